@@ -194,7 +194,7 @@ fn a_damaged_scan_is_skipped_and_counted() {
     let exported = export(run.out(), &path, &[]);
     exported.succeeded();
     // A few rows of the recording are not measured, as in real ones.
-    let says = exported.stderr.contains("rows were interpolated");
+    let says = exported.stderr.contains("interpolated rows: ");
     assert!(says, "{}", exported.stderr);
     let bytes = fs::read(&path).unwrap();
     // Zstandard's signature begins the content of each chunk; the fifth one has scans.

@@ -170,7 +170,7 @@ fn another_machine_sees_all_poses_of_a_run_from_its_beginning() {
 
 #[test]
 fn a_sender_that_begins_again_is_gone_on_with() {
-    let run = Run::of_recording().rate("1");
+    let run = Run::of_recording().rate("0.4");
     let mut running = run.start();
     running.await_poses(3);
     let link = Link::new();
@@ -193,7 +193,7 @@ fn a_sender_that_begins_again_is_gone_on_with() {
 
 #[test]
 fn another_drive_is_not_put_behind_the_one_that_was_received() {
-    let run = Run::of_recording().rate("1");
+    let run = Run::of_recording().rate("0.4");
     let mut running = run.start();
     running.await_poses(3);
     let link = Link::new();
@@ -205,7 +205,7 @@ fn another_drive_is_not_put_behind_the_one_that_was_received() {
     first.wait().unwrap();
     running.kill_supervisor();
     let other = recording::linked(recording::small(), |scan| scan > 3);
-    let later = Run::small().data(other.path()).rate("1");
+    let later = Run::small().data(other.path()).rate("0.4");
     let mut running = later.start();
     running.await_poses(3);
     let mut second = link.end("send", later.out()).spawn().unwrap();
@@ -220,7 +220,7 @@ fn another_drive_is_not_put_behind_the_one_that_was_received() {
 fn nobody_connects_without_a_certificate_of_the_authority() {
     let ours = Certificates::of("127.0.0.1", "127.0.0.1");
     let theirs = Certificates::of("127.0.0.1", "127.0.0.1");
-    let run = Run::of_recording().rate("0.5");
+    let run = Run::of_recording().rate("0.2");
     let mut running = run.start();
     running.await_poses(2);
     let link = Link::with_tls();
@@ -248,7 +248,7 @@ fn nobody_connects_without_a_certificate_of_the_authority() {
     stranger.kill().unwrap();
     stranger.wait().unwrap();
     let mut good = sends(&ours);
-    let said = receives(&ours, "10");
+    let said = receives(&ours, "20");
     assert!(seen(&said), "{said}");
     good.kill().unwrap();
     good.wait().unwrap();
@@ -287,7 +287,7 @@ impl Link {
     }
 
     fn start(&self, end: &str, out: &Path) -> thread::JoinHandle<Ended> {
-        let command = self.end(end, out);
+        let command = wrapped(&["timeout", "120"], &self.end(end, out));
         thread::spawn(move || Ended::of(command))
     }
 }

@@ -144,7 +144,6 @@ impl Base<'_> {
     /// Waits until the robot knows that all of the run is here, without which it would wait for that.
     fn say_farewell(&self, end: &Item, coming: &[Coming]) {
         let next = end.seq.saturating_add(1);
-        self.confirm(Some(end), coming);
         let since = Instant::now();
         let is_confirmed = |topic: &Coming| topic.fetcher.is_confirmed(next);
         while !coming.iter().all(is_confirmed) {
@@ -154,6 +153,7 @@ impl Base<'_> {
                 );
                 return;
             }
+            self.confirm(Some(end), coming);
             thread::sleep(LOOK);
         }
         thread::sleep(LAST_ANSWERS);

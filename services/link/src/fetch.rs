@@ -118,10 +118,15 @@ impl Fetcher {
         self.state.answered.load(Ordering::Relaxed) >= next
     }
 
-    /// Tells the other side that nothing more is wanted, if it can be reached.
-    pub fn leave(mut self) {
+    /// Has the other side told that nothing more is wanted, if it can be reached.
+    pub fn begin_to_leave(&self) {
         self.state.leaves.store(true, Ordering::Relaxed);
         self.state.stop.store(true, Ordering::Relaxed);
+    }
+
+    /// Tells the other side that nothing more is wanted, and waits until it knows or cannot be reached.
+    pub fn leave(mut self) {
+        self.begin_to_leave();
         if let Some(thread) = self.thread.take() {
             // It does not panic.
             let _ = thread.join();
@@ -189,6 +194,8 @@ impl Asking {
 
     /// Asks once, and takes the answers until they end; returns whether there were any.
     fn ask(&mut self) -> bool {
+        // Before the number is read: what is confirmed after that is asked for again.
+        self.state.again.store(false, Ordering::Relaxed);
         let confirmed = self.state.confirmed.load(Ordering::Relaxed);
         self.request.from = self.request.from.max(confirmed);
         let Request {
@@ -211,7 +218,6 @@ impl Asking {
         };
         let mut was_answered = false;
         self.state.asked.store(*from, Ordering::Relaxed);
-        self.state.again.store(false, Ordering::Relaxed);
         let mut heard = Instant::now();
         loop {
             match replies.recv_timeout(LOOK) {

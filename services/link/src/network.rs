@@ -68,7 +68,7 @@ pub enum NetworkError {
     },
     /// A host for which a public authority might sign a certificate of somebody else.
     #[error(
-        "{0} has a public name or address, for which others may have a certificate that is believed: connect to a private address, or to a name within `.internal` (in /etc/hosts, and in the certificate)"
+        "{0} has a public name or address, for which others can obtain a publicly trusted certificate: connect to a private address, or to a name within `.internal` (in /etc/hosts, and in the certificate)"
     )]
     Public(String),
     /// A name that cannot be part of a key.

@@ -2,8 +2,8 @@
 
 use std::{
     collections::BTreeMap,
-    fmt,
-    hash::{DefaultHasher, Hash, Hasher},
+    fmt, fs,
+    io::ErrorKind,
     path::{Path, PathBuf},
     time::Duration,
 };
@@ -184,7 +184,7 @@ pub fn receive(
     let mut mirror = Mirror {
         session: session.clone(),
         link: options.network.name.clone(),
-        receiver: receiver(&options.out),
+        receiver: receiver(&options.out, &session)?,
         topics: Vec::new(),
         journal,
         next_pose,
@@ -199,6 +199,9 @@ pub fn receive(
         }
     }
     let received = mirror.run();
+    // All at once: each may wait for a sender that does not answer.
+    let topics = mirror.topics.iter();
+    topics.for_each(|topic| topic.fetcher.begin_to_leave());
     mirror
         .topics
         .into_iter()
@@ -207,17 +210,23 @@ pub fn receive(
     received
 }
 
-/// Returns what tells this receiver from others: its folder on its machine.
-fn receiver(out: &Path) -> String {
-    let mut hasher = DefaultHasher::new();
-    rustix::system::uname()
-        .nodename()
-        .to_bytes()
-        .hash(&mut hasher);
-    out.canonicalize()
-        .unwrap_or_else(|_| out.to_owned())
-        .hash(&mut hasher);
-    format!("{:016x}", hasher.finish())
+/// Returns what tells this receiver from others, and is the same when it begins again: the name of the first session that has written to the
+/// folder.
+fn receiver(out: &Path, session: &Session) -> Result<String, LinkError> {
+    let path = out.join("journal/receiver");
+    let failed = |source| LinkError::File {
+        path: path.clone(),
+        source,
+    };
+    match fs::read_to_string(&path) {
+        Ok(name) if !name.is_empty() && name.chars().all(|c| c.is_ascii_hexdigit()) => Ok(name),
+        Err(error) if error.kind() != ErrorKind::NotFound => Err(failed(error)),
+        _ => {
+            let name = session.zid().to_string();
+            fs::write(&path, &name).map_err(failed)?;
+            Ok(name)
+        }
+    }
 }
 
 /// Returns the number of the first pose that is not in the journal, which is of this drive or empty.
@@ -332,15 +341,34 @@ impl Mirror<'_> {
                 self.greeting.live,
                 self.greeting.refines,
             );
-        let goes_on = self.next_pose == 0 || other.began_ns == began_ns(&self.rig.manifest().out)?;
+        other.topics.iter().try_for_each(require_same)?;
+        let began_ns = match self.next_pose {
+            0 => self.greeting.began_ns,
+            _ => began_ns(&self.rig.manifest().out)?,
+        };
+        // Without a pose of the earlier drive nothing of it may be there.
+        let goes_on = match began_ns {
+            Some(_) => other.began_ns == began_ns,
+            None => self.topics.iter().all(|topic| topic.next.is_none()),
+        };
         if !is_same || !goes_on {
             return Err(LinkError::Refused(
                 "the sender is at another drive now: what came of this one is whole up to here; receive the other one into another folder".to_owned(),
             ));
         }
+        let is_sent = |topic: &Topic| other.topics.iter().any(|it| it.name == topic.name);
+        if let Some(topic) = self.topics.iter().find(|topic| !is_sent(topic)) {
+            return Err(LinkError::Refused(format!(
+                "the sender has begun again and does not send `{}` any more: give it the same --topics",
+                topic.name
+            )));
+        }
         self.greeting = other;
         for place in 0..self.topics.len() {
             let topic = &self.topics[place];
+            if topic.fetcher.has_ended() {
+                continue;
+            }
             let from = match topic.name {
                 Pose::TOPIC => self.next_pose,
                 _ => topic.next.unwrap_or_default(),
@@ -369,7 +397,9 @@ impl Mirror<'_> {
             if have_ended {
                 return Ok(self.received(false));
             }
-            let is_connected = self.topics.iter().any(|topic| topic.fetcher.is_connected());
+            let is_live =
+                |topic: &Topic| topic.fetcher.is_connected() && !topic.fetcher.has_ended();
+            let is_connected = self.topics.iter().any(is_live);
             status.update(is_connected, self.next_pose);
             match is_connected {
                 true => self.question = None,

@@ -38,6 +38,8 @@ const NAME: &str = "link";
 const DEFAULT: [&str; 6] = ["motion", "refined", "pose", "loop", "correction", "fix"];
 /// Bytes that are kept of a topic without payloads: hours.
 const KEPT_BYTES: usize = 64 << 20;
+/// Time in which a receiver comes back whose sender has begun again just before the end.
+const RECONNECTS: Duration = Duration::from_secs(6);
 /// Scans that are kept. With one more the newest would come later.
 const KEPT_SCANS: usize = 2;
 
@@ -195,11 +197,12 @@ impl<'run> Sending<'run> {
                 self.topics.iter().try_for_each(|topic| topic.kept.end())?;
             }
             if let Some(ended) = ended {
-                let is_complete = self.is_complete();
+                let is_expected = ended.elapsed() < RECONNECTS && !self.has_receivers();
+                let is_complete = self.is_complete() && !is_expected;
                 if is_complete || ended.elapsed() > linger {
                     // The last answer is on its way.
                     signals.sleep(MAX_WAIT)?;
-                    return Ok(self.sent(is_complete));
+                    return Ok(self.sent(self.is_complete()));
                 }
             }
             let listeners: Vec<_> = self
@@ -215,6 +218,10 @@ impl<'run> Sending<'run> {
                 return Ok(self.sent(self.is_complete()));
             }
         }
+    }
+
+    fn has_receivers(&self) -> bool {
+        self.topics.iter().any(|topic| topic.offer.has_receivers())
     }
 
     /// Returns whether all receivers have everything, or want no more.

@@ -127,6 +127,11 @@ impl Offer {
         (read(&self.messages), read(&self.bytes))
     }
 
+    /// Returns whether anybody has asked.
+    pub fn has_receivers(&self) -> bool {
+        !self.receivers().is_empty()
+    }
+
     /// Returns whether all receivers have said that they want no more. That an answer was sent does not tell that it has arrived.
     pub fn is_done(&self) -> bool {
         self.receivers().values().all(|asking| asking.is_done)

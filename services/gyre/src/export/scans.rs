@@ -100,7 +100,7 @@ impl Losses {
         if self.interpolated > 0 {
             let rows = self.interpolated;
             sentences.push(format!(
-                "{rows} rows were interpolated, not measured: Navtech's messages have no such azimuths, and who reads the bag finds them missing"
+                "interpolated rows: {rows}. Navtech's messages cannot carry them; a run on the bag finds them missing"
             ));
         }
         if self.retimed > 0 {
@@ -320,7 +320,7 @@ mod tests {
         };
         let mut interpolated = scan();
         interpolated.flags[4] = 0;
-        only(&interpolated, 0.0, "1 rows were interpolated");
+        only(&interpolated, 0.0, "interpolated rows: 1");
         // A row without powers has nothing to lose.
         interpolated.bytes[8..10].fill(0);
         assert_eq!(sentences(&interpolated, 0.0), [""; 0]);
