@@ -11,7 +11,7 @@ use tempfile::TempDir;
 
 use crate::{
     common::{Ended, Run, gyre, odometry, python, real_data, recording},
-    ros2::with_constants,
+    ros2_driver::with_constants,
 };
 
 fn export(source: &Path, bag: &Path, arguments: &[&str]) -> Ended {

@@ -3,7 +3,7 @@
 use std::{
     net::TcpListener,
     path::{Path, PathBuf},
-    process::{self, Command},
+    process::{self, Child, Command},
     thread,
     time::{Duration, Instant},
 };
@@ -174,12 +174,7 @@ fn a_sender_that_begins_again_is_gone_on_with() {
     let mut running = run.start();
     running.await_poses(3);
     let link = Link::new();
-    let seen = run.folder().join("seen");
-    let mut first = link.end("send", run.out()).spawn().unwrap();
-    let receiving = link.start("receive", &seen);
-    await_poses(&seen);
-    first.kill().unwrap();
-    first.wait().unwrap();
+    let receiving = link.lose_sender(&run);
     let second = link.start("send", run.out());
     running.finish().succeeded();
     let received = receiving.join().unwrap();
@@ -197,12 +192,7 @@ fn another_drive_is_not_put_behind_the_one_that_was_received() {
     let mut running = run.start();
     running.await_poses(3);
     let link = Link::new();
-    let seen = run.folder().join("seen");
-    let mut first = link.end("send", run.out()).spawn().unwrap();
-    let receiving = link.start("receive", &seen);
-    await_poses(&seen);
-    first.kill().unwrap();
-    first.wait().unwrap();
+    let receiving = link.lose_sender(&run);
     running.kill_supervisor();
     let other = recording::linked(recording::small(), |scan| scan > 3);
     let later = Run::small().data(other.path()).rate("0.4");
@@ -211,8 +201,7 @@ fn another_drive_is_not_put_behind_the_one_that_was_received() {
     let mut second = link.end("send", later.out()).spawn().unwrap();
     let received = receiving.join().unwrap();
     received.failed_with(&["the sender is at another drive now"]);
-    second.kill().unwrap();
-    second.wait().unwrap();
+    end(&mut second);
     running.finish().succeeded();
 }
 
@@ -240,18 +229,15 @@ fn nobody_connects_without_a_certificate_of_the_authority() {
     let seen = |said: &str| said.contains("is here as");
     let said = receives(&theirs, "4");
     assert!(!seen(&said), "a stranger has received: {said}");
-    good.kill().unwrap();
-    good.wait().unwrap();
+    end(&mut good);
     let mut stranger = sends(&theirs);
     let said = receives(&ours, "4");
     assert!(!seen(&said), "a stranger has sent: {said}");
-    stranger.kill().unwrap();
-    stranger.wait().unwrap();
+    end(&mut stranger);
     let mut good = sends(&ours);
     let said = receives(&ours, "20");
     assert!(seen(&said), "{said}");
-    good.kill().unwrap();
-    good.wait().unwrap();
+    end(&mut good);
     running.kill_supervisor();
 }
 
@@ -286,10 +272,25 @@ impl Link {
         command
     }
 
+    /// Starts a receiver of a run, whose sender is killed when poses have come.
+    fn lose_sender(&self, run: &Run) -> thread::JoinHandle<Ended> {
+        let seen = run.folder().join("seen");
+        let mut sender = self.end("send", run.out()).spawn().unwrap();
+        let receiving = self.start("receive", &seen);
+        await_poses(&seen);
+        end(&mut sender);
+        receiving
+    }
+
     fn start(&self, end: &str, out: &Path) -> thread::JoinHandle<Ended> {
         let command = wrapped(&["timeout", "120"], &self.end(end, out));
         thread::spawn(move || Ended::of(command))
     }
+}
+
+fn end(process: &mut Child) {
+    process.kill().unwrap();
+    process.wait().unwrap();
 }
 
 /// The number of poses in a folder, with the end.

@@ -43,6 +43,7 @@ mod resources;
 mod restart;
 mod results;
 mod ros2;
+mod ros2_driver;
 mod shadow;
 mod shared_memory;
 mod simulation;

@@ -1,5 +1,5 @@
-//! ROS 2 without ROS 2: what a peer that is not Gyre's own (Cyclone DDS) receives of a run, and a run that receives a radar from it. All on
-//! the loopback, each test in a domain of its own.
+//! ROS 2 without ROS 2: what a peer that is not Gyre's own (Cyclone DDS) receives of a run. All on the loopback, each test in a domain of its own,
+//! with those of [`ros2_driver`](crate::ros2_driver).
 
 use std::{
     collections::BTreeMap,
@@ -19,13 +19,9 @@ use crate::common::{Ended, Run, gyre, odometry, python, recording};
 const UNKNOWN: f64 = 1e6;
 /// Where x, y and yaw are among the values of ROS.
 const PLANAR: [usize; 3] = [0, 1, 5];
-/// The topic of a driver's azimuths.
-const FFT_DATA: &str = "/radar_data/fft_data";
-/// The topic of a driver's turns.
-const B_SCANS: &str = "/radar_data/b_scan_msg";
 
 /// Returns whether the peer can be started; prints why a test is skipped.
-fn can_speak() -> bool {
+pub(crate) fn can_speak() -> bool {
     let can = Command::new(python())
         .args(["-c", "import cyclonedds"])
         .output()
@@ -40,12 +36,12 @@ fn can_speak() -> bool {
 }
 
 /// A domain that only this test of this process uses. Those above 101 share their ports with other programs.
-fn domain(test: u32) -> String {
+pub(crate) fn domain(test: u32) -> String {
     (1 + (process::id() % 11) * 9 + test).to_string()
 }
 
 /// A program that says lines. Dropped, it is killed.
-struct Program {
+pub(crate) struct Program {
     child: Child,
     said: Lines<BufReader<ChildStdout>>,
 }
@@ -62,7 +58,7 @@ impl Program {
     }
 
     /// A peer in Python.
-    fn peer(script: &str, arguments: &[&str]) -> Self {
+    pub(crate) fn peer(script: &str, arguments: &[&str]) -> Self {
         let scripts = Path::new(crate::PROJECT).join("tests/ros2");
         Self::start(
             Command::new(python())
@@ -518,133 +514,4 @@ fn a_filter_can_have_its_own_transforms_and_is_told_which_velocities_are_predict
     assert_odometry(&topics["/odom"], &run);
     assert!(!topics.contains_key("/tf"), "{:?}", topics["/tf"]);
     assert_eq!(transforms(&topics["/tf_static"])[0].1, "base_link -> radar");
-}
-
-/// A radar of a recording, behind a driver in ROS 2.
-struct Driver {
-    server: Child,
-    _driver: Program,
-}
-
-impl Driver {
-    fn playing(recording: &Path, domain: &str, publishes: &str, options: &[&str]) -> Self {
-        let mut command = gyre();
-        command.args(["radar-server", "--listen", "127.0.0.1:0", "--data"]);
-        let mut server = command
-            .arg(recording)
-            .args(options)
-            .stderr(Stdio::piped())
-            .stdout(Stdio::null())
-            .spawn()
-            .unwrap();
-        let mut said = String::new();
-        BufReader::new(server.stderr.take().unwrap())
-            .read_line(&mut said)
-            .unwrap();
-        let address = said.trim().rsplit(' ').next().unwrap();
-        let driver = Program::peer("driver.py", &[domain, address, publishes]);
-        Self {
-            server,
-            _driver: driver,
-        }
-    }
-}
-
-impl Drop for Driver {
-    fn drop(&mut self) {
-        let _ = self.server.kill();
-        let _ = self.server.wait();
-    }
-}
-
-/// A run that receives so many scans from a topic in a domain.
-fn receiving(run: Run, domain: &str, topic: &str, scans: usize) -> Run {
-    run.argument("--ros2", topic)
-        .set(&format!("source.domain={domain}"))
-        .set("source.interface='127.0.0.1'")
-        .set(&format!("source.scans={scans}"))
-}
-
-/// The constants that the small recording has in its `dataset.toml`.
-pub(crate) fn with_constants(run: Run) -> Run {
-    let settings = std::fs::read_to_string(recording::small().join("dataset.toml")).unwrap();
-    let settings: toml::Table = settings.parse().unwrap();
-    let known = settings.iter().filter(|(key, _)| *key != "format");
-    known.fold(run, |run, (key, value)| {
-        run.set(&format!("dataset.{key}={value}"))
-    })
-}
-
-#[test]
-fn a_radar_behind_its_driver_gives_the_motions_of_the_recording() {
-    assert_motions_of_the_recording("configured", FFT_DATA, domain(2));
-}
-
-#[test]
-fn a_driver_of_before_2024_gives_the_motions_of_the_recording() {
-    assert_motions_of_the_recording("older", FFT_DATA, domain(5));
-}
-
-#[test]
-fn the_turns_of_a_driver_give_the_motions_of_the_recording() {
-    assert_motions_of_the_recording("turns", B_SCANS, domain(6));
-}
-
-fn assert_motions_of_the_recording(publishes: &str, topic: &str, domain: String) {
-    if !can_speak() {
-        return;
-    }
-    let scans = recording::SCANS / 2;
-    let whole = recording::copy(scans);
-    for image in recording::images(whole.path()) {
-        recording::complete(&image);
-    }
-    let recorded = Run::small().data(whole.path()).complete();
-    let _driver = Driver::playing(whole.path(), &domain, publishes, &[]);
-    let run = receiving(with_constants(Run::small()), &domain, topic, scans);
-    let live = run.complete();
-    let source = &run.summary()["stages"]["radar-replay"];
-    for lost in [
-        "missing_azimuths",
-        "damaged_messages",
-        "scans_left_out",
-        "reconnections",
-    ] {
-        assert_eq!(source[lost], 0, "{lost}");
-    }
-    assert_eq!(run.summary()["dropped"], 0);
-    assert!(live == recorded, "{live}\n{recorded}");
-}
-
-#[test]
-fn the_azimuths_of_a_driver_that_publishes_no_configuration_tell_it() {
-    assert_configuration_is_found("silent", FFT_DATA, domain(3));
-}
-
-#[test]
-fn the_turns_of_a_driver_that_publishes_no_configuration_tell_it() {
-    assert_configuration_is_found("silent-turns", B_SCANS, domain(8));
-}
-
-fn assert_configuration_is_found(publishes: &str, topic: &str, domain: String) {
-    if !can_speak() {
-        return;
-    }
-    let _driver = Driver::playing(recording::small(), &domain, publishes, &["--repeat"]);
-    let run = receiving(with_constants(Run::small()), &domain, topic, 6);
-    let motions = odometry::rows(&run.complete());
-    assert_eq!(motions.len(), 5);
-    odometry::assert_unbroken(&motions);
-    let log = run.result("log.jsonl");
-    assert!(log.contains("it was found from azimuths"), "{log}");
-}
-
-#[test]
-fn a_topic_that_nobody_publishes_is_named() {
-    let run = receiving(Run::small(), &domain(4), FFT_DATA, 4);
-    let ended = run.finish();
-    ended.refused_with(&[
-        "nobody publishes /radar_data/fft_data in domain",
-        "ROS_DOMAIN_ID",
-    ]);
 }

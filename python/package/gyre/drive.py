@@ -30,7 +30,7 @@ def row(scan: gyre.Scan, registered: gyre.Registered) -> str:
 
 
 class Drive:
-    """Registers scans, closes loops if `slam.kind` says so, and writes the results into the folder `out`, for those of an earlier call."""
+    """Registers scans, closes loops if `slam.kind` says so, and writes the results into the folder `out` in place of those of an earlier call."""
 
     def __init__(self, config: gyre.Config, out: Path, truth: gyre.Trajectory | None, visualize: bool) -> None:
         if (out / "journal").exists():

@@ -4,14 +4,13 @@ mod read;
 
 use std::path::{Path, PathBuf};
 
+use gyre_stage::run::COMPLETE;
 use serde::{Deserialize, Serialize};
 
 use crate::{BatchError, Drive, Outcome};
 
 /// The version of the file. It is raised when a key changes its meaning or goes.
 const VERSION: u32 = 1;
-/// The file that a run leaves among its results when it has them all.
-const COMPLETE: &str = "journal/complete";
 
 /// What the drives of a batch have in common.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

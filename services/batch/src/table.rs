@@ -49,16 +49,14 @@ pub fn collect(list: &List, settings: &Settings, out: &Path) -> Result<Table, Ba
 
 fn row(drive: &Drive, settings: &Settings, out: &Path) -> Result<Row, BatchError> {
     Ok(match Row::read(out, drive) {
-        Ok(Some(row)) if row.is_of(drive, settings) => {
-            match row.outcome.has_results() && !row.has_its_results(out) {
-                true => Row::not_run(
-                    drive,
-                    settings,
-                    "its results are being computed anew, or were removed",
-                ),
-                false => row,
-            }
-        }
+        Ok(Some(row)) if row.is_of(drive, settings) => match row.outcome.has_results() {
+            true if !row.has_its_results(out) => Row::not_run(
+                drive,
+                settings,
+                "its results are being computed anew, or were removed",
+            ),
+            _ => row,
+        },
         Ok(Some(_)) => Row::not_run(drive, settings, "it was computed with other settings"),
         Ok(None) => Row::not_run(drive, settings, "it has not been computed yet"),
         Err(error @ BatchError::Unknown { .. }) => {

@@ -13,6 +13,7 @@ use gyre_pose_integration::{
 use gyre_refinement::checkpoint::{self, Checkpoint, CheckpointError};
 use gyre_scan_matching::Refiner;
 use gyre_slam::{Keyframe, Place, Query, RecordReader, records_path};
+use gyre_stage::run::COMPLETE;
 use gyre_storage::{self as storage, GroupSync, LogError};
 
 use crate::{
@@ -23,8 +24,6 @@ use crate::{
     print, results,
 };
 
-/// Says that the journal has its end and that all results have been written from it: the next run starts anew.
-const COMPLETE: &str = "journal/complete";
 const CONFIGURATION: &str = "config.toml";
 const LOGS: [&str; 2] = ["log.jsonl", "log.jsonl.old"];
 

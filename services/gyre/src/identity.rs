@@ -7,6 +7,7 @@ use std::{
 };
 
 use gyre_radar::{DatasetOptions, Fingerprint};
+use gyre_stage::run::BEGUN_WITH;
 use gyre_storage as storage;
 use serde::{Deserialize, Serialize};
 
@@ -19,8 +20,6 @@ use crate::{
     run::with_stored_options,
 };
 
-/// The file, in the folder of the results.
-const FILE: &str = "journal/run.toml";
 const HEAD: &str = "# What the run was begun with, which the same command compares before it resumes the run.\n# CRC-32 of the rest: ";
 
 /// What a run was begun with.
@@ -113,7 +112,7 @@ impl Identity {
         let text = toml::to_string_pretty(self)?;
         let checksum = checksum(&text);
         Ok(storage::write(
-            &out.join(FILE),
+            &out.join(BEGUN_WITH),
             format!("{HEAD}{checksum}\n{text}"),
         )?)
     }
@@ -124,7 +123,7 @@ impl Identity {
     /// One sentence that says what is wrong with the file. It is written as a whole before the first pose, so the run did not
     /// leave it like that.
     pub fn read(out: &Out, poses: u64) -> Result<Self, Failure> {
-        let path = out.join(FILE);
+        let path = out.join(BEGUN_WITH);
         Self::read_file(&path).map_err(|state| {
             format!(
                 "{} {state}: it says what the {poses} poses in the journal beside it were computed from, so the run cannot be resumed \

@@ -13,7 +13,7 @@ use std::{
 };
 
 use gyre_geometry::Pose;
-use gyre_mapping::{MapOptions, Origin, write_geotiff, write_pgm, write_web_tiles};
+use gyre_mapping::{Evidence, MapOptions, Origin, write_geotiff, write_pgm, write_web_tiles};
 use gyre_radar::{Trajectory, ground_truth::read_trajectory};
 use gyre_slam::{Keyframe, RecordReader, records_path};
 
@@ -81,16 +81,22 @@ fn draw_run(arguments: &MapArguments) -> Result<Drawing, Failure> {
     Ok(drawing)
 }
 
-/// Draws the keyframes of a run along its trajectory. What does not fit into memory lies in a file in `folder`, which has no name.
+/// Draws the keyframes of a run along its trajectory, in the frame in which the frame of the trajectory has the pose `placed`. What does not fit
+/// into memory lies in a file in `folder`, which has no name.
 ///
 /// # Errors
 /// A run without keyframes or without a trajectory.
-pub fn drawn(run: &Path, folder: &Path) -> Result<Drawing, Failure> {
+pub fn evidence(run: &Path, folder: &Path, placed: &Pose) -> Result<Evidence, Failure> {
     let mut keyframes = open(run)?;
     let poses = read_trajectory(&trajectory_of(run))?;
-    let mut drawing = Drawing::new(&options(&configuration(run)?), folder)?;
-    draw(&mut keyframes, &poses, &[], &mut drawing)?;
-    Ok(drawing)
+    let mut evidence = Evidence::new(&options(&configuration(run)?), folder)?;
+    for index in 0..keyframes.len() {
+        let keyframe = keyframes.read(index)?;
+        if let Some(pose) = poses.near(keyframe.stamp_ns, Trajectory::ROUNDING_NS) {
+            evidence.draw(&keyframe, &(placed * pose))?;
+        }
+    }
+    Ok(evidence)
 }
 
 /// Returns the trajectory of a run: the corrected one, if it has one.

@@ -3,7 +3,7 @@
 use std::{fs, path::Path, thread, time::Duration};
 
 use gyre_messages::{Limits, topic};
-use gyre_stage::Manifest;
+use gyre_stage::{Manifest, run::BEGUN_WITH};
 use serde::{Deserialize, Serialize};
 use zenoh::{Session, Wait};
 
@@ -194,7 +194,7 @@ impl Agreement {
 
 /// Returns what tells the recording that a run plays from another one; `None` of a radar, and on the base.
 fn drive(out: &Path) -> Option<String> {
-    let text = fs::read_to_string(out.join("journal/run.toml")).ok()?;
+    let text = fs::read_to_string(out.join(BEGUN_WITH)).ok()?;
     let begun: toml::Table = text.parse().ok()?;
     Some(begun.get("recording")?.get("sha256")?.as_str()?.to_owned())
 }

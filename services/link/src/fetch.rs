@@ -45,7 +45,7 @@ pub(crate) struct Fetcher {
 
 struct State {
     stop: AtomicBool,
-    /// Whether the sender is told so when this stops.
+    /// Whether to say to the sender, at the stop, that nothing more is wanted.
     leaves: AtomicBool,
     again: AtomicBool,
     is_connected: AtomicBool,

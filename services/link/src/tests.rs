@@ -15,7 +15,7 @@ use zenoh::{Session, Wait, qos::Priority};
 use crate::{
     Network,
     fetch::{Fetcher, Request},
-    serve::Server,
+    serve::{Offer, Server},
     tape::{Message, Motions, Next, PoseLog, Poses, Ring, Tape},
     wake::Sleeper,
 };
@@ -158,39 +158,57 @@ fn a_receiver_goes_on_where_it_was_when_the_sender_comes_back() {
     }
 }
 
+/// A sender of a topic, and a receiver that has its first message.
+struct Ends {
+    ring: Arc<Ring>,
+    offer: Arc<Offer>,
+    fetcher: Fetcher,
+    there: Session,
+    _sleeper: Sleeper,
+    _server: Server,
+    _here: Session,
+}
+
+impl Ends {
+    fn new() -> Self {
+        let address = endpoint();
+        let here = open(listening(&address));
+        let there = open(connecting(&address));
+        let ring = Arc::new(Ring::of(100));
+        ring.push(message(0));
+        let mut server = Server::new(&here, "gyre/test", None);
+        let offer = server.offer("topic", ring.clone()).unwrap();
+        let (fetcher, sleeper) = fetcher(&there, 0);
+        assert_eq!(take(&fetcher, 1), [0]);
+        assert!(!offer.is_done());
+        Self {
+            ring,
+            offer,
+            fetcher,
+            there,
+            _sleeper: sleeper,
+            _server: server,
+            _here: here,
+        }
+    }
+}
+
 #[test]
 fn an_end_that_has_not_arrived_is_not_taken_for_known() {
-    let address = endpoint();
-    let here = open(listening(&address));
-    let there = open(connecting(&address));
-    let ring = Arc::new(Ring::of(100));
-    ring.push(message(0));
-    let mut server = Server::new(&here, "gyre/test", None);
-    let offer = server.offer("topic", ring.clone()).unwrap();
-    let (fetcher, _sleeper) = fetcher(&there, 0);
-    assert_eq!(take(&fetcher, 1), [0]);
+    let ends = Ends::new();
     // The receiver dies: the end is sent to nobody.
-    drop(fetcher);
-    there.close().wait().unwrap();
-    ring.end();
+    drop(ends.fetcher);
+    ends.there.close().wait().unwrap();
+    ends.ring.end();
     thread::sleep(Duration::from_secs(1));
-    assert!(!offer.is_done());
+    assert!(!ends.offer.is_done());
 }
 
 #[test]
 fn a_receiver_that_leaves_is_not_waited_for() {
-    let address = endpoint();
-    let here = open(listening(&address));
-    let there = open(connecting(&address));
-    let ring = Arc::new(Ring::of(100));
-    ring.push(message(0));
-    let mut server = Server::new(&here, "gyre/test", None);
-    let offer = server.offer("topic", ring).unwrap();
-    let (fetcher, _sleeper) = fetcher(&there, 0);
-    assert_eq!(take(&fetcher, 1), [0]);
-    assert!(!offer.is_done());
-    fetcher.leave();
-    assert!(offer.is_done());
+    let ends = Ends::new();
+    ends.fetcher.leave();
+    assert!(ends.offer.is_done());
 }
 
 #[test]

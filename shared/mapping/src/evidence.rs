@@ -108,11 +108,6 @@ impl Evidence {
         })
     }
 
-    /// Returns the pose in the map frame at which a keyframe is drawn.
-    pub fn pose(&self, seq: u64) -> Option<&Pose> {
-        self.drawn.get(&seq)
-    }
-
     /// Draws a keyframe at `pose` in the map frame. If it is drawn already, it is taken out there first.
     ///
     /// # Errors

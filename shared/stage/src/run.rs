@@ -29,6 +29,11 @@ pub(crate) use root::{close_to_others, is_alive, own_files, roots, shared_memory
 /// The environment variable with the path of the run's root.
 pub const ENVIRONMENT: &str = "GYRE_RUN";
 
+/// The file in the folder of the results that says what the run was begun with, TOML.
+pub const BEGUN_WITH: &str = "journal/run.toml";
+/// The file there that a run leaves when it has all its results. The next run begins anew.
+pub const COMPLETE: &str = "journal/complete";
+
 /// The environment variable of a process that stands by for another one. When it has loaded what it needs it creates the file
 /// `NAME.ready` in the run's root, and it opens its topics when its standard input ends.
 pub const STANDBY: &str = "GYRE_STANDBY";

@@ -4,13 +4,12 @@ use std::{iter, path::Path, path::PathBuf};
 
 use gyre_bags::{BagWriter, Kept};
 use gyre_geometry::Pose;
-use gyre_mapping::{Evidence, grid};
+use gyre_mapping::grid;
 use gyre_messages::{Correction, CorrectionHeader, Message, Pose as PoseTopic, PoseHeader};
 use gyre_pose_integration::journal;
 use gyre_radar::{Dataset, DatasetOptions, Trajectory, ground_truth::read_trajectory};
 use gyre_recording::Recording;
 use gyre_ros2_messages::{Mounting, frames::Frames, nav_msgs::OccupancyGrid};
-use gyre_slam::{Keyframe, RecordReader};
 
 use super::places::Place;
 use crate::{Failure, configuration::Configuration, map, preflight, print};
@@ -148,17 +147,15 @@ impl Source {
             return Ok(());
         }
         let aside = tempfile::tempdir()?;
-        let mut drawing = match map::drawn(&self.path, aside.path()) {
-            Ok(drawing) => drawing,
+        // Along the axes of the vehicle: Nav2 ignores the rotation of a grid.
+        let mut evidence = match map::evidence(&self.path, aside.path(), mounting.radar()) {
+            Ok(evidence) => evidence,
             Err(reason) => {
                 print::note(format_args!("the bag has no map: {reason}"));
                 return Ok(());
             }
         };
-        let placed = *mounting.radar() * drawing.first_pose();
-        let evidence = drawing.evidence();
-        place(&self.path, evidence, &placed)?;
-        let grid: OccupancyGrid = grid(evidence, stamp_ns, &frames.map)?;
+        let grid: OccupancyGrid = grid(&mut evidence, stamp_ns, &frames.map)?;
         let topic = bag.topic("/map", Kept::ForLater)?;
         bag.write(&topic, stamp_ns, &grid)?;
         Ok(())
@@ -179,21 +176,6 @@ impl Scans {
             is_corrected: false,
         }
     }
-}
-
-/// Draws the keyframes of a run anew, in the frame in which that of their map has the pose `placed`: Nav2 ignores the rotation of a grid.
-fn place(run: &Path, evidence: &mut Evidence, placed: &Pose) -> Result<(), Failure> {
-    if *placed == Pose::identity() {
-        return Ok(());
-    }
-    let mut keyframes: RecordReader<Keyframe> = RecordReader::open(run)?;
-    for index in 0..keyframes.len() {
-        let keyframe = keyframes.read(index)?;
-        if let Some(pose) = evidence.pose(keyframe.seq).copied() {
-            evidence.draw(&keyframe, &(placed * pose))?;
-        }
-    }
-    Ok(())
 }
 
 /// Adds the pose of the odometry frame in the map frame, if the corrected trajectory has the pose.

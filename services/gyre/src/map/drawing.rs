@@ -74,11 +74,6 @@ impl Drawing {
         &mut self.evidence
     }
 
-    /// Returns the pose of the map's frame in the frame that poses are given in.
-    pub fn first_pose(&self) -> Pose {
-        self.first.map_or(Pose::identity(), |first| first.pose)
-    }
-
     /// Returns the number of keyframes.
     pub fn keyframes(&self) -> usize {
         self.odometry.len()
