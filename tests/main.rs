@@ -44,6 +44,7 @@ mod restart;
 mod results;
 mod ros2;
 mod ros2_driver;
+mod scheduling;
 mod shadow;
 mod shared_memory;
 mod simulation;

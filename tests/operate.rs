@@ -1,4 +1,4 @@
-//! Running runs from the command line: up, ps, logs, top, restart, down; what systemd is notified of; priorities.
+//! Running runs from the command line: up, ps, logs, top, restart, down; what systemd is notified of.
 
 use std::{
     fs,
@@ -332,47 +332,4 @@ fn systemd_is_notified_when_a_run_is_ready_alive_and_stopping() {
     assert!(position("WATCHDOG=1") < position("STOPPING=1"), "{all:?}");
     let alive = all.iter().filter(|it| it.contains("WATCHDOG=1")).count();
     assert!(alive >= 3, "{all:?}");
-}
-
-/// The niceness of a process and the processors that it may use.
-fn scheduling(pid: Pid) -> (i32, String) {
-    let stat = fs::read_to_string(format!("/proc/{pid}/stat")).unwrap();
-    let nice = stat
-        .rsplit_once(") ")
-        .unwrap()
-        .1
-        .split(' ')
-        .nth(16)
-        .unwrap();
-    let status = fs::read_to_string(Path::new("/proc").join(pid.to_string()).join("status"));
-    let status = status.unwrap();
-    let cpus = status
-        .lines()
-        .find_map(|line| line.strip_prefix("Cpus_allowed_list:"));
-    (nice.parse().unwrap(), cpus.unwrap().trim().to_owned())
-}
-
-#[test]
-fn stages_have_the_priority_and_the_processors_of_the_configuration_after_restarts_too() {
-    let run = Run::of_recording()
-        .rate(MODERATE)
-        .set("run.scheduling.nice=3")
-        .set("stages.masking.scheduling={ nice = 5, cpus = [0] }");
-    let mut running = run.start();
-    let stages = running.await_stages();
-    running.await_poses(2);
-    assert_eq!(scheduling(stages["refinement"]).0, 3);
-    assert_eq!(scheduling(stages["masking"]), (5, "0".to_owned()));
-    running.kill("masking");
-    let again = running.await_other_stage("masking", stages["masking"]);
-    running.await_poses(THIRD);
-    assert_eq!(scheduling(again), (5, "0".to_owned()));
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed());
-    let refused = Run::of_recording().set("run.scheduling.nice=-21").finish();
-    refused.refused_with(&["run", "nice", "-20 to 19"]);
-    let processor = Run::of_recording()
-        .set("run.scheduling.cpus=[1000]")
-        .finish();
-    processor.failed_with(&["scheduling", "cpus = [1000]"]);
 }

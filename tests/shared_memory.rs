@@ -5,16 +5,15 @@ use std::{
     os::unix::fs::{MetadataExt, PermissionsExt, symlink},
     path::{Path, PathBuf},
     process::{Child, Command},
-    sync::atomic::{AtomicU32, Ordering},
     thread,
     time::Duration,
 };
 
 use gyre_stage::run::SHARED_MEMORY;
-use rustix::{process::geteuid, thread::Pid};
+use rustix::thread::Pid;
 use tempfile::TempDir;
 
-use crate::common::{Ended, Run, copy_program, leftovers, undisturbed};
+use crate::common::{Ended, OtherUser, Run, leftovers, undisturbed};
 
 /// Holds the lock of a file, as another program does.
 struct Lock(Child);
@@ -49,39 +48,29 @@ impl Drop for Lock {
 /// A run of a short simulation by another user, with a program and results of its own.
 struct Other {
     folder: TempDir,
-    user: u32,
+    user: OtherUser,
 }
 
 impl Other {
     /// `None` if this user cannot become another.
     fn new() -> Option<Self> {
-        if !geteuid().is_root() {
-            println!("skipped: only root can become another user");
-            return None;
-        }
         let folder = tempfile::tempdir().unwrap();
-        fs::set_permissions(folder.path(), fs::Permissions::from_mode(0o777)).unwrap();
-        copy_program(&folder.path().join("gyre"));
+        let user = OtherUser::new(folder.path())?;
         let configuration = "[raster]\nn = 127\ncell_m = 0.8\n[simulation]\nscans = 8\n";
         fs::write(folder.path().join("test.toml"), configuration).unwrap();
-        // Tests that run at the same time are different users.
-        static USERS: AtomicU32 = AtomicU32::new(0);
-        let user = 1_000_000 + 10 * std::process::id() + USERS.fetch_add(1, Ordering::Relaxed);
         Some(Self { folder, user })
     }
 
     fn run(&self) -> Ended {
-        let user = self.user.to_string();
-        let mut command = Command::new("setpriv");
+        let mut command = self.user.gyre();
         command
             .current_dir(self.folder.path())
-            .args(["--reuid", &user, "--regid", &user, "--clear-groups"])
-            .args(["./gyre", "run", "test.toml"]);
+            .args(["run", "test.toml"]);
         Ended::of(command)
     }
 
     fn runs(&self) -> PathBuf {
-        Path::new(SHARED_MEMORY).join(format!("gyre-{}", self.user))
+        Path::new(SHARED_MEMORY).join(format!("gyre-{}", self.user.id))
     }
 }
 

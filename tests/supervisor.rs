@@ -1,10 +1,10 @@
 //! What the supervisor owes to the machine: no process outlives a run, no log grows for ever, and it waits for room.
 
-use std::{fs, os::unix::fs::PermissionsExt, process::Command, thread, time::Duration};
+use std::{fs, thread, time::Duration};
 
-use rustix::process::{Signal, geteuid};
+use rustix::process::Signal;
 
-use crate::common::{Run, copy_program, leftovers, send, undisturbed};
+use crate::common::{OtherUser, Run, leftovers, send, undisturbed};
 
 /// A stage under a shell that has started another program, which knows nothing of the run.
 const SHELL: &str = "sleep 600 &\n{gyre} stage masking";
@@ -64,29 +64,15 @@ fn a_stage_that_prints_without_end_does_not_fill_the_disk() {
 /// The limits of the system's processes do not hold for root, so the run is another user's.
 #[test]
 fn a_stage_for_which_there_is_no_process_is_started_when_there_is_one() {
-    if !geteuid().is_root() {
-        println!("skipped: only root can become another user");
-        return;
-    }
     let run =
         Run::configured("[raster]\nn = 127\ncell_m = 0.8\n[simulation]\nscans = 24\n").rate("6");
-    let folder = run.folder();
-    fs::set_permissions(folder, fs::Permissions::from_mode(0o777)).unwrap();
-    copy_program(&folder.join("gyre"));
-    let user = (2_000_000_000 + std::process::id()).to_string();
-    let as_user = || {
-        let mut command = Command::new("setpriv");
-        command.args(["--reuid", &user, "--regid", &user, "--clear-groups"]);
-        command
+    let Some(user) = OtherUser::new(run.folder()) else {
+        return;
     };
-    let mut command = as_user();
-    command
-        .arg(folder.join("gyre"))
-        .args(run.command().get_args());
-    let mut running = run.start_as(command);
+    let mut running = run.start_as(user.command_of(&run));
     let supervisor = running.await_poses(3).pid().to_string();
     let allow_processes = |number: &str| {
-        let mut prlimit = as_user();
+        let mut prlimit = user.command();
         let limit = format!("--nproc={number}:");
         prlimit.args(["prlimit", "--pid", &supervisor, &limit]);
         assert!(prlimit.status().unwrap().success());

@@ -254,6 +254,7 @@ fn plan(configuration: &Configuration, manifest: Manifest) -> Plan {
         guardian: vec![gyre.to_string_lossy().into_owned(), "guard".to_owned()],
         stall_timeout: limit(configuration.run.stall_timeout_s),
         start_timeout: limit(configuration.run.start_timeout_s),
+        cpu_wake_us: configuration.run.cpu_wake_us,
         manifest,
     }
 }

@@ -90,7 +90,7 @@ struct Base<'a> {
 }
 
 /// What is offered to the robot.
-struct Offered {
+struct PosesOnOffer {
     poses: Arc<Poses>,
     asked: Arc<Offer>,
     motions: Arc<Ring>,
@@ -192,7 +192,7 @@ impl Base<'_> {
         }
     }
 
-    fn offer(&self) -> Result<Offered, LinkError> {
+    fn offer(&self) -> Result<PosesOnOffer, LinkError> {
         let manifest = &self.launch.manifest;
         let prefix = begin::prefix(&self.config, Side::Base);
         let mut server = Server::new(&self.session, &prefix, Some(self.sleeper.waker()));
@@ -211,7 +211,7 @@ impl Base<'_> {
             .map_err(|e| LinkError::zenoh("wait for the robot", &e))?;
         let asked = server.offer(Pose::TOPIC, poses.clone())?;
         server.offer(Motion::TOPIC, motions.clone())?;
-        Ok(Offered {
+        Ok(PosesOnOffer {
             poses,
             asked,
             motions,
@@ -248,7 +248,7 @@ impl Base<'_> {
     }
 
     /// Offers the new poses and motions.
-    fn give_back(&mut self, offered: &Offered) -> Result<(), LinkError> {
+    fn give_back(&mut self, offered: &PosesOnOffer) -> Result<(), LinkError> {
         let resumed = (!self.resumed.is(flag::BASE)).then_some(self.resumed.seq);
         let newest = self.stages.newest_pose().max(resumed);
         offered
@@ -298,7 +298,7 @@ impl Base<'_> {
     fn publish(
         &mut self,
         coming: &mut [Coming],
-        offered: &Offered,
+        offered: &PosesOnOffer,
         end: &mut Option<Item>,
     ) -> Result<bool, LinkError> {
         let items = coming.iter().map(|topic| topic.messages.front()?.item());

@@ -21,7 +21,7 @@ use zenoh::{Session, Wait, handlers::FifoChannelHandler, qos::Priority, query::R
 use crate::{
     LinkError, Network,
     fetch::{Fetcher, Request},
-    send::{Greeting, Offered, greeting_key, prefix},
+    send::{Greeting, OfferedTopic, greeting_key, prefix},
     status::Status,
     wake::Sleeper,
 };
@@ -131,7 +131,7 @@ pub fn ask(network: &Network, signals: &Signals) -> Result<Option<Seen>, LinkErr
 
 const OTHER_VERSION: &str = "the sender is another version of gyre: install the same on both";
 
-fn require_same(offered: &Offered) -> Result<(), LinkError> {
+fn require_same(offered: &OfferedTopic) -> Result<(), LinkError> {
     let ours = topic(&offered.name).map(|topic| (topic.header_type)());
     match ours == Some(&*offered.version) {
         true => Ok(()),
@@ -277,7 +277,7 @@ struct Topic {
 }
 
 impl Mirror<'_> {
-    fn open(&self, offered: &Offered) -> Result<Topic, LinkError> {
+    fn open(&self, offered: &OfferedTopic) -> Result<Topic, LinkError> {
         let other = || LinkError::Refused(OTHER_VERSION.to_owned());
         let topic = topic(&offered.name).ok_or_else(other)?;
         let from = match topic.name {

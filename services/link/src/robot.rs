@@ -70,7 +70,7 @@ struct Robot<'a> {
 }
 
 /// A topic that the base asks for.
-struct Sent {
+struct AskedTopic {
     tape: Arc<Ring>,
     offer: Arc<Offer>,
 }
@@ -197,7 +197,7 @@ impl Robot<'_> {
         let sent = topics.iter().map(|topic| {
             let tape = Arc::new(Ring::of(depth));
             let offer = server.offer(topic, tape.clone())?;
-            Ok(Sent { tape, offer })
+            Ok(AskedTopic { tape, offer })
         });
         let sent = sent.collect::<Result<Vec<_>, LinkError>>()?;
         let motions = self
@@ -230,7 +230,7 @@ impl Robot<'_> {
     fn send(
         &mut self,
         place: usize,
-        sent: &Sent,
+        sent: &AskedTopic,
         topics: usize,
         depth: usize,
     ) -> Result<Option<Item>, LinkError> {
@@ -307,10 +307,10 @@ impl Robot<'_> {
     }
 
     /// Ends this side when the base has the end too; false if it has not yet. Until it asks for what follows the end, it may not have it.
-    fn end(&mut self, end: &Item, sent: &[Sent], poses: &Fetcher) -> Result<bool, LinkError> {
+    fn end(&mut self, end: &Item, sent: &[AskedTopic], poses: &Fetcher) -> Result<bool, LinkError> {
         // The base ends when it knows that all poses are here.
         poses.confirm(self.next_pose());
-        let has_end = |sent: &Sent| sent.offer.asked() > end.seq;
+        let has_end = |sent: &AskedTopic| sent.offer.asked() > end.seq;
         if !sent.iter().all(has_end) {
             return Ok(false);
         }

@@ -96,12 +96,12 @@ pub(crate) struct Greeting {
     pub sender: String,
     /// Time of the first pose, ns since 1970, if there is one: it tells one drive from another.
     pub began_ns: Option<i64>,
-    pub topics: Vec<Offered>,
+    pub topics: Vec<OfferedTopic>,
 }
 
 /// A topic that is sent.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub(crate) struct Offered {
+pub(crate) struct OfferedTopic {
     pub name: String,
     /// The type of its header, with the version.
     pub version: String,
@@ -148,7 +148,7 @@ struct Sending<'run> {
 struct Topic<'run> {
     name: &'static str,
     observer: Box<dyn Observing + 'run>,
-    kept: Kept,
+    kept: Store,
     offer: Arc<Offer>,
 }
 
@@ -246,10 +246,10 @@ impl Topic<'_> {
         while let Some(message) = self.observer.take()? {
             let come = message.item().map_or(0, |item| item.seq.saturating_add(1));
             match &self.kept {
-                Kept::Ring(ring) => ring.push(Message::of(&message)),
-                Kept::Poses(poses) => poses.have_come(come),
-                Kept::Loops(loops) => loops.have_come(come),
-                Kept::WithPoses => {}
+                Store::Ring(ring) => ring.push(Message::of(&message)),
+                Store::Poses(poses) => poses.have_come(come),
+                Store::Loops(loops) => loops.have_come(come),
+                Store::WithPoses => {}
             }
         }
         Ok(())
@@ -257,7 +257,7 @@ impl Topic<'_> {
 }
 
 /// Where the messages of a topic are kept.
-enum Kept {
+enum Store {
     Ring(Arc<Ring>),
     Poses(Arc<Poses>),
     Loops(Arc<Loops>),
@@ -265,7 +265,7 @@ enum Kept {
     WithPoses,
 }
 
-impl Kept {
+impl Store {
     fn end(&self) -> Result<(), LinkError> {
         match self {
             Self::Ring(ring) => {
@@ -299,21 +299,21 @@ impl Logs {
     }
 
     /// Returns what a topic is sent from, and what is to be told of new messages.
-    fn tape(&self, name: &str, manifest: &Manifest) -> (Arc<dyn Tape>, Kept) {
+    fn tape(&self, name: &str, manifest: &Manifest) -> (Arc<dyn Tape>, Store) {
         let composed = match manifest.refines {
             true => Refined::TOPIC,
             false => Motion::TOPIC,
         };
         let poses = || self.poses.clone();
         let ring = match (name, &self.loops) {
-            (Pose::TOPIC, _) => return (poses(), Kept::Poses(poses())),
-            (Loop::TOPIC, Some(loops)) => return (loops.clone(), Kept::Loops(loops.clone())),
-            _ if name == composed => return (Arc::new(Motions(poses())), Kept::WithPoses),
+            (Pose::TOPIC, _) => return (poses(), Store::Poses(poses())),
+            (Loop::TOPIC, Some(loops)) => return (loops.clone(), Store::Loops(loops.clone())),
+            _ if name == composed => return (Arc::new(Motions(poses())), Store::WithPoses),
             _ if is_lossless(name) => Ring::bounded(usize::MAX, KEPT_BYTES),
             _ => Ring::of(KEPT_SCANS),
         };
         let ring = Arc::new(ring);
-        (ring.clone(), Kept::Ring(ring))
+        (ring.clone(), Store::Ring(ring))
     }
 }
 
@@ -358,7 +358,7 @@ fn greet(
     poses: Arc<Poses>,
 ) -> Result<Queryable<()>, LinkError> {
     let path = manifest.root.join("config.toml");
-    let offered = |name: &&'static str| Offered {
+    let offered = |name: &&'static str| OfferedTopic {
         name: (*name).to_owned(),
         version: topic(name)
             .map_or("", |topic| (topic.header_type)())

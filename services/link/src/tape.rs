@@ -53,14 +53,14 @@ pub(crate) trait Tape: Send + Sync {
 
 /// The newest messages of a topic, in memory.
 pub(crate) struct Ring {
-    kept: Mutex<Kept>,
+    kept: Mutex<Held>,
     changed: Condvar,
     max_messages: usize,
     max_bytes: usize,
 }
 
 #[derive(Default)]
-struct Kept {
+struct Held {
     messages: VecDeque<Message>,
     bytes: usize,
     has_ended: bool,
@@ -104,7 +104,7 @@ impl Ring {
 
 impl Tape for Ring {
     fn next(&self, seq: u64, limit: Duration) -> Result<Next, LinkError> {
-        let first = |kept: &Kept| {
+        let first = |kept: &Held| {
             let at = kept.messages.partition_point(|message| message.seq < seq);
             let message = kept.messages.get(at).cloned().map(Next::Message);
             message.or(kept.has_ended.then_some(Next::Ended))

@@ -9,7 +9,12 @@ mod position;
 pub(crate) mod received;
 mod sensor;
 
-use std::{num::NonZeroUsize, ops::Range};
+use std::{
+    num::{NonZeroU64, NonZeroUsize},
+    ops::Range,
+};
+
+use rustix::thread::set_current_timer_slack;
 
 use gyre_messages::{ScanHeader, StageId};
 
@@ -83,7 +88,10 @@ pub fn run(
         scans,
         schedule,
         counters: StageCounters::default(),
+        may_have_new_readers: false,
     };
+    // By default the system ends a wait up to 50 us late, to join it with others. Scans are due at their time. A refusal costs these alone.
+    let _ = set_current_timer_slack(NonZeroU64::new(1));
     if let Some(position) = playback.wait_for_start()? {
         playback.play(position)?;
     }

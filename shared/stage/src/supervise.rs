@@ -23,6 +23,7 @@ mod stall;
 mod start;
 mod swap;
 mod trial;
+mod wake_limit;
 mod watchdog;
 
 use std::{
@@ -122,6 +123,7 @@ struct Supervisor<'a> {
     recovery: Vec<Duration>,
     observers: observers::Sweep,
     logs: log::Logs,
+    _wake_limit: Option<wake_limit::WakeLimit>,
     // Dropped in this order: ports, services, node.
     poses: Port<Pose>,
     services: Services,
@@ -167,6 +169,10 @@ impl<'a> Supervisor<'a> {
             recovery: Vec::new(),
             observers: observers::Sweep::new(),
             logs: log::Logs::of(plan),
+            _wake_limit: plan
+                .cpu_wake_us
+                .map(wake_limit::WakeLimit::hold)
+                .transpose()?,
             poses,
             services,
             _node: node,

@@ -33,6 +33,11 @@ pub struct RunConfig {
     /// How the system runs the stages: priority, processors, memory. Followers have their own alone.
     #[serde(skip_serializing_if = "is_default")]
     pub scheduling: Scheduling,
+    /// Longest time that a processor may take to wake from idleness, us; 0: none sleeps, which costs
+    /// power. For the whole machine, while the run lives. It needs the right to write to
+    /// `/dev/cpu_dma_latency`. Default: as the system has it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cpu_wake_us: Option<u32>,
     /// Ground truth for the evaluation. Default: the one in the recording's folder.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ground_truth: Option<PathBuf>,
@@ -83,6 +88,7 @@ impl Default for RunConfig {
             stall_timeout_s: 60.0,
             start_timeout_s: 300.0,
             scheduling: Scheduling::default(),
+            cpu_wake_us: None,
             ground_truth: None,
         }
     }

@@ -1,6 +1,6 @@
 //! Playing: which scan is next, when it is due, and when the window admits it.
 
-use std::time::Duration;
+use std::{mem, time::Duration};
 
 use gyre_messages::{Hop, Scan, ScanHeader};
 use gyre_radar::continues;
@@ -27,6 +27,8 @@ pub(super) struct Playback<'a, S: Source> {
     pub scans: Writer<Scan>,
     pub schedule: ScheduleWriter,
     pub counters: StageCounters,
+    /// True if readers may have come since the last wait.
+    pub may_have_new_readers: bool,
 }
 
 /// The next scan of the recording.
@@ -303,17 +305,19 @@ impl<S: Source> Playback<'_, S> {
         self.schedule.has_published(position.published)
     }
 
-    /// Sleeps, and answers the handshakes of new readers; true on a request to stop.
+    /// Answers the handshakes of new readers, and sleeps; true on a request to stop. In this order, since the scan that has become
+    /// due when the sleep ends goes first.
     fn sleep(&mut self, limit: Duration) -> Result<bool, StageError> {
+        if mem::take(&mut self.may_have_new_readers) {
+            self.scans.accept_readers()?;
+        }
         let woken = self.launch.signals.wait(
             &[self.credit.poses.listener()],
             Some(self.scans.listener()),
             limit,
         )?;
         self.counters.wakes += 1;
-        if woken.may_have_new_readers() {
-            self.scans.accept_readers()?;
-        }
+        self.may_have_new_readers = woken.may_have_new_readers();
         Ok(woken.stop)
     }
 }

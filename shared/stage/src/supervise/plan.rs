@@ -28,6 +28,8 @@ pub struct Plan {
     pub stall_timeout: Option<Duration>,
     /// Time for a stage to open its topics; `None`: no limit.
     pub start_timeout: Option<Duration>,
+    /// Longest time that a processor of the machine may take to wake while the run lives, us; `None`: as the system has it.
+    pub cpu_wake_us: Option<u32>,
 }
 
 /// One process of a run.
@@ -254,6 +256,17 @@ pub enum SuperviseError {
         stage: String,
         /// The key and its value.
         what: String,
+        /// The system error.
+        source: std::io::Error,
+    },
+    /// The system does not let processors be kept awake.
+    #[error(
+        "cannot limit the time in which processors wake to {us} us (run.cpu_wake_us): /dev/cpu_dma_latency: {source}; give the user \
+         of the run the right to write to it, or leave the key out"
+    )]
+    WakeLimit {
+        /// The limit, us.
+        us: u32,
         /// The system error.
         source: std::io::Error,
     },

@@ -1,0 +1,33 @@
+//! Processors that wake in time: a limit on how long they take to leave an idle state.
+//!
+//! A processor that has nothing to do sleeps, the deeper the longer. Each hop of a scan wakes one up, which can take longer than
+//! the hop's message needs. The limit holds for the whole machine, while the supervisor lives.
+
+use std::{fs::File, io::Write};
+
+use super::SuperviseError;
+
+/// The system keeps to what a process has written here until that process closes it (Linux, "PM QoS").
+const FILE: &str = "/dev/cpu_dma_latency";
+
+/// A limit that is in effect until it is dropped.
+pub(super) struct WakeLimit {
+    _file: File,
+}
+
+impl WakeLimit {
+    /// Lets no processor sleep so deeply that it takes longer than `us` microseconds to wake; with 0 none sleeps.
+    ///
+    /// # Errors
+    /// The system refuses it.
+    pub fn hold(us: u32) -> Result<Self, SuperviseError> {
+        let set = || {
+            let mut file = File::options().write(true).open(FILE)?;
+            // The file takes a signed number.
+            let limit = i32::try_from(us).unwrap_or(i32::MAX);
+            file.write_all(&limit.to_ne_bytes())?;
+            Ok(Self { _file: file })
+        };
+        set().map_err(|source| SuperviseError::WakeLimit { us, source })
+    }
+}

@@ -1,0 +1,96 @@
+//! How the system runs a run: the priorities and processors of its stages, and how soon processors wake.
+
+use std::{fs, io::Read, path::Path};
+
+use crate::common::{OtherUser, Pid, Run, leftovers, recording, undisturbed};
+
+/// The recording's six seconds in two.
+const MODERATE: &str = "3";
+const THIRD: usize = recording::SCANS / 3;
+/// The system's limit on the time in which a processor wakes.
+const WAKE_LIMIT: &str = "/dev/cpu_dma_latency";
+
+/// The niceness of a process and the processors that it may use.
+fn priority(pid: Pid) -> (i32, String) {
+    let stat = fs::read_to_string(format!("/proc/{pid}/stat")).unwrap();
+    let nice = stat
+        .rsplit_once(") ")
+        .unwrap()
+        .1
+        .split(' ')
+        .nth(16)
+        .unwrap();
+    let status = fs::read_to_string(Path::new("/proc").join(pid.to_string()).join("status"));
+    let status = status.unwrap();
+    let cpus = status
+        .lines()
+        .find_map(|line| line.strip_prefix("Cpus_allowed_list:"));
+    (nice.parse().unwrap(), cpus.unwrap().trim().to_owned())
+}
+
+#[test]
+fn stages_have_the_priority_and_the_processors_of_the_configuration_after_restarts_too() {
+    let run = Run::of_recording()
+        .rate(MODERATE)
+        .set("run.scheduling.nice=3")
+        .set("stages.masking.scheduling={ nice = 5, cpus = [0] }");
+    let mut running = run.start();
+    let stages = running.await_stages();
+    running.await_poses(2);
+    assert_eq!(priority(stages["refinement"]).0, 3);
+    assert_eq!(priority(stages["masking"]), (5, "0".to_owned()));
+    running.kill("masking");
+    let again = running.await_other_stage("masking", stages["masking"]);
+    running.await_poses(THIRD);
+    assert_eq!(priority(again), (5, "0".to_owned()));
+    running.finish().succeeded();
+    assert_eq!(run.odometry(), undisturbed());
+    let refused = Run::of_recording().set("run.scheduling.nice=-21").finish();
+    refused.refused_with(&["run", "nice", "-20 to 19"]);
+    let processor = Run::of_recording()
+        .set("run.scheduling.cpus=[1000]")
+        .finish();
+    processor.failed_with(&["scheduling", "cpus = [1000]"]);
+}
+
+/// The limit that the system keeps to, us.
+fn wake_limit() -> Option<i32> {
+    let mut limit = [0; 4];
+    fs::File::open(WAKE_LIMIT)
+        .ok()?
+        .read_exact(&mut limit)
+        .ok()?;
+    Some(i32::from_ne_bytes(limit))
+}
+
+#[test]
+fn processors_wake_within_the_limit_of_the_configuration_as_long_as_the_run_lives() {
+    let Some(before) = wake_limit().filter(|limit| *limit > 7) else {
+        println!("skipped: {WAKE_LIMIT} cannot be read, or has a limit already");
+        return;
+    };
+    let run = Run::of_recording().rate(MODERATE).set("run.cpu_wake_us=7");
+    let mut running = run.start();
+    running.await_poses(2);
+    assert_eq!(wake_limit(), Some(7));
+    running.finish().succeeded();
+    assert_eq!(wake_limit(), Some(before));
+    assert_eq!(run.odometry(), undisturbed());
+    let killed = Run::of_recording().rate(MODERATE).set("run.cpu_wake_us=7");
+    let mut running = killed.start();
+    running.await_poses(2);
+    running.kill_supervisor();
+    leftovers::remove(killed.out());
+    assert_eq!(wake_limit(), Some(before));
+}
+
+#[test]
+fn a_run_that_may_not_keep_processors_awake_does_not_start() {
+    let run = Run::configured("[raster]\nn = 127\ncell_m = 0.8\n[simulation]\nscans = 8\n")
+        .set("run.cpu_wake_us=0");
+    let Some(user) = OtherUser::new(run.folder()) else {
+        return;
+    };
+    let ended = run.start_as(user.command_of(&run)).finish();
+    ended.failed_with(&["run.cpu_wake_us", WAKE_LIMIT, "Permission denied"]);
+}
