@@ -3,7 +3,6 @@
 use std::{
     fs,
     os::unix::net::UnixDatagram,
-    path::Path,
     process::Command,
     thread,
     time::{Duration, Instant},
