@@ -6,7 +6,6 @@ use crate::common::{OtherUser, Pid, Run, leftovers, recording, undisturbed};
 
 /// The recording's six seconds in two.
 const MODERATE: &str = "3";
-const THIRD: usize = recording::SCANS / 3;
 /// The system's limit on the time in which a processor wakes.
 const WAKE_LIMIT: &str = "/dev/cpu_dma_latency";
 
@@ -41,7 +40,7 @@ fn stages_have_the_priority_and_the_processors_of_the_configuration_after_restar
     assert_eq!(priority(stages["masking"]), (5, "0".to_owned()));
     running.kill("masking");
     let again = running.await_other_stage("masking", stages["masking"]);
-    running.await_poses(THIRD);
+    running.await_poses(recording::SCANS / 3);
     assert_eq!(priority(again), (5, "0".to_owned()));
     running.finish().succeeded();
     assert_eq!(run.odometry(), undisturbed());

@@ -95,8 +95,8 @@ impl Heartbeat {
     }
 }
 
-/// Writes the beats of this process, through a mapping of the file: there are two for each wait, and a system call takes part in the
-/// latency.
+/// Writes the beats of this process, through a mapping of the file: the beat at the end of a wait is part of the latency, and a system
+/// call would take longer.
 #[derive(Debug)]
 pub(crate) struct HeartbeatWriter {
     mapped: MmapRaw,

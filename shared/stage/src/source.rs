@@ -90,7 +90,7 @@ pub fn run(
         counters: StageCounters::default(),
         may_have_new_readers: false,
     };
-    // By default the system ends a wait up to 50 us late, to join it with others. Scans are due at their time. A refusal costs these alone.
+    // The system ends a wait up to 50 us late unless told. If it refuses, scans are that late.
     let _ = set_current_timer_slack(NonZeroU64::new(1));
     if let Some(position) = playback.wait_for_start()? {
         playback.play(position)?;
