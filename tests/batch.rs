@@ -12,10 +12,7 @@ use gyre_pose_integration::journal;
 use rustix::process::{Pid, Signal, kill_process_group};
 use tempfile::TempDir;
 
-use crate::{
-    PROJECT,
-    common::{Ended, assert_nothing_left, gyre, leftovers, processes, recording, send},
-};
+use crate::common::{Ended, assert_nothing_left, gyre, leftovers, processes, recording, send};
 
 /// A batch takes seconds, far more only on a loaded machine.
 const LIMIT: Duration = Duration::from_secs(180);
@@ -23,13 +20,13 @@ const LOOK: Duration = Duration::from_millis(2);
 const SMALL: &str = "[raster]\nn = 127\ncell_m = 0.8\n";
 
 /// A list of drives, and the recordings in it.
-struct Drives {
+pub(crate) struct Drives {
     folder: TempDir,
     names: Vec<String>,
 }
 
 impl Drives {
-    fn new() -> Self {
+    pub fn new() -> Self {
         let folder = crate::common::folder();
         fs::write(folder.path().join("list.csv"), "name,drive,set\n").unwrap();
         Self {
@@ -39,7 +36,7 @@ impl Drives {
     }
 
     /// Parts of the small recording.
-    fn recordings(mut self, parts: &[usize]) -> Self {
+    pub fn recordings(mut self, parts: &[usize]) -> Self {
         for scans in parts {
             let kept = recording::linked(recording::small(), |scan| scan < *scans).keep();
             let place = self.path(&format!("part-{scans}"));
@@ -49,7 +46,7 @@ impl Drives {
         self
     }
 
-    fn line(mut self, name: &str, drive: &Path, set: &str) -> Self {
+    pub fn line(mut self, name: &str, drive: &Path, set: &str) -> Self {
         let list = self.path("list.csv");
         let lines = fs::read_to_string(&list).unwrap();
         let line = format!("{name},{},{set}\n", drive.display());
@@ -58,12 +55,12 @@ impl Drives {
         self
     }
 
-    fn path(&self, name: &str) -> PathBuf {
+    pub fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 
     /// The command with its results in a folder.
-    fn batch(&self, out: &str) -> Batch<'_> {
+    pub fn batch(&self, out: &str) -> Batch<'_> {
         Batch {
             drives: self,
             out: self.path(out),
@@ -74,14 +71,14 @@ impl Drives {
 
 /// A `gyre batch` command.
 #[derive(Clone)]
-struct Batch<'a> {
+pub(crate) struct Batch<'a> {
     drives: &'a Drives,
-    out: PathBuf,
+    pub out: PathBuf,
     options: Vec<String>,
 }
 
 impl Batch<'_> {
-    fn with(mut self, options: &[&str]) -> Self {
+    pub fn with(mut self, options: &[&str]) -> Self {
         self.options.extend(options.iter().map(|&it| it.to_owned()));
         self
     }
@@ -100,7 +97,7 @@ impl Batch<'_> {
     }
 
     /// Runs it to its end, which leaves nothing behind.
-    fn finish(&self) -> Ended {
+    pub fn finish(&self) -> Ended {
         let ended = Ended::of(self.command());
         println!("{}{}", ended.stderr, ended.stdout);
         for name in &self.drives.names {
@@ -151,7 +148,7 @@ impl Batch<'_> {
         journal::records(&path).map_or(0, |records| records.into_iter().flatten().count())
     }
 
-    fn table(&self) -> String {
+    pub fn table(&self) -> String {
         fs::read_to_string(self.out.join("results.csv")).unwrap()
     }
 
@@ -423,88 +420,4 @@ fn a_full_disk_is_told_from_other_failures() {
         batch.outcomes(),
         [("part-24".to_owned(), "disk-full".to_owned())]
     );
-}
-
-/// Slurm on this computer alone, in a folder. Dropped, it is stopped.
-struct Slurm {
-    folder: TempDir,
-}
-
-impl Slurm {
-    /// Starts it; prints why a test is skipped where there is none.
-    fn start() -> Option<Self> {
-        let programs = ["slurmctld", "slurmd", "munged", "sbatch"].iter();
-        let is_there = |program: &&str| {
-            let found = Command::new("sh")
-                .args(["-c", "command -v $0", program])
-                .output();
-            found.is_ok_and(|output| output.status.success())
-        };
-        if !programs.into_iter().all(is_there) || !rustix::process::geteuid().is_root() {
-            println!("skipped: Slurm and munge are not installed, or this is not root");
-            return None;
-        }
-        let slurm = Self {
-            folder: crate::common::folder(),
-        };
-        let started = slurm.script("start").status().unwrap();
-        assert!(started.success());
-        Some(slurm)
-    }
-
-    fn script(&self, action: &str) -> Command {
-        let mut command = Command::new(format!("{PROJECT}/examples/slurm/one-node.sh"));
-        command.arg(self.folder.path()).arg(action);
-        command
-    }
-
-    fn sbatch(&self) -> Command {
-        let mut command = Command::new("sbatch");
-        command
-            .env("SLURM_CONF", self.folder.path().join("slurm.conf"))
-            .current_dir(self.folder.path())
-            .args(["--parsable", "--wait"]);
-        command
-    }
-}
-
-impl Drop for Slurm {
-    fn drop(&mut self) {
-        let _ = self.script("stop").status();
-    }
-}
-
-#[test]
-fn an_array_of_slurm_gives_the_same_table() {
-    let Some(slurm) = Slurm::start() else {
-        return;
-    };
-    let drives = Drives::new().recordings(&[4, 5, 6]);
-    let drives = {
-        let nowhere = drives.path("nowhere");
-        drives.line("missing", &nowhere, "")
-    };
-    let alone = drives.batch("alone");
-    assert_eq!(alone.finish().code(), Some(1));
-    let array = drives.batch("array");
-    let programs = Path::new(crate::PROGRAM).parent().unwrap();
-    let path = format!("{}:{}", programs.display(), std::env::var("PATH").unwrap());
-    let mut sbatch = slurm.sbatch();
-    sbatch
-        .env("PATH", path)
-        .env("TASKS", "2")
-        .arg("--array=0-1")
-        .arg("--cpus-per-task=1")
-        .arg("--mem-per-cpu=0")
-        .arg(format!("{PROJECT}/examples/slurm/gyre.sbatch"))
-        .arg(drives.path("list.csv"))
-        .arg(&array.out)
-        .arg("--config")
-        .arg(drives.path("small.toml"));
-    // One of its drives is missing.
-    let submitted = Ended::of(sbatch);
-    assert_eq!(submitted.code(), Some(1), "{}", submitted.stderr);
-    let ended = array.clone().with(&["--collect"]).finish();
-    assert_eq!(ended.code(), Some(1));
-    assert_eq!(array.table(), alone.table());
 }

@@ -7,19 +7,21 @@
 //! Reading order:
 //!
 //! 1. [`list`]: the drives; [`Outcome`]: how one can end.
-//! 2. [`compute`]: one run after the other, several at once; `child.rs`: one of them.
+//! 2. [`Batch`]: what is to be done; [`compute`]: one run after the other, several at once; `child.rs`: one of them.
 //! 3. [`row`]: what is kept of a drive; [`table`]: `results.csv` and `times.csv`.
 
 mod batch;
 mod child;
+mod compute;
 mod error;
 pub mod list;
 mod outcome;
 pub mod row;
 pub mod table;
 
-pub use batch::{Batch, Ended, compute};
+pub use batch::Batch;
 pub use child::COMMAND;
+pub use compute::{Ended, compute};
 pub use error::BatchError;
 pub use list::{Drive, List, Slice};
 pub use outcome::Outcome;

@@ -2,7 +2,9 @@
 
 pub mod difference;
 mod rate;
+mod record;
 mod sections;
+mod stored;
 mod validation;
 
 use std::{
@@ -24,10 +26,11 @@ use gyre_stage::supervise::{Program, StagePlan};
 use gyre_stress::{Budget, Scenario};
 use serde::Serialize;
 
-use crate::{Failure, print, record::RecordConfig};
+use crate::{Failure, print};
 
 pub use gyre_configuration::ConfigurationError;
 pub use rate::Rate;
+pub use record::RecordConfig;
 pub use sections::{Mode, RunConfig, StageConfig};
 
 /// The configuration of a run. Every key has a default.

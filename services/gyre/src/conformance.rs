@@ -137,7 +137,7 @@ fn configuration(
         set: small.chain(arguments.set.clone()).chain(lossless).collect(),
         ..RunArguments::default()
     })?;
-    let mut configuration = run::with_stored_options(&resolved)?.streaming(None);
+    let mut configuration = resolved.with_stored_options()?.streaming(None);
     configuration.source.scans = Some(arguments.scans.into());
     let method = &mut configuration.odometry;
     match stage {

@@ -17,7 +17,6 @@ use crate::{
     out::Out,
     preflight::{self, Preflight},
     program,
-    run::with_stored_options,
 };
 
 const HEAD: &str = "# What the run was begun with, which the same command compares before it resumes the run.\n# CRC-32 of the rest: ";
@@ -199,7 +198,7 @@ impl Identity {
     /// # Errors
     /// A recording or a program that cannot be read.
     pub fn has_inputs_of(&self, configuration: &Configuration) -> Result<bool, Failure> {
-        let resolved = with_stored_options(configuration)?;
+        let resolved = configuration.with_stored_options()?;
         let plans = configuration.stage_plans(&program::own());
         let truth = |table: &toml::Table| table.get("run")?.get("ground_truth").cloned();
         let now: toml::Table = configuration.to_toml()?.parse()?;

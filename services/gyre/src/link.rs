@@ -3,9 +3,8 @@
 use std::{env, os::unix::process::CommandExt, process::Command};
 
 use gyre_link::{LinkConfig, ONE_THREAD, Side};
-use gyre_radar::DEFAULT_TURN_NS;
 
-use crate::{Failure, configuration::Configuration, preflight::Scans, print, program};
+use crate::{Failure, configuration::Configuration, print, program};
 
 #[cfg(feature = "link")]
 mod ends;
@@ -66,19 +65,11 @@ pub fn describe(configuration: &Configuration) {
     }
 }
 
-/// Returns what a base knows of the robot's scans before the run.
-pub(crate) fn scans(configuration: &Configuration) -> Result<Scans, Failure> {
-    Ok(Scans {
-        count: None,
-        period_ns: DEFAULT_TURN_NS,
-        bytes: scan_bytes(&configuration.link)?,
-        truth: None,
-        recording: None,
-    })
-}
-
-/// Returns the size of the largest scan, if scans are sent: the robot knows it.
-fn scan_bytes(link: &LinkConfig) -> Result<usize, Failure> {
+/// Returns the size of the largest scan, bytes, if scans are sent: the robot knows it.
+///
+/// # Errors
+/// The robot cannot be asked.
+pub(crate) fn scan_bytes(link: &LinkConfig) -> Result<usize, Failure> {
     match link.cut {
         #[cfg(feature = "link")]
         gyre_radar_replay::PlayedFrom::Scan => {

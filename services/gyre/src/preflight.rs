@@ -106,7 +106,7 @@ pub fn check(configuration: &Configuration) -> Result<Preflight, crate::Failure>
     link::check(configuration)?;
     let scans = match configuration.is_radar() {
         true => Scans::of_radar(configuration)?,
-        false if configuration.is_side(Side::Base) => link::scans(configuration)?,
+        false if configuration.is_side(Side::Base) => Scans::of_base(configuration)?,
         false if configuration.source.from != PlayedFrom::Scan => {
             Scans::of_messages(configuration)?
         }
@@ -209,6 +209,17 @@ impl Scans {
             count: Some(stamps.len()),
             period_ns: turn_ns(stamps.into_iter()).unwrap_or(DEFAULT_TURN_NS),
             bytes: 0,
+            truth: None,
+            recording: None,
+        })
+    }
+
+    /// What a base knows of the robot's scans before the run.
+    fn of_base(configuration: &Configuration) -> Result<Self, crate::Failure> {
+        Ok(Self {
+            count: None,
+            period_ns: DEFAULT_TURN_NS,
+            bytes: link::scan_bytes(&configuration.link)?,
             truth: None,
             recording: None,
         })

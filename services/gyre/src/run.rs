@@ -133,7 +133,7 @@ fn make_ready(
     }
     preflight::check_open_files()?;
     // The stages read the options of dataset.toml from here: it may change while they run.
-    let resolved = with_stored_options(configuration)?;
+    let resolved = configuration.with_stored_options()?;
     let checked = preflight::check(&resolved)?;
     let identity = Identity::of(configuration, programs, resolved.dataset, &checked)?;
     if let Some(begun) = unfinished {
@@ -215,17 +215,6 @@ fn play(
         Ok(_) => conclude(&session, &written?),
         Err(failure) => Err(failed(&failure, &out, written)),
     }
-}
-
-/// Returns the configuration with the options of the recording's `dataset.toml` where it has none.
-pub(crate) fn with_stored_options(configuration: &Configuration) -> Result<Configuration, Failure> {
-    let mut resolved = configuration.clone();
-    let data = &configuration.source.data;
-    if configuration.streamed().is_none() && !data.as_os_str().is_empty() {
-        let stored = gyre_recording::stored_options(data)?;
-        resolved.dataset = resolved.dataset.or(&stored);
-    }
-    Ok(resolved)
 }
 
 /// Writes into the folder of the results what the stages expect there.

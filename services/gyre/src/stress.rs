@@ -3,7 +3,7 @@
 use std::{fs, path::Path, process::ExitCode, time::Duration};
 
 use gyre_messages::{Masked, Message, Motion, Scan, StageId, topics};
-use gyre_stress::{Options, Provenance, Report, Scenario, Subject, copying::Kind, report::Verdict};
+use gyre_stress::{Kind, Options, Provenance, Report, Scenario, Subject, report::Verdict};
 
 use crate::{
     Failure,
@@ -13,7 +13,6 @@ use crate::{
     out::Out,
     preflight::{self, Preflight},
     print, program,
-    record::RecordConfig,
     run::resolve::resolve,
     simulate,
 };
@@ -53,7 +52,7 @@ pub fn stress(arguments: &StressArguments) -> Result<ExitCode, Failure> {
 /// # Errors
 /// A failure of it.
 pub fn help(arguments: &[String]) -> Result<ExitCode, Failure> {
-    gyre_stress::helper::main(&program::own(), arguments)?;
+    gyre_stress::help(&program::own(), arguments)?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -67,7 +66,7 @@ fn carry_out(arguments: &StressArguments) -> Result<Report, Failure> {
         ..RunArguments::default()
     })?;
     // Many runs would write to one file.
-    configuration.record = RecordConfig::default();
+    configuration.record = Default::default();
     render(&mut configuration, &out)?;
     // First, since a radar that is configured is no recording, and would be asked for its scans.
     let played = preflight::open(&configuration)?;

@@ -10,7 +10,8 @@ use gyre_recording::{Head, Recording, RecordingError, next_part, parts};
 use gyre_stage::{Manifest, StageError};
 
 use crate::{
-    recorder::{HEALTH, LOG, Options, RecorderError},
+    RecorderError,
+    options::{HEALTH, LOG, Options},
     tap::now_ns,
 };
 

@@ -4,17 +4,21 @@
 //! limit in bytes. So a slow disk costs memory first, and then messages, which are counted. Nothing that the recorder does reaches the
 //! run: see [`gyre_stage::observer`].
 //!
-//! Reading order: `recorder` (the loop), `begin`, `tap` (the observers), `queue`, `writing` (the other thread), `log_tail`, `health`.
+//! Reading order: `options`, `recorder` (the loop), `begin`, `tap` (the observers), `queue`, `writing` (the other thread), `log_tail`, `health`.
 
 mod begin;
+mod error;
 mod health;
 mod log_tail;
+mod options;
 mod queue;
 mod recorder;
 mod tap;
 mod writing;
 
+pub use error::RecorderError;
 pub use gyre_recording::Split;
 pub use log_tail::LogTail;
-pub use recorder::{Options, Recorded, RecorderError, record};
+pub use options::Options;
+pub use recorder::{Recorded, record};
 pub use tap::now_ns;

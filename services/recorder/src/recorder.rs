@@ -9,19 +9,20 @@ use std::{
 };
 
 use gyre_messages::{Message, Refined, Sender as PublishedBy, topic};
-use gyre_recording::{RecordingError, Split, SplitWriter};
+use gyre_recording::SplitWriter;
 use gyre_stage::{
     Manifest, StageError, launch,
     observer::{ObservedRun, wait_for_any},
     run,
     wake::{MAX_WAIT, Signals},
 };
-use thiserror::Error;
 
 use crate::{
+    RecorderError,
     begin::{Begun, begin},
     health::health,
     log_tail::LogTail,
+    options::{HEALTH, LOG, Options},
     queue::{Entry, LIMIT_BYTES, Sender, queue},
     tap::{Counts, Tap, now_ns, tap},
     writing,
@@ -29,10 +30,6 @@ use crate::{
 
 /// The name of the recorder in the log and among the processes of a run.
 const NAME: &str = "recorder";
-/// The topic of log lines, which is no topic of the transport.
-pub(crate) const LOG: &str = "log";
-/// That of the run's health, no more.
-pub(crate) const HEALTH: &str = "health";
 /// The topics that are recorded unless others are named.
 const DEFAULT: [&str; 7] = [
     "scan",
@@ -45,21 +42,6 @@ const DEFAULT: [&str; 7] = [
 ];
 /// Time between two sentences about missed messages in the log.
 const SENTENCE_PERIOD: Duration = Duration::from_secs(1);
-
-/// What to record.
-#[derive(Clone, Debug)]
-pub struct Options {
-    /// The folder of the run's results.
-    pub out: PathBuf,
-    /// The file.
-    pub to: PathBuf,
-    /// The topics, `log` and `health` among them; empty: the default ones that the run has.
-    pub topics: Vec<String>,
-    /// When a file is ended and the next part begun.
-    pub split: Split,
-    /// Whether a recording that is there is one of this run, which another recorder has begun: it goes on in its next part.
-    pub continues: bool,
-}
 
 /// A recording that has ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -102,39 +84,6 @@ impl fmt::Display for Recorded {
                 "; missed {}: the recording is not complete",
                 list(|it| it.missed)
             ),
-        }
-    }
-}
-
-/// Why there is no recording, or no complete one.
-#[derive(Debug, Error)]
-pub enum RecorderError {
-    /// The run cannot be observed.
-    #[error(transparent)]
-    Stage(#[from] StageError),
-    /// The file cannot be written, or one that is there not be read.
-    #[error("cannot record: {0}; the run goes on without")]
-    Recording(#[from] RecordingError),
-    /// A file is there.
-    #[error("{0} exists, and a recording is never overwritten: name another file, or remove it")]
-    Exists(PathBuf),
-    /// No such topic.
-    #[error(
-        "there is no topic `{0}`: there are scan, masked, rotation, motion, refined, pose, loop, correction, fix, log and health"
-    )]
-    NoTopic(String),
-    /// The thread that writes has ended without a reason.
-    #[error("the thread that writes the recording has ended")]
-    Thread,
-}
-
-impl RecorderError {
-    /// Returns the exit code of the process: whether another start may help.
-    pub fn exit_code(&self) -> u8 {
-        match self {
-            Self::Stage(error) => error.exit_code(),
-            Self::Thread => StageError::TRANSIENT,
-            _ => StageError::PERMANENT,
         }
     }
 }

@@ -1,14 +1,14 @@
 //! One scenario after the other.
 
-use std::{path::PathBuf, thread, time::Duration};
+use std::{thread, time::Duration};
 
 use gyre_messages::StageId;
 use gyre_stage::run::{free_shared_memory, sweep};
 
 use crate::{
-    Budget, Limits, Report, StressError,
+    Limits, Report, StressError, Subject,
     budget::Check,
-    copying::{self, Kind},
+    copying,
     fault::{self, FaultKind},
     pipeline::{Gate, Measured, Setup, measure},
     report::{Figures, Outcome, Step, Verdict},
@@ -34,27 +34,6 @@ const MOST_LEVELS: u32 = 8 * LEVELS;
 const MOST_RADARS: u32 = 64;
 /// The rate of the source has a limit: 1000 times the sensor's own.
 const MOST_HZ: f64 = 1000.0;
-
-/// What is stressed.
-#[derive(Clone, Debug)]
-pub struct Subject {
-    /// The program `gyre`.
-    pub program: PathBuf,
-    /// The resolved configuration, whose source is a recording.
-    pub configuration: PathBuf,
-    /// The folder of the report.
-    pub out: PathBuf,
-    /// Time between two scans of the recording.
-    pub period: Duration,
-    /// The stages of the run.
-    pub stages: Vec<StageId>,
-    /// Its budget.
-    pub budget: Budget,
-    /// The messages whose hand-over is compared with copies.
-    pub kinds: Vec<Kind>,
-    /// Shared memory of a run, bytes.
-    pub shared_bytes: u64,
-}
 
 /// What is to be done.
 #[derive(Clone, Debug)]

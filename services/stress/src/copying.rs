@@ -5,6 +5,7 @@
 //! a reader sleeps in `ppoll`, and has a message when it has read a byte of each of its cache lines.
 
 mod reader;
+mod send;
 mod sender;
 mod socket;
 
@@ -13,7 +14,12 @@ use std::{fs, path::PathBuf};
 use gyre_latency::Durations;
 use serde::{Deserialize, Serialize};
 
-use crate::{StressError, campaign::Subject, helper::Helper, record::Distribution};
+use crate::{
+    StressError,
+    helper::Helper,
+    record::Distribution,
+    subject::{Kind, Subject},
+};
 
 /// Messages a second. An observer rests for 10 ms between two looks, which must not show.
 const RATE_HZ: f64 = 50.0;
@@ -54,15 +60,6 @@ impl Way {
             Self::Sockets => "sockets",
         }
     }
-}
-
-/// A kind of message.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Kind {
-    /// The topic whose messages are so large.
-    pub topic: &'static str,
-    /// Bytes of a message.
-    pub bytes: usize,
 }
 
 /// What the hand-over of one kind of message to so many readers costs.

@@ -2,22 +2,17 @@
 //!
 //! A helper ends with the process that has started it, even if that is killed.
 
-pub(crate) mod load;
-
 use std::{
     io::{BufRead, BufReader, Write},
-    os::unix::process::CommandExt,
-    path::{Path, PathBuf},
+    path::Path,
     process::{Child, ChildStdin, ChildStdout, Command, Stdio},
 };
 
-use gyre_stage::run::end_with;
-use rustix::process::Signal;
 use serde::{Serialize, de::DeserializeOwned};
 
-use crate::{StressError, copying};
+use crate::StressError;
 
-/// The command of `gyre` that calls [`main`].
+/// The command of `gyre` that calls [`help`](crate::help).
 pub const COMMAND: &str = "stress-helper";
 /// What a helper prints when it works.
 const READY: &str = "ready";
@@ -137,38 +132,6 @@ pub(crate) fn command(program: &Path, work: &[String]) -> Command {
         .arg(std::process::id().to_string())
         .args(work);
     command
-}
-
-/// Does the work of a helper: its arguments are the process that has started it, the kind of work, and what that needs.
-///
-/// # Errors
-/// Work that is not known, or a failure of it.
-pub fn main(program: &Path, arguments: &[String]) -> Result<(), StressError> {
-    let usage = || StressError::Usage(format!("`gyre {COMMAND}` is what `gyre stress` starts"));
-    let [parent, work, rest @ ..] = arguments else {
-        return Err(usage());
-    };
-    let signal = match work.as_str() {
-        // It ends its stages first.
-        "run" => Signal::TERM,
-        _ => Signal::KILL,
-    };
-    let parent = parent.parse().map_err(|_| usage())?;
-    let refused = |error: rustix::io::Errno| StressError::Usage(error.to_string());
-    if !end_with(parent, signal).map_err(refused)? {
-        return Err(StressError::Interrupted);
-    }
-    match (work.as_str(), rest) {
-        ("run", words) => Err(StressError::Start {
-            program: program.display().to_string(),
-            source: Command::new(program).args(words).exec(),
-        }),
-        ("spin", []) => load::spin(),
-        ("memory", [share]) => load::churn(share.parse().map_err(|_| usage())?),
-        ("observe", [out]) => load::observe(&PathBuf::from(out)),
-        ("hand-over", words) => copying::helper(words),
-        _ => Err(usage()),
-    }
 }
 
 /// Says that the work has begun.

@@ -1,4 +1,4 @@
-//! The loads.
+//! The loads of a machine, each in a helper of its own.
 
 use std::{
     fs,
@@ -15,9 +15,9 @@ use gyre_stage::{
     observer::{Next, ObservedRun},
 };
 
-use super::{say_ready, say_result};
 use crate::{
     StressError,
+    helper::{say_ready, say_result},
     memory::{LEFT, Room, Taken},
 };
 

@@ -19,13 +19,13 @@ use serde::Deserialize;
 
 use crate::{
     StressError,
-    campaign::Subject,
     fault::{Fault, FaultKind, Faults},
     helper::Helper,
     memory::Taken,
     processes::{Cost, Sampler},
     record::{Recorded, Recorder},
     scenario::Scenario,
+    subject::Subject,
 };
 
 pub use gate::Gate;

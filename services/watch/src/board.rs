@@ -16,8 +16,8 @@ use tokio::sync::watch;
 
 use crate::{
     delays::Delays,
+    histograms::Histograms,
     messages::{Counts, Current, Health, Layer, Missed, Poses, Run, RunState},
-    metrics::Histograms,
     pictures::Points,
     processes::Process,
     traces,

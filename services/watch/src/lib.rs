@@ -14,6 +14,7 @@ mod connections;
 mod delays;
 mod foxglove;
 mod frame;
+mod histograms;
 mod messages;
 mod metrics;
 mod observing;

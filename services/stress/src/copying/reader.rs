@@ -14,7 +14,8 @@ use gyre_stage::{
 use super::{Had, Plan, WARM_UP, Way, cpu_ns, own_bytes, socket};
 use crate::{
     StressError,
-    helper::{load::touched, say_ready, say_result},
+    helper::{say_ready, say_result},
+    load::touched,
 };
 
 /// Time without a message after which none is expected any more.

@@ -5,26 +5,11 @@ use std::thread;
 use gyre_stage::{clock, hand_over::HandOver};
 use rustix::time::{ClockId, clock_gettime};
 
-use super::{Plan, RATE_HZ, Sent, WARM_UP, Way, own_bytes, socket};
+use super::{Plan, RATE_HZ, Sent, WARM_UP, Way, own_bytes, send::Send, socket};
 use crate::{
     StressError,
     helper::{say_ready, say_result},
 };
-
-/// One way to send.
-pub(super) trait Send {
-    /// Waits until all readers are there, after they have said so.
-    fn begin(&mut self) -> Result<(), StressError>;
-
-    /// Writes a message anew.
-    fn write(&mut self, number: u64) -> Result<(), StressError>;
-
-    /// Sends it.
-    fn send(&mut self) -> Result<(), StressError>;
-
-    /// Returns the bytes of shared memory.
-    fn shared_bytes(&self) -> u64;
-}
 
 /// Sends the messages of a plan.
 pub(super) fn send(plan: &Plan) -> Result<(), StressError> {

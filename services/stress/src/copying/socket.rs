@@ -12,7 +12,7 @@ use std::{
 use gyre_stage::clock;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
-use super::{Plan, sender::Send};
+use super::{Plan, send::Send};
 use crate::StressError;
 
 const HEAD: usize = 16;

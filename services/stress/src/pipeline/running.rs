@@ -22,10 +22,10 @@ use rustix::process::{Pid, Signal, kill_process};
 use super::{Setup, Summary, TICK, drain};
 use crate::{
     StressError,
-    campaign::Subject,
     helper::{self, Helper},
     memory::Taken,
     scenario::Scenario,
+    subject::Subject,
 };
 
 /// Poses before the measurement: buffers grow, and memory is touched for the first time.

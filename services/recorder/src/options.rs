@@ -1,0 +1,25 @@
+//! What to record.
+
+use std::path::PathBuf;
+
+use gyre_recording::Split;
+
+/// The topic of log lines, which is no topic of the transport.
+pub(crate) const LOG: &str = "log";
+/// That of the run's health, no more.
+pub(crate) const HEALTH: &str = "health";
+
+/// What to record.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The folder of the run's results.
+    pub out: PathBuf,
+    /// The file.
+    pub to: PathBuf,
+    /// The topics, `log` and `health` among them; empty: the default ones that the run has.
+    pub topics: Vec<String>,
+    /// When a file is ended and the next part begun.
+    pub split: Split,
+    /// Whether a recording that is there is one of this run, which another recorder has begun: it goes on in its next part.
+    pub continues: bool,
+}

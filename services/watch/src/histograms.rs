@@ -1,0 +1,67 @@
+//! The delays of all poses, in buckets as Prometheus counts them.
+
+use gyre_messages::{Item, StageId};
+use prometheus_client::{
+    encoding::EncodeLabelSet,
+    metrics::{family::Family, histogram::Histogram},
+};
+
+/// Upper limits of the buckets of one hop, s.
+const HOP_BUCKETS_S: [f64; 15] = [
+    0.000_05, 0.000_1, 0.000_25, 0.000_5, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5,
+    1.0, 2.5,
+];
+/// Upper limits of the buckets from sensor to pose, s.
+const POSE_BUCKETS_S: [f64; 14] = [
+    0.001, 0.0025, 0.005, 0.0075, 0.01, 0.025, 0.05, 0.075, 0.1, 0.25, 0.5, 1.0, 2.5, 10.0,
+];
+
+/// The delays of all poses that were seen.
+#[derive(Clone, Debug)]
+pub struct Histograms {
+    pub sensor_to_pose: Histogram,
+    pub hops: Hops,
+}
+
+/// Those of each hop.
+pub type Hops = Family<Hop, Histogram, fn() -> Histogram>;
+
+/// A part of a stage's time for a scan: `transport`, `wait` or `work`.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, EncodeLabelSet)]
+pub struct Hop {
+    stage: &'static str,
+    part: &'static str,
+}
+
+impl Default for Histograms {
+    fn default() -> Self {
+        Self {
+            sensor_to_pose: Histogram::new(POSE_BUCKETS_S),
+            hops: Family::new_with_constructor(|| Histogram::new(HOP_BUCKETS_S)),
+        }
+    }
+}
+
+impl Histograms {
+    /// Adds a pose.
+    pub fn add(&self, item: &Item) {
+        let seconds = |duration_ns: i64| duration_ns as f64 * 1e-9;
+        self.sensor_to_pose
+            .observe(seconds(item.sensor_to_pose_ns()));
+        for times in item.hop_times() {
+            let parts = [
+                ("transport", times.transport_ns),
+                ("wait", Some(times.wait_ns)),
+                ("work", Some(times.work_ns)),
+            ];
+            for (part, duration_ns) in parts {
+                let Some(duration_ns) = duration_ns else {
+                    continue;
+                };
+                let stage = StageId::name(times.stage);
+                let hop = self.hops.get_or_create(&Hop { stage, part });
+                hop.observe(seconds(duration_ns));
+            }
+        }
+    }
+}
