@@ -194,5 +194,5 @@ fn the_method_in_one_process_breaks_the_chain_at_the_same_scan() {
 }
 
 fn pair_network() -> PathBuf {
-    Path::new(crate::PROJECT).join("shared/masking/tests/models/pair-127.toml")
+    Path::new(crate::PROJECT).join("shared/method/masking/tests/models/pair-127.toml")
 }

@@ -107,7 +107,7 @@ fn trajectories_and_motions_without_end_are_refused() {
 #[test]
 fn a_model_and_a_card_without_end_are_refused() {
     let folder = tempfile::tempdir().unwrap();
-    let models = Path::new(crate::PROJECT).join("shared/masking/tests/models");
+    let models = Path::new(crate::PROJECT).join("shared/method/masking/tests/models");
     let run = |card: &Path| {
         let model = format!("masking.model='{}'", card.display());
         let out = folder.path().join("out");

@@ -92,7 +92,7 @@ fn with_networks_of_one_and_of_two_scans() {
     }
     for model in ["single-127", "pair-127"] {
         let card = Path::new(crate::PROJECT)
-            .join("shared/masking/tests/models")
+            .join("shared/method/masking/tests/models")
             .join(model)
             .with_extension("toml");
         assert_same_bits(&Run::of_recording().masked_by(&card));

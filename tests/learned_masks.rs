@@ -17,7 +17,7 @@ pub const TWO_SCANS: &str = "pair-127";
 
 pub fn card(model: &str) -> PathBuf {
     Path::new(crate::PROJECT)
-        .join("shared/masking/tests/models")
+        .join("shared/method/masking/tests/models")
         .join(model)
         .with_extension("toml")
 }

@@ -34,7 +34,7 @@ fn masks_of(data: &Path, folder: &Path, arguments: &[&str]) -> Ended {
 
 /// The `--set` sentences of a learned mask.
 fn learned(model: &str) -> [String; 2] {
-    let models = Path::new(crate::PROJECT).join("shared/masking/tests/models");
+    let models = Path::new(crate::PROJECT).join("shared/method/masking/tests/models");
     [
         "masking.kind=learned".to_owned(),
         format!("masking.model='{}'", models.join(model).display()),

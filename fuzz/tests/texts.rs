@@ -112,7 +112,8 @@ fn run_configurations() {
 #[test]
 fn model_cards() {
     let target = Target::new("model_cards", 16);
-    let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/masking/tests/models");
+    let models =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/method/masking/tests/models");
     let (folder, card) = (
         folder(),
         fs::read_to_string(models.join("single-127.toml")).unwrap(),

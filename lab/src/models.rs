@@ -69,7 +69,7 @@ mod tests {
     use super::*;
 
     fn fixtures() -> PathBuf {
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/masking/tests/models")
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/method/masking/tests/models")
     }
 
     fn find(folder: &Path, names: &[&str], n: usize, cell_m: Option<f32>) -> Result<Model, String> {

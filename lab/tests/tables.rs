@@ -29,7 +29,7 @@ echo '{"torch": "0.0", "threads": 1, "rows": [
 /// Puts a model of the tests of masking into a folder's `models`.
 fn install(folder: &Path, fixture: &str, name: &str) {
     let (from, to) = (
-        Path::new(crate::PROJECT).join("shared/masking/tests/models"),
+        Path::new(crate::PROJECT).join("shared/method/masking/tests/models"),
         folder.join("models"),
     );
     fs::create_dir_all(&to).unwrap();

@@ -53,7 +53,7 @@ def test_rasters_and_points_are_not_copied() -> None:
 
 
 def test_a_mask_of_two_scans_masks_the_previous_one_too() -> None:
-    model = Path(__file__).parents[2] / "shared/masking/tests/models/pair-127.toml"
+    model = Path(__file__).parents[2] / "shared/method/masking/tests/models/pair-127.toml"
     masking = {"kind": "learned", "model": model, "backend": "tract"}
     config = gyre.Config({"masking": masking, "raster": {"n": 127, "cell_m": 0.8}})
     masker, odometry = gyre.Masker(config), gyre.Odometry(config)
@@ -118,7 +118,7 @@ def without_times() -> gyre.Scan:
 def test_a_network_that_fails_is_not_the_fault_of_the_scan(tmp_path: Path) -> None:
     if not os.environ.get("ORT_DYLIB_PATH"):
         pytest.skip("tract computes a number of anything: ORT_DYLIB_PATH names no ONNX Runtime")
-    models = ROOT / "shared/masking/tests/models"
+    models = ROOT / "shared/method/masking/tests/models"
     model, scale = (models / "single-127.onnx").read_bytes(), b"B\x05scaleJ\x04" + struct.pack("<f", 1 / 16)
     assert model.count(scale) == 1
     broken = model.replace(scale, scale[:-4] + struct.pack("<f", float("nan")))

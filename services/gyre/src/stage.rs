@@ -45,9 +45,9 @@ fn work_of_stage(stage: StageId) -> Work {
     match stage {
         StageId::RadarReplay => play,
         StageId::Masking => gyre_masking_stage::run,
-        StageId::RotationSearch => gyre_rotation_search::run,
-        StageId::TranslationSearch => gyre_translation_search::run,
-        StageId::JointSearch => gyre_joint_search::run,
+        StageId::RotationSearch => gyre_search::rotation::run,
+        StageId::TranslationSearch => gyre_search::translation::run,
+        StageId::JointSearch => gyre_search::joint::run,
         StageId::Refinement => gyre_refinement::run,
         StageId::PoseIntegration => integrate,
     }

@@ -1,0 +1,163 @@
+//! The messages of a span.
+
+use std::{
+    collections::BTreeMap,
+    fs::File,
+    path::{Path, PathBuf},
+};
+
+use crate::damaged::Span;
+use mcap::{McapError, records::Record};
+
+use crate::{BagError, spans::spans};
+
+/// The largest record that is read, bytes: several times the largest scan.
+const MAX_RECORD_BYTES: usize = 64 << 20;
+/// The largest span that is read, bytes, of messages that are wanted.
+const MAX_KEPT_BYTES: usize = 256 << 20;
+/// The largest span, bytes in the file. ROS 2's chunks have 768 kB.
+const MAX_SPAN_BYTES: u64 = 256 << 20;
+
+/// The largest number of channels and of schemas of a file, the longest name of a topic, and what is kept of a schema, bytes.
+const MAX_CHANNELS: usize = 4096;
+const MAX_NAME_BYTES: usize = 1024;
+const MAX_SCHEMA_BYTES: usize = 4096;
+
+/// A channel of a file.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Channel {
+    pub topic: String,
+    /// The type, such as `nav_msgs/msg/Odometry`.
+    pub type_name: String,
+    /// The type's definition.
+    pub schema: String,
+    /// The encoding of its messages.
+    pub encoding: String,
+}
+
+/// A message.
+#[derive(Clone, Debug)]
+pub(crate) struct Message {
+    pub channel: u16,
+    /// When it was received, ns since 1970.
+    pub log_ns: i64,
+    pub data: Vec<u8>,
+}
+
+/// A file of a bag.
+#[derive(Debug)]
+pub(crate) struct BagFile {
+    pub path: PathBuf,
+    file: File,
+    schemas: BTreeMap<u16, (String, String)>,
+    pub channels: BTreeMap<u16, Channel>,
+    /// Whether its writer came to its end.
+    pub is_complete: bool,
+    /// Whether it lists its channels at its end.
+    pub has_summary: bool,
+}
+
+impl BagFile {
+    /// Opens a file, and returns the spans of its messages.
+    pub fn open(path: &Path) -> Result<(Self, Vec<Span>), BagError> {
+        let file = File::open(path).map_err(|error| BagError::io(path, error))?;
+        let found = spans(path, &file)?;
+        let mut bag = Self {
+            path: path.to_owned(),
+            file,
+            schemas: BTreeMap::new(),
+            channels: BTreeMap::new(),
+            is_complete: found.is_complete,
+            has_summary: false,
+        };
+        for span in found.summary {
+            bag.read(span, |_| false)?;
+        }
+        bag.has_summary = !bag.channels.is_empty();
+        Ok((bag, found.messages))
+    }
+
+    /// Returns the messages of a span that are of wanted channels, and learns the channels in it.
+    ///
+    /// # Errors
+    /// It cannot be read, or is damaged.
+    pub fn read(
+        &mut self,
+        span: Span,
+        wanted: impl Fn(&Channel) -> bool,
+    ) -> Result<Vec<Message>, BagError> {
+        let mut messages = Vec::new();
+        let read = match span.bytes <= MAX_SPAN_BYTES {
+            true => {
+                let bytes = crate::damaged::read(&self.file, span);
+                let bytes = bytes.map_err(|error| BagError::io(&self.path, error))?;
+                self.parse(&bytes, &wanted, &mut messages)
+            }
+            false => Err(McapError::ChunkTooLarge(span.bytes)),
+        };
+        read.map_err(|error| BagError::Damaged {
+            path: self.path.clone(),
+            offset: span.offset,
+            reason: error.to_string(),
+        })?;
+        Ok(messages)
+    }
+
+    fn parse(
+        &mut self,
+        bytes: &[u8],
+        wanted: &impl Fn(&Channel) -> bool,
+        messages: &mut Vec<Message>,
+    ) -> Result<(), McapError> {
+        let mut kept = 0;
+        crate::damaged::records(bytes, MAX_RECORD_BYTES, |record| {
+            let Some(message) = self.learn(record, wanted) else {
+                return Ok(());
+            };
+            kept += message.data.len();
+            if kept > MAX_KEPT_BYTES {
+                return Err(McapError::ChunkTooLarge(kept as u64));
+            }
+            messages.push(message);
+            Ok(())
+        })
+    }
+
+    /// Learns channels, and returns a message that is wanted.
+    fn learn(&mut self, record: Record<'_>, wanted: &impl Fn(&Channel) -> bool) -> Option<Message> {
+        match record {
+            Record::Schema { header, data }
+                if self.schemas.len() < MAX_CHANNELS && header.name.len() <= MAX_NAME_BYTES =>
+            {
+                let text = &data[..data.len().min(MAX_SCHEMA_BYTES)];
+                let text = String::from_utf8_lossy(text).into_owned();
+                self.schemas.insert(header.id, (header.name, text));
+            }
+            Record::Channel(channel)
+                if self.channels.len() < MAX_CHANNELS
+                    && channel.topic.len() <= MAX_NAME_BYTES
+                    && !channel.topic.contains(char::is_control) =>
+            {
+                let schema = self.schemas.get(&channel.schema_id);
+                let (type_name, schema) = schema.cloned().unwrap_or_default();
+                let learned = Channel {
+                    topic: channel.topic,
+                    type_name,
+                    schema,
+                    encoding: channel.message_encoding,
+                };
+                self.channels.insert(channel.id, learned);
+            }
+            Record::Message { header, data } => {
+                let channel = self.channels.get(&header.channel_id)?;
+                return wanted(channel).then(|| Message {
+                    channel: header.channel_id,
+                    log_ns: i64::try_from(header.log_time).unwrap_or(i64::MAX),
+                    data: data.into_owned(),
+                });
+            }
+            _ => {}
+        }
+        None
+    }
+}

@@ -1,0 +1,412 @@
+//! The scans of a bag as a dataset.
+
+mod index;
+
+use std::path::{Path, PathBuf};
+
+use crate::damaged::Span;
+use gyre_colossus::{Constants, SweepAssembler};
+use gyre_radar::{
+    AzimuthSource, DEFAULT_TURN_NS, Dataset, DatasetOptions, FileList, Format, ImageSize,
+    OpenError, ReadError, ScanLimits, ScanSlot, SweepGeometry, turn_ns,
+};
+
+use crate::{
+    BagError,
+    azimuths::{Described, azimuths, described},
+    files::files,
+    radar::Survey,
+    reading::{BagFile, Channel, Message},
+    topics::{Kind, Topics},
+};
+use index::{Entry, Index};
+
+/// Opens the scans in a bag.
+///
+/// # Errors
+/// It has no scans, or cannot be read; options that it cannot be read with.
+pub fn open(path: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
+    options.check()?;
+    open_files(path, &files(path)?, options)
+}
+
+/// Opens the scans in a bag again, with the files that it had.
+///
+/// # Errors
+/// As [`open`].
+pub fn reopen(
+    path: &Path,
+    options: &DatasetOptions,
+    files: &FileList,
+) -> Result<Box<dyn Dataset>, OpenError> {
+    options.check()?;
+    let paths = (0..files.len()).filter_map(|index| files.get(index));
+    let paths: Vec<PathBuf> = paths.map(Path::to_owned).collect();
+    open_files(path, &paths, options)
+}
+
+fn open_files(
+    path: &Path,
+    paths: &[PathBuf],
+    options: &DatasetOptions,
+) -> Result<Box<dyn Dataset>, OpenError> {
+    if options.azimuth_source == Some(AzimuthSource::Uniform) {
+        return Err(OpenError::BadOption {
+            key: "azimuth_source",
+            value: "uniform".to_owned(),
+            format: Format::Ros2Bag.to_string(),
+            reason: "its azimuths are those of the encoder; leave the key out",
+        });
+    }
+    Ok(Box::new(Scans::open(path, paths, options)?))
+}
+
+/// The files of a bag, and the spans of the messages in them.
+struct Bag {
+    path: PathBuf,
+    files: Vec<BagFile>,
+    /// The number of the file of each span, and the span.
+    spans: Vec<(usize, Span)>,
+}
+
+impl Bag {
+    fn open(path: &Path, paths: &[PathBuf]) -> Result<Self, BagError> {
+        let mut bag = Self {
+            path: path.to_owned(),
+            files: Vec::new(),
+            spans: Vec::new(),
+        };
+        for (number, path) in paths.iter().enumerate() {
+            let (file, spans) = BagFile::open(path)?;
+            bag.files.push(file);
+            bag.spans
+                .extend(spans.into_iter().map(|span| (number, span)));
+        }
+        Ok(bag)
+    }
+
+    /// Returns the messages of a span that are wanted.
+    fn read(
+        &mut self,
+        span: usize,
+        wanted: impl Fn(&Channel) -> bool,
+    ) -> Result<Vec<Message>, BagError> {
+        let Some(&(file, span)) = self.spans.get(span) else {
+            return Ok(Vec::new());
+        };
+        self.files[file].read(span, wanted)
+    }
+
+    fn channels(&self) -> Vec<&Channel> {
+        let files = self.files.iter();
+        files.flat_map(|file| file.channels.values()).collect()
+    }
+
+    /// Learns all channels. A file without a list of them is read as a whole.
+    fn learn_channels(&mut self) {
+        for span in 0..self.spans.len() {
+            let (file, _) = self.spans[span];
+            if !self.files[file].has_summary {
+                // What is damaged has no channels.
+                let _ = self.read(span, |_| false);
+            }
+        }
+    }
+
+    /// Describes the radar: by its first configuration, otherwise by what its azimuths and the options show. Also returns whether it has
+    /// described itself.
+    fn describe(
+        &mut self,
+        topics: &Topics,
+        options: &DatasetOptions,
+    ) -> Result<(Described, bool), BagError> {
+        let mut survey = Survey::new(topics.scans.kind);
+        for span in 0..self.spans.len() {
+            let messages = self.read(span, |channel| topics.has(channel));
+            for message in messages.unwrap_or_default() {
+                match self.configuration(self.spans[span].0, topics, &message) {
+                    Some(described) => return Ok((described, true)),
+                    None if !survey.is_done() => survey.add(&message),
+                    None => {}
+                }
+            }
+            if survey.is_done() && topics.configuration.is_none() {
+                break;
+            }
+        }
+        Ok((survey.describe(&self.path, options)?, false))
+    }
+
+    /// Returns what a message says of the radar, if it is of that topic and can be used.
+    fn configuration(&self, file: usize, topics: &Topics, message: &Message) -> Option<Described> {
+        let topic = topics.configuration.as_ref()?;
+        let channel = self.files[file].channels.get(&message.channel)?;
+        match topic.kind {
+            Kind::Configuration(form) if channel.topic == topic.name => {
+                let described = described(form, message).ok()?;
+                described.radar.check().is_ok().then_some(described)
+            }
+            _ => None,
+        }
+    }
+}
+
+/// The scans of a bag.
+struct Scans {
+    bag: Bag,
+    topics: Topics,
+    described: Described,
+    constants: Constants,
+    index: Index,
+    files: FileList,
+    period_ns: i64,
+    notes: Vec<String>,
+    /// The span that was read last, and its messages of scans.
+    kept: Option<(u32, Vec<Message>)>,
+}
+
+impl Scans {
+    fn open(path: &Path, paths: &[PathBuf], options: &DatasetOptions) -> Result<Self, BagError> {
+        let mut bag = Bag::open(path, paths)?;
+        bag.learn_channels();
+        let wished = options.topic.as_ref().map(|topic| topic.as_str());
+        let topics = Topics::choose(path, &bag.channels(), wished)?;
+        let (mut described, is_own) = bag.describe(&topics, options)?;
+        if let Some(counts) = options.encoder_counts {
+            described.radar.encoder_size = counts;
+        }
+        let constants = Constants::from(options);
+        let assembler = SweepAssembler::new(&described.radar, constants);
+        let assembler = assembler
+            .map_err(|error| BagError::unreadable(path, format!("cannot be read: {error}")))?;
+        let index = Index::of(&mut bag, &topics, &described, assembler)?;
+        if index.entries.is_empty() {
+            let reason = format!("has no complete turn of the radar on {}", topics.scans.name);
+            return Err(BagError::unreadable(path, reason));
+        }
+        let stamps = index.entries.iter().map(|entry| entry.stamp_ns);
+        Ok(Self {
+            period_ns: turn_ns(stamps).unwrap_or(DEFAULT_TURN_NS),
+            notes: notes(&bag, &topics, &described, is_own, &index),
+            files: paths.iter().cloned().collect(),
+            bag,
+            topics,
+            described,
+            constants,
+            index,
+            kept: None,
+        })
+    }
+
+    fn assembler(&self) -> Option<SweepAssembler> {
+        SweepAssembler::new(&self.described.radar, self.constants).ok()
+    }
+
+    /// Returns the messages of scans of a span.
+    fn messages(&mut self, span: u32) -> Result<Vec<Message>, BagError> {
+        if let Some((kept, messages)) = self.kept.take_if(|(kept, _)| *kept == span) {
+            debug_assert_eq!(kept, span);
+            return Ok(messages);
+        }
+        let topic = &self.topics.scans.name;
+        self.bag
+            .read(span as usize, |channel| channel.topic == *topic)
+    }
+
+    /// Assembles a scan from the azimuths from its entry's start on.
+    fn assemble(
+        &mut self,
+        index: usize,
+        entry: Entry,
+        mut slot: ScanSlot<'_>,
+    ) -> Result<Option<SweepGeometry>, BagError> {
+        let Some(mut assembler) = self.assembler() else {
+            return Ok(None);
+        };
+        let mut clock = self.index.clock(index);
+        let mut found = None;
+        for span in entry.start.span..=entry.end.span {
+            let messages = match self.messages(span) {
+                // The index went on behind it, too.
+                Err(BagError::Damaged { .. }) => Vec::new(),
+                read => read?,
+            };
+            let first = if span == entry.start.span {
+                entry.start.message as usize
+            } else {
+                0
+            };
+            for (number, message) in messages.iter().enumerate().skip(first) {
+                let mut skipped =
+                    match (span, number as u32) == (entry.start.span, entry.start.message) {
+                        true => entry.start.row,
+                        false => 0,
+                    };
+                // A damaged one between was left out of the index, too.
+                let _ = azimuths(
+                    self.topics.scans.kind,
+                    message,
+                    &self.described,
+                    |azimuth, received_ns| {
+                        if skipped > 0 {
+                            skipped -= 1;
+                            return;
+                        }
+                        for (azimuth, stamp_ns) in clock.stamp(azimuth, received_ns) {
+                            if found.is_none() {
+                                found = assembler.add(&azimuth, stamp_ns, reborrow(&mut slot));
+                            }
+                        }
+                    },
+                );
+                if found.is_some() {
+                    break;
+                }
+            }
+            self.kept = Some((span, messages));
+        }
+        Ok(found.map(|sweep| sweep.geometry))
+    }
+}
+
+fn reborrow<'a>(slot: &'a mut ScanSlot<'_>) -> ScanSlot<'a> {
+    ScanSlot {
+        bytes: slot.bytes,
+        azimuth_rad: slot.azimuth_rad,
+        stamp_ns: slot.stamp_ns,
+        flags: slot.flags,
+    }
+}
+
+/// Returns what is known of the radar, and what is missing: whole sentences.
+fn notes(
+    bag: &Bag,
+    topics: &Topics,
+    described: &Described,
+    is_own: bool,
+    index: &Index,
+) -> Vec<String> {
+    let radar = &described.radar;
+    let mut notes = vec![match is_own {
+        true => format!(
+            "Scans are on {}, {} azimuths of {} bins, {} encoder counts per turn, as the radar says of itself.",
+            topics.scans.name, radar.azimuth_samples, radar.range_in_bins, radar.encoder_size
+        ),
+        false => format!(
+            "Scans are on {}; the radar does not describe itself in the bag: {} azimuths of {} bins are as found, {} encoder counts per \
+             turn as configured (default: 5600).",
+            topics.scans.name, radar.azimuth_samples, radar.range_in_bins, radar.encoder_size
+        ),
+    }];
+    notes.extend(index.notes());
+    let cut = bag.files.iter().filter(|file| !file.is_complete);
+    notes.extend(cut.map(|file| {
+        format!(
+            "{} has no end: its recorder was killed, or it was not copied whole.",
+            file.path.display()
+        )
+    }));
+    notes
+}
+
+impl Dataset for Scans {
+    fn format(&self) -> Format {
+        Format::Ros2Bag
+    }
+
+    fn len(&self) -> usize {
+        self.index.entries.len()
+    }
+
+    fn limits(&self) -> ScanLimits {
+        self.index.limits
+    }
+
+    fn image_size(&self) -> ImageSize {
+        ImageSize {
+            width: usize::from(self.described.radar.range_in_bins),
+            height: usize::from(self.described.radar.azimuth_samples),
+        }
+    }
+
+    fn files(&self) -> &FileList {
+        &self.files
+    }
+
+    fn file(&self, index: usize) -> &Path {
+        let entry = self.index.entries.get(index);
+        let span = entry.and_then(|entry| self.bag.spans.get(entry.end.span as usize));
+        let file = span.and_then(|(file, _)| self.bag.files.get(*file));
+        file.map_or(Path::new(""), |file| &file.path)
+    }
+
+    fn nominal_stamp_ns(&self, index: usize) -> Option<i64> {
+        Some(self.index.entries.get(index)?.stamp_ns)
+    }
+
+    fn period_ns(&self) -> i64 {
+        self.period_ns
+    }
+
+    fn logged_stamp_ns(&self, index: usize) -> Option<i64> {
+        Some(self.index.entries.get(index)?.logged_ns)
+    }
+
+    fn stamp_meaning(&self) -> &'static str {
+        "Logged stamps are times at which the bag received the end of a turn; each azimuth has the radar's own time, and the time of a scan \
+         is the middle of its first and last."
+    }
+
+    fn encoder_counts(&self) -> Option<u16> {
+        Some(self.described.radar.encoder_size)
+    }
+
+    fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError> {
+        let len = self.len();
+        let entry = *self
+            .index
+            .entries
+            .get(index)
+            .ok_or(ReadError::NoSuchScan { index, len })?;
+        check_capacity(&self.limits(), &slot)?;
+        let path = self.file(index).to_owned();
+        if entry.is_damaged {
+            let reason = format!("the message of scan {index} cannot be decoded");
+            return Err(ReadError::Damaged { path, reason });
+        }
+        match self.assemble(index, entry, slot) {
+            Ok(Some(geometry)) => Ok(geometry),
+            Ok(None) => Err(ReadError::Damaged {
+                path,
+                reason: format!("scan {index} is not as it was when the bag was opened"),
+            }),
+            Err(BagError::Io { path, source }) => Err(ReadError::Io { path, source }),
+            Err(error) => Err(ReadError::Damaged {
+                path,
+                reason: error.to_string(),
+            }),
+        }
+    }
+}
+
+fn check_capacity(limits: &ScanLimits, slot: &ScanSlot<'_>) -> Result<(), ReadError> {
+    for (what, needed, actual) in [
+        ("bytes", limits.bytes, slot.bytes.len()),
+        ("azimuths", limits.azimuths, slot.azimuth_rad.len()),
+        ("stamps", limits.azimuths, slot.stamp_ns.len()),
+        ("flags", limits.azimuths, slot.flags.len()),
+    ] {
+        if actual < needed {
+            return Err(ReadError::SlotTooSmall {
+                what,
+                needed,
+                actual,
+            });
+        }
+    }
+    Ok(())
+}

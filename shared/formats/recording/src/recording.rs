@@ -1,0 +1,308 @@
+//! A recording, opened: where each message is, and the messages.
+
+use std::{
+    collections::BTreeMap,
+    fs::File,
+    path::{Path, PathBuf},
+};
+
+use foxglove::{Decode, messages::RawImage};
+use gyre_bags::damaged::Span;
+use gyre_messages::{Item, topic};
+
+use crate::{
+    Entry, Head, RecordingError,
+    chunk::{self, Channels, Message},
+    exact_channel,
+    image::{Rows, read},
+    table::Table,
+    view::image_channel,
+    walk::{Step, Walk},
+};
+
+/// Chunks that are kept in memory: messages of one scan can be in two.
+const KEPT: usize = 2;
+
+/// A wire message as it was recorded.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Stored {
+    /// The bytes of its header.
+    pub header: Vec<u8>,
+    /// The bytes of its payload that the header describes.
+    pub payload: Vec<u8>,
+}
+
+/// An open recording with all its parts.
+pub struct Recording {
+    head: Head,
+    parts: Vec<Part>,
+    /// The messages of each topic by their sequence number.
+    places: BTreeMap<String, BTreeMap<u64, Place>>,
+    kept: Vec<Kept>,
+}
+
+/// A file of a recording.
+struct Part {
+    path: PathBuf,
+    file: File,
+    channels: Channels,
+    missed: BTreeMap<String, u64>,
+    /// Whether its writer came to its end.
+    is_complete: bool,
+}
+
+/// The place of a message.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    entry: Entry,
+    part: usize,
+    chunk: Span,
+}
+
+/// The messages of a part: their topic, and the chunk that they are in.
+type Places = Vec<(String, Entry, Span)>;
+
+/// The messages of a chunk in memory.
+struct Kept {
+    part: usize,
+    chunk: Span,
+    messages: Vec<Message>,
+}
+
+impl Recording {
+    /// Opens the files of a recording, in order. Those of another one after the first are left out.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or is no recording.
+    pub fn open(paths: &[PathBuf]) -> Result<Self, RecordingError> {
+        let mut recording: Option<Self> = None;
+        for path in paths {
+            let (head, part, places) = Part::open(path)?;
+            let recording = recording.get_or_insert_with(|| Self {
+                head: head.clone(),
+                parts: Vec::new(),
+                places: BTreeMap::new(),
+                kept: Vec::new(),
+            });
+            if head.id != recording.head.id {
+                break;
+            }
+            recording.add(part, places);
+        }
+        recording.ok_or_else(|| RecordingError::Io {
+            path: PathBuf::new(),
+            source: std::io::ErrorKind::NotFound.into(),
+        })
+    }
+
+    /// Adds a part. A message that an earlier one has is the same.
+    fn add(&mut self, part: Part, places: Places) {
+        let number = self.parts.len();
+        self.parts.push(part);
+        for (topic, entry, chunk) in places {
+            let place = Place {
+                entry,
+                part: number,
+                chunk,
+            };
+            self.places
+                .entry(topic)
+                .or_default()
+                .entry(entry.seq)
+                .or_insert(place);
+        }
+    }
+
+    /// Returns the run that it is of.
+    pub fn head(&self) -> &Head {
+        &self.head
+    }
+
+    /// Returns its files.
+    pub fn paths(&self) -> impl Iterator<Item = &Path> {
+        self.parts.iter().map(|part| part.path.as_path())
+    }
+
+    /// Returns the messages of a topic in the order of their sequence numbers.
+    pub fn entries(&self, topic: &str) -> impl Iterator<Item = Entry> + '_ {
+        let places = self.places.get(topic).into_iter().flatten();
+        places.map(|(_, place)| place.entry)
+    }
+
+    /// Returns the file that holds a message; the first one if none does.
+    pub fn path_of(&self, topic: &str, seq: u64) -> &Path {
+        let place = self.places.get(topic).and_then(|places| places.get(&seq));
+        &self.parts[place.map_or(0, |place| place.part)].path
+    }
+
+    /// Returns the numbers of messages that the recorders have counted as missed, by topic. One that is in another part counts all the same.
+    pub fn missed(&self) -> BTreeMap<&str, u64> {
+        let mut missed = BTreeMap::new();
+        for (topic, count) in self.parts.iter().flat_map(|part| &part.missed) {
+            *missed.entry(topic.as_str()).or_default() += count;
+        }
+        missed
+    }
+
+    /// Returns the files whose writers were killed.
+    pub fn cut(&self) -> impl Iterator<Item = &Path> {
+        let cut = self.parts.iter().filter(|part| !part.is_complete);
+        cut.map(|part| part.path.as_path())
+    }
+
+    /// Reads a message.
+    ///
+    /// # Errors
+    /// It was not recorded, cannot be read, or is damaged.
+    pub fn read(&mut self, topic: &str, seq: u64) -> Result<Stored, RecordingError> {
+        let place = self.places.get(topic).and_then(|places| places.get(&seq));
+        let Some(place) = place.copied() else {
+            return Err(RecordingError::Absent {
+                path: self.parts[0].path.clone(),
+                topic: topic.to_owned(),
+                seq,
+            });
+        };
+        let damaged = |path: &Path| RecordingError::Damaged {
+            path: path.to_owned(),
+            offset: place.chunk.offset,
+            reason: format!(
+                "it has no complete message {seq} of topic `{topic}`, which its table lists"
+            ),
+        };
+        let kept = self.keep(place)?;
+        let (messages, part) = (&self.kept[kept].messages, &self.parts[place.part]);
+        stored(messages, &part.channels, topic, seq).ok_or_else(|| damaged(&part.path))
+    }
+
+    /// Reads the header of a message.
+    ///
+    /// # Errors
+    /// As [`Recording::read`]; a header that is not of the type.
+    pub fn read_header<H: bytemuck::AnyBitPattern>(
+        &mut self,
+        topic: &str,
+        seq: u64,
+    ) -> Result<H, RecordingError> {
+        let stored = self.read(topic, seq)?;
+        read(&stored.header).ok_or_else(|| RecordingError::Foreign {
+            path: self.path_of(topic, seq).to_owned(),
+            reason: format!("its messages of topic `{topic}` are of another version"),
+        })
+    }
+
+    /// Returns the position of a chunk among those in memory, and reads it first if it is not there.
+    fn keep(&mut self, place: Place) -> Result<usize, RecordingError> {
+        let is_it = |kept: &Kept| (kept.part, kept.chunk) == (place.part, place.chunk);
+        if let Some(index) = self.kept.iter().position(is_it) {
+            return Ok(index);
+        }
+        if self.kept.len() == KEPT {
+            self.kept.remove(0);
+        }
+        let part = &mut self.parts[place.part];
+        let messages = chunk::read(&part.path, &part.file, place.chunk, &mut part.channels)?;
+        self.kept.push(Kept {
+            part: place.part,
+            chunk: place.chunk,
+            messages,
+        });
+        Ok(self.kept.len() - 1)
+    }
+}
+
+impl Part {
+    /// Opens a file: its head, and where its messages are.
+    fn open(path: &Path) -> Result<(Head, Self, Places), RecordingError> {
+        let file = File::open(path).map_err(|source| RecordingError::Io {
+            path: path.to_owned(),
+            source,
+        })?;
+        let mut part = Self {
+            path: path.to_owned(),
+            file,
+            channels: Channels::new(),
+            missed: BTreeMap::new(),
+            is_complete: false,
+        };
+        let (mut head, mut places, mut chunk) = (None, Vec::new(), None);
+        let mut walk = Walk::new(&part.path, &part.file)?;
+        while let Some(step) = walk.next()? {
+            match step {
+                Step::End => {
+                    part.is_complete = true;
+                    break;
+                }
+                Step::Chunk(span) => {
+                    // The first one has the channels.
+                    if part.channels.is_empty() {
+                        chunk::read(&part.path, &part.file, span, &mut part.channels)?;
+                    }
+                    chunk = Some(span);
+                }
+                Step::Metadata(record) => {
+                    if let Some(read) = Head::of_metadata(&record) {
+                        head = Some(read.map_err(|reason| part.foreign(reason))?);
+                    } else if let (Some(table), Some(chunk)) =
+                        (Table::of_metadata(&record), chunk.take())
+                    {
+                        part.missed = table.missed;
+                        places.extend(in_chunk(table.entries, chunk));
+                    }
+                }
+            }
+        }
+        let head =
+            head.ok_or_else(|| part.foreign("it has no metadata `gyre.recording`".to_owned()))?;
+        Ok((head, part, places))
+    }
+
+    fn foreign(&self, reason: String) -> RecordingError {
+        RecordingError::Foreign {
+            path: self.path.clone(),
+            reason,
+        }
+    }
+}
+
+fn in_chunk(
+    entries: BTreeMap<String, Vec<Entry>>,
+    chunk: Span,
+) -> impl Iterator<Item = (String, Entry, Span)> {
+    let topics = entries.into_iter();
+    topics.flat_map(move |(topic, entries)| {
+        entries
+            .into_iter()
+            .map(move |entry| (topic.clone(), entry, chunk))
+    })
+}
+
+/// Puts a message together.
+fn stored(messages: &[Message], channels: &Channels, name: &str, seq: u64) -> Option<Stored> {
+    let on = |message: &Message, channel: &str| {
+        let is_named = channels
+            .get(&message.channel)
+            .is_some_and(|name| name == channel);
+        is_named && message.sequence == seq as u32
+    };
+    let exact = exact_channel(name);
+    let index = messages.iter().position(|message| on(message, &exact))?;
+    let (header, rest) = messages[index]
+        .data
+        .split_at_checked(topic(name)?.header_bytes)?;
+    let item: Item = read(header.get(..size_of::<Item>())?)?;
+    let payload = match (image_channel(name), Rows::of(name, header)) {
+        (Some(channel), Some(rows)) => {
+            let image = messages[..index]
+                .last()
+                .filter(|message| on(message, channel))?;
+            let image = RawImage::decode(image.data.as_slice()).ok()?;
+            rows.join(&image.data, rest)?
+        }
+        _ => rest.to_vec(),
+    };
+    (item.seq == seq).then(|| Stored {
+        header: header.to_vec(),
+        payload,
+    })
+}

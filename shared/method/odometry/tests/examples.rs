@@ -1,0 +1,56 @@
+//! The examples that people copy: `examples/own_sensor.rs` and `examples/own_dataset.rs`.
+#![allow(clippy::unwrap_used)]
+
+#[allow(dead_code)] // Its `main`.
+#[path = "../../../../examples/own_dataset.rs"]
+mod own_dataset;
+#[allow(dead_code)] // Its `main`.
+#[path = "../../../../examples/own_sensor.rs"]
+mod own_sensor;
+
+use std::fs;
+
+use gyre_radar::{DatasetOptions, inspect_dataset};
+use gyre_simulator::{Profile, SimulatedDrive, SimulationConfig};
+use own_dataset::RawSweeps;
+
+#[test]
+fn an_own_sensor_drives_two_metres_in_each_sweep() {
+    let drive = own_sensor::drive(20).unwrap();
+    let end = drive[19].pose.motion.translation.vector;
+    assert!((end.x - 38.0).abs() < 0.3 && end.y.abs() < 0.3, "{end}");
+}
+
+#[test]
+fn an_own_dataset_is_registered_and_inspected() {
+    let mut config = SimulationConfig {
+        scans: Some(8),
+        ..SimulationConfig::default()
+    };
+    config.sensor.profile = Profile::Cts350xRadiate;
+    let drive = SimulatedDrive::new(&config).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    for index in 0..drive.scans() {
+        let scan = drive.simulator().render_scan(index).scan;
+        let power: Vec<u8> = scan.view().power().iter().copied().collect();
+        let name = format!("{}.u8", scan.geometry.stamp_ns);
+        fs::write(folder.path().join(name), power).unwrap();
+    }
+
+    let trajectory = own_dataset::drive(&mut RawSweeps::open(folder.path()).unwrap()).unwrap();
+    let pose = |index| drive.simulator().pose(index);
+    let truth = pose(0).inv_mul(&pose(7));
+    let off = truth.inv_mul(&trajectory.poses[7]).translation.vector;
+    assert!(truth.translation.vector.norm() > 5.0);
+    assert!(off.norm() < 0.5, "{off}");
+
+    let damaged = fs::read_dir(folder.path()).unwrap().next().unwrap();
+    fs::write(damaged.unwrap().path(), "too short").unwrap();
+    let dataset = Box::new(RawSweeps::open(folder.path()).unwrap());
+    let options = DatasetOptions::default();
+    let report = inspect_dataset(folder.path(), dataset, &options, None).to_string();
+    assert!(
+        report.contains("other") && report.contains("has 9 bytes"),
+        "{report}"
+    );
+}

@@ -1,0 +1,52 @@
+//! Two scans of a standing vehicle, in both forms in which MulRan has them.
+#![allow(clippy::unwrap_used)]
+
+use std::{env, fs, path::Path};
+
+use gyre_geometry::xy_yaw;
+use gyre_odometry::{Odometry, OdometryConfig};
+use gyre_radar::{DatasetOptions, OwnedScan};
+use serde::Deserialize;
+
+#[derive(Deserialize)]
+struct Configuration {
+    dataset: DatasetOptions,
+    #[serde(flatten)]
+    odometry: OdometryConfig,
+}
+
+/// The motion between the first two scans: x, y (m), yaw (rad).
+fn motion(recording: &Path, hold: bool) -> [f64; 3] {
+    let project = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..");
+    let text = fs::read_to_string(project.join("configs/mulran.toml")).unwrap();
+    let mut config: Configuration = toml::from_str(&text).unwrap();
+    config.odometry.refinement.hold_standstill = hold;
+    let mut dataset = gyre_radar::open(recording, &config.dataset).unwrap();
+    let mut scan = OwnedScan::with_limits(dataset.limits());
+    let mut odometry = Odometry::new(&config.odometry).unwrap();
+    let registered = [0, 1].map(|index| {
+        scan.geometry = dataset.read(index, scan.slot()).unwrap();
+        odometry.register(&scan.view()).unwrap()
+    });
+    xy_yaw(&registered[1].motion.motion)
+}
+
+#[test]
+fn both_forms_of_mulran_stand_still() {
+    let Some(data) = env::var_os("GYRE_DATA") else {
+        println!("skipped: GYRE_DATA is not set");
+        return;
+    };
+    let samples = Path::new(&data).join("samples");
+    let forms = ["mulran-kaist03", "mulran-kaist03-raw"].map(|name| samples.join(name));
+    let [rows, raw] = [0, 1].map(|form| motion(&forms[form], true));
+    println!("{rows:?} {raw:?}");
+    assert_eq!(rows, raw);
+    let [x_m, y_m, yaw_rad] = rows;
+    assert!(x_m.hypot(y_m) <= 0.02 && yaw_rad.abs().to_degrees() <= 0.03);
+    // As measured, they differ by no more than what their times differ.
+    let [rows, raw] = [0, 1].map(|form| motion(&forms[form], false));
+    println!("{rows:?} {raw:?}");
+    let apart = [0, 1, 2].map(|k| (rows[k] - raw[k]).abs());
+    assert!(apart[0] < 1e-3 && apart[1] < 1e-3 && apart[2] < 1e-4);
+}
