@@ -31,11 +31,11 @@ pub enum EvaluationError {
     BadPosition {
         /// Whose pose.
         side: Side,
-        /// Its index, from 0.
+        /// The index, from 0.
         index: usize,
-        /// Its x, m.
+        /// The pose's x, m.
         x_m: f64,
-        /// Its y, m.
+        /// The pose's y, m.
         y_m: f64,
     },
     /// The cosine and sine of a pose do not lie on the unit circle.
@@ -45,7 +45,7 @@ pub enum EvaluationError {
     BadRotation {
         /// Whose pose.
         side: Side,
-        /// Its index, from 0.
+        /// The index, from 0.
         index: usize,
         /// Length of (cosine, sine).
         length: f64,
@@ -111,13 +111,13 @@ pub enum EvaluationError {
     /// A motion is not finite, or further than any vehicle drives.
     #[error("motion {index} is invalid: ({x_m} m, {y_m} m, {yaw_rad} rad)")]
     BadMotion {
-        /// Its index, from 0.
+        /// The index, from 0.
         index: usize,
-        /// Its x, m.
+        /// The pose's x, m.
         x_m: f64,
-        /// Its y, m.
+        /// The pose's y, m.
         y_m: f64,
-        /// Its yaw, rad.
+        /// The pose's yaw, rad.
         yaw_rad: f64,
     },
     /// A motion does not end after its start, or starts before the end of the one before.
@@ -125,13 +125,13 @@ pub enum EvaluationError {
         "motion {index} is out of order: from {from_ns} ns to {to_ns} ns, after {previous_ns} ns"
     )]
     MotionOutOfOrder {
-        /// Its index, from 0.
+        /// The index, from 0.
         index: usize,
         /// End of the motion before, ns; for the first motion its own start.
         previous_ns: i64,
-        /// Its earlier stamp, ns.
+        /// The earlier stamp, ns.
         from_ns: i64,
-        /// Its later stamp, ns.
+        /// The later stamp, ns.
         to_ns: i64,
     },
     /// No motion has both ground truth and a covariance.

@@ -52,7 +52,7 @@ pub struct Scatterer {
     pub cross_section_m2: f64,
     /// The dependence on direction.
     pub aspect: Aspect,
-    /// Its body, whose walls do not hide it; [`NO_BODY`] if it has none.
+    /// The body, whose walls do not hide it; [`NO_BODY`] if it has none.
     pub body: u32,
 }
 
@@ -67,7 +67,7 @@ pub struct Wall {
     pub transmission: f64,
     /// Share of the power that is mirrored: 0 (rough) to 1 (a sheet of metal).
     pub mirror: f64,
-    /// Its body.
+    /// The body.
     pub body: u32,
 }
 
@@ -120,7 +120,7 @@ impl Body {
 /// A moving body at an instant.
 #[derive(Clone, Copy, Debug)]
 pub struct Moving<'a> {
-    /// Its content, in its own frame (x ahead), with a number that no other body has.
+    /// The content, in its own frame (x ahead), with a number that no other body has.
     pub body: &'a Body,
     /// The pose of its frame in the world.
     pub pose: Pose,

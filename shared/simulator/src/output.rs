@@ -15,7 +15,7 @@ pub struct OutputConfig {
     pub format: Option<OutputFormat>,
     /// The times at which the host receives scans, which RADIATE logs instead of the sensor's times.
     pub host_stamps: HostStamps,
-    /// Whether `gyre run` writes the dataset to its results and plays it from there. Default: it is played
+    /// True if `gyre run` writes the dataset to its results and plays it from there. Default: it is played
     /// without touching the disk.
     pub store: bool,
 }

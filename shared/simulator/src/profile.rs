@@ -84,7 +84,7 @@ pub struct Receiver {
     pub near_m: f64,
     /// Power at which the receiver saturates, in its units.
     pub full_scale: f32,
-    /// Whether powers are rounded to whole units.
+    /// True if powers are rounded to whole units.
     pub whole_powers: bool,
     /// Mean power of the receiver's noise by range: (m, dB above the unit), interpolated.
     pub floor_db: &'static [(f64, f64)],

@@ -87,7 +87,7 @@ struct Shared {
     changed: Condvar,
 }
 
-/// What is rendered, and what is next.
+/// The scans that are rendered, and what is next.
 #[derive(Default)]
 struct Queue {
     /// All images.

@@ -14,7 +14,7 @@ use crate::{
     topics::{Form, Kind},
 };
 
-/// What a radar says of itself, and by how many rows its driver turns images.
+/// The description that a radar gives of itself, and by how many rows its driver turns images.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Described {
     pub radar: Configuration,

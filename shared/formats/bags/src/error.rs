@@ -35,7 +35,7 @@ pub enum BagError {
         path: PathBuf,
         /// The position.
         offset: u64,
-        /// What is wrong there.
+        /// The problem there.
         reason: String,
     },
     /// A message that cannot be written.

@@ -17,7 +17,7 @@ use crate::BagError;
 
 /// The description of a bag in its folder.
 pub(crate) const METADATA: &str = "metadata.yaml";
-/// What a bag's description begins with.
+/// The key that a bag's description begins with.
 const INFORMATION: &str = "rosbag2_bagfile_information";
 /// The MCAP profile of bags.
 pub(crate) const PROFILE: &str = "ros2";

@@ -24,7 +24,7 @@ pub(crate) const MAX_SAMPLES: usize = 2000;
 /// The rotation of Navtech's radars, turns per 1000 s, where the times do not show it.
 const ROTATION_MHZ: u16 = 4000;
 
-/// What a message shows of the radar.
+/// The properties of the radar that a message shows.
 #[derive(Clone, Copy, Debug)]
 struct Sample {
     encoder: u16,
@@ -33,7 +33,7 @@ struct Sample {
     log_ns: i64,
 }
 
-/// What the first messages of a topic show of a radar.
+/// The properties of a radar that the first messages of a topic show.
 #[derive(Clone, Debug)]
 pub(crate) struct Survey {
     kind: Kind,

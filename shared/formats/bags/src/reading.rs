@@ -51,9 +51,9 @@ pub(crate) struct BagFile {
     file: File,
     schemas: BTreeMap<u16, (String, String)>,
     pub channels: BTreeMap<u16, Channel>,
-    /// Whether its writer came to its end.
+    /// True if its writer came to its end.
     pub is_complete: bool,
-    /// Whether it lists its channels at its end.
+    /// True if it lists its channels at its end.
     pub has_summary: bool,
 }
 

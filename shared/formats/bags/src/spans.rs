@@ -17,7 +17,7 @@ pub(crate) struct Spans {
     pub messages: Vec<Span>,
     /// Those with the names of all channels, at the end of the file.
     pub summary: Vec<Span>,
-    /// Whether the file goes on to its end.
+    /// True if the file goes on to its end.
     pub is_complete: bool,
 }
 

@@ -6,7 +6,7 @@ use gyre_radar::quoted;
 
 use crate::{BagError, reading::Channel};
 
-/// What a topic carries.
+/// The content of a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Kind {
     /// Azimuths.
@@ -19,7 +19,7 @@ pub(crate) enum Kind {
     Configuration(Form),
 }
 
-/// How Navtech's driver has written numbers.
+/// The number format of Navtech's driver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Form {
     /// As numbers.

@@ -68,7 +68,7 @@ fn scan(turn: usize) -> OwnedScan {
     scan
 }
 
-/// What a bag is made of: topic, schema, time and bytes of each message.
+/// The content of a bag: topic, schema, time and bytes of each message.
 #[derive(Default)]
 struct Messages(Vec<(String, String, String, i64, Vec<u8>)>);
 

@@ -85,7 +85,7 @@ pub enum MalformedDatagram {
     Cells {
         /// Bins in the message.
         cells: usize,
-        /// Its first bin.
+        /// The first bin.
         first: usize,
         /// Bytes of its cells.
         bytes: usize,

@@ -62,7 +62,7 @@ impl fmt::Display for SplitUnit {
     }
 }
 
-/// How the time of an azimuth is written. The default is what most radars send.
+/// The encoding of an azimuth's time. The default is what most radars send.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ClockFormat {
     /// Byte order of both numbers.

@@ -44,7 +44,7 @@ pub struct Configuration {
 pub struct BadConfiguration {
     /// The number.
     pub what: &'static str,
-    /// Its value.
+    /// The value.
     pub value: f64,
     /// Permitted values.
     pub bounds: RangeInclusive<f64>,

@@ -23,11 +23,11 @@ const ENCODER_ERRORS_FIELD: u64 = 12;
 const VALUE_FIELD: u64 = 3;
 const STATUS_FIELD: u64 = 5;
 
-/// What a radar says of its health: id 40. Other fields are skipped.
+/// The health that a radar reports: id 40. Other fields are skipped.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Health {
     readings: [Option<Reading>; READINGS.len()],
-    /// Whether it transmits; `None`: it does not say.
+    /// True if it transmits; `None`: it does not say.
     pub transmitting: Option<bool>,
     /// Errors of the encoder; `None`: it does not say.
     pub encoder_errors: Option<i32>,
@@ -38,11 +38,11 @@ pub struct Health {
 pub struct Reading {
     /// The value.
     pub value: f32,
-    /// How good it is.
+    /// The quality.
     pub status: HealthStatus,
 }
 
-/// How good a reading is, as the radar judges it.
+/// The quality of a reading, as the radar judges it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum HealthStatus {
     /// It is beyond its limits.

@@ -46,7 +46,7 @@ pub enum Message<'a> {
     Other {
         /// The kind of message.
         id: u8,
-        /// Its bytes.
+        /// The bytes.
         payload: &'a [u8],
     },
 }

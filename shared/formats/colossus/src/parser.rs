@@ -12,7 +12,7 @@ pub const MAX_SPACE_BYTES: usize = 1 << 16;
 pub const MAX_BUFFER_BYTES: usize =
     SIGNATURE.len() + HEADER_BYTES + MAX_PAYLOAD_BYTES + MAX_SPACE_BYTES;
 
-/// What a stream contains.
+/// One element of a stream.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event<'a> {
     /// A message.

@@ -21,7 +21,7 @@ pub use counters::Counters;
 use rows::{Empty, Rows};
 use seam::{Grid, Seam};
 
-/// What the radar does not say of itself; as [`gyre_radar::DatasetOptions`].
+/// The constants that the radar does not report; as [`gyre_radar::DatasetOptions`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Constants {
     /// Depth of a range bin, m. Default: the radar's.
@@ -55,7 +55,7 @@ pub struct Sweep {
     pub missing: usize,
 }
 
-/// What becomes of an azimuth.
+/// The fate of an azimuth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
     /// Dropped: the sweep has begun before.

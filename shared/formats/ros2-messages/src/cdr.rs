@@ -30,7 +30,7 @@ pub enum BadMessage {
         type_name: String,
         /// The bytes of the message.
         bytes: usize,
-        /// What is wrong.
+        /// The problem.
         reason: String,
     },
     /// A field that is not what its type is.
@@ -38,7 +38,7 @@ pub enum BadMessage {
     Field {
         /// The type expected.
         type_name: String,
-        /// What is wrong.
+        /// The problem.
         reason: String,
     },
 }

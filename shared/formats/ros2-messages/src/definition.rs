@@ -7,7 +7,7 @@ pub struct Definition {
     pub package: &'static str,
     /// The type without its package, such as `Odometry`.
     pub name: &'static str,
-    /// Its fields, one a line, as in its `.msg` file.
+    /// The fields, one a line, as in its `.msg` file.
     pub fields: &'static str,
     /// The types of its fields that are messages themselves.
     pub parts: &'static [&'static Definition],
@@ -53,7 +53,7 @@ impl Definition {
 
 /// A message of ROS 2.
 pub trait Ros2Message: serde::Serialize + serde::de::DeserializeOwned {
-    /// Its definition.
+    /// The definition.
     const DEFINITION: &'static Definition;
 }
 

@@ -37,7 +37,7 @@ pub struct DiagnosticStatus {
     pub name: String,
     /// A sentence.
     pub message: String,
-    /// What the part is on.
+    /// The hardware of the part.
     pub hardware_id: String,
     /// Figures.
     pub values: Vec<KeyValue>,

@@ -49,9 +49,9 @@ impl Default for Frames {
 pub struct Interval {
     /// The motion from the previous scan, with the covariance of its (x, y, yaw) along the axes of the earlier frame.
     pub motion: UncertainMotion,
-    /// Its duration, ns.
+    /// The duration, ns.
     pub duration_ns: i64,
-    /// Whether it was measured, not predicted from earlier motions.
+    /// True if it was measured, not predicted from earlier motions.
     pub is_measured: bool,
 }
 

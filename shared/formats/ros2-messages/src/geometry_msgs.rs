@@ -123,7 +123,7 @@ message!(
 pub struct PoseWithCovariance {
     /// The pose.
     pub pose: Pose,
-    /// Its covariance, along the axes of the frame of the pose.
+    /// The covariance, along the axes of the frame of the pose.
     pub covariance: Covariance,
 }
 message!(
@@ -153,7 +153,7 @@ message!(
 pub struct TwistWithCovariance {
     /// The velocity.
     pub twist: Twist,
-    /// Its covariance, in (m/s)^2, (rad/s)^2 and their products.
+    /// The covariance, in (m/s)^2, (rad/s)^2 and their products.
     pub covariance: Covariance,
 }
 message!(
@@ -185,7 +185,7 @@ pub struct TransformStamped {
     pub header: Header,
     /// The inner frame.
     pub child_frame_id: String,
-    /// Its pose.
+    /// The pose.
     pub transform: Transform,
 }
 message!(

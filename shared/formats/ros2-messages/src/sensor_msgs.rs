@@ -13,7 +13,7 @@ pub struct Image {
     pub height: u32,
     /// Columns.
     pub width: u32,
-    /// What a pixel is, such as `mono8` or `8UC1`.
+    /// The encoding of a pixel, such as `mono8` or `8UC1`.
     pub encoding: String,
     /// 1 if pixels of several bytes are big-endian.
     pub is_bigendian: u8,

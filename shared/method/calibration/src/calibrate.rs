@@ -66,13 +66,13 @@ pub struct FactEstimate {
     pub fact: Fact,
     /// Change against the configured value, in the fact's unit.
     pub change: Estimate,
-    /// What the overlap of scans alone says.
+    /// The estimate from the overlap of scans alone.
     pub by_overlap: Estimate,
-    /// What the drift between revisits alone says, if there are any.
+    /// The estimate from the drift between revisits alone, if there are any.
     pub by_drift: Option<Estimate>,
 }
 
-/// What a drive says about its radar.
+/// The constants of a radar, estimated from a drive.
 #[derive(Clone, Debug)]
 pub struct Calibration {
     /// All facts in their order. The eccentricity to the side and the times of rows are checks, with the other facts as found.
@@ -204,7 +204,7 @@ fn round(
     })
 }
 
-/// What the drift between revisits says about the eccentricity, as a change against the configured one.
+/// Estimates the eccentricity from the drift between revisits, as a change against the configured one.
 fn drift_of(
     drive: &Drive,
     at: &Track,

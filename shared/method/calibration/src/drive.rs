@@ -62,7 +62,7 @@ pub struct Track {
     pub motions: Vec<UncertainMotion>,
     /// The velocity at each scan.
     pub twists: Vec<Twist>,
-    /// Whether the chain of motions starts with a scan.
+    /// True if the chain of motions starts with a scan.
     starts: Vec<bool>,
 }
 

@@ -37,7 +37,7 @@ pub use revisits::Revisit;
 pub struct Estimate {
     /// The number.
     pub value: f64,
-    /// Its standard deviation.
+    /// The standard deviation.
     pub sigma: f64,
 }
 

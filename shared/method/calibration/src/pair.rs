@@ -11,7 +11,7 @@ use crate::{
 
 const ITERATIONS: usize = 12;
 const MIN_STEP: [f64; 3] = [2e-4, 2e-4, 4e-6];
-/// How far each fact displaces a point, by x and y.
+/// The displacement of a point by each fact, by x and y.
 type Displacement = SMatrix<f64, 2, FACTS>;
 
 /// A scan deskewed under assumed facts, with its images.
@@ -90,7 +90,7 @@ impl View {
         }
     }
 
-    /// How the facts displace what lies at a place in this view.
+    /// Returns the displacement by the facts of what lies at a place in this view.
     fn displacement(&self, drive: &Drive, at: Vector2<f64>, chirp: f64) -> Displacement {
         let time_s = drive.row_time_s(self.scan, at);
         displacements(at, time_s, chirp, &self.twist, drive.sense)

@@ -19,7 +19,7 @@ const ALIGNED: usize = 3;
 pub struct Observation<'a> {
     /// Time of the scan, ns.
     pub stamp_ns: i64,
-    /// Its points as measured.
+    /// The points as measured.
     pub points: &'a [SparsePoint],
     /// The velocity of the sensor.
     pub twist: Twist,
@@ -27,7 +27,7 @@ pub struct Observation<'a> {
     pub motion: UncertainMotion,
 }
 
-/// What is known of the place of a scan.
+/// The state of the localisation of a scan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
     /// Nothing.
@@ -56,7 +56,7 @@ pub struct Fix {
 /// The place of a scan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Localisation {
-    /// What is known.
+    /// The state.
     pub status: Status,
     /// The fix, or the prediction; `None` if lost or outside the map.
     pub fix: Option<Fix>,

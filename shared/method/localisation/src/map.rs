@@ -15,7 +15,7 @@ use thiserror::Error;
 
 /// The keyframes of a map, in its folder.
 const KEYFRAMES: &str = Keyframe::FILE;
-/// What their submaps look like, in its folder.
+/// The file of descriptors of submaps, in its folder.
 const PLACES: &str = "places.index";
 
 /// Keyframes that make no map, or a map that cannot be read or written.
@@ -30,7 +30,7 @@ pub enum MapError {
     /// The keyframes cannot be read or written.
     #[error(transparent)]
     Keyframes(#[from] LogError),
-    /// What they look like cannot be read or written.
+    /// The descriptors of submaps cannot be read or written.
     #[error(transparent)]
     Places(#[from] PlaceFileError),
     /// The two files are not of one map.

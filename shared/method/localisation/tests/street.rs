@@ -32,7 +32,7 @@ fn street() -> Vec<(Point2<f64>, f32)> {
     (0..3000).map(|_| post()).collect()
 }
 
-/// What a sensor that stands at `at` sees of the street.
+/// Returns what a sensor that stands at `at` sees of the street.
 fn seen(street: &[(Point2<f64>, f32)], at: &Pose) -> Vec<SparsePoint> {
     let local = street
         .iter()

@@ -26,7 +26,7 @@ const PRIOR: f64 = 1.0;
 /// Looks from nearby of a cell that is well known.
 const WELL_KNOWN: f64 = 8.0;
 
-/// What keyframes at their poses say about the cells of a map: how often each returned power of how often it was looked at.
+/// The evidence of keyframes at their poses about the cells of a map: how often each returned power of how often it was looked at.
 ///
 /// It is the same whatever the order in which keyframes were drawn, and wherever they were drawn before.
 ///
@@ -38,7 +38,7 @@ pub struct Evidence {
     /// The pose at which each keyframe is drawn, by its `seq`.
     drawn: BTreeMap<u64, Pose>,
     changed: BTreeSet<TileIndex>,
-    /// What a keyframe adds to a tile: the cell and the amount.
+    /// The contribution of a keyframe to a tile: the cell and the amount.
     returned: BTreeMap<TileIndex, Vec<(u32, u32)>>,
 }
 
@@ -213,7 +213,7 @@ fn quantise(returned: u32, looked: u32) -> Cell {
     }
 }
 
-/// How well a keyframe looked at the blocks of a tile.
+/// The visibility of the blocks of a tile from a keyframe.
 struct Looks<'a> {
     view: &'a View,
     map_to_keyframe: Pose,

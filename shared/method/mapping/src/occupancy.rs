@@ -6,7 +6,7 @@ use crate::Cell;
 const KNOWN_LOOKED: u8 = 16;
 const OCCUPIED_EVIDENCE: u8 = 64;
 
-/// What a cell is to a planner.
+/// The meaning of a cell to a planner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Occupancy {
     /// It was hardly looked at.

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// What a map is drawn with. It is stored with the map.
+/// The options that a map is drawn with. It is stored with the map.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MapOptions {
@@ -37,7 +37,7 @@ impl Default for MapOptions {
 pub struct OptionError {
     /// The option.
     pub name: &'static str,
-    /// Its value.
+    /// The value.
     pub value: f64,
     /// Permitted values.
     pub bounds: &'static str,

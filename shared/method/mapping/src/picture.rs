@@ -27,7 +27,7 @@ const LEGIBLE_SIDE: f64 = 2048.0;
 /// Side of the largest cells that are chosen for a picture, m: larger pixels are made of several cells.
 const MAX_CELL_M: f64 = 3.2;
 
-/// What is drawn over a map, all in the map frame.
+/// The overlay drawn over a map, all in the map frame.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Overlay<'a> {
     /// The trajectory by which the map was drawn.

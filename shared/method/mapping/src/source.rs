@@ -24,7 +24,7 @@ pub enum MapError {
     NotAMap {
         /// The folder.
         path: PathBuf,
-        /// What is wrong.
+        /// The problem.
         reason: String,
     },
     /// A tile that cannot be read.
@@ -32,7 +32,7 @@ pub enum MapError {
     Tile {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The problem.
         reason: String,
     },
     /// No keyframe.

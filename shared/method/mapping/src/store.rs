@@ -18,15 +18,15 @@ pub const BLOCKS: usize = TILE_CELLS / BLOCK;
 /// One look from nearby, and one return of full weight in it.
 pub const ONE: u32 = 1 << 14;
 
-/// What is known of the cells of a tile, in units of [`ONE`].
+/// The evidence about the cells of a tile, in units of [`ONE`].
 ///
 /// Integers, so that a keyframe is taken out again without a trace, and sums do not depend on their order.
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Tile {
-    /// What was returned by each cell, row after row, that of the lowest y first.
+    /// The returns of each cell, row after row, that of the lowest y first.
     pub returned: [u32; CELLS],
-    /// How often each block was looked at.
+    /// Number of looks at each block.
     pub looked: [u32; BLOCKS * BLOCKS],
 }
 
@@ -39,7 +39,7 @@ struct Entry {
     used: u64,
     /// The tile, while it is in memory.
     tile: Option<Box<Tile>>,
-    /// Its place in the file, once it has been written.
+    /// The place in the file, once it has been written.
     slot: Option<u64>,
 }
 

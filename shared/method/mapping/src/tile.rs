@@ -52,9 +52,9 @@ fn span(at_m: f64, reach_m: f64, cell_m: f64) -> RangeInclusive<i32> {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Cell {
-    /// How often the cell returned power of how often it was looked at: the square root of that share, from 0 (never) to 255.
+    /// The share of looks at which the cell returned power: the square root of that share, from 0 (never) to 255.
     pub evidence: u8,
-    /// How often it was looked at, from 0 (never) to 255 (8 times from nearby, or oftener).
+    /// Number of looks, from 0 (never) to 255 (8 times from nearby, or oftener).
     pub looked: u8,
 }
 

@@ -1,4 +1,4 @@
-//! What a keyframe sees: its returns, and how well it looked at each place around it.
+//! The view of a keyframe: its returns, and how well it looked at each place around it.
 
 use std::f64::consts::TAU;
 
@@ -33,9 +33,9 @@ pub struct View {
 /// A part of a return.
 #[derive(Clone, Copy)]
 pub struct Sample {
-    /// Its place in the frame of the keyframe, m.
+    /// The place in the frame of the keyframe, m.
     pub place: Point2<f64>,
-    /// What it adds to its place.
+    /// The amount that it adds to its place.
     pub amount: f64,
 }
 

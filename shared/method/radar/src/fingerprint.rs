@@ -7,7 +7,7 @@ use sha2::{Digest, Sha256};
 
 use crate::dataset::{Dataset, Format, OpenError};
 
-/// What tells a recording from another one: its files by name and size, and its times.
+/// The identity of a recording: its files by name and size, and its times.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fingerprint {

@@ -49,7 +49,7 @@ pub enum TrajectoryError {
     Unknown {
         /// The file.
         path: PathBuf,
-        /// What was found.
+        /// The finding.
         reason: String,
     },
     /// A line that does not match the format.
@@ -59,7 +59,7 @@ pub enum TrajectoryError {
         path: PathBuf,
         /// The line, from 1.
         line: usize,
-        /// What is wrong.
+        /// The problem.
         reason: String,
     },
 }

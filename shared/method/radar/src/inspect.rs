@@ -39,7 +39,7 @@ pub struct Report {
     pub scans_read: usize,
     /// Size of the images as stored.
     pub image: ImageSize,
-    /// Whether images are stored as range x azimuth.
+    /// True if images are stored as range x azimuth.
     pub transposed: bool,
     /// Azimuths per scan.
     pub azimuths: usize,

@@ -60,7 +60,7 @@ impl Default for PointsConfig {
 pub struct PointsError {
     /// The setting.
     pub key: &'static str,
-    /// Its value.
+    /// The value.
     pub value: f64,
     /// Permitted values.
     pub bounds: &'static str,

@@ -35,7 +35,7 @@ pub use sweep_motion::{MAX_TRAVEL_M, MAX_TURN_RAD};
 /// The largest number of cells per side of a raster.
 pub const MAX_CELLS_PER_SIDE: usize = 4096;
 
-/// How the value of a cell is computed from the range bins.
+/// The rule that computes the value of a cell from the range bins.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
 )]
@@ -70,7 +70,7 @@ pub struct RasterConfig {
     pub cell_m: f32,
     /// Minimum range, m. Nearer cells, which hold the vehicle or the ringing of the sensor, are set to zero.
     pub min_range_m: f32,
-    /// How the value of a cell is computed from the range bins: `averaged` or `bilinear`.
+    /// The rule that computes the value of a cell from the range bins: `averaged` or `bilinear`.
     pub sampling: Sampling,
     /// Depth of the mean of `averaged`, in cells. More than 1 smooths.
     pub averaged_cells: f32,
@@ -119,7 +119,7 @@ pub enum RasterError {
     Setting {
         /// The setting.
         key: &'static str,
-        /// Its value.
+        /// The value.
         value: f64,
         /// Permitted values.
         bounds: &'static str,

@@ -51,7 +51,7 @@ fn measured<T>(name: &str, work: impl FnOnce() -> T) -> T {
     result
 }
 
-/// What loop-closure reads when it starts.
+/// Reads what loop-closure reads when it starts.
 fn loop_closure(out: &Path) -> (LoopCloser, RecordReader<Keyframe>) {
     let keyframes = RecordReader::<Keyframe>::open(out).unwrap();
     let mut closer =
@@ -69,7 +69,7 @@ fn loop_closure(out: &Path) -> (LoopCloser, RecordReader<Keyframe>) {
     (closer, keyframes)
 }
 
-/// What trajectory does when it starts.
+/// Does what trajectory does when it starts.
 fn trajectory(out: &Path) -> TrajectoryEstimator {
     let mut estimator = pushed(out);
     let mut queries = RecordReader::<Query>::open(out).unwrap();

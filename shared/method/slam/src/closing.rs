@@ -230,7 +230,7 @@ impl LoopCloser {
         Ok(())
     }
 
-    /// Whether all keyframes of a submap are known. Which they are does not change afterwards.
+    /// Returns whether all keyframes of a submap are known. Which they are does not change afterwards.
     fn is_complete(&self, middle: usize) -> bool {
         let known = self.path_m.len();
         let end = self.neighbours(middle).end;

@@ -11,7 +11,7 @@ use std::{
 
 use gyre_storage::{Log, LogError, LogMagic, LogReader};
 
-/// What a file of records holds.
+/// An entry of a file of records.
 pub trait Record: Sized {
     /// The name of the file, in the folder `journal` of the results.
     const FILE: &'static str;

@@ -13,7 +13,7 @@ pub enum LoopVerdict {
     ContradictsOdometry,
     /// It contradicts most of the other loops.
     ContradictsLoops,
-    /// Its group has been counted in full (filter alone).
+    /// The group has been counted in full (filter alone).
     Redundant,
 }
 
@@ -39,7 +39,7 @@ pub struct JudgedLoop {
     pub verdict: LoopVerdict,
     /// The kernel's weight in the graph, 0 to 1; 0 if the loop is not used.
     pub weight: f64,
-    /// Whether the standing estimate is made with it.
+    /// True if the standing estimate is made with it.
     pub(crate) is_taken: bool,
 }
 

@@ -13,7 +13,7 @@ fn closer() -> LoopCloser {
     LoopCloser::new(LoopOptions::default(), &RefinementConfig::default(), 400).unwrap()
 }
 
-/// What a closer has left: its places and its queries, encoded.
+/// The logs of a closer: its places and its queries, encoded.
 #[derive(Clone, Default, PartialEq)]
 struct Logs {
     places: Vec<Vec<u8>>,

@@ -112,7 +112,7 @@ struct Merger {
     /// The passes beside each point of each line: minimum and maximum offset, metres to the left.
     spans: Vec<Vec<[f64; 2]>>,
     grid: LineGrid,
-    /// Whether the last line is being continued.
+    /// True if the last line is being continued.
     drawing: bool,
     /// The last place on an existing street.
     joined: Option<Point2<f64>>,

@@ -10,7 +10,7 @@ pub struct Street {
     pub centre: Vec<Point2<f64>>,
     /// Distance from the centre line to the kerbs, metres.
     pub half_width_m: f64,
-    /// Whether the ego vehicle drives on it; false for side streets.
+    /// True if the ego vehicle drives on it; false for side streets.
     pub driven: bool,
 }
 

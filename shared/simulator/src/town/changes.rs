@@ -1,4 +1,4 @@
-//! What changes from one drive to another while the town stays.
+//! The changes from one drive to another while the town stays.
 
 use gyre_geometry::Pose;
 use nalgebra::Point2;
@@ -13,7 +13,7 @@ const WORKS: u64 = 1;
 /// Marks the generators of cars and leaves.
 const REST: u64 = 2;
 
-/// What changes from one drive to another while the town stays.
+/// The changes from one drive to another while the town stays.
 #[derive(Clone, Copy)]
 pub(super) struct Changes {
     town_seed: u64,

@@ -35,12 +35,12 @@ pub(super) struct Kerb<'a> {
     pub frontage: Frontage<'a>,
     pub config: &'a TownConfig,
     pub district: District,
-    /// Its start and end, metres along the street.
+    /// The start and end, metres along the street.
     pub from_m: f64,
     pub to_m: f64,
     /// Distance from the kerb to the lots, including bays, metres.
     pub pavement_m: f64,
-    /// Whether there are parking bays.
+    /// True if there are parking bays.
     pub bays: bool,
     pub rng: ChaCha8Rng,
     pub changes: Changes,
@@ -90,7 +90,7 @@ impl Kerb<'_> {
         })
     }
 
-    /// Whether a rectangle in the frame of a station, of half a length along the kerb and between two
+    /// Returns whether a rectangle in the frame of a station, of half a length along the kerb and between two
     /// distances from the frame's origin, stays off all carriageways.
     fn has_room(&self, along_m: f64, out_m: f64, half_m: f64, y: [f64; 2]) -> bool {
         let frame = self.frontage.frame(along_m, out_m);

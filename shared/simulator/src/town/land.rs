@@ -39,7 +39,7 @@ impl Lot {
         .map(|(x, y)| self.pose * Point2::new(x, y))
     }
 
-    /// Whether all of it is at least `metres` from all kerbs.
+    /// Returns whether all of it is at least `metres` from all kerbs.
     pub(super) fn is_clear(&self, streets: &Streets, metres: f64) -> bool {
         let steps = |length_m: f64| (length_m / SAMPLE_M).ceil().max(1.0) as usize;
         let (columns, rows) = (steps(self.width_m), steps(self.depth_m));
@@ -55,7 +55,7 @@ impl Lot {
         })
     }
 
-    /// Whether the two overlap: no side of either separates them.
+    /// Returns whether the two overlap: no side of either separates them.
     pub(super) fn overlaps(&self, other: &Self) -> bool {
         let (ours, theirs) = (self.corners(), other.corners());
         [self, other].into_iter().all(|lot| {

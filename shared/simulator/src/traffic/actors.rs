@@ -236,7 +236,7 @@ fn meeting(track: &Track, route: &EgoRoute) -> [f64; 2] {
     })
 }
 
-/// Whether two tracks meet in the oncoming lane.
+/// Returns whether two tracks meet in the oncoming lane.
 fn meets(oncoming: &Track, other: &Track, route: &EgoRoute, visible_s: [f64; 2]) -> bool {
     let Track::Alongside(_) = other else {
         return false;

@@ -43,7 +43,7 @@ fn around(
     all
 }
 
-/// Whether two road users overlap.
+/// Returns whether two road users overlap.
 fn overlap(a: &Actor, at: &Pose, b: &Actor, there: &Pose) -> bool {
     let seen = at.inverse() * there;
     let (cosine, sine) = (

@@ -58,9 +58,9 @@ pub struct Alongside {
     pub at_m: f64,
     /// and the time, seconds.
     pub at_s: f64,
-    /// Its speed relative to the ego vehicle's: above 1 it overtakes, below it is overtaken.
+    /// The speed relative to the ego vehicle's: above 1 it overtakes, below it is overtaken.
     pub share: f64,
-    /// Its additional speed along the route, metres a second.
+    /// The additional speed along the route, metres a second.
     pub speed_mps: f64,
     pub lane: Lane,
 }
@@ -82,7 +82,7 @@ pub const PASSING_M: f64 = 1.7;
 /// A vehicle that comes out of a side street, waits, and may cross.
 #[derive(Clone, Debug)]
 pub struct Crossing {
-    /// Its path by distance.
+    /// The path by distance.
     pub path: UniformSpline<2>,
     /// The place on the path where it waits, metres.
     pub waits_m: f64,

@@ -94,7 +94,7 @@ fn images(folder: &Path) -> Result<BTreeSet<String>, SimulatorError> {
     Ok(names)
 }
 
-/// Whether `out` was made by `config`, up to the number of scans and how they are played; false if it does
+/// Returns whether `out` was made by `config`, up to the number of scans and how they are played; false if it does
 /// not say.
 fn made_by_this(config: &SimulationConfig, out: &Path) -> Result<bool, SimulatorError> {
     match made_with(out)? {

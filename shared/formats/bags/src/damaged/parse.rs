@@ -74,9 +74,9 @@ fn next<'a>(bytes: &mut &'a [u8]) -> Option<(u8, &'a [u8])> {
 #[derive(Clone, Copy)]
 enum Field {
     Bytes(usize),
-    /// Its length in bytes, and the text.
+    /// The length in bytes, and the text.
     Text,
-    /// Its length in bytes, and pairs of texts.
+    /// The length in bytes, and pairs of texts.
     Map,
 }
 

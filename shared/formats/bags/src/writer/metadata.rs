@@ -8,7 +8,7 @@ use super::Kept;
 pub(super) struct Described {
     pub name: String,
     pub type_name: String,
-    /// Its qualities of service, as YAML.
+    /// The qualities of service, as YAML.
     pub qualities: String,
     pub messages: u64,
 }

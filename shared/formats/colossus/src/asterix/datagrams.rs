@@ -35,7 +35,7 @@ pub struct Datagrams {
     has_part: bool,
 }
 
-/// What a datagram leads to.
+/// The result of a datagram.
 enum Step {
     Nothing,
     Description(Configuration),

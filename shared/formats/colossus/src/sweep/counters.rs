@@ -1,6 +1,6 @@
 //! Counts of what is not as sent.
 
-/// What has been lost, dropped and changed since the start of a stream.
+/// Counts of what has been lost, dropped and changed since the start of a stream.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counters {
     /// Sweeps returned.

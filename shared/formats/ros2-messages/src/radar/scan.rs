@@ -19,7 +19,7 @@ const ROUNDING_RAD: f64 = 2e-6;
 pub struct Encoder {
     /// Counts per turn.
     pub counts: u16,
-    /// Whether the angles of the scan are such counts, but for rounding.
+    /// True if the angles of the scan are such counts, but for rounding.
     pub is_exact: bool,
 }
 

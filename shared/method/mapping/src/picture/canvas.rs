@@ -13,7 +13,7 @@ use nalgebra::Point2;
 /// Red, green and blue.
 pub type Colour = [u8; 3];
 
-/// How a line is drawn.
+/// The style of a line.
 #[derive(Clone, Copy)]
 pub struct Pen {
     pub colour: Colour,

@@ -1,4 +1,4 @@
-//! What keyframes leave in the cells.
+//! The evidence that keyframes leave in the cells.
 
 use gyre_geometry::{SparsePoint, Twist, pose};
 use gyre_mapping::{Evidence, MapOptions, TileIndex};

@@ -36,7 +36,7 @@ pub enum OpenError {
     UnknownLayout {
         /// The dataset's root.
         path: PathBuf,
-        /// What was found.
+        /// The finding.
         reason: String,
     },
     /// An option that is out of bounds, or does not apply to the format.
@@ -58,7 +58,7 @@ pub enum OpenError {
         path: PathBuf,
         /// The line, from 1; 0 for the file as a whole.
         line: usize,
-        /// What is wrong, and what is expected.
+        /// The problem, and what is expected.
         reason: String,
     },
     /// A file or folder that cannot be read.
@@ -74,7 +74,7 @@ pub enum OpenError {
     DatasetToml {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The problem.
         reason: String,
     },
     /// The first image, which determines the size of all scans, cannot be read.
@@ -88,11 +88,11 @@ pub enum OpenError {
     WrongImage {
         /// The first image.
         path: PathBuf,
-        /// Its size.
+        /// The size.
         actual: ImageSize,
         /// The format.
         format: Format,
-        /// What the format requires.
+        /// The requirement of the format.
         reason: String,
     },
 }
@@ -159,7 +159,7 @@ pub enum ReadError {
     WrongSize {
         /// The file.
         path: PathBuf,
-        /// Its size.
+        /// The size.
         actual: ImageSize,
         /// The size of the first image.
         expected: ImageSize,

@@ -36,7 +36,7 @@ pub(crate) struct Profile {
     pub(crate) encoder_counts: u16,
     pub(crate) azimuth_source: AzimuthSource,
     pub(crate) scan_time: ScanTime,
-    /// Whether row stamps come in bursts, and are replaced by a linear fit over the azimuth.
+    /// True if row stamps come in bursts, and are replaced by a linear fit over the azimuth.
     pub(crate) smooth_stamps: bool,
     pub(crate) byte_ten: ByteTen,
     pub(crate) named_by: NamedBy,
@@ -67,7 +67,7 @@ pub(crate) struct NavtechScans {
     period_ns: i64,
     /// The longest plausible sweep.
     max_sweep_ns: i64,
-    /// Whether the names of the files are times of their sweeps.
+    /// True if the names of the files are times of their sweeps.
     named_by_time: bool,
     notes: Vec<String>,
 }

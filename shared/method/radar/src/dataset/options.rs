@@ -21,7 +21,7 @@ pub enum AzimuthSource {
 /// The longest name of a topic, bytes.
 const TOPIC_BYTES: usize = 256;
 
-/// How to read a dataset: the section `[dataset]` of a configuration. All keys are optional; the defaults depend on the format.
+/// The way to read a dataset: the section `[dataset]` of a configuration. All keys are optional; the defaults depend on the format.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct DatasetOptions {

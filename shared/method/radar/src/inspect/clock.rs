@@ -26,7 +26,7 @@ pub struct ClockOffset {
     pub speed_correlation: f64,
     /// Correlation of the yaw rates at that offset; `None` if a trajectory has no headings.
     pub turn_correlation: Option<f64>,
-    /// Whether the trajectories turn in opposite directions.
+    /// True if the trajectories turn in opposite directions.
     pub mirrored: bool,
 }
 

@@ -24,7 +24,7 @@ pub struct GroundTruthReport {
     pub poses: usize,
     /// Length of the path, m.
     pub path_length_m: f64,
-    /// Whether it has headings.
+    /// True if it has headings.
     pub has_heading: bool,
     /// First and last time, ns; `None` if it has no times.
     pub span_ns: Option<(i64, i64)>,
@@ -32,7 +32,7 @@ pub struct GroundTruthReport {
     pub scans_covered: Option<usize>,
     /// Median difference between the time of a scan and the nearest pose, s.
     pub nearest_pose_s: Option<f64>,
-    /// Its clock relative to the given trajectory.
+    /// The clock relative to the given trajectory.
     pub clock: Option<ClockOffset>,
 }
 

@@ -15,7 +15,7 @@ pub(super) struct RangeCells {
     layout: Layout,
     /// Row-major, one row per azimuth.
     powers: Vec<i16>,
-    /// Whether each azimuth was measured and has a power above the floor.
+    /// True if each azimuth was measured and has a power above the floor.
     active: Vec<bool>,
 }
 

@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 /// neighbourhood of a measured azimuth, and below `azimuths / (4 NODES)` of the change in spacing there.
 pub(super) const NODES: usize = 4096;
 
-/// How far an azimuth may lie behind the previous one, turns: encoder jitter, or a sweep that ends past its start.
+/// The most that an azimuth may lie behind the previous one, turns: encoder jitter, or a sweep that ends past its start.
 const BACKLASH: f64 = 0.1;
 
 /// Fractional azimuths and times at bearings `k / NODES`, over the turn that starts at the first azimuth.

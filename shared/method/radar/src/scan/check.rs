@@ -26,7 +26,7 @@ pub enum ScanError {
     Geometry {
         /// The number.
         what: &'static str,
-        /// Its value.
+        /// The value.
         value: f64,
         /// Permitted values.
         bounds: RangeInclusive<f64>,
@@ -48,7 +48,7 @@ pub enum ScanError {
     StampSpan {
         /// The row, from 0.
         row: usize,
-        /// Its stamp minus that of the first row, s.
+        /// The stamp minus that of the first row, s.
         after_s: f64,
         /// The longest sweep, s.
         max_s: f64,
@@ -64,7 +64,7 @@ pub enum ScanError {
     Azimuth {
         /// The row.
         index: usize,
-        /// Its angle.
+        /// The angle.
         value: f32,
     },
 }

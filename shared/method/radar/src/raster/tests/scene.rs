@@ -21,7 +21,7 @@ pub struct Sensor {
     pub range_resolution_m: f32,
     pub range_offset_m: f32,
     pub doppler_s: f32,
-    /// Whether chirps alternate, and the scan reports them.
+    /// True if chirps alternate, and the scan reports them.
     pub chirps_alternate: bool,
     pub sense: Sense,
     pub twist: Twist,
