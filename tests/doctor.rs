@@ -77,7 +77,7 @@ fn without_onnx_runtime_learned_masks_take_longer() {
     let ended = Ended::of(command);
     let stdout = &ended.succeeded().stdout;
     assert!(
-        stdout.contains("note  ONNX Runtime   none: tract computes learned masks"),
+        stdout.contains("note  ONNX Runtime   none: rten computes learned masks"),
         "{stdout}"
     );
 }

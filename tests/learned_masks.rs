@@ -220,7 +220,7 @@ fn a_mask_that_cannot_be_made_is_refused_before_anything_starts() {
     );
     refused(
         masked_by(ONE_SCAN)
-            .set("masking.backend=tract")
+            .set("masking.backend=rten")
             .set("masking.provider=cuda"),
         &["provider is a setting of ONNX Runtime", "`onnxruntime`"],
     );
@@ -242,8 +242,8 @@ fn an_onnx_runtime_that_is_named_but_not_there_is_refused_and_other_masks_still_
 }
 
 #[test]
-fn a_killed_masking_goes_on_with_a_network_in_tract() {
-    let masked = || masked_by(TWO_SCANS).set("masking.backend=tract");
+fn a_killed_masking_goes_on_with_a_network_in_rten() {
+    let masked = || masked_by(TWO_SCANS).set("masking.backend=rten");
     let undisturbed = masked().complete();
     let run = masked().rate("6");
     let mut running = run.start();
@@ -257,7 +257,7 @@ fn a_run_from_its_resolved_configuration_is_computed_by_the_same_library() {
     if !runtime_is_installed() {
         return;
     }
-    for backend in ["onnxruntime", "tract"] {
+    for backend in ["onnxruntime", "rten"] {
         let run = masked_by(ONE_SCAN).set(&format!("masking.backend={backend}"));
         let odometry = run.complete();
         assert_eq!(run.summary()["mask"]["backend"], backend);
@@ -287,7 +287,7 @@ fn a_library_in_the_current_folder_is_not_opened_unless_it_is_named() {
         let ended = in_its_folder(None, data_home);
         ended.succeeded();
         assert!(
-            ended.stderr.contains("computed by tract"),
+            ended.stderr.contains("computed by rten"),
             "{}",
             ended.stderr
         );

@@ -54,7 +54,7 @@ def test_motions_of_real_scans_are_those_of_a_run(radiate: Path, tmp_path: Path)
 
 
 def test_a_learned_mask_is_that_of_a_run(recording: Path, tmp_path: Path) -> None:
-    overrides: dict[str, object] = {"masking.kind": "learned", "masking.model": ROOT / "models/gyre-255.toml", "masking.backend": "tract"}
+    overrides: dict[str, object] = {"masking.kind": "learned", "masking.model": ROOT / "models/gyre-255.toml", "masking.backend": "rten"}
     given = [argument for key, value in overrides.items() for argument in ("--set", f"{key}={value}")]
     gyre_program("run", "configs/demo.toml", "--data", recording, "--out", tmp_path, "--set", "source.scans=4", *given)
     config = gyre.Config.read(ROOT / "configs/demo.toml", overrides)

@@ -54,7 +54,7 @@ def test_rasters_and_points_are_not_copied() -> None:
 
 def test_a_mask_of_two_scans_masks_the_previous_one_too() -> None:
     model = Path(__file__).parents[2] / "shared/method/masking/tests/models/pair-127.toml"
-    masking = {"kind": "learned", "model": model, "backend": "tract"}
+    masking = {"kind": "learned", "model": model, "backend": "rten"}
     config = gyre.Config({"masking": masking, "raster": {"n": 127, "cell_m": 0.8}})
     masker, odometry = gyre.Masker(config), gyre.Odometry(config)
     for number in range(3):

@@ -278,8 +278,8 @@ pub fn describe_masks(configuration: &Configuration) -> Result<(), crate::Failur
                 path.display()
             )
         }
-        Library::Tract => format!(
-            "the masks of {card} are computed by tract, in one thread; ONNX Runtime is several times faster: \
+        Library::Rten => format!(
+            "the masks of {card} are computed by rten, in one thread; ONNX Runtime is several times faster: \
              `{INSTALL}` in the folder of Gyre's sources installs it"
         ),
     });

@@ -147,8 +147,8 @@ pub(super) fn onnx_runtime() -> Finding {
         Ok(path) => Finding::good("ONNX Runtime", path.display().to_string()),
         Err(error) => {
             let found = match error {
-                RuntimeError::Missing => "none: tract computes learned masks, which takes longer",
-                _ => "cannot be used: no learned masks, unless masking.backend is `tract`",
+                RuntimeError::Missing => "none: rten computes learned masks, which takes longer",
+                _ => "cannot be used: no learned masks, unless masking.backend is `rten`",
             };
             Finding::good("ONNX Runtime", found).limited(error.to_string())
         }

@@ -2,7 +2,10 @@
 
 use std::{fmt, path::PathBuf};
 
-use serde::{Deserialize, Serialize};
+use serde::{
+    Deserialize, Deserializer, Serialize,
+    de::{Error as _, IntoDeserializer},
+};
 
 use crate::{
     MaskingConfig, Provider,
@@ -15,22 +18,22 @@ use crate::{
 )]
 #[serde(rename_all = "lowercase")]
 pub enum Backend {
-    /// ONNX Runtime where it is found, else tract.
+    /// ONNX Runtime where it is found, else rten.
     #[default]
     Auto,
     /// ONNX Runtime, which is opened at run time.
     OnnxRuntime,
-    /// tract, which is built in: pure Rust, and slower.
-    Tract,
+    /// rten, which is built in: pure Rust, and slower.
+    Rten,
 }
 
 impl Backend {
     /// The name of the library.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Auto => "ONNX Runtime or tract",
+            Self::Auto => "ONNX Runtime or rten",
             Self::OnnxRuntime => "ONNX Runtime",
-            Self::Tract => "tract",
+            Self::Rten => "rten",
         }
     }
 }
@@ -41,7 +44,7 @@ impl fmt::Display for Backend {
         f.write_str(match self {
             Self::Auto => "auto",
             Self::OnnxRuntime => "onnxruntime",
-            Self::Tract => "tract",
+            Self::Rten => "rten",
         })
     }
 }
@@ -51,24 +54,24 @@ impl fmt::Display for Backend {
 pub enum Library {
     /// ONNX Runtime, with the path of its library.
     OnnxRuntime(PathBuf),
-    /// tract.
-    Tract,
+    /// rten.
+    Rten,
 }
 
 impl Library {
     /// Returns the library that computes the networks of a configuration. ONNX Runtime that is named is required: only where none
-    /// is named or installed, tract stands in for it, and only on the processor.
+    /// is named or installed, rten stands in for it, and only on the processor.
     ///
     /// # Errors
     /// ONNX Runtime is required and missing.
     pub fn find(config: &MaskingConfig) -> Result<Self, RuntimeError> {
-        if config.backend == Backend::Tract {
-            return Ok(Self::Tract);
+        if config.backend == Backend::Rten {
+            return Ok(Self::Rten);
         }
         let is_required =
             config.backend == Backend::OnnxRuntime || config.provider != Provider::Cpu;
         match runtime::find(config.runtime.as_deref()) {
-            Err(RuntimeError::Missing) if !is_required => Ok(Self::Tract),
+            Err(RuntimeError::Missing) if !is_required => Ok(Self::Rten),
             found => Ok(Self::OnnxRuntime(found?)),
         }
     }
@@ -77,7 +80,22 @@ impl Library {
     pub fn backend(&self) -> Backend {
         match self {
             Self::OnnxRuntime(_) => Backend::OnnxRuntime,
-            Self::Tract => Backend::Tract,
+            Self::Rten => Backend::Rten,
         }
     }
+}
+
+/// Reads a backend of a configuration.
+///
+/// # Errors
+/// No backend, or one that earlier versions had.
+pub(crate) fn deserialize<'de, D: Deserializer<'de>>(source: D) -> Result<Backend, D::Error> {
+    let name = String::deserialize(source)?;
+    if name == "tract" {
+        return Err(D::Error::custom(
+            "tract is no longer part of Gyre: rten is built in instead and computes other last digits; \
+             set masking.backend to `rten`, or leave it out",
+        ));
+    }
+    Backend::deserialize(name.into_deserializer())
 }

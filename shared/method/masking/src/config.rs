@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::{
-    backend::{Backend, Library},
+    backend::{self, Backend, Library},
     model::Card,
     network::NetworkError,
 };
@@ -27,13 +27,14 @@ pub struct MaskingConfig {
     /// SHA-256 of the network, to refuse another one. Default: the one of its card.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sha256: Option<String>,
-    /// The library that computes the network: `onnxruntime`; `tract`, which is built in and slower; or
-    /// `auto`: ONNX Runtime where it is found, else tract.
+    /// The library that computes the network: `onnxruntime`; `rten`, which is built in and slower; or
+    /// `auto`: ONNX Runtime where it is found, else rten.
+    #[serde(deserialize_with = "backend::deserialize")]
     pub backend: Backend,
     /// The library of ONNX Runtime, or its folder. Default: it is searched for, see docs/masks.md.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub runtime: Option<PathBuf>,
-    /// Threads of ONNX Runtime, 1 to 64; tract computes with one. The other stages work at the same
+    /// Threads of ONNX Runtime, 1 to 64; rten computes with one. The other stages work at the same
     /// time.
     pub threads: usize,
     /// Execution provider of the network: `cpu`, or `cuda`, `tensorrt` or `openvino` in a build with
@@ -103,11 +104,11 @@ pub enum MaskingConfigError {
     /// The exponent of the mask.
     #[error("point_exponent is {0}, but must be 0 to 4")]
     PointExponent(f32),
-    /// tract with a setting of ONNX Runtime.
+    /// rten with a setting of ONNX Runtime.
     #[error(
-        "backend is `tract`, but {0} is a setting of ONNX Runtime: set backend to `onnxruntime`, or leave {0} out"
+        "backend is `rten`, but {0} is a setting of ONNX Runtime: set backend to `onnxruntime`, or leave {0} out"
     )]
-    NotOfTract(&'static str),
+    NotOfRten(&'static str),
     /// A lag of 0: the motion of a scan is not known yet when it is masked.
     #[error("lag is 0, but must be 1 or more: the motion of a scan is not known before its search")]
     Lag,
@@ -145,11 +146,11 @@ impl MaskingConfig {
             () if !(0.0..=4.0).contains(&self.point_exponent) => {
                 Err(MaskingConfigError::PointExponent(self.point_exponent))
             }
-            () if self.backend == Backend::Tract && self.runtime.is_some() => {
-                Err(MaskingConfigError::NotOfTract("runtime"))
+            () if self.backend == Backend::Rten && self.runtime.is_some() => {
+                Err(MaskingConfigError::NotOfRten("runtime"))
             }
-            () if self.backend == Backend::Tract && self.provider != Provider::Cpu => {
-                Err(MaskingConfigError::NotOfTract("provider"))
+            () if self.backend == Backend::Rten && self.provider != Provider::Cpu => {
+                Err(MaskingConfigError::NotOfRten("provider"))
             }
             () if self.compensate && self.lag == 0 => Err(MaskingConfigError::Lag),
             () => Ok(()),
@@ -168,7 +169,7 @@ impl MaskingConfig {
             self.backend = library.backend();
             self.runtime = match library {
                 Library::OnnxRuntime(path) => Some(path),
-                Library::Tract => None,
+                Library::Rten => None,
             };
             self.model = self
                 .model

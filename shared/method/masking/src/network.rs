@@ -1,8 +1,7 @@
-//! A learned mask: a network in ONNX Runtime or in tract.
+//! A learned mask: a network in ONNX Runtime or in rten.
 
-mod floating_point;
 mod onnx_runtime;
-mod tract;
+mod rten;
 
 use std::path::PathBuf;
 
@@ -17,7 +16,7 @@ use crate::{
     runtime::RuntimeError,
 };
 use onnx_runtime::OnnxRuntime;
-use tract::Tract;
+use rten::Rten;
 
 const INPUT: &str = "scans";
 const OUTPUT: &str = "masks";
@@ -97,7 +96,7 @@ pub struct Network {
 #[derive(Debug)]
 enum Engine {
     OnnxRuntime(OnnxRuntime),
-    Tract(Tract),
+    Rten(Rten),
 }
 
 impl Network {
@@ -111,11 +110,11 @@ impl Network {
             Library::OnnxRuntime(path) => {
                 Engine::OnnxRuntime(OnnxRuntime::load(&path, &model, config)?)
             }
-            Library::Tract => Engine::Tract(Tract::load(&model)?),
+            Library::Rten => Engine::Rten(Rten::load(&model)?),
         };
         let (inputs, outputs) = match &engine {
             Engine::OnnxRuntime(engine) => (engine.inputs(), engine.outputs()),
-            Engine::Tract(engine) => (engine.inputs(), engine.outputs()),
+            Engine::Rten(engine) => (engine.inputs(), engine.outputs()),
         };
         let shape = [1, model.card.model.inputs, raster.n, raster.n];
         check("takes", INPUT, &inputs, shape, &model)?;
@@ -144,7 +143,7 @@ impl Network {
     ) -> Result<ArrayView3<'_, f32>, NetworkError> {
         match &mut self.engine {
             Engine::OnnxRuntime(engine) => engine.run(rasters, self.masks.view_mut()),
-            Engine::Tract(engine) => engine.run(rasters, self.masks.view_mut()),
+            Engine::Rten(engine) => engine.run(rasters, self.masks.view_mut()),
         }?;
         match self.masks.iter().filter(|mask| mask.is_nan()).count() {
             0 => Ok(self.masks.view()),

@@ -28,7 +28,7 @@ pub enum RuntimeError {
     /// It is not installed.
     #[error(
         "ONNX Runtime is not installed: `{INSTALL}` in the folder of Gyre's sources installs it; masking.runtime or {VARIABLE} names one \
-         in another place; masking.backend = \"tract\" does not need it"
+         in another place; masking.backend = \"rten\" does not need it"
     )]
     Missing,
     /// The named path has no library.

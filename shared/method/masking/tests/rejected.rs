@@ -231,7 +231,7 @@ fn a_model_that_the_backend_cannot_read_is_rejected() {
 fn operators_that_are_too_new_are_rejected() {
     for backend in backends() {
         let newest = match backend {
-            Backend::Tract => ["this tract knows them up to 18", "opset=18"],
+            Backend::Rten => ["this rten knows them up to 18", "opset=18"],
             _ => ["this ONNX Runtime knows them up to 2", "opset=2"],
         };
         let version = "opset-99.onnx has operators of version 99";
@@ -257,7 +257,7 @@ fn a_model_with_other_inputs_than_its_card_states_is_rejected() {
 
 #[test]
 fn factors_that_are_nan_are_rejected() {
-    // tract's sigmoid gives a number for any input.
+    // rten's sigmoid gives a number for any input.
     if !runtime_is_installed() {
         return;
     }
@@ -290,15 +290,15 @@ fn a_missing_runtime_is_reported_with_the_install_command() {
 }
 
 #[test]
-fn settings_of_onnx_runtime_are_rejected_for_tract() {
-    let tract = || learned_by(Backend::Tract, &card("single-31"));
+fn settings_of_onnx_runtime_are_rejected_for_rten() {
+    let rten = || learned_by(Backend::Rten, &card("single-31"));
     let runtime = MaskingConfig {
         runtime: Some(PathBuf::from("/anywhere")),
-        ..tract()
+        ..rten()
     };
     let provider = MaskingConfig {
         provider: Provider::Cuda,
-        ..tract()
+        ..rten()
     };
     for (config, key) in [(runtime, "runtime"), (provider, "provider")] {
         let sentence = config.validate().unwrap_err().to_string();

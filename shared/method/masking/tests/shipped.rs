@@ -71,12 +71,12 @@ fn the_backends_agree_on_scans_of_a_simulated_drive() {
             let mut network = Network::load(&learned_by(backend, &path), &raster).unwrap();
             network.run(rasters.view()).unwrap().to_owned()
         };
-        let apart = (masks(Backend::Tract) - masks(Backend::OnnxRuntime)).mapv(f32::abs);
+        let apart = (masks(Backend::Rten) - masks(Backend::OnnxRuntime)).mapv(f32::abs);
         let (most, mean) = (
             apart.iter().copied().fold(0.0, f32::max),
             apart.mean().unwrap(),
         );
-        // An 8-bit network rounds the values of each layer to 256 steps, which tract does not: the more layers, the farther apart.
+        // An 8-bit network rounds the values of each layer to 256 steps, which rten does not: the more layers, the farther apart.
         let limits = match fs::metadata(path.with_extension("onnx")).unwrap().len() {
             ..1_000_000 => (16.0 / 255.0, 1.5 / 255.0),
             1_000_000..4_000_000 => (32.0 / 255.0, 1.5 / 255.0),

@@ -35,11 +35,11 @@ pub fn runtime_is_installed() -> bool {
     found
 }
 
-/// The backends that can be tested here: tract, and ONNX Runtime where it is installed.
+/// The backends that can be tested here: rten, and ONNX Runtime where it is installed.
 pub fn backends() -> Vec<Backend> {
     match runtime_is_installed() {
-        true => vec![Backend::Tract, Backend::OnnxRuntime],
-        false => vec![Backend::Tract],
+        true => vec![Backend::Rten, Backend::OnnxRuntime],
+        false => vec![Backend::Rten],
     }
 }
 

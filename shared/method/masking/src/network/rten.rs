@@ -1,0 +1,138 @@
+//! A network in rten.
+
+use std::{
+    fmt::Display,
+    panic::{AssertUnwindSafe, catch_unwind},
+    sync::Arc,
+};
+
+use ndarray::{ArrayView3, ArrayViewMut3};
+use rten::{ModelOptions, RunOptions, ThreadPool, Value};
+use rten_onnx::onnx::{DataType, Dimension, GraphProto, ModelProto, ValueInfoProto};
+
+use super::{NetworkError, fill, one_line};
+use crate::{Backend, model::Model};
+
+/// The newest operators with which the models of `models/` agree with ONNX Runtime.
+const OPSET: i64 = 18;
+
+/// A network. One thread computes it.
+#[derive(Debug)]
+pub(super) struct Rten {
+    network: rten::Model,
+    thread: Arc<ThreadPool>,
+    inputs: Vec<String>,
+    outputs: Vec<String>,
+}
+
+impl Rten {
+    /// Loads a model.
+    pub fn load(model: &Model) -> Result<Self, NetworkError> {
+        let rejected = |reason| NetworkError::Load {
+            by: Backend::Rten,
+            path: model.file.clone(),
+            reason,
+        };
+        let file = guarded(|| ModelProto::parse_buf(&model.bytes)).map_err(|error| {
+            rejected(format!("it is not a model in ONNX, or is damaged: {error}"))
+        })?;
+        let opset = newest_operators(&file);
+        if opset > OPSET {
+            return Err(NetworkError::Opset {
+                path: model.file.clone(),
+                opset,
+                by: Backend::Rten,
+                known: OPSET.to_string(),
+            });
+        }
+        let graph = file.graph.as_ref();
+        let graph = graph.ok_or_else(|| rejected("it has no graph".to_owned()))?;
+        let (inputs, outputs) = (inputs(graph), graph.output.iter().map(describe).collect());
+        let network = guarded(|| ModelOptions::with_all_ops().load(model.bytes.clone()));
+        Ok(Self {
+            network: network.map_err(rejected)?,
+            thread: Arc::new(ThreadPool::with_num_threads(1)),
+            inputs,
+            outputs,
+        })
+    }
+
+    /// Returns the name, type and shape of each input.
+    pub fn inputs(&self) -> Vec<String> {
+        self.inputs.clone()
+    }
+
+    /// Returns the name, type and shape of each output.
+    pub fn outputs(&self) -> Vec<String> {
+        self.outputs.clone()
+    }
+
+    /// Computes the masks of rasters, both scans x n x n.
+    pub fn run(
+        &mut self,
+        rasters: ArrayView3<'_, f32>,
+        masks: ArrayViewMut3<'_, f32>,
+    ) -> Result<(), NetworkError> {
+        let (scans, rows, columns) = rasters.dim();
+        let shape = [1, scans, rows, columns];
+        let cells: Vec<f32> = rasters.iter().copied().collect();
+        let input = Value::from_shape(shape, cells).map_err(failed)?;
+        let options = RunOptions::default().with_thread_pool(Some(self.thread.clone()));
+        let computed = guarded(|| self.network.run_one(input.into(), Some(options)));
+        let computed = computed.map_err(NetworkError::Run)?;
+        let (_, factors) = computed.into_shape_vec::<f32, 4>().map_err(failed)?;
+        fill(masks, &factors)
+    }
+}
+
+fn failed(error: impl Display) -> NetworkError {
+    NetworkError::Run(one_line(&error.to_string()))
+}
+
+/// Calls rten. A model may have what rten does not expect, and then it panics: this becomes an error too.
+fn guarded<T, E: Display>(call: impl FnOnce() -> Result<T, E>) -> Result<T, String> {
+    match catch_unwind(AssertUnwindSafe(call)) {
+        Ok(result) => result.map_err(|error| one_line(&error.to_string())),
+        Err(_) => Err("it fails on this model".to_owned()),
+    }
+}
+
+/// Returns the version of ONNX's own operators.
+fn newest_operators(file: &ModelProto) -> i64 {
+    let own = file
+        .opset_import
+        .iter()
+        .filter(|import| matches!(import.domain.as_deref(), None | Some("" | "ai.onnx")));
+    own.filter_map(|import| import.version).max().unwrap_or(0)
+}
+
+/// Returns the inputs of a graph. Old files list weights among them.
+fn inputs(graph: &GraphProto) -> Vec<String> {
+    let is_weight = |input: &&ValueInfoProto| {
+        let mut weights = graph.initializer.iter();
+        weights.any(|weight| weight.name == input.name)
+    };
+    let inputs = graph.input.iter().filter(|input| !is_weight(input));
+    inputs.map(describe).collect()
+}
+
+fn describe(tensor: &ValueInfoProto) -> String {
+    let name = tensor.name.as_deref().unwrap_or_default();
+    let kind = tensor.r#type.as_ref();
+    let Some(tensor) = kind.and_then(|kind| kind.tensor_type.as_ref()) else {
+        return format!("`{name}`, which is not a tensor");
+    };
+    let kind = match tensor.elem_type {
+        Some(DataType::FLOAT) => "Float32".to_owned(),
+        Some(other) => other.to_string(),
+        None => "untyped".to_owned(),
+    };
+    let size = |size: &Dimension| match (size.dim_value, &size.dim_param) {
+        (Some(size), _) => size.to_string(),
+        (None, Some(name)) => name.clone(),
+        (None, None) => "?".to_owned(),
+    };
+    let sizes = tensor.shape.iter().flat_map(|shape| &shape.dim);
+    let sizes: Vec<_> = sizes.map(size).collect();
+    format!("`{name}` {kind} [{}]", sizes.join(", "))
+}
