@@ -9,9 +9,8 @@ use std::{
 use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::{
-    common::{Ended, Run, gyre, odometry, python, real_data, recording},
-    ros2_driver::with_constants,
+use crate::common::{
+    Ended, Run, gyre, odometry, python, real_data, recording, recording::with_constants,
 };
 
 fn export(source: &Path, bag: &Path, arguments: &[&str]) -> Ended {

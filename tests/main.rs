@@ -4,6 +4,8 @@
 
 mod common;
 
+#[cfg(not(feature = "full"))]
+mod absent_features;
 mod bad_input;
 mod bags;
 mod batch;
@@ -24,6 +26,7 @@ mod joint_search;
 mod k2pi;
 mod keyframes;
 mod learned_masks;
+#[cfg(feature = "link")]
 mod link;
 mod live;
 mod localise;
@@ -43,8 +46,11 @@ mod refinement;
 mod resources;
 mod restart;
 mod results;
+#[cfg(feature = "ros2")]
 mod ros2;
+#[cfg(feature = "ros2")]
 mod ros2_driver;
+#[cfg(feature = "ros2")]
 mod ros2_map;
 mod scheduling;
 mod shadow;

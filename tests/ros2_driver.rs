@@ -7,7 +7,7 @@ use std::{
 };
 
 use crate::{
-    common::{Run, gyre, odometry, recording},
+    common::{Run, gyre, odometry, recording, recording::with_constants},
     ros2::{Program, can_speak, domain},
 };
 
@@ -59,16 +59,6 @@ fn receiving(run: Run, domain: &str, topic: &str, scans: usize) -> Run {
         .set(&format!("source.domain={domain}"))
         .set("source.interface='127.0.0.1'")
         .set(&format!("source.scans={scans}"))
-}
-
-/// The constants that the small recording has in its `dataset.toml`.
-pub(crate) fn with_constants(run: Run) -> Run {
-    let settings = std::fs::read_to_string(recording::small().join("dataset.toml")).unwrap();
-    let settings: toml::Table = settings.parse().unwrap();
-    let known = settings.iter().filter(|(key, _)| *key != "format");
-    known.fold(run, |run, (key, value)| {
-        run.set(&format!("dataset.{key}={value}"))
-    })
 }
 
 #[test]

@@ -12,6 +12,8 @@ use std::{
 use gyre_simulator::{SimulationConfig, drive::DriveConfig, write_dataset};
 use tempfile::TempDir;
 
+use super::Run;
+
 /// Scans of the small recording.
 pub const SCANS: usize = 24;
 
@@ -19,6 +21,16 @@ pub const SCANS: usize = 24;
 pub fn small() -> &'static Path {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
     FOLDER.get_or_init(|| of_a_block(SCANS))
+}
+
+/// Returns a run with the constants that the small recording has in its `dataset.toml`.
+pub fn with_constants(run: Run) -> Run {
+    let settings = fs::read_to_string(small().join("dataset.toml")).unwrap();
+    let settings: toml::Table = settings.parse().unwrap();
+    let constants = settings.iter().filter(|(key, _)| *key != "format");
+    constants.fold(run, |run, (key, value)| {
+        run.set(&format!("dataset.{key}={value}"))
+    })
 }
 
 /// Scans of the recording once around a block and a bit further.

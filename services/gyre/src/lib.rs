@@ -12,6 +12,8 @@ pub mod earlier;
 pub mod echo;
 pub mod evaluate;
 pub mod export;
+#[cfg(not(all(feature = "link", feature = "ros2")))]
+mod features;
 pub mod identity;
 pub mod inspect;
 pub mod judgement;

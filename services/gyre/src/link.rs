@@ -90,17 +90,16 @@ mod absent {
 
     use gyre_stage::{Launch, StageCounters, StageError};
 
-    use crate::{Failure, cli::LinkArguments};
+    use crate::{Failure, cli::LinkArguments, features::Absent};
 
-    pub const ABSENT: &str =
-        "this gyre was built without the feature `link`: build it with its default features";
+    pub const ABSENT: Absent = Absent("zenoh, which links machines");
 
     /// Refuses to run.
     ///
     /// # Errors
     /// Always.
     pub fn run_robot(_: &Launch) -> Result<StageCounters, StageError> {
-        Err(StageError::Configuration(ABSENT.to_owned()))
+        Err(ABSENT.into())
     }
 
     /// Refuses to run.
@@ -108,7 +107,7 @@ mod absent {
     /// # Errors
     /// Always.
     pub fn run_base(_: &Launch) -> Result<StageCounters, StageError> {
-        Err(StageError::Configuration(ABSENT.to_owned()))
+        Err(ABSENT.into())
     }
 
     /// Refuses to link.

@@ -7,9 +7,9 @@ use gyre_radar::DatasetOptions;
 use gyre_radar_replay::SourceConfig;
 use gyre_stage::{Launch, StageCounters, StageError};
 
-use crate::{Failure, cli::Ros2Arguments};
+use crate::{Failure, cli::Ros2Arguments, features::Absent};
 
-const ABSENT: &str = "this gyre was built without ROS 2: build it with the feature `ros2`, which is among the default ones";
+const ABSENT: Absent = Absent("ROS 2");
 
 /// Says that there is no ROS 2.
 ///
@@ -44,5 +44,5 @@ pub fn receive(
     _: &SourceConfig,
     _: &DatasetOptions,
 ) -> Result<StageCounters, StageError> {
-    Err(StageError::Configuration(ABSENT.to_owned()))
+    Err(ABSENT.into())
 }

@@ -6,6 +6,8 @@
 //! 3. `clock`, [`Mounting`], `health`, `live_map`: stamps, frames, diagnostics, the map.
 //! 4. [`source`]: the topics of Navtech's driver as the source of a run.
 
+#![cfg(feature = "dds")]
+
 mod bridge;
 mod clock;
 mod domain;
