@@ -5,11 +5,8 @@ use std::{env, fs, thread, time::Duration};
 use gyre_messages::{
     Hop, Item, Masked, MaskedHeader, Message, Motion, Rotation, RotationHeader, Scan, StageId, flag,
 };
-use gyre_stage::{
-    Launch, StageCounters, StageError, clock,
-    run::STANDBY,
-    supervise::rig::{Feed, Joining, Ports, Recorded, Tap},
-};
+use gyre_stage::{Launch, StageCounters, StageError, clock, run::STANDBY};
+use gyre_supervise::rig::{Feed, Joining, Ports, Recorded, Tap};
 
 /// What a stage does wrong.
 pub const BREACH: &str = "GYRE_TEST_BREACH";

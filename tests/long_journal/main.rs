@@ -16,7 +16,7 @@ use std::{
 use gyre::{configuration::Configuration, out::Out, results, summary::Session};
 use gyre_messages::{Hop, Item, MotionEstimate, PoseHeader, flag};
 use gyre_pose_integration::journal::{self, Journal};
-use gyre_stage::supervise::Ending;
+use gyre_supervise::Ending;
 use tempfile::TempDir;
 
 /// Poses that a restart asks for with a usual window.

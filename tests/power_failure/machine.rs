@@ -24,7 +24,7 @@ use gyre_radar::DatasetOptions;
 use gyre_refinement::checkpoint::{self, Checkpoint};
 use gyre_scan_matching::Refiner;
 use gyre_slam::{Keyframe, SlamKind, records_path};
-use gyre_stage::supervise::Ending;
+use gyre_supervise::Ending;
 use nalgebra::{Isometry2, Vector2};
 
 /// Scans of the drive: three groups of synchronised changes.

@@ -22,8 +22,8 @@ use gyre_radar_replay::{PlayedFrom, SourceConfig, SourceKind};
 use gyre_scan_matching::RefinementKind;
 use gyre_simulator::{OutputFormat, SimulationConfig};
 use gyre_slam::SlamConfig;
-use gyre_stage::supervise::{Program, StagePlan};
 use gyre_stress::{Budget, Scenario};
+use gyre_supervise::{Program, StagePlan};
 use serde::Serialize;
 
 use crate::{Failure, print};

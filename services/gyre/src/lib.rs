@@ -65,7 +65,7 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
     match command {
         Command::Stage { name } => Ok(stage::run(&name)),
         Command::Guard => {
-            gyre_stage::supervise::guard(std::io::stdin().lock());
+            gyre_supervise::guard(std::io::stdin().lock());
             Ok(ExitCode::SUCCESS)
         }
         Command::Run(arguments) => {

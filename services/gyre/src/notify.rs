@@ -6,7 +6,7 @@ use std::{
 };
 
 use gyre_messages::PoseHeader;
-use gyre_stage::supervise::Event;
+use gyre_supervise::Event;
 use sd_notify::NotifyState;
 
 use crate::print;

@@ -11,10 +11,8 @@ mod top;
 
 use std::{env, process::ExitCode};
 
-use gyre_stage::{
-    control::{Control, Swap},
-    supervise::Program,
-};
+use gyre_stage::control::{Control, Swap};
+use gyre_supervise::Program;
 
 use crate::{
     Failure,

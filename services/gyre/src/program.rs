@@ -10,7 +10,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use gyre_stage::supervise::StagePlan;
+use gyre_supervise::StagePlan;
 use sha2::{Digest, Sha256};
 
 use crate::Failure;

@@ -6,7 +6,8 @@ use std::{
 };
 
 use gyre_messages::{FollowerId, Footprint, Item, PoseHeader};
-use gyre_stage::{clock, follower::Progress as Following, supervise::Event};
+use gyre_stage::{clock, follower::Progress as Following};
+use gyre_supervise::Event;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::print;

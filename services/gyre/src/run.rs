@@ -14,10 +14,10 @@ use gyre_messages::StageId;
 use gyre_stage::{
     Manifest,
     run::{RootError, RunRoot, sweep},
-    supervise::{Ending, Plan, SuperviseError, supervise},
     wake::Signals,
 };
 use gyre_storage as storage;
+use gyre_supervise::{Ending, Plan, SuperviseError, supervise};
 
 use crate::{
     Failure,

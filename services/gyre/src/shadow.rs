@@ -4,7 +4,8 @@ use std::{process::ExitCode, time::Duration};
 
 use gyre_messages::{FollowerId, Footprint, StageId, Window};
 use gyre_shadow::{Options, STAGES};
-use gyre_stage::{control::Control, observer::ObservedRun, supervise::Scheduling};
+use gyre_stage::{control::Control, observer::ObservedRun};
+use gyre_supervise::Scheduling;
 
 use crate::{Failure, cli::ShadowArguments, operate, preflight, print, program};
 

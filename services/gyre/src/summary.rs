@@ -8,10 +8,8 @@ use std::{collections::BTreeMap, fmt, path::Path, time::Duration};
 use gyre_latency::{Latency, Percentiles};
 use gyre_masking::{Backend, MaskKind, MaskingConfig};
 use gyre_messages::{Footprint, StageId};
-use gyre_stage::{
-    StageCounters,
-    supervise::{Ending, Report, Swapped},
-};
+use gyre_stage::StageCounters;
+use gyre_supervise::{Ending, Report, Swapped};
 use serde::Serialize;
 use thiserror::Error;
 

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use gyre_stage::supervise::{RestartPolicy, Scheduling, StagePlan};
+use gyre_supervise::{RestartPolicy, Scheduling, StagePlan};
 use serde::{Deserialize, Serialize};
 
 use crate::Failure;

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use gyre_stage::supervise::{RestartPolicy, Scheduling};
+use gyre_supervise::{RestartPolicy, Scheduling};
 use serde::{Deserialize, Serialize};
 
 use super::Rate;

@@ -13,9 +13,9 @@ use std::{
 
 use gyre_stage::{
     control::{Control, Phase, Status},
-    supervise::last_line,
     wake::Signals,
 };
+use gyre_supervise::last_line;
 use rustix::process::{Pid, Signal, kill_process};
 
 use crate::{

@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use gyre_pose_integration::journal::JournalError;
-use gyre_stage::{StageError, supervise::SuperviseError};
+use gyre_stage::StageError;
+use gyre_supervise::SuperviseError;
 use thiserror::Error;
 
 use crate::NetworkError;

@@ -13,9 +13,9 @@ use gyre_pose_integration::journal::{self, Journal};
 use gyre_stage::{
     Manifest, launch,
     source::RecordedMessage,
-    supervise::rig::{Feed, Recorded, Rig},
     wake::{MAX_WAIT, Signals},
 };
+use gyre_supervise::rig::{Feed, Recorded, Rig};
 use zenoh::{Session, Wait, handlers::FifoChannelHandler, qos::Priority, query::Reply};
 
 use crate::{

@@ -7,8 +7,8 @@ use gyre_stage::{
     Listener, StageError,
     observer::{Next, ObservedRun, Observer},
     reader::Received,
-    supervise::rig::Recorded,
 };
+use gyre_supervise::rig::Recorded;
 
 /// The observer of a topic, whatever its type.
 pub(crate) trait Inlet {

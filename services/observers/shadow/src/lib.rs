@@ -24,12 +24,8 @@ use std::{
 
 use gyre_conformance::topology::Ports;
 use gyre_messages::StageId;
-use gyre_stage::{
-    StageError,
-    observer::ObservedRun,
-    supervise::{Scheduling, SuperviseError},
-    wake::Signals,
-};
+use gyre_stage::{StageError, observer::ObservedRun, wake::Signals};
+use gyre_supervise::{Scheduling, SuperviseError};
 use thiserror::Error;
 
 pub use record::Counts;

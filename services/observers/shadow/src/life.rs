@@ -11,13 +11,10 @@ use std::{
 use gyre_conformance::topology::Ports;
 use gyre_messages::{StageId, Window};
 use gyre_refinement::checkpoint;
-use gyre_stage::{
-    Listener, Manifest, StageError,
-    supervise::{
-        Death, Scheduling,
-        rig::{Feed, Process, Recorded, Rig, Tap},
-    },
-    wake::Signals,
+use gyre_stage::{Listener, Manifest, StageError, wake::Signals};
+use gyre_supervise::{
+    Death, Scheduling,
+    rig::{Feed, Process, Recorded, Rig, Tap},
 };
 
 use crate::ShadowError;

@@ -4,7 +4,8 @@ use std::collections::{BTreeMap, VecDeque};
 
 use gyre_conformance::topology::{Ports, Way};
 use gyre_messages::{StageId, flag};
-use gyre_stage::{Listener, StageError, observer::ObservedRun, supervise::rig::Recorded};
+use gyre_stage::{Listener, StageError, observer::ObservedRun};
+use gyre_supervise::rig::Recorded;
 
 use crate::inlet::{Inlet, inlet};
 

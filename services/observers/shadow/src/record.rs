@@ -5,7 +5,8 @@ use std::{fs::File, path::Path};
 use gyre_conformance::content::{Difference, difference, essence};
 use gyre_latency::Durations;
 use gyre_messages::{Item, StageId};
-use gyre_stage::{StageError, supervise::rig::Recorded};
+use gyre_stage::StageError;
+use gyre_supervise::rig::Recorded;
 use serde::Serialize;
 
 use crate::ShadowError;

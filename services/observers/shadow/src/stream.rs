@@ -169,7 +169,7 @@ fn tell_start(life: &Life<'_>, observed: &Observed) -> Result<(), StageError> {
 #[cfg(test)]
 mod tests {
     use gyre_messages::{Masked, MaskedHeader};
-    use gyre_stage::supervise::rig::Recorded;
+    use gyre_supervise::rig::Recorded;
 
     use super::*;
 

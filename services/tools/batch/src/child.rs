@@ -8,7 +8,7 @@ use std::{
     process::{self, Command, ExitStatus, Stdio},
 };
 
-use gyre_stage::supervise::last_line;
+use gyre_supervise::last_line;
 use rustix::process::{Pid, Signal, kill_process};
 
 use crate::{BatchError, Drive, Outcome, batch::Batch, list::is_configuration};

@@ -12,7 +12,8 @@ mod timing;
 use std::{collections::BTreeMap, time::Duration};
 
 use gyre_messages::{StageId, flag};
-use gyre_stage::{supervise::rig::Recorded, wake::Signals};
+use gyre_stage::wake::Signals;
+use gyre_supervise::rig::Recorded;
 
 use crate::{
     ConformanceError,

@@ -6,7 +6,8 @@ use gyre_messages::{
     Item, Masked, MaskedHeader, Message, Motion, MotionHeader, Pose, Refined, Rotation, Scan,
     ScanHeader, StageId, flag,
 };
-use gyre_stage::{StageError, supervise::rig::Recorded};
+use gyre_stage::StageError;
+use gyre_supervise::rig::Recorded;
 
 /// Returns the bytes of a message that its inputs determine: all but the times of its processing, its sender, and what it does not use
 /// of its payload.

@@ -22,7 +22,8 @@ pub mod topology;
 
 use std::{io, path::PathBuf};
 
-use gyre_stage::{StageError, supervise::SuperviseError, wake::Signals};
+use gyre_stage::{StageError, wake::Signals};
+use gyre_supervise::SuperviseError;
 use thiserror::Error;
 
 pub use report::{Report, Work};

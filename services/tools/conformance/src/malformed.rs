@@ -1,7 +1,8 @@
 //! Inputs that break the contract, and that each reader has to refuse.
 
 use gyre_messages::{Masked, Message, Motion, Pose, Rotation, Scan};
-use gyre_stage::{StageError, supervise::rig::Recorded};
+use gyre_stage::StageError;
+use gyre_supervise::rig::Recorded;
 
 use crate::content::floats;
 

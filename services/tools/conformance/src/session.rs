@@ -9,12 +9,10 @@ use std::{
 };
 
 use gyre_messages::{Message, Pose, flag};
-use gyre_stage::{
-    StageError,
-    supervise::{
-        Death, Scheduling,
-        rig::{Feed, Process, Recorded, Rig, Tap},
-    },
+use gyre_stage::StageError;
+use gyre_supervise::{
+    Death, Scheduling,
+    rig::{Feed, Process, Recorded, Rig, Tap},
 };
 
 use crate::{

@@ -4,7 +4,8 @@ use std::{fs, io, ops::Range, path::Path, time::Duration};
 
 use gyre_messages::StageId;
 use gyre_radar::Dataset;
-use gyre_stage::{Manifest, supervise::rig::Rig, wake::Signals};
+use gyre_stage::{Manifest, wake::Signals};
+use gyre_supervise::rig::Rig;
 
 use crate::{ConformanceError, topology::Ports};
 

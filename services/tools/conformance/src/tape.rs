@@ -11,13 +11,10 @@ use gyre_messages::{
 };
 use gyre_pose_integration::compose;
 use gyre_radar::continues;
-use gyre_stage::{
-    clock,
-    supervise::{
-        Scheduling,
-        rig::{Feed, Process, Recorded, Rig, Tap},
-    },
-    wake::Signals,
+use gyre_stage::{clock, wake::Signals};
+use gyre_supervise::{
+    Scheduling,
+    rig::{Feed, Process, Recorded, Rig, Tap},
 };
 
 use crate::{

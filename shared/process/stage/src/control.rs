@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use crate::{Manifest, StageError, run, source::Received};
 
 /// The name of the socket in the run's root.
-pub(crate) const SOCKET: &str = "control.sock";
+pub const SOCKET: &str = "control.sock";
 /// Time for the supervisor to answer. It is busy while it ends a process that the kernel holds.
 const ANSWER: Duration = Duration::from_secs(15);
 

@@ -1,8 +1,10 @@
 //! The counters of a stage.
 
+use std::{fs, path::PathBuf};
+
 use serde::{Deserialize, Serialize};
 
-use crate::allocations;
+use crate::{Manifest, StageError, allocations, run};
 
 /// Counters of one process of a stage, from its start to its clean exit.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -40,15 +42,28 @@ pub struct StageCounters {
     pub busy_ns: u64,
 }
 
-/// Returns the name of the file in the run's root to which a stage writes its counters.
-pub(crate) fn file_name(stage: &str) -> String {
-    format!("{stage}.counters.json")
+/// Returns the file in the run's root to which a stage writes its counters.
+fn path_of(manifest: &Manifest, stage: &str) -> PathBuf {
+    manifest.root.join(format!("{stage}.counters.json"))
 }
 
 /// Items that may allocate, since buffers grow at first.
 const WARM_UP: u64 = 5;
 
 impl StageCounters {
+    /// Reads the counters of a stage; `None` if it has not exited cleanly.
+    #[must_use]
+    pub fn of(manifest: &Manifest, stage: &str) -> Option<Self> {
+        let text = fs::read_to_string(path_of(manifest, stage)).ok()?;
+        serde_json::from_str(&text).ok()
+    }
+
+    pub(crate) fn write(&self, manifest: &Manifest, stage: &str) -> Result<(), StageError> {
+        let text =
+            serde_json::to_string(self).map_err(|e| StageError::Configuration(e.to_string()))?;
+        run::write(path_of(manifest, stage), &text)
+    }
+
     /// Counts the work on one item.
     pub(crate) fn record(&mut self, allocations: u64, busy_ns: i64) {
         if allocations::are_counted() {

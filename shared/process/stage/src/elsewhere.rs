@@ -55,7 +55,7 @@ impl ElsewhereWriter {
 }
 
 /// Returns whether stages on another machine owe the pose of an item that was handed over to them, after so many poses.
-pub(crate) fn owes(manifest: &Manifest, poses: u64) -> bool {
+pub fn owes(manifest: &Manifest, poses: u64) -> bool {
     let mut bytes = [0; 8];
     let read =
         File::open(manifest.root.join(FILE)).and_then(|file| file.read_exact_at(&mut bytes, 0));

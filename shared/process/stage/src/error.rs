@@ -126,7 +126,7 @@ impl StageError {
     pub const PERMANENT: u8 = 2;
 
     /// Creates an error of the transport.
-    pub(crate) fn transport(action: impl Into<String>, reason: impl Debug) -> Self {
+    pub fn transport(action: impl Into<String>, reason: impl Debug) -> Self {
         // The transport does not name this cause.
         let full = match run::shared_memory_is_full() {
             true => format!("; {SHARED_MEMORY} is full"),

@@ -16,8 +16,7 @@ use crate::{
 };
 pub use growth::Growth;
 use progress::ProgressWriter;
-pub(crate) use progress::is_done;
-pub use progress::{Progress, read as progress_of};
+pub use progress::{Progress, is_done, read as progress_of};
 
 /// Priority of a follower among the processes of the machine: it computes while no stage does.
 const NICENESS: i32 = 10;

@@ -26,7 +26,7 @@ const SILENT: Duration = MAX_WAIT.saturating_mul(5);
 
 /// The activity of a process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Activity {
+pub enum Activity {
     /// It works on an item.
     Works,
     /// It sleeps until there is work.
@@ -35,11 +35,12 @@ pub(crate) enum Activity {
 
 /// The newest beat of a process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Heartbeat {
+pub struct Heartbeat {
     /// Time at which the activity began, `CLOCK_MONOTONIC`, ns.
     pub since_ns: i64,
     /// The process.
     pub pid: u32,
+    /// What it does since then.
     pub activity: Activity,
 }
 
@@ -143,7 +144,7 @@ impl HeartbeatWriter {
 }
 
 /// Returns the newest beat of a process, if it writes any: a replacement need not.
-pub(crate) fn read(manifest: &Manifest, process: &str, pid: u32) -> Option<Heartbeat> {
+pub fn read(manifest: &Manifest, process: &str, pid: u32) -> Option<Heartbeat> {
     let mut bytes = [0; BYTES];
     let file = File::open(path_of(manifest, process)).ok()?;
     file.read_exact_at(&mut bytes, 0).ok()?;

@@ -21,7 +21,7 @@ use serde::de::DeserializeOwned;
 use tracing::span::EnteredSpan;
 
 use crate::{
-    Manifest, StageCounters, StageError, counters,
+    Manifest, StageCounters, StageError,
     heartbeat::HeartbeatWriter,
     run,
     services::{self, Node},
@@ -187,11 +187,9 @@ impl Launch {
         self.configuration.contains_key(section)
     }
 
-    fn write_counters(&self, counters: &StageCounters) -> Result<(), StageError> {
-        let path = self.manifest.root.join(counters::file_name(&self.name));
-        let text = serde_json::to_string(counters)
-            .map_err(|e| StageError::Configuration(e.to_string()))?;
-        run::write(path, &text)
+    /// Returns the process's node in the transport.
+    pub fn node(&self) -> &Node {
+        &self.node
     }
 }
 
@@ -208,7 +206,7 @@ pub fn main(
     let result = Launch::from_environment(name).and_then(|launch| {
         tracing::debug!(pid = std::process::id(), "started");
         let counters = work(&launch)?;
-        launch.write_counters(&counters)
+        counters.write(&launch.manifest, name)
     });
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -224,7 +222,7 @@ pub fn main(
 }
 
 /// Returns the name of the file in the run's root in which a stage says why it ended, or a process that was started to stand by.
-pub(crate) fn last_words(stage: &str, stands_by: bool) -> String {
+pub fn last_words(stage: &str, stands_by: bool) -> String {
     match stands_by {
         true => format!("{stage}.standby.error"),
         false => format!("{stage}.error"),

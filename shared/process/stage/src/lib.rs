@@ -1,4 +1,4 @@
-//! All inter-process communication of Gyre. Only this crate and the wire types depend on the transport (iceoryx2).
+//! All inter-process communication of Gyre. Only this crate, the wire types and the supervisor depend on the transport (iceoryx2).
 //!
 //! Reading order:
 //!
@@ -11,7 +11,7 @@
 //! 6. [`follower`]: the loop of a process that reads durable logs and is not in the stream.
 //! 7. [`observer`]: subscribers that the run does not depend on; [`relay`]: stand-ins for stages on another machine.
 //! 8. [`usage`]: what a process uses of the machine; [`hand_over`]: one topic alone, to measure the transport.
-//! 9. [`supervise`]: starts the processes, restarts dead ones, removes all resources at the end.
+//! 9. [`schedule`], [`heartbeat`], [`elsewhere`], [`services`]: what the supervisor (`gyre-supervise`) reads and creates.
 //!
 //! The protocol in one paragraph: items carry consecutive sequence numbers. The source may have W of them in flight; each pose
 //! is the credit for one more. A stage is a function of its inputs, and a publisher keeps a history for late readers. So a
@@ -25,11 +25,11 @@ mod allocations;
 pub mod clock;
 pub mod control;
 mod counters;
-mod elsewhere;
+pub mod elsewhere;
 mod error;
 pub mod follower;
 pub mod hand_over;
-mod heartbeat;
+pub mod heartbeat;
 pub mod inputs;
 pub mod launch;
 pub mod lock;
@@ -40,12 +40,11 @@ pub mod reader;
 pub mod relay;
 mod reservation;
 pub mod run;
-mod schedule;
-mod services;
+pub mod schedule;
+pub mod services;
 pub mod sink;
 pub mod source;
 pub mod stage;
-pub mod supervise;
 #[cfg(test)]
 mod tests;
 pub mod usage;

@@ -199,7 +199,7 @@ impl ObservedRun {
 }
 
 /// Returns the file in the run's root that the recorder writes when it observes all topics.
-pub(crate) fn ready_file(root: &Path) -> PathBuf {
+pub fn ready_file(root: &Path) -> PathBuf {
     root.join("recorder.ready")
 }
 
@@ -209,7 +209,7 @@ fn missed_file(root: &Path) -> PathBuf {
 }
 
 /// Returns the number of messages that the recorder, this process, has missed as it says itself; none unless it has told of some.
-pub(crate) fn read_missed(root: &Path, recorder: u32) -> u64 {
+pub fn read_missed(root: &Path, recorder: u32) -> u64 {
     let told = fs::read_to_string(missed_file(root)).unwrap_or_default();
     // The recorder before has left its own.
     let missed = told.strip_prefix(&format!("{recorder} "));

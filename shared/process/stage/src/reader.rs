@@ -92,7 +92,11 @@ impl<M: Message> Port<M> {
         Self::on(&launch.node, &launch.manifest)
     }
 
-    pub(crate) fn on(node: &Node, manifest: &Manifest) -> Result<Self, StageError> {
+    /// Subscribes as a process that is no stage.
+    ///
+    /// # Errors
+    /// A failure of the transport.
+    pub fn on(node: &Node, manifest: &Manifest) -> Result<Self, StageError> {
         let port = Self::silent(node, manifest)?;
         port.handshake.notify().map_err(|e| {
             StageError::transport(format!("notify the publisher of {}", M::TOPIC), e)
@@ -101,7 +105,10 @@ impl<M: Message> Port<M> {
     }
 
     /// Subscribes without notifying the publisher, as no stage may.
-    pub(crate) fn silent(node: &Node, manifest: &Manifest) -> Result<Self, StageError> {
+    ///
+    /// # Errors
+    /// A failure of the transport.
+    pub fn silent(node: &Node, manifest: &Manifest) -> Result<Self, StageError> {
         let subscriber = services::open_topic::<M>(node)?
             .subscriber_builder()
             .create()

@@ -23,8 +23,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::StageError;
 
-pub use root::{RootError, RunRoot, SHARED_MEMORY, free_shared_memory, root_of, sweep};
-pub(crate) use root::{close_to_others, is_alive, own_files, roots, shared_memory_is_full};
+pub use root::{
+    RootError, RunRoot, SHARED_MEMORY, close_to_others, free_shared_memory, own_files, root_of,
+    sweep,
+};
+pub(crate) use root::{is_alive, roots, shared_memory_is_full};
 
 /// The environment variable with the path of the run's root.
 pub const ENVIRONMENT: &str = "GYRE_RUN";
@@ -39,7 +42,7 @@ pub const COMPLETE: &str = "journal/complete";
 pub const STANDBY: &str = "GYRE_STANDBY";
 
 /// Returns the path of the file by which a process says that it stands by.
-pub(crate) fn ready_file(root: &Path, process: &str) -> PathBuf {
+pub fn ready_file(root: &Path, process: &str) -> PathBuf {
     root.join(format!("{process}.ready"))
 }
 
@@ -116,7 +119,10 @@ impl Manifest {
     }
 
     /// Returns the configuration of the transport. Names and paths are unique to the run, and only the supervisor cleans up.
-    pub(crate) fn transport(&self) -> Result<Config, StageError> {
+    ///
+    /// # Errors
+    /// A name or a path that the transport does not take.
+    pub fn transport(&self) -> Result<Config, StageError> {
         let mut config = Config::default();
         config.global.prefix = FileName::new(self.prefix.as_bytes())
             .map_err(|e| StageError::transport("name the run", e))?;

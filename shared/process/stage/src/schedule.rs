@@ -16,7 +16,7 @@ const FILE: &str = "source.schedule";
 
 /// The state of the source.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Schedule {
+pub struct Schedule {
     /// One more than `Item::published` of the newest item; 0 before the first one.
     pub published: u64,
     /// Time at which the next item is due if the window admits it, `CLOCK_MONOTONIC`, ns.
@@ -168,7 +168,7 @@ impl ScheduleWriter {
 }
 
 /// Returns the schedule of the run's source, if it has written one: a replaced source need not.
-pub(crate) fn read(manifest: &Manifest) -> Option<Schedule> {
+pub fn read(manifest: &Manifest) -> Option<Schedule> {
     read_pair(manifest, 0).map(Schedule::of)
 }
 

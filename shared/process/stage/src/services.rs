@@ -12,9 +12,12 @@ use iceoryx2::{
 
 use crate::{StageError, log_id::LOGS};
 
-pub(crate) type Ipc = ipc::Service;
-pub(crate) type Node = iceoryx2::node::Node<Ipc>;
-pub(crate) type Topic<M> =
+/// The kind of services: shared memory between processes.
+pub type Ipc = ipc::Service;
+/// A process in the transport.
+pub type Node = iceoryx2::node::Node<Ipc>;
+/// A topic, which ports are opened of.
+pub type Topic<M> =
     publish_subscribe::PortFactory<Ipc, [<M as Message>::Element], <M as Message>::Header>;
 pub(crate) type Event = event::PortFactory<Ipc>;
 /// The receiver of an event's notifications.
@@ -25,7 +28,10 @@ pub(crate) type Notifier = iceoryx2::port::notifier::Notifier<Ipc>;
 const HEADROOM: usize = 6;
 
 /// Creates a node of this run. The transport's tools show its name.
-pub(crate) fn node(config: &Config, name: &str) -> Result<Node, StageError> {
+///
+/// # Errors
+/// A failure of the transport.
+pub fn node(config: &Config, name: &str) -> Result<Node, StageError> {
     let name = NodeName::new(name).map_err(|e| StageError::transport("name the node", e))?;
     NodeBuilder::new()
         .name(&name)
@@ -36,7 +42,7 @@ pub(crate) fn node(config: &Config, name: &str) -> Result<Node, StageError> {
 }
 
 /// All services of a run. They exist as long as this value.
-pub(crate) struct Services {
+pub struct Services {
     scan: Topic<Scan>,
     masked: Topic<Masked>,
     rotation: Topic<Rotation>,
@@ -52,7 +58,10 @@ pub(crate) struct Services {
 
 impl Services {
     /// Creates the services.
-    pub(crate) fn create(node: &Node, window: &Window) -> Result<Self, StageError> {
+    ///
+    /// # Errors
+    /// A failure of the transport.
+    pub fn create(node: &Node, window: &Window) -> Result<Self, StageError> {
         let mut events = Vec::new();
         for topic in gyre_messages::topics(window) {
             events.extend(create_events(node, topic.name, &(topic.sizes)(window))?);
@@ -86,7 +95,7 @@ impl Services {
 
     /// Returns whether a stage has opened the topic that it publishes, which stages do last. A dead stage counts until its
     /// resources are removed.
-    pub(crate) fn has_publisher(&self, stage: StageId) -> bool {
+    pub fn has_publisher(&self, stage: StageId) -> bool {
         let publishers = match stage {
             StageId::RadarReplay => self.scan.dynamic_config().number_of_publishers(),
             StageId::Masking => self.masked.dynamic_config().number_of_publishers(),
@@ -176,7 +185,10 @@ fn create_event(node: &Node, name: &str, sizes: EventSizes) -> Result<Event, Sta
 }
 
 /// Opens a topic, which the supervisor has created.
-pub(crate) fn open_topic<M: Message>(node: &Node) -> Result<Topic<M>, StageError> {
+///
+/// # Errors
+/// A failure of the transport.
+pub fn open_topic<M: Message>(node: &Node) -> Result<Topic<M>, StageError> {
     node.service_builder(&service_name(M::TOPIC)?)
         .publish_subscribe::<[M::Element]>()
         .user_header::<M::Header>()

@@ -6,7 +6,7 @@ mod pace;
 mod playback;
 mod player;
 mod position;
-pub(crate) mod received;
+mod received;
 mod sensor;
 
 use std::{
@@ -27,7 +27,7 @@ pub(crate) use sensor::ALIVE_NS;
 pub use crate::outlet::RecordedMessage;
 pub use attempts::{Tolerance, Unreadable, open};
 pub use player::{Recorded, run_player};
-pub use received::{LastScan, Received};
+pub use received::{LastScan, Received, read as received_of};
 pub use sensor::{Arrival, Sensor, run_sensor};
 
 /// A source of scans.

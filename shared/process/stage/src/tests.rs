@@ -33,8 +33,8 @@ const WINDOW: Window = Window {
 };
 
 /// A run without processes: its services, and nodes for tests. Runs are isolated from each other.
-pub(crate) struct Run {
-    pub(crate) manifest: Manifest,
+struct Run {
+    manifest: Manifest,
     _services: Services,
     _supervisor: Node,
     // Last: removes all files of the run.
@@ -43,7 +43,7 @@ pub(crate) struct Run {
 }
 
 impl Run {
-    pub(crate) fn new() -> Self {
+    fn new() -> Self {
         Self::writing_to(&Rc::new(tempfile::tempdir().unwrap()))
     }
 

@@ -124,7 +124,10 @@ impl Signals {
     /// Sleeps until a listener is notified, a signal arrives or `limit` has passed, whichever is first.
     /// Consumes the notifications of `data`: read all queues afterwards. A notification of `handshake` is left for
     /// [`Writer::accept_readers`](crate::writer::Writer::accept_readers), to be called if [`Woken::may_have_new_readers`].
-    pub(crate) fn wait(
+    ///
+    /// # Errors
+    /// The system refuses to wait, or a notification cannot be read.
+    pub fn wait(
         &self,
         data: &[&Listener],
         handshake: Option<&Listener>,
@@ -134,7 +137,10 @@ impl Signals {
     }
 
     /// As [`wait`](Self::wait) with any number of topics that are published, or until a connection has something to read, which it leaves there.
-    pub(crate) fn wait_or_readable(
+    ///
+    /// # Errors
+    /// The system refuses to wait, or a notification cannot be read.
+    pub fn wait_or_readable(
         &self,
         data: &[&Listener],
         handshakes: &[&Listener],

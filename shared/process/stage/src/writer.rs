@@ -27,7 +27,10 @@ pub struct Draft<M: Message> {
 
 impl<M: Message> Writer<M> {
     /// Opens the topic for publishing.
-    pub(crate) fn open(node: &Node, manifest: &Manifest) -> Result<Self, StageError> {
+    ///
+    /// # Errors
+    /// A failure of the transport.
+    pub fn open(node: &Node, manifest: &Manifest) -> Result<Self, StageError> {
         let handshake = services::listener(node, &services::handshake_event(M::TOPIC))?;
         let data = services::notifier(node, &services::data_event(M::TOPIC))?;
         let elements = M::max_elements(&manifest.limits);
@@ -84,7 +87,10 @@ impl<M: Message> Writer<M> {
     }
 
     /// Publishes a message that says of itself who has sent it.
-    pub(crate) fn send_unchanged(&self, draft: Draft<M>) -> Result<(), StageError> {
+    ///
+    /// # Errors
+    /// A failure of the transport.
+    pub fn send_unchanged(&self, draft: Draft<M>) -> Result<(), StageError> {
         draft
             .sample
             .send()
@@ -107,7 +113,10 @@ impl<M: Message> Writer<M> {
     }
 
     /// The same for readers that have notified alone; returns whether there were any.
-    pub(crate) fn answer_handshakes(&self) -> Result<bool, StageError> {
+    ///
+    /// # Errors
+    /// A failure of the transport.
+    pub fn answer_handshakes(&self) -> Result<bool, StageError> {
         let new_reader = self.has_new_reader()?;
         if new_reader {
             self.connect()?;
@@ -133,7 +142,7 @@ impl<M: Message> Writer<M> {
     }
 
     /// Returns the listener that new readers notify.
-    pub(crate) fn listener(&self) -> &Listener {
+    pub fn listener(&self) -> &Listener {
         &self.handshake
     }
 

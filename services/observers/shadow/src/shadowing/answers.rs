@@ -2,7 +2,7 @@
 
 use gyre_conformance::copying::{not_copied, wrong_stamps};
 use gyre_messages::{Item, flag};
-use gyre_stage::supervise::rig::Recorded;
+use gyre_supervise::rig::Recorded;
 
 use super::{Shadowing, UnderWay};
 use crate::{ShadowError, life::Sent, record::Pair};

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use gyre_stage::supervise::Scheduling;
+use gyre_supervise::Scheduling;
 
 use super::Examination;
 use crate::{ConformanceError, rule::Rule, tape::LOOK};

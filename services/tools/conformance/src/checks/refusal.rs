@@ -1,9 +1,7 @@
 //! Inputs that break the contract: the program ends with exit code 3 and a sentence, and sends nothing about them.
 
-use gyre_stage::{
-    StageError,
-    supervise::{Death, rig::Rig},
-};
+use gyre_stage::StageError;
+use gyre_supervise::{Death, rig::Rig};
 
 use super::{Examination, stream::starts};
 use crate::{

@@ -118,7 +118,7 @@ impl Death {
     }
 }
 
-fn last_of(outputs: &[gyre_stage::supervise::rig::Recorded]) -> String {
+fn last_of(outputs: &[gyre_supervise::rig::Recorded]) -> String {
     let last = outputs.iter().map(|it| it.item().seq).max();
     last.map_or_else(|| "no item".to_owned(), |seq| format!("item {seq}"))
 }

@@ -1,7 +1,7 @@
 //! What must hold for each item that a process sends.
 
 use gyre_messages::{Item, flag};
-use gyre_stage::supervise::rig::Recorded;
+use gyre_supervise::rig::Recorded;
 
 use super::Session;
 use crate::{

@@ -1,7 +1,8 @@
 //! What is fed to a process: its inputs as they are admitted, and what the rest of the run would make of its answers.
 
 use gyre_messages::{Message, Motion, Pose, flag};
-use gyre_stage::{clock, supervise::rig::Recorded};
+use gyre_stage::clock;
+use gyre_supervise::rig::Recorded;
 
 use super::{Pace, Session};
 use crate::{ConformanceError, topology::Way};

@@ -15,8 +15,8 @@ use gyre_stage::{
     control::Control,
     observer::{ObservedRun, Observer},
     run::sweep,
-    supervise::last_line,
 };
+use gyre_supervise::last_line;
 use rustix::process::{Pid, Signal, kill_process};
 
 use super::{Setup, Summary, TICK, drain};

@@ -70,7 +70,7 @@ pub fn read(manifest: &Manifest, follower: &str) -> Option<(Progress, bool)> {
 }
 
 /// Returns whether a follower has come to the end of its logs.
-pub(crate) fn is_done(manifest: &Manifest, follower: &str) -> bool {
+pub fn is_done(manifest: &Manifest, follower: &str) -> bool {
     read(manifest, follower).is_some_and(|(_, has_ended)| has_ended)
 }
 

@@ -301,10 +301,7 @@ fn remove_files(root: &Path) {
 }
 
 /// Returns the files of this user in a directory whose names begin with `prefix`.
-pub(crate) fn own_files(
-    directory: &Path,
-    prefix: &str,
-) -> impl Iterator<Item = (PathBuf, Metadata)> {
+pub fn own_files(directory: &Path, prefix: &str) -> impl Iterator<Item = (PathBuf, Metadata)> {
     let user = geteuid().as_raw();
     let entries = fs::read_dir(directory).into_iter().flatten().flatten();
     entries
@@ -328,7 +325,10 @@ pub(crate) fn shared_memory_is_full() -> bool {
 }
 
 /// Closes the files of a run to other users. The transport opens one of them, the counter of its nodes, to all.
-pub(crate) fn close_to_others(prefix: &str) -> io::Result<()> {
+///
+/// # Errors
+/// A file whose mode cannot be changed.
+pub fn close_to_others(prefix: &str) -> io::Result<()> {
     own_files(Path::new(SHARED_MEMORY), prefix)
         .filter(|(_, file)| file.mode() & 0o077 != 0)
         .try_for_each(|(path, _)| fs::set_permissions(path, Permissions::from_mode(0o600)))

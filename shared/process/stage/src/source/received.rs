@@ -106,7 +106,7 @@ impl Received {
 }
 
 /// Returns what the sensor of a run has delivered; `None` if its source is no sensor.
-pub(crate) fn read(manifest: &Manifest) -> Option<Received> {
+pub fn read(manifest: &Manifest) -> Option<Received> {
     let mut bytes = [0; BYTES];
     let file = File::open(manifest.root.join(FILE)).ok()?;
     file.read_exact_at(&mut bytes, 0).ok()?;

@@ -3,15 +3,16 @@
 
 use std::time::{Duration, Instant};
 
-use super::{
+use gyre_stage::{
+    control::{Activity, ProcessStatus},
+    observer,
+};
+
+use crate::{
     Ending, Event, SuperviseError, Supervisor,
     child::Child,
     requests::{activity, of_child},
     start::{Place, Starter},
-};
-use crate::{
-    control::{Activity, ProcessStatus},
-    observer,
 };
 
 /// The longest time for which the first scan waits until the recorder observes all topics.
@@ -24,7 +25,7 @@ const END_TIMEOUT: Duration = Duration::from_secs(30);
 const STOP_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// The process, and when it is to be started again.
-pub(super) struct Recorder {
+pub(crate) struct Recorder {
     child: Child,
     /// `None` while it runs, and when it has ended for good.
     restart_at: Option<Instant>,
@@ -40,7 +41,7 @@ impl Recorder {
 
 impl Supervisor<'_> {
     /// Starts the recorder before any stage, and waits until it observes all topics, so that it misses nothing of the beginning.
-    pub(super) fn start_recorder(&mut self) -> Result<(), SuperviseError> {
+    pub(crate) fn start_recorder(&mut self) -> Result<(), SuperviseError> {
         let Some(plan) = &self.plan.recorder else {
             return Ok(());
         };
@@ -69,7 +70,7 @@ impl Supervisor<'_> {
     }
 
     /// Starts a recorder again that has died.
-    pub(super) fn keep_recorder(&mut self) -> Result<(), SuperviseError> {
+    pub(crate) fn keep_recorder(&mut self) -> Result<(), SuperviseError> {
         let Some(recorder) = &mut self.recorder else {
             return Ok(());
         };
@@ -134,7 +135,7 @@ impl Supervisor<'_> {
     }
 
     /// Lets the recorder write what it has received, before the stages end.
-    pub(super) fn stop_recorder(&mut self, ending: Option<Ending>) -> Result<(), SuperviseError> {
+    pub(crate) fn stop_recorder(&mut self, ending: Option<Ending>) -> Result<(), SuperviseError> {
         let awaits_restart = |it: &Recorder| it.restart_at.is_some();
         if self.recorder.as_ref().is_some_and(awaits_restart) {
             self.say_of_recording(
@@ -148,19 +149,19 @@ impl Supervisor<'_> {
     }
 
     /// Returns whether a process of this name is the recorder.
-    pub(super) fn is_recorder(&self, process: &str) -> bool {
+    pub(crate) fn is_recorder(&self, process: &str) -> bool {
         let recorder = self.recorder.as_ref();
         recorder.is_some_and(|recorder| recorder.child.name() == process)
     }
 
     /// Ends the recorder and starts it again, also one that has ended for good: its disk may have room again.
-    pub(super) fn restart_recorder(&mut self) -> Result<(), SuperviseError> {
+    pub(crate) fn restart_recorder(&mut self) -> Result<(), SuperviseError> {
         self.end_recorder(STOP_TIMEOUT)?;
         self.respawn_recorder()
     }
 
     /// Returns the state of the recorder, if the run has one.
-    pub(super) fn status_of_recorder(&self) -> Option<ProcessStatus> {
+    pub(crate) fn status_of_recorder(&self) -> Option<ProcessStatus> {
         let Recorder {
             child, restarts, ..
         } = self.recorder.as_ref()?;

@@ -3,11 +3,12 @@
 
 use std::time::{Duration, Instant};
 
-use super::{Ending, Event, Stall, SuperviseError, Supervisor};
-use crate::{
+use gyre_stage::{
     clock,
     follower::{self, Progress},
 };
+
+use crate::{Ending, Event, Stall, SuperviseError, Supervisor};
 
 /// Stalls of a follower in a row after which the run ends.
 const MAX_STALLS: usize = 3;
@@ -42,7 +43,7 @@ impl Clock {
 
 impl Supervisor<'_> {
     /// Restarts dead followers while the stream goes on. The stages do not notice, and one that cannot be restarted does not end them.
-    pub(super) fn recover_followers(&mut self, dead: &[usize]) -> Result<(), SuperviseError> {
+    pub(crate) fn recover_followers(&mut self, dead: &[usize]) -> Result<(), SuperviseError> {
         for follower in dead {
             match self.recover_follower(*follower) {
                 Err(error) if error.is_of_one_process() => {
@@ -69,7 +70,7 @@ impl Supervisor<'_> {
 
     /// Waits until the followers have read the logs to their end, or until they have that do not read what one writes that dies again
     /// and again. The stream has ended, so the death of a stage changes nothing.
-    pub(super) fn await_followers(&mut self) -> Result<Ending, SuperviseError> {
+    pub(crate) fn await_followers(&mut self) -> Result<Ending, SuperviseError> {
         self.is_following = true;
         // The last pose may have been the first of a program on trial.
         self.continue_trial();
@@ -133,7 +134,7 @@ impl Supervisor<'_> {
     }
 
     /// Returns whether a process is a follower that has not come to its end, and may still do so.
-    pub(super) fn is_behind(&self, child: usize) -> bool {
+    pub(crate) fn is_behind(&self, child: usize) -> bool {
         let has_given_up = self.given_up.iter().any(|(follower, _)| *follower == child);
         let child = &self.children[child];
         child.follows() && !has_given_up && !follower::is_done(&self.plan.manifest, child.name())

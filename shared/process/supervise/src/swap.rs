@@ -10,12 +10,18 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::{Event, StagePlan, SuperviseError, Supervisor, Swapped, child::Child, start::Place};
-use crate::{
+use gyre_stage::{
     clock,
     control::{Answer, Swap},
     run, schedule,
-    supervise::{program::Program, socket::Client, start::Starter},
+};
+
+use crate::{
+    Event, StagePlan, SuperviseError, Supervisor, Swapped,
+    child::Child,
+    program::Program,
+    socket::Client,
+    start::{Place, Starter},
 };
 
 /// Time for which a moment without a scan in flight is waited for. At the highest rate there is none.
@@ -24,7 +30,7 @@ const PATIENCE: Duration = Duration::from_secs(1);
 const ENDED: &str = "the stream has ended";
 
 /// A program that stands by.
-pub(super) struct Standby {
+pub(crate) struct Standby {
     /// The index of the process whose place it is to take.
     child: usize,
     process: Child,
@@ -42,7 +48,7 @@ impl Standby {
 impl Supervisor<'_> {
     /// Starts a program that is to take the place of another one. The client has its answer when that has done so, and has worked on a
     /// first pose.
-    pub(super) fn begin_swap(&mut self, swap: Swap, client: Client) -> Result<(), SuperviseError> {
+    pub(crate) fn begin_swap(&mut self, swap: Swap, client: Client) -> Result<(), SuperviseError> {
         let Some(child) = self.named(&swap.process) else {
             self.refuse_unknown(&swap.process, client);
             return Ok(());
@@ -130,7 +136,7 @@ impl Supervisor<'_> {
     }
 
     /// Looks after the program that stands by, and lets it take over.
-    pub(super) fn continue_swap(&mut self) -> Result<(), SuperviseError> {
+    pub(crate) fn continue_swap(&mut self) -> Result<(), SuperviseError> {
         let Some(mut standby) = self.standby.take() else {
             return Ok(());
         };
@@ -167,7 +173,7 @@ impl Supervisor<'_> {
     }
 
     /// Gives up the program that stands by, since the stream has ended.
-    pub(super) fn end_swap(&mut self) -> Result<(), SuperviseError> {
+    pub(crate) fn end_swap(&mut self) -> Result<(), SuperviseError> {
         match self.standby.take() {
             Some(standby) => self.give_up(standby, ENDED.to_owned()),
             None => Ok(()),
@@ -233,7 +239,7 @@ impl Supervisor<'_> {
     }
 
     /// Goes back to the program before a swap, from the next start on; false if there was none.
-    pub(super) fn go_back(&mut self, child: usize, reason: &str) -> bool {
+    pub(crate) fn go_back(&mut self, child: usize, reason: &str) -> bool {
         let failed = self.children[child].plan().command.join(" ");
         let has_gone_back = self.children[child].go_back(&self.plan.stages[child]);
         if has_gone_back {

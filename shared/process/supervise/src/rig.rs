@@ -11,24 +11,24 @@ use std::{collections::BTreeSet, fs, os::fd::BorrowedFd, path::PathBuf, time::Du
 use gyre_messages::{
     Correction, Fix, Loop, Masked, Message, Motion, Pose, Refined, Rotation, Scan, StageId,
 };
-use iceoryx2::prelude::{Config, LogLevel, set_log_level};
-use rustix::process::{Pid, getpgid};
-
-use super::{
-    Death, RestartPolicy, Scheduling, StagePlan, SuperviseError,
-    child::Child,
-    clean,
-    guardian::Guardian,
-    log,
-    start::{Place, Starter},
-};
-use crate::{
+use gyre_stage::{
     Launch, Manifest, StageError,
     reader::Port,
     run::{self, RunRoot},
     services::{self, Listener, Node, Services, Topic},
     wake::Signals,
     writer::Writer,
+};
+use iceoryx2::prelude::{Config, LogLevel, set_log_level};
+use rustix::process::{Pid, getpgid};
+
+use crate::{
+    Death, RestartPolicy, Scheduling, StagePlan, SuperviseError,
+    child::Child,
+    clean,
+    guardian::Guardian,
+    log,
+    start::{Place, Starter},
 };
 
 pub use recorded::Recorded;
@@ -93,7 +93,7 @@ pub trait Tap {
 
 impl<'a> Rig<'a> {
     /// Creates the root of a run with this manifest, the prefix and the root of which are set, and this configuration, and the services
-    /// of the run. `guardian` is as in [`Plan`](super::Plan).
+    /// of the run. `guardian` is as in [`Plan`](crate::Plan).
     ///
     /// # Errors
     /// Shared memory that cannot be used, a guardian that cannot be started, or a failure of the transport.
@@ -288,7 +288,7 @@ impl<'a> Ports<'a> {
     /// The topics of the run that a process has joined.
     pub fn of(launch: &'a Launch) -> Self {
         Self {
-            node: &launch.node,
+            node: launch.node(),
             manifest: &launch.manifest,
         }
     }

@@ -3,14 +3,15 @@
 
 use std::time::{Duration, Instant};
 
-use super::{Supervisor, socket::Client};
-use crate::control::Answer;
+use gyre_stage::control::Answer;
+
+use crate::{Supervisor, socket::Client};
 
 /// Time for which a client waits for the first pose, from when the program has opened its topics. A radar may be switched off.
 const LIMIT: Duration = Duration::from_secs(10);
 
 /// A client that waits for the result.
-pub(super) struct Trial {
+pub(crate) struct Trial {
     /// The index of the process on trial.
     child: usize,
     client: Client,
@@ -20,7 +21,7 @@ pub(super) struct Trial {
 
 impl Supervisor<'_> {
     /// Lets the client of a swap wait. Of a follower no pose says what it does: so its swap is done when it is started.
-    pub(super) fn await_trial(&mut self, child: usize, client: Client) {
+    pub(crate) fn await_trial(&mut self, child: usize, client: Client) {
         if self.children[child].follows() {
             client.answer(&Answer::Done);
             return;
@@ -33,7 +34,7 @@ impl Supervisor<'_> {
     }
 
     /// Answers the client if the program has passed, or no scan has come for long.
-    pub(super) fn continue_trial(&mut self) {
+    pub(crate) fn continue_trial(&mut self) {
         let Some(mut trial) = self.trial.take() else {
             return;
         };
@@ -56,7 +57,7 @@ impl Supervisor<'_> {
     }
 
     /// Tells the client that the program has failed, and the one before is started again.
-    pub(super) fn fail_trial(&mut self, child: usize, command: &str, reason: &str) {
+    pub(crate) fn fail_trial(&mut self, child: usize, command: &str, reason: &str) {
         let is_of_it = |trial: &mut Trial| trial.child == child;
         if let Some(trial) = self.trial.take_if(is_of_it) {
             trial.client.answer(&Answer::Refused(format!(
@@ -67,7 +68,7 @@ impl Supervisor<'_> {
     }
 
     /// Tells the client that the stream has ended before the first pose.
-    pub(super) fn end_trial(&mut self) {
+    pub(crate) fn end_trial(&mut self) {
         if let Some(trial) = self.trial.take() {
             let name = self.children[trial.child].name();
             trial.client.answer(&Answer::Untried(format!(

@@ -63,7 +63,7 @@ impl Scheduling {
     }
 
     /// Returns what a new process can apply to itself between fork and exec.
-    pub(super) fn prepare(&self) -> Prepared {
+    pub(crate) fn prepare(&self) -> Prepared {
         let mut set = CpuSet::new();
         self.cpus.iter().for_each(|cpu| set.set(*cpu));
         Prepared {
@@ -74,7 +74,7 @@ impl Scheduling {
     }
 
     /// Returns a key with its value, for a sentence.
-    pub(super) fn describe(&self, key: Key) -> String {
+    pub(crate) fn describe(&self, key: Key) -> String {
         match key {
             Key::Cpus => format!("cpus = {:?}", self.cpus),
             Key::Nice => format!("nice = {}", self.nice.unwrap_or_default()),
@@ -88,7 +88,7 @@ impl Scheduling {
 
 /// A key that the system can refuse.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Key {
+pub(crate) enum Key {
     Cpus,
     Nice,
     RealtimePriority,
@@ -100,7 +100,7 @@ impl Key {
 
 /// A [`Scheduling`] without anything that has to be allocated.
 #[derive(Clone, Copy)]
-pub(super) struct Prepared {
+pub(crate) struct Prepared {
     cpus: Option<CpuSet>,
     nice: Option<i32>,
     realtime_priority: Option<u8>,

@@ -5,13 +5,13 @@
 
 use std::{fs::File, io::Write};
 
-use super::SuperviseError;
+use crate::SuperviseError;
 
 /// The system keeps to what a process has written here until that process closes it (Linux, "PM QoS").
 const FILE: &str = "/dev/cpu_dma_latency";
 
 /// A limit that is in effect until it is dropped.
-pub(super) struct WakeLimit {
+pub(crate) struct WakeLimit {
     _file: File,
 }
 

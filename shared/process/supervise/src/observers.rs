@@ -5,10 +5,10 @@ use std::{
     time::{Duration, Instant},
 };
 
+use gyre_stage::Manifest;
 use iceoryx2::prelude::Config;
 
-use super::clean;
-use crate::Manifest;
+use crate::clean;
 
 /// Time between two looks.
 const PERIOD: Duration = Duration::from_secs(1);
@@ -16,19 +16,19 @@ const PERIOD: Duration = Duration::from_secs(1);
 const PERIOD_AFTER_FAILURE: Duration = Duration::from_secs(30);
 
 /// Looks for killed observers at a low rate, since nothing tells the supervisor of their death.
-pub(super) struct Sweep {
+pub(crate) struct Sweep {
     due: Instant,
 }
 
 impl Sweep {
-    pub(super) fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self {
             due: Instant::now() + PERIOD,
         }
     }
 
     /// Removes what killed observers left, if it is time to look. `processes` is the number of the run's own processes.
-    pub(super) fn run_if_due(&mut self, manifest: &Manifest, transport: &Config, processes: usize) {
+    pub(crate) fn run_if_due(&mut self, manifest: &Manifest, transport: &Config, processes: usize) {
         let now = Instant::now();
         if now < self.due {
             return;

@@ -3,22 +3,22 @@
 use std::process;
 
 use gyre_messages::StageId;
-
-use super::{SuperviseError, Supervisor, child::Child, socket::Client};
-use crate::{
+use gyre_stage::{
     clock,
     control::{Activity, Answer, Phase, ProcessStatus, Request, Status},
     heartbeat::{self, Heartbeat},
     schedule,
-    source::received,
+    source::received_of,
 };
+
+use crate::{SuperviseError, Supervisor, child::Child, socket::Client};
 
 /// Requests that are answered before the supervisor looks after its processes again.
 const MAX_REQUESTS: usize = 8;
 
 impl Supervisor<'_> {
     /// Answers the requests that have come; true if one of them is to stop.
-    pub(super) fn serve(&mut self) -> Result<bool, SuperviseError> {
+    pub(crate) fn serve(&mut self) -> Result<bool, SuperviseError> {
         let mut stop = false;
         for _ in 0..MAX_REQUESTS {
             let Some((request, client)) = self.socket.next() else {
@@ -48,12 +48,12 @@ impl Supervisor<'_> {
     }
 
     /// Returns the index of a process.
-    pub(super) fn named(&self, process: &str) -> Option<usize> {
+    pub(crate) fn named(&self, process: &str) -> Option<usize> {
         let mut children = self.children.iter();
         children.position(|child| child.name() == process)
     }
 
-    pub(super) fn refuse_unknown(&self, process: &str, client: Client) {
+    pub(crate) fn refuse_unknown(&self, process: &str, client: Client) {
         let names: Vec<&str> = self.children.iter().map(Child::name).collect();
         let names = names.join(", ");
         client.answer(&Answer::Refused(format!(
@@ -71,7 +71,7 @@ impl Supervisor<'_> {
         Ok(Answer::Done)
     }
 
-    pub(super) fn restart_and_count(&mut self, stages: &[usize]) -> Result<(), SuperviseError> {
+    pub(crate) fn restart_and_count(&mut self, stages: &[usize]) -> Result<(), SuperviseError> {
         stages.iter().for_each(|i| self.count_restart(*i));
         self.restart(stages, clock::now_ns())
     }
@@ -118,7 +118,7 @@ impl Supervisor<'_> {
             is_swapped: child.plan().command != *begun,
             restarts: restarts.copied().unwrap_or_default(),
             received: match child.stage() {
-                Some(StageId::RadarReplay) => received::read(&self.plan.manifest),
+                Some(StageId::RadarReplay) => received_of(&self.plan.manifest),
                 _ => None,
             },
             ..of_child(child, beat, activity)
@@ -127,7 +127,7 @@ impl Supervisor<'_> {
 }
 
 /// Returns what a living process does.
-pub(super) fn activity(beat: Heartbeat) -> Activity {
+pub(crate) fn activity(beat: Heartbeat) -> Activity {
     match beat.activity {
         _ if beat.is_silent() => Activity::Silent,
         heartbeat::Activity::Works => Activity::Working,
@@ -136,7 +136,7 @@ pub(super) fn activity(beat: Heartbeat) -> Activity {
 }
 
 /// Returns the state of a process that has never been restarted.
-pub(super) fn of_child(
+pub(crate) fn of_child(
     child: &Child,
     beat: Option<Heartbeat>,
     activity: Activity,

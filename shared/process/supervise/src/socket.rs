@@ -9,12 +9,11 @@ use std::{
     time::{Duration, Instant},
 };
 
-use rustix::event::{PollFd, PollFlags, Timespec, poll};
-
-use crate::{
+use gyre_stage::{
     Manifest, StageError,
     control::{Answer, Request, SOCKET},
 };
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
 /// Time for a client to send its request, and to take the answer. The supervisor does nothing else meanwhile, and clients of this
 /// user send it at once.
@@ -23,7 +22,7 @@ const LIMIT: Duration = Duration::from_millis(100);
 const MAX: usize = 64 << 10;
 
 /// The socket, open to this user alone since it lies in the run's root.
-pub(super) struct ControlSocket(UnixListener);
+pub(crate) struct ControlSocket(UnixListener);
 
 impl ControlSocket {
     pub fn open(manifest: &Manifest) -> Result<Self, StageError> {
@@ -61,7 +60,7 @@ impl ControlSocket {
 }
 
 /// A client that waits for its answer.
-pub(super) struct Client(UnixStream);
+pub(crate) struct Client(UnixStream);
 
 impl Client {
     fn of(stream: UnixStream) -> io::Result<Self> {

@@ -2,7 +2,10 @@
 //!
 //! After a death only the dead stage is restarted: every start resumes. All stages are restarted if that does not help (the
 //! stage dies again before a new pose, or no pose is published) or if the plan says so. Followers are no part of that: they are
-//! restarted alone, and waited for at the end.
+//! restarted alone, and waited for at the end. [`rig`] runs one process alone, to test it.
+
+// `pre_exec` and raw file descriptors need `unsafe`; each use states why it is sound.
+#![allow(unsafe_code)]
 
 mod child;
 mod clean;
@@ -28,20 +31,19 @@ mod watchdog;
 
 use std::{
     collections::BTreeMap,
-    fs,
     time::{Duration, Instant},
 };
 
 use gyre_messages::{Item, Pose, flag};
-use iceoryx2::prelude::{Config, FilePath, SemanticString};
-
-use crate::{
-    StageCounters, StageError, counters,
+use gyre_stage::{
+    StageCounters, StageError,
     reader::Port,
     run,
     services::{self, Node, Services},
     wake::{self, Signals},
 };
+use iceoryx2::prelude::{Config, FilePath, SemanticString};
+
 use child::Child;
 use guardian::Guardian;
 use recovery::{Recovering, pass_trials, record_recoveries};
@@ -317,9 +319,8 @@ fn use_as_global(path: &std::path::Path) -> Result<(), StageError> {
 /// Reads the counters of the stages that exited cleanly, by name.
 fn counters(plan: &Plan) -> BTreeMap<String, StageCounters> {
     let read = |stage: &StagePlan| {
-        let text =
-            fs::read_to_string(plan.manifest.root.join(counters::file_name(&stage.name))).ok()?;
-        Some((stage.name.clone(), serde_json::from_str(&text).ok()?))
+        let counters = StageCounters::of(&plan.manifest, &stage.name)?;
+        Some((stage.name.clone(), counters))
     };
     plan.stages.iter().filter_map(read).collect()
 }

@@ -10,19 +10,19 @@ use std::{
 };
 
 use gyre_messages::{FollowerId, StageId};
-use rustix::process::{Pid, Signal, kill_process_group};
-
-use super::{
-    StagePlan, SuperviseError,
-    end::ends_within,
-    log::Log,
-    start::{Place, Starter},
-};
-use crate::{
+use gyre_stage::{
     Manifest, StageError,
     heartbeat::{self, Heartbeat},
     launch,
     run::SHARED_MEMORY,
+};
+use rustix::process::{Pid, Signal, kill_process_group};
+
+use crate::{
+    StagePlan, SuperviseError,
+    end::ends_within,
+    log::Log,
+    start::{Place, Starter},
 };
 
 /// Time for a killed process to end. The kernel holds one that waits for a device, as for a network folder.
@@ -52,7 +52,7 @@ impl fmt::Display for Death {
     }
 }
 
-pub(super) struct Child {
+pub(crate) struct Child {
     plan: StagePlan,
     process: std::process::Child,
     started: Instant,
@@ -74,7 +74,7 @@ pub(super) struct Child {
 }
 
 impl Child {
-    pub(super) fn spawn(
+    pub(crate) fn spawn(
         plan: &StagePlan,
         manifest: &Manifest,
         starter: &Starter<'_>,
@@ -98,7 +98,7 @@ impl Child {
         })
     }
 
-    pub(super) fn respawn(
+    pub(crate) fn respawn(
         &mut self,
         manifest: &Manifest,
         starter: &Starter<'_>,
@@ -119,7 +119,7 @@ impl Child {
     }
 
     /// Takes the place of a process that has ended, with another program that stood by for it.
-    pub(super) fn succeed(&mut self, mut successor: Self, newest_pose: Option<u64>) {
+    pub(crate) fn succeed(&mut self, mut successor: Self, newest_pose: Option<u64>) {
         // It opens its topics when its standard input ends.
         drop(successor.process.stdin.take());
         successor.started = Instant::now();
@@ -131,7 +131,7 @@ impl Child {
     }
 
     /// Goes on with another program from the next start on.
-    pub(super) fn change(&mut self, plan: StagePlan) {
+    pub(crate) fn change(&mut self, plan: StagePlan) {
         let before = std::mem::replace(&mut self.plan, plan);
         self.deaths.clear();
         self.try_after(before);
@@ -146,18 +146,18 @@ impl Child {
     }
 
     /// Returns whether its program has taken the place of another one and has not worked on a pose yet.
-    pub(super) fn is_on_trial(&self) -> bool {
+    pub(crate) fn is_on_trial(&self) -> bool {
         self.is_on_trial
     }
 
     /// The program that has taken the place of another one has worked on a pose.
-    pub(super) fn pass_trial(&mut self) {
+    pub(crate) fn pass_trial(&mut self) {
         self.is_on_trial = false;
     }
 
     /// Goes back to the program before a swap, from the next start on, or to `begun`, that of the run's begin, if a file of the former
     /// has changed since. False if there is none.
-    pub(super) fn go_back(&mut self, begun: &StagePlan) -> bool {
+    pub(crate) fn go_back(&mut self, begun: &StagePlan) -> bool {
         let is_another = self.plan.command != begun.command;
         let plans = self.before.take().into_iter();
         let mut plans = plans.chain(is_another.then(|| begun.clone()));
@@ -171,66 +171,66 @@ impl Child {
     }
 
     /// Returns a file of its command that has changed since it was started first.
-    pub(super) fn changed_file(&self) -> Option<&Path> {
+    pub(crate) fn changed_file(&self) -> Option<&Path> {
         self.plan.changed_file()
     }
 
-    pub(super) fn plan(&self) -> &StagePlan {
+    pub(crate) fn plan(&self) -> &StagePlan {
         &self.plan
     }
 
-    pub(super) fn name(&self) -> &str {
+    pub(crate) fn name(&self) -> &str {
         &self.plan.name
     }
 
-    pub(super) fn pid(&self) -> u32 {
+    pub(crate) fn pid(&self) -> u32 {
         self.process.id()
     }
 
     /// Returns which stage it is; `None` for an additional process.
-    pub(super) fn stage(&self) -> Option<StageId> {
+    pub(crate) fn stage(&self) -> Option<StageId> {
         StageId::by_name(self.name())
     }
 
     /// Returns whether it is a follower, and not in the stream.
-    pub(super) fn follows(&self) -> bool {
+    pub(crate) fn follows(&self) -> bool {
         FollowerId::by_name(self.name()).is_some()
     }
 
     /// Returns when the process was started.
-    pub(super) fn started(&self) -> Instant {
+    pub(crate) fn started(&self) -> Instant {
         self.started
     }
 
     /// Returns its newest heartbeat; `None` before the first one, or if it writes none.
-    pub(super) fn heartbeat(&self, manifest: &Manifest) -> Option<Heartbeat> {
+    pub(crate) fn heartbeat(&self, manifest: &Manifest) -> Option<Heartbeat> {
         heartbeat::read(manifest, self.name(), self.pid())
     }
 
     /// Returns the cause of its last death.
-    pub(super) fn last_death(&self) -> Option<&str> {
+    pub(crate) fn last_death(&self) -> Option<&str> {
         self.last_death.as_deref()
     }
 
-    pub(super) fn note_death(&mut self, cause: String) {
+    pub(crate) fn note_death(&mut self, cause: String) {
         self.last_death = Some(cause);
     }
 
     /// Returns whether it has lived for longer than the time in which its deaths are counted.
-    pub(super) fn has_outlived_its_window(&self) -> bool {
+    pub(crate) fn has_outlived_its_window(&self) -> bool {
         self.started.elapsed().as_secs_f64() > self.plan.restart.window_s
     }
 
-    pub(super) fn backoff(&self) -> Duration {
+    pub(crate) fn backoff(&self) -> Duration {
         Duration::from_millis(self.plan.restart.backoff_ms)
     }
 
     /// Returns whether no pose was published since the last restart.
-    pub(super) fn died_without_progress(&self, newest_pose: Option<u64>) -> bool {
+    pub(crate) fn died_without_progress(&self, newest_pose: Option<u64>) -> bool {
         self.pose_at_restart == Some(newest_pose)
     }
 
-    pub(super) fn has_exited(&mut self) -> bool {
+    pub(crate) fn has_exited(&mut self) -> bool {
         if self.status.is_none() {
             self.status = self.process.try_wait().ok().flatten();
             if self.status.is_some() {
@@ -242,7 +242,7 @@ impl Child {
     }
 
     /// Returns whether it was found to have exited.
-    pub(super) fn is_known_to_have_exited(&self) -> bool {
+    pub(crate) fn is_known_to_have_exited(&self) -> bool {
         self.status.is_some()
     }
 
@@ -250,7 +250,7 @@ impl Child {
     ///
     /// # Errors
     /// A permanent failure, or more deaths than the policy allows.
-    pub(super) fn may_restart(&mut self, death: &Death) -> Result<(), SuperviseError> {
+    pub(crate) fn may_restart(&mut self, death: &Death) -> Result<(), SuperviseError> {
         if death.code == Some(i32::from(StageError::PERMANENT)) {
             let message = death
                 .last_output
@@ -277,7 +277,7 @@ impl Child {
         })
     }
 
-    pub(super) fn death(&mut self) -> Death {
+    pub(crate) fn death(&mut self) -> Death {
         let status = self.status.unwrap_or_default();
         let cause = match (status.signal(), status.code()) {
             (Some(signal), _) if signal == Signal::BUS.as_raw() => {
@@ -295,14 +295,14 @@ impl Child {
         }
     }
 
-    pub(super) fn terminate(&self) {
+    pub(crate) fn terminate(&self) {
         if self.status.is_none() {
             self.signal(Signal::TERM);
         }
     }
 
     /// Kills the process without waiting for its end.
-    pub(super) fn kill(&self) {
+    pub(crate) fn kill(&self) {
         if self.status.is_none() {
             self.signal(Signal::KILL);
         }
@@ -312,7 +312,7 @@ impl Child {
     ///
     /// # Errors
     /// It does not end.
-    pub(super) fn await_end(&mut self) -> Result<(), SuperviseError> {
+    pub(crate) fn await_end(&mut self) -> Result<(), SuperviseError> {
         // What was waited for in vain once is not waited for again.
         if !self.has_exited() && !self.is_held {
             self.is_held = !ends_within(&self.process, KILL_TIMEOUT);
@@ -335,7 +335,7 @@ impl Child {
     }
 
     /// Returns the reason that the process gave, else the last line of its output.
-    pub(super) fn last_output(&mut self) -> Option<String> {
+    pub(crate) fn last_output(&mut self) -> Option<String> {
         let reason = fs::read_to_string(&self.last_words).ok();
         let _ = fs::remove_file(&self.last_words);
         let output = self.log.last_line();

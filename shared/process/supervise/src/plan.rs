@@ -7,11 +7,11 @@ use std::{
 };
 
 use gyre_messages::PoseHeader;
+use gyre_stage::{Manifest, StageCounters, StageError, follower::Progress};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::{child::Death, program::Program, scheduling::Scheduling};
-use crate::{Manifest, StageCounters, StageError, follower::Progress};
+use crate::{child::Death, program::Program, scheduling::Scheduling};
 
 /// The plan of a run.
 #[derive(Debug)]
@@ -22,7 +22,7 @@ pub struct Plan {
     pub stages: Vec<StagePlan>,
     /// The process that records the run, if any: nothing depends on it.
     pub recorder: Option<StagePlan>,
-    /// Program and arguments of a process that calls [`guard`](super::guard) with its standard input.
+    /// Program and arguments of a process that calls [`guard`](crate::guard) with its standard input.
     pub guardian: Vec<String>,
     /// Time for which a published scan may lack its pose, or the source a scan that is due; `None`: no limit.
     pub stall_timeout: Option<Duration>,
@@ -55,7 +55,7 @@ pub struct StagePlan {
 
 impl StagePlan {
     /// Returns a file of the command that has changed since this plan was made.
-    pub(super) fn changed_file(&self) -> Option<&Path> {
+    pub(crate) fn changed_file(&self) -> Option<&Path> {
         let changed = self.programs.iter().find(|program| !program.is_unchanged());
         changed.map(Program::path)
     }
@@ -335,7 +335,7 @@ pub enum SuperviseError {
 
 impl SuperviseError {
     /// Returns whether it says that one process cannot be kept alive.
-    pub(super) fn is_of_one_process(&self) -> bool {
+    pub(crate) fn is_of_one_process(&self) -> bool {
         matches!(
             self,
             Self::Spawn { .. }

@@ -7,15 +7,15 @@
 use std::time::{Duration, Instant};
 
 use gyre_messages::Item;
-
-use super::{Plan, Stall};
-use crate::{
-    elsewhere,
+use gyre_stage::{
+    Manifest, elsewhere,
     schedule::{self, Schedule},
 };
 
+use crate::{Plan, Stall};
+
 /// The clock of a run's stalls.
-pub(super) struct Watchdog {
+pub(crate) struct Watchdog {
     stall_timeout: Option<Duration>,
     start_timeout: Option<Duration>,
     /// `Item::published` of the newest pose.
@@ -26,7 +26,7 @@ pub(super) struct Watchdog {
 }
 
 /// A stage that has not opened its topics.
-pub(super) struct Starting<'a> {
+pub(crate) struct Starting<'a> {
     pub stage: &'a str,
     pub since: Instant,
 }
@@ -55,11 +55,7 @@ impl Watchdog {
     }
 
     /// Returns the stall, if something has been owed for too long.
-    pub fn look(
-        &mut self,
-        manifest: &crate::Manifest,
-        starting: Option<Starting<'_>>,
-    ) -> Option<Stall> {
+    pub fn look(&mut self, manifest: &Manifest, starting: Option<Starting<'_>>) -> Option<Stall> {
         if let Some(starting) = starting {
             self.owed = None;
             let limit = self.start_timeout?;
@@ -109,7 +105,7 @@ impl Watchdog {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::clock;
+    use gyre_stage::clock;
 
     const LIMIT: Duration = Duration::from_secs(1);
 

@@ -14,20 +14,20 @@ use std::{
     time::Duration,
 };
 
+use gyre_stage::{Manifest, run, wake::Signals};
 use procfs::process::Process;
 use rustix::{
     io::ioctl_fionbio,
     process::{Pid, RawPid, Signal, getpid, kill_process_group},
 };
 
-use super::{SuperviseError, end::ends_within};
-use crate::{Manifest, run, wake::Signals};
+use crate::{SuperviseError, end::ends_within};
 
 /// Time for the guardian to end with the run.
 const STOP_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// The running guardian.
-pub(super) struct Guardian {
+pub(crate) struct Guardian {
     process: Child,
     groups: Option<ChildStdin>,
 }
@@ -99,7 +99,7 @@ impl Drop for Guardian {
 
 /// Puts the group that this process leads into the care of the guardian. Called between fork and exec, so that there is no moment
 /// in which a stage has children that nobody knows of.
-pub(super) fn join(pipe: RawFd) {
+pub(crate) fn join(pipe: RawFd) {
     // SAFETY: the supervisor keeps the pipe open while it starts a process, and the new process has a copy of it.
     let pipe = unsafe { BorrowedFd::borrow_raw(pipe) };
     let _ = rustix::io::write(pipe, &getpid().as_raw_nonzero().get().to_ne_bytes());

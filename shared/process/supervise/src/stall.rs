@@ -3,9 +3,9 @@
 use std::time::{Duration, Instant};
 
 use gyre_messages::StageId;
+use gyre_stage::{clock, wake};
 
-use super::{Event, Stall, SuperviseError, Supervisor, watchdog::Starting};
-use crate::{clock, wake};
+use crate::{Event, Stall, SuperviseError, Supervisor, watchdog::Starting};
 
 /// Time between two looks at the heartbeats.
 const PERIOD: Duration = Duration::from_secs(1);
@@ -13,7 +13,7 @@ const PERIOD: Duration = Duration::from_secs(1);
 const RESUMED: Duration = wake::MAX_WAIT.saturating_mul(5);
 
 /// When the supervisor has looked for stalls.
-pub(super) struct Looks {
+pub(crate) struct Looks {
     last: Instant,
     /// The last look at the heartbeats.
     at_heartbeats: Instant,
@@ -52,7 +52,7 @@ impl Looks {
 
 impl Supervisor<'_> {
     /// Returns the stall of the stages, if there is one.
-    pub(super) fn stall(&mut self) -> Option<Stall> {
+    pub(crate) fn stall(&mut self) -> Option<Stall> {
         let now = Instant::now();
         if self.hangs.is_resuming(now) {
             self.watchdog.restarted();
@@ -122,7 +122,7 @@ impl Supervisor<'_> {
 
     /// Restarts the processes that may be stuck: one that hangs alone; else first the source if it is late, and all but a live source
     /// otherwise. When that does not help, all stages; when that does not help either, the run ends.
-    pub(super) fn recover_from_stall(&mut self, stall: Stall) -> Result<(), SuperviseError> {
+    pub(crate) fn recover_from_stall(&mut self, stall: Stall) -> Result<(), SuperviseError> {
         let processes = match (self.watchdog.count(), &stall) {
             (1, Stall::Hang { process, .. }) => self
                 .named(process)

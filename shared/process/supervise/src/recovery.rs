@@ -3,17 +3,17 @@
 use std::time::{Duration, Instant};
 
 use gyre_messages::{Header, PoseHeader, StageId};
+use gyre_stage::{clock, wake};
 
-use super::{
+use crate::{
     Event, SuperviseError, Supervisor,
     child::{Child, Death},
     clean,
     start::Starter,
 };
-use crate::{clock, wake};
 
 /// A restarted stage without a pose that the new process has worked on.
-pub(super) struct Recovering {
+pub(crate) struct Recovering {
     hop: StageId,
     died_ns: i64,
     started_ns: i64,
@@ -21,7 +21,7 @@ pub(super) struct Recovering {
 
 impl Supervisor<'_> {
     /// Restarts dead stages, or all stages if that alone would not help.
-    pub(super) fn recover(&mut self, dead: &[usize]) -> Result<(), SuperviseError> {
+    pub(crate) fn recover(&mut self, dead: &[usize]) -> Result<(), SuperviseError> {
         let died_ns = clock::now_ns();
         let failure = self.may_restart(dead)?;
         let blamed = failure.map_or_else(Vec::new, |failure| self.blame_trial(dead, &failure));
@@ -46,7 +46,7 @@ impl Supervisor<'_> {
 
     /// Counts deaths against the restart policies, and waits for the longest backoff. Returns a sentence about one that was a failure of a
     /// program which is not on trial.
-    pub(super) fn may_restart(&mut self, dead: &[usize]) -> Result<Option<String>, SuperviseError> {
+    pub(crate) fn may_restart(&mut self, dead: &[usize]) -> Result<Option<String>, SuperviseError> {
         let (mut backoff, mut failure) = (Duration::ZERO, None);
         for i in dead {
             let child = &mut self.children[*i];
@@ -82,7 +82,7 @@ impl Supervisor<'_> {
 
     /// Returns whether a dead process may be started again, by its policy. One that has taken the place of another gives way to it
     /// first.
-    pub(super) fn require_restart(
+    pub(crate) fn require_restart(
         &mut self,
         child: usize,
         death: &Death,
@@ -96,21 +96,21 @@ impl Supervisor<'_> {
         }
     }
 
-    pub(super) fn count_restart(&mut self, child: usize) {
+    pub(crate) fn count_restart(&mut self, child: usize) {
         let name = self.children[child].name().to_owned();
         *self.restarts.entry(name).or_default() += 1;
     }
 
-    pub(super) fn newest_seq(&self) -> Option<u64> {
+    pub(crate) fn newest_seq(&self) -> Option<u64> {
         self.newest.map(|newest| newest.seq)
     }
 
-    pub(super) fn poses_so_far(&self) -> u64 {
+    pub(crate) fn poses_so_far(&self) -> u64 {
         self.newest_seq().map_or(0, |newest| newest + 1)
     }
 
     /// Returns the processes to restart with one of them: itself, or all stages if its restart alone does not recover its state.
-    pub(super) fn restarted_with(&self, child: usize) -> Vec<usize> {
+    pub(crate) fn restarted_with(&self, child: usize) -> Vec<usize> {
         match self.children[child].plan().restarts_all {
             true => self.all_but_survivors(&[child]),
             false => vec![child],
@@ -118,24 +118,24 @@ impl Supervisor<'_> {
     }
 
     /// Returns all stages.
-    pub(super) fn all(&self) -> impl Iterator<Item = usize> + '_ {
+    pub(crate) fn all(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.children.len()).filter(|i| !self.children[*i].follows())
     }
 
     /// Returns all stages except those that are alive and outlive restarts.
-    pub(super) fn all_but_survivors(&self, dead: &[usize]) -> Vec<usize> {
+    pub(crate) fn all_but_survivors(&self, dead: &[usize]) -> Vec<usize> {
         let survives = |i: &usize| self.children[*i].plan().outlives_restarts && !dead.contains(i);
         self.all().filter(|i| !survives(i)).collect()
     }
 
-    pub(super) fn restart(&mut self, stages: &[usize], died_ns: i64) -> Result<(), SuperviseError> {
+    pub(crate) fn restart(&mut self, stages: &[usize], died_ns: i64) -> Result<(), SuperviseError> {
         self.replace(stages, died_ns, None)?;
         self.watchdog.restarted();
         self.say_restarted(stages);
         Ok(())
     }
 
-    pub(super) fn say_restarted(&mut self, processes: &[usize]) {
+    pub(crate) fn say_restarted(&mut self, processes: &[usize]) {
         let only = match processes {
             [child] => Some(self.children[*child].name()),
             _ => None,
@@ -144,7 +144,7 @@ impl Supervisor<'_> {
     }
 
     /// Ends processes and starts others in their places; in one of them a process that stood by goes on.
-    pub(super) fn replace(
+    pub(crate) fn replace(
         &mut self,
         stages: &[usize],
         died_ns: i64,
@@ -193,7 +193,7 @@ impl Supervisor<'_> {
     }
 
     /// Returns why one of these processes could not be started again, as far as that is known. Then it must not be ended.
-    pub(super) fn why_not_again(
+    pub(crate) fn why_not_again(
         &self,
         mut processes: impl Iterator<Item = usize>,
     ) -> Option<String> {
@@ -208,7 +208,7 @@ impl Supervisor<'_> {
 }
 
 /// Records the recovery of stages at the first pose that their new processes worked on; items in flight do not count.
-pub(super) fn record_recoveries(
+pub(crate) fn record_recoveries(
     pose: &PoseHeader,
     recovering: &mut Vec<Recovering>,
     recovery: &mut Vec<Duration>,
@@ -226,7 +226,7 @@ pub(super) fn record_recoveries(
 }
 
 /// A program that has worked on a pose since it took the place of another one has passed its trial.
-pub(super) fn pass_trials(pose: &PoseHeader, children: &mut [Child], recovering: &[Recovering]) {
+pub(crate) fn pass_trials(pose: &PoseHeader, children: &mut [Child], recovering: &[Recovering]) {
     for child in children.iter_mut().filter(|child| child.is_on_trial()) {
         let Some(hop) = child.stage() else {
             // No pose says what a follower has done.

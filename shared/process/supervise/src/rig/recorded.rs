@@ -2,7 +2,7 @@
 
 use gyre_messages::{Item, Message};
 
-use crate::{StageError, outlet::RecordedMessage};
+use gyre_stage::{StageError, source::RecordedMessage};
 
 /// A message outside of shared memory, of any topic of a stage.
 #[derive(Clone, Debug, PartialEq, Eq)]

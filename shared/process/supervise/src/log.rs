@@ -8,8 +8,9 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::Plan;
-use crate::{Manifest, StageError};
+use gyre_stage::{Manifest, StageError};
+
+use crate::Plan;
 
 /// Size of a log beyond which it is moved to its `.old`, bytes.
 const MAX: u64 = 8 << 20;
@@ -23,7 +24,7 @@ const BACKGROUND: &str = "gyre";
 const TAIL: u64 = 4096;
 
 /// The log `<out>/log/<stage>.txt`, to which the stage appends.
-pub(super) struct Log {
+pub(crate) struct Log {
     file: File,
     /// The beginning of what has not been looked at.
     unread: u64,
@@ -68,7 +69,7 @@ pub fn last_line(text: &str) -> Option<&str> {
 }
 
 /// All logs of a run, which are kept short.
-pub(super) struct Logs {
+pub(crate) struct Logs {
     files: Vec<PathBuf>,
     due: Instant,
 }
@@ -100,12 +101,12 @@ impl Logs {
 }
 
 /// Returns the log of a process.
-pub(super) fn path_of(manifest: &Manifest, stage: &str) -> PathBuf {
+pub(crate) fn path_of(manifest: &Manifest, stage: &str) -> PathBuf {
     manifest.out.join("log").join(format!("{stage}.txt"))
 }
 
 /// Moves the end of a log that is too long to its `.old`, and empties it. The processes that append to it do not notice.
-pub(super) fn bound(path: &Path) {
+pub(crate) fn bound(path: &Path) {
     let too_long = fs::symlink_metadata(path).is_ok_and(|log| log.is_file() && log.len() > MAX);
     if !too_long {
         return;

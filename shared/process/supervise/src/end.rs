@@ -12,7 +12,7 @@ use rustix::{
 };
 
 /// Waits until a child process has exited, at most for `limit`; returns whether it has. Its status is left to be read.
-pub(super) fn ends_within(process: &Child, limit: Duration) -> bool {
+pub(crate) fn ends_within(process: &Child, limit: Duration) -> bool {
     let pid = Pid::from_child(process);
     let Ok(descriptor) = pidfd_open(pid, PidfdFlags::empty()) else {
         // It has been waited for already.

@@ -14,17 +14,17 @@ use std::{
     time::Duration,
 };
 
+use gyre_stage::{
+    Manifest, observer,
+    run::{self, SHARED_MEMORY},
+    services,
+};
 use iceoryx2::{
     node::NodeView,
     prelude::{CallbackProgression, Config, NodeState},
 };
 
-use super::SuperviseError;
-use crate::{
-    Manifest, observer,
-    run::{self, SHARED_MEMORY},
-    services,
-};
+use crate::SuperviseError;
 
 /// Time limit of a cleanup, which normally takes milliseconds.
 const LIMIT: Duration = Duration::from_secs(3);
@@ -37,7 +37,7 @@ type TransportNode = iceoryx2::node::Node<services::Ipc>;
 
 /// Removes all resources of dead processes. This must precede a restart: a topic has room for exactly one publisher, and old and
 /// new samples must not mix.
-pub(super) fn remove_dead(
+pub(crate) fn remove_dead(
     manifest: &Manifest,
     transport: &Config,
     all_dead: bool,
@@ -47,7 +47,7 @@ pub(super) fn remove_dead(
 }
 
 /// Removes all resources of dead observers, and the files that would make a stage wait for a stopped one.
-pub(super) fn remove_dead_observers(
+pub(crate) fn remove_dead_observers(
     manifest: &Manifest,
     transport: &Config,
 ) -> Result<(), SuperviseError> {
@@ -191,10 +191,40 @@ fn unlink_incomplete_tags(directory: &Path) {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use gyre_messages::Pose;
+    use gyre_messages::{Limits, Pose, Window};
+    use gyre_stage::{observer::ObservedRun, wake::Signals};
 
     use super::*;
-    use crate::{observer::ObservedRun, tests::Run};
+    use crate::rig::Rig;
+
+    /// The manifest of a run with these results.
+    fn manifest(out: &Path) -> Manifest {
+        Manifest {
+            prefix: String::new(),
+            root: PathBuf::new(),
+            out: out.to_owned(),
+            window: Window {
+                scans: 2,
+                lag: 1,
+                look_back: 1,
+                live_depth: 0,
+                observers: 2,
+                slam: false,
+                localises: false,
+            },
+            limits: Limits {
+                scan_bytes: 1000,
+                raster_cells: 100,
+                cell_m: 1.0,
+                rasters: 1,
+                points: 0,
+            },
+            live: false,
+            refines: false,
+            rate: None,
+            build: String::new(),
+        }
+    }
 
     #[test]
     fn only_empty_files_of_dead_ports_are_found() {
@@ -213,20 +243,23 @@ mod tests {
 
     #[test]
     fn an_empty_file_that_a_stopped_observer_began_does_not_stay() {
-        let run = Run::new();
-        let transport = run.manifest.transport().unwrap();
-        let observed = ObservedRun::at(&run.manifest.root).unwrap();
+        let (out, signals) = (tempfile::tempdir().unwrap(), Signals::install().unwrap());
+        let guardian = ["cat".to_owned()];
+        let run = Rig::new(manifest(out.path()), "", &guardian, &signals).unwrap();
+        let manifest = run.manifest();
+        let transport = manifest.transport().unwrap();
+        let observed = ObservedRun::at(&manifest.root).unwrap();
         let _observer = observed.observe::<Pose>().unwrap();
-        let of_observer = ports_of(&run.manifest, &living_observers(&transport));
+        let of_observer = ports_of(manifest, &living_observers(&transport));
         let file = |port: &str| {
-            let name = format!("{}0_{port}.connection", run.manifest.prefix);
+            let name = format!("{}0_{port}.connection", manifest.prefix);
             let path = Path::new(SHARED_MEMORY).join(name);
             fs::write(&path, "").unwrap();
             path
         };
         let begun: Vec<_> = of_observer.iter().map(|port| file(port)).collect();
         let of_a_stage = file("1");
-        assert!(remove_dead_observers(&run.manifest, &transport).is_ok());
+        assert!(remove_dead_observers(manifest, &transport).is_ok());
         assert!(!begun.is_empty() && begun.iter().all(|path| !path.exists()));
         assert!(of_a_stage.exists());
     }

@@ -8,21 +8,21 @@ use std::{
     time::Duration,
 };
 
+use gyre_stage::{Manifest, StageError, run, wake::Signals};
 use rustix::process::{Signal, getpid, getppid, set_parent_process_death_signal};
 
-use super::{
+use crate::{
     StagePlan, SuperviseError,
     guardian::{self, Guardian},
     scheduling::Key,
 };
-use crate::{Manifest, StageError, run, wake::Signals};
 
 /// Pauses after a failure to start a process for want of processes or memory; the sum is the time for which it is tried.
 const PAUSES_MS: [u64; 8] = [20, 50, 100, 200, 500, 1000, 2000, 4000];
 
 /// The place of a process that is started.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Place {
+pub(crate) enum Place {
     /// Nobody else has it.
     Free,
     /// Another process has it: the new one stands by until its standard input ends (see [`run::STANDBY`]).
@@ -30,7 +30,7 @@ pub(super) enum Place {
 }
 
 /// Starts processes that end with this one.
-pub(super) struct Starter<'a> {
+pub(crate) struct Starter<'a> {
     signals: &'a Signals,
     guardian: &'a Guardian,
 }

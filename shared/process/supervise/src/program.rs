@@ -68,7 +68,7 @@ impl Program {
         &self.path
     }
 
-    pub(super) fn is_unchanged(&self) -> bool {
+    pub(crate) fn is_unchanged(&self) -> bool {
         State::of(&self.path).is_ok_and(|state| state == self.state)
     }
 }
