@@ -2,11 +2,12 @@
 
 use std::{path::Path, process::ExitCode, time::Duration};
 
-use gyre_conformance::{ConformanceError, Demands, Report, Scans, Subject, check};
+use gyre_conformance::{Candidate, ConformanceError, Demands, InputScans, Report, Test, check};
 use gyre_messages::StageId;
 use gyre_odometry::SearchKind;
 use gyre_scan_matching::RefinementKind;
 use gyre_stage::{Manifest, wake::Signals};
+use gyre_supervise::Scheduling;
 
 use crate::{
     Failure,
@@ -55,16 +56,19 @@ fn examine(arguments: &ConformanceArguments) -> Result<Option<Report>, Failure> 
         .prefix("gyre-conformance-")
         .tempdir()?;
     let dataset = preflight::open(&configuration)?.dataset;
-    let scans = Scans {
+    let scans = InputScans {
         played: configuration.source.played(dataset.as_ref()),
         dataset,
     };
-    let subject = Subject {
-        stage,
-        command,
-        gyre: program::own().to_string_lossy().into_owned(),
-        manifest: manifest(&configuration, &checked, folder.path())?,
-        configuration: configuration.to_toml()?,
+    let test = Test {
+        candidate: Candidate {
+            stage,
+            command,
+            scheduling: Scheduling::default(),
+            gyre: program::own().to_string_lossy().into_owned(),
+            manifest: manifest(&configuration, &checked, folder.path())?,
+            configuration: configuration.to_toml()?,
+        },
         stages: StageId::ALL
             .into_iter()
             .filter(|stage| configuration.has(*stage))
@@ -75,15 +79,15 @@ fn examine(arguments: &ConformanceArguments) -> Result<Option<Report>, Failure> 
         }),
         demands,
     };
-    match test(&subject, scans, arguments.json) {
+    match run_test(&test, scans, arguments.json) {
         Err(ConformanceError::Interrupted) => Ok(None),
         report => Ok(Some(report?)),
     }
 }
 
-fn test(subject: &Subject, scans: Scans, quietly: bool) -> Result<Report, ConformanceError> {
+fn run_test(test: &Test, scans: InputScans, quietly: bool) -> Result<Report, ConformanceError> {
     let signals = Signals::install()?;
-    check(subject, scans, &signals, &mut |what| {
+    check(test, scans, &signals, &mut |what| {
         if !quietly {
             print::note(format_args!("gyre: testing {what}"));
         }
@@ -112,7 +116,7 @@ fn demands(arguments: &ConformanceArguments) -> Result<Demands, Failure> {
         .map(|ms| seconds("--budget-ms", ms / 1e3));
     Ok(Demands {
         start_timeout: seconds("--start-timeout-s", arguments.start_timeout_s)?,
-        patience: seconds("--patience-s", arguments.patience_s)?,
+        item_timeout: seconds("--patience-s", arguments.patience_s)?,
         stop_timeout: seconds("--stop-timeout-s", arguments.stop_timeout_s)?,
         same_as_own: arguments.same_as_own,
         budget: budget.transpose()?,

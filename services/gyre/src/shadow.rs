@@ -86,7 +86,7 @@ fn options(arguments: &ShadowArguments, stage: StageId) -> Result<Options, Failu
             ..Scheduling::default()
         },
         start_timeout: seconds("--start-timeout-s", arguments.start_timeout_s)?,
-        patience: seconds("--patience-s", arguments.patience_s)?,
+        item_timeout: seconds("--patience-s", arguments.patience_s)?,
         scans: arguments.scans,
         duration: duration.transpose()?,
         report: arguments.report.clone(),

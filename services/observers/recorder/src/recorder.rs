@@ -24,7 +24,7 @@ use crate::{
     log_tail::LogTail,
     options::{HEALTH, LOG, Options},
     queue::{Entry, LIMIT_BYTES, Sender, queue},
-    tap::{Counts, Tap, now_ns, tap},
+    tap::{Counts, Tap, now_ns},
     writing,
 };
 
@@ -108,11 +108,11 @@ pub fn record(options: &Options) -> Result<Recorded, RecorderError> {
         earlier,
     } = begin(options, manifest, &topics)?;
     let writer = SplitWriter::create(options.to.clone(), head, options.split)?;
-    let taps = topics.iter().filter_map(|topic| {
+    let taps = topics.iter().map(|topic| {
         let expected = earlier.as_ref().map(|it| it.next_of(topic));
-        tap(&run, topic, expected)
+        Tap::on(&run, topic, expected)
     });
-    let taps = taps.collect::<Result<Vec<_>, _>>()?;
+    let taps: Vec<_> = taps.flat_map(Result::transpose).collect::<Result<_, _>>()?;
     if options.continues {
         run.is_ready(NAME, &signals)?;
     }
@@ -167,7 +167,7 @@ fn topics(named: &[String], manifest: &Manifest) -> Result<Vec<String>, Recorder
 struct Recorder<'run> {
     run: &'run ObservedRun,
     signals: Signals,
-    taps: Vec<Box<dyn Tap + 'run>>,
+    taps: Vec<Tap<'run>>,
     log: Option<LogTail>,
     health: Option<Receiver<String>>,
     queue: Sender,

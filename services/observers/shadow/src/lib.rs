@@ -1,20 +1,20 @@
-//! Shadow mode: a second program for a stage of a running run. It gets the same inputs as the stage, its results are compared with the
-//! stage's and timed, and nobody uses them.
+//! Shadow mode: a second program for a stage of a running run. It gets the same inputs as the stage,
+//! its results are compared with the stage's and timed, and nobody uses them.
 //!
-//! To the run this process is an observer ([`gyre_stage::observer`]): the run neither waits for it nor fails with it. The program runs in a
-//! run of its own, alone, where this process sends it what it has observed, an item at a time. What it does there, the observed run does
-//! not notice, but for the processor time.
+//! To the run this process is an observer ([`gyre_stage::observer`]): the run neither waits for it nor
+//! fails with it. The program runs in a run of its own, alone ([`gyre_harness`]), where this process
+//! sends it the observed items, one at a time. It takes nothing from the observed run but processor
+//! time.
 //!
-//! Reading order: [`shadow`], `shadowing` (the loop), `observation` (the items of the run), `stream` (how an item is sent to the shadow),
-//! `life` (the process), `record`, [`Report`].
+//! Reading order: [`shadow`], `shadowing` (the loop), `observation` (the items of the run),
+//! `renumbering` (the items as the shadow gets them), `life` (the process), `record`, [`Report`].
 
-mod inlet;
 mod life;
 mod observation;
 mod record;
+mod renumbering;
 mod report;
 mod shadowing;
-mod stream;
 
 use std::{
     fs, io,
@@ -22,16 +22,15 @@ use std::{
     time::Duration,
 };
 
-use gyre_conformance::topology::Ports;
-use gyre_messages::StageId;
-use gyre_stage::{StageError, observer::ObservedRun, wake::Signals};
-use gyre_supervise::{Scheduling, SuperviseError};
+use gyre_harness::{Candidate, Scheduling, SuperviseError};
+use gyre_messages::{StageId, Window};
+use gyre_stage::{Manifest, StageError, observer::ObservedRun, wake::Signals};
 use thiserror::Error;
 
 pub use record::Counts;
 pub use report::{Beside, Report, Spread, Spreads, Verdict};
 
-use life::Subject;
+use life::ShadowProgram;
 use record::Record;
 use shadowing::Shadowing;
 
@@ -44,7 +43,7 @@ pub const STAGES: [StageId; 5] = [
     StageId::Refinement,
 ];
 
-/// What runs as the shadow of which stage, and for how long.
+/// The program, the stage that it shadows, and the limits of the comparison.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// The stage.
@@ -58,12 +57,12 @@ pub struct Options {
     /// Time for it to open its topics.
     pub start_timeout: Duration,
     /// Time for an item.
-    pub patience: Duration,
+    pub item_timeout: Duration,
     /// Items to compare; `None`: until the run ends.
     pub scans: Option<u64>,
     /// Time after which it ends.
     pub duration: Option<Duration>,
-    /// A folder for `shadow.json`, `shadow.csv` and what the program prints, `shadow.txt`.
+    /// A folder for `shadow.json`, `shadow.csv`, and the output of the program, `shadow.txt`.
     pub report: Option<PathBuf>,
 }
 
@@ -76,14 +75,6 @@ pub enum ShadowError {
     /// The program cannot be started.
     #[error(transparent)]
     Supervise(#[from] SuperviseError),
-    /// A file or a folder.
-    #[error("{path}: {source}")]
-    File {
-        /// The path.
-        path: PathBuf,
-        /// The system error.
-        source: io::Error,
-    },
     /// The rows of `shadow.csv` cannot be written.
     #[error("cannot write shadow.csv: {0}")]
     Rows(csv::Error),
@@ -95,52 +86,68 @@ pub enum ShadowError {
 impl ShadowError {
     fn file(path: &Path) -> impl FnOnce(io::Error) -> Self + use<> {
         let path = path.to_owned();
-        move |source| Self::File { path, source }
+        move |source| StageError::File { path, source }.into()
     }
 }
 
-/// Runs a program as the shadow of a stage until the run ends, the options say so, or a signal requests a stop. `observe` receives how it
-/// goes.
+/// Runs a program as the shadow of a stage until the run ends, a limit is reached, or a signal requests
+/// a stop. `observe` receives lines about the progress.
 ///
 /// # Errors
-/// The run cannot be observed, the program cannot be started, or the report cannot be written. What the program does wrong is no error: the
-/// report says so.
+/// The run cannot be observed, the program cannot be started, or the report cannot be written. A fault
+/// of the program is no error: the report says so.
 pub fn shadow(
     run: &ObservedRun,
     options: &Options,
     observe: &mut dyn FnMut(&str),
 ) -> Result<Report, ShadowError> {
     let signals = Signals::install()?;
-    let stage = options.stage;
-    let ports = Ports::of(stage, run.manifest());
     let in_report = |name| options.report.as_ref().map(|folder| folder.join(name));
     if let Some(folder) = &options.report {
         fs::create_dir_all(folder).map_err(ShadowError::file(folder))?;
     }
     let folder = tempfile::Builder::new().prefix("gyre-shadow-").tempdir();
     let folder = folder.map_err(ShadowError::file(&std::env::temp_dir()))?;
-    let configuration = run.manifest().root.join("config.toml");
-    let subject = Subject {
-        stage,
-        command: options.command.clone(),
-        gyre: options.gyre.clone(),
-        scheduling: options.scheduling.clone(),
-        manifest: run.manifest().clone(),
-        configuration: fs::read_to_string(&configuration)
-            .map_err(ShadowError::file(&configuration))?,
+    let program = ShadowProgram {
+        candidate: candidate(run, options)?,
         folder: folder.path().to_owned(),
         output: in_report("shadow.txt"),
     };
-    if let Some(path) = &subject.output {
+    if let Some(path) = &program.output {
         fs::write(path, "").map_err(ShadowError::file(path))?;
     }
-    let record = Record::new(stage, ports.output, in_report("shadow.csv").as_deref())?;
-    let shadowing = Shadowing::begin(options, &subject, run, &signals, &ports, record)?;
+    let topic = program.candidate.topics().output;
+    let record = Record::new(options.stage, topic, in_report("shadow.csv").as_deref())?;
+    let shadowing = Shadowing::begin(options, &program, run, &signals, record)?;
     let record = shadowing.run(observe)?;
-    let report = Report::of(stage.name(), &options.command, &record);
+    let report = Report::of(options.stage.name(), &options.command, &record);
     if let Some(path) = in_report("shadow.json") {
         let text = serde_json::to_string_pretty(&report)?;
         fs::write(&path, text).map_err(ShadowError::file(&path))?;
     }
     Ok(report)
+}
+
+/// Returns the program, in a run like the observed one but lossless: the scans that the run's masking
+/// has dropped are not sent at all.
+fn candidate(run: &ObservedRun, options: &Options) -> Result<Candidate, ShadowError> {
+    let manifest = run.manifest();
+    let configuration = manifest.root.join("config.toml");
+    Ok(Candidate {
+        stage: options.stage,
+        command: options.command.clone(),
+        scheduling: options.scheduling.clone(),
+        gyre: options.gyre.clone(),
+        manifest: Manifest {
+            live: false,
+            window: Window {
+                live_depth: 0,
+                observers: 0,
+                ..manifest.window
+            },
+            ..manifest.clone()
+        },
+        configuration: fs::read_to_string(&configuration)
+            .map_err(ShadowError::file(&configuration))?,
+    })
 }

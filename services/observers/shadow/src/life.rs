@@ -1,88 +1,60 @@
-//! One life of the shadow: its process, alone in a run of its own, and this program in place of the rest of that run.
+//! One life of the shadow: its process, alone in a run of its own.
 
 use std::{
-    collections::BTreeMap,
-    fs,
+    fs, io,
     io::Write,
     path::{Path, PathBuf},
     time::{Duration, Instant},
 };
 
-use gyre_conformance::topology::Ports;
-use gyre_messages::{StageId, Window};
+use gyre_harness::{Candidate, Harness, Rig, Sent};
+use gyre_messages::StageId;
 use gyre_refinement::checkpoint;
-use gyre_stage::{Listener, Manifest, StageError, wake::Signals};
-use gyre_supervise::{
-    Death, Scheduling,
-    rig::{Feed, Process, Recorded, Rig, Tap},
-};
+use gyre_stage::{StageError, wake::Signals};
 
 use crate::ShadowError;
 
 /// Messages that are taken at once of a program that may send without end.
 const AT_ONCE: usize = 64;
-/// Time between two looks at the size of its log.
+/// Time between two checks of the size of its log.
 const LOG_PERIOD: Duration = Duration::from_secs(1);
 /// Time to exit after SIGTERM, as in a run.
 const STOP_TIMEOUT: Duration = Duration::from_secs(2);
-/// Time between two looks at a process that is to exit.
-const LOOK: Duration = Duration::from_millis(5);
+/// Time between two polls of a process that is to exit.
+const POLL_PERIOD: Duration = Duration::from_millis(5);
 
-/// What is started, and beside which run.
-pub(crate) struct Subject {
-    pub stage: StageId,
-    pub command: Vec<String>,
-    /// The program of the guardian.
-    pub gyre: String,
-    pub scheduling: Scheduling,
-    /// The manifest of the observed run.
-    pub manifest: Manifest,
-    /// The configuration of the observed run, TOML.
-    pub configuration: String,
+/// The program of the shadow, and the places of its files.
+pub(crate) struct ShadowProgram {
+    /// The program; its manifest is that of the observed run, without its live mode.
+    pub candidate: Candidate,
     /// The place for the files of all lives.
     pub folder: PathBuf,
-    /// The file for what the program prints.
+    /// The file for the output of the program.
     pub output: Option<PathBuf>,
 }
 
 /// A process in a run of its own.
 pub(crate) struct Life<'a> {
-    // Dropped in this order: process, ports, run.
-    process: Process,
-    feeds: BTreeMap<&'static str, Box<dyn Feed>>,
-    tap: Box<dyn Tap>,
-    rig: Rig<'a>,
-    stage: StageId,
+    pub harness: Harness<'a>,
     began: Instant,
     is_open: bool,
     log_due: Instant,
 }
 
-/// What a program has sent, or that it cannot be read.
-pub(crate) type Sent = Result<Recorded, String>;
-
 impl<'a> Life<'a> {
     /// Starts the program in a run of its own.
     ///
     /// # Errors
-    /// Folders or services that cannot be created, a command that cannot be started.
-    pub(crate) fn begin(subject: &Subject, signals: &'a Signals) -> Result<Self, ShadowError> {
-        let manifest = subject.manifest_of_its_own()?;
-        let guardian = [&subject.gyre, "guard"].map(str::to_owned);
-        let rig = Rig::new(manifest, &subject.configuration, &guardian, signals)?;
-        let ports = Ports::of(subject.stage, rig.manifest());
-        let mut feeds = BTreeMap::new();
-        for (topic, _) in &ports.inputs {
-            feeds.insert(*topic, rig.feed(topic)?);
-        }
-        let tap = rig.tap(ports.output)?;
-        let (name, now) = (subject.stage.name(), Instant::now());
+    /// A folder or a service cannot be created, or the command cannot be started.
+    pub(crate) fn begin(
+        program: &ShadowProgram,
+        signals: &'a Signals,
+    ) -> Result<Self, ShadowError> {
+        let (candidate, now) = (&program.candidate, Instant::now());
+        let mut harness = Harness::open(program.rig(signals)?, candidate.stage)?;
+        harness.start(&candidate.command, &candidate.scheduling)?;
         Ok(Self {
-            process: rig.start(name, &subject.command, &subject.scheduling)?,
-            feeds,
-            tap,
-            rig,
-            stage: subject.stage,
+            harness,
             began: now,
             is_open: false,
             log_due: now,
@@ -94,16 +66,14 @@ impl<'a> Life<'a> {
     /// # Errors
     /// A failure of the transport.
     pub(crate) fn attend(&mut self) -> Result<bool, StageError> {
-        for feed in self.feeds.values() {
-            feed.answer_handshakes()?;
-        }
-        if !self.is_open && self.rig.has_publisher(self.stage) {
+        self.harness.answer_handshakes()?;
+        if !self.is_open && self.harness.has_publisher() {
             self.is_open = true;
-            self.feeds.values().try_for_each(|feed| feed.connect())?;
+            self.harness.connect()?;
         }
         if Instant::now() >= self.log_due {
             self.log_due = Instant::now() + LOG_PERIOD;
-            self.rig.bound_log(self.stage.name());
+            self.harness.bound_log();
         }
         Ok(self.is_open)
     }
@@ -117,43 +87,13 @@ impl<'a> Life<'a> {
         self.began.elapsed()
     }
 
-    /// Publishes a message on a topic of its inputs.
-    ///
-    /// # Errors
-    /// A failure of the transport.
-    pub(crate) fn feed(&self, topic: &str, message: &Recorded) -> Result<(), StageError> {
-        self.feeds
-            .get(topic)
-            .map_or(Ok(()), |feed| feed.send(message))
-    }
-
-    /// Takes some of what it has sent.
+    /// Takes some of its messages.
     ///
     /// # Errors
     /// A failure of the transport.
     pub(crate) fn take(&self) -> Result<Vec<Sent>, StageError> {
-        let mut all = Vec::new();
-        while all.len() < AT_ONCE {
-            match self.tap.receive() {
-                Ok(None) => break,
-                Ok(Some(message)) => all.push(Ok(message)),
-                Err(StageError::Malformed { seq, reason, .. }) => all.push(Err(format!(
-                    "item {seq} cannot be read by any stage: {reason}"
-                ))),
-                Err(error) => return Err(error),
-            }
-        }
-        Ok(all)
-    }
-
-    /// Returns how it ended; `None` while it runs.
-    pub(crate) fn death(&mut self) -> Option<Death> {
-        self.process.death()
-    }
-
-    /// Returns the listener that it notifies of what it sends.
-    pub(crate) fn listener(&self) -> &Listener {
-        self.tap.listener()
+        let received = std::iter::from_fn(|| self.harness.receive().transpose());
+        received.take(AT_ONCE).collect()
     }
 
     /// Asks it to end, and kills it if it does not.
@@ -161,44 +101,30 @@ impl<'a> Life<'a> {
     /// # Errors
     /// The system refuses to wait.
     pub(crate) fn end(&mut self) -> Result<(), StageError> {
-        self.process.terminate();
+        self.harness.terminate();
         let since = Instant::now();
-        while self.process.death().is_none() && since.elapsed() < STOP_TIMEOUT {
-            std::thread::sleep(LOOK);
+        while self.harness.is_running() && since.elapsed() < STOP_TIMEOUT {
+            std::thread::sleep(POLL_PERIOD);
             self.attend()?;
         }
         Ok(())
     }
 }
 
-impl Subject {
-    /// Returns the manifest of a run of its own, whose folders are created: that of the observed run, but lossless. What the run's masking
-    /// has dropped is not sent at all.
-    fn manifest_of_its_own(&self) -> Result<Manifest, ShadowError> {
+impl ShadowProgram {
+    /// Creates a run of its own, with a copy of the state of the observed run's refinement.
+    fn rig<'a>(&self, signals: &'a Signals) -> Result<Rig<'a>, ShadowError> {
         let out = self.folder.join("out");
         if out.exists() {
             fs::remove_dir_all(&out).map_err(ShadowError::file(&out))?;
         }
-        for folder in ["log", "journal"] {
-            let path = out.join(folder);
-            fs::create_dir_all(&path).map_err(ShadowError::file(&path))?;
-        }
-        if self.stage == StageId::Refinement {
+        if self.candidate.stage == StageId::Refinement {
             self.copy_state(&out)?;
         }
-        Ok(Manifest {
-            out,
-            live: false,
-            window: Window {
-                live_depth: 0,
-                observers: 0,
-                ..self.manifest.window
-            },
-            ..self.manifest.clone()
-        })
+        Ok(self.candidate.rig(out, signals)?)
     }
 
-    /// Appends what a life of the program has printed to the file for it.
+    /// Appends the output of a life of the program to the file for it.
     ///
     /// # Errors
     /// A file that cannot be read or written.
@@ -206,26 +132,26 @@ impl Subject {
         let Some(path) = &self.output else {
             return Ok(());
         };
-        let from = log_of(&life.rig.manifest().out, self.stage);
-        let appended = fs::read(&from).and_then(|printed| {
+        let log = format!("log/{}.txt", self.candidate.stage.name());
+        let appended = fs::read(life.harness.manifest().out.join(log)).and_then(|printed| {
             let file = fs::OpenOptions::new().create(true).append(true).open(path);
             file?.write_all(&printed)
         });
         appended.map_err(ShadowError::file(path))
     }
 
-    /// Copies the state of the run's refinement, from which a restarted one or one that is swapped in goes on too.
+    /// Copies the state of the run's refinement, from which a restarted one or one that is swapped in
+    /// starts too.
     fn copy_state(&self, out: &Path) -> Result<(), ShadowError> {
-        let (from, to) = (checkpoint::path(&self.manifest.out), checkpoint::path(out));
-        match fs::copy(&from, to) {
-            Ok(_) => Ok(()),
+        let from = checkpoint::path(&self.candidate.manifest.out);
+        let to = checkpoint::path(out);
+        let copied = fs::create_dir_all(to.parent().unwrap_or(out));
+        match copied.and_then(|()| fs::copy(&from, to)) {
             // A replaced refinement need not have one.
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(()),
-            Err(source) => Err(ShadowError::File { path: from, source }),
+            Err(error) if error.kind() != io::ErrorKind::NotFound => {
+                Err(ShadowError::file(&from)(error))
+            }
+            _ => Ok(()),
         }
     }
-}
-
-fn log_of(out: &Path, stage: StageId) -> PathBuf {
-    out.join("log").join(format!("{}.txt", stage.name()))
 }

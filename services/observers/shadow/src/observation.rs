@@ -1,15 +1,16 @@
-//! What is seen of the run: item after item what the stage was given, and what it made of it.
+//! The observed items of the run: the inputs of the stage, and its output.
 
 use std::collections::{BTreeMap, VecDeque};
 
-use gyre_conformance::topology::{Ports, Way};
+use gyre_harness::{Direction, Recorded, StageTopics};
 use gyre_messages::{StageId, flag};
-use gyre_stage::{Listener, StageError, observer::ObservedRun};
-use gyre_supervise::rig::Recorded;
+use gyre_stage::{
+    Listener, StageError,
+    observer::{ObservedRun, TopicObserver},
+};
 
-use crate::inlet::{Inlet, inlet};
-
-/// Bytes of messages of items that are not complete. Beyond them the oldest is given up: in live mode most scans never become an item.
+/// Bytes of messages of items that are not complete. Beyond them the oldest is given up: in live mode
+/// most scans never become an item.
 const MAX_INCOMPLETE_BYTES: usize = 64 << 20;
 
 /// An item of the stage, with all messages that it is about.
@@ -17,15 +18,15 @@ const MAX_INCOMPLETE_BYTES: usize = 64 << 20;
 pub(crate) struct Observed {
     /// The inputs that lead down the stream, by topic.
     pub inputs: Vec<(&'static str, Recorded)>,
-    /// What the stage of the run made of them.
+    /// The output of the stage of the run.
     pub output: Recorded,
-    /// For masking: what the items before led to, without a gap, as far back as it may need.
+    /// For masking: the feedback to the items before, without a gap, as far back as it may need.
     pub before: Vec<Feedback>,
     /// True if a stage that begins here can give the result of one that has seen all before.
     pub can_open: bool,
 }
 
-/// What an earlier item led to.
+/// The feedback to an earlier item.
 #[derive(Clone, Debug)]
 pub(crate) struct Feedback {
     pub seq: u64,
@@ -57,10 +58,11 @@ pub(crate) struct Observation<'run> {
     run: &'run ObservedRun,
     /// The inputs, the output, then the feedback.
     topics: Vec<&'static str>,
-    inlets: Vec<Box<dyn Inlet + 'run>>,
+    observers: Vec<Box<dyn TopicObserver + 'run>>,
     forward: usize,
     lag: u64,
-    /// The messages of items that are not complete, by the number that the source gave to the scan: masking numbers anew.
+    /// The messages of items that are not complete, by the number that the source gave to the scan:
+    /// masking numbers anew.
     incomplete: BTreeMap<u64, Vec<Option<Recorded>>>,
     incomplete_bytes: usize,
     /// The last items without a gap: those that the lag reaches from an item and from the one before.
@@ -80,17 +82,21 @@ impl<'run> Observation<'run> {
     pub(crate) fn of(
         run: &'run ObservedRun,
         stage: StageId,
-        ports: &Ports,
+        stage_topics: &StageTopics,
     ) -> Result<Self, StageError> {
-        let mut topics: Vec<_> = ports.by(Way::Forward).chain([ports.output]).collect();
+        let inputs = stage_topics.leading(Direction::Forward);
+        let mut topics: Vec<_> = inputs.chain([stage_topics.output]).collect();
         let forward = topics.len() - 1;
         if stage == StageId::Masking {
-            topics.extend(ports.by(Way::Feedback));
+            topics.extend(stage_topics.leading(Direction::Feedback));
         }
-        let inlets = topics.iter().map(|topic| inlet(run, topic));
+        let mut observers = Vec::new();
+        for topic in &topics {
+            observers.extend(run.observe_topic(topic)?);
+        }
         Ok(Self {
             run,
-            inlets: inlets.collect::<Result<_, _>>()?,
+            observers,
             topics,
             forward,
             lag: run.manifest().window.lag as u64,
@@ -103,15 +109,23 @@ impl<'run> Observation<'run> {
         })
     }
 
-    /// Takes what is in the queues; returns the items that are complete with it.
+    /// Empties the queues; returns the items that are complete with it.
     ///
     /// # Errors
     /// A failure of the transport.
-    pub(crate) fn look(&mut self) -> Result<Vec<Observed>, StageError> {
+    pub(crate) fn take(&mut self) -> Result<Vec<Observed>, StageError> {
         let mut complete = Vec::new();
-        for place in 0..self.inlets.len() {
-            while let Some(message) = self.inlets[place].take()? {
-                complete.extend(self.add(place, message));
+        for place in 0..self.observers.len() {
+            loop {
+                match self.observers[place].take() {
+                    Ok(Some(message)) => {
+                        complete.extend(self.add(place, Recorded::from_bytes(message)));
+                    }
+                    Ok(None) => break,
+                    // The run judges the messages of its stages. The item counts as missed.
+                    Err(StageError::Malformed { .. }) => {}
+                    Err(error) => return Err(error),
+                }
             }
         }
         Ok(complete)
@@ -119,12 +133,12 @@ impl<'run> Observation<'run> {
 
     /// Returns the listeners that the publishers notify.
     pub(crate) fn listeners(&self) -> impl Iterator<Item = &Listener> {
-        self.inlets.iter().map(|inlet| inlet.listener())
+        self.observers.iter().map(|it| it.listener())
     }
 
     /// Returns whether the stream or the run has ended.
     pub(crate) fn has_ended(&self) -> bool {
-        self.run.has_ended() || self.inlets.iter().all(|inlet| inlet.has_ended())
+        self.run.has_ended() || self.observers.iter().all(|it| it.has_ended())
     }
 
     fn add(&mut self, place: usize, message: Recorded) -> Option<Observed> {
@@ -147,7 +161,7 @@ impl<'run> Observation<'run> {
     }
 
     fn complete(&mut self, published: u64) -> Option<Observed> {
-        // Each topic comes in order: what is missing of an earlier item does not come any more.
+        // Each topic comes in order: a missing message of an earlier item does not come any more.
         let later = self.incomplete.split_off(&published.saturating_add(1));
         let mut earlier = std::mem::replace(&mut self.incomplete, later);
         self.incomplete_bytes -= earlier.values().map(|it| bytes(it)).sum::<usize>();
@@ -189,7 +203,7 @@ impl<'run> Observation<'run> {
         self.last = Some(seq);
     }
 
-    /// Adds what masking needs of earlier items.
+    /// Adds the feedback to earlier items that masking needs.
     fn add_feedback(&self, observed: &mut Observed) {
         let (seq, lag) = (observed.seq(), self.lag);
         observed.before = self.recent.iter().cloned().collect();

@@ -2,11 +2,14 @@
 
 use std::{fs::File, path::Path};
 
-use gyre_conformance::content::{Difference, difference, essence};
+use gyre_harness::{
+    Recorded,
+    item::work_ns,
+    result::{Difference, difference, result_bytes},
+};
 use gyre_latency::Durations;
 use gyre_messages::{Item, StageId};
 use gyre_stage::StageError;
-use gyre_supervise::rig::Recorded;
 use serde::Serialize;
 
 use crate::ShadowError;
@@ -14,7 +17,7 @@ use crate::ShadowError;
 /// Sentences about breaches and deaths that are kept; more are counted.
 const SENTENCES: usize = 5;
 
-/// What became of the items that were seen.
+/// The fates of the observed items.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Counts {
     /// Items of the stage that were seen whole.
@@ -92,7 +95,7 @@ pub(crate) struct Pair<'a> {
 
 /// A row of `shadow.csv`.
 #[derive(Debug, Serialize)]
-struct Row {
+struct ComparedItem {
     seq: u64,
     scan: u64,
     stamp_ns: i64,
@@ -138,7 +141,8 @@ impl Record {
     /// # Errors
     /// Messages of another topic, or a file that cannot be written.
     pub(crate) fn compare(&mut self, pair: &Pair<'_>) -> Result<(), ShadowError> {
-        let identical = essence(self.topic, pair.real)? == essence(self.topic, pair.shadow)?;
+        let identical =
+            result_bytes(self.topic, pair.real)? == result_bytes(self.topic, pair.shadow)?;
         self.counts.compared += 1;
         self.counts.identical += u64::from(identical);
         let row = self.row(pair, identical)?;
@@ -151,13 +155,14 @@ impl Record {
         Ok(())
     }
 
-    fn row(&mut self, pair: &Pair<'_>, identical: bool) -> Result<Row, StageError> {
+    fn row(&mut self, pair: &Pair<'_>, identical: bool) -> Result<ComparedItem, StageError> {
         let (real, shadow) = (pair.real.item(), pair.shadow.item());
         let [mask_difference, translation_m, rotation_deg] = match identical {
             true => [None; 3],
             false => self.differ(pair)?,
         };
-        let (shadow_work_ns, real_work_ns) = (self.work_ns(&shadow), self.work_ns(&real));
+        let (shadow_work_ns, real_work_ns) =
+            (work_ns(self.stage, &shadow), work_ns(self.stage, &real));
         self.work.shadow.add(shadow_work_ns);
         self.work.real.add(real_work_ns);
         let answers = pair.answer_ns.zip(self.answer_ns(&real));
@@ -165,7 +170,7 @@ impl Record {
             self.answer.shadow.add(shadow_ns);
             self.answer.real.add(real_ns);
         }
-        Ok(Row {
+        Ok(ComparedItem {
             seq: real.seq,
             scan: real.scan,
             stamp_ns: real.stamp_ns,
@@ -205,11 +210,6 @@ impl Record {
         })
     }
 
-    fn work_ns(&self, item: &Item) -> i64 {
-        let hop = item.hops[self.stage as usize];
-        hop.finished_ns.saturating_sub(hop.started_ns)
-    }
-
     /// Returns the time from the publication of an item's last input to that of the item, in the run.
     fn answer_ns(&self, item: &Item) -> Option<i64> {
         let stage = self.stage as usize;
@@ -224,7 +224,7 @@ impl Record {
         keep(&mut self.breaches, sentence);
     }
 
-    /// Notes how the shadow ended, or was ended.
+    /// Notes the end of the shadow.
     pub(crate) fn ended(&mut self, sentence: String) {
         keep(&mut self.ends, sentence);
     }

@@ -7,16 +7,16 @@ use serde::Serialize;
 
 use crate::record::{Counts, Differences, Record, Times};
 
-/// What was found out about a program beside a stage of a run.
+/// The comparison of a program with a stage of a run.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     /// The stage.
     pub stage: &'static str,
     /// The program and its arguments.
     pub command: Vec<String>,
-    /// What became of the items.
+    /// The fates of the items.
     pub counts: Counts,
-    /// How far apart the results are that are not identical.
+    /// The differences of the results that are not identical.
     pub differences: Spreads,
     /// From the start of the work on an item to its end.
     pub work: Option<Beside>,
@@ -24,13 +24,13 @@ pub struct Report {
     pub answer: Option<Beside>,
     /// The first breaches of the contract.
     pub breaches: Vec<String>,
-    /// How it ended the first times, or why it was ended.
+    /// The first ends of the program, and their reasons.
     pub ends: Vec<String>,
     /// The verdict.
     pub verdict: Verdict,
 }
 
-/// Whether the results are the same.
+/// The verdict on the results.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
@@ -42,7 +42,8 @@ pub enum Verdict {
     Nothing,
 }
 
-/// How far apart results are; `None` where the stage's results have no such part, or none is different.
+/// The differences of results; `None` where the stage's results have no such part, or none is
+/// different.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Spreads {
     /// Mean absolute difference of the cells of the rasters.

@@ -1,4 +1,5 @@
-//! The loop: looks at the run, starts the shadow, tells it item after item, and compares what it answers.
+//! The loop: takes the items of the run, starts the shadow, sends it item after item, and compares its
+//! answers.
 
 mod answers;
 
@@ -7,7 +8,6 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_conformance::topology::Ports;
 use gyre_messages::StageId;
 use gyre_stage::{
     Listener, clock,
@@ -17,55 +17,55 @@ use gyre_stage::{
 
 use crate::{
     Options, ShadowError,
-    life::{Life, Subject},
+    life::{Life, ShadowProgram},
     observation::{Observation, Observed},
     record::Record,
-    stream::{Entry, Stream, Told},
+    renumbering::{Entry, Renumbering, SentItem},
 };
 
 /// Items that wait for the shadow at most; then all but the newest are skipped.
 const BACKLOG: usize = 16;
 /// Bytes that wait at most for a refinement, which cannot skip an item: it is started anew instead.
 const BACKLOG_BYTES: usize = 64 << 20;
-/// The shortest time between two looks at the run: see [`gyre_stage::observer`].
+/// The shortest time between two polls of the run: see [`gyre_stage::observer`].
 const REST: Duration = Duration::from_millis(10);
-/// The same at the shadow while it starts, which is not heard of by a listener.
+/// The same of the shadow while it starts, of which no listener is notified.
 const STARTING: Duration = Duration::from_millis(5);
 /// Time before the shadow is started again.
 const BACKOFF: Duration = Duration::from_secs(1);
 /// Ends in a row without a compared item after which it is not started again.
-const MAX_VAIN_STARTS: u64 = 3;
-/// Time between two lines about how it goes.
-const NEWS: Duration = Duration::from_secs(10);
+const MAX_FAILURES: u64 = 3;
+/// Time between two lines about the progress.
+const PROGRESS_PERIOD: Duration = Duration::from_secs(10);
 
 /// A shadow of a stage of a run.
 pub(crate) struct Shadowing<'a> {
     options: &'a Options,
-    subject: &'a Subject,
+    program: &'a ShadowProgram,
     signals: &'a Signals,
     topic: &'static str,
     observation: Observation<'a>,
-    looked: Instant,
+    taken: Instant,
     backlog: VecDeque<Observed>,
     life: Option<Life<'a>>,
-    stream: Stream,
+    renumbering: Renumbering,
     under_way: Option<UnderWay>,
     /// The item before the one under way, which need not be answered.
-    unasked: Option<u64>,
+    unanswerable: Option<u64>,
     /// When the shadow may be started.
     due: Instant,
     /// Ends since the last compared item.
-    vain: u64,
+    failures: u64,
     record: Record,
-    news: Vec<String>,
+    lines: Vec<String>,
 }
 
 /// The item that the shadow has.
 struct UnderWay {
     observed: Observed,
-    told: Told,
+    sent: SentItem,
     sent_ns: i64,
-    sent: Instant,
+    since: Instant,
     /// True if it had the item before, and so nothing else to do.
     is_timed: bool,
 }
@@ -73,14 +73,15 @@ struct UnderWay {
 impl<'a> Shadowing<'a> {
     pub(crate) fn begin(
         options: &'a Options,
-        subject: &'a Subject,
+        program: &'a ShadowProgram,
         run: &'a ObservedRun,
         signals: &'a Signals,
-        ports: &Ports,
         record: Record,
     ) -> Result<Self, ShadowError> {
         let now = Instant::now();
-        let (command, out) = (options.command.join(" "), &subject.manifest.out);
+        let candidate = &program.candidate;
+        let (topics, out) = (candidate.topics(), &candidate.manifest.out);
+        let command = candidate.command.join(" ");
         let beside = format!(
             "`{command}` beside {} of {}",
             options.stage.name(),
@@ -88,34 +89,34 @@ impl<'a> Shadowing<'a> {
         );
         Ok(Self {
             options,
-            subject,
+            program,
             signals,
-            topic: ports.output,
-            observation: Observation::of(run, options.stage, ports)?,
-            looked: now,
+            topic: topics.output,
+            observation: Observation::of(run, options.stage, &topics)?,
+            taken: now,
             backlog: VecDeque::new(),
             life: None,
-            stream: Stream::new(options.stage, run.manifest().window.lag),
+            renumbering: Renumbering::new(options.stage, run.manifest().window.lag),
             under_way: None,
-            unasked: None,
+            unanswerable: None,
             due: now,
-            vain: 0,
+            failures: 0,
             record,
-            news: vec![beside],
+            lines: vec![beside],
         })
     }
 
     /// Runs until the run has ended, enough is compared, or a signal requests a stop.
     pub(crate) fn run(mut self, observe: &mut dyn FnMut(&str)) -> Result<Record, ShadowError> {
-        let (began, mut told) = (Instant::now(), Instant::now());
+        let (began, mut reported) = (Instant::now(), Instant::now());
         loop {
-            // Before the look: what was published before the end is still in the queues.
+            // Before the poll: the messages before the end are still in the queues.
             let has_ended = self.observation.has_ended();
-            self.look(has_ended)?;
+            self.take(has_ended)?;
             self.attend()?;
-            self.news.drain(..).for_each(|line| observe(&line));
-            if told.elapsed() >= NEWS {
-                told = Instant::now();
+            self.lines.drain(..).for_each(|line| observe(&line));
+            if reported.elapsed() >= PROGRESS_PERIOD {
+                reported = Instant::now();
                 observe(&self.progress());
             }
             let is_over = self
@@ -136,7 +137,7 @@ impl<'a> Shadowing<'a> {
     /// Returns whether nothing more can come: the run has ended and all is answered, or the shadow is given up.
     fn is_done(&self, has_ended: bool) -> bool {
         let has_answered = self.backlog.is_empty() && self.under_way.is_none();
-        let is_given_up = self.vain >= MAX_VAIN_STARTS;
+        let is_given_up = self.failures >= MAX_FAILURES;
         let comes_again = self.life.is_some() || self.record.counts.starts == 0;
         is_given_up || (has_ended && (has_answered || !comes_again))
     }
@@ -148,14 +149,14 @@ impl<'a> Shadowing<'a> {
     }
 
     fn sleep(&self) -> Result<bool, ShadowError> {
-        let rest = REST.saturating_sub(self.looked.elapsed());
+        let rest = REST.saturating_sub(self.taken.elapsed());
         let is_starting = self.life.as_ref().is_some_and(|life| !life.is_open());
         let limit = match (rest.is_zero(), is_starting) {
             (false, _) => rest,
             (true, true) => STARTING,
             (true, false) => MAX_WAIT,
         };
-        let shadow = self.life.iter().map(Life::listener);
+        let shadow = self.life.iter().map(|life| life.harness.listener());
         let listeners: Vec<&Listener> = match rest.is_zero() {
             true => shadow.chain(self.observation.listeners()).collect(),
             false => shadow.collect(),
@@ -163,13 +164,13 @@ impl<'a> Shadowing<'a> {
         Ok(self.signals.sleep_until_any(&listeners, limit)?)
     }
 
-    /// Takes what the run has published, if it is time to look.
-    fn look(&mut self, at_once: bool) -> Result<(), ShadowError> {
-        if !at_once && self.looked.elapsed() < REST {
+    /// Takes the messages of the run, if a poll is due.
+    fn take(&mut self, at_once: bool) -> Result<(), ShadowError> {
+        if !at_once && self.taken.elapsed() < REST {
             return Ok(());
         }
-        self.looked = Instant::now();
-        for observed in self.observation.look()? {
+        self.taken = Instant::now();
+        for observed in self.observation.take()? {
             self.record.counts.observed += 1;
             self.backlog.push_back(observed);
         }
@@ -178,7 +179,7 @@ impl<'a> Shadowing<'a> {
         self.bound_backlog()
     }
 
-    /// Leaves out what the shadow is too late for.
+    /// Leaves out the items for which the shadow is too late.
     fn bound_backlog(&mut self) -> Result<(), ShadowError> {
         let is_full = match self.options.stage {
             StageId::Refinement if self.life.is_some() => {
@@ -205,7 +206,7 @@ impl<'a> Shadowing<'a> {
         }
     }
 
-    /// Starts the shadow if there is none, and goes on with it.
+    /// Starts the shadow if there is none, and exchanges messages with it.
     fn attend(&mut self) -> Result<(), ShadowError> {
         let Some(life) = &mut self.life else {
             return self.start();
@@ -214,8 +215,8 @@ impl<'a> Shadowing<'a> {
         for sent in life.take()? {
             self.receive(sent)?;
         }
-        if let Some(death) = self.life.as_mut().and_then(Life::death) {
-            // What it has sent last.
+        if let Some(death) = self.life.as_mut().and_then(|life| life.harness.death()) {
+            // Its last messages.
             let last = self.life.as_ref().map(Life::take).transpose()?;
             last.into_iter()
                 .flatten()
@@ -228,7 +229,7 @@ impl<'a> Shadowing<'a> {
             return self.fail(reason);
         }
         match is_open {
-            true => self.tell(),
+            true => self.send(),
             false => Ok(()),
         }
     }
@@ -240,15 +241,18 @@ impl<'a> Shadowing<'a> {
             return Ok(());
         }
         self.record.counts.starts += 1;
-        self.stream = Stream::new(self.options.stage, self.subject.manifest.window.lag);
-        self.life = Some(Life::begin(self.subject, self.signals)?);
+        self.renumbering = Renumbering::new(
+            self.options.stage,
+            self.program.candidate.manifest.window.lag,
+        );
+        self.life = Some(Life::begin(self.program, self.signals)?);
         Ok(())
     }
 
-    /// Says that the shadow does not come or does not answer.
+    /// Returns a sentence if the shadow does not start or does not answer.
     fn hangs(&self) -> Option<String> {
         let life = self.life.as_ref()?;
-        let (start, patience) = (self.options.start_timeout, self.options.patience);
+        let (start, item_timeout) = (self.options.start_timeout, self.options.item_timeout);
         if !life.is_open() {
             let topic = self.topic;
             return (life.age() > start)
@@ -256,38 +260,38 @@ impl<'a> Shadowing<'a> {
         }
         let under_way = self.under_way.as_ref()?;
         let seq = under_way.observed.seq();
-        (under_way.sent.elapsed() > patience)
-            .then(|| format!("it has not answered item {seq} within {patience:.0?}"))
+        (under_way.since.elapsed() > item_timeout)
+            .then(|| format!("it has not answered item {seq} within {item_timeout:.0?}"))
     }
 
     /// Ends a life that has failed.
     fn fail(&mut self, sentence: String) -> Result<(), ShadowError> {
-        self.vain += 1;
-        let again = match self.vain >= MAX_VAIN_STARTS {
+        self.failures += 1;
+        let again = match self.failures >= MAX_FAILURES {
             true => "it is not started again",
             false => "it is started again",
         };
-        self.news.push(format!("{sentence}; {again}"));
+        self.lines.push(format!("{sentence}; {again}"));
         self.record.ended(sentence);
         self.end_life(BACKOFF)
     }
 
     fn end_life(&mut self, backoff: Duration) -> Result<(), ShadowError> {
         self.record.counts.unanswered += u64::from(self.under_way.take().is_some());
-        self.unasked = None;
+        self.unanswerable = None;
         self.due = Instant::now() + backoff;
         match self.life.take() {
-            Some(life) => self.subject.keep_output(&life),
+            Some(life) => self.program.keep_output(&life),
             None => Ok(()),
         }
     }
 
-    /// Sends the next items: one that has to be answered, and what has to be sent before.
-    fn tell(&mut self) -> Result<(), ShadowError> {
+    /// Sends the next items: one that has to be answered, and those before it.
+    fn send(&mut self) -> Result<(), ShadowError> {
         while self.under_way.is_none()
             && let Some(observed) = self.backlog.pop_front()
         {
-            match self.stream.entry(&observed) {
+            match self.renumbering.entry(&observed) {
                 Entry::Continues | Entry::Opens => {}
                 Entry::IsLeftOut => {
                     self.record.counts.opening += 1;
@@ -301,19 +305,19 @@ impl<'a> Shadowing<'a> {
             let Some(life) = &self.life else {
                 return Ok(());
             };
-            let (sent_ns, sent) = (clock::now_ns(), Instant::now());
-            let told = self.stream.tell(life, &observed)?;
-            if told.is_answered {
-                let is_timed = self.unasked.is_none();
+            let (sent_ns, since) = (clock::now_ns(), Instant::now());
+            let sent = self.renumbering.send(&life.harness, &observed)?;
+            if sent.is_answered {
+                let is_timed = self.unanswerable.is_none();
                 self.under_way = Some(UnderWay {
                     observed,
-                    told,
-                    sent_ns,
                     sent,
+                    sent_ns,
+                    since,
                     is_timed,
                 });
             } else {
-                self.unasked = Some(told.item.seq);
+                self.unanswerable = Some(sent.item.seq);
                 self.record.counts.opening += 1;
             }
         }
@@ -325,7 +329,7 @@ impl<'a> Shadowing<'a> {
         counts.left += self.backlog.len() as u64 + u64::from(self.under_way.is_some());
         if let Some(mut life) = self.life.take() {
             life.end()?;
-            self.subject.keep_output(&life)?;
+            self.program.keep_output(&life)?;
         }
         Ok(self.record)
     }

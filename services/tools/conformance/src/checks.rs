@@ -11,131 +11,117 @@ mod timing;
 
 use std::{collections::BTreeMap, time::Duration};
 
-use gyre_messages::{StageId, flag};
-use gyre_stage::wake::Signals;
-use gyre_supervise::rig::Recorded;
+use gyre_harness::{Recorded, item::work_ns, result::result_bytes};
+use gyre_messages::{Item, StageId, flag};
 
 use crate::{
     ConformanceError,
-    content::{deviation, essence, work_ns},
+    deviation::deviation,
     report::{Judged, Report, Work},
     rule::{Findings, Rule},
-    session::{Session, Waited},
-    subject::Subject,
-    tape::Tape,
+    session::Session,
+    test::Context,
 };
 
 /// The test of one program.
 pub(crate) struct Examination<'a> {
-    subject: &'a Subject,
-    tape: &'a Tape,
-    signals: &'a Signals,
+    context: Context<'a>,
     observe: &'a mut dyn FnMut(&str),
     findings: Findings,
-    /// What it sent in the first scenario.
+    /// Its messages in the first scenario.
     outputs: Vec<Recorded>,
-    /// The bytes of it that its inputs determine, by item.
-    reference: BTreeMap<u64, Vec<u8>>,
+    /// Their result bytes, by item.
+    first_results: BTreeMap<u64, Vec<u8>>,
 }
 
 impl<'a> Examination<'a> {
-    pub(crate) fn new(
-        subject: &'a Subject,
-        tape: &'a Tape,
-        signals: &'a Signals,
-        observe: &'a mut dyn FnMut(&str),
-    ) -> Self {
+    pub(crate) fn new(context: Context<'a>, observe: &'a mut dyn FnMut(&str)) -> Self {
         Self {
-            subject,
-            tape,
-            signals,
+            context,
             observe,
             findings: Findings::default(),
             outputs: Vec::new(),
-            reference: BTreeMap::new(),
+            first_results: BTreeMap::new(),
         }
+    }
+
+    fn stage(&self) -> StageId {
+        self.context.test.candidate.stage
     }
 
     /// Runs all scenarios. If the program does not get through the first, the others could say nothing.
     pub(crate) fn run(mut self) -> Result<Report, ConformanceError> {
-        self.note_what_does_not_apply();
+        self.note_inapplicable_rules();
         (self.observe)("a start without topics");
         self.start_without_topics()?;
         (self.observe)("a whole stream");
-        let has_streamed = self.stream()?;
-        if has_streamed {
-            (self.observe)("one item at a time, with observers");
-            self.steps()?;
-            (self.observe)("kill -9");
-            self.restart()?;
-            if self.subject.stage == StageId::Masking {
-                (self.observe)("feedback");
-                self.feedback()?;
-            }
-            if self.subject.stage == StageId::RadarReplay {
-                (self.observe)("a full window");
-                self.window()?;
-            }
-            (self.observe)("standing by");
-            self.standing_by()?;
-            self.refusals()?;
+        if !self.stream()? {
+            return self.report(None, None);
         }
-        let answers = match self.subject.demands.budget.is_some() && has_streamed {
-            true => {
-                (self.observe)("the time of its answers");
-                self.timing()?
-            }
-            false => None,
-        };
-        let own_work = match self.is_own() || !has_streamed {
-            true => None,
-            false => self.own_work()?,
-        };
+        (self.observe)("one item at a time, with observers");
+        self.steps()?;
+        (self.observe)("kill -9");
+        self.restart()?;
+        if self.stage() == StageId::Masking {
+            (self.observe)("feedback");
+            self.feedback()?;
+        }
+        if self.stage() == StageId::RadarReplay {
+            (self.observe)("a full window");
+            self.window()?;
+        }
+        (self.observe)("standing by");
+        self.standing_by()?;
+        self.refusals()?;
+        let mut answers = None;
+        if self.context.test.demands.budget.is_some() {
+            (self.observe)("the time of its answers");
+            answers = self.timing()?;
+        }
+        let own_work = self.own_work()?;
         self.report(answers, own_work)
     }
 
-    fn is_own(&self) -> bool {
-        self.subject.command == self.subject.own(self.subject.stage)
-    }
-
-    fn note_what_does_not_apply(&mut self) {
-        let findings = &mut self.findings;
-        let stage = self.subject.stage;
-        if stage == StageId::RadarReplay {
-            findings.not_for(Rule::CopiesItem, "a source makes the items");
-        } else {
-            findings.not_for(Rule::KeepsWindow, "it is no source");
-        }
-        if stage != StageId::Masking {
-            findings.not_for(Rule::WaitsForMotion, "it is not masking");
-        } else if self.subject.manifest.window.lag == 0 {
-            findings.not_for(Rule::WaitsForMotion, "masking.lag is 0");
-        }
-        if stage != StageId::PoseIntegration {
-            findings.not_for(Rule::BeginsWithNewest, "it is not the sink");
-        }
-        if !self.subject.demands.same_as_own {
-            findings.not_for(Rule::SameAsOwn, "not asked for");
-        }
-        if self.subject.demands.budget.is_none() {
-            findings.not_for(Rule::KeepsBudget, "not asked for");
+    fn note_inapplicable_rules(&mut self) {
+        let (stage, demands) = (self.stage(), &self.context.test.demands);
+        let lag = self.context.test.candidate.manifest.window.lag;
+        let is_source = stage == StageId::RadarReplay;
+        let is_masking = stage == StageId::Masking;
+        let inapplicable = [
+            (is_source, Rule::CopiesItem, "a source makes the items"),
+            (!is_source, Rule::KeepsWindow, "it is no source"),
+            (!is_masking, Rule::WaitsForMotion, "it is not masking"),
+            (lag == 0, Rule::WaitsForMotion, "masking.lag is 0"),
+            (
+                stage != StageId::PoseIntegration,
+                Rule::BeginsWithNewest,
+                "it is not the sink",
+            ),
+            (!demands.same_as_own, Rule::SameAsOwn, "not asked for"),
+            (demands.budget.is_none(), Rule::KeepsBudget, "not asked for"),
+        ];
+        for (_, rule, reason) in inapplicable.into_iter().filter(|it| it.0) {
+            self.findings.not_for(rule, reason);
         }
     }
 
-    /// Measures Gyre's own stage on the same inputs.
+    /// Measures Gyre's own stage on the same inputs, unless it is the program.
     fn own_work(&mut self) -> Result<Option<Work>, ConformanceError> {
+        let (stage, candidate) = (self.stage(), &self.context.test.candidate);
+        let own = candidate.own_command(stage);
+        if candidate.command == own {
+            return Ok(None);
+        }
         (self.observe)("our own stage on the same inputs");
-        let stage = self.subject.stage;
-        let rig = self.subject.rig(self.signals, "measured")?;
         let mut scratch = Findings::default();
-        let mut session = Session::open(self.subject, &rig, self.tape, &mut scratch)?;
-        session.start(&self.subject.own(stage))?;
-        let (patience, end) = (self.subject.demands.patience, self.tape.end());
-        match session.wait(patience, |session| session.newest() >= Some(end))? {
-            Waited::Done => Ok(Work::of(work_on(stage, &session.outputs))),
-            other => Err(ConformanceError::Own {
+        let mut session = Session::open(self.context, "measured", &mut scratch)?;
+        session.start(&own)?;
+        let waited = session.reach(self.context.reference.end())?;
+        match waited.is_done() {
+            true => Ok(Work::of(work_on(stage, &session.outputs))),
+            false => Err(ConformanceError::Own {
                 stage: stage.name(),
-                reason: how(&other),
+                reason: waited.to_string(),
             }),
         }
     }
@@ -145,13 +131,16 @@ impl<'a> Examination<'a> {
         answers: Option<Work>,
         own_work: Option<Work>,
     ) -> Result<Report, ConformanceError> {
-        let (subject, topic) = (self.subject, self.subject.ports().output);
-        let work = Work::of(work_on(subject.stage, &self.outputs));
-        let own = self.tape.topic(topic);
-        if subject.demands.same_as_own && !self.outputs.is_empty() {
+        let Context {
+            test, reference, ..
+        } = self.context;
+        let (stage, topic) = (self.stage(), test.candidate.topics().output);
+        let work = Work::of(work_on(stage, &self.outputs));
+        let own = reference.topic(topic);
+        if test.demands.same_as_own && !self.outputs.is_empty() {
             self.compare_with_own(topic, own)?;
         }
-        if let Some(budget) = subject.demands.budget {
+        if let Some(budget) = test.demands.budget {
             self.judge_times("by its own stamps", work, budget);
             self.judge_times("by our clock, until its answer,", answers, budget);
         }
@@ -166,9 +155,9 @@ impl<'a> Examination<'a> {
             verdict,
         };
         Ok(Report {
-            stage: subject.stage.name(),
-            command: subject.command.clone(),
-            scans: self.tape.end() as usize,
+            stage: stage.name(),
+            command: test.candidate.command.clone(),
+            scans: reference.end() as usize,
             rules: self.findings.verdicts().into_iter().map(judged).collect(),
             work,
             answers,
@@ -191,7 +180,7 @@ impl<'a> Examination<'a> {
     fn compare_with_own(&mut self, topic: &str, own: &[Recorded]) -> Result<(), ConformanceError> {
         for own in own {
             let seq = own.item().seq;
-            let same = self.reference.get(&seq) == Some(&essence(topic, own)?);
+            let same = self.first_results.get(&seq) == Some(&result_bytes(topic, own)?);
             self.findings.require(Rule::SameAsOwn, same, || {
                 format!("item {seq} has other bytes than that of our own stage")
             });
@@ -200,45 +189,9 @@ impl<'a> Examination<'a> {
     }
 }
 
-/// The times of a stage's work on items as it stamps them, ns.
+/// Returns the times of a stage's work on items by its own stamps, ns.
 fn work_on(stage: StageId, outputs: &[Recorded]) -> impl Iterator<Item = i64> {
-    let is_worked_on = |it: &&Recorded| !it.item().is(flag::END) && !it.item().is(flag::BASE);
-    let outputs = outputs.iter().filter(is_worked_on);
-    outputs.map(move |it| work_ns(stage, it))
-}
-
-/// Notes each item whose bytes are not those of the first scenario.
-fn compare(
-    session: &mut Session<'_>,
-    reference: &BTreeMap<u64, Vec<u8>>,
-    outputs: std::ops::Range<usize>,
-    rule: Rule,
-    when: &str,
-) -> Result<(), ConformanceError> {
-    session.findings.checked(rule);
-    for i in outputs {
-        let output = &session.outputs[i];
-        let item = output.item();
-        if item.is(flag::BASE) {
-            continue;
-        }
-        let bytes = essence(session.ports.output, output)?;
-        if reference
-            .get(&item.seq)
-            .is_some_and(|known| *known != bytes)
-        {
-            let sentence = format!("item {} has other bytes {when}", item.seq);
-            session.findings.broken(rule, sentence);
-        }
-    }
-    Ok(())
-}
-
-/// Says why a wait ended in vain.
-fn how(waited: &Waited) -> String {
-    match waited {
-        Waited::Done => "it did".to_owned(),
-        Waited::Died(death) => death.to_string(),
-        Waited::TimedOut => "it lives and sends nothing".to_owned(),
-    }
+    let items = outputs.iter().map(Recorded::item);
+    let worked_on = items.filter(|it: &Item| !it.is(flag::END) && !it.is(flag::BASE));
+    worked_on.map(move |it| work_ns(stage, &it))
 }

@@ -1,10 +1,8 @@
 //! Inputs that break the contract, and that each reader has to refuse.
 
+use gyre_harness::{Recorded, result::floats};
 use gyre_messages::{Masked, Message, Motion, Pose, Rotation, Scan};
 use gyre_stage::StageError;
-use gyre_supervise::rig::Recorded;
-
-use crate::content::floats;
 
 /// A message that no stage may send, and what is wrong with it.
 pub(crate) type Malformed = (&'static str, Recorded);

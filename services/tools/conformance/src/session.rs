@@ -1,30 +1,29 @@
-//! One process under test in a run of its own: what is fed to it, and what it sends.
+//! One process under test in a run of its own: its inputs and its outputs.
 
 mod examine;
 mod feeding;
 
 use std::{
     collections::{BTreeMap, BTreeSet},
+    fmt,
+    ops::Range,
     time::{Duration, Instant},
 };
 
-use gyre_messages::{Message, Pose, flag};
-use gyre_stage::StageError;
-use gyre_supervise::{
-    Death, Scheduling,
-    rig::{Feed, Process, Recorded, Rig, Tap},
+use gyre_harness::{
+    Death, Direction, Harness, Recorded, Scheduling, Sent, result::result_bytes,
+    start_of_trajectory,
 };
+use gyre_messages::{Message, Pose, StageId, flag};
 
 use crate::{
     ConformanceError,
-    content::essence,
+    reference::{POLL_PERIOD, Reference},
     rule::{Findings, Rule},
-    subject::Subject,
-    tape::{LOOK, Tape, start_of_trajectory},
-    topology::{Ports, Way},
+    test::{Context, Demands, Test},
 };
 
-/// How many items are under way at most.
+/// The number of items under way at most.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Pace {
     /// As many as the window admits.
@@ -37,14 +36,9 @@ pub(crate) enum Pace {
 
 /// A process under test, and this program in place of the rest of the run.
 pub(crate) struct Session<'a> {
-    // Dropped in this order: process, ports, run.
-    process: Option<Process>,
-    feeds: BTreeMap<&'static str, Box<dyn Feed>>,
-    tap: Box<dyn Tap>,
-    pub rig: &'a Rig<'a>,
-    pub subject: &'a Subject,
-    pub tape: &'a Tape,
-    pub ports: Ports,
+    pub harness: Harness<'a>,
+    pub test: &'a Test,
+    pub reference: &'a Reference,
     pub findings: &'a mut Findings,
     pub pace: Pace,
     /// The first item that is not sent by itself.
@@ -55,19 +49,19 @@ pub(crate) struct Session<'a> {
     newest: Option<u64>,
     /// The last item of this life of the process.
     last: Option<u64>,
-    /// What it has sent, in order, over all its lives.
+    /// Its outputs, in order, over all its lives.
     pub outputs: Vec<Recorded>,
     /// The topics whose publishers it has notified.
-    asked: BTreeSet<&'static str>,
-    /// When each item was last sent.
+    notified: BTreeSet<&'static str>,
+    /// The last time at which each item was sent.
     sent_ns: BTreeMap<u64, i64>,
     progress: Instant,
 }
 
-/// Why a wait ended.
+/// The end of a wait.
 #[derive(Clone, Debug)]
 pub(crate) enum Waited {
-    /// What was waited for is there.
+    /// The condition holds.
     Done,
     /// The process has ended.
     Died(Death),
@@ -75,26 +69,44 @@ pub(crate) enum Waited {
     TimedOut,
 }
 
+impl Waited {
+    pub(crate) fn is_done(&self) -> bool {
+        matches!(self, Self::Done)
+    }
+}
+
+impl fmt::Display for Waited {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Done => f.write_str("it did"),
+            Self::Died(death) => write!(f, "{death}"),
+            Self::TimedOut => f.write_str("it lives and sends nothing"),
+        }
+    }
+}
+
 impl<'a> Session<'a> {
-    /// Opens the topics of the stage, and sends what comes first. No process is started.
+    /// Creates a run of this name, opens the topics of the stage, and sends the start of the
+    /// trajectory. No process is started.
     ///
     /// # Errors
     /// A failure of the transport.
     pub(crate) fn open(
-        subject: &'a Subject,
-        rig: &'a Rig<'a>,
-        tape: &'a Tape,
+        context: Context<'a>,
+        name: &str,
         findings: &'a mut Findings,
     ) -> Result<Self, ConformanceError> {
-        let ports = subject.ports();
-        let mut session = Self {
-            process: None,
-            feeds: BTreeMap::new(),
-            tap: rig.tap(ports.output)?,
-            rig,
-            subject,
-            tape,
-            ports,
+        let Context {
+            test,
+            reference,
+            signals,
+        } = context;
+        let harness = Harness::open(test.rig(name, signals)?, test.candidate.stage)?;
+        harness.feed(Pose::TOPIC, &start_of_trajectory())?;
+        Ok(Self {
+            harness,
+            test,
+            reference,
             findings,
             pace: Pace::Window,
             until: u64::MAX,
@@ -102,41 +114,47 @@ impl<'a> Session<'a> {
             newest: None,
             last: None,
             outputs: Vec::new(),
-            asked: BTreeSet::new(),
+            notified: BTreeSet::new(),
             sent_ns: BTreeMap::new(),
             progress: Instant::now(),
-        };
-        session.open_feeds()?;
-        if session.feeds.contains_key(Pose::TOPIC) {
-            session.feed(Pose::TOPIC, &start_of_trajectory())?;
-        }
-        Ok(session)
+        })
     }
 
-    fn open_feeds(&mut self) -> Result<(), ConformanceError> {
-        for (topic, _) in &self.ports.inputs {
-            self.feeds.insert(topic, self.rig.feed(topic)?);
-        }
-        Ok(())
+    pub(crate) fn stage(&self) -> StageId {
+        self.test.candidate.stage
+    }
+
+    pub(crate) fn demands(&self) -> &'a Demands {
+        &self.test.demands
+    }
+
+    /// Returns the topic that the process publishes.
+    pub(crate) fn output_topic(&self) -> &'static str {
+        self.harness.topics().output
     }
 
     /// Starts the process and waits until it has opened the topic that it publishes.
     pub(crate) fn start(&mut self, command: &[String]) -> Result<Waited, ConformanceError> {
         self.spawn(command)?;
-        let (stage, limit) = (self.subject.stage, self.subject.demands.start_timeout);
-        self.wait(limit, |session| session.rig.has_publisher(stage))
+        let limit = self.demands().start_timeout;
+        self.wait(limit, |session| session.harness.has_publisher())
     }
 
     /// Starts the process.
     pub(crate) fn spawn(&mut self, command: &[String]) -> Result<(), ConformanceError> {
         self.last = None;
-        self.asked.clear();
-        let name = self.subject.stage.name();
-        self.process = Some(self.rig.start(name, command, &Scheduling::default())?);
-        Ok(())
+        self.notified.clear();
+        Ok(self.harness.start(command, &Scheduling::default())?)
     }
 
-    /// Waits until `done`, while the run goes on around the process; `limit` is counted from the last item that it sent.
+    /// Waits until the process has answered an item; the limit is that for one item.
+    pub(crate) fn reach(&mut self, seq: u64) -> Result<Waited, ConformanceError> {
+        let limit = self.demands().item_timeout;
+        self.wait(limit, |session| session.newest >= Some(seq))
+    }
+
+    /// Waits until `done`, while the run goes on around the process; `limit` is counted from the last
+    /// item that it sent.
     pub(crate) fn wait(
         &mut self,
         limit: Duration,
@@ -144,13 +162,12 @@ impl<'a> Session<'a> {
     ) -> Result<Waited, ConformanceError> {
         self.progress = Instant::now();
         loop {
-            self.answer()?;
-            self.receive()?;
+            self.exchange()?;
             self.admit()?;
             if done(self) {
                 return Ok(Waited::Done);
             }
-            if let Some(death) = self.process.as_mut().and_then(Process::death) {
+            if let Some(death) = self.harness.death() {
                 self.receive()?;
                 return Ok(match done(self) {
                     true => Waited::Done,
@@ -172,27 +189,23 @@ impl<'a> Session<'a> {
     }
 
     fn sleep(&self) -> Result<(), ConformanceError> {
-        match self.rig.sleep(&[self.tap.as_ref()], LOOK)? {
+        match self.harness.sleep(POLL_PERIOD)? {
             true => Err(ConformanceError::Interrupted),
             false => Ok(()),
         }
     }
 
-    fn answer(&mut self) -> Result<(), ConformanceError> {
-        for (topic, feed) in &self.feeds {
-            if feed.answer_handshakes()? {
-                self.asked.insert(topic);
-            }
-        }
-        Ok(())
+    /// Answers handshakes and receives.
+    fn exchange(&mut self) -> Result<(), ConformanceError> {
+        self.notified.extend(self.harness.answer_handshakes()?);
+        self.receive()
     }
 
-    /// Receives what the process has sent, and examines it.
+    /// Receives the messages of the process, and examines them.
     fn receive(&mut self) -> Result<(), ConformanceError> {
-        loop {
-            match self.tap.receive() {
-                Ok(None) => return Ok(()),
-                Ok(Some(output)) => {
+        while let Some(sent) = self.harness.receive()? {
+            match sent {
+                Sent::Message(output) => {
                     self.findings.checked(Rule::SendsValid);
                     self.examine(&output);
                     let item = output.item();
@@ -201,35 +214,29 @@ impl<'a> Session<'a> {
                         self.answered(item.seq)?;
                     }
                 }
-                Err(StageError::Malformed { seq, reason, .. }) => {
-                    let sentence = format!("item {seq} cannot be read by any stage: {reason}");
+                Sent::Malformed { seq, sentence } => {
                     self.findings.broken(Rule::SendsValid, sentence);
                     self.last = Some(seq);
                     self.answered(seq)?;
                 }
-                Err(error) => return Err(error.into()),
             }
             self.progress = Instant::now();
         }
+        Ok(())
     }
 
     /// Kills the process and removes what it leaves.
     pub(crate) fn kill(&mut self) -> Result<(), ConformanceError> {
-        if let Some(process) = self.process.take() {
-            process.kill()?;
-        }
+        self.harness.kill()?;
         self.receive()?;
-        self.rig.remove_dead()?;
-        Ok(())
+        Ok(self.harness.rig().remove_dead()?)
     }
 
     /// Sends SIGTERM; returns how the process ended, `None` if it did not in time.
     pub(crate) fn stop(&mut self) -> Result<Option<Death>, ConformanceError> {
-        if let Some(process) = &self.process {
-            process.terminate();
-        }
+        self.harness.terminate();
         self.pace = Pace::Hold;
-        self.ended_within(self.subject.demands.stop_timeout)
+        self.ended_within(self.demands().stop_timeout)
     }
 
     /// Waits for the end of the process; `None` if it does not end in time.
@@ -239,9 +246,8 @@ impl<'a> Session<'a> {
     ) -> Result<Option<Death>, ConformanceError> {
         let since = Instant::now();
         loop {
-            self.answer()?;
-            self.receive()?;
-            if let Some(death) = self.process.as_mut().and_then(Process::death) {
+            self.exchange()?;
+            if let Some(death) = self.harness.death() {
                 self.receive()?;
                 return Ok(Some(death));
             }
@@ -252,36 +258,26 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Connects to readers that have not asked, so that what they do otherwise can be seen.
-    pub(crate) fn connect_all(&self) -> Result<(), ConformanceError> {
-        Ok(self.feeds.values().try_for_each(|feed| feed.connect())?)
-    }
-
     /// Returns the topics that the process has subscribed to without notifying their publishers.
-    pub(crate) fn not_asked(&self) -> Vec<&'static str> {
-        let silent = self
-            .feeds
-            .iter()
-            .filter(|(topic, feed)| feed.subscribers() > 0 && !self.asked.contains(*topic));
+    pub(crate) fn not_notified(&self) -> Vec<&'static str> {
+        let feeds = self.harness.feeds().iter();
+        let silent =
+            feeds.filter(|(topic, feed)| feed.subscribers() > 0 && !self.notified.contains(*topic));
         silent.map(|(topic, _)| *topic).collect()
     }
 
     /// Returns whether the process has opened a topic.
     pub(crate) fn has_joined(&self) -> bool {
-        let mut feeds = self.feeds.values();
-        feeds.any(|feed| feed.subscribers() > 0) || self.rig.has_publisher(self.subject.stage)
+        let mut feeds = self.harness.feeds().values();
+        feeds.any(|feed| feed.subscribers() > 0) || self.harness.has_publisher()
     }
 
     /// Returns the inputs that the process has not subscribed to.
     pub(crate) fn not_read(&self) -> Vec<&'static str> {
-        let unread = self.ports.by(Way::Forward);
-        unread
-            .filter(|topic| {
-                self.feeds
-                    .get(topic)
-                    .is_some_and(|it| it.subscribers() == 0)
-            })
-            .collect()
+        let feeds = self.harness.feeds();
+        let is_unread = |topic: &&str| feeds.get(topic).is_some_and(|it| it.subscribers() == 0);
+        let inputs = self.harness.topics().leading(Direction::Forward);
+        inputs.filter(is_unread).collect()
     }
 
     /// Returns the newest item that the process has sent.
@@ -289,10 +285,15 @@ impl<'a> Session<'a> {
         self.newest
     }
 
-    /// Returns what it has sent about an item, in all its lives.
+    /// Returns its messages about an item, in all its lives.
     pub(crate) fn about(&self, seq: u64) -> impl Iterator<Item = &Recorded> {
         let items = self.outputs.iter();
         items.filter(move |it| it.item().seq == seq && !it.item().is(flag::BASE))
+    }
+
+    /// Returns whether it has sent something about an item.
+    pub(crate) fn has(&self, seq: u64) -> bool {
+        self.about(seq).next().is_some()
     }
 
     /// Returns the time from when an item was sent to when the first answer to it was read, ns.
@@ -301,13 +302,34 @@ impl<'a> Session<'a> {
         Some(answer.received_ns.saturating_sub(*sent_ns))
     }
 
-    /// Returns the bytes that its inputs determine, by item: the first of each.
-    pub(crate) fn essences(&self) -> Result<BTreeMap<u64, Vec<u8>>, ConformanceError> {
-        let mut essences = BTreeMap::new();
+    /// Returns the result bytes of the first message about each item.
+    pub(crate) fn results(&self) -> Result<BTreeMap<u64, Vec<u8>>, ConformanceError> {
+        let mut results = BTreeMap::new();
         for output in self.outputs.iter().filter(|it| !it.item().is(flag::BASE)) {
-            let essence = essence(self.ports.output, output)?;
-            essences.entry(output.item().seq).or_insert(essence);
+            let bytes = result_bytes(self.output_topic(), output)?;
+            results.entry(output.item().seq).or_insert(bytes);
         }
-        Ok(essences)
+        Ok(results)
+    }
+
+    /// Notes each output whose bytes are not those of the first scenario.
+    pub(crate) fn compare(
+        &mut self,
+        first: &BTreeMap<u64, Vec<u8>>,
+        outputs: Range<usize>,
+        rule: Rule,
+        when: &str,
+    ) -> Result<(), ConformanceError> {
+        self.findings.checked(rule);
+        for output in &self.outputs[outputs] {
+            let item = output.item();
+            let bytes = result_bytes(self.harness.topics().output, output)?;
+            let differs = first.get(&item.seq).is_some_and(|first| *first != bytes);
+            if differs && !item.is(flag::BASE) {
+                let sentence = format!("item {} has other bytes {when}", item.seq);
+                self.findings.broken(rule, sentence);
+            }
+        }
+        Ok(())
     }
 }

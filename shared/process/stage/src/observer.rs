@@ -5,6 +5,8 @@
 //! (see [`TopicSizes::samples`](gyre_messages::TopicSizes::samples)). It notifies the publisher once, when it attaches, so that the
 //! publisher connects to it while it waits, and not while it sends. The supervisor frees the places of killed observers.
 
+mod topic;
+
 use std::{
     fs::{self, File},
     path::{Path, PathBuf},
@@ -26,6 +28,8 @@ use crate::{
     services::{self, Ipc, Node, Topic},
     wake::{self, Signals},
 };
+
+pub use topic::TopicObserver;
 
 /// The name of the nodes and the subscribers of observers. Those of a topic are counted by it.
 pub const NAME: &str = "observer";

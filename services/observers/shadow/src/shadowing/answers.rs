@@ -1,18 +1,21 @@
-//! What the shadow has sent: examined against the contract, and compared with what the run has made of the same item.
+//! The messages of the shadow: examined against the contract, and compared with the result of the
+//! run for the same item.
 
-use gyre_conformance::copying::{not_copied, wrong_stamps};
+use gyre_harness::{
+    Recorded, Sent,
+    item::{not_copied, wrong_stamps},
+};
 use gyre_messages::{Item, flag};
-use gyre_supervise::rig::Recorded;
 
 use super::{Shadowing, UnderWay};
-use crate::{ShadowError, life::Sent, record::Pair};
+use crate::{ShadowError, record::Pair};
 
 impl Shadowing<'_> {
-    /// Examines what the shadow has sent.
+    /// Examines a message of the shadow.
     pub(super) fn receive(&mut self, sent: Sent) -> Result<(), ShadowError> {
         let output = match sent {
-            Ok(output) => output,
-            Err(sentence) => {
+            Sent::Message(output) => output,
+            Sent::Malformed { sentence, .. } => {
                 self.breach(sentence);
                 self.record.counts.unanswered += u64::from(self.under_way.take().is_some());
                 return Ok(());
@@ -20,16 +23,16 @@ impl Shadowing<'_> {
         };
         let item = output.item();
         match self.under_way.take() {
-            Some(it) if it.told.item.seq == item.seq && !item.is(flag::END) => {
-                self.unasked = None;
+            Some(it) if it.sent.item.seq == item.seq && !item.is(flag::END) => {
+                self.unanswerable = None;
                 return self.answered(&it, &output);
             }
             before => self.under_way = before,
         }
-        match self.unasked.take() {
+        match self.unanswerable.take() {
             Some(seq) if seq == item.seq && !item.is(flag::END) => {}
             unasked => {
-                self.unasked = unasked;
+                self.unanswerable = unasked;
                 self.breach(unexpected(&item, self.under_way.as_ref()));
             }
         }
@@ -38,7 +41,7 @@ impl Shadowing<'_> {
 
     fn answered(&mut self, it: &UnderWay, output: &Recorded) -> Result<(), ShadowError> {
         let stage = self.options.stage;
-        let (item, sent) = (output.item(), &it.told.item);
+        let (item, sent) = (output.item(), &it.sent.item);
         for field in not_copied(stage, sent, &item) {
             let seq = it.observed.seq();
             self.breach(format!("item {seq}: {field} is not that of its input"));
@@ -46,11 +49,11 @@ impl Shadowing<'_> {
         let wrong = wrong_stamps(stage, &item, Some(it.sent_ns), output.received_ns);
         let has_stamps = wrong.is_none();
         wrong.into_iter().for_each(|sentence| self.breach(sentence));
-        if it.told.opens {
+        if it.sent.opens {
             self.record.counts.opening += 1;
             return Ok(());
         }
-        self.vain = 0;
+        self.failures = 0;
         let answered_ns = match has_stamps {
             true => item.hops[stage as usize].published_ns,
             false => output.received_ns,
@@ -68,7 +71,7 @@ impl Shadowing<'_> {
 
     fn breach(&mut self, sentence: String) {
         if self.record.counts.breaches == 0 {
-            self.news
+            self.lines
                 .push(format!("it breaks the contract: {sentence}"));
         }
         self.record.breach(sentence);
@@ -80,7 +83,7 @@ fn unexpected(item: &Item, under_way: Option<&UnderWay>) -> String {
     match under_way {
         Some(it) => format!(
             "it sent item {seq}, and item {} was to be answered",
-            it.told.item.seq
+            it.sent.item.seq
         ),
         None => format!("it sent item {seq}, and none was to be answered"),
     }

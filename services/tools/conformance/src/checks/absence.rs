@@ -1,28 +1,25 @@
-//! A start where the supervisor has created nothing: what exists afterwards, the program has created.
+//! A start where the supervisor has created nothing: all that exists afterwards is the program's.
 
 use std::time::Instant;
 
-use gyre_supervise::Scheduling;
+use gyre_harness::Scheduling;
 
 use super::Examination;
-use crate::{ConformanceError, rule::Rule, tape::LOOK};
+use crate::{ConformanceError, reference::POLL_PERIOD, rule::Rule};
 
 impl Examination<'_> {
     pub(super) fn start_without_topics(&mut self) -> Result<(), ConformanceError> {
-        let subject = self.subject;
-        let rig = subject.empty_rig(self.signals, "absence")?;
-        let mut process = rig.start(
-            subject.stage.name(),
-            &subject.command,
-            &Scheduling::default(),
-        )?;
+        let test = self.context.test;
+        let rig = test.empty_rig("absence", self.context.signals)?;
+        let command = &test.candidate.command;
+        let mut process = rig.start(self.stage().name(), command, &Scheduling::default())?;
         let since = Instant::now();
-        while process.death().is_none() && rig.services().is_empty() {
-            // It may wait for its topics as long as it likes.
-            if since.elapsed() > subject.demands.patience {
-                break;
-            }
-            if rig.sleep(&[], LOOK)? {
+        // It may wait for its topics as long as it likes.
+        while process.death().is_none()
+            && rig.services().is_empty()
+            && since.elapsed() <= test.demands.item_timeout
+        {
+            if rig.sleep(&[], POLL_PERIOD)? {
                 return Err(ConformanceError::Interrupted);
             }
         }
@@ -31,7 +28,6 @@ impl Examination<'_> {
             .require(Rule::CreatesNothing, created == 0, || {
                 "it creates its topics where there are none: open them, so that the supervisor's sizes hold".to_owned()
             });
-        process.kill()?;
-        Ok(())
+        Ok(process.kill()?)
     }
 }

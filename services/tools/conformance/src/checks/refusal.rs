@@ -1,15 +1,15 @@
-//! Inputs that break the contract: the program ends with exit code 3 and a sentence, and sends nothing about them.
+//! Inputs that break the contract: the program ends with exit code 3 and a sentence, and sends
+//! nothing about them.
 
+use gyre_harness::{Death, Direction};
 use gyre_stage::StageError;
-use gyre_supervise::{Death, rig::Rig};
 
 use super::{Examination, stream::starts};
 use crate::{
     ConformanceError,
     malformed::{Malformed, malformed},
     rule::Rule,
-    session::{Pace, Session, Waited},
-    topology::Way,
+    session::{Pace, Session},
 };
 
 /// The item that is sent wrong.
@@ -17,21 +17,20 @@ const WRONG: u64 = 2;
 
 impl Examination<'_> {
     pub(super) fn refusals(&mut self) -> Result<(), ConformanceError> {
-        for (topic, way) in self.subject.ports().inputs {
-            let Some(valid) = self.tape.get(topic, WRONG) else {
+        let reference = self.context.reference;
+        for (topic, direction) in self.context.test.candidate.topics().inputs {
+            let Some(valid) = reference.get(topic, WRONG) else {
                 continue;
             };
             let mut wrong = malformed(topic, valid)?;
-            if let (Way::Forward, Some(later)) = (way, self.tape.get(topic, WRONG + 1)) {
+            let later = reference.get(topic, WRONG + 1);
+            if let (Direction::Forward, Some(later)) = (direction, later) {
                 wrong.push(("a sequence gap", later.clone()));
             }
             for (i, wrong) in wrong.iter().enumerate() {
                 (self.observe)(&format!("`{topic}` with {}", wrong.0));
-                // Each in a folder of its own: what a stage keeps of one is no matter of the next.
-                let rig = self
-                    .subject
-                    .rig(self.signals, &format!("refusal-{topic}-{i}"))?;
-                self.refusal(&rig, topic, way, wrong)?;
+                // Each in a folder of its own, so that no state is kept from one to the next.
+                self.refusal(&format!("refusal-{topic}-{i}"), (topic, direction), wrong)?;
             }
         }
         Ok(())
@@ -39,52 +38,46 @@ impl Examination<'_> {
 
     fn refusal(
         &mut self,
-        rig: &Rig<'_>,
-        topic: &'static str,
-        way: Way,
-        (what, message): &Malformed,
+        name: &str,
+        (topic, direction): (&'static str, Direction),
+        (fault, message): &Malformed,
     ) -> Result<(), ConformanceError> {
-        let mut session = Session::open(self.subject, rig, self.tape, &mut self.findings)?;
+        let mut session = Session::open(self.context, name, &mut self.findings)?;
         session.until = WRONG;
         if !starts(&mut session)? {
             return Ok(());
         }
-        session.connect_all()?;
-        let patience = self.subject.demands.patience;
-        let before = session.wait(patience, |session| session.newest() >= Some(WRONG - 1))?;
-        if !matches!(before, Waited::Done) {
-            // What it does with valid items is judged elsewhere.
+        session.harness.connect()?;
+        if !session.reach(WRONG - 1)?.is_done() {
+            // Other scenarios judge its work on valid items.
             return Ok(());
         }
         session.pace = Pace::Hold;
-        let others = session
-            .ports
-            .by(Way::Forward)
-            .filter(|other| *other != topic);
-        for other in others {
-            if let Some(valid) = self.tape.get(other, WRONG) {
-                session.feed(other, valid)?;
+        let forward = session.harness.topics().leading(Direction::Forward);
+        for other in forward.filter(|other| *other != topic) {
+            if let Some(valid) = self.context.reference.get(other, WRONG) {
+                session.harness.feed(other, valid)?;
             }
         }
-        session.feed(topic, message)?;
-        let ending = session.ended_within(self.subject.demands.patience)?;
-        let is_sent = way == Way::Forward && session.about(WRONG).next().is_some();
+        session.harness.feed(topic, message)?;
+        let ending = session.ended_within(session.demands().item_timeout)?;
+        let is_sent = direction == Direction::Forward && session.has(WRONG);
         session
             .findings
             .require(Rule::RefusesMalformed, !is_sent, || {
-                format!("it sent item {WRONG}, although its input on `{topic}` had {what}")
+                format!("it sent item {WRONG}, although its input on `{topic}` had {fault}")
             });
-        if let Some(breach) = breach(ending, topic, what) {
+        if let Some(breach) = breach(ending, topic, fault) {
             session.findings.broken(Rule::RefusesMalformed, breach);
         }
         Ok(())
     }
 }
 
-/// Says what is wrong with the end of a program after a malformed item; `None` if nothing is.
-fn breach(ending: Option<Death>, topic: &str, what: &str) -> Option<String> {
+/// Returns the fault in the end of a program after a malformed item; `None` if there is none.
+fn breach(ending: Option<Death>, topic: &str, fault: &str) -> Option<String> {
     let code = i32::from(StageError::TRANSIENT);
-    let item = format!("an item on `{topic}` with {what}");
+    let item = format!("an item on `{topic}` with {fault}");
     match ending {
         None => Some(format!("it goes on after {item}")),
         Some(death) if death.code != Some(code) => {

@@ -1,78 +1,62 @@
-//! Two deaths. After the first the inputs are still there, with their history. After the second all other stages are restarted too: no
-//! more of the inputs is there than a restarted stage may need.
+//! Two deaths. After the first the inputs are still there, with their history. After the second all
+//! other stages are restarted too: no more of the inputs is there than a restarted stage may need.
 
-use gyre_messages::{StageId, flag};
+use gyre_harness::Recorded;
+use gyre_messages::{Item, StageId, flag};
 
-use super::{Examination, compare, how, stream::starts};
-use crate::{
-    ConformanceError,
-    rule::Rule,
-    session::{Session, Waited},
-};
+use super::{Examination, stream::starts};
+use crate::{ConformanceError, rule::Rule, session::Session};
 
 /// Items on their way when the program is killed: fast ones would be done with all before.
 const UNDER_WAY: u64 = 2;
 
 impl Examination<'_> {
     pub(super) fn restart(&mut self) -> Result<(), ConformanceError> {
-        let rig = self.subject.rig(self.signals, "restart")?;
-        let mut session = Session::open(self.subject, &rig, self.tape, &mut self.findings)?;
-        let (end, patience) = (self.tape.end(), self.subject.demands.patience);
+        let mut session = Session::open(self.context, "restart", &mut self.findings)?;
+        let end = self.context.reference.end();
         starts(&mut session)?;
-        session.connect_all()?;
+        session.harness.connect()?;
         session.until = end / 3 + UNDER_WAY;
-        session.wait(patience, |session| session.newest() >= Some(end / 3))?;
+        session.reach(end / 3)?;
         session.kill()?;
 
         let first_life = session.outputs.len();
-        let goes_on = Death {
+        let resumes = Restart {
             rule: Rule::Resumes,
             when: "after kill -9",
             until: end * 2 / 3,
         };
-        session.until = goes_on.until + UNDER_WAY;
-        goes_on.examine(&mut session)?;
+        session.until = resumes.until + UNDER_WAY;
+        resumes.examine(&mut session)?;
         let all = first_life..session.outputs.len();
-        compare(
-            &mut session,
-            &self.reference,
-            all,
-            Rule::Resumes,
-            "after kill -9",
-        )?;
+        session.compare(&self.first_results, all, resumes.rule, resumes.when)?;
         session.kill()?;
 
         let second_life = session.outputs.len();
         let newest = session.newest().unwrap_or_default();
         session.restart_inputs(newest)?;
         session.until = u64::MAX;
-        let goes_on = Death {
+        let looks_back = Restart {
             rule: Rule::LooksBack,
             when: "after a restart of all stages, which repeats no more than it may need",
             until: end,
         };
-        goes_on.examine(&mut session)?;
+        looks_back.examine(&mut session)?;
         let all = second_life..session.outputs.len();
-        compare(
-            &mut session,
-            &self.reference,
-            all,
-            Rule::LooksBack,
-            goes_on.when,
-        )
+        session.compare(&self.first_results, all, looks_back.rule, looks_back.when)
     }
 }
 
-/// What is required after a death.
-struct Death {
+/// The demands on a restarted program.
+struct Restart {
     rule: Rule,
     when: &'static str,
     /// The item that the program has to come to.
     until: u64,
 }
 
-impl Death {
-    /// Starts the program again, and requires that it goes on.
+impl Restart {
+    /// Starts the program again, and requires that it resumes.
     fn examine(&self, session: &mut Session<'_>) -> Result<(), ConformanceError> {
         let Self { rule, when, until } = *self;
         let (newest, sent) = (session.newest(), session.outputs.len());
@@ -83,23 +67,15 @@ impl Death {
             session.findings.broken(rule, sentence);
             return Ok(());
         }
-        session.connect_all()?;
-        let patience = session.subject.demands.patience;
-        let waited = session.wait(patience, |session| session.newest() >= Some(until))?;
-        let went_on = matches!(waited, Waited::Done);
-        session.findings.require(rule, went_on, || {
-            let reached = last_of(&session.outputs[sent..]);
-            format!(
-                "{when} it came to {reached} and not to item {until}: {}",
-                how(&waited)
-            )
+        session.harness.connect()?;
+        let waited = session.reach(until)?;
+        let life: Vec<Item> = session.outputs[sent..].iter().map(Recorded::item).collect();
+        session.findings.require(rule, waited.is_done(), || {
+            let last = life.iter().map(|it| it.seq).max();
+            let reached = last.map_or_else(|| "no item".to_owned(), |seq| format!("item {seq}"));
+            format!("{when} it came to {reached} and not to item {until}: {waited}")
         });
-        let life = &session.outputs[sent..];
-        let first = life
-            .iter()
-            .map(|it| it.item())
-            .find(|it| !it.is(flag::BASE));
-        if let Some(first) = first {
+        if let Some(first) = life.iter().find(|it| !it.is(flag::BASE)) {
             session.findings.require(rule, first.seq <= next, || {
                 format!(
                     "{when} it went on with item {}, and its readers need item {next}",
@@ -107,8 +83,8 @@ impl Death {
                 )
             });
         }
-        if session.subject.stage == StageId::PoseIntegration {
-            let marked = life.iter().map(|it| it.item()).find(|it| it.is(flag::SYNC));
+        if session.stage() == StageId::PoseIntegration {
+            let marked = life.iter().find(|it| it.is(flag::SYNC));
             let is_newest = marked.is_some_and(|it| Some(it.seq) >= newest && !it.is(flag::BASE));
             session.findings.require(Rule::BeginsWithNewest, is_newest, || {
                 format!("{when} it has to send its last poses again, with the flag SYNC on the newest alone, item {} or later", next.saturating_sub(1))
@@ -116,9 +92,4 @@ impl Death {
         }
         Ok(())
     }
-}
-
-fn last_of(outputs: &[gyre_supervise::rig::Recorded]) -> String {
-    let last = outputs.iter().map(|it| it.item().seq).max();
-    last.map_or_else(|| "no item".to_owned(), |seq| format!("item {seq}"))
 }

@@ -1,16 +1,15 @@
-//! Told to stand by, as for a swap: the program says when it is ready, opens nothing before its standard input ends, and then goes on as at
-//! any start.
+//! Told to stand by, as for a swap: the program says when it is ready, opens nothing before its
+//! standard input ends, and then works as at any start.
 
 use std::{
     fs::File,
     path::{Path, PathBuf},
 };
 
-use gyre_messages::StageId;
-use gyre_stage::run::STANDBY;
+use gyre_stage::{StageError, run::STANDBY};
 use rustix::fs::{CWD, FileType, Mode, mknodat};
 
-use super::{Examination, compare, how};
+use super::Examination;
 use crate::{
     ConformanceError,
     rule::Rule,
@@ -24,16 +23,16 @@ const WITH_INPUT: &str = "exec \"$@\" < \"$0\"";
 
 impl Examination<'_> {
     pub(super) fn standing_by(&mut self) -> Result<(), ConformanceError> {
-        let subject = self.subject;
-        let rig = subject.rig(self.signals, "standing-by")?;
-        let ready = ready_file(&rig.manifest().root, subject.stage);
-        let input = Input::create(&rig.manifest().root)?;
-        let mut session = Session::open(subject, &rig, self.tape, &mut self.findings)?;
-        session.send_history()?;
-        session.spawn(&input.command(&subject.command))?;
-        let limit = subject.demands.start_timeout;
+        let mut session = Session::open(self.context, "standing-by", &mut self.findings)?;
+        let candidate = &session.test.candidate;
+        let root = session.harness.manifest().root.clone();
+        let ready = root.join(format!("{}.ready", candidate.stage.name()));
+        let input = StandardInput::create(&root)?;
+        session.admit()?;
+        session.spawn(&input.command(&candidate.command))?;
+        let limit = session.demands().start_timeout;
         let waited = session.wait(limit, |session| ready.exists() || session.has_joined())?;
-        let lives = session.rest(subject.demands.quiet)?;
+        let lives = session.rest(session.demands().quiet)?;
         match (ready.exists(), session.has_joined()) {
             (false, true) => {
                 session.findings.not_for(Rule::StandsBy, DOES_NOT);
@@ -50,7 +49,7 @@ impl Examination<'_> {
         takes_over(&mut session)?;
         let all = 0..session.outputs.len();
         let when = "after it has stood by";
-        compare(&mut session, &self.reference, all, Rule::StandsBy, when)
+        session.compare(&self.first_results, all, Rule::StandsBy, when)
     }
 }
 
@@ -63,48 +62,35 @@ fn breach(has_joined: bool, waited: &Waited) -> String {
             "told to stand by it neither says that it does nor starts, within the start timeout".to_owned()
         }
         (false, Waited::Done) => "told to stand by it said that it does, and ended".to_owned(),
-        (false, waited) => format!("told to stand by {}", how(waited)),
+        (false, waited) => format!("told to stand by {waited}"),
     }
 }
 
 /// Requires that the program works as at any start.
 fn takes_over(session: &mut Session<'_>) -> Result<(), ConformanceError> {
-    let (limit, patience) = (
-        session.subject.demands.start_timeout,
-        session.subject.demands.patience,
-    );
-    let stage = session.subject.stage;
     session.findings.checked(Rule::StandsBy);
-    let mut waited = session.wait(limit, |session| session.rig.has_publisher(stage))?;
-    let until = session.tape.end() / 3;
-    if matches!(waited, Waited::Done) {
-        session.connect_all()?;
-        waited = session.wait(patience, |session| session.newest() >= Some(until))?;
+    let limit = session.demands().start_timeout;
+    let mut waited = session.wait(limit, |session| session.harness.has_publisher())?;
+    let until = session.reference.end() / 3;
+    if waited.is_done() {
+        session.harness.connect()?;
+        waited = session.reach(until)?;
     }
-    let has_taken_over = matches!(waited, Waited::Done);
     session
         .findings
-        .require(Rule::StandsBy, has_taken_over, || {
-            format!(
-                "its standard input has ended, and it has not come to item {until}: {}",
-                how(&waited)
-            )
+        .require(Rule::StandsBy, waited.is_done(), || {
+            format!("its standard input has ended, and it has not come to item {until}: {waited}")
         });
     Ok(())
 }
 
-/// Returns the file by which a program says that it stands by.
-fn ready_file(root: &Path, stage: StageId) -> PathBuf {
-    root.join(format!("{}.ready", stage.name()))
-}
-
 /// The standard input of a program that stands by: a named pipe, which ends when this is dropped.
-struct Input {
+struct StandardInput {
     path: PathBuf,
     _end: File,
 }
 
-impl Input {
+impl StandardInput {
     fn create(root: &Path) -> Result<Self, ConformanceError> {
         let path = root.join("standing-by.input");
         let created = mknodat(CWD, &path, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0);
@@ -112,7 +98,7 @@ impl Input {
         let open = |()| File::options().read(true).write(true).open(&path);
         match created.map_err(Into::into).and_then(open) {
             Ok(end) => Ok(Self { path, _end: end }),
-            Err(source) => Err(ConformanceError::File { path, source }),
+            Err(source) => Err(StageError::File { path, source }.into()),
         }
     }
 

@@ -1,14 +1,14 @@
-//! One item at a time, while observers come and go and one never reads; then SIGTERM in the middle. The results must be those of the
-//! whole stream.
+//! One item at a time, while observers come and go and one never reads; then SIGTERM in the middle.
+//! The results must be those of the whole stream.
 
 use super::{
-    Examination, compare, how,
+    Examination,
     stream::{starts, stops},
 };
 use crate::{
     ConformanceError,
     rule::Rule,
-    session::{Pace, Session, Waited},
+    session::{Pace, Session},
 };
 
 /// Items between two observers.
@@ -16,44 +16,36 @@ const BETWEEN: u64 = 3;
 
 impl Examination<'_> {
     pub(super) fn steps(&mut self) -> Result<(), ConformanceError> {
-        let rig = self.subject.rig(self.signals, "steps")?;
-        let mut session = Session::open(self.subject, &rig, self.tape, &mut self.findings)?;
+        let mut session = Session::open(self.context, "steps", &mut self.findings)?;
         session.pace = Pace::Single;
         if !starts(&mut session)? {
             return Ok(());
         }
-        session.connect_all()?;
-        let never_read = rig.tap(session.ports.output)?;
-        let patience = self.subject.demands.patience;
+        session.harness.connect()?;
+        let output = session.output_topic();
+        let never_read = session.harness.rig().tap(output)?;
         session.findings.checked(Rule::IgnoresObservers);
-        for seq in 0..self.tape.end() * 2 / 3 {
-            let waited = session.wait(patience, |session| session.newest() >= Some(seq))?;
-            if !matches!(waited, Waited::Done) {
+        for seq in 0..self.context.reference.end() * 2 / 3 {
+            let waited = session.reach(seq)?;
+            if !waited.is_done() {
                 let sentence = format!(
-                    "while observers came and went it sent nothing about item {seq}: {}",
-                    how(&waited)
+                    "while observers came and went it sent nothing about item {seq}: {waited}"
                 );
                 session.findings.broken(Rule::IgnoresObservers, sentence);
                 break;
             }
             if seq % BETWEEN == 0 {
                 // It takes what is there, if anything, and leaves.
-                drop(rig.tap(session.ports.output)?.receive());
+                drop(session.harness.rig().tap(output)?.receive());
             }
         }
         // Items are on their way when the request comes.
         session.pace = Pace::Window;
-        session.send_history()?;
+        session.admit()?;
         stops(&mut session, "in the middle of the stream")?;
         drop(never_read);
         let all = 0..session.outputs.len();
         let when = "when the items come one at a time";
-        compare(
-            &mut session,
-            &self.reference,
-            all,
-            Rule::Deterministic,
-            when,
-        )
+        session.compare(&self.first_results, all, Rule::Deterministic, when)
     }
 }

@@ -4,31 +4,31 @@ use std::time::Instant;
 
 use gyre_messages::{StageId, flag};
 
-use super::{Examination, how};
+use super::Examination;
 use crate::{
     ConformanceError,
+    reference::POLL_PERIOD,
     rule::Rule,
-    session::{Session, Waited},
-    tape::LOOK,
+    session::{Pace, Session, Waited},
 };
 
 impl Examination<'_> {
     /// Returns whether the program has worked on items, so that more can be tested.
     pub(super) fn stream(&mut self) -> Result<bool, ConformanceError> {
-        let rig = self.subject.rig(self.signals, "stream")?;
-        let before = rig.services();
-        let mut session = Session::open(self.subject, &rig, self.tape, &mut self.findings)?;
-        session.send_history()?;
+        let mut session = Session::open(self.context, "stream", &mut self.findings)?;
+        let before = session.harness.rig().services();
+        session.admit()?;
         if !starts(&mut session)? {
             return Ok(false);
         }
         joins(&mut session)?;
         let has_ended = reaches_the_end(&mut session)?;
-        let created: Vec<_> = rig.services().difference(&before).cloned().collect();
+        let services = session.harness.rig().services();
+        let created = services.difference(&before).count();
         session
             .findings
-            .require(Rule::CreatesNothing, created.is_empty(), || {
-                format!("it has created {} services of its own", created.len())
+            .require(Rule::CreatesNothing, created == 0, || {
+                format!("it has created {created} services of its own")
             });
         if has_ended {
             waits_after_the_end(&mut session)?;
@@ -36,21 +36,21 @@ impl Examination<'_> {
         gives_history(&mut session)?;
         begins_with_newest(&mut session);
         stops(&mut session, "after the end of the stream")?;
-        self.reference = session.essences()?;
+        self.first_results = session.results()?;
         self.outputs = std::mem::take(&mut session.outputs);
-        Ok(self.reference.len() > 1)
+        Ok(self.first_results.len() > 1)
     }
 
     /// The source: without a pose it sends the items of one window, and waits.
     pub(super) fn window(&mut self) -> Result<(), ConformanceError> {
-        let rig = self.subject.rig(self.signals, "window")?;
-        let mut session = Session::open(self.subject, &rig, self.tape, &mut self.findings)?;
-        session.pace = crate::session::Pace::Hold;
+        let mut session = Session::open(self.context, "window", &mut self.findings)?;
+        session.pace = Pace::Hold;
         starts(&mut session)?;
-        let (patience, quiet) = (self.subject.demands.patience, self.subject.demands.quiet);
-        let window = rig.manifest().window.scans.min(self.tape.end() as usize);
-        session.wait(patience, |session| session.outputs.len() >= window)?;
-        session.rest(quiet)?;
+        let (demands, scans) = (session.demands(), session.harness.manifest().window.scans);
+        let window = scans.min(self.context.reference.end() as usize);
+        let has_sent = |session: &Session<'_>| session.outputs.len() >= window;
+        session.wait(demands.item_timeout, has_sent)?;
+        session.rest(demands.quiet)?;
         let sent = session.outputs.len();
         session
             .findings
@@ -63,10 +63,9 @@ impl Examination<'_> {
 
 /// Starts the program, and requires that it opens its topic.
 pub(super) fn starts(session: &mut Session<'_>) -> Result<bool, ConformanceError> {
-    let command = session.subject.command.clone();
-    let topic = session.ports.output;
-    let waited = session.start(&command)?;
-    let is_open = matches!(waited, Waited::Done);
+    let topic = session.output_topic();
+    let waited = session.start(&session.test.candidate.command)?;
+    let is_open = waited.is_done();
     session
         .findings
         .require(Rule::StartsInTime, is_open, || match &waited {
@@ -78,38 +77,35 @@ pub(super) fn starts(session: &mut Session<'_>) -> Result<bool, ConformanceError
 
 /// Requires the subscribe handshake of each input.
 fn joins(session: &mut Session<'_>) -> Result<(), ConformanceError> {
-    let patience = session.subject.demands.patience;
-    let joined =
-        |session: &Session<'_>| session.not_asked().is_empty() && session.not_read().is_empty();
     session.findings.checked(Rule::AsksForHistory);
-    session.wait(patience, joined)?;
+    session.wait(session.demands().item_timeout, |session| {
+        session.not_notified().is_empty() && session.not_read().is_empty()
+    })?;
     for topic in session.not_read() {
         let sentence = format!("it has not subscribed to `{topic}`");
         session.findings.broken(Rule::AsksForHistory, sentence);
     }
-    for topic in session.not_asked() {
+    for topic in session.not_notified() {
         let sentence = format!(
             "it has subscribed to `{topic}` without notifying `{topic}_handshake`: it would wait for the history until the next item"
         );
         session.findings.broken(Rule::AsksForHistory, sentence);
     }
-    session.connect_all()
+    Ok(session.harness.connect()?)
 }
 
 /// Requires an item for each, and the end.
 fn reaches_the_end(session: &mut Session<'_>) -> Result<bool, ConformanceError> {
-    let (patience, end) = (session.subject.demands.patience, session.tape.end());
+    let end = session.reference.end();
     session.findings.checked(Rule::OneForOne);
     session.findings.checked(Rule::PassesEnd);
-    let waited = session.wait(patience, |session| session.newest() >= Some(end))?;
-    let missing: Vec<u64> = (0..end)
-        .filter(|seq| session.about(*seq).next().is_none())
-        .collect();
+    let waited = session.reach(end)?;
+    let missing: Vec<u64> = (0..end).filter(|seq| !session.has(*seq)).collect();
     if let Some(first) = missing.first() {
         let count = missing.len();
-        let why = match &waited {
-            Waited::Done => String::new(),
-            waited => format!(": {}", how(waited)),
+        let why = match waited.is_done() {
+            true => String::new(),
+            false => format!(": {waited}"),
         };
         let sentence =
             format!("it sent nothing about item {first} ({count} of {end} are missing){why}");
@@ -118,10 +114,7 @@ fn reaches_the_end(session: &mut Session<'_>) -> Result<bool, ConformanceError> 
     let has_end = session.about(end).any(|last| last.item().is(flag::END));
     let has_all_but_end = session.newest().map(|newest| newest + 1) >= Some(end);
     if !has_end && has_all_but_end {
-        let sentence = format!(
-            "it has not passed on item {end}, the end of the stream: {}",
-            how(&waited)
-        );
+        let sentence = format!("it has not passed on item {end}, the end of the stream: {waited}");
         session.findings.broken(Rule::PassesEnd, sentence);
     }
     Ok(has_end)
@@ -129,7 +122,7 @@ fn reaches_the_end(session: &mut Session<'_>) -> Result<bool, ConformanceError> 
 
 fn waits_after_the_end(session: &mut Session<'_>) -> Result<(), ConformanceError> {
     let sent = session.outputs.len();
-    let lives = session.rest(session.subject.demands.quiet)?;
+    let lives = session.rest(session.demands().quiet)?;
     session.findings.require(Rule::PassesEnd, lives, || {
         "it ended at the end of the stream: wait for SIGTERM, its history may still be needed"
             .to_owned()
@@ -143,19 +136,21 @@ fn waits_after_the_end(session: &mut Session<'_>) -> Result<(), ConformanceError
 
 /// Requires that a reader which comes now receives the newest items.
 fn gives_history(session: &mut Session<'_>) -> Result<(), ConformanceError> {
-    let wanted = session.ports.sizes.history.min(session.outputs.len());
-    let late = session.rig.tap(session.ports.output)?;
+    let topic = session.output_topic();
+    let history = session.harness.topics().sizes.history;
+    let wanted = history.min(session.outputs.len());
+    let late = session.harness.rig().tap(topic)?;
     let mut received = 0;
     let since = Instant::now();
-    while received < wanted && since.elapsed() < session.subject.demands.patience {
+    while received < wanted && since.elapsed() < session.demands().item_timeout {
         while late.receive().is_ok_and(|message| message.is_some()) {
             received += 1;
         }
-        if session.rig.sleep(&[late.as_ref()], LOOK)? {
+        let rig = session.harness.rig();
+        if rig.sleep(&[late.as_ref()], POLL_PERIOD)? {
             return Err(ConformanceError::Interrupted);
         }
     }
-    let topic = session.ports.output;
     session
         .findings
         .require(Rule::GivesHistory, received >= wanted, || {
@@ -165,7 +160,7 @@ fn gives_history(session: &mut Session<'_>) -> Result<(), ConformanceError> {
 }
 
 fn begins_with_newest(session: &mut Session<'_>) {
-    if session.subject.stage != StageId::PoseIntegration {
+    if session.stage() != StageId::PoseIntegration {
         return;
     }
     let first = session.outputs.first();
@@ -179,7 +174,7 @@ fn begins_with_newest(session: &mut Session<'_>) {
 
 /// Sends SIGTERM, and requires the exit code 0.
 pub(super) fn stops(session: &mut Session<'_>, when: &str) -> Result<(), ConformanceError> {
-    let limit = session.subject.demands.stop_timeout;
+    let limit = session.demands().stop_timeout;
     session.findings.checked(Rule::StopsOnRequest);
     match session.stop()? {
         None => session.findings.broken(

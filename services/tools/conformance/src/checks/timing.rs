@@ -1,34 +1,33 @@
-//! How long the program takes by the clock of this one: one item at a time, from when it is sent to when its answer is read. The stamps in
-//! the answers are the program's own word.
+//! The time of its answers by the clock of this process: one item at a time, from when it is sent to
+//! when its answer is read. The stamps in the answers are the program's own.
 
-use super::{Examination, how, stream::starts};
+use super::{Examination, stream::starts};
 use crate::{
     ConformanceError,
     report::Work,
     rule::Rule,
-    session::{Pace, Session, Waited},
+    session::{Pace, Session},
 };
 
 impl Examination<'_> {
     /// Measures the answers to all items. A source answers none: it is asked for the next by a pose.
     pub(super) fn timing(&mut self) -> Result<Option<Work>, ConformanceError> {
-        let rig = self.subject.rig(self.signals, "timing")?;
-        let mut session = Session::open(self.subject, &rig, self.tape, &mut self.findings)?;
-        if session.ports.copied().is_none() {
+        let mut session = Session::open(self.context, "timing", &mut self.findings)?;
+        if session.harness.topics().copied().is_none() {
             return Ok(None);
         }
         session.pace = Pace::Single;
         if !starts(&mut session)? {
             return Ok(None);
         }
-        session.connect_all()?;
-        let (patience, end) = (self.subject.demands.patience, self.tape.end());
-        let waited = session.wait(patience, |session| session.newest() >= Some(end))?;
-        let has_ended = matches!(waited, Waited::Done);
-        session.findings.require(Rule::KeepsBudget, has_ended, || {
-            let how = how(&waited);
-            format!("it has not come to the end when the items come one at a time: {how}")
-        });
+        session.harness.connect()?;
+        let end = self.context.reference.end();
+        let waited = session.reach(end)?;
+        session
+            .findings
+            .require(Rule::KeepsBudget, waited.is_done(), || {
+                format!("it has not come to the end when the items come one at a time: {waited}")
+            });
         Ok(Work::of((0..end).filter_map(|seq| session.answer_ns(seq))))
     }
 }

@@ -1,44 +1,34 @@
-//! What is fed to a process: its inputs as they are admitted, and what the rest of the run would make of its answers.
+//! The messages that are fed to a process: its inputs as they are admitted, and the feedback of the
+//! rest of the run to its answers.
 
+use gyre_harness::Direction;
 use gyre_messages::{Message, Motion, Pose, flag};
 use gyre_stage::clock;
-use gyre_supervise::rig::Recorded;
 
 use super::{Pace, Session};
-use crate::{ConformanceError, topology::Way};
+use crate::ConformanceError;
 
 impl Session<'_> {
-    /// Publishes a message on a topic of the stage's inputs.
-    pub(crate) fn feed(
-        &self,
-        topic: &'static str,
-        message: &Recorded,
-    ) -> Result<(), ConformanceError> {
-        let feed = self.feeds.get(topic);
-        feed.map_or(Ok(()), |feed| feed.send(message))?;
-        Ok(())
-    }
-
-    /// Feeds back what the rest of the run makes of an item.
+    /// Sends the feedback of the rest of the run to an item.
     pub(super) fn answered(&mut self, seq: u64) -> Result<(), ConformanceError> {
         if self.newest.is_some_and(|newest| seq <= newest) || self.pace == Pace::Hold {
             return Ok(());
         }
         let first = self.newest.map_or(0, |newest| newest + 1);
         self.newest = Some(seq);
-        for seq in first..=seq.min(self.tape.end()) {
-            for topic in self.ports.by(Way::Feedback) {
-                if let Some(message) = self.tape.get(topic, seq) {
-                    self.feed(topic, message)?;
+        for seq in first..=seq.min(self.reference.end()) {
+            for topic in self.harness.topics().leading(Direction::Feedback) {
+                if let Some(message) = self.reference.get(topic, seq) {
+                    self.harness.feed(topic, message)?;
                 }
             }
         }
         Ok(())
     }
 
-    /// Sends the inputs that are admitted.
-    pub(super) fn admit(&mut self) -> Result<(), ConformanceError> {
-        let last = self.tape.end().min(self.until.saturating_sub(1));
+    /// Sends the inputs that are admitted now.
+    pub(crate) fn admit(&mut self) -> Result<(), ConformanceError> {
+        let last = self.reference.end().min(self.until.saturating_sub(1));
         while self.next <= last && self.is_admitted(self.next) {
             self.send_inputs(self.next)?;
         }
@@ -47,7 +37,7 @@ impl Session<'_> {
 
     fn is_admitted(&self, seq: u64) -> bool {
         match self.pace {
-            Pace::Window => self.rig.manifest().window.admits(seq, self.newest),
+            Pace::Window => self.harness.manifest().window.admits(seq, self.newest),
             Pace::Single => seq <= self.newest.map_or(0, |newest| newest + 1),
             Pace::Hold => false,
         }
@@ -55,30 +45,24 @@ impl Session<'_> {
 
     /// Sends an item on all topics that lead forward.
     pub(crate) fn send_inputs(&mut self, seq: u64) -> Result<(), ConformanceError> {
-        if self.ports.copied().is_some() {
+        if self.harness.topics().copied().is_some() {
             self.sent_ns.insert(seq, clock::now_ns());
         }
-        for topic in self.ports.by(Way::Forward) {
-            if let Some(message) = self.tape.get(topic, seq) {
-                self.feed(topic, message)?;
+        for topic in self.harness.topics().leading(Direction::Forward) {
+            if let Some(message) = self.reference.get(topic, seq) {
+                self.harness.feed(topic, message)?;
             }
         }
         self.next = seq + 1;
         Ok(())
     }
 
-    /// Sends the inputs that are admitted now: what the process finds when it comes.
-    pub(crate) fn send_history(&mut self) -> Result<(), ConformanceError> {
-        self.admit()
-    }
-
-    /// Publishes the inputs anew as after a restart of all stages: of the items so far no more than a restarted stage may need, and
-    /// the last poses. Those after them follow as they are admitted.
+    /// Publishes the inputs anew as after a restart of all stages: of the items so far no more than a
+    /// restarted stage may need, and the last poses. Those after them follow as they are admitted.
     pub(crate) fn restart_inputs(&mut self, newest_pose: u64) -> Result<(), ConformanceError> {
-        self.feeds.clear();
-        self.open_feeds()?;
+        self.harness.open_feeds()?;
         self.republish_poses(newest_pose)?;
-        let look_back = self.rig.manifest().window.look_back as u64;
+        let look_back = self.harness.manifest().window.look_back as u64;
         self.newest = Some(newest_pose);
         self.next = (newest_pose + 1).saturating_sub(look_back);
         Ok(())
@@ -86,27 +70,24 @@ impl Session<'_> {
 
     /// Publishes the last poses as the sink does when it starts.
     fn republish_poses(&mut self, newest: u64) -> Result<(), ConformanceError> {
-        if !self.feeds.contains_key(Pose::TOPIC) {
-            return Ok(());
-        }
-        let history = Pose::sizes(&self.rig.manifest().window).history as u64;
+        let history = Pose::sizes(&self.harness.manifest().window).history as u64;
         for seq in (newest + 1).saturating_sub(history)..=newest {
-            let Some(pose) = self.tape.get(Pose::TOPIC, seq) else {
+            let Some(pose) = self.reference.get(Pose::TOPIC, seq) else {
                 continue;
             };
             let mut item = pose.item();
             if seq < newest {
                 item.flags &= !flag::SYNC;
             }
-            self.feed(Pose::TOPIC, &pose.about(&item))?;
+            self.harness.feed(Pose::TOPIC, &pose.about(&item))?;
         }
         Ok(())
     }
 
     /// Sends the motion of an item as the search does.
     pub(crate) fn send_motion(&self, seq: u64) -> Result<(), ConformanceError> {
-        match self.tape.get(Motion::TOPIC, seq) {
-            Some(motion) => self.feed(Motion::TOPIC, motion),
+        match self.reference.get(Motion::TOPIC, seq) {
+            Some(motion) => Ok(self.harness.feed(Motion::TOPIC, motion)?),
             None => Ok(()),
         }
     }

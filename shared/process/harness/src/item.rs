@@ -1,4 +1,4 @@
-//! What an item that a stage has sent has of its input, and what of it is the stage's own.
+//! The item of a message that a stage has sent: the fields copied from its input, and its own hop.
 
 use gyre_messages::{Item, StageId, flag};
 
@@ -20,8 +20,9 @@ pub fn not_copied(stage: StageId, input: &Item, output: &Item) -> Vec<&'static s
     missing.map(|(field, _)| field).collect()
 }
 
-/// Returns what is wrong with the time stamps of a stage's own hop; `None` if they are in order, and between the times at which its input was
-/// sent (if that is known) and its output was read, both CLOCK_MONOTONIC, ns.
+/// Returns what is wrong with the time stamps of a stage's own hop; `None` if they are in order, and
+/// between the times at which its input was sent (if that is known) and its output was read, both
+/// CLOCK_MONOTONIC, ns.
 pub fn wrong_stamps(
     stage: StageId,
     output: &Item,
@@ -48,4 +49,10 @@ pub fn wrong_stamps(
             "item {seq}: its stamps are not between those of its input and of its reader; they are to be CLOCK_MONOTONIC, ns"
         )
     })
+}
+
+/// Returns the time of a stage's work on an item, ns.
+pub fn work_ns(stage: StageId, item: &Item) -> i64 {
+    let hop = item.hops[stage as usize];
+    hop.finished_ns.saturating_sub(hop.started_ns)
 }

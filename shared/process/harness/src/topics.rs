@@ -3,9 +3,9 @@
 use gyre_messages::{Masked, Message, Motion, Pose, Refined, Rotation, Scan, StageId, TopicSizes};
 use gyre_stage::Manifest;
 
-/// How a topic comes to a stage.
+/// The direction in which a topic leads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Way {
+pub enum Direction {
     /// Down the stream: item `seq` is sent for the stage to answer with its item `seq`.
     Forward,
     /// Back to an earlier stage: item `seq` is sent after the stage has answered it.
@@ -14,19 +14,20 @@ pub enum Way {
 
 /// The topics of a stage.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Ports {
-    /// The topics that it may subscribe to. Of several that lead forward, the last comes from farthest down the stream.
-    pub inputs: Vec<(&'static str, Way)>,
+pub struct StageTopics {
+    /// The topics that it may subscribe to. Of several that lead
+    /// forward, the last comes from farthest down the stream.
+    pub inputs: Vec<(&'static str, Direction)>,
     /// The topic that it publishes.
     pub output: &'static str,
     /// The sizes of that topic's queues.
     pub sizes: TopicSizes,
 }
 
-impl Ports {
+impl StageTopics {
     /// The topics of a stage in a run with this manifest.
     pub fn of(stage: StageId, manifest: &Manifest) -> Self {
-        use Way::{Feedback, Forward};
+        use Direction::{Feedback, Forward};
         let motions = match manifest.refines {
             true => Refined::TOPIC,
             false => Motion::TOPIC,
@@ -69,17 +70,17 @@ impl Ports {
         }
     }
 
-    /// Returns the topics that lead to the stage this way.
-    pub fn by(&self, way: Way) -> impl Iterator<Item = &'static str> + use<> {
+    /// Returns the inputs that lead in this direction.
+    pub fn leading(&self, direction: Direction) -> impl Iterator<Item = &'static str> + use<> {
         let inputs = self.inputs.clone();
         inputs
             .into_iter()
-            .filter(move |(_, its)| *its == way)
+            .filter(move |(_, its)| *its == direction)
             .map(|(topic, _)| topic)
     }
 
     /// Returns the topic whose items the stage copies; `None` for a source.
     pub fn copied(&self) -> Option<&'static str> {
-        self.by(Way::Forward).last()
+        self.leading(Direction::Forward).last()
     }
 }

@@ -1,45 +1,48 @@
 //! Renumbers an observed item, and sends it to the shadow.
 //!
-//! The shadow's numbers are consecutive, as the contract says, also where the observed ones are not: after a gap, or skipped items. Such an
-//! item *opens* the stream anew, and its result is not compared:
+//! The shadow's numbers are consecutive, as the contract says, also where the observed ones are not:
+//! after a gap, or skipped items. Such an item *opens* the stream anew, and its result is not compared:
 //!
-//! - to a search it is the start of a chain (BREAK), so that the next item is matched against it and not against an older one;
-//! - masking looks up motions by number: it gets each motion with the number at which it looks, directly before the scan;
-//! - refinement needs the state before its first item, which its life is begun with: it is started again.
+//! - to a search it is the start of a chain (BREAK), so that the next item is matched against it and
+//!   not against an older one;
+//! - masking looks up motions by number: it gets each motion with that number, directly before the
+//!   scan;
+//! - refinement needs the state before its first item, with which each life begins: it is started
+//!   again.
 
-use gyre_conformance::start_of_trajectory;
+use gyre_harness::{Harness, start_of_trajectory};
 use gyre_messages::{Item, Message, Motion, Pose, StageId, flag};
 use gyre_stage::StageError;
 
-use crate::{life::Life, observation::Observed};
+use crate::observation::Observed;
 
 /// The numbers of the shadow's stream.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Stream {
+pub(crate) struct Renumbering {
     stage: StageId,
     lag: u64,
-    /// What the last item is numbered in the run and for the shadow.
+    /// The numbers of the last item in the run and for the shadow.
     last: Option<(u64, u64)>,
     /// The shadow's number of the last item with which a chain of motions has begun.
     broken_at: Option<u64>,
 }
 
-/// How an item comes into the stream.
+/// The entry of an item into the stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Entry {
     /// It follows the last one.
     Continues,
     /// It opens the stream.
     Opens,
-    /// It is left out: what a stage makes of it depends on items before, which were not seen.
+    /// It is left out: its result depends on items before, which were not seen.
     IsLeftOut,
     /// It needs a shadow that has had no other item.
     NeedsNewLife,
 }
 
-/// An item as the shadow has it.
+/// An item as it was sent to the shadow.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Told {
+pub(crate) struct SentItem {
     /// The item of its last input.
     pub item: Item,
     /// True if the item is one that only opens the stream.
@@ -48,7 +51,7 @@ pub(crate) struct Told {
     pub is_answered: bool,
 }
 
-impl Stream {
+impl Renumbering {
     pub(crate) fn new(stage: StageId, lag: usize) -> Self {
         Self {
             stage,
@@ -58,7 +61,7 @@ impl Stream {
         }
     }
 
-    /// Returns how an item comes into the stream.
+    /// Returns the entry of an item into the stream.
     pub(crate) fn entry(&self, observed: &Observed) -> Entry {
         match self.last {
             Some((run, _)) if run.checked_add(1) == Some(observed.seq()) => Entry::Continues,
@@ -82,16 +85,16 @@ impl Stream {
     ///
     /// # Errors
     /// A failure of the transport.
-    pub(crate) fn tell(
+    pub(crate) fn send(
         &mut self,
-        life: &Life<'_>,
+        shadow: &Harness<'_>,
         observed: &Observed,
-    ) -> Result<Told, StageError> {
+    ) -> Result<SentItem, StageError> {
         let opens = self.entry(observed) != Entry::Continues;
         let run = observed.seq();
         let number = self.last.map_or(run, |(_, number)| number + 1);
         if self.stage == StageId::Masking {
-            self.tell_motions(life, observed, number)?;
+            self.send_motions(shadow, observed, number)?;
         }
         let mut item = Item {
             seq: number,
@@ -109,13 +112,13 @@ impl Stream {
                 flags: item.flags,
                 ..input.item()
             };
-            life.feed(topic, &input.about(&item))?;
+            shadow.feed(topic, &input.about(&item))?;
         }
         self.last = Some((run, number));
         if observed.breaks() {
             self.broken_at = Some(number);
         }
-        Ok(Told {
+        Ok(SentItem {
             item,
             opens: opens && !observed.breaks(),
             is_answered: !opens || item.is(flag::BREAK),
@@ -123,15 +126,15 @@ impl Stream {
     }
 
     /// Sends the motions and poses that masking needs for an item.
-    fn tell_motions(
+    fn send_motions(
         &self,
-        life: &Life<'_>,
+        shadow: &Harness<'_>,
         observed: &Observed,
         number: u64,
     ) -> Result<(), StageError> {
         let run = observed.seq();
         if self.last.is_none() {
-            return tell_start(life, observed);
+            return send_start(shadow, observed);
         }
         let mut before = observed.before.iter();
         let lagged = before.find(|it| self.lag > 0 && it.seq.checked_add(self.lag) == Some(run));
@@ -144,32 +147,32 @@ impl Stream {
                 flags: message.item().flags & !flag::SYNC,
                 ..message.item()
             };
-            life.feed(topic, &message.about(&item))?;
+            shadow.feed(topic, &message.about(&item))?;
         }
         Ok(())
     }
 }
 
-/// Sends what masking finds when it starts: the newest pose, and the motions before.
-fn tell_start(life: &Life<'_>, observed: &Observed) -> Result<(), StageError> {
+/// Sends the history that masking finds when it starts: the newest pose, and the motions before.
+fn send_start(shadow: &Harness<'_>, observed: &Observed) -> Result<(), StageError> {
     for before in &observed.before {
-        life.feed(Motion::TOPIC, &before.motion)?;
+        shadow.feed(Motion::TOPIC, &before.motion)?;
     }
     let Some(newest) = observed.before.last() else {
-        return life.feed(Pose::TOPIC, &start_of_trajectory());
+        return shadow.feed(Pose::TOPIC, &start_of_trajectory());
     };
     let item = newest.pose.item();
     let item = Item {
         flags: item.flags | flag::SYNC,
         ..item
     };
-    life.feed(Pose::TOPIC, &newest.pose.about(&item))
+    shadow.feed(Pose::TOPIC, &newest.pose.about(&item))
 }
 
 #[cfg(test)]
 mod tests {
+    use gyre_harness::Recorded;
     use gyre_messages::{Masked, MaskedHeader};
-    use gyre_supervise::rig::Recorded;
 
     use super::*;
 
@@ -191,10 +194,10 @@ mod tests {
 
     #[test]
     fn a_stream_is_opened_where_the_results_depend_on_nothing_that_was_not_seen() {
-        let stream = Stream::new(StageId::Masking, 2);
+        let stream = Renumbering::new(StageId::Masking, 2);
         assert_eq!(stream.entry(&item(7, false)), Entry::IsLeftOut);
         assert_eq!(stream.entry(&item(7, true)), Entry::Opens);
-        let begun = Stream {
+        let begun = Renumbering {
             last: Some((7, 5)),
             ..stream
         };
@@ -204,10 +207,10 @@ mod tests {
 
     #[test]
     fn masking_does_not_jump_within_the_lag_of_a_break_and_refinement_not_at_all() {
-        let stream = |stage, broken_at| Stream {
+        let stream = |stage, broken_at| Renumbering {
             last: Some((7, 5)),
             broken_at: Some(broken_at),
-            ..Stream::new(stage, 2)
+            ..Renumbering::new(stage, 2)
         };
         let entry = |stage, broken_at| stream(stage, broken_at).entry(&item(20, true));
         assert_eq!(entry(StageId::Masking, 4), Entry::NeedsNewLife);

@@ -1,20 +1,20 @@
-//! What of a message is a result: the bytes that must be the same again, and how far two results are apart.
+//! The result in a message: its bytes, and the difference of two results.
 
 use bytemuck::{cast_slice, pod_read_unaligned};
 use gyre_geometry::wrap_angle;
 use gyre_messages::{
     Item, Masked, MaskedHeader, Message, Motion, MotionHeader, Pose, Refined, Rotation, Scan,
-    ScanHeader, StageId, flag,
+    ScanHeader, flag,
 };
 use gyre_stage::StageError;
 use gyre_supervise::rig::Recorded;
 
-/// Returns the bytes of a message that its inputs determine: all but the times of its processing, its sender, and what it does not use
-/// of its payload.
+/// Returns the bytes of a message that its inputs determine: all but the times of its processing,
+/// its sender, and the unused part of its payload.
 ///
 /// # Errors
 /// A message of another topic.
-pub fn essence(topic: &str, message: &Recorded) -> Result<Vec<u8>, StageError> {
+pub fn result_bytes(topic: &str, message: &Recorded) -> Result<Vec<u8>, StageError> {
     let item = message.item();
     let item = Item {
         due_ns: 0,
@@ -34,7 +34,7 @@ pub fn essence(topic: &str, message: &Recorded) -> Result<Vec<u8>, StageError> {
     }
 }
 
-/// The header without the unused rows of its tables, and the rows of the sweep.
+/// Returns the header without the unused rows of its tables, and the rows of the sweep.
 fn scan(message: &Recorded) -> Result<Vec<u8>, StageError> {
     let mut header: ScanHeader = message.header::<Scan>()?;
     let azimuths = header.azimuths as usize;
@@ -63,11 +63,11 @@ fn masked(message: &Recorded) -> Result<Vec<u8>, StageError> {
 }
 
 /// Returns the values of a payload, which need not be aligned.
-pub(crate) fn floats(payload: &[u8]) -> Vec<f32> {
+pub fn floats(payload: &[u8]) -> Vec<f32> {
     payload.chunks_exact(4).map(pod_read_unaligned).collect()
 }
 
-/// The cells of the rasters, row after row.
+/// Returns the cells of the rasters, row after row.
 fn rasters(header: &MaskedHeader, values: &[f32]) -> Vec<Vec<f32>> {
     let pair = header.pair(values, Some((header, values)));
     let Some(pair) = pair else {
@@ -78,43 +78,7 @@ fn rasters(header: &MaskedHeader, values: &[f32]) -> Vec<Vec<f32>> {
     views.map(|view| view.iter().copied().collect()).collect()
 }
 
-/// Says how far results are from those of Gyre's own stage, item by item. Items that only one of them has are left out.
-///
-/// # Errors
-/// Messages of another topic.
-pub(crate) fn deviation(
-    topic: &str,
-    own: &[Recorded],
-    other: &[Recorded],
-) -> Result<String, StageError> {
-    let pairs: Vec<_> = own
-        .iter()
-        .filter(|own| !own.item().is(flag::END))
-        .filter_map(|own| {
-            let same = |other: &&Recorded| {
-                let item = other.item();
-                item.seq == own.item().seq && !item.is(flag::BASE)
-            };
-            Some((own, other.iter().find(same)?))
-        })
-        .collect();
-    let mut equal = 0;
-    for (own, other) in &pairs {
-        equal += usize::from(essence(topic, own)? == essence(topic, other)?);
-    }
-    let items = pairs.len();
-    let mut differences = Vec::new();
-    for (own, other) in &pairs {
-        differences.extend(difference(topic, own, other)?);
-    }
-    let measured = summary(topic, &differences);
-    let measured = measured.map_or_else(String::new, |measured| format!("; {measured}"));
-    Ok(format!(
-        "{equal} of {items} items are the same bytes{measured}"
-    ))
-}
-
-/// How far apart two results for an item are.
+/// The difference of two results for an item.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Difference {
     /// Of masks.
@@ -137,7 +101,7 @@ pub enum Difference {
     },
 }
 
-/// Returns how far apart two results for an item are; `None` for scans.
+/// Returns the difference of two results for an item; `None` for scans.
 ///
 /// # Errors
 /// Messages of another topic.
@@ -178,42 +142,7 @@ fn difference_of_masks(one: &Recorded, other: &Recorded) -> Result<Difference, S
     })
 }
 
-/// Says how far apart results are on the whole.
-fn summary(topic: &str, differences: &[Difference]) -> Option<String> {
-    let items = differences.len().max(1) as f64;
-    let mut sums = [0.0; 3];
-    let mut all_points = [0; 2];
-    for difference in differences {
-        let values = match difference {
-            Difference::Masks {
-                mean_absolute,
-                level,
-                points,
-            } => {
-                (0..2).for_each(|i| all_points[i] += u64::from(points[i]));
-                [*mean_absolute, *level, 0.0]
-            }
-            Difference::Planar { x_m, y_m, yaw_rad } => [x_m.powi(2), y_m.powi(2), yaw_rad.powi(2)],
-        };
-        (0..3).for_each(|i| sums[i] += values[i]);
-    }
-    let means = sums.map(|sum| sum / items);
-    let [x_m, y_m, yaw_rad] = means.map(f64::sqrt);
-    let yaw = format!("{:.4} deg in yaw", yaw_rad.to_degrees());
-    match topic {
-        Scan::TOPIC => None,
-        Masked::TOPIC => Some(format!(
-            "mean absolute difference of the rasters {:.4}, where the mean of our own is {:.4}; {} points to our {}",
-            means[0], means[1], all_points[1], all_points[0]
-        )),
-        Rotation::TOPIC => Some(format!("RMS difference {yaw}")),
-        _ => Some(format!(
-            "RMS difference {x_m:.4} m in x, {y_m:.4} m in y, {yaw}"
-        )),
-    }
-}
-
-/// The result of a search, a refinement or a composition: x, y (m), yaw (rad).
+/// Returns the result of a search, a refinement or a composition: x, y (m), yaw (rad).
 fn planar(topic: &str, message: &Recorded) -> Result<[f64; 3], StageError> {
     let motion =
         |header: MotionHeader| [header.motion.x_m, header.motion.y_m, header.motion.yaw_rad];
@@ -226,10 +155,4 @@ fn planar(topic: &str, message: &Recorded) -> Result<[f64; 3], StageError> {
             [pose.x_m, pose.y_m, pose.yaw_rad]
         }
     })
-}
-
-/// Returns the time of a stage's work on an item, ns.
-pub fn work_ns(stage: StageId, message: &Recorded) -> i64 {
-    let hop = message.item().hops[stage as usize];
-    hop.finished_ns.saturating_sub(hop.started_ns)
 }

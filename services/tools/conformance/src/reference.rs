@@ -1,36 +1,35 @@
-//! The inputs: what Gyre's own stages make of the scans. They run as in a pipeline, between a source and a sink that are part of this
-//! process and lose nothing.
+//! The inputs: the results of Gyre's own stages for the scans. The stages run as in a pipeline,
+//! between a source and a sink that are part of this process and lose nothing.
 
 use std::{
     collections::BTreeMap,
     time::{Duration, Instant},
 };
 
+use gyre_harness::{
+    Feed, Process, Recorded, Rig, Scheduling, StageTopics, Tap, start_of_trajectory,
+};
 use gyre_messages::{
-    Item, Message, Motion, MotionHeader, Pose, PoseHeader, Refined, Scan, ScanHeader, StageId, flag,
+    Hop, Item, Message, Motion, MotionHeader, Pose, PoseHeader, Refined, Scan, ScanHeader, StageId,
+    flag,
 };
 use gyre_pose_integration::compose;
 use gyre_radar::continues;
 use gyre_stage::{clock, wake::Signals};
-use gyre_supervise::{
-    Scheduling,
-    rig::{Feed, Process, Recorded, Rig, Tap},
-};
 
 use crate::{
     ConformanceError,
-    subject::{Scans, Subject},
-    topology::Ports,
+    test::{InputScans, Test},
 };
 
-/// Time between two looks at what does not wake the tester.
-pub(crate) const LOOK: Duration = Duration::from_millis(2);
+/// Time between two polls of what does not wake the tester.
+pub(crate) const POLL_PERIOD: Duration = Duration::from_millis(2);
 
 /// The messages of a whole run by topic: item after item, then the end of the stream.
 #[derive(Debug, Default)]
-pub(crate) struct Tape(BTreeMap<&'static str, Vec<Recorded>>);
+pub(crate) struct Reference(BTreeMap<&'static str, Vec<Recorded>>);
 
-impl Tape {
+impl Reference {
     /// Returns the message of a topic about item `seq`; that of the number of items is the end.
     pub(crate) fn get(&self, topic: &str, seq: u64) -> Option<&Recorded> {
         self.0.get(topic)?.get(seq as usize)
@@ -50,23 +49,26 @@ impl Tape {
     ///
     /// # Errors
     /// No scan can be read, or one of the stages fails.
-    pub(crate) fn record(
-        subject: &Subject,
-        scans: &mut Scans,
+    pub(crate) fn compute(
+        test: &Test,
+        scans: &mut InputScans,
         signals: &Signals,
     ) -> Result<Self, ConformanceError> {
         let scans = read(scans)?;
         if scans.len() < 3 {
             return Err(ConformanceError::TooFew(scans.len().saturating_sub(1)));
         }
-        let rig = subject.rig(signals, "own")?;
-        let recording = Recording::begin(subject, &rig, scans)?;
-        recording.run()
+        let rig = test.rig("own", signals)?;
+        OwnPipeline::begin(test, &rig, scans)?.run()
+    }
+
+    fn push(&mut self, topic: &'static str, message: Recorded) {
+        self.0.entry(topic).or_default().push(message);
     }
 }
 
 /// Reads the scans, as the source does; the end of the stream follows.
-fn read(scans: &mut Scans) -> Result<Vec<Recorded>, ConformanceError> {
+fn read(scans: &mut InputScans) -> Result<Vec<Recorded>, ConformanceError> {
     let mut read: Vec<Recorded> = Vec::new();
     let mut bytes = vec![0; scans.dataset.limits().bytes];
     let mut before: Option<Item> = None;
@@ -103,41 +105,42 @@ fn read(scans: &mut Scans) -> Result<Vec<Recorded>, ConformanceError> {
 }
 
 /// A pipeline of Gyre's own stages whose source and sink are here.
-struct Recording<'a> {
+struct OwnPipeline<'a> {
     // Dropped in this order: processes, ports, run.
     processes: Vec<(StageId, Process)>,
     scans: Box<dyn Feed>,
     poses: Box<dyn Feed>,
     taps: Vec<(&'static str, Box<dyn Tap>)>,
     rig: &'a Rig<'a>,
-    patience: Duration,
-    tape: Tape,
+    /// Time without progress after which it has failed.
+    stall_timeout: Duration,
+    reference: Reference,
     last_pose: Option<PoseHeader>,
     /// The topic of the motions that poses are composed of.
     motions: &'static str,
     unsent: std::iter::Peekable<std::vec::IntoIter<Recorded>>,
 }
 
-impl<'a> Recording<'a> {
+impl<'a> OwnPipeline<'a> {
     fn begin(
-        subject: &Subject,
+        test: &Test,
         rig: &'a Rig<'a>,
         scans: Vec<Recorded>,
     ) -> Result<Self, ConformanceError> {
-        let between =
-            |stage: &&StageId| !matches!(stage, StageId::RadarReplay | StageId::PoseIntegration);
-        let stages: Vec<StageId> = subject.stages.iter().filter(between).copied().collect();
         let manifest = rig.manifest();
+        let mut stages = test.stages.clone();
+        stages.retain(|it| !matches!(it, StageId::RadarReplay | StageId::PoseIntegration));
         let mut taps = Vec::new();
         for stage in &stages {
-            let topic = Ports::of(*stage, manifest).output;
+            let topic = StageTopics::of(*stage, manifest).output;
             taps.push((topic, rig.tap(topic)?));
         }
         let (scan_feed, poses) = (rig.feed(Scan::TOPIC)?, rig.feed(Pose::TOPIC)?);
         poses.send(&start_of_trajectory())?;
         let mut processes = Vec::new();
         for stage in stages {
-            let process = rig.start(stage.name(), &subject.own(stage), &Scheduling::default())?;
+            let command = test.candidate.own_command(stage);
+            let process = rig.start(stage.name(), &command, &Scheduling::default())?;
             processes.push((stage, process));
         }
         Ok(Self {
@@ -146,8 +149,8 @@ impl<'a> Recording<'a> {
             poses,
             taps,
             rig,
-            patience: subject.demands.start_timeout,
-            tape: Tape::default(),
+            stall_timeout: test.demands.start_timeout,
+            reference: Reference::default(),
             last_pose: None,
             motions: if manifest.refines {
                 Refined::TOPIC
@@ -158,7 +161,7 @@ impl<'a> Recording<'a> {
         })
     }
 
-    fn run(mut self) -> Result<Tape, ConformanceError> {
+    fn run(mut self) -> Result<Reference, ConformanceError> {
         let mut progress = Instant::now();
         while !self.has_ended() {
             self.scans.answer_handshakes()?;
@@ -168,18 +171,18 @@ impl<'a> Recording<'a> {
             } else {
                 self.require_living(progress.elapsed())?;
                 let taps: Vec<&dyn Tap> = self.taps.iter().map(|(_, tap)| tap.as_ref()).collect();
-                if self.rig.sleep(&taps, LOOK)? {
+                if self.rig.sleep(&taps, POLL_PERIOD)? {
                     return Err(ConformanceError::Interrupted);
                 }
             }
         }
-        Ok(self.tape)
+        Ok(self.reference)
     }
 
     /// Returns whether all have sent the end of the stream.
     fn has_ended(&self) -> bool {
         let has_end = |topic| {
-            let last = self.tape.topic(topic).last();
+            let last = self.reference.topic(topic).last();
             last.is_some_and(|last| last.item().is(flag::END))
         };
         has_end(Pose::TOPIC) && self.taps.iter().all(|(topic, _)| has_end(topic))
@@ -189,49 +192,47 @@ impl<'a> Recording<'a> {
         let mut any = false;
         for (topic, tap) in &self.taps {
             while let Some(message) = tap.receive()? {
-                self.tape.0.entry(topic).or_default().push(message);
+                self.reference.push(topic, message);
                 any = true;
             }
         }
         Ok(any)
     }
 
-    /// Publishes the pose of each item that all stages are done with.
+    /// Publishes the pose of an item that all stages have answered; returns whether there was one.
     fn integrate(&mut self) -> Result<bool, ConformanceError> {
-        let next = self.tape.topic(Pose::TOPIC).len() as u64;
-        let is_done = |(topic, _): &(&str, _)| self.tape.get(topic, next).is_some();
+        let next = self.reference.topic(Pose::TOPIC).len() as u64;
+        let is_done = |(topic, _): &(&str, _)| self.reference.get(topic, next).is_some();
         if !self.taps.iter().all(is_done) {
             return Ok(false);
         }
-        let Some(motion) = self.tape.get(self.motions, next) else {
+        let Some(motion) = self.reference.get(self.motions, next) else {
             return Ok(false);
         };
         let pose = self.pose(&motion.header::<Motion>()?);
         self.last_pose = Some(pose).filter(|pose| !pose.item.is(flag::END));
         let pose = Recorded::of::<Pose>(&pose, &[], 0);
         self.poses.send(&pose)?;
-        self.tape.0.entry(Pose::TOPIC).or_default().push(pose);
+        self.reference.push(Pose::TOPIC, pose);
         Ok(true)
     }
 
     fn pose(&self, motion: &MotionHeader) -> PoseHeader {
-        let mut pose = match motion.item.is(flag::END) {
-            true => PoseHeader {
-                item: motion.item,
-                ..PoseHeader::default()
-            },
-            false => compose(self.last_pose.as_ref(), motion),
+        let mut pose = PoseHeader {
+            item: motion.item,
+            ..PoseHeader::default()
         };
         if !motion.item.is(flag::END) {
+            pose = compose(self.last_pose.as_ref(), motion);
             pose.item.flags |= flag::SYNC;
         }
         pose.item.pid = std::process::id();
         pose
     }
 
-    /// Publishes the scans that the window admits.
+    /// Publishes the scans that the window admits; returns whether there was one.
     fn admit(&mut self) -> Result<bool, ConformanceError> {
-        let newest = (self.tape.topic(Pose::TOPIC).len() as u64).checked_sub(1);
+        let newest = (self.reference.topic(Pose::TOPIC).len() as u64).checked_sub(1);
         let window = self.rig.manifest().window;
         let mut any = false;
         while let Some(scan) = self
@@ -241,7 +242,7 @@ impl<'a> Recording<'a> {
             let now_ns = clock::now_ns();
             let mut item = scan.item();
             (item.due_ns, item.pid) = (now_ns, std::process::id());
-            *item.hop_mut(StageId::RadarReplay) = gyre_messages::Hop {
+            *item.hop_mut(StageId::RadarReplay) = Hop {
                 received_ns: now_ns,
                 started_ns: now_ns,
                 finished_ns: now_ns,
@@ -249,7 +250,7 @@ impl<'a> Recording<'a> {
             };
             let scan = scan.about(&item);
             self.scans.send(&scan)?;
-            self.tape.0.entry(Scan::TOPIC).or_default().push(scan);
+            self.reference.push(Scan::TOPIC, scan);
             any = true;
         }
         Ok(any)
@@ -264,7 +265,7 @@ impl<'a> Recording<'a> {
                 });
             }
         }
-        match idle < self.patience {
+        match idle < self.stall_timeout {
             true => Ok(()),
             false => Err(ConformanceError::Own {
                 stage: "pipeline",
@@ -272,17 +273,4 @@ impl<'a> Recording<'a> {
             }),
         }
     }
-}
-
-/// The message with which a sink without poses starts.
-pub fn start_of_trajectory() -> Recorded {
-    let start = PoseHeader {
-        item: Item {
-            flags: flag::BASE | flag::SYNC,
-            pid: std::process::id(),
-            ..Item::default()
-        },
-        ..PoseHeader::default()
-    };
-    Recorded::of::<Pose>(&start, &[], 0)
 }

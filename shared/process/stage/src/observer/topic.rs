@@ -1,0 +1,106 @@
+//! The observer of a topic that is known by its name, whose messages are taken as bytes.
+
+use std::time::Duration;
+
+use gyre_messages::{
+    Correction, Fix, Loop, Masked, Message, Motion, Pose, Refined, Rotation, Scan,
+};
+
+use super::{Next, ObservedRun, Observer};
+use crate::{Listener, StageError, outlet::RecordedMessage};
+
+/// The observer of a topic, whatever its type.
+pub trait TopicObserver {
+    /// Returns the topic.
+    fn topic(&self) -> &'static str;
+
+    /// Takes the next message that is there; `None` if there is none.
+    ///
+    /// # Errors
+    /// A message that breaks its contract, which counts as missed; a failure of the transport.
+    fn take(&mut self) -> Result<Option<RecordedMessage>, StageError>;
+
+    /// Returns whether the end of the stream or of the run has been taken.
+    fn has_ended(&self) -> bool;
+
+    /// See [`Observer::listener`].
+    fn listener(&self) -> &Listener;
+
+    /// See [`Observer::expect`].
+    fn expect(&mut self, next: u64);
+
+    /// See [`Observer::missed`].
+    fn missed(&self) -> u64;
+}
+
+struct Typed<'run, M: Message> {
+    observer: Observer<'run, M>,
+    has_ended: bool,
+}
+
+impl ObservedRun {
+    /// Subscribes to the topic of this name; `None` if there is none.
+    ///
+    /// # Errors
+    /// As [`observe`](Self::observe).
+    pub fn observe_topic(
+        &self,
+        topic: &str,
+    ) -> Result<Option<Box<dyn TopicObserver + '_>>, StageError> {
+        Ok(Some(match topic {
+            Scan::TOPIC => self.typed::<Scan>()?,
+            Masked::TOPIC => self.typed::<Masked>()?,
+            Rotation::TOPIC => self.typed::<Rotation>()?,
+            Motion::TOPIC => self.typed::<Motion>()?,
+            Refined::TOPIC => self.typed::<Refined>()?,
+            Pose::TOPIC => self.typed::<Pose>()?,
+            Loop::TOPIC => self.typed::<Loop>()?,
+            Correction::TOPIC => self.typed::<Correction>()?,
+            Fix::TOPIC => self.typed::<Fix>()?,
+            _ => return Ok(None),
+        }))
+    }
+
+    fn typed<M: Message>(&self) -> Result<Box<dyn TopicObserver + '_>, StageError> {
+        Ok(Box::new(Typed {
+            observer: self.observe::<M>()?,
+            has_ended: false,
+        }))
+    }
+}
+
+impl<M: Message> TopicObserver for Typed<'_, M> {
+    fn topic(&self) -> &'static str {
+        M::TOPIC
+    }
+
+    fn take(&mut self) -> Result<Option<RecordedMessage>, StageError> {
+        if self.has_ended {
+            return Ok(None);
+        }
+        Ok(match self.observer.next(Duration::ZERO)? {
+            Next::Message(message, _) => Some(message.to_bytes()),
+            Next::Idle => None,
+            Next::Ended => {
+                self.has_ended = true;
+                None
+            }
+        })
+    }
+
+    fn has_ended(&self) -> bool {
+        self.has_ended
+    }
+
+    fn listener(&self) -> &Listener {
+        self.observer.listener()
+    }
+
+    fn expect(&mut self, next: u64) {
+        self.observer.expect(next);
+    }
+
+    fn missed(&self) -> u64 {
+        self.observer.missed()
+    }
+}
