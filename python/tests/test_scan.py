@@ -117,7 +117,7 @@ def without_times() -> gyre.Scan:
 
 def test_a_network_that_fails_is_not_the_fault_of_the_scan(tmp_path: Path) -> None:
     if not os.environ.get("ORT_DYLIB_PATH"):
-        pytest.skip("tract computes a number of anything: ORT_DYLIB_PATH names no ONNX Runtime")
+        pytest.skip("ORT_DYLIB_PATH names no ONNX Runtime")
     models = ROOT / "shared/method/masking/tests/models"
     model, scale = (models / "single-127.onnx").read_bytes(), b"B\x05scaleJ\x04" + struct.pack("<f", 1 / 16)
     assert model.count(scale) == 1

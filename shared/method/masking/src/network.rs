@@ -106,7 +106,7 @@ impl Network {
     /// A model that does not fit, or a backend that is missing or rejects it.
     pub fn load(config: &MaskingConfig, raster: &RasterConfig) -> Result<Self, NetworkError> {
         let model = Model::read(config, raster)?;
-        let engine = match Library::find(config)? {
+        let mut engine = match Library::find(config)? {
             Library::OnnxRuntime(path) => {
                 Engine::OnnxRuntime(OnnxRuntime::load(&path, &model, config)?)
             }
@@ -120,10 +120,11 @@ impl Network {
         check("takes", INPUT, &inputs, shape, &model)?;
         check("gives", OUTPUT, &outputs, shape, &model)?;
         let [_, scans, rows, columns] = shape;
-        Ok(Self {
-            engine,
-            masks: Array3::zeros((scans, rows, columns)),
-        })
+        let masks = Array3::zeros((scans, rows, columns));
+        if let Engine::Rten(engine) = &mut engine {
+            engine.rehearse(&model, masks.clone())?;
+        }
+        Ok(Self { engine, masks })
     }
 
     /// Returns the number of scans that it takes and of masks that it gives: 1, or 2 (this scan, then the previous one).
@@ -135,8 +136,7 @@ impl Network {
     /// clamped to that range.
     ///
     /// # Errors
-    /// Rasters of the wrong shape, an error of the backend, or factors that are NaN (tract computes none: its sigmoid gives a number for
-    /// any input).
+    /// Rasters of the wrong shape, an error of the backend, or factors that are NaN.
     pub fn run(
         &mut self,
         rasters: ArrayView3<'_, f32>,

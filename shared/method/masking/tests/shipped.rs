@@ -76,11 +76,10 @@ fn the_backends_agree_on_scans_of_a_simulated_drive() {
             apart.iter().copied().fold(0.0, f32::max),
             apart.mean().unwrap(),
         );
-        // An 8-bit network rounds the values of each layer to 256 steps, which rten does not: the more layers, the farther apart.
+        // An 8-bit network rounds the values of each layer to 256 steps. Where the libraries differ in the last digit, that may be a step.
         let limits = match fs::metadata(path.with_extension("onnx")).unwrap().len() {
-            ..1_000_000 => (16.0 / 255.0, 1.5 / 255.0),
-            1_000_000..4_000_000 => (32.0 / 255.0, 1.5 / 255.0),
-            _ => (1e-4, 1e-6),
+            ..4_000_000 => (16.0 / 255.0, 0.5 / 255.0),
+            _ => (1e-5, 1e-6),
         };
         println!("{}: at most {most}, in the mean {mean}", path.display());
         assert!(

@@ -6,20 +6,22 @@ use std::{
     sync::Arc,
 };
 
-use ndarray::{ArrayView3, ArrayViewMut3};
+use ndarray::{Array3, ArrayView3, ArrayViewMut3};
 use rten::{ModelOptions, RunOptions, ThreadPool, Value};
-use rten_onnx::onnx::{DataType, Dimension, GraphProto, ModelProto, ValueInfoProto};
+use rten_onnx::onnx::{
+    AttributeProto, AttributeType, DataType, Dimension, GraphProto, ModelProto, ValueInfoProto,
+};
 
 use super::{NetworkError, fill, one_line};
 use crate::{Backend, model::Model};
 
 /// The newest operators with which the models of `models/` agree with ONNX Runtime.
-const OPSET: i64 = 18;
+const OPSET: i64 = 26;
 
 /// A network. One thread computes it.
 #[derive(Debug)]
 pub(super) struct Rten {
-    network: rten::Model,
+    network: Box<rten::Model>,
     thread: Arc<ThreadPool>,
     inputs: Vec<String>,
     outputs: Vec<String>,
@@ -33,7 +35,7 @@ impl Rten {
             path: model.file.clone(),
             reason,
         };
-        let file = guarded(|| ModelProto::parse_buf(&model.bytes)).map_err(|error| {
+        let mut file = guarded(|| ModelProto::parse_buf(&model.bytes)).map_err(|error| {
             rejected(format!("it is not a model in ONNX, or is damaged: {error}"))
         })?;
         let opset = newest_operators(&file);
@@ -45,12 +47,14 @@ impl Rten {
                 known: OPSET.to_string(),
             });
         }
-        let graph = file.graph.as_ref();
+        let graph = file.graph.as_mut();
         let graph = graph.ok_or_else(|| rejected("it has no graph".to_owned()))?;
         let (inputs, outputs) = (inputs(graph), graph.output.iter().map(describe).collect());
-        let network = guarded(|| ModelOptions::with_all_ops().load(model.bytes.clone()));
+        state_kernel_sizes(graph);
+        let bytes = guarded(|| file.write_buf()).map_err(rejected)?;
+        let network = guarded(|| ModelOptions::with_all_ops().load(bytes)).map_err(rejected)?;
         Ok(Self {
-            network: network.map_err(rejected)?,
+            network: Box::new(network),
             thread: Arc::new(ThreadPool::with_num_threads(1)),
             inputs,
             outputs,
@@ -65,6 +69,18 @@ impl Rten {
     /// Returns the name, type and shape of each output.
     pub fn outputs(&self) -> Vec<String> {
         self.outputs.clone()
+    }
+
+    /// Computes the masks of empty rasters. Only now does rten find operators that do not fit each other.
+    pub fn rehearse(&mut self, model: &Model, empty: Array3<f32>) -> Result<(), NetworkError> {
+        match self.run(empty.view(), empty.clone().view_mut()) {
+            Err(NetworkError::Run(reason)) => Err(NetworkError::Load {
+                by: Backend::Rten,
+                path: model.file.clone(),
+                reason,
+            }),
+            computed => computed,
+        }
     }
 
     /// Computes the masks of rasters, both scans x n x n.
@@ -106,6 +122,30 @@ fn newest_operators(file: &ModelProto) -> i64 {
     own.filter_map(|import| import.version).max().unwrap_or(0)
 }
 
+/// Adds the sizes of kernels to convolutions that leave them out. In ONNX the weights state them too, but rten does not look there.
+fn state_kernel_sizes(graph: &mut GraphProto) {
+    const NAME: &str = "kernel_shape";
+    for node in &mut graph.node {
+        let is_convolution = matches!(
+            node.op_type.as_deref(),
+            Some("Conv" | "ConvInteger" | "ConvTranspose")
+        );
+        let mut attributes = node.attribute.iter();
+        if !is_convolution || attributes.any(|it| it.name.as_deref() == Some(NAME)) {
+            continue;
+        }
+        let name = node.input.get(1);
+        let weights = graph.initializer.iter().find(|it| it.name.as_ref() == name);
+        let sizes = weights.and_then(|weights| weights.dims.get(2..));
+        node.attribute.extend(sizes.map(|sizes| AttributeProto {
+            name: Some(NAME.to_owned()),
+            ints: sizes.to_vec(),
+            r#type: Some(AttributeType::INTS),
+            ..AttributeProto::default()
+        }));
+    }
+}
+
 /// Returns the inputs of a graph. Old files list weights among them.
 fn inputs(graph: &GraphProto) -> Vec<String> {
     let is_weight = |input: &&ValueInfoProto| {
@@ -135,4 +175,15 @@ fn describe(tensor: &ValueInfoProto) -> String {
     let sizes = tensor.shape.iter().flat_map(|shape| &shape.dim);
     let sizes: Vec<_> = sizes.map(size).collect();
     format!("`{name}` {kind} [{}]", sizes.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_of_rten_becomes_an_error() {
+        let panics = || -> Result<(), String> { panic!("as rten may") };
+        assert_eq!(guarded(panics), Err("it fails on this model".to_owned()));
+    }
 }

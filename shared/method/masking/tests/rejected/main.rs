@@ -2,19 +2,20 @@
 
 #![allow(clippy::unwrap_used)]
 
+#[path = "../common/mod.rs"]
 mod common;
+mod content;
 
 use std::{
     fs,
     path::{Path, PathBuf},
 };
 
-use common::{N, backends, card, learned, learned_by, raster, runtime_is_installed};
+use common::{backends, card, learned, learned_by, raster, runtime_is_installed};
 use gyre_masking::{
     Backend, MaskingConfig, Provider, model::Card, network::Network, runtime::INSTALL,
 };
 use gyre_radar::{RasterConfig, Sampling};
-use ndarray::Array3;
 use sha2::{Digest, Sha256};
 use tempfile::TempDir;
 
@@ -214,36 +215,6 @@ fn the_model_is_not_that_of_the_configured_checksum() {
 }
 
 #[test]
-fn a_model_that_the_backend_cannot_read_is_rejected() {
-    let bytes = fs::read(card("single-31").with_extension("onnx")).unwrap();
-    let (_folder, cut_short) = with_valid_checksum(&bytes[..bytes.len() / 2]);
-    let (_folder, other) = with_valid_checksum(b"no model");
-    for backend in backends() {
-        let cannot = format!("{} cannot load", backend.name());
-        for card in [&cut_short, &other] {
-            let config = learned_by(backend, card);
-            rejected(&config, &raster(), &[&cannot, "single-31.onnx"]);
-        }
-    }
-}
-
-#[test]
-fn operators_that_are_too_new_are_rejected() {
-    for backend in backends() {
-        let newest = match backend {
-            Backend::Rten => ["this rten knows them up to 18", "opset=18"],
-            _ => ["this ONNX Runtime knows them up to 2", "opset=2"],
-        };
-        let version = "opset-99.onnx has operators of version 99";
-        rejected(
-            &learned_by(backend, &card("opset-99")),
-            &raster(),
-            &[&[version][..], &newest[..]].concat(),
-        );
-    }
-}
-
-#[test]
 fn a_model_with_other_inputs_than_its_card_states_is_rejected() {
     let (_folder, card) = changed("pair-31", "inputs = 2", "inputs = 1");
     let words = [
@@ -253,24 +224,6 @@ fn a_model_with_other_inputs_than_its_card_states_is_rejected() {
     for backend in backends() {
         rejected(&learned_by(backend, &card), &raster(), &words);
     }
-}
-
-#[test]
-fn factors_that_are_nan_are_rejected() {
-    // rten's sigmoid gives a number for any input.
-    if !runtime_is_installed() {
-        return;
-    }
-    let config = learned_by(Backend::OnnxRuntime, &card("single-31"));
-    let mut network = Network::load(&config, &raster()).unwrap();
-    let mut cells = Array3::from_elem((1, N, N), 1.0);
-    assert!(network.run(cells.view()).is_ok());
-    cells[[0, N / 2, N / 2]] = f32::NAN;
-    let sentence = network.run(cells.view()).unwrap_err().to_string();
-    assert!(
-        sentence.contains("9 of 961 factors are NaN") && sentence.contains("`cpu`"),
-        "{sentence}"
-    );
 }
 
 // Runtimes and execution providers.
@@ -305,6 +258,19 @@ fn settings_of_onnx_runtime_are_rejected_for_rten() {
         let words = format!("{key} is a setting of ONNX Runtime");
         assert!(sentence.contains(&words), "{sentence}");
     }
+}
+
+#[test]
+fn tract_is_rejected_with_what_replaces_it() {
+    let read = |text| toml::from_str::<MaskingConfig>(text);
+    let sentence = read("backend = \"tract\"").unwrap_err().to_string();
+    for words in ["no longer part of Gyre", "set masking.backend to `rten`"] {
+        assert!(sentence.contains(words), "{sentence}");
+    }
+    let sentence = read("backend = \"onyx\"").unwrap_err().to_string();
+    assert!(sentence.contains("expected one of `auto`"), "{sentence}");
+    assert_eq!(read("backend = \"rten\"").unwrap().backend, Backend::Rten);
+    assert_eq!(read("").unwrap().backend, Backend::Auto);
 }
 
 #[cfg(not(any(feature = "cuda", feature = "tensorrt", feature = "openvino")))]
