@@ -8,7 +8,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_pose_integration::journal;
+use gyre_journal as journal;
 use rustix::process::{Pid, Signal, kill_process_group};
 use tempfile::TempDir;
 

@@ -7,7 +7,7 @@ use std::{
     process::Command,
 };
 
-use gyre_pose_integration::journal;
+use gyre_journal as journal;
 use gyre_slam::{Keyframe, Place, Query, records_path};
 
 use crate::common::{Ended, Run, recording, undisturbed, wrapped};

@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use gyre::{configuration::Configuration, preflight};
+use gyre_journal as journal;
 use gyre_messages::{PoseHeader, flag};
 use gyre_odometry::{Odometry, OdometryConfig, Outcome, Registered};
-use gyre_pose_integration::journal;
 use gyre_radar::OwnedScan;
 
 use crate::common::{Run, real_data, runtime_is_installed};

@@ -2,7 +2,7 @@
 
 use std::{fs, sync::OnceLock, thread, time::Duration};
 
-use gyre_pose_integration::journal;
+use gyre_journal as journal;
 use gyre_slam::{Keyframe, RecordLog, RecordReader, records_path};
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use rustix::process::Signal;

@@ -6,7 +6,7 @@ use std::{collections::BTreeSet, fs, thread, time::Duration};
 use crate::common::{
     Ended, Pid, Run, Running, STAGES, odometry::columns, recording, send, undisturbed,
 };
-use gyre_pose_integration::journal::{self, Journal};
+use gyre_journal::{self as journal, Journal};
 use rustix::process::Signal;
 use serde_json::Value;
 

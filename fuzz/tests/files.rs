@@ -8,9 +8,11 @@ use gyre_fuzz::{
     edit::{ByteEdit, Number, edit_bytes},
 };
 use gyre_geometry::{Pose, SparsePoint};
+use gyre_journal::{
+    self as journal, Journal,
+    checkpoint::{self, Checkpoint},
+};
 use gyre_messages::{Item, PoseHeader};
-use gyre_pose_integration::journal::{self, Journal};
-use gyre_refinement::checkpoint::{self, Checkpoint};
 use gyre_scan_matching::{RefinementConfig, Refiner};
 
 use crate::recordings::folder;

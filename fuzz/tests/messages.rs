@@ -5,9 +5,8 @@ use gyre_fuzz::{Failure, Target, edit::Number};
 use gyre_geometry::SparsePoint;
 use gyre_masking::{MaskKind, Masker, MaskingConfig, Sweep};
 use gyre_messages::{
-    MaskedHeader, MotionEstimate, MotionHeader, PoseHeader, RotationEstimate, ScanHeader,
+    MaskedHeader, MotionEstimate, MotionHeader, PoseHeader, RotationEstimate, ScanHeader, compose,
 };
-use gyre_pose_integration::compose;
 use gyre_radar::{PointsConfig, RasterConfig};
 use gyre_scan_matching::{
     ExhaustiveConfig, ExhaustiveSearch, RefinementConfig, Refiner, RotationConfig,

@@ -2,9 +2,8 @@
 
 use std::time::Duration;
 
+use gyre_journal::{self as journal, checkpoint};
 use gyre_messages::FollowerId;
-use gyre_pose_integration::journal;
-use gyre_refinement::checkpoint;
 use gyre_slam::{Keyframe, Place, Query, records_path};
 use rand::{Rng, seq::IndexedRandom};
 use rustix::process::Signal;

@@ -5,9 +5,8 @@ use std::{env, path::Path};
 use bytemuck::Pod;
 use gyre_messages::{
     Item, Masked, MaskedHeader, Motion, MotionEstimate, MotionHeader, PoseHeader, Refined,
-    Rotation, Scan, ScanHeader, StageId, flag,
+    Rotation, Scan, ScanHeader, StageId, compose, flag,
 };
-use gyre_pose_integration::compose;
 use gyre_radar::{Dataset, DatasetOptions};
 use gyre_radar_replay::SourceConfig;
 use gyre_stage::{

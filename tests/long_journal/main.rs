@@ -14,8 +14,8 @@ use std::{
 };
 
 use gyre::{configuration::Configuration, out::Out, results, summary::Session};
+use gyre_journal::{self as journal, Journal};
 use gyre_messages::{Hop, Item, MotionEstimate, PoseHeader, flag};
-use gyre_pose_integration::journal::{self, Journal};
 use gyre_supervise::Ending;
 use tempfile::TempDir;
 

@@ -13,15 +13,15 @@ use gyre::{
     summary::Session,
 };
 use gyre_geometry::SparsePoint;
-use gyre_messages::{
-    Footprint, Item, Limits, MotionEstimate, MotionHeader, PoseHeader, Window, flag,
+use gyre_journal::{
+    self as journal, Journal,
+    checkpoint::{self, Checkpoint},
+    keyframes::Keyframes,
 };
-use gyre_pose_integration::{
-    Keyframes, compose,
-    journal::{self, Journal},
+use gyre_messages::{
+    Footprint, Item, Limits, MotionEstimate, MotionHeader, PoseHeader, Window, compose, flag,
 };
 use gyre_radar::DatasetOptions;
-use gyre_refinement::checkpoint::{self, Checkpoint};
 use gyre_scan_matching::Refiner;
 use gyre_slam::{Keyframe, SlamKind, records_path};
 use gyre_supervise::Ending;

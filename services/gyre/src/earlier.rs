@@ -5,12 +5,12 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use gyre_messages::StageId;
-use gyre_pose_integration::{
-    KeyframesError, complete_poses,
-    journal::{self, Content, JournalError},
+use gyre_journal::{
+    self as journal, Content, JournalError,
+    checkpoint::{self, Checkpoint, CheckpointError},
+    keyframes::{KeyframesError, complete_poses},
 };
-use gyre_refinement::checkpoint::{self, Checkpoint, CheckpointError};
+use gyre_messages::StageId;
 use gyre_scan_matching::Refiner;
 use gyre_slam::{Keyframe, Place, Query, RecordReader, records_path};
 use gyre_stage::run::COMPLETE;

@@ -13,8 +13,8 @@ mod slam;
 use std::path::{Path, PathBuf};
 
 use gyre_evaluation::{NeesOptions, Options, plot::bands_svg};
+use gyre_journal as journal;
 use gyre_messages::StageId;
-use gyre_pose_integration::journal;
 use gyre_radar::{
     Trajectory,
     ground_truth::{find_ground_truth, read_trajectory},

@@ -4,9 +4,9 @@ use std::{iter, path::Path, path::PathBuf};
 
 use gyre_bags::{BagWriter, Kept};
 use gyre_geometry::Pose;
+use gyre_journal as journal;
 use gyre_mapping::grid;
 use gyre_messages::{Correction, CorrectionHeader, Message, Pose as PoseTopic, PoseHeader};
-use gyre_pose_integration::journal;
 use gyre_radar::{Dataset, DatasetOptions, Trajectory, ground_truth::read_trajectory};
 use gyre_recording::Recording;
 use gyre_ros2_messages::{Mounting, frames::Frames, nav_msgs::OccupancyGrid};

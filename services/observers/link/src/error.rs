@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use gyre_pose_integration::journal::JournalError;
+use gyre_journal::JournalError;
 use gyre_stage::StageError;
 use gyre_supervise::SuperviseError;
 use thiserror::Error;

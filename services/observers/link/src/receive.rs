@@ -8,8 +8,8 @@ use std::{
     time::Duration,
 };
 
+use gyre_journal::{self as journal, Journal};
 use gyre_messages::{Correction, Limits, Message as _, Pose, PoseHeader, flag, topic};
-use gyre_pose_integration::journal::{self, Journal};
 use gyre_stage::{
     Manifest, launch,
     source::RecordedMessage,

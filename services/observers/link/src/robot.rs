@@ -6,10 +6,10 @@
 use std::{collections::VecDeque, sync::Arc};
 
 use bytemuck::Pod;
+use gyre_journal::{self as journal, Journal};
 use gyre_messages::{
     Hop, Item, Masked, Message as _, Motion, MotionHeader, Pose, PoseHeader, StageId, flag,
 };
-use gyre_pose_integration::journal::{self, Journal};
 use gyre_radar_replay::PlayedFrom;
 use gyre_stage::{Launch, StageCounters, StageError, clock, relay::LastStages};
 use zenoh::{Session, Wait, qos::Priority, query::Queryable};

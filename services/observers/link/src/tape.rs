@@ -8,9 +8,9 @@ use std::{
 };
 
 use bytemuck::Pod;
+use gyre_journal as journal;
 use gyre_loop_closure::LoggedLoops;
 use gyre_messages::{Hop, LoopHeader, MotionHeader, PoseHeader, StageId, flag};
-use gyre_pose_integration::journal;
 use gyre_stage::source::RecordedMessage;
 
 use crate::LinkError;

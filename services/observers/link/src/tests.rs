@@ -8,8 +8,8 @@ use std::{
     time::{Duration, Instant},
 };
 
+use gyre_journal::{self as journal, Journal};
 use gyre_messages::{Item, MotionHeader, PoseHeader, flag};
-use gyre_pose_integration::journal::{self, Journal};
 use zenoh::{Session, Wait, qos::Priority};
 
 use crate::{

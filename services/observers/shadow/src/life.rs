@@ -8,8 +8,8 @@ use std::{
 };
 
 use gyre_harness::{Candidate, Harness, Rig, Sent};
+use gyre_journal::checkpoint;
 use gyre_messages::StageId;
-use gyre_refinement::checkpoint;
 use gyre_stage::{StageError, wake::Signals};
 
 use crate::ShadowError;

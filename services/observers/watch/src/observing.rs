@@ -7,8 +7,8 @@ use std::{
     time::{Duration, Instant},
 };
 
+use gyre_journal as journal;
 use gyre_messages::{Masked, Message, Pose, Scan};
-use gyre_pose_integration::journal;
 use gyre_stage::{
     StageError,
     observer::{Next, ObservedRun},

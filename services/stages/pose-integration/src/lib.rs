@@ -2,14 +2,16 @@
 //!
 //! With SLAM it also selects the keyframes, and logs each of them before its pose is journalled.
 
-mod compose;
-pub mod journal;
-mod keyframes;
-
 use std::path::PathBuf;
 
 use gyre_geometry::SparsePoint;
-use gyre_messages::{Item, Masked, Motion, MotionHeader, PoseHeader, Refined, StageId, flag};
+use gyre_journal::{
+    self as journal, Journal, JournalError,
+    keyframes::{Keyframes, KeyframesError},
+};
+use gyre_messages::{
+    Item, Masked, Motion, MotionHeader, PoseHeader, Refined, StageId, compose, flag,
+};
 use gyre_slam::SlamConfig;
 use gyre_stage::{
     Launch, Sink, StageCounters, StageError, clock,
@@ -18,10 +20,6 @@ use gyre_stage::{
     sink,
 };
 use gyre_storage::LogError;
-
-pub use compose::compose;
-use journal::{Journal, JournalError};
-pub use keyframes::{Keyframes, KeyframesError, complete_poses};
 
 /// Runs the stage until SIGTERM.
 ///
@@ -137,14 +135,14 @@ fn points(scan: &Received<Masked>) -> Result<&[SparsePoint], StageError> {
 
 fn unusable(error: JournalError) -> StageError {
     match error {
-        JournalError::Busy { .. } => busy("open the journal", &error),
+        JournalError::Busy(_) => busy("open the journal", &error),
         _ => StageError::Input(error.to_string()),
     }
 }
 
 fn unusable_keyframes(error: KeyframesError) -> StageError {
     match error {
-        KeyframesError::Log(LogError::Busy { .. }) => busy("open the keyframes", &error),
+        KeyframesError::Log(LogError::Busy(_)) => busy("open the keyframes", &error),
         _ => StageError::Input(error.to_string()),
     }
 }

@@ -1,8 +1,7 @@
 //! The refinement stage: registers the searched motions against a map of the last keyframes.
 
-pub mod checkpoint;
-
 use gyre_geometry::SparsePoint;
+use gyre_journal::checkpoint::{self, Checkpoint, CheckpointError};
 use gyre_messages::{Item, Masked, Motion, Refined, StageId, flag};
 use gyre_radar::PointsConfig;
 use gyre_scan_matching::{RefinementConfig, Refiner};
@@ -13,8 +12,6 @@ use gyre_stage::{
     stage,
     writer::Draft,
 };
-
-use checkpoint::{Checkpoint, CheckpointError};
 
 /// Runs the stage until SIGTERM.
 ///
@@ -106,7 +103,7 @@ fn points(masked: &Received<Masked>) -> Result<&[SparsePoint], StageError> {
 fn unusable(error: CheckpointError) -> StageError {
     match error {
         // A process that was killed, and is not gone yet.
-        CheckpointError::Busy { .. } => StageError::Transport {
+        CheckpointError::Busy(_) => StageError::Transport {
             action: "open the checkpoint".to_owned(),
             reason: error.to_string(),
         },

@@ -11,9 +11,8 @@ use gyre_harness::{
 };
 use gyre_messages::{
     Hop, Item, Message, Motion, MotionHeader, Pose, PoseHeader, Refined, Scan, ScanHeader, StageId,
-    flag,
+    compose, flag,
 };
-use gyre_pose_integration::compose;
 use gyre_radar::continues;
 use gyre_stage::{clock, wake::Signals};
 

@@ -27,6 +27,7 @@
 mod block;
 mod check;
 mod closed_loop;
+mod compose;
 mod correction;
 mod fix;
 mod follower;
@@ -45,6 +46,7 @@ mod topics;
 pub use block::{ByteBlock, FloatBlock};
 pub use check::Violation;
 pub use closed_loop::{Loop, LoopHeader};
+pub use compose::compose;
 pub use correction::{Correction, CorrectionHeader};
 pub use fix::{Fix, FixHeader, fix_status};
 pub use follower::FollowerId;

@@ -168,6 +168,17 @@ impl File {
         Ok(())
     }
 
+    /// Cuts off what is behind `end`, if there is anything.
+    ///
+    /// # Errors
+    /// The file cannot be read or written.
+    pub fn cut_to(&self, end: u64) -> Result<(), StorageError> {
+        match self.length()? > end {
+            true => self.set_length(end),
+            false => Ok(()),
+        }
+    }
+
     /// Makes all that was written before survive a power failure.
     ///
     /// # Errors

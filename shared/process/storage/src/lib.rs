@@ -3,6 +3,7 @@
 //! - [`write()`] and [`Draft`] replace a file as a whole: it is written aside, synchronised and renamed.
 //! - [`File`] is changed in place; what has not been synchronised when the power fails may be there in part.
 //! - [`GroupSync`] synchronises such a file in the background.
+//! - [`DurableFile`] is such a file of one process, synchronised so; its records are in [`Slots`], each with a [`Checksum`].
 //! - [`Log`] is a file of records that grows at its end; [`LogReader`] reads it meanwhile.
 //! - [`read_text`] and [`read_bytes`] read files that may come from elsewhere, up to a size.
 //!
@@ -11,6 +12,7 @@
 //! replay what a power failure would have left of them.
 
 mod draft;
+mod durable;
 mod file;
 mod folder;
 mod group_sync;
@@ -27,6 +29,7 @@ use std::{
 use thiserror::Error;
 
 pub use draft::{Draft, is_draft, write};
+pub use durable::{Busy, Checksum, DurableFile, Slots};
 pub use file::File;
 pub use folder::{create_folder, remove, sync_folder};
 pub use group_sync::GroupSync;

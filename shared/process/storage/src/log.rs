@@ -2,7 +2,7 @@
 //!
 //! One process appends, others read what is complete meanwhile. Each record is one `write`. A record that is cut short by a death is
 //! the last one; a thread synchronises the file, so that a power failure takes or damages at most the last
-//! [`GroupSync::LIMIT`] records. Those are cut off when the log is opened. Any other damaged record was whole once, and is
+//! [`GroupSync::LIMIT`](crate::GroupSync::LIMIT) records. Those are cut off when the log is opened. Any other damaged record was whole once, and is
 //! refused with its number: when the log is opened if its header is damaged, else when it is read.
 //!
 //! Layout, little-endian: 16 bytes of magic; then for each record its number (u64), its length in bytes (u32), the CRC-32 of its bytes
@@ -20,7 +20,7 @@ use std::{
 
 use thiserror::Error;
 
-use crate::{File, GroupSync, StorageError, create_folder};
+use crate::{Busy, DurableFile, StorageError};
 pub use reader::LogReader;
 use records::{Records, encode};
 
@@ -61,19 +61,15 @@ pub enum LogError {
         record: usize,
     },
     /// Another process appends to the file.
-    #[error("another process is writing to {path}")]
-    Busy {
-        /// The file.
-        path: PathBuf,
-    },
+    #[error(transparent)]
+    Busy(#[from] Busy),
 }
 
 /// A log open for appending.
 #[derive(Debug)]
 pub struct Log {
-    file: File,
+    file: DurableFile,
     records: Records,
-    sync: GroupSync,
     /// Number of changes that were counted.
     changes: u64,
     buffer: Vec<u8>,
@@ -86,26 +82,18 @@ impl Log {
     /// # Errors
     /// A file that cannot be read or written, is not such a log, is damaged, or to which another process writes.
     pub fn open(path: &Path, magic: LogMagic) -> Result<Self, LogError> {
-        path.parent().map_or(Ok(()), create_folder)?;
-        let file = File::open_or_create(path)?;
-        if !file.lock()? {
-            return Err(LogError::Busy {
-                path: path.to_owned(),
-            });
-        }
         let mut records = Records::new(path, magic);
-        records.refresh()?;
-        if !records.has_magic() {
-            file.set_length(0)?;
-            file.write_at(&magic, 0)?;
+        let file = DurableFile::open(path, |file| {
             records.refresh()?;
-        }
-        if file.length()? > records.end() {
-            file.set_length(records.end())?;
-        }
-        file.sync()?;
+            if !records.has_magic() {
+                file.set_length(0)?;
+                file.write_at(&magic, 0)?;
+                records.refresh()?;
+            }
+            file.cut_to(records.end())?;
+            Ok::<(), LogError>(file.sync()?)
+        })?;
         Ok(Self {
-            sync: GroupSync::start(&file)?,
             file,
             records,
             changes: 0,
@@ -136,21 +124,23 @@ impl Log {
     pub fn append(&mut self, record: &[u8]) -> Result<(), LogError> {
         if record.len() > MAX_BYTES {
             let too_long = io::ErrorKind::FileTooLarge.into();
-            return Err(StorageError::at("write", self.file.path())(too_long).into());
+            return Err(StorageError::at("write", self.file.file().path())(too_long).into());
         }
         let header = encode(self.len(), record, &mut self.buffer);
-        self.file.write_at(&self.buffer, self.records.end())?;
+        self.file
+            .file()
+            .write_at(&self.buffer, self.records.end())?;
         self.records.push(header);
         self.count()
     }
 
-    /// Counts a change of another file that is of use only with the records that were appended. At most [`GroupSync::LIMIT`] of
+    /// Counts a change of another file that is of use only with the records that were appended. At most [`GroupSync::LIMIT`](crate::GroupSync::LIMIT) of
     /// them are made before the records survive a power failure.
     ///
     /// # Errors
     /// A file that cannot be synchronised.
     pub fn rely(&mut self) -> Result<(), LogError> {
-        match self.sync.safe() == Some(self.changes) {
+        match self.file.safe() == Some(self.changes) {
             true => Ok(()),
             false => self.count(),
         }
@@ -158,7 +148,7 @@ impl Log {
 
     fn count(&mut self) -> Result<(), LogError> {
         self.changes += 1;
-        Ok(self.sync.changed()?)
+        Ok(self.file.changed()?)
     }
 
     /// Makes all records survive a power failure.
@@ -166,7 +156,7 @@ impl Log {
     /// # Errors
     /// A file that cannot be synchronised.
     pub fn sync(&self) -> Result<(), LogError> {
-        Ok(self.file.sync()?)
+        Ok(self.file.file().sync()?)
     }
 
     /// Reads a record, which replaces the content of `bytes`.
@@ -192,8 +182,8 @@ impl Log {
     pub fn cut(&mut self, records: usize) -> Result<(), LogError> {
         if records < self.len() {
             self.records.truncate(records);
-            self.file.set_length(self.records.end())?;
-            self.file.sync()?;
+            self.file.file().set_length(self.records.end())?;
+            self.file.file().sync()?;
         }
         Ok(())
     }

@@ -1,15 +1,16 @@
 //! The binary layout of a record.
 
 use gyre_messages::PoseHeader;
+use gyre_storage::Checksum;
 
 const POSE: usize = size_of::<PoseHeader>();
 /// Bytes of a record: the pose, the number of records before it that were in danger, and a checksum of both.
-pub(super) const RECORD: usize = POSE + 8;
+pub(crate) const RECORD: usize = POSE + 8;
 const CHECK: usize = POSE + 4;
 
 /// A valid record.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Record {
+pub(crate) struct Record {
     pub pose: PoseHeader,
     /// Number of records before it that were not known to be on the disk when it was written. All earlier ones were.
     pub in_danger: u32,
@@ -19,19 +20,16 @@ impl Record {
     pub fn encode(&self, bytes: &mut [u8; RECORD]) {
         bytes[..POSE].copy_from_slice(bytemuck::bytes_of(&self.pose));
         bytes[POSE..CHECK].copy_from_slice(&self.in_danger.to_le_bytes());
-        let check = crc32fast::hash(&bytes[..CHECK]);
-        bytes[CHECK..].copy_from_slice(&check.to_le_bytes());
+        Checksum::Last.seal(bytes);
     }
 
     /// Decodes the record number `index`. Records are numbered as their items are, so that one in a wrong place is not valid.
     pub fn decode(bytes: &[u8], index: u64) -> Option<Self> {
-        let (content, check) = bytes.split_at_checked(CHECK)?;
         let record = Self {
-            pose: bytemuck::pod_read_unaligned(&content[..POSE]),
-            in_danger: u32::from_le_bytes(*content[POSE..].first_chunk()?),
+            pose: bytemuck::pod_read_unaligned(bytes.get(..POSE)?),
+            in_danger: u32::from_le_bytes(*bytes[POSE..].first_chunk()?),
         };
-        let valid =
-            check == crc32fast::hash(content).to_le_bytes() && record.pose.item.seq == index;
-        valid.then_some(record)
+        let is_valid = Checksum::Last.is_right(bytes) && record.pose.item.seq == index;
+        is_valid.then_some(record)
     }
 }

@@ -20,7 +20,7 @@ use std::{
 
 use gyre_messages::{MotionEstimate, PoseHeader};
 use gyre_scan_matching::{Keyframe, Refiner, TrackerState};
-use gyre_storage::{File, GroupSync, StorageError, create_folder};
+use gyre_storage::{Busy, DurableFile, File, GroupSync, Slots, StorageError};
 use thiserror::Error;
 
 use codec::{
@@ -61,18 +61,15 @@ pub enum CheckpointError {
         item: u64,
     },
     /// Another process writes to the file.
-    #[error("another process is writing to {path}")]
-    Busy {
-        /// The file.
-        path: PathBuf,
-    },
+    #[error(transparent)]
+    Busy(#[from] Busy),
 }
 
 /// An open checkpoint.
 #[derive(Debug)]
 pub struct Checkpoint {
-    file: File,
-    sync: GroupSync,
+    file: DurableFile,
+    layout: Layout,
     /// Number of keyframes to keep; further slots stay empty.
     kept: usize,
     /// The keyframe in each slot; `None` for an empty slot.
@@ -80,12 +77,21 @@ pub struct Checkpoint {
     /// The keyframes of the last state that was written or restored, oldest first, and those of the state before it.
     map: Vec<Name>,
     earlier_map: Vec<Name>,
-    slots: Slots,
+    buffers: Buffers,
+}
+
+/// The places of the two rings of a file.
+#[derive(Clone, Copy, Debug)]
+struct Layout {
+    states: Slots,
+    keyframes: Slots,
+    /// Number of slots for keyframes.
+    count: usize,
 }
 
 /// Buffers for one slot each.
 #[derive(Debug)]
-struct Slots {
+struct Buffers {
     state: Vec<u8>,
     found: Vec<u8>,
     keyframe: Vec<u8>,
@@ -103,6 +109,50 @@ pub fn checksum(motion: &MotionEstimate) -> u64 {
     crc32fast::hash(bytemuck::bytes_of(motion)).into()
 }
 
+/// Returns the slot of the state after an item.
+fn slot_of(item: u64) -> u64 {
+    item % STATES as u64
+}
+
+impl Layout {
+    fn of(max_keyframes: usize, cells: usize) -> Self {
+        let states = Slots {
+            start: HEADER_BYTES as u64,
+            bytes: state_bytes(max_keyframes),
+        };
+        let keyframes = Slots {
+            start: states.offset(STATES as u64),
+            bytes: KEYFRAME_WORDS * 8 + cells,
+        };
+        Self {
+            states,
+            keyframes,
+            count: max_keyframes + look_back(MAX_WINDOW),
+        }
+    }
+
+    fn header(&self) -> [u8; HEADER_BYTES] {
+        let mut header = [0; HEADER_BYTES];
+        header[..16].copy_from_slice(&MAGIC);
+        let sizes = [self.states.bytes, self.keyframes.bytes];
+        for (k, number) in [STATES, self.count].into_iter().chain(sizes).enumerate() {
+            header[16 + 8 * k..24 + 8 * k].copy_from_slice(&(number as u64).to_le_bytes());
+        }
+        header
+    }
+
+    /// Begins a file of another layout anew.
+    fn require(&self, file: &File) -> Result<(), StorageError> {
+        let mut header = [0; HEADER_BYTES];
+        let matches = file.read_at(&mut header, 0)? && header == self.header();
+        if !matches {
+            file.set_length(0)?;
+            file.write_at(&self.header(), 0)?;
+        }
+        Ok(())
+    }
+}
+
 impl Checkpoint {
     /// Opens or creates a checkpoint for runs with this window and maps of at most `max_keyframes` keyframes of `cells` cells.
     ///
@@ -114,70 +164,38 @@ impl Checkpoint {
         max_keyframes: usize,
         cells: usize,
     ) -> Result<Self, CheckpointError> {
-        path.parent().map_or(Ok(()), create_folder)?;
-        let file = File::open_or_create(path)?;
-        if !file.lock()? {
-            return Err(CheckpointError::Busy {
-                path: path.to_owned(),
-            });
-        }
-        let slots = |window: usize| max_keyframes + look_back(window);
+        let layout = Layout::of(max_keyframes, cells);
+        let file = DurableFile::open(path, |file| {
+            Ok::<(), CheckpointError>(layout.require(file)?)
+        })?;
         let mut checkpoint = Self {
-            sync: GroupSync::start(&file)?,
             file,
-            kept: slots(window.min(MAX_WINDOW)),
-            keyframes: vec![None; slots(MAX_WINDOW)],
+            layout,
+            kept: max_keyframes + look_back(window.min(MAX_WINDOW)),
+            keyframes: Vec::with_capacity(layout.count),
             map: Vec::with_capacity(max_keyframes),
             earlier_map: Vec::with_capacity(max_keyframes),
-            slots: Slots {
-                state: vec![0; state_bytes(max_keyframes)],
-                found: vec![0; state_bytes(max_keyframes)],
-                keyframe: vec![0; KEYFRAME_WORDS * 8 + cells],
+            buffers: Buffers {
+                state: vec![0; layout.states.bytes],
+                found: vec![0; layout.states.bytes],
+                keyframe: vec![0; layout.keyframes.bytes],
                 encoded: None,
             },
         };
-        checkpoint.load()?;
+        checkpoint.read_names()?;
         Ok(checkpoint)
     }
 
-    /// Reads the names of all keyframes. A file of another layout is overwritten.
-    fn load(&mut self) -> Result<(), StorageError> {
-        let mut header = [0; HEADER_BYTES];
-        let matches = self.file.read_at(&mut header, 0)? && header == self.header();
-        if !matches {
-            self.file.set_length(0)?;
-            return self.file.write_at(&self.header(), 0);
-        }
-        for k in 0..self.keyframes.len() {
-            let offset = self.keyframe_offset(k);
-            let whole = self.file.read_at(&mut self.slots.keyframe, offset)?;
-            self.keyframes[k] = keyframe_name(&self.slots.keyframe).filter(|_| whole);
+    /// Reads the names of all keyframes.
+    fn read_names(&mut self) -> Result<(), StorageError> {
+        let Self { file, layout, .. } = self;
+        let bytes = &mut self.buffers.keyframe;
+        for slot in 0..layout.count {
+            let is_there = file.read(&layout.keyframes, slot as u64, bytes)?;
+            self.keyframes
+                .push(keyframe_name(bytes).filter(|_| is_there));
         }
         Ok(())
-    }
-
-    fn header(&self) -> [u8; HEADER_BYTES] {
-        let mut header = [0; HEADER_BYTES];
-        header[..16].copy_from_slice(&MAGIC);
-        let Slots {
-            state, keyframe, ..
-        } = &self.slots;
-        for (k, number) in [STATES, self.keyframes.len(), state.len(), keyframe.len()]
-            .into_iter()
-            .enumerate()
-        {
-            header[16 + 8 * k..24 + 8 * k].copy_from_slice(&(number as u64).to_le_bytes());
-        }
-        header
-    }
-
-    fn state_offset(&self, item: u64) -> u64 {
-        HEADER_BYTES as u64 + item % STATES as u64 * self.slots.state.len() as u64
-    }
-
-    fn keyframe_offset(&self, slot: usize) -> u64 {
-        let states = STATES * self.slots.state.len();
-        (HEADER_BYTES + states + slot * self.slots.keyframe.len()) as u64
     }
 
     /// Writes the state after `item`, which led to a motion with this checksum: first the new keyframes, then the state that names
@@ -194,17 +212,17 @@ impl Checkpoint {
     ) -> Result<(), CheckpointError> {
         self.name_keyframes(item, refiner);
         let header = StateHeader { item, motion };
-        let (file, offset) = (&self.file, self.state_offset(item));
-        encode_state(header, &self.map, refiner.state(), &mut self.slots.state);
-        let known =
-            file.read_at(&mut self.slots.found, offset)? && self.slots.found == self.slots.state;
+        let (file, states, slot) = (&self.file, self.layout.states, slot_of(item));
+        let Buffers { state, found, .. } = &mut self.buffers;
+        encode_state(header, &self.map, refiner.state(), state);
+        let known = file.read(&states, slot, found)? && found == state;
         if !known {
             self.erase_keyframes_from(item)?;
         }
         self.write_keyframes(refiner)?;
         if !known {
-            self.file.write_at(&self.slots.state, offset)?;
-            self.sync.changed()?;
+            self.file.write(&states, slot, &self.buffers.state)?;
+            self.file.changed()?;
         }
         Ok(())
     }
@@ -220,7 +238,7 @@ impl Checkpoint {
             let named = earlier.find(|name| name.id == keyframe.id && !starts_map);
             let name = named
                 .copied()
-                .unwrap_or_else(|| self.slots.encode(keyframe));
+                .unwrap_or_else(|| self.buffers.encode(keyframe));
             self.map.push(name);
         }
     }
@@ -232,13 +250,14 @@ impl Checkpoint {
             if self.keyframes.contains(&Some(name)) {
                 continue;
             }
-            if self.slots.encoded != Some(name) {
-                self.slots.encode(keyframe);
+            if self.buffers.encoded != Some(name) {
+                self.buffers.encode(keyframe);
             }
             let slot = self.free_slot();
             self.keyframes[slot] = Some(name);
+            let keyframes = &self.layout.keyframes;
             self.file
-                .write_at(&self.slots.keyframe, self.keyframe_offset(slot))?;
+                .write(keyframes, slot as u64, &self.buffers.keyframe)?;
         }
         Ok(())
     }
@@ -248,7 +267,8 @@ impl Checkpoint {
         for slot in 0..self.keyframes.len() {
             let obsolete = |name: &Name| name.id >= item && !self.map.contains(name);
             if self.keyframes[slot].as_ref().is_some_and(obsolete) {
-                self.file.write_at(&EMPTY, self.keyframe_offset(slot))?;
+                self.file
+                    .write(&self.layout.keyframes, slot as u64, &EMPTY)?;
                 self.keyframes[slot] = None;
             }
         }
@@ -276,9 +296,9 @@ impl Checkpoint {
         &mut self,
         item: u64,
     ) -> Result<Option<(StateHeader, TrackerState)>, StorageError> {
-        let offset = self.state_offset(item);
-        let whole = self.file.read_at(&mut self.slots.found, offset)?;
-        let state = decode_state(&self.slots.found, &mut self.map);
+        let (states, found) = (&self.layout.states, &mut self.buffers.found);
+        let whole = self.file.read(states, slot_of(item), found)?;
+        let state = decode_state(found, &mut self.map);
         Ok(state.filter(|(header, _)| whole && header.item == item))
     }
 
@@ -288,7 +308,7 @@ impl Checkpoint {
     /// [`CheckpointError::Missing`].
     pub fn restore(&mut self, item: u64, refiner: &mut Refiner) -> Result<(), CheckpointError> {
         let missing = CheckpointError::Missing {
-            path: self.file.path().to_owned(),
+            path: self.file.file().path().to_owned(),
             item: item.saturating_add(1),
         };
         let Some((_, tracker)) = self.read_state(item)? else {
@@ -296,14 +316,15 @@ impl Checkpoint {
         };
         let places: Vec<Option<u64>> = self.map.iter().map(|name| self.place_of(*name)).collect();
         let mut keyframes = self.map.iter().zip(places);
-        let (file, slot) = (&self.file, &mut self.slots.keyframe);
-        self.slots.encoded = None;
+        let (file, slots) = (&self.file, &self.layout.keyframes);
+        let bytes = &mut self.buffers.keyframe;
+        self.buffers.encoded = None;
         refiner.restore(tracker, |keyframe| {
-            let Some((name, Some(offset))) = keyframes.next() else {
+            let Some((name, Some(slot))) = keyframes.next() else {
                 return false;
             };
-            file.read_at(slot, offset).is_ok_and(|whole| whole)
-                && decode_keyframe(slot, *name, keyframe)
+            file.read(slots, slot, bytes).is_ok_and(|whole| whole)
+                && decode_keyframe(bytes, *name, keyframe)
         });
         match refiner.keyframes().count() == self.map.len() {
             true => Ok(()),
@@ -311,10 +332,10 @@ impl Checkpoint {
         }
     }
 
-    /// Returns the offset of a keyframe in the file, if it is there.
+    /// Returns the slot of a keyframe, if it is in the file.
     fn place_of(&self, name: Name) -> Option<u64> {
         let slot = self.keyframes.iter().position(|slot| *slot == Some(name));
-        slot.map(|slot| self.keyframe_offset(slot))
+        slot.map(|slot| slot as u64)
     }
 
     /// Returns whether the whole state after a pose is in the file.
@@ -341,7 +362,7 @@ impl Checkpoint {
     }
 }
 
-impl Slots {
+impl Buffers {
     fn encode(&mut self, keyframe: &Keyframe) -> Name {
         let name = encode_keyframe(keyframe, &mut self.keyframe);
         self.encoded = Some(name);

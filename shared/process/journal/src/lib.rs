@@ -1,10 +1,14 @@
-//! The journal: a file of poses, each with its motion and a checksum, from which all results of a run are made.
+//! The files that a run goes on from after a death or a power failure: the journal of its poses; with SLAM its [`keyframes`]; and the
+//! [`checkpoint`] of its refinement.
 //!
+//! The journal is a file of poses, each with its motion and a checksum, from which all results of a run are made.
 //! Each record is one `write`, before its pose is published. A record that is cut short by a death is found by its checksum; its
 //! pose had not been published. A thread synchronises the file about once a second, so a power failure takes the poses of
 //! the last second: what is left of them is found by [`check`] and cut off, and they are computed anew.
 
 mod check;
+pub mod checkpoint;
+pub mod keyframes;
 mod record;
 mod records;
 #[cfg(test)]
@@ -13,7 +17,7 @@ mod tests;
 use std::path::{Path, PathBuf};
 
 use gyre_messages::{PoseHeader, flag};
-use gyre_storage::{File, GroupSync, StorageError, create_folder};
+use gyre_storage::{Busy, DurableFile, Slots, StorageError};
 use thiserror::Error;
 
 pub use check::{Content, check, cut};
@@ -44,18 +48,14 @@ pub enum JournalError {
         pose: u64,
     },
     /// Another process appends to the file.
-    #[error("another process is writing to {path}")]
-    Busy {
-        /// The file.
-        path: PathBuf,
-    },
+    #[error(transparent)]
+    Busy(#[from] Busy),
 }
 
 /// A journal open for appending.
 #[derive(Debug)]
 pub struct Journal {
-    file: File,
-    sync: GroupSync,
+    file: DurableFile,
     /// Number of records, and of those that were there when it was opened.
     records: u64,
     found: u64,
@@ -67,10 +67,11 @@ pub fn path(out: &Path) -> PathBuf {
     out.join("journal").join("poses.journal")
 }
 
-/// Returns the length of a journal of so many records, bytes.
-fn length_of(records: u64) -> u64 {
-    MAGIC.len() as u64 + records * RECORD as u64
-}
+/// The places of the records. So the offset of the one behind them is the length of a journal.
+const RECORDS: Slots = Slots {
+    start: MAGIC.len() as u64,
+    bytes: RECORD,
+};
 
 impl Journal {
     /// Opens or creates a journal and cuts off an incomplete record at its end. Only the end is read, however long it is.
@@ -78,31 +79,24 @@ impl Journal {
     /// # Errors
     /// A file that cannot be read or written, is not a journal, or to which another process writes.
     pub fn open(path: &Path) -> Result<Self, JournalError> {
-        path.parent().map_or(Ok(()), create_folder)?;
-        let file = File::open_or_create(path)?;
-        if !file.lock()? {
-            return Err(JournalError::Busy {
-                path: path.to_owned(),
-            });
-        }
-        let length = file.length()?;
-        let records = length.saturating_sub(MAGIC.len() as u64) / RECORD as u64;
-        let mut header = [0; MAGIC.len()];
-        if records > 0 && !(file.read_at(&mut header, 0)? && header == MAGIC) {
-            return Err(JournalError::Foreign {
-                path: path.to_owned(),
-            });
-        }
-        if records == 0 {
-            // Opened to be read, it is refused if it belongs to another program.
-            records::records(path)?;
-            file.write_at(&MAGIC, 0)?;
-        }
-        if length > length_of(records) {
-            file.set_length(length_of(records))?;
-        }
+        let mut records = 0;
+        let file = DurableFile::open(path, |file| {
+            let begin = RECORDS.start;
+            records = file.length()?.saturating_sub(begin) / RECORD as u64;
+            let mut header = [0; MAGIC.len()];
+            if records > 0 && !(file.read_at(&mut header, 0)? && header == MAGIC) {
+                return Err(JournalError::Foreign {
+                    path: path.to_owned(),
+                });
+            }
+            if records == 0 {
+                // Opened to be read, it is refused if it belongs to another program.
+                records::records(path)?;
+                file.write_at(&MAGIC, 0)?;
+            }
+            Ok(file.cut_to(RECORDS.offset(records))?)
+        })?;
         Ok(Self {
-            sync: GroupSync::start(&file)?,
             file,
             records,
             found: records,
@@ -122,12 +116,12 @@ impl Journal {
             if poses.len() == count {
                 break;
             }
-            let whole = self.file.read_at(&mut bytes, length_of(index))?;
+            let whole = self.file.read(&RECORDS, index, &mut bytes)?;
             let record = Record::decode(&bytes, index).filter(|_| whole);
             let pose = record
                 .map(|record| record.pose)
                 .ok_or_else(|| JournalError::Damaged {
-                    path: self.file.path().to_owned(),
+                    path: self.file.file().path().to_owned(),
                     pose: index,
                 })?;
             match pose.item.is(flag::END) {
@@ -144,14 +138,14 @@ impl Journal {
     /// # Errors
     /// A file that cannot be written or synchronised.
     pub fn append(&mut self, pose: &PoseHeader) -> Result<(), JournalError> {
-        let safe = self.sync.safe().map_or(0, |appended| self.found + appended);
+        let safe = self.file.safe().map_or(0, |appended| self.found + appended);
         let record = Record {
             pose: *pose,
             in_danger: u32::try_from(self.records - safe).unwrap_or(u32::MAX),
         };
         record.encode(&mut self.buffer);
-        self.file.write_at(&self.buffer, length_of(self.records))?;
+        self.file.write(&RECORDS, self.records, &self.buffer)?;
         self.records += 1;
-        Ok(self.sync.changed()?)
+        Ok(self.file.changed()?)
     }
 }

@@ -2,6 +2,7 @@
 use std::fs;
 
 use gyre_messages::Item;
+use gyre_storage::GroupSync;
 
 use super::*;
 
@@ -53,7 +54,7 @@ fn journal_in_danger(poses: u64) -> (tempfile::TempDir, PathBuf) {
 
 fn corrupt(path: &Path, record: u64) {
     let mut bytes = fs::read(path).unwrap();
-    bytes[length_of(record) as usize + 100] ^= 1;
+    bytes[RECORDS.offset(record) as usize + 100] ^= 1;
     fs::write(path, bytes).unwrap();
 }
 
@@ -187,8 +188,8 @@ fn a_record_that_was_safe_and_is_not_whole_is_reported_and_left_as_it_is() {
 fn a_record_in_a_wrong_place_is_not_valid() {
     let (_folder, path) = journal_in_danger(4);
     let mut bytes = fs::read(&path).unwrap();
-    let first = length_of(1) as usize..length_of(2) as usize;
-    bytes.copy_within(first, length_of(2) as usize);
+    let first = RECORDS.offset(1) as usize..RECORDS.offset(2) as usize;
+    bytes.copy_within(first, RECORDS.offset(2) as usize);
     fs::write(&path, bytes).unwrap();
     assert_eq!(check(&path).unwrap().poses, 2);
 }
@@ -211,10 +212,7 @@ fn another_programs_file_is_rejected() {
 fn two_processes_do_not_append_to_one_journal() {
     let (_folder, path) = journal_of(2);
     let _first = Journal::open(&path).unwrap();
-    assert!(matches!(
-        Journal::open(&path),
-        Err(JournalError::Busy { .. })
-    ));
+    assert!(matches!(Journal::open(&path), Err(JournalError::Busy(_))));
 }
 
 #[test]

@@ -1,7 +1,8 @@
 //! The composition of poses and motions.
 
 use gyre_geometry::{covariance, xy_yaw};
-use gyre_messages::{MotionHeader, PoseHeader};
+
+use crate::{MotionHeader, PoseHeader};
 
 /// Composes the previous pose (the origin without one) and a motion (zero at the start of a chain) to the next pose. The covariance
 /// is propagated to first order (Checchin et al., Eqs. 1 and 2), but the noise of a scan's registration does not accumulate: see
@@ -29,9 +30,9 @@ mod tests {
     use std::f64::consts::{FRAC_PI_2, PI};
 
     use gyre_geometry::ComposedMotion;
-    use gyre_messages::MotionEstimate;
 
     use super::*;
+    use crate::MotionEstimate;
 
     #[test]
     fn motions_compose_to_a_pose_in_the_frame_of_the_first_scan() {

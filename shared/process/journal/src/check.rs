@@ -5,7 +5,7 @@ use std::{collections::VecDeque, path::Path};
 use gyre_messages::{PoseHeader, flag};
 use gyre_storage::{File, GroupSync};
 
-use super::{JournalError, length_of, records::Places};
+use crate::{JournalError, RECORDS, records::Places};
 
 /// Number of the last poses that a check returns: more than a power failure can take.
 const LAST: usize = 8 * GroupSync::LIMIT as usize;
@@ -88,6 +88,10 @@ fn damaged(path: &Path, pose: u64) -> JournalError {
 /// A file that cannot be written.
 pub fn cut(path: &Path, records: u64) -> Result<(), JournalError> {
     let file = File::open_or_create(path)?;
-    file.set_length(if records == 0 { 0 } else { length_of(records) })?;
+    file.set_length(if records == 0 {
+        0
+    } else {
+        RECORDS.offset(records)
+    })?;
     Ok(file.sync()?)
 }

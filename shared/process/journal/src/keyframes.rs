@@ -12,7 +12,7 @@ use gyre_slam::{Keyframe, KeyframeBuilder, RecordLog, RecordReader, ScanPose, re
 use gyre_storage::LogError;
 use thiserror::Error;
 
-use crate::journal::{self, JournalError};
+use crate::JournalError;
 
 /// An error of the keyframes of a run.
 #[derive(Debug, Error)]
@@ -163,7 +163,7 @@ fn recover(
 ) -> Result<(KeyframeBuilder, Option<u64>), KeyframesError> {
     let mut builder = KeyframeBuilder::new(options);
     let last = found.last.as_ref().map_or(0, |keyframe| keyframe.seq);
-    let records = journal::records_from(&journal::path(out), last)?;
+    let records = crate::records_from(&crate::path(out), last)?;
     // Behind them may be what a power failure has left of others, or the end of the stream.
     let count = usize::try_from(poses.saturating_sub(last)).unwrap_or(usize::MAX);
     for pose in records.into_iter().flatten().take(count) {

@@ -4,8 +4,8 @@
 use std::{fs, path::Path};
 
 use gyre_geometry::SparsePoint;
+use gyre_journal::checkpoint::{self, Checkpoint, CheckpointError};
 use gyre_messages::{Item, MotionEstimate, PoseHeader};
-use gyre_refinement::checkpoint::{self, Checkpoint, CheckpointError};
 use gyre_scan_matching::{RefinementConfig, Refiner, TrackerState};
 use nalgebra::{Isometry2, Vector2};
 

@@ -2,6 +2,7 @@
 
 use gyre_geometry::Twist;
 use gyre_scan_matching::{Anchor, Keyframe, Standstill, TrackerState};
+use gyre_storage::Checksum;
 use nalgebra::{Complex, Isometry2, Translation2, UnitComplex};
 
 /// Words of a state's slot before the names of its keyframes: the checksum; the item, the checksum of its motion, the number of
@@ -50,16 +51,6 @@ fn word(bytes: &[u8], k: usize) -> u64 {
 
 fn set_word(bytes: &mut [u8], k: usize, word: u64) {
     bytes[8 * k..8 * k + 8].copy_from_slice(&word.to_le_bytes());
-}
-
-/// Returns whether the checksum of a slot is right.
-fn is_valid(slot: &[u8]) -> bool {
-    word(slot, 0) == checksum(&slot[8..])
-}
-
-/// The CRC-32 with one more bit set, so that it is never zero, as in an empty slot.
-fn checksum(bytes: &[u8]) -> u64 {
-    1 << 32 | u64::from(crc32fast::hash(bytes))
 }
 
 fn pose_words(pose: &Isometry2<f64>) -> [u64; 4] {
@@ -178,8 +169,7 @@ pub(super) fn encode_state(
         .chain(names)
         .enumerate()
         .for_each(|(k, value)| set_word(slot, k + 1, value));
-    let check = checksum(&slot[8..]);
-    set_word(slot, 0, check);
+    Checksum::First.seal(slot);
 }
 
 /// Decodes a state; `None` if its checksum is wrong. Its keyframes are put into `keyframes`, oldest first.
@@ -187,7 +177,7 @@ pub(super) fn decode_state(
     slot: &[u8],
     keyframes: &mut Vec<Name>,
 ) -> Option<(StateHeader, TrackerState)> {
-    if !is_valid(slot) {
+    if !Checksum::First.is_right(slot) {
         return None;
     }
     let [item, motion, count] = [1, 2, 3].map(|k| word(slot, k));
@@ -222,17 +212,16 @@ pub(super) fn encode_keyframe(keyframe: &Keyframe, slot: &mut [u8]) -> Name {
             .for_each(|(to, cell)| *to = *cell);
         at += cells.len();
     }
-    let check = checksum(&slot[8..]);
-    set_word(slot, 0, check);
+    Checksum::First.seal(slot);
     Name {
         id: keyframe.id,
-        check,
+        check: word(slot, 0),
     }
 }
 
 /// Returns the name of the keyframe in a slot; `None` if its checksum is wrong.
 pub(super) fn keyframe_name(slot: &[u8]) -> Option<Name> {
-    is_valid(slot).then(|| Name {
+    Checksum::First.is_right(slot).then(|| Name {
         id: word(slot, 1),
         check: word(slot, 0),
     })

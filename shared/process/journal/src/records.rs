@@ -9,8 +9,8 @@ use std::{
 use gyre_messages::PoseHeader;
 use gyre_storage::StorageError;
 
-use super::{
-    JournalError, MAGIC, length_of,
+use crate::{
+    JournalError, MAGIC, RECORDS,
     record::{RECORD, Record},
 };
 
@@ -25,7 +25,7 @@ pub struct Records {
 
 /// All places of a journal that can hold a record, valid or not.
 #[derive(Debug)]
-pub(super) struct Places {
+pub(crate) struct Places {
     path: PathBuf,
     reader: BufReader<File>,
     bytes: Box<[u8; RECORD]>,
@@ -52,7 +52,7 @@ pub fn records_from(path: &Path, first: u64) -> Result<Option<Records>, JournalE
     let Some(mut records) = records(path)? else {
         return Ok(None);
     };
-    let start = SeekFrom::Start(length_of(first));
+    let start = SeekFrom::Start(RECORDS.offset(first));
     let places = &mut records.places;
     places
         .reader

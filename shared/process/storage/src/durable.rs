@@ -1,0 +1,198 @@
+//! A file that one process at a time changes in place: the common part of logs, of the journal and of checkpoints.
+
+use std::path::{Path, PathBuf};
+
+use thiserror::Error;
+
+use crate::{File, GroupSync, StorageError, create_folder};
+
+/// Another process changes the file.
+#[derive(Debug, Error)]
+#[error("another process is writing to {path}")]
+pub struct Busy {
+    /// The file.
+    pub path: PathBuf,
+}
+
+/// A file that one process at a time changes in place, and that a thread synchronises.
+#[derive(Debug)]
+pub struct DurableFile {
+    file: File,
+    sync: GroupSync,
+}
+
+impl DurableFile {
+    /// Opens or creates a file and its folder, and locks it for this process. `prepare` makes of what it finds there what the process
+    /// goes on from, before the thread starts.
+    ///
+    /// # Errors
+    /// A file that cannot be read or written, or that another process changes; an error of `prepare`.
+    pub fn open<E: From<StorageError> + From<Busy>>(
+        path: &Path,
+        prepare: impl FnOnce(&File) -> Result<(), E>,
+    ) -> Result<Self, E> {
+        path.parent().map_or(Ok(()), create_folder)?;
+        let file = File::open_or_create(path)?;
+        if !file.lock()? {
+            let path = path.to_owned();
+            return Err(Busy { path }.into());
+        }
+        prepare(&file)?;
+        Ok(Self {
+            sync: GroupSync::start(&file)?,
+            file,
+        })
+    }
+
+    /// Returns the file.
+    pub fn file(&self) -> &File {
+        &self.file
+    }
+
+    /// Fills `bytes` with the content of a slot; false if the file ends before. [`Checksum::is_right`] says whether it is whole.
+    ///
+    /// # Errors
+    /// The file cannot be read.
+    pub fn read(&self, slots: &Slots, slot: u64, bytes: &mut [u8]) -> Result<bool, StorageError> {
+        self.file.read_at(bytes, slots.offset(slot))
+    }
+
+    /// Writes `bytes` at the start of a slot. [`changed`](Self::changed) counts what was written.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write(&self, slots: &Slots, slot: u64, bytes: &[u8]) -> Result<(), StorageError> {
+        self.file.write_at(bytes, slots.offset(slot))
+    }
+
+    /// Counts a change that has been made. Waits while [`GroupSync::LIMIT`] are in danger.
+    ///
+    /// # Errors
+    /// A synchronisation has failed: changes may be lost.
+    pub fn changed(&self) -> Result<(), StorageError> {
+        self.sync.changed()
+    }
+
+    /// Returns the number of changes that survive a power failure; `None` until the first synchronisation has ended.
+    pub fn safe(&self) -> Option<u64> {
+        self.sync.safe()
+    }
+}
+
+/// Places of equal size in a file.
+#[derive(Clone, Copy, Debug)]
+pub struct Slots {
+    /// The offset of the first one.
+    pub start: u64,
+    /// The size of each.
+    pub bytes: usize,
+}
+
+impl Slots {
+    /// Returns the offset of a slot.
+    pub const fn offset(&self, slot: u64) -> u64 {
+        self.start + slot * self.bytes as u64
+    }
+}
+
+/// The place of a CRC-32 by which the content of a slot is known to be whole. Numbers are little-endian.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Checksum {
+    /// The first eight bytes, with one more bit set: it is never zero, as in an empty slot.
+    First,
+    /// The last four bytes.
+    Last,
+}
+
+impl Checksum {
+    /// Puts the checksum into its place.
+    ///
+    /// # Panics
+    /// The slot is shorter than its checksum.
+    pub fn seal(self, slot: &mut [u8]) {
+        match self {
+            Self::First => {
+                let (check, content) = slot.split_at_mut(8);
+                check.copy_from_slice(&never_zero(content));
+            }
+            Self::Last => {
+                let (content, check) = slot.split_at_mut(slot.len() - 4);
+                check.copy_from_slice(&crc32fast::hash(content).to_le_bytes());
+            }
+        }
+    }
+
+    /// Returns whether the checksum is that of the content.
+    #[must_use]
+    pub fn is_right(self, slot: &[u8]) -> bool {
+        match self {
+            Self::First => slot
+                .split_first_chunk()
+                .is_some_and(|(check, content)| *check == never_zero(content)),
+            Self::Last => slot
+                .split_last_chunk()
+                .is_some_and(|(content, check)| *check == crc32fast::hash(content).to_le_bytes()),
+        }
+    }
+}
+
+fn never_zero(content: &[u8]) -> [u8; 8] {
+    (1 << 32 | u64::from(crc32fast::hash(content))).to_le_bytes()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[derive(Debug, Error)]
+    enum TestError {
+        #[error(transparent)]
+        Storage(#[from] StorageError),
+        #[error(transparent)]
+        Busy(#[from] Busy),
+    }
+
+    #[test]
+    fn a_slot_is_whole_until_one_of_its_bytes_changes() {
+        for checksum in [Checksum::First, Checksum::Last] {
+            let mut slot = [7; 24];
+            checksum.seal(&mut slot);
+            assert!(checksum.is_right(&slot));
+            for at in 0..slot.len() {
+                let mut other = slot;
+                other[at] ^= 1;
+                assert!(!checksum.is_right(&other), "{checksum:?}, byte {at}");
+            }
+            assert!(!checksum.is_right(&[]));
+        }
+        assert!(!Checksum::First.is_right(&[0; 24]), "it is empty");
+    }
+
+    /// Files of earlier versions stay readable.
+    #[test]
+    fn checksums_are_where_they_have_always_been() {
+        let mut slot = *b"????????123456789";
+        Checksum::First.seal(&mut slot);
+        assert_eq!(slot[..8], [0x26, 0x39, 0xf4, 0xcb, 1, 0, 0, 0]);
+        let mut slot = *b"123456789????";
+        Checksum::Last.seal(&mut slot);
+        assert_eq!(slot[9..], [0x26, 0x39, 0xf4, 0xcb]);
+    }
+
+    #[test]
+    fn a_slot_is_read_as_it_was_written_and_only_by_one_process() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("folder").join("file");
+        let open = || DurableFile::open::<TestError>(&path, |_| Ok(()));
+        let (file, slots) = (open().unwrap(), Slots { start: 3, bytes: 5 });
+        file.write(&slots, 2, b"whole").unwrap();
+        file.changed().unwrap();
+        let mut bytes = [0; 5];
+        assert!(file.read(&slots, 2, &mut bytes).unwrap() && bytes == *b"whole");
+        assert!(!file.read(&slots, 3, &mut bytes).unwrap());
+        assert!(matches!(open(), Err(TestError::Busy(busy)) if busy.path == path));
+        drop(file);
+        assert!(open().is_ok());
+    }
+}
