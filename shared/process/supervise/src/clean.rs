@@ -191,40 +191,11 @@ fn unlink_incomplete_tags(directory: &Path) {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use gyre_messages::{Limits, Pose, Window};
+    use gyre_messages::Pose;
     use gyre_stage::{observer::ObservedRun, wake::Signals};
 
     use super::*;
-    use crate::rig::Rig;
-
-    /// The manifest of a run with these results.
-    fn manifest(out: &Path) -> Manifest {
-        Manifest {
-            prefix: String::new(),
-            root: PathBuf::new(),
-            out: out.to_owned(),
-            window: Window {
-                scans: 2,
-                lag: 1,
-                look_back: 1,
-                live_depth: 0,
-                observers: 2,
-                slam: false,
-                localises: false,
-            },
-            limits: Limits {
-                scan_bytes: 1000,
-                raster_cells: 100,
-                cell_m: 1.0,
-                rasters: 1,
-                points: 0,
-            },
-            live: false,
-            refines: false,
-            rate: None,
-            build: String::new(),
-        }
-    }
+    use crate::{rig::Rig, tests::manifest};
 
     #[test]
     fn only_empty_files_of_dead_ports_are_found() {

@@ -6,9 +6,8 @@ use std::{
 };
 
 use gyre_stage::Manifest;
-use iceoryx2::prelude::Config;
 
-use crate::clean;
+use crate::run::Run;
 
 /// Time between two looks.
 const PERIOD: Duration = Duration::from_secs(1);
@@ -28,13 +27,13 @@ impl Sweep {
     }
 
     /// Removes what killed observers left, if it is time to look. `processes` is the number of the run's own processes.
-    pub(crate) fn run_if_due(&mut self, manifest: &Manifest, transport: &Config, processes: usize) {
+    pub(crate) fn run_if_due(&mut self, run: &Run<'_>, processes: usize) {
         let now = Instant::now();
         if now < self.due {
             return;
         }
-        let has_observers = nodes(manifest) > processes;
-        let failed = has_observers && clean::remove_dead_observers(manifest, transport).is_err();
+        let has_observers = nodes(run.manifest()) > processes;
+        let failed = has_observers && run.remove_dead_observers().is_err();
         self.due = now
             + match failed {
                 true => PERIOD_AFTER_FAILURE,

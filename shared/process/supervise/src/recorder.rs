@@ -4,15 +4,17 @@
 use std::time::{Duration, Instant};
 
 use gyre_stage::{
+    Manifest,
     control::{Activity, ProcessStatus},
     observer,
 };
 
 use crate::{
-    Ending, Event, SuperviseError, Supervisor,
-    child::Child,
+    Ending, Event, SuperviseError,
+    child::{Child, Death},
     requests::{activity, of_child},
-    start::{Place, Starter},
+    run::Run,
+    start::Place,
 };
 
 /// The longest time for which the first scan waits until the recorder observes all topics.
@@ -34,172 +36,157 @@ pub(crate) struct Recorder {
 }
 
 impl Recorder {
-    pub fn pid(&self) -> u32 {
-        self.child.pid()
-    }
-}
-
-impl Supervisor<'_> {
-    /// Starts the recorder before any stage, and waits until it observes all topics, so that it misses nothing of the beginning.
-    pub(crate) fn start_recorder(&mut self) -> Result<(), SuperviseError> {
-        let Some(plan) = &self.plan.recorder else {
-            return Ok(());
+    /// Starts the recorder of the plan before any stage, and waits until it observes all topics, so that it misses nothing of the
+    /// beginning.
+    pub fn start(run: &mut Run<'_>) -> Result<Option<Self>, SuperviseError> {
+        let Some(plan) = &run.plan.recorder else {
+            return Ok(None);
         };
-        let starter = Starter::new(&self.signals, &self.guardian);
-        let mut child = match Child::spawn(plan, &self.plan.manifest, &starter, Place::Free) {
+        let mut child = match Child::spawn(plan, run.manifest(), &run.starter(), Place::Free) {
             Err(error) if error.is_of_one_process() => {
-                self.say_of_recording(&error.to_string());
-                return Ok(());
+                say(run, &error.to_string());
+                return Ok(None);
             }
             spawned => spawned?,
         };
-        let ready = observer::ready_file(&self.plan.manifest.root);
+        let ready = observer::ready_file(&run.manifest().root);
         let started = Instant::now();
         while started.elapsed() < START_TIMEOUT && !ready.exists() && !child.has_exited() {
-            if self.signals.wait(&[], None, LOOK)?.stop {
+            if run.sleep(LOOK)? {
                 break;
             }
         }
-        self.recorder = Some(Recorder {
+        Ok(Some(Self {
             child,
             restart_at: None,
             has_ended: false,
             restarts: 0,
-        });
-        Ok(())
+        }))
     }
 
-    /// Starts a recorder again that has died.
-    pub(crate) fn keep_recorder(&mut self) -> Result<(), SuperviseError> {
-        let Some(recorder) = &mut self.recorder else {
-            return Ok(());
-        };
-        if recorder.has_ended || !recorder.child.has_exited() {
-            return Ok(());
-        }
-        let Some(restart_at) = recorder.restart_at else {
-            return self.judge_recorder();
-        };
-        match Instant::now() < restart_at {
-            true => Ok(()),
-            false => self.respawn_recorder(),
-        }
+    pub fn name(&self) -> &str {
+        self.child.name()
     }
 
-    fn respawn_recorder(&mut self) -> Result<(), SuperviseError> {
-        let Some(recorder) = &mut self.recorder else {
+    pub fn pid(&self) -> u32 {
+        self.child.pid()
+    }
+
+    /// Starts the recorder again if it has died.
+    pub fn keep(&mut self, run: &mut Run<'_>, newest: Option<u64>) -> Result<(), SuperviseError> {
+        if self.has_ended || !self.child.has_exited() {
             return Ok(());
-        };
-        (recorder.restart_at, recorder.has_ended) = (None, false);
-        recorder.restarts += 1;
-        let newest = self.newest.map(|newest| newest.seq);
-        let starter = Starter::new(&self.signals, &self.guardian);
-        let manifest = &self.plan.manifest;
-        match recorder.child.respawn(manifest, &starter, newest) {
-            Err(error) if error.is_of_one_process() => {
-                recorder.has_ended = true;
-                self.say_of_recording(&error.to_string());
+        }
+        match self.restart_at {
+            None => {
+                run.guardian.forget(self.child.pid());
+                let death = self.child.death();
+                say(run, &self.judge(death));
                 Ok(())
             }
-            respawned => respawned,
+            Some(restart_at) if Instant::now() < restart_at => Ok(()),
+            Some(_) => self.respawn(run, newest),
         }
     }
 
-    /// Decides whether a recorder that has just died is started again.
-    fn judge_recorder(&mut self) -> Result<(), SuperviseError> {
-        let Some(recorder) = &mut self.recorder else {
-            return Ok(());
-        };
-        self.guardian.forget(recorder.child.pid());
-        let death = recorder.child.death();
-        let sentence = match recorder.child.may_restart(&death) {
+    /// Decides whether a recorder that has just died is started again. Returns a sentence.
+    fn judge(&mut self, death: Death) -> String {
+        match self.child.may_restart(&death) {
             // It was asked to stop.
             _ if death.code == Some(0) => {
-                recorder.has_ended = true;
+                self.has_ended = true;
                 death.last_output.unwrap_or_default()
             }
             Ok(()) => {
-                recorder.restart_at = Some(Instant::now() + recorder.child.backoff());
+                self.restart_at = Some(Instant::now() + self.child.backoff());
                 format!(
                     "the recorder died ({}), and is started again: it goes on in another file",
                     death.cause
                 )
             }
             Err(error) => {
-                recorder.has_ended = true;
+                self.has_ended = true;
                 error.to_string()
             }
-        };
-        self.say_of_recording(&sentence);
-        Ok(())
+        }
+    }
+
+    fn respawn(&mut self, run: &mut Run<'_>, newest: Option<u64>) -> Result<(), SuperviseError> {
+        (self.restart_at, self.has_ended) = (None, false);
+        self.restarts += 1;
+        let respawned = self.child.respawn(run.manifest(), &run.starter(), newest);
+        match respawned {
+            Err(error) if error.is_of_one_process() => {
+                self.has_ended = true;
+                say(run, &error.to_string());
+                Ok(())
+            }
+            respawned => respawned,
+        }
     }
 
     /// Lets the recorder write what it has received, before the stages end.
-    pub(crate) fn stop_recorder(&mut self, ending: Option<Ending>) -> Result<(), SuperviseError> {
-        let awaits_restart = |it: &Recorder| it.restart_at.is_some();
-        if self.recorder.as_ref().is_some_and(awaits_restart) {
-            self.say_of_recording(
+    pub fn stop(
+        &mut self,
+        run: &mut Run<'_>,
+        ending: Option<Ending>,
+    ) -> Result<(), SuperviseError> {
+        if self.restart_at.is_some() {
+            say(
+                run,
                 "the recorder died, and the run ended before it was started again: the end of the recording is missing",
             );
         }
-        self.end_recorder(match ending {
+        let limit = match ending {
             Some(Ending::Complete) => END_TIMEOUT,
             _ => STOP_TIMEOUT,
-        })
-    }
-
-    /// Returns whether a process of this name is the recorder.
-    pub(crate) fn is_recorder(&self, process: &str) -> bool {
-        let recorder = self.recorder.as_ref();
-        recorder.is_some_and(|recorder| recorder.child.name() == process)
+        };
+        self.end(run, limit)
     }
 
     /// Ends the recorder and starts it again, also one that has ended for good: its disk may have room again.
-    pub(crate) fn restart_recorder(&mut self) -> Result<(), SuperviseError> {
-        self.end_recorder(STOP_TIMEOUT)?;
-        self.respawn_recorder()
+    pub fn restart(
+        &mut self,
+        run: &mut Run<'_>,
+        newest: Option<u64>,
+    ) -> Result<(), SuperviseError> {
+        self.end(run, STOP_TIMEOUT)?;
+        self.respawn(run, newest)
     }
 
-    /// Returns the state of the recorder, if the run has one.
-    pub(crate) fn status_of_recorder(&self) -> Option<ProcessStatus> {
-        let Recorder {
-            child, restarts, ..
-        } = self.recorder.as_ref()?;
-        let manifest = &self.plan.manifest;
-        let beat = child.heartbeat(manifest);
+    /// Returns the state of the recorder.
+    pub fn status(&self, manifest: &Manifest) -> ProcessStatus {
+        let beat = self.child.heartbeat(manifest);
         let activity = match beat {
-            _ if child.is_known_to_have_exited() => Activity::Ended,
+            _ if self.child.is_known_to_have_exited() => Activity::Ended,
             // It beats from when it observes all topics.
             None => Activity::Starting,
             Some(beat) => activity(beat),
         };
-        Some(ProcessStatus {
-            restarts: *restarts,
-            missed: Some(observer::read_missed(&manifest.root, child.pid())),
-            ..of_child(child, beat, activity)
-        })
+        ProcessStatus {
+            restarts: self.restarts,
+            missed: Some(observer::read_missed(&manifest.root, self.child.pid())),
+            ..of_child(&self.child, beat, activity)
+        }
     }
 
     /// Tells the recorder to write what it has received, and kills it if it has not after `limit`.
-    fn end_recorder(&mut self, limit: Duration) -> Result<(), SuperviseError> {
-        let Some(recorder) = &mut self.recorder else {
-            return Ok(());
-        };
-        if recorder.has_ended || recorder.restart_at.is_some() {
+    fn end(&mut self, run: &mut Run<'_>, limit: Duration) -> Result<(), SuperviseError> {
+        if self.has_ended || self.restart_at.is_some() {
             return Ok(());
         }
-        recorder.child.terminate();
+        self.child.terminate();
         let since = Instant::now();
-        while !recorder.child.has_exited() && since.elapsed() < limit {
-            self.signals.wait(&[], None, LOOK)?;
-            (self.observe)(Event::Watched);
+        while !self.child.has_exited() && since.elapsed() < limit {
+            run.sleep(LOOK)?;
+            run.say(Event::Watched);
         }
-        let was_late = !recorder.child.has_exited();
-        recorder.child.kill();
+        let was_late = !self.child.has_exited();
+        self.child.kill();
         // One that the kernel holds is left to it.
-        let _ = recorder.child.await_end();
-        self.guardian.forget(recorder.child.pid());
-        let output = recorder.child.last_output().unwrap_or_default();
+        let _ = self.child.await_end();
+        run.guardian.forget(self.child.pid());
+        let output = self.child.last_output().unwrap_or_default();
         let sentence = match was_late {
             true => format!(
                 "the recorder had not written all after {limit:?}, and was killed: the end of the recording is missing"
@@ -207,17 +194,17 @@ impl Supervisor<'_> {
             // It says something, whether it has missed messages or not.
             false if output.is_empty() => format!(
                 "the recorder died ({}): the end of the recording is missing",
-                recorder.child.death().cause
+                self.child.death().cause
             ),
             false => output,
         };
-        self.say_of_recording(&sentence);
+        say(run, &sentence);
         Ok(())
     }
+}
 
-    fn say_of_recording(&mut self, sentence: &str) {
-        if !sentence.is_empty() {
-            (self.observe)(Event::Recorder { sentence });
-        }
+fn say(run: &mut Run<'_>, sentence: &str) {
+    if !sentence.is_empty() {
+        run.say(Event::Recorder { sentence });
     }
 }

@@ -5,13 +5,21 @@ use std::process;
 use gyre_messages::StageId;
 use gyre_stage::{
     clock,
-    control::{Activity, Answer, Phase, ProcessStatus, Request, Status},
+    control::{Activity, Answer, Phase, ProcessStatus, Request, Status, Swap},
     heartbeat::{self, Heartbeat},
     schedule,
     source::received_of,
 };
 
-use crate::{SuperviseError, Supervisor, child::Child, socket::Client};
+use crate::{
+    Event, StagePlan, SuperviseError,
+    child::Child,
+    processes::Processes,
+    run::Run,
+    socket::Client,
+    supervisor::Supervisor,
+    swaps::{Standby, Step, plan_of},
+};
 
 /// Requests that are answered before the supervisor looks after its processes again.
 const MAX_REQUESTS: usize = 8;
@@ -30,31 +38,15 @@ impl Supervisor<'_> {
                     stop = true;
                     client.answer(&Answer::Done);
                 }
-                Request::Restart { process } => match self.named(&process) {
-                    Some(child) => {
-                        let answer = self.restart_on_request(child)?;
-                        client.answer(&answer);
-                    }
-                    None if self.is_recorder(&process) => {
-                        self.restart_recorder()?;
-                        client.answer(&Answer::Done);
-                    }
-                    None => self.refuse_unknown(&process, client),
-                },
-                Request::Swap(swap) => self.begin_swap(swap, client)?,
+                Request::Restart { process } => self.restart_on_request(&process, client)?,
+                Request::Swap(swap) => self.begin_swap(&swap, client)?,
             }
         }
         Ok(stop)
     }
 
-    /// Returns the index of a process.
-    pub(crate) fn named(&self, process: &str) -> Option<usize> {
-        let mut children = self.children.iter();
-        children.position(|child| child.name() == process)
-    }
-
-    pub(crate) fn refuse_unknown(&self, process: &str, client: Client) {
-        let names: Vec<&str> = self.children.iter().map(Child::name).collect();
+    fn refuse_unknown(&self, process: &str, client: Client) {
+        let names: Vec<&str> = self.run.roles().names().collect();
         let names = names.join(", ");
         client.answer(&Answer::Refused(format!(
             "the run has no process `{process}`; it has {names}"
@@ -62,67 +54,189 @@ impl Supervisor<'_> {
     }
 
     /// Ends a process and starts it again, which counts as a restart and not as a death. One that could not be started again goes on.
-    fn restart_on_request(&mut self, child: usize) -> Result<Answer, SuperviseError> {
-        let stages = self.restarted_with(child);
-        if let Some(reason) = self.why_not_again(stages.iter().copied()) {
-            return Ok(Answer::Refused(reason));
-        }
-        self.restart_and_count(&stages)?;
-        Ok(Answer::Done)
+    fn restart_on_request(&mut self, name: &str, client: Client) -> Result<(), SuperviseError> {
+        let Some(process) = self.run.roles().named(name) else {
+            let newest = self.poses.newest_seq();
+            match &mut self.recorder {
+                Some(recorder) if recorder.name() == name => {
+                    recorder.restart(&mut self.run, newest)?;
+                    client.answer(&Answer::Done);
+                }
+                _ => self.refuse_unknown(name, client),
+            }
+            return Ok(());
+        };
+        let stages = self.run.roles().restarted_with(process);
+        let why_not = self.processes.why_not_again(stages.iter().copied());
+        client.answer(&match why_not {
+            Some(reason) => Answer::Refused(reason),
+            None => {
+                self.restart_and_count(&stages)?;
+                Answer::Done
+            }
+        });
+        Ok(())
     }
 
-    pub(crate) fn restart_and_count(&mut self, stages: &[usize]) -> Result<(), SuperviseError> {
-        stages.iter().for_each(|i| self.count_restart(*i));
+    fn restart_and_count(&mut self, stages: &[usize]) -> Result<(), SuperviseError> {
+        stages.iter().for_each(|i| self.processes.count_restart(*i));
         self.restart(stages, clock::now_ns())
     }
 
-    fn status(&mut self) -> Status {
-        let manifest = &self.plan.manifest;
-        let processes = (0..self.children.len()).map(|i| self.status_of(i));
+    /// Starts a program that is to take the place of another one. The client has its answer when that has done so, and has worked on a
+    /// first pose.
+    fn begin_swap(&mut self, swap: &Swap, client: Client) -> Result<(), SuperviseError> {
+        let Some(process) = self.run.roles().named(&swap.process) else {
+            self.refuse_unknown(&swap.process, client);
+            return Ok(());
+        };
+        if let Some(reason) = self.swaps.why_not_now(self.followers.are_awaited()) {
+            client.answer(&Answer::Refused(reason.to_owned()));
+            return Ok(());
+        }
+        let plan = plan_of(&self.run.plan.stages[process], swap);
+        match swap.cold {
+            true => self.swap_cold(process, plan, client),
+            false => self.swaps.begin(process, &plan, client, &self.run),
+        }
+    }
+
+    /// Ends a process, and starts another program in its place. If that cannot be started, the one before is started again.
+    fn swap_cold(
+        &mut self,
+        process: usize,
+        plan: StagePlan,
+        client: Client,
+    ) -> Result<(), SuperviseError> {
+        let stages = self.run.roles().restarted_with(process);
+        if let Some(reason) = self.why_others_stay(process, &stages) {
+            client.answer(&Answer::Refused(reason));
+            return Ok(());
+        }
+        self.processes[process].change(plan);
+        self.restart_and_count(&stages)?;
+        let child = &self.processes[process];
+        if child.is_on_trial() {
+            self.has_swapped(process, client);
+            return Ok(());
+        }
+        let (name, reason) = (child.name(), child.last_death().unwrap_or_default());
+        client.answer(&Answer::Refused(format!(
+            "{name} goes on as before: {reason}"
+        )));
+        Ok(())
+    }
+
+    /// Returns why the processes that are restarted together with one could not be.
+    fn why_others_stay(&self, process: usize, stages: &[usize]) -> Option<String> {
+        let others = stages.iter().copied().filter(|i| *i != process);
+        self.processes.why_not_again(others)
+    }
+
+    /// Looks after the program that stands by, and lets it take over.
+    pub(crate) fn continue_swap(&mut self) -> Result<(), SuperviseError> {
+        let is_in_flight = || self.poses.are_owed(self.run.manifest());
+        match self.swaps.step(&self.run, is_in_flight) {
+            Step::Wait => Ok(()),
+            Step::TakeOver(standby) => self.take_over(standby),
+            Step::GiveUp(standby, reason) => {
+                self.give_up(standby, &reason);
+                Ok(())
+            }
+        }
+    }
+
+    pub(crate) fn give_up(&self, standby: Standby, reason: &str) {
+        let pid = standby.give_up(reason);
+        self.run.guardian.forget(pid);
+    }
+
+    /// Ends the program that is to be replaced, and lets the new one go on.
+    fn take_over(&mut self, standby: Standby) -> Result<(), SuperviseError> {
+        let process = standby.process;
+        let stages = self.run.roles().restarted_with(process);
+        if let Some(reason) = self.why_others_stay(process, &stages) {
+            self.give_up(standby, &reason);
+            return Ok(());
+        }
+        let (child, client) = standby.into_parts(self.run.manifest());
+        let stages = match self.ends_between_scans(process)? {
+            true => vec![process],
+            false => stages,
+        };
+        self.replace(&stages, clock::now_ns(), Some((process, child)))?;
+        self.stalls.restarted();
+        self.has_swapped(process, client);
+        Ok(())
+    }
+
+    /// Ends a process; returns whether it has left no scan without a pose. Then the one after it numbers scans as it would have, and no
+    /// other process need be restarted with it.
+    fn ends_between_scans(&mut self, process: usize) -> Result<bool, SuperviseError> {
+        self.processes[process].kill();
+        self.processes[process].await_end()?;
+        Ok(!self.poses.are_owed(self.run.manifest()))
+    }
+
+    /// Says that a program has taken the place of another one, and lets the client wait until it proves itself.
+    fn has_swapped(&mut self, process: usize, client: Client) {
+        let child = &self.processes[process];
+        self.swaps.has_swapped(child.plan(), self.poses.count());
+        self.run.say(Event::Swapped {
+            stage: child.name(),
+            command: &child.plan().command,
+        });
+        self.swaps.await_trial(process, child, client);
+    }
+
+    fn status(&self) -> Status {
+        let manifest = self.run.manifest();
+        let processes = (0..self.processes.len()).map(|i| status_of(i, &self.processes, &self.run));
         let mut processes: Vec<ProcessStatus> = processes.collect();
         let is_starting = |process: &ProcessStatus| process.activity == Activity::Starting;
         let phase = match () {
-            () if self.is_following => Phase::Following,
+            () if self.followers.are_awaited() => Phase::Following,
             () if processes.iter().any(is_starting) => Phase::Starting,
             () => Phase::Running,
         };
         // Nothing waits for it.
-        processes.extend(self.status_of_recorder());
+        processes.extend(
+            self.recorder
+                .iter()
+                .map(|recorder| recorder.status(manifest)),
+        );
         Status {
             pid: process::id(),
             out: manifest.out.clone(),
             live: manifest.live,
             phase,
-            uptime_s: self.since.elapsed().as_secs_f64(),
+            uptime_s: self.run.since.elapsed().as_secs_f64(),
             published: schedule::read(manifest).map(|source| source.published),
-            poses: self.poses_so_far(),
-            dropped: self.newest.map_or(0, |newest| newest.dropped()),
-            last_pose_s: self.last_pose.map(|pose| pose.elapsed().as_secs_f64()),
+            poses: self.poses.count(),
+            dropped: self.poses.dropped(),
+            last_pose_s: self.poses.age_s(),
             processes,
         }
     }
+}
 
-    fn status_of(&self, child: usize) -> ProcessStatus {
-        let begun = &self.plan.stages[child].command;
-        let child = &self.children[child];
-        let beat = child.heartbeat(&self.plan.manifest);
-        let is_opening = |stage: StageId| !self.services.has_publisher(stage);
-        let activity = match beat {
-            _ if child.is_known_to_have_exited() => Activity::Ended,
-            _ if child.stage().is_some_and(is_opening) => Activity::Starting,
-            None => Activity::Running,
-            Some(beat) => activity(beat),
-        };
-        let restarts = self.restarts.get(child.name());
-        ProcessStatus {
-            is_swapped: child.plan().command != *begun,
-            restarts: restarts.copied().unwrap_or_default(),
-            received: match child.stage() {
-                Some(StageId::RadarReplay) => received_of(&self.plan.manifest),
-                _ => None,
-            },
-            ..of_child(child, beat, activity)
-        }
+fn status_of(process: usize, processes: &Processes, run: &Run<'_>) -> ProcessStatus {
+    let child = &processes[process];
+    let beat = child.heartbeat(run.manifest());
+    let activity = match beat {
+        _ if child.is_known_to_have_exited() => Activity::Ended,
+        _ if run.is_starting(child) => Activity::Starting,
+        None => Activity::Running,
+        Some(beat) => activity(beat),
+    };
+    ProcessStatus {
+        is_swapped: child.plan().command != run.plan.stages[process].command,
+        restarts: processes.restarts_of(process),
+        received: match child.stage() {
+            Some(StageId::RadarReplay) => received_of(run.manifest()),
+            _ => None,
+        },
+        ..of_child(child, beat, activity)
     }
 }
 

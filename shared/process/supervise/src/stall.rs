@@ -1,19 +1,133 @@
-//! What is done about a run that makes no progress although no process has died.
+//! Finds a run that makes no progress although no process has died, and says what to restart.
 
 use std::time::{Duration, Instant};
 
-use gyre_messages::StageId;
-use gyre_stage::{clock, wake};
+use gyre_messages::Item;
+use gyre_stage::{Manifest, wake};
 
-use crate::{Event, Stall, SuperviseError, Supervisor, watchdog::Starting};
+use crate::{
+    Plan, Stall,
+    roles::Roles,
+    watchdog::{Starting, Watchdog},
+};
 
 /// Time between two looks at the heartbeats.
 const PERIOD: Duration = Duration::from_secs(1);
 /// Time after which all processes have beaten again that can run.
 const RESUMED: Duration = wake::MAX_WAIT.saturating_mul(5);
 
+/// The stalls of a run.
+pub(crate) struct Stalls<'a> {
+    roles: Roles<'a>,
+    manifest: &'a Manifest,
+    limit: Option<Duration>,
+    watchdog: Watchdog,
+    looks: Looks,
+}
+
+/// The result of a look at all processes.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub(crate) struct Found {
+    /// Followers that hang: odometry goes on, with them or without.
+    pub followers: Vec<(usize, Stall)>,
+    /// The stall of the stages.
+    pub stall: Option<Stall>,
+}
+
+impl<'a> Stalls<'a> {
+    pub fn of(plan: &'a Plan) -> Self {
+        Self {
+            roles: Roles::of(plan),
+            manifest: &plan.manifest,
+            limit: plan.stall_timeout,
+            watchdog: Watchdog::new(plan),
+            looks: Looks::new(),
+        }
+    }
+
+    /// Resets the clock at a new pose.
+    pub fn progress(&mut self, pose: &Item) {
+        self.watchdog.progress(pose);
+    }
+
+    /// Resets the clock at a restart.
+    pub fn restarted(&mut self) {
+        self.watchdog.restarted();
+    }
+
+    /// Looks for stalls. `hangs` says whether a process has not come to its next wait for longer than a time, and `starting` is the stage
+    /// that has been opening its topics for longest.
+    pub fn look(
+        &mut self,
+        now: Instant,
+        hangs: impl Fn(usize, Duration) -> bool,
+        starting: Option<Starting<'_>>,
+    ) -> Found {
+        if self.looks.are_resuming(now) {
+            self.watchdog.restarted();
+            return Found::default();
+        }
+        let mut followers = Vec::new();
+        if self.looks.are_at_heartbeats(now)
+            && let Some(limit) = self.limit
+        {
+            let hanging = self.roles.followers().filter(|i| hangs(*i, limit));
+            followers.extend(hanging.map(|i| (i, self.hang_of(i, limit))));
+            let stall = self.hang(&hangs, limit, limit);
+            if stall.is_some() {
+                return Found { followers, stall };
+            }
+        }
+        let stall = self.watchdog.look(self.manifest, starting);
+        let cause = match stall {
+            // What is owed has been waited for since some time after the process began to hang.
+            Some(Stall::Pose { limit } | Stall::Scan { limit }) => {
+                self.hang(&hangs, limit / 2, limit)
+            }
+            _ => None,
+        };
+        Found {
+            followers,
+            stall: cause.or(stall),
+        }
+    }
+
+    /// Returns the stage that has hung for longer than `since`.
+    fn hang(
+        &self,
+        hangs: impl Fn(usize, Duration) -> bool,
+        since: Duration,
+        limit: Duration,
+    ) -> Option<Stall> {
+        let process = self.roles.stages().find(|i| hangs(*i, since))?;
+        Some(self.hang_of(process, limit))
+    }
+
+    fn hang_of(&self, process: usize, limit: Duration) -> Stall {
+        Stall::Hang {
+            process: self.roles.name(process).to_owned(),
+            limit,
+        }
+    }
+
+    /// Returns the processes to restart, which may be stuck: one that hangs alone; else first the source if it is late, and all but a live
+    /// source otherwise. When that does not help, all stages; `None` when that does not help either.
+    pub fn remedy(&mut self, stall: &Stall) -> Option<Vec<usize>> {
+        let roles = self.roles;
+        Some(match (self.watchdog.count(), stall) {
+            (1, Stall::Hang { process, .. }) => roles
+                .named(process)
+                .map_or_else(Vec::new, |process| roles.restarted_with(process)),
+            (1, Stall::Scan { .. }) => roles.sources(),
+            (1, _) => roles.all_but_survivors(&[]),
+            (2, _) => roles.stages().collect(),
+            _ => return None,
+        })
+    }
+}
+
 /// When the supervisor has looked for stalls.
-pub(crate) struct Looks {
+struct Looks {
     last: Instant,
     /// The last look at the heartbeats.
     at_heartbeats: Instant,
@@ -22,7 +136,7 @@ pub(crate) struct Looks {
 }
 
 impl Looks {
-    pub fn new() -> Self {
+    fn new() -> Self {
         let now = Instant::now();
         Self {
             last: now,
@@ -33,7 +147,7 @@ impl Looks {
 
     /// Returns whether this process itself was not run until a moment ago, as in a container that was frozen. Then all heartbeats
     /// are old.
-    fn is_resuming(&mut self, now: Instant) -> bool {
+    fn are_resuming(&mut self, now: Instant) -> bool {
         if now.duration_since(self.last) > RESUMED {
             self.resumes_until = Some(now + RESUMED);
         }
@@ -41,7 +155,7 @@ impl Looks {
         self.resumes_until.is_some_and(|end| now < end)
     }
 
-    fn is_time_for_heartbeats(&mut self, now: Instant) -> bool {
+    fn are_at_heartbeats(&mut self, now: Instant) -> bool {
         let is_time = now.duration_since(self.at_heartbeats) >= PERIOD;
         if is_time {
             self.at_heartbeats = now;
@@ -50,116 +164,78 @@ impl Looks {
     }
 }
 
-impl Supervisor<'_> {
-    /// Returns the stall of the stages, if there is one.
-    pub(crate) fn stall(&mut self) -> Option<Stall> {
-        let now = Instant::now();
-        if self.hangs.is_resuming(now) {
-            self.watchdog.restarted();
-            return None;
-        }
-        if self.hangs.is_time_for_heartbeats(now)
-            && let Some(limit) = self.plan.stall_timeout
-        {
-            self.end_hanging_followers(limit);
-            if let Some(hang) = self.hang(limit, limit) {
-                return Some(hang);
-            }
-        }
-        let opening = self.children.iter().filter(|child| {
-            child
-                .stage()
-                .is_some_and(|stage| !self.services.has_publisher(stage))
-        });
-        let starting = opening
-            .min_by_key(|child| child.started())
-            .map(|child| Starting {
-                stage: child.name(),
-                since: child.started(),
-            });
-        let stall = self.watchdog.look(&self.plan.manifest, starting)?;
-        let cause = match stall {
-            // What is owed has been waited for since some time after the process began to hang.
-            Stall::Pose { limit } | Stall::Scan { limit } => self.hang(limit / 2, limit),
-            _ => None,
-        };
-        Some(cause.unwrap_or(stall))
-    }
-
-    /// Returns the stage that has hung for longer than `since`.
-    fn hang(&self, since: Duration, limit: Duration) -> Option<Stall> {
-        let child = self.all().find(|i| self.hangs(*i, since))?;
-        Some(self.hang_of(child, limit))
-    }
-
-    fn hang_of(&self, child: usize, limit: Duration) -> Stall {
-        Stall::Hang {
-            process: self.children[child].name().to_owned(),
-            limit,
-        }
-    }
-
-    /// A stage that has not opened its topics is starting, and has a limit of its own.
-    fn hangs(&self, child: usize, since: Duration) -> bool {
-        let child = &self.children[child];
-        let is_starting = |stage| !self.services.has_publisher(stage);
-        let beat = child.heartbeat(&self.plan.manifest);
-        !child.is_known_to_have_exited()
-            && !child.stage().is_some_and(is_starting)
-            && beat.is_some_and(|beat| beat.hangs(since))
-    }
-
-    /// Ends followers that hang. That counts as a death: odometry goes on, with them or without.
-    fn end_hanging_followers(&mut self, limit: Duration) {
-        for i in 0..self.children.len() {
-            if self.children[i].follows() && self.hangs(i, limit) {
-                let hang = self.hang_of(i, limit);
-                (self.observe)(Event::Stalled(&hang));
-                self.children[i].kill();
-            }
-        }
-    }
-
-    /// Restarts the processes that may be stuck: one that hangs alone; else first the source if it is late, and all but a live source
-    /// otherwise. When that does not help, all stages; when that does not help either, the run ends.
-    pub(crate) fn recover_from_stall(&mut self, stall: Stall) -> Result<(), SuperviseError> {
-        let processes = match (self.watchdog.count(), &stall) {
-            (1, Stall::Hang { process, .. }) => self
-                .named(process)
-                .map_or_else(Vec::new, |child| self.restarted_with(child)),
-            (1, Stall::Scan { .. }) => self.sources(),
-            (1, _) => self.all_but_survivors(&[]),
-            (2, _) => self.all().collect(),
-            _ => return Err(SuperviseError::Stalled(stall)),
-        };
-        (self.observe)(Event::Stalled(&stall));
-        for i in &processes {
-            self.count_restart(*i);
-            if self.children[*i].is_on_trial() {
-                self.go_back(*i, &stall.to_string());
-            }
-        }
-        self.restart(&processes, clock::now_ns())
-    }
-
-    fn sources(&self) -> Vec<usize> {
-        let is_source = |i: &usize| self.children[*i].stage() == Some(StageId::RadarReplay);
-        (0..self.children.len()).filter(is_source).collect()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tests::{FOLLOWER, LIMIT, MASKING, REFINEMENT, SOURCE, plan};
+
+    /// Looks when the heartbeats are due and each of these processes has hung for a time.
+    fn found(stalls: &mut Stalls<'_>, hanging: &[usize], time: Duration) -> Found {
+        let now = stalls.looks.last + RESUMED;
+        let hangs = |process, since| hanging.contains(&process) && time > since;
+        stalls.look(now, hangs, None)
+    }
 
     #[test]
     fn heartbeats_say_nothing_for_a_moment_after_the_supervisor_was_not_run() {
         let mut looks = Looks::new();
         let start = Instant::now();
-        let mut is_resuming = |ms| looks.is_resuming(start + Duration::from_millis(ms));
-        assert!(!is_resuming(200) && !is_resuming(400));
-        assert!(is_resuming(60_000), "a minute is missing");
-        assert!(is_resuming(60_200));
-        assert!(!is_resuming(61_100));
+        let mut are_resuming = |ms| looks.are_resuming(start + Duration::from_millis(ms));
+        assert!(!are_resuming(200) && !are_resuming(400));
+        assert!(are_resuming(60_000), "a minute is missing");
+        assert!(are_resuming(60_200));
+        assert!(!are_resuming(61_100));
+    }
+
+    #[test]
+    fn a_stage_that_hangs_is_a_stall_and_a_follower_that_hangs_is_none() {
+        let plan = plan();
+        let mut stalls = Stalls::of(&plan);
+        assert_eq!(found(&mut stalls, &[MASKING], LIMIT / 2), Found::default());
+        let both = found(&mut stalls, &[MASKING, FOLLOWER], 2 * LIMIT);
+        let follower = stalls.hang_of(FOLLOWER, LIMIT);
+        assert_eq!(both.followers, [(FOLLOWER, follower.clone())]);
+        assert_eq!(both.stall, Some(stalls.hang_of(MASKING, LIMIT)));
+        let one = found(&mut stalls, &[FOLLOWER], 2 * LIMIT);
+        assert_eq!(
+            (one.followers, one.stall),
+            (vec![(FOLLOWER, follower)], None)
+        );
+    }
+
+    #[test]
+    fn heartbeats_are_looked_at_once_a_second() {
+        let plan = plan();
+        let mut stalls = Stalls::of(&plan);
+        found(&mut stalls, &[], LIMIT);
+        let now = stalls.looks.last + PERIOD / 2;
+        assert_eq!(stalls.look(now, |_, _| true, None), Found::default());
+    }
+
+    #[test]
+    fn a_stage_that_hangs_is_restarted_alone_then_all_are_and_then_the_run_ends() {
+        let plan = plan();
+        let mut stalls = Stalls::of(&plan);
+        let stall = stalls.hang_of(MASKING, LIMIT);
+        assert_eq!(stalls.remedy(&stall), Some(vec![MASKING]));
+        let all = vec![SOURCE, MASKING, REFINEMENT];
+        assert_eq!(stalls.remedy(&stall), Some(all));
+        assert_eq!(stalls.remedy(&stall), None);
+        stalls.progress(&Item::default());
+        assert_eq!(stalls.remedy(&stall), Some(vec![MASKING]), "after a pose");
+    }
+
+    #[test]
+    fn a_late_scan_is_the_sources_and_a_late_pose_not_that_of_a_live_source() {
+        let mut plan = plan();
+        plan.stages[SOURCE].outlives_restarts = true;
+        let mut stalls = Stalls::of(&plan);
+        let late = stalls.remedy(&Stall::Scan { limit: LIMIT });
+        assert_eq!(late, Some(vec![SOURCE]));
+        stalls.progress(&Item::default());
+        let late = stalls.remedy(&Stall::Pose { limit: LIMIT });
+        assert_eq!(late, Some(vec![MASKING, REFINEMENT]));
+        let late = stalls.remedy(&Stall::Pose { limit: LIMIT });
+        assert_eq!(late, Some(vec![SOURCE, MASKING, REFINEMENT]));
     }
 }

@@ -5,42 +5,42 @@ use std::time::{Duration, Instant};
 
 use gyre_stage::control::Answer;
 
-use crate::{Supervisor, socket::Client};
+use super::Swaps;
+use crate::{child::Child, processes::Processes, run::Run, socket::Client};
 
 /// Time for which a client waits for the first pose, from when the program has opened its topics. A radar may be switched off.
 const LIMIT: Duration = Duration::from_secs(10);
 
 /// A client that waits for the result.
-pub(crate) struct Trial {
+pub(super) struct Trial {
     /// The index of the process on trial.
-    child: usize,
+    process: usize,
     client: Client,
     /// When it was last seen without its topics.
     since: Instant,
 }
 
-impl Supervisor<'_> {
+impl Swaps {
     /// Lets the client of a swap wait. Of a follower no pose says what it does: so its swap is done when it is started.
-    pub(crate) fn await_trial(&mut self, child: usize, client: Client) {
-        if self.children[child].follows() {
+    pub fn await_trial(&mut self, process: usize, child: &Child, client: Client) {
+        if child.follows() {
             client.answer(&Answer::Done);
             return;
         }
         self.trial = Some(Trial {
-            child,
+            process,
             client,
             since: Instant::now(),
         });
     }
 
     /// Answers the client if the program has passed, or no scan has come for long.
-    pub(crate) fn continue_trial(&mut self) {
+    pub fn continue_trial(&mut self, processes: &Processes, run: &Run<'_>) {
         let Some(mut trial) = self.trial.take() else {
             return;
         };
-        let child = &self.children[trial.child];
-        let is_starting = |stage| !self.services.has_publisher(stage);
-        if child.stage().is_some_and(is_starting) {
+        let child = &processes[trial.process];
+        if run.is_starting(child) {
             trial.since = Instant::now();
         }
         match () {
@@ -57,20 +57,19 @@ impl Supervisor<'_> {
     }
 
     /// Tells the client that the program has failed, and the one before is started again.
-    pub(crate) fn fail_trial(&mut self, child: usize, command: &str, reason: &str) {
-        let is_of_it = |trial: &mut Trial| trial.child == child;
+    pub(super) fn fail_trial(&mut self, process: usize, name: &str, command: &str, reason: &str) {
+        let is_of_it = |trial: &mut Trial| trial.process == process;
         if let Some(trial) = self.trial.take_if(is_of_it) {
             trial.client.answer(&Answer::Refused(format!(
-                "{} goes on as before, since `{command}` has failed: {reason}",
-                self.children[child].name()
+                "{name} goes on as before, since `{command}` has failed: {reason}"
             )));
         }
     }
 
     /// Tells the client that the stream has ended before the first pose.
-    pub(crate) fn end_trial(&mut self) {
+    pub fn end_trial(&mut self, processes: &Processes) {
         if let Some(trial) = self.trial.take() {
-            let name = self.children[trial.child].name();
+            let name = processes[trial.process].name();
             trial.client.answer(&Answer::Untried(format!(
                 "{name} has taken over, but the run has ended before a scan went through it"
             )));

@@ -1,0 +1,105 @@
+//! The poses of a run, which say how far it is.
+
+use std::time::Instant;
+
+use gyre_messages::{Item, Pose, flag};
+use gyre_stage::{
+    Listener, Manifest, StageError,
+    reader::{Port, Received},
+    schedule,
+};
+
+use crate::run::Run;
+
+/// The reader of the poses.
+pub(crate) struct Poses {
+    port: Port<Pose>,
+    /// The item of the newest pose, and when it was seen.
+    newest: Option<Item>,
+    seen: Option<Instant>,
+}
+
+/// A message that says something new.
+pub(crate) enum News {
+    Pose(Received<Pose>),
+    /// The end of the stream.
+    End,
+}
+
+impl Poses {
+    pub fn of(run: &Run<'_>) -> Result<Self, StageError> {
+        Ok(Self {
+            port: Port::on(&run.node, run.manifest())?,
+            newest: None,
+            seen: None,
+        })
+    }
+
+    pub fn listener(&self) -> &Listener {
+        self.port.listener()
+    }
+
+    /// Returns the next new pose, or the end; `None` if nothing has come.
+    pub fn next(&mut self) -> Result<Option<News>, StageError> {
+        while let Some(received) = self.port.receive()? {
+            let item = *received.item();
+            if item.is(flag::END) {
+                return Ok(Some(News::End));
+            }
+            if is_new(self.newest.as_ref(), &item) {
+                (self.newest, self.seen) = (Some(item), Some(Instant::now()));
+                return Ok(Some(News::Pose(received)));
+            }
+        }
+        Ok(None)
+    }
+
+    pub fn newest_seq(&self) -> Option<u64> {
+        self.newest.map(|newest| newest.seq)
+    }
+
+    /// Returns the number of poses so far.
+    pub fn count(&self) -> u64 {
+        self.newest_seq().map_or(0, |newest| newest + 1)
+    }
+
+    /// Returns the number of scans that were dropped before the newest pose.
+    pub fn dropped(&self) -> u64 {
+        self.newest.map_or(0, |newest| newest.dropped())
+    }
+
+    /// Returns the time since the newest pose was seen, s.
+    pub fn age_s(&self) -> Option<f64> {
+        self.seen.map(|seen| seen.elapsed().as_secs_f64())
+    }
+
+    /// Returns whether a scan has been published whose pose is not there. Unknown counts as yes.
+    pub fn are_owed(&self, manifest: &Manifest) -> bool {
+        let poses = self.newest.map_or(0, |newest| newest.published + 1);
+        schedule::read(manifest).is_none_or(|source| source.published > poses)
+    }
+}
+
+/// Returns whether a pose is one that has not been seen. A restarted process sends its last ones again.
+fn is_new(newest: Option<&Item>, item: &Item) -> bool {
+    !item.is(flag::BASE) && newest.is_none_or(|newest| item.seq > newest.seq)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn poses_that_are_sent_again_are_not_new() {
+        let item = |seq, flags| Item {
+            seq,
+            flags,
+            ..Item::default()
+        };
+        assert!(is_new(None, &item(0, 0)));
+        assert!(!is_new(None, &item(7, flag::BASE)));
+        let newest = item(7, 0);
+        assert!(!is_new(Some(&newest), &item(7, 0)) && !is_new(Some(&newest), &item(3, 0)));
+        assert!(is_new(Some(&newest), &item(8, 0)));
+    }
+}

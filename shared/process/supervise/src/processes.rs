@@ -1,0 +1,161 @@
+//! The processes of a run: the stages in the order of the stream, then the followers.
+
+use std::{
+    collections::BTreeMap,
+    ops::{Index, IndexMut},
+    time::{Duration, Instant},
+};
+
+use gyre_messages::PoseHeader;
+use gyre_stage::wake;
+
+use crate::{
+    Event, SuperviseError, child::Child, guardian::Guardian, recovery::Recovery, roles::Roles,
+    run::Run, start::Place,
+};
+
+/// Time for stages to exit by themselves before they are killed.
+const STOP_TIMEOUT: Duration = Duration::from_secs(2);
+
+/// The processes, by their indices into the plan's stages.
+#[derive(Default)]
+pub(crate) struct Processes {
+    children: Vec<Child>,
+    restarts: BTreeMap<String, usize>,
+}
+
+/// The processes that have ended.
+pub(crate) struct Ended {
+    pub stages: Vec<usize>,
+    pub followers: Vec<usize>,
+}
+
+impl Index<usize> for Processes {
+    type Output = Child;
+
+    fn index(&self, process: usize) -> &Child {
+        &self.children[process]
+    }
+}
+
+impl IndexMut<usize> for Processes {
+    fn index_mut(&mut self, process: usize) -> &mut Child {
+        &mut self.children[process]
+    }
+}
+
+impl Processes {
+    /// Starts all processes of the plan.
+    pub fn start(&mut self, run: &mut Run<'_>) -> Result<(), SuperviseError> {
+        let plan = run.plan;
+        for stage in &plan.stages {
+            let child = Child::spawn(stage, &plan.manifest, &run.starter(), Place::Free)?;
+            run.say(Event::Started {
+                stage: &stage.name,
+                pid: child.pid(),
+            });
+            self.children.push(child);
+        }
+        Ok(())
+    }
+
+    pub fn len(&self) -> usize {
+        self.children.len()
+    }
+
+    pub fn iter(&self) -> impl Iterator<Item = &Child> {
+        self.children.iter()
+    }
+
+    /// Returns the processes that have ended.
+    pub fn ended(&mut self, roles: Roles<'_>) -> Ended {
+        let children = self.children.iter_mut().enumerate();
+        let ended = children.filter_map(|(i, child)| child.has_exited().then_some(i));
+        let (followers, stages) = ended.partition(|i| roles.follows(*i));
+        Ended { stages, followers }
+    }
+
+    /// Returns whether all stages have opened their topics.
+    pub fn are_ready(&self, run: &Run<'_>) -> bool {
+        let mut stages = self.iter().filter(|child| child.stage().is_some());
+        stages.all(|stage| !run.is_starting(stage))
+    }
+
+    /// Returns the stage that has been opening its topics for longest.
+    pub fn starting(&self, run: &Run<'_>) -> Option<&Child> {
+        let opening = self.iter().filter(|child| run.is_starting(child));
+        opening.min_by_key(|child| child.started())
+    }
+
+    /// Returns whether a process has not come to its next wait for longer than `since`. A stage that has not opened its topics is
+    /// starting, and has a limit of its own.
+    pub fn hangs(&self, process: usize, since: Duration, run: &Run<'_>) -> bool {
+        let child = &self[process];
+        let beat = child.heartbeat(run.manifest());
+        !child.is_known_to_have_exited()
+            && !run.is_starting(child)
+            && beat.is_some_and(|beat| beat.hangs(since))
+    }
+
+    /// Returns why one of these processes could not be started again, as far as that is known. Then it must not be ended.
+    pub fn why_not_again(&self, mut processes: impl Iterator<Item = usize>) -> Option<String> {
+        processes.find_map(|i| {
+            let (name, path) = (self[i].name(), self[i].changed_file()?.display());
+            Some(format!(
+                "{name} could not be started again, since {path} has changed; `gyre swap {name}` takes the new one"
+            ))
+        })
+    }
+
+    pub fn count_restart(&mut self, process: usize) {
+        let name = self[process].name().to_owned();
+        *self.restarts.entry(name).or_default() += 1;
+    }
+
+    pub fn restarts_of(&self, process: usize) -> usize {
+        let restarts = self.restarts.get(self[process].name());
+        restarts.copied().unwrap_or_default()
+    }
+
+    /// Returns the numbers of restarts by name.
+    pub fn into_restarts(self) -> BTreeMap<String, usize> {
+        self.restarts
+    }
+
+    /// Lets programs pass their trials that have worked on a pose since they took the place of others.
+    pub fn pass_trials(&mut self, pose: &PoseHeader, recovery: &Recovery) {
+        let on_trial = self.children.iter_mut().filter(|child| child.is_on_trial());
+        for child in on_trial {
+            let has_passed = match child.stage() {
+                Some(hop) => recovery.has_worked(hop, pose),
+                // No pose says what a follower has done.
+                None => child.has_outlived_its_window(),
+            };
+            if has_passed {
+                child.pass_trial();
+            }
+        }
+    }
+
+    /// Kills these processes, and waits for their end.
+    pub fn kill(&mut self, processes: &[usize], guardian: &Guardian) -> Result<(), SuperviseError> {
+        processes.iter().for_each(|i| self[*i].kill());
+        for i in processes {
+            self[*i].await_end()?;
+            guardian.forget(self[*i].pid());
+        }
+        Ok(())
+    }
+
+    /// Stops all processes, and kills those that do not exit in time.
+    pub fn stop(&mut self, run: &mut Run<'_>) -> Result<(), SuperviseError> {
+        self.children.iter().for_each(Child::terminate);
+        let deadline = Instant::now() + STOP_TIMEOUT;
+        while Instant::now() < deadline && !self.children.iter_mut().all(Child::has_exited) {
+            run.sleep(wake::MAX_WAIT)?;
+            run.say(Event::Watched);
+        }
+        let all: Vec<usize> = (0..self.len()).collect();
+        self.kill(&all, &run.guardian)
+    }
+}

@@ -1,0 +1,225 @@
+//! Restarts: what is done after a death or a stall, as the parts of the supervisor have decided.
+
+use std::time::{Duration, Instant};
+
+use gyre_stage::clock;
+
+use crate::{
+    Event, Stall, SuperviseError,
+    child::{Child, Death},
+    followers::Patience,
+    recovery::restarted_after,
+    supervisor::Supervisor,
+    watchdog::Starting,
+};
+
+impl Supervisor<'_> {
+    /// Restarts dead stages, or all stages if that alone would not help.
+    pub(crate) fn recover(&mut self, dead: &[usize]) -> Result<(), SuperviseError> {
+        let died_ns = clock::now_ns();
+        let failure = self.may_restart(dead)?;
+        let blamed = failure.map_or_else(Vec::new, |failure| self.blame_trial(dead, &failure));
+        let newest = self.poses.newest_seq();
+        let died_without_progress = |i: usize| self.processes[i].died_without_progress(newest);
+        let stages = [dead, &blamed].concat();
+        let restarted = restarted_after(&stages, self.run.roles(), died_without_progress);
+        self.restart(&restarted, died_ns)
+    }
+
+    /// Goes back to the programs before those that are on trial while another stage fails: what they sent may be the cause. Returns them.
+    fn blame_trial(&mut self, dead: &[usize], failure: &str) -> Vec<usize> {
+        let is_blamed = |i: &usize| self.processes[*i].is_on_trial() && !dead.contains(i);
+        let mut blamed: Vec<usize> = self.run.roles().stages().filter(is_blamed).collect();
+        blamed.retain(|i| self.go_back(*i, failure));
+        blamed
+    }
+
+    /// Counts deaths against the restart policies, and waits for the longest backoff. Returns a sentence about one that was a failure of a
+    /// program which is not on trial.
+    fn may_restart(&mut self, dead: &[usize]) -> Result<Option<String>, SuperviseError> {
+        let (mut backoff, mut failure) = (Duration::ZERO, None);
+        for i in dead {
+            let child = &mut self.processes[*i];
+            let death = child.death();
+            self.run.say(Event::Died {
+                stage: child.name(),
+                death: &death,
+            });
+            if !death.killed {
+                backoff = backoff.max(child.backoff());
+                if !child.is_on_trial() {
+                    failure = Some(format!("{} died after it: {death}", child.name()));
+                }
+            }
+            self.require_restart(*i, &death)?;
+            self.processes.count_restart(*i);
+        }
+        self.run.pause(backoff)?;
+        Ok(failure)
+    }
+
+    /// Checks whether a dead process may be started again, by its policy. One that has taken the place of another gives way to it first.
+    fn require_restart(&mut self, process: usize, death: &Death) -> Result<(), SuperviseError> {
+        if self.processes[process].is_on_trial() && self.go_back(process, &death.to_string()) {
+            return Ok(());
+        }
+        match self.processes[process].may_restart(death) {
+            Err(error) if self.go_back(process, &error.to_string()) => Ok(()),
+            may_restart => may_restart,
+        }
+    }
+
+    /// Goes back to the program before a swap, from the next start on; false if there was none.
+    fn go_back(&mut self, process: usize, reason: &str) -> bool {
+        let begun = &self.run.plan.stages[process];
+        let child = &mut self.processes[process];
+        let poses = self.poses.count();
+        let has_gone_back = self.swaps.go_back(process, child, begun, reason, poses);
+        if has_gone_back {
+            let stage = &begun.name;
+            self.run.say(Event::WentBack { stage, reason });
+        }
+        has_gone_back
+    }
+
+    pub(crate) fn restart(
+        &mut self,
+        processes: &[usize],
+        died_ns: i64,
+    ) -> Result<(), SuperviseError> {
+        self.replace(processes, died_ns, None)?;
+        self.stalls.restarted();
+        self.say_restarted(processes);
+        Ok(())
+    }
+
+    fn say_restarted(&mut self, processes: &[usize]) {
+        let only = match processes {
+            [process] => Some(self.processes[*process].name()),
+            _ => None,
+        };
+        self.run.say(Event::Restarted { only });
+    }
+
+    /// Ends processes and starts others in their places; in one of them a process that stood by goes on.
+    pub(crate) fn replace(
+        &mut self,
+        processes: &[usize],
+        died_ns: i64,
+        mut successor: Option<(usize, Child)>,
+    ) -> Result<(), SuperviseError> {
+        self.processes.kill(processes, &self.run.guardian)?;
+        let all_dead = processes.len() == self.processes.len() && successor.is_none();
+        self.run.remove_dead(all_dead)?;
+        for i in processes {
+            match successor.take_if(|(place, _)| place == i) {
+                Some((_, successor)) => {
+                    let newest = self.poses.newest_seq();
+                    self.processes[*i].succeed(successor, newest);
+                }
+                None => self.respawn(*i)?,
+            }
+            if let Some(hop) = self.processes[*i].stage() {
+                self.recovery.begins(hop, died_ns);
+            }
+        }
+        Ok(())
+    }
+
+    /// Starts a process again. If its program cannot be started, and has taken the place of another one, that one is.
+    fn respawn(&mut self, process: usize) -> Result<(), SuperviseError> {
+        let newest = self.poses.newest_seq();
+        loop {
+            let (manifest, starter) = (self.run.manifest(), self.run.starter());
+            match self.processes[process].respawn(manifest, &starter, newest) {
+                Err(error) if error.is_of_one_process() => {
+                    let reason = error.to_string();
+                    if !self.go_back(process, &reason) {
+                        return Err(error);
+                    }
+                    self.processes[process].note_death(reason);
+                }
+                respawned => return respawned,
+            }
+        }
+    }
+
+    /// Looks for stalls, and restarts what may be stuck.
+    pub(crate) fn look_for_stalls(&mut self) -> Result<(), SuperviseError> {
+        let (processes, run) = (&self.processes, &self.run);
+        let starting = processes.starting(run).map(|child| Starting {
+            stage: child.name(),
+            since: child.started(),
+        });
+        let hangs = |process, since| processes.hangs(process, since, run);
+        let found = self.stalls.look(Instant::now(), hangs, starting);
+        for (follower, hang) in found.followers {
+            // It counts as a death.
+            self.run.say(Event::Stalled(&hang));
+            self.processes[follower].kill();
+        }
+        found
+            .stall
+            .map_or(Ok(()), |stall| self.recover_from_stall(stall))
+    }
+
+    fn recover_from_stall(&mut self, stall: Stall) -> Result<(), SuperviseError> {
+        let Some(processes) = self.stalls.remedy(&stall) else {
+            return Err(SuperviseError::Stalled(stall));
+        };
+        self.run.say(Event::Stalled(&stall));
+        for i in &processes {
+            self.processes.count_restart(*i);
+            if self.processes[*i].is_on_trial() {
+                self.go_back(*i, &stall.to_string());
+            }
+        }
+        self.restart(&processes, clock::now_ns())
+    }
+
+    /// Restarts dead followers that are not at their end. The stages do not notice, and one that cannot be restarted does not end them.
+    pub(crate) fn recover_followers(&mut self, dead: &[usize]) -> Result<(), SuperviseError> {
+        let mut dead = dead.to_vec();
+        dead.retain(|i| self.followers.is_behind(*i));
+        for follower in dead {
+            match self.recover_follower(follower) {
+                Err(error) if error.is_of_one_process() => {
+                    self.run.say(Event::GaveUp {
+                        follower: self.processes[follower].name(),
+                        error: &error,
+                    });
+                    self.followers.give_up(follower, error);
+                }
+                recovered => recovered?,
+            }
+        }
+        Ok(())
+    }
+
+    fn recover_follower(&mut self, dead: usize) -> Result<(), SuperviseError> {
+        let died_ns = clock::now_ns();
+        self.may_restart(&[dead])?;
+        self.replace(&[dead], died_ns, None)?;
+        self.say_restarted(&[dead]);
+        Ok(())
+    }
+
+    /// Says how far a follower is, and ends one that has stayed there for too long: it is then started again as after a death.
+    pub(crate) fn end_stuck_follower(&mut self, follower: usize) -> Result<(), SuperviseError> {
+        let child = &mut self.processes[follower];
+        let progress = self.followers.progress_of(follower);
+        self.run.say(Event::Following {
+            follower: child.name(),
+            progress,
+        });
+        match self.followers.judge(follower, progress, child.started()) {
+            Patience::Wait => Ok(()),
+            Patience::GiveUp(stall) => Err(SuperviseError::Stalled(stall)),
+            Patience::End(stall) => {
+                self.run.say(Event::Stalled(&stall));
+                child.kill();
+                child.await_end()
+            }
+        }
+    }
+}

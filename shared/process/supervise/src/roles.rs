@@ -1,0 +1,97 @@
+//! The roles of a run's processes, by the plan: which of them a restart concerns. Processes are indices into the plan's stages.
+
+use gyre_messages::{FollowerId, StageId};
+
+use crate::{Plan, StagePlan};
+
+/// The roles of all processes. A swap does not change them.
+#[derive(Clone, Copy)]
+pub(crate) struct Roles<'a>(&'a [StagePlan]);
+
+impl<'a> Roles<'a> {
+    pub fn of(plan: &'a Plan) -> Self {
+        Self(&plan.stages)
+    }
+
+    pub fn name(self, process: usize) -> &'a str {
+        &self.0[process].name
+    }
+
+    /// Returns whether a process is a follower, and not in the stream.
+    pub fn follows(self, process: usize) -> bool {
+        FollowerId::by_name(self.name(process)).is_some()
+    }
+
+    /// Returns the process of this name.
+    pub fn named(self, name: &str) -> Option<usize> {
+        self.0.iter().position(|plan| plan.name == name)
+    }
+
+    pub fn names(self) -> impl Iterator<Item = &'a str> {
+        self.0.iter().map(|plan| plan.name.as_str())
+    }
+
+    /// Returns all stages.
+    pub fn stages(self) -> impl Iterator<Item = usize> {
+        (0..self.0.len()).filter(move |process| !self.follows(*process))
+    }
+
+    /// Returns all followers.
+    pub fn followers(self) -> impl Iterator<Item = usize> {
+        (0..self.0.len()).filter(move |process| self.follows(*process))
+    }
+
+    /// Returns the first stage of the stream.
+    pub fn sources(self) -> Vec<usize> {
+        let is_source = |name| StageId::by_name(name) == Some(StageId::RadarReplay);
+        let all = 0..self.0.len();
+        all.filter(|process| is_source(self.name(*process)))
+            .collect()
+    }
+
+    /// Returns all stages except those that are alive and outlive restarts.
+    pub fn all_but_survivors(self, dead: &[usize]) -> Vec<usize> {
+        let survives = |i: &usize| self.0[*i].outlives_restarts && !dead.contains(i);
+        self.stages().filter(|i| !survives(i)).collect()
+    }
+
+    /// Returns whether the restart of a process alone does not recover its state.
+    pub fn restarts_all(self, process: usize) -> bool {
+        self.0[process].restarts_all
+    }
+
+    /// Returns the processes to restart with one of them: itself, or all stages if its restart alone does not recover its state.
+    pub fn restarted_with(self, process: usize) -> Vec<usize> {
+        match self.restarts_all(process) {
+            true => self.all_but_survivors(&[process]),
+            false => vec![process],
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::{FOLLOWER, MASKING, REFINEMENT, SOURCE, plan};
+
+    #[test]
+    fn a_restart_of_all_spares_a_living_live_source_and_the_followers() {
+        let mut plan = plan();
+        let all = |plan: &Plan, dead: &[usize]| Roles::of(plan).all_but_survivors(dead);
+        assert_eq!(all(&plan, &[]), [SOURCE, MASKING, REFINEMENT]);
+        plan.stages[SOURCE].outlives_restarts = true;
+        assert_eq!(all(&plan, &[MASKING]), [MASKING, REFINEMENT]);
+        assert_eq!(all(&plan, &[SOURCE]), [SOURCE, MASKING, REFINEMENT]);
+        assert!(Roles::of(&plan).follows(FOLLOWER));
+    }
+
+    #[test]
+    fn a_process_is_restarted_alone_unless_that_does_not_recover_its_state() {
+        let mut plan = plan();
+        assert_eq!(Roles::of(&plan).restarted_with(MASKING), [MASKING]);
+        plan.stages[MASKING].restarts_all = true;
+        let all = [SOURCE, MASKING, REFINEMENT];
+        assert_eq!(Roles::of(&plan).restarted_with(MASKING), all);
+        assert_eq!(Roles::of(&plan).restarted_with(FOLLOWER), [FOLLOWER]);
+    }
+}

@@ -1,0 +1,134 @@
+//! The run that is supervised: what all parts of the supervisor share.
+
+use std::{
+    path::Path,
+    time::{Duration, Instant},
+};
+
+use gyre_stage::{
+    Manifest, StageError,
+    run::close_to_others,
+    services::{self, Node, Services},
+    wake::{self, Signals},
+};
+use iceoryx2::prelude::{Config, FilePath, SemanticString};
+
+use crate::{
+    Event, Plan, SuperviseError, child::Child, clean, guardian::Guardian, roles::Roles,
+    start::Starter, wake_limit::WakeLimit,
+};
+
+/// The plan of a run, and what its processes need to be started, to be seen and to be cleaned up after.
+pub(crate) struct Run<'a> {
+    pub plan: &'a Plan,
+    observe: &'a mut dyn FnMut(Event<'_>),
+    pub since: Instant,
+    /// Outlives the stages, which it cares for.
+    pub guardian: Guardian,
+    _wake_limit: Option<WakeLimit>,
+    // Dropped in this order: services, node.
+    services: Services,
+    pub node: Node,
+    transport: Config,
+    pub signals: Signals,
+}
+
+impl<'a> Run<'a> {
+    /// Creates the services, which exist as long as this value.
+    pub fn new(
+        plan: &'a Plan,
+        signals: Signals,
+        observe: &'a mut dyn FnMut(Event<'_>),
+    ) -> Result<Self, SuperviseError> {
+        let manifest = &plan.manifest;
+        let transport = manifest.transport()?;
+        use_as_global(&manifest.root.join("iox.toml"))?;
+        let node = services::node(&transport, "supervisor")?;
+        close_to_others(&manifest.prefix)
+            .map_err(|e| StageError::transport("close shared memory to other users", e))?;
+        let services = Services::create(&node, &manifest.window)?;
+        Ok(Self {
+            plan,
+            observe,
+            since: Instant::now(),
+            guardian: Guardian::start(&plan.guardian, manifest)?,
+            _wake_limit: plan.cpu_wake_us.map(WakeLimit::hold).transpose()?,
+            services,
+            node,
+            transport,
+            signals,
+        })
+    }
+
+    pub fn manifest(&self) -> &'a Manifest {
+        &self.plan.manifest
+    }
+
+    pub fn roles(&self) -> Roles<'a> {
+        Roles::of(self.plan)
+    }
+
+    pub fn starter(&self) -> Starter<'_> {
+        Starter::new(&self.signals, &self.guardian)
+    }
+
+    /// Reports an event.
+    pub fn say(&mut self, event: Event<'_>) {
+        (self.observe)(event);
+    }
+
+    /// Returns whether a process is a stage that has not opened its topics.
+    pub fn is_starting(&self, child: &Child) -> bool {
+        let stage = child.stage();
+        stage.is_some_and(|stage| !self.services.has_publisher(stage))
+    }
+
+    /// Sleeps until a process ends, or `limit` has passed; true on a request to stop.
+    pub fn sleep(&self, limit: Duration) -> Result<bool, SuperviseError> {
+        Ok(self.signals.sleep(limit)?)
+    }
+
+    /// Lets time pass. A request to stop, or a process that dies meanwhile, is found afterwards.
+    pub fn pause(&mut self, time: Duration) -> Result<(), SuperviseError> {
+        let end = Instant::now() + time;
+        while let Some(rest) = end.checked_duration_since(Instant::now()) {
+            if self.sleep(rest.min(wake::MAX_WAIT))? {
+                break;
+            }
+            self.say(Event::Watched);
+        }
+        Ok(())
+    }
+
+    /// Removes all that dead processes have left in the transport.
+    pub fn remove_dead(&self, all_dead: bool) -> Result<(), SuperviseError> {
+        clean::remove_dead(self.manifest(), &self.transport, all_dead)
+    }
+
+    /// Removes all that dead observers have left there.
+    pub fn remove_dead_observers(&self) -> Result<(), SuperviseError> {
+        clean::remove_dead_observers(self.manifest(), &self.transport)
+    }
+
+    /// Replaces a guardian that somebody has killed. If there is no room for a process it is tried again at the next wake-up.
+    pub fn keep_guardian(&mut self, groups: impl Iterator<Item = u32>) {
+        if self.guardian.has_ended()
+            && let Ok(guardian) = Guardian::start(&self.plan.guardian, &self.plan.manifest)
+        {
+            self.guardian = guardian;
+            groups.for_each(|group| self.guardian.remember(group));
+        }
+    }
+}
+
+/// Makes the run's configuration of the transport the global one, which the transport uses to clean up incomplete nodes.
+fn use_as_global(path: &Path) -> Result<(), StageError> {
+    let failed = |reason: String| StageError::Manifest {
+        path: path.to_owned(),
+        reason,
+    };
+    let file =
+        FilePath::new(path.as_os_str().as_encoded_bytes()).map_err(|e| failed(format!("{e:?}")))?;
+    Config::setup_global_config_from_file(&file).map_err(|e| failed(format!("{e:?}")))?;
+    Ok(())
+}

@@ -1,0 +1,217 @@
+//! The loop of the supervisor. Its parts look at what has happened and decide; what they have decided is done in `restarts` and
+//! `requests`.
+
+use std::collections::BTreeMap;
+
+use gyre_stage::{
+    StageCounters,
+    wake::{self, Signals},
+};
+
+use crate::{
+    Ending, Event, Plan, Report, SuperviseError,
+    child::Child,
+    followers::Followers,
+    log::Logs,
+    observers::Sweep,
+    poses::{News, Poses},
+    processes::{Ended, Processes},
+    recorder::Recorder,
+    recovery::Recovery,
+    run::Run,
+    socket::ControlSocket,
+    stall::Stalls,
+    swaps::Swaps,
+};
+
+/// Runs all stages of `plan` until the stream ends, a signal requests a stop, or restarts do not help.
+///
+/// Install the signals before acquiring the run's root. A signal in between would otherwise end the process without cleanup.
+///
+/// # Errors
+/// A stage that cannot be started or fails too often, a stall, or a failure of the transport.
+pub fn supervise(
+    plan: &Plan,
+    signals: Signals,
+    observe: &mut dyn FnMut(Event<'_>),
+) -> Result<Report, SuperviseError> {
+    iceoryx2::prelude::set_log_level(iceoryx2::prelude::LogLevel::Fatal);
+    let mut supervisor = Supervisor::new(plan, signals, observe)?;
+    let ending = supervisor.start().and_then(|()| supervisor.watch());
+    supervisor.stop(ending.as_ref().ok().copied())?;
+    Ok(supervisor.report(ending?))
+}
+
+/// The parts of the supervisor.
+pub(crate) struct Supervisor<'a> {
+    pub processes: Processes,
+    /// No stage, and no follower.
+    pub recorder: Option<Recorder>,
+    pub poses: Poses,
+    pub recovery: Recovery,
+    pub stalls: Stalls<'a>,
+    pub followers: Followers<'a>,
+    pub swaps: Swaps,
+    pub socket: ControlSocket,
+    observers: Sweep,
+    logs: Logs,
+    /// True when all stages have opened their topics once.
+    is_ready: bool,
+    // Last: the processes end before their guardian, and the ports before their node.
+    pub run: Run<'a>,
+}
+
+impl<'a> Supervisor<'a> {
+    fn new(
+        plan: &'a Plan,
+        signals: Signals,
+        observe: &'a mut dyn FnMut(Event<'_>),
+    ) -> Result<Self, SuperviseError> {
+        let run = Run::new(plan, signals, observe)?;
+        Ok(Self {
+            processes: Processes::default(),
+            recorder: None,
+            poses: Poses::of(&run)?,
+            recovery: Recovery::default(),
+            stalls: Stalls::of(plan),
+            followers: Followers::of(plan),
+            swaps: Swaps::default(),
+            socket: ControlSocket::open(&plan.manifest)?,
+            observers: Sweep::new(),
+            logs: Logs::of(plan),
+            is_ready: false,
+            run,
+        })
+    }
+
+    fn start(&mut self) -> Result<(), SuperviseError> {
+        self.recorder = Recorder::start(&mut self.run)?;
+        self.processes.start(&mut self.run)
+    }
+
+    fn watch(&mut self) -> Result<Ending, SuperviseError> {
+        loop {
+            if self.sleep()? || self.serve()? {
+                return Ok(Ending::Interrupted);
+            }
+            if self.read_poses()? {
+                return self.await_followers();
+            }
+            self.swaps.continue_trial(&self.processes, &self.run);
+            self.continue_swap()?;
+            self.report_readiness();
+            self.keep_house()?;
+            let own = self.processes.len() + 1 + usize::from(self.recorder.is_some());
+            self.observers.run_if_due(&self.run, own);
+            let Ended { stages, followers } = self.processes.ended(self.run.roles());
+            self.recover_followers(&followers)?;
+            match stages.is_empty() {
+                true => self.look_for_stalls()?,
+                false => self.recover(&stages)?,
+            }
+        }
+    }
+
+    /// Waits until the followers have read the logs to their end, or until they have that do not read what one writes that dies again
+    /// and again. The stream has ended, so the death of a stage changes nothing.
+    fn await_followers(&mut self) -> Result<Ending, SuperviseError> {
+        self.followers.begin_to_be_awaited();
+        // The last pose may have been the first of a program on trial.
+        self.swaps.continue_trial(&self.processes, &self.run);
+        self.swaps.end_trial(&self.processes);
+        if let Some((standby, reason)) = self.swaps.end() {
+            self.give_up(standby, reason);
+        }
+        loop {
+            let mut behind = self.followers.behind();
+            let Some(first) = behind.first() else {
+                return self.followers.end();
+            };
+            self.end_stuck_follower(*first)?;
+            if self.sleep()? || self.serve()? {
+                return Ok(Ending::Interrupted);
+            }
+            self.run.say(Event::Watched);
+            self.keep_house()?;
+            behind.retain(|i| self.processes[*i].has_exited());
+            self.recover_followers(&behind)?;
+        }
+    }
+
+    /// Sleeps until there is a pose, a request or a dead process; true on a request to stop.
+    fn sleep(&self) -> Result<bool, SuperviseError> {
+        let (poses, requests) = (self.poses.listener(), self.socket.descriptor());
+        let woken =
+            self.run
+                .signals
+                .wait_or_readable(&[poses], &[], Some(requests), wake::MAX_WAIT)?;
+        Ok(woken.stop)
+    }
+
+    /// Reads the new poses; true at the end of the stream.
+    fn read_poses(&mut self) -> Result<bool, SuperviseError> {
+        while let Some(news) = self.poses.next()? {
+            let News::Pose(received) = news else {
+                return Ok(true);
+            };
+            let pose = received.header();
+            self.stalls.progress(&pose.item);
+            self.processes.pass_trials(pose, &self.recovery);
+            self.recovery.see(pose);
+            self.run.say(Event::Pose(pose));
+        }
+        Ok(false)
+    }
+
+    fn report_readiness(&mut self) {
+        if !self.is_ready && self.processes.are_ready(&self.run) {
+            self.is_ready = true;
+            self.run.say(Event::Ready);
+        }
+        self.run.say(Event::Watched);
+    }
+
+    /// Keeps the logs short, and the processes alive that nothing depends on.
+    fn keep_house(&mut self) -> Result<(), SuperviseError> {
+        self.logs.bound_if_due();
+        let standby = self.swaps.pid();
+        let others = standby
+            .into_iter()
+            .chain(self.recorder.as_ref().map(Recorder::pid));
+        let living = self.processes.iter().map(Child::pid).chain(others);
+        self.run.keep_guardian(living);
+        match &mut self.recorder {
+            Some(recorder) => recorder.keep(&mut self.run, self.poses.newest_seq()),
+            None => Ok(()),
+        }
+    }
+
+    fn stop(&mut self, ending: Option<Ending>) -> Result<(), SuperviseError> {
+        self.run.say(Event::Stopping);
+        self.swaps.end_trial(&self.processes);
+        if let Some(recorder) = &mut self.recorder {
+            recorder.stop(&mut self.run, ending)?;
+        }
+        self.processes.stop(&mut self.run)?;
+        self.logs.bound();
+        Ok(())
+    }
+
+    fn report(self, ending: Ending) -> Report {
+        Report {
+            ending,
+            restarts: self.processes.into_restarts(),
+            recovery: self.recovery.into_times(),
+            counters: counters(self.run.plan),
+            swaps: self.swaps.into_done(),
+        }
+    }
+}
+
+/// Reads the counters of the stages that exited cleanly, by name.
+fn counters(plan: &Plan) -> BTreeMap<String, StageCounters> {
+    let names = plan.stages.iter().map(|stage| &stage.name);
+    names
+        .filter_map(|name| Some((name.clone(), StageCounters::of(&plan.manifest, name)?)))
+        .collect()
+}

@@ -1,0 +1,288 @@
+//! Swaps: another program takes the place of a stage while the run goes on.
+//!
+//! The new program first stands by: it loads what it needs while the one before works. It takes over when no scan is in flight, if
+//! there is such a moment, and a restart of the stage is all that the others see. (Masking in live mode alone knows which scans it has
+//! admitted: if there are some without a pose, the others are restarted with it.) A program that fails before its first pose, or too
+//! often later, is given up, and the one before is started again.
+
+mod trial;
+
+use std::{
+    fs,
+    time::{Duration, Instant},
+};
+
+use gyre_stage::{
+    Manifest,
+    control::{Answer, Swap},
+    run,
+};
+
+use crate::{
+    StagePlan, SuperviseError, Swapped, child::Child, program::Program, run::Run, socket::Client,
+    start::Place,
+};
+use trial::Trial;
+
+/// Time for which a moment without a scan in flight is waited for. At the highest rate there is none.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+const ENDED: &str = "the stream has ended";
+
+/// The swaps of a run: at most one at a time.
+#[derive(Default)]
+pub(crate) struct Swaps {
+    /// The program that stands by to take the place of another one.
+    standby: Option<Standby>,
+    /// Who waits for a program that has taken over to prove itself.
+    trial: Option<Trial>,
+    done: Vec<Swapped>,
+}
+
+/// A program that stands by.
+pub(crate) struct Standby {
+    /// The index of the process whose place it is to take.
+    pub process: usize,
+    child: Child,
+    client: Client,
+    since: Instant,
+    ready: Option<Instant>,
+}
+
+/// What is to be done about the program that stands by.
+pub(crate) enum Step {
+    Wait,
+    TakeOver(Standby),
+    /// It cannot take over, and why.
+    GiveUp(Standby, String),
+}
+
+impl Swaps {
+    /// Returns why no swap can begin now.
+    pub fn why_not_now(&self, has_ended: bool) -> Option<&'static str> {
+        match () {
+            () if has_ended => Some(ENDED),
+            () if self.standby.is_some() || self.trial.is_some() => {
+                Some("another program is taking over: wait until its first pose")
+            }
+            () => None,
+        }
+    }
+
+    /// Starts a program that is to take the place of a process. The client has its answer when that has done so, and has worked on a
+    /// first pose.
+    pub fn begin(
+        &mut self,
+        process: usize,
+        plan: &StagePlan,
+        client: Client,
+        run: &Run<'_>,
+    ) -> Result<(), SuperviseError> {
+        let manifest = run.manifest();
+        let _ = fs::remove_file(run::ready_file(&manifest.root, &plan.name));
+        match Child::spawn(plan, manifest, &run.starter(), Place::Taken) {
+            Ok(child) => {
+                self.standby = Some(Standby {
+                    process,
+                    child,
+                    client,
+                    since: Instant::now(),
+                    ready: None,
+                });
+            }
+            Err(error) if error.is_of_one_process() => {
+                client.answer(&Answer::Refused(error.to_string()));
+            }
+            Err(error) => return Err(error),
+        }
+        Ok(())
+    }
+
+    /// Looks after the program that stands by. `is_in_flight` says whether a scan lacks its pose.
+    pub fn step(&mut self, run: &Run<'_>, is_in_flight: impl FnOnce() -> bool) -> Step {
+        let Some(mut standby) = self.standby.take() else {
+            return Step::Wait;
+        };
+        if let Some(reason) = standby.why_not() {
+            return Step::GiveUp(standby, reason);
+        }
+        let name = standby.child.name();
+        let is_ready = run::ready_file(&run.manifest().root, name).exists();
+        if is_ready && standby.ready.is_none() {
+            standby.ready = Some(Instant::now());
+        }
+        let ready = standby.ready.map(|ready| ready.elapsed());
+        let limit = run.plan.start_timeout;
+        match judge(ready, standby.since.elapsed(), limit, is_in_flight) {
+            Judged::TooLate => Step::GiveUp(
+                standby,
+                "it did not get ready to take over (run.start_timeout_s); start a program that cannot stand by with --cold"
+                    .to_owned(),
+            ),
+            Judged::Now => Step::TakeOver(standby),
+            Judged::Later => {
+                self.standby = Some(standby);
+                Step::Wait
+            }
+        }
+    }
+
+    /// Takes back the program that stands by, since the stream has ended.
+    pub fn end(&mut self) -> Option<(Standby, &'static str)> {
+        let standby = self.standby.take()?;
+        Some((standby, ENDED))
+    }
+
+    /// Returns the process that stands by.
+    pub fn pid(&self) -> Option<u32> {
+        self.standby.as_ref().map(|standby| standby.child.pid())
+    }
+
+    /// Records that a program has taken the place of another one.
+    pub fn has_swapped(&mut self, plan: &StagePlan, after_poses: u64) {
+        self.done.push(Swapped {
+            stage: plan.name.clone(),
+            command: plan.command.clone(),
+            after_poses,
+        });
+    }
+
+    /// Goes back to the program before a swap, or to `begun`, that of the run's begin, from the next start on; false if there is none.
+    pub fn go_back(
+        &mut self,
+        process: usize,
+        child: &mut Child,
+        begun: &StagePlan,
+        reason: &str,
+        after_poses: u64,
+    ) -> bool {
+        let failed = child.plan().command.join(" ");
+        let has_gone_back = child.go_back(begun);
+        if has_gone_back {
+            self.fail_trial(process, child.name(), &failed, reason);
+            self.has_swapped(child.plan(), after_poses);
+        }
+        has_gone_back
+    }
+
+    /// Returns the programs that have taken the place of others, in order.
+    pub fn into_done(self) -> Vec<Swapped> {
+        self.done
+    }
+}
+
+impl Standby {
+    /// Returns why it cannot take over any more.
+    fn why_not(&mut self) -> Option<String> {
+        if self.child.has_exited() {
+            let death = self.child.death();
+            let output = death
+                .last_output
+                .map_or(String::new(), |line| format!(" ({line})"));
+            return Some(format!("it ended by {}{output}", death.cause));
+        }
+        let has_gone = self.client.has_gone();
+        has_gone.then(|| "who has asked for it has gone".to_owned())
+    }
+
+    /// Lets it take over: returns its process, and who waits for the result.
+    pub fn into_parts(self, manifest: &Manifest) -> (Child, Client) {
+        let _ = fs::remove_file(run::ready_file(&manifest.root, self.child.name()));
+        (self.child, self.client)
+    }
+
+    /// Tells the client why it cannot take over, and ends the program. Returns the process that it was.
+    pub fn give_up(self, reason: &str) -> u32 {
+        let name = self.child.name();
+        let command = self.child.plan().command.join(" ");
+        let sentence =
+            format!("{name} goes on as before, since `{command}` cannot take over: {reason}");
+        self.client.answer(&Answer::Refused(sentence));
+        // Its end is waited for.
+        self.child.pid()
+    }
+}
+
+/// When a program that stands by takes over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Judged {
+    Now,
+    Later,
+    TooLate,
+}
+
+/// Judges a program that has stood by for some time, and has been ready for some of it, if at all.
+fn judge(
+    ready: Option<Duration>,
+    stood_by: Duration,
+    limit: Option<Duration>,
+    is_in_flight: impl FnOnce() -> bool,
+) -> Judged {
+    match ready {
+        None if limit.is_some_and(|limit| stood_by > limit) => Judged::TooLate,
+        Some(ready) if !is_in_flight() || ready > PATIENCE => Judged::Now,
+        _ => Judged::Later,
+    }
+}
+
+/// Returns the plan of a process after a swap.
+pub(crate) fn plan_of(begun: &StagePlan, swap: &Swap) -> StagePlan {
+    match &swap.command {
+        None => begun.clone(),
+        Some(command) => StagePlan {
+            command: command.clone(),
+            programs: Program::all_of(command, Some(&swap.directory)),
+            directory: Some(swap.directory.clone()),
+            ..begun.clone()
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::{MASKING, plan};
+
+    #[test]
+    fn a_ready_program_takes_over_between_scans_or_when_there_is_no_such_moment() {
+        let (moment, long) = (Duration::from_millis(1), 2 * PATIENCE);
+        let limit = Some(Duration::from_secs(60));
+        let ready = |ready, is_in_flight| judge(Some(ready), long, limit, || is_in_flight);
+        assert_eq!(ready(moment, true), Judged::Later);
+        assert_eq!(ready(moment, false), Judged::Now);
+        assert_eq!(ready(long, true), Judged::Now);
+    }
+
+    #[test]
+    fn a_program_that_does_not_get_ready_is_waited_for_with_the_limit_of_a_start() {
+        let (minute, limit) = (Duration::from_secs(60), Duration::from_secs(30));
+        let waited = |limit| judge(None, minute, limit, || false);
+        assert_eq!(waited(Some(limit)), Judged::TooLate);
+        assert_eq!(waited(Some(2 * minute)), Judged::Later);
+        assert_eq!(waited(None), Judged::Later);
+    }
+
+    #[test]
+    fn no_swap_begins_after_the_end_of_the_stream() {
+        let swaps = Swaps::default();
+        assert_eq!(swaps.why_not_now(true), Some(ENDED));
+        assert_eq!(swaps.why_not_now(false), None);
+    }
+
+    #[test]
+    fn a_swap_changes_the_command_alone() {
+        let begun = &plan().stages[MASKING];
+        let swap = |command| Swap {
+            process: begun.name.clone(),
+            command,
+            directory: "/".into(),
+            cold: false,
+        };
+        let other = plan_of(begun, &swap(Some(vec!["other".to_owned()])));
+        assert_eq!(
+            (other.name.as_str(), other.command),
+            ("masking", vec!["other".to_owned()])
+        );
+        assert_eq!(plan_of(begun, &swap(None)).command, begun.command);
+    }
+}

@@ -1,0 +1,81 @@
+//! What the tests of several parts need: a plan that is never started.
+
+use std::{
+    path::{Path, PathBuf},
+    time::Duration,
+};
+
+use gyre_messages::{FollowerId, Limits, StageId, Window};
+use gyre_stage::Manifest;
+
+use crate::{Plan, RestartPolicy, Scheduling, StagePlan};
+
+/// The processes of [`plan`].
+pub(crate) const SOURCE: usize = 0;
+pub(crate) const MASKING: usize = 1;
+pub(crate) const REFINEMENT: usize = 2;
+pub(crate) const FOLLOWER: usize = 3;
+
+/// The time limit of a stall.
+pub(crate) const LIMIT: Duration = Duration::from_secs(5);
+
+/// The manifest of a run with these results.
+pub(crate) fn manifest(out: &Path) -> Manifest {
+    Manifest {
+        prefix: String::new(),
+        root: out.to_owned(),
+        out: out.to_owned(),
+        window: Window {
+            scans: 2,
+            lag: 1,
+            look_back: 1,
+            live_depth: 0,
+            observers: 2,
+            slam: false,
+            localises: false,
+        },
+        limits: Limits {
+            scan_bytes: 1000,
+            raster_cells: 100,
+            cell_m: 1.0,
+            rasters: 1,
+            points: 0,
+        },
+        live: false,
+        refines: false,
+        rate: None,
+        build: String::new(),
+    }
+}
+
+/// A plan of three stages and a follower, in a folder that does not exist.
+pub(crate) fn plan() -> Plan {
+    let stages = [
+        StageId::RadarReplay.name(),
+        StageId::Masking.name(),
+        StageId::Refinement.name(),
+        FollowerId::LoopClosure.name(),
+    ];
+    Plan {
+        manifest: manifest(&PathBuf::from("/nonexistent")),
+        stages: stages.map(stage).into(),
+        recorder: None,
+        guardian: Vec::new(),
+        stall_timeout: Some(LIMIT),
+        start_timeout: None,
+        cpu_wake_us: None,
+    }
+}
+
+fn stage(name: &str) -> StagePlan {
+    StagePlan {
+        name: name.to_owned(),
+        command: vec!["true".to_owned()],
+        programs: Vec::new(),
+        directory: None,
+        scheduling: Scheduling::default(),
+        restart: RestartPolicy::default(),
+        outlives_restarts: false,
+        restarts_all: false,
+    }
+}
