@@ -134,7 +134,7 @@ fn kinds(checked: &Preflight) -> Vec<Kind> {
         let topic = topics.find(|topic| topic.name == name);
         Kind {
             topic: name,
-            bytes: topic.map_or(0, |topic| (topic.max_sample_bytes)(&checked.limits)),
+            bytes: topic.map_or(0, |topic| topic.max_sample_bytes(&checked.limits)),
         }
     };
     [Scan::TOPIC, Masked::TOPIC, Motion::TOPIC]

@@ -233,7 +233,7 @@ impl Base<'_> {
             };
             Coming {
                 fetcher: Fetcher::start(&self.session, request, self.sleeper.waker()),
-                header_bytes: topic(name).map_or(0, |topic| topic.header_bytes),
+                header_bytes: topic(name).map_or(0, |topic| topic.header.bytes),
                 messages: VecDeque::new(),
             }
         });

@@ -99,7 +99,7 @@ impl Agreement {
     /// Returns that of this side.
     pub fn of(manifest: &Manifest, config: &LinkConfig, topics: &[&'static str]) -> Self {
         let versioned = |name: &&'static str| {
-            let version = topic(name).map_or("", |topic| (topic.header_type)());
+            let version = topic(name).map_or("", |topic| topic.header.name);
             ((*name).to_owned(), version.to_owned())
         };
         Self {

@@ -132,7 +132,7 @@ pub fn ask(network: &Network, signals: &Signals) -> Result<Option<Seen>, LinkErr
 const OTHER_VERSION: &str = "the sender is another version of gyre: install the same on both";
 
 fn require_same(offered: &OfferedTopic) -> Result<(), LinkError> {
-    let ours = topic(&offered.name).map(|topic| (topic.header_type)());
+    let ours = topic(&offered.name).map(|topic| topic.header.name);
     match ours == Some(&*offered.version) {
         true => Ok(()),
         false => Err(LinkError::Refused(OTHER_VERSION.to_owned())),
@@ -286,7 +286,7 @@ impl Mirror<'_> {
         };
         Ok(Topic {
             name: topic.name,
-            header_bytes: topic.header_bytes,
+            header_bytes: topic.header.bytes,
             fetcher: self.fetch(topic.name, from, offered.is_lossless),
             feed: self.rig.feed(topic.name)?,
             next: None,

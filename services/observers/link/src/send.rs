@@ -360,9 +360,7 @@ fn greet(
     let path = manifest.root.join("config.toml");
     let offered = |name: &&'static str| OfferedTopic {
         name: (*name).to_owned(),
-        version: topic(name)
-            .map_or("", |topic| (topic.header_type)())
-            .to_owned(),
+        version: topic(name).map_or("", |topic| topic.header.name).to_owned(),
         is_lossless: is_lossless(name),
     };
     let greeting = Greeting {

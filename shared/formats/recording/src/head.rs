@@ -95,7 +95,7 @@ impl Head {
 fn types(topics: &[String]) -> String {
     let topics = topics.iter().filter_map(|name| topic(name));
     let types: Vec<String> = topics
-        .map(|topic| format!("{}={}", topic.name, (topic.header_type)()))
+        .map(|topic| format!("{}={}", topic.name, topic.header.name))
         .collect();
     types.join(",")
 }
@@ -103,7 +103,7 @@ fn types(topics: &[String]) -> String {
 /// Returns the topic of this type, which must be the type that this program has.
 fn of_type(text: &str) -> Result<String, String> {
     let (name, of) = text.split_once('=').unwrap_or((text, ""));
-    match topic(name).map(|topic| (topic.header_type)()) {
+    match topic(name).map(|topic| topic.header.name) {
         Some(own) if own == of => Ok(name.to_owned()),
         own => Err(format!(
             "its messages of topic {} are of type {}, and this version of Gyre reads `{}`",

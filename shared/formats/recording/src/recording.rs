@@ -289,7 +289,7 @@ fn stored(messages: &[Message], channels: &Channels, name: &str, seq: u64) -> Op
     let index = messages.iter().position(|message| on(message, &exact))?;
     let (header, rest) = messages[index]
         .data
-        .split_at_checked(topic(name)?.header_bytes)?;
+        .split_at_checked(topic(name)?.header.bytes)?;
     let item: Item = read(header.get(..size_of::<Item>())?)?;
     let payload = match (image_channel(name), Rows::of(name, header)) {
         (Some(channel), Some(rows)) => {

@@ -140,7 +140,7 @@ impl RecordingWriter {
         for topic in head.topics.iter().filter_map(|name| topic(name)) {
             let schema =
                 self.mcap()?
-                    .add_schema((topic.header_type)(), ENCODING, topic.name.as_bytes())?;
+                    .add_schema(topic.header.name, ENCODING, topic.name.as_bytes())?;
             let name = exact_channel(topic.name);
             let channel = self
                 .mcap()?

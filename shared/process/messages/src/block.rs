@@ -3,7 +3,8 @@
 //! The element type carries the alignment, because the transport multiplies the memory of an aligned slice of bytes by the alignment.
 
 use bytemuck::{Pod, Zeroable};
-use iceoryx2::prelude::ZeroCopySend;
+
+use crate::message::Element;
 
 /// 64 bytes of a polar scan.
 #[repr(C, align(64))]
@@ -35,18 +36,12 @@ impl FloatBlock {
     }
 }
 
-// SAFETY: plain numbers, repr(C), no pointers. Implemented by hand because the derive rejects `align`.
-unsafe impl ZeroCopySend for ByteBlock {
-    unsafe fn type_name() -> &'static str {
-        "gyre_byte_block_v1"
-    }
+impl Element for ByteBlock {
+    const TYPE_NAME: &'static str = "gyre_byte_block_v1";
 }
 
-// SAFETY: as above.
-unsafe impl ZeroCopySend for FloatBlock {
-    unsafe fn type_name() -> &'static str {
-        "gyre_float_block_v1"
-    }
+impl Element for FloatBlock {
+    const TYPE_NAME: &'static str = "gyre_float_block_v1";
 }
 
 #[cfg(test)]

@@ -2,7 +2,6 @@
 
 use bytemuck::{Pod, Zeroable};
 use gyre_geometry::{UncertainMotion, covariance, pose};
-use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{
     block::FloatBlock,
@@ -33,12 +32,11 @@ impl Message for Loop {
         header.check(limits)
     }
 }
-header!(LoopHeader);
+header!(LoopHeader, "gyre_loop_header_v1");
 
 /// The pose of the later keyframe in the frame of the earlier one.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable, ZeroCopySend)]
-#[type_name("gyre_loop_header_v1")]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct LoopHeader {
     /// `seq` counts the loops, from 0. `scan` is the later keyframe's and `previous_scan` the earlier one's.
     pub item: Item,

@@ -2,7 +2,6 @@
 
 use bytemuck::{Pod, Zeroable};
 use gyre_geometry::{Pose as PlanarPose, covariance, pose};
-use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{
     block::FloatBlock,
@@ -35,12 +34,11 @@ impl Message for Correction {
         header.check()
     }
 }
-header!(CorrectionHeader);
+header!(CorrectionHeader, "gyre_correction_header_v1");
 
 /// The pose of the odometry frame in the map frame.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable, ZeroCopySend)]
-#[type_name("gyre_correction_header_v1")]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct CorrectionHeader {
     /// `seq` counts what was read of the logs so far, from 0; their ends count as one. `scan` and the times are the newest keyframe's.
     pub item: Item,

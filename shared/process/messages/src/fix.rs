@@ -2,7 +2,6 @@
 
 use bytemuck::{Pod, Zeroable};
 use gyre_geometry::{Pose as PlanarPose, covariance, pose};
-use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{
     block::FloatBlock,
@@ -46,12 +45,11 @@ impl Message for Fix {
         header.check()
     }
 }
-header!(FixHeader);
+header!(FixHeader, "gyre_fix_header_v1");
 
 /// The pose of a keyframe in the map's frame; all zero if it is lost.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable, ZeroCopySend)]
-#[type_name("gyre_fix_header_v1")]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct FixHeader {
     /// `seq` counts the keyframes of the run, from 0. `scan` and the times are the keyframe's.
     pub item: Item,

@@ -1,7 +1,6 @@
 //! The start of every message: the scan that it is about, and the time stamps of each stage.
 
 use bytemuck::{Pod, Zeroable};
-use iceoryx2::prelude::ZeroCopySend;
 
 use crate::check::{Violation, require};
 
@@ -75,8 +74,7 @@ impl StageId {
 
 /// Time stamps of one stage's work on a scan: `CLOCK_MONOTONIC`, ns; zero until then.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
-#[type_name("gyre_hop_v1")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct Hop {
     /// The last input was taken from its queue.
     pub received_ns: i64,
@@ -106,8 +104,7 @@ pub type Hops = [Hop; StageId::ALL.len()];
 
 /// The identity of a scan: its numbers, its times, and the time stamps of each stage.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
-#[type_name("gyre_item_v3")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct Item {
     /// Sequence number in the chain of motions: consecutive, from 0. Readers check it for gaps.
     pub seq: u64,

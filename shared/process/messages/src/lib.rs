@@ -21,9 +21,6 @@
 //! Reading order: `item`, `limits`, `message` (the contract of a message type), `check` (its enforcement), one file per message,
 //! `topics`.
 
-// The compiler cannot check that a type may be shared between processes; each `unsafe impl` states why it may.
-#![allow(unsafe_code)]
-
 mod block;
 mod check;
 mod closed_loop;
@@ -53,11 +50,11 @@ pub use follower::FollowerId;
 pub use item::{Hop, HopTimes, Hops, Item, StageId, flag};
 pub use limits::{History, Limits, TopicSizes, Window, WindowError};
 pub use masked::{Masked, MaskedHeader, MaskedParts, Pair, mask_kind};
-pub use message::{Header, Message, Sender};
+pub use message::{Element, Header, Message, Sender};
 pub use motion::{Motion, MotionEstimate, MotionHeader, SearchedMotion};
 pub use pose::{Pose, PoseHeader};
 pub use refined::Refined;
 pub use refinement::{RefinementRecord, initial_guess, outcome};
 pub use rotation::{Rotation, RotationEstimate, RotationHeader};
 pub use scan::{Scan, ScanHeader};
-pub use topics::{Footprint, Topic, topic, topics};
+pub use topics::{Footprint, Topic, WireType, topic, topics};

@@ -2,7 +2,6 @@
 
 use bytemuck::{Pod, Zeroable};
 use gyre_geometry::{SparsePoint, Twist};
-use iceoryx2::prelude::ZeroCopySend;
 use ndarray::{ArrayView2, ArrayViewMut2};
 
 use crate::{
@@ -52,7 +51,7 @@ impl Message for Masked {
             + (limits.points * size_of::<SparsePoint>()).div_ceil(ByteBlock::LEN)
     }
 }
-header!(MaskedHeader);
+header!(MaskedHeader, "gyre_masked_header_v3");
 
 /// Values of [`MaskedHeader::mask`].
 pub mod mask_kind {
@@ -66,8 +65,7 @@ pub mod mask_kind {
 
 /// The geometry of a raster and the processing that led to it.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable, ZeroCopySend)]
-#[type_name("gyre_masked_header_v3")]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct MaskedHeader {
     /// The scan.
     pub item: Item,

@@ -3,7 +3,6 @@
 use std::fmt::Debug;
 
 use bytemuck::Pod;
-use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{
     check::Violation,
@@ -12,17 +11,20 @@ use crate::{
     limits::{History, Limits, TopicSizes, Window},
 };
 
-/// A fixed header that starts with an [`Item`].
-pub trait Header: ZeroCopySend + Pod + Default + Debug + 'static {
-    /// Returns the name of the type with its version, as the transport compares it.
-    fn type_name() -> &'static str {
-        // SAFETY: the function returns a constant; it is unsafe to implement, not to call.
-        unsafe { <Self as ZeroCopySend>::type_name() }
-    }
+/// A fixed header that starts with an [`Item`]. It is plain data, so processes may share its memory.
+pub trait Header: Pod + Default + Debug {
+    /// The name of the type with its version, as the transport compares it.
+    const TYPE_NAME: &'static str;
     /// The scan that the message is about.
     fn item(&self) -> &Item;
     /// The same, to fill in.
     fn item_mut(&mut self) -> &mut Item;
+}
+
+/// An element of payloads, plain data too.
+pub trait Element: Pod + Debug {
+    /// The name of the type with its version, as the transport compares it.
+    const TYPE_NAME: &'static str;
 }
 
 /// The process that publishes a topic.
@@ -60,7 +62,7 @@ pub trait Message: 'static {
     /// The header of each message.
     type Header: Header;
     /// The element that the payload is a slice of.
-    type Element: ZeroCopySend + Pod + Debug;
+    type Element: Element;
 
     /// The longest payload, in elements. A topic without a payload still has one element.
     fn max_elements(_limits: &Limits) -> usize {
@@ -107,10 +109,14 @@ pub trait Message: 'static {
     }
 }
 
-/// Implements [`Header`] for a type with a field `item`.
+/// Implements [`Header`] for a type whose first field is `item`.
 macro_rules! header {
-    ($header:ty) => {
+    ($header:ty, $type_name:literal) => {
+        const _: () = assert!(std::mem::offset_of!($header, item) == 0);
+
         impl $crate::message::Header for $header {
+            const TYPE_NAME: &'static str = $type_name;
+
             fn item(&self) -> &$crate::item::Item {
                 &self.item
             }

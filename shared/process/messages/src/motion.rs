@@ -4,7 +4,6 @@ use bytemuck::{Pod, Zeroable};
 use gyre_geometry::{OdometryMotion, Pose, Twist, covariance, pose, xy_yaw};
 use gyre_radar::MAX_INTERVAL_NS;
 use gyre_scan_matching::{MotionMatch, Refined};
-use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{
     block::FloatBlock,
@@ -37,12 +36,11 @@ impl Message for Motion {
         header.motion.check(limits)
     }
 }
-header!(MotionHeader);
+header!(MotionHeader, "gyre_motion_header_v5");
 
 /// The pose of this scan's frame in the previous scan's frame, with its covariance.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable, ZeroCopySend)]
-#[type_name("gyre_motion_estimate_v4")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct MotionEstimate {
     /// Forward, m.
     pub x_m: f64,
@@ -184,8 +182,7 @@ impl MotionEstimate {
 
 /// The header of `motion` and `refined`.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable, ZeroCopySend)]
-#[type_name("gyre_motion_header_v5")]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct MotionHeader {
     /// The scan.
     pub item: Item,

@@ -2,7 +2,6 @@
 
 use bytemuck::{Pod, Zeroable};
 use gyre_geometry::{ComposedMotion, UncertainMotion, covariance, pose};
-use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{
     block::FloatBlock,
@@ -34,12 +33,11 @@ impl Message for Pose {
         header.check(limits)
     }
 }
-header!(PoseHeader);
+header!(PoseHeader, "gyre_pose_header_v5");
 
 /// A pose in the frame of the first scan, with the motion that led to it.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable, ZeroCopySend)]
-#[type_name("gyre_pose_header_v5")]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct PoseHeader {
     /// The scan.
     pub item: Item,

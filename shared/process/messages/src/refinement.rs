@@ -2,7 +2,6 @@
 
 use bytemuck::{Pod, Zeroable};
 use gyre_scan_matching::{InitialGuess, Outcome};
-use iceoryx2::prelude::ZeroCopySend;
 
 use crate::check::{Violation, finite, require};
 
@@ -32,8 +31,7 @@ pub mod initial_guess {
 
 /// The result of a refinement; all zero without one.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable, ZeroCopySend)]
-#[type_name("gyre_refinement_v2")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct RefinementRecord {
     /// The outcome: see [`outcome`].
     pub outcome: u32,

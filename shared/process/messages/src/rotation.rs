@@ -4,7 +4,6 @@ use std::f64::consts::PI;
 
 use bytemuck::{Pod, Zeroable};
 use gyre_scan_matching::RotationMatch;
-use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{
     block::FloatBlock,
@@ -34,12 +33,11 @@ impl Message for Rotation {
         header.rotation.check()
     }
 }
-header!(RotationHeader);
+header!(RotationHeader, "gyre_rotation_header_v3");
 
 /// An angle with its variance.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable, ZeroCopySend)]
-#[type_name("gyre_rotation_estimate_v1")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct RotationEstimate {
     /// Yaw of this scan's frame in the previous scan's frame, rad, counter-clockwise.
     pub angle_rad: f64,
@@ -93,8 +91,7 @@ impl From<RotationEstimate> for RotationMatch {
 
 /// The header of `rotation`.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable, ZeroCopySend)]
-#[type_name("gyre_rotation_header_v3")]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct RotationHeader {
     /// The scan.
     pub item: Item,

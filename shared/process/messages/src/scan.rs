@@ -2,7 +2,6 @@
 
 use bytemuck::{Pod, Zeroable};
 use gyre_radar::{MAX_AZIMUTHS, PolarScan, ScanSlot, Sense, SweepGeometry};
-use iceoryx2::prelude::ZeroCopySend;
 
 use crate::{
     block::ByteBlock,
@@ -56,12 +55,11 @@ impl Message for Scan {
         }
     }
 }
-header!(ScanHeader);
+header!(ScanHeader, "gyre_scan_header_v3");
 
 /// The geometry of a scan, and the measured angle and time of each azimuth.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable, ZeroCopySend)]
-#[type_name("gyre_scan_header_v3")]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct ScanHeader {
     /// The scan.
     pub item: Item,

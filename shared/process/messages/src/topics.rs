@@ -10,7 +10,7 @@ use crate::{
     fix::Fix,
     limits::{Limits, TopicSizes, Window},
     masked::Masked,
-    message::{Header, Message, Sender},
+    message::{Element, Header, Message, Sender},
     motion::Motion,
     pose::Pose,
     refined::Refined,
@@ -21,7 +21,28 @@ use crate::{
 /// Bytes that the transport puts before each sample, rounded up.
 const SAMPLE_OVERHEAD: usize = 192;
 
-/// The properties of a topic that do not depend on its types.
+/// A type of headers or of elements, as the transport compares it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct WireType {
+    /// The name, with the version.
+    pub name: &'static str,
+    /// Bytes of a value.
+    pub bytes: usize,
+    /// The alignment of a value in memory.
+    pub alignment: usize,
+}
+
+impl WireType {
+    const fn of<T>(name: &'static str) -> Self {
+        Self {
+            name,
+            bytes: size_of::<T>(),
+            alignment: align_of::<T>(),
+        }
+    }
+}
+
+/// The properties of a message type as values.
 #[derive(Clone, Copy, Debug)]
 pub struct Topic {
     /// The name of the topic.
@@ -30,24 +51,30 @@ pub struct Topic {
     pub sender: Sender,
     /// The sizes of its queues.
     pub sizes: fn(&Window) -> TopicSizes,
-    /// Bytes of its largest sample in shared memory.
-    pub max_sample_bytes: fn(&Limits) -> usize,
-    /// The name of its header's type, with the version.
-    pub header_type: fn() -> &'static str,
-    /// Bytes of its header.
-    pub header_bytes: usize,
+    /// The longest payload, in elements.
+    pub max_elements: fn(&Limits) -> usize,
+    /// The type of its header.
+    pub header: WireType,
+    /// The type of the elements of its payload.
+    pub element: WireType,
 }
 
 impl Topic {
-    const fn of<M: Message>() -> Self {
+    /// The topic of a message type.
+    pub const fn of<M: Message>() -> Self {
         Self {
             name: M::TOPIC,
             sender: M::SENDER,
             sizes: M::sizes,
-            max_sample_bytes: max_sample_bytes::<M>,
-            header_type: <M::Header as Header>::type_name,
-            header_bytes: size_of::<M::Header>(),
+            max_elements: M::max_elements,
+            header: WireType::of::<M::Header>(M::Header::TYPE_NAME),
+            element: WireType::of::<M::Element>(M::Element::TYPE_NAME),
         }
+    }
+
+    /// Returns the bytes of its largest sample in shared memory.
+    pub fn max_sample_bytes(&self, limits: &Limits) -> usize {
+        SAMPLE_OVERHEAD + self.header.bytes + (self.max_elements)(limits) * self.element.bytes
     }
 }
 
@@ -85,10 +112,6 @@ pub fn topic(name: &str) -> Option<&'static Topic> {
     TOPICS.iter().find(|topic| topic.name == name)
 }
 
-fn max_sample_bytes<M: Message>(limits: &Limits) -> usize {
-    SAMPLE_OVERHEAD + size_of::<M::Header>() + M::max_elements(limits) * size_of::<M::Element>()
-}
-
 /// Returns an upper limit of the transport's bookkeeping, of which each file takes whole pages: a service has its description and
 /// state, a subscriber its queue, its events, and a process of its own. Measured without observers: 83 pages.
 fn bookkeeping(window: &Window) -> usize {
@@ -111,7 +134,7 @@ impl Footprint {
     pub fn new(window: &Window, limits: &Limits) -> Self {
         let segments = topics(window).map(|topic| {
             let samples = (topic.sizes)(window).samples();
-            (topic.name, samples * (topic.max_sample_bytes)(limits))
+            (topic.name, samples * topic.max_sample_bytes(limits))
         });
         let bookkeeping = [("bookkeeping", bookkeeping(window))];
         Self {

@@ -12,7 +12,7 @@ use gyre_messages::{Header, Item, Message, flag};
 
 pub use crate::log_id::LogId;
 use crate::{
-    Launch, Listener, StageCounters, StageError, allocations, clock, services, wake, writer::Writer,
+    Launch, Listener, StageCounters, StageError, allocations, clock, wake, writer::Writer,
 };
 pub use growth::Growth;
 use progress::ProgressWriter;
@@ -61,7 +61,7 @@ pub fn run<F: Follower>(launch: &Launch, follower: &mut F) -> Result<StageCounte
     let _ = rustix::process::nice(NICENESS);
     let listeners: Vec<Listener> = F::LOGS
         .iter()
-        .map(|log| services::listener(&launch.node, log.event()))
+        .map(|log| Listener::open(&launch.node, log.event()))
         .collect::<Result<_, _>>()?;
     let grown: Vec<&Listener> = listeners.iter().collect();
     launch.begin_heartbeat()?;

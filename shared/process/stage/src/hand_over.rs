@@ -5,15 +5,15 @@
 use std::path::Path;
 
 use gyre_messages::{
-    ByteBlock, History, Limits, Message, RotationHeader, Sender, StageId, TopicSizes, Violation,
-    Window,
+    ByteBlock, History, Limits, Message, RotationHeader, Sender, StageId, Topic, TopicSizes,
+    Violation, Window,
 };
-use iceoryx2::prelude::{LogLevel, set_log_level};
 
 use crate::{
     Manifest, StageError,
     run::{RunRoot, close_to_others},
-    services::{self, Event, Node, Topic},
+    services,
+    transport::{self, Event, Node, Service},
     wake::Signals,
     writer::{Draft, Writer},
 };
@@ -50,7 +50,7 @@ pub struct HandOver {
     sizes: TopicSizes,
     bytes: usize,
     // Dropped in this order: services, node, root.
-    _topic: Topic<Parcel>,
+    _topic: Service,
     _events: [Event; 2],
     _node: Node,
     _root: RunRoot,
@@ -62,16 +62,16 @@ impl HandOver {
     /// # Errors
     /// Shared memory cannot be used, or a failure of the transport.
     pub fn create(out: &Path, bytes: usize, readers: usize) -> Result<Self, StageError> {
-        set_log_level(LogLevel::Fatal);
+        transport::silence();
         let root = RunRoot::acquire(out, &Signals::install()?)
             .map_err(|e| StageError::transport("make a place for a topic", e))?;
         let manifest = manifest(&root, out, bytes, readers);
         manifest.write("")?;
-        let node = services::node(&manifest.transport()?, "sender")?;
+        let node = manifest.transport()?.join("sender")?;
         close_to_others(&manifest.prefix)
             .map_err(|e| StageError::transport("close shared memory to other users", e))?;
         let sizes = Parcel::sizes(&manifest.window);
-        let topic = services::create_topic::<Parcel>(&node, &manifest.window)?;
+        let topic = Service::create(&node, &Topic::of::<Parcel>(), &manifest.window)?;
         let events = services::create_events(&node, Parcel::TOPIC, &sizes)?;
         Ok(Self {
             writer: Writer::open(&node, &manifest)?,

@@ -5,7 +5,7 @@ use gyre_messages::{Item, Masked, Message, Pair, flag};
 use crate::{
     Launch, StageError,
     reader::{Reader, Received},
-    services::Listener,
+    transport::Listener,
 };
 
 /// The next action of a stage.

@@ -24,7 +24,7 @@ use crate::{
     Manifest, StageCounters, StageError,
     heartbeat::HeartbeatWriter,
     run,
-    services::{self, Node},
+    transport::Node,
     wake::{self, Signals},
 };
 
@@ -71,7 +71,7 @@ impl Launch {
                     reason: error.message().to_owned(),
                 })?;
         let signals = Signals::install()?;
-        let node = services::node(&manifest.transport()?, name)?;
+        let node = manifest.transport()?.join(name)?;
         Ok(Self {
             name: name.to_owned(),
             manifest,

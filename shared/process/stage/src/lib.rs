@@ -1,10 +1,10 @@
-//! All inter-process communication of Gyre. Only this crate, the wire types and the supervisor depend on the transport (iceoryx2).
+//! All inter-process communication of Gyre. Only this crate depends on the transport (iceoryx2).
 //!
 //! Reading order:
 //!
 //! 1. [`run`]: the manifest that a process reads, and the files of a run; [`lock`]: locks of files.
 //! 2. [`launch`]: how a process starts and ends: configuration, log, signals, exit codes.
-//! 3. [`writer`], [`reader`]: publisher and subscriber of a topic, with the handshake that gives a new reader the history.
+//! 3. `transport`: the boundary of iceoryx2; [`writer`], [`reader`]: publisher and subscriber of a topic, with the handshake that gives a new reader the history.
 //! 4. [`wake`]: how a process sleeps until there is work.
 //! 5. [`source`], [`stage`], [`sink`]: the loops of the first, the middle and the last processes; [`inputs`]: what a middle
 //!    process waits for.
@@ -47,6 +47,7 @@ pub mod source;
 pub mod stage;
 #[cfg(test)]
 mod tests;
+pub mod transport;
 pub mod usage;
 pub mod wake;
 pub mod writer;
@@ -57,7 +58,7 @@ pub use error::StageError;
 pub use follower::Follower;
 pub use launch::Launch;
 pub use run::Manifest;
-pub use services::Listener;
 pub use sink::Sink;
 pub use source::Source;
 pub use stage::Stage;
+pub use transport::Listener;

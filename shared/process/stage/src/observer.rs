@@ -14,18 +14,14 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::{Item, Message, Sender, flag};
-use iceoryx2::{
-    port::{ReceiveError, port_name::PortName, subscriber::Subscriber},
-    prelude::{CallbackProgression, LogLevel, PortFactory, set_log_level},
-};
+use gyre_messages::{Item, Message, Sender, Topic, flag};
 
 use crate::{
     Listener, Manifest, StageError,
     heartbeat::HeartbeatWriter,
-    reader::Received,
-    run,
-    services::{self, Ipc, Node, Topic},
+    reader::{self, Received},
+    run, services,
+    transport::{self, Node, Service, Subscriber},
     wake::{self, Signals},
 };
 
@@ -52,7 +48,7 @@ pub struct ObservedRun {
 /// An observer of one topic.
 pub struct Observer<'run, M: Message> {
     run: &'run ObservedRun,
-    subscriber: Subscriber<Ipc, [M::Element], M::Header>,
+    subscriber: Subscriber,
     data: Listener,
     current: Option<Received<M>>,
     sequence: Sequence,
@@ -89,11 +85,11 @@ impl ObservedRun {
     /// # Errors
     /// There is no such run, or the transport fails.
     pub fn at(root: &Path) -> Result<Self, StageError> {
-        set_log_level(LogLevel::Fatal);
+        transport::silence();
         let manifest = Manifest::read(root)?;
         let path = Manifest::path(root);
         let file = File::open(&path).map_err(|source| StageError::File { path, source })?;
-        let node = services::node(&manifest.transport()?, NAME)?;
+        let node = manifest.transport()?.join(NAME)?;
         let run = Self {
             manifest,
             file,
@@ -139,19 +135,31 @@ impl ObservedRun {
     /// # Errors
     /// The run has no such topic, all places of the topic are taken, the run has ended, or the transport fails.
     pub fn observe<M: Message>(&self) -> Result<Observer<'_, M>, StageError> {
-        if let Sender::Follower(follower) = M::SENDER
+        let (subscriber, data) = self.attach(&Topic::of::<M>())?;
+        Ok(Observer {
+            run: self,
+            subscriber,
+            data,
+            current: None,
+            sequence: Sequence::default(),
+            looked: Instant::now(),
+        })
+    }
+
+    fn attach(&self, topic: &Topic) -> Result<(Subscriber, Listener), StageError> {
+        if let Sender::Follower(follower) = topic.sender
             && !follower.is_in(&self.manifest.window)
         {
             return Err(StageError::NoTopic {
-                topic: M::TOPIC,
+                topic: topic.name,
                 needs: follower.needs(),
                 out: self.manifest.out.clone(),
             });
         }
         let deadline = Instant::now() + MAX_WAIT_FOR_PLACE;
         loop {
-            let failed = match self.try_observe::<M>() {
-                Ok(observer) => return Ok(observer),
+            let failed = match self.try_attach(topic) {
+                Ok(ports) => return Ok(ports),
                 Err(_) if self.has_ended() => {
                     return Err(StageError::NotRunning(self.manifest.out.clone()));
                 }
@@ -164,41 +172,24 @@ impl ObservedRun {
         }
     }
 
-    pub(crate) fn try_observe<M: Message>(&self) -> Result<Observer<'_, M>, StageError> {
+    pub(crate) fn try_attach(&self, topic: &Topic) -> Result<(Subscriber, Listener), StageError> {
         let places = self.manifest.window.observers;
         let no_place = || StageError::NoPlace {
-            topic: M::TOPIC,
+            topic: topic.name,
             observers: places,
         };
-        let name =
-            PortName::new(NAME).map_err(|e| StageError::transport("name the observer", e))?;
-        let topic = services::open_topic::<M>(&self.node)?;
-        if observers_of::<M>(&topic, &name) >= places {
+        let service = Service::open(&self.node, topic)?;
+        if service.subscribers_named(NAME) >= places {
             return Err(no_place());
         }
-        let subscriber = topic
-            .subscriber_builder()
-            .name(&name)
-            .create()
-            .map_err(|e| StageError::transport(format!("observe {}", M::TOPIC), e))?;
+        let subscriber = Subscriber::observe(&service, NAME)?;
         // Another one may have come at the same time. The places of the stages must stay free for their restarts.
-        if observers_of::<M>(&topic, &name) > places {
+        if service.subscribers_named(NAME) > places {
             return Err(no_place());
         }
-        let data = services::listener(&self.node, &services::data_event(M::TOPIC))?;
-        services::notifier(&self.node, &services::handshake_event(M::TOPIC))?
-            .notify()
-            .map_err(|e| {
-                StageError::transport(format!("notify the publisher of {}", M::TOPIC), e)
-            })?;
-        Ok(Observer {
-            run: self,
-            subscriber,
-            data,
-            current: None,
-            sequence: Sequence::default(),
-            looked: Instant::now(),
-        })
+        let data = Listener::open(&self.node, &services::data_event(topic.name))?;
+        reader::notify_publisher(&self.node, topic.name)?;
+        Ok((subscriber, data))
     }
 }
 
@@ -218,15 +209,6 @@ pub fn read_missed(root: &Path, recorder: u32) -> u64 {
     // The recorder before has left its own.
     let missed = told.strip_prefix(&format!("{recorder} "));
     missed.and_then(|it| it.parse().ok()).unwrap_or_default()
-}
-
-fn observers_of<M: Message>(topic: &Topic<M>, name: &PortName) -> usize {
-    let mut observers = 0;
-    topic.dynamic_config().list_subscribers(|subscriber| {
-        observers += usize::from(subscriber.subscriber_name == *name);
-        CallbackProgression::Continue
-    });
-    observers
 }
 
 impl<M: Message> Observer<'_, M> {
@@ -272,17 +254,10 @@ impl<M: Message> Observer<'_, M> {
     }
 
     fn receive(&self) -> Result<Option<Received<M>>, StageError> {
-        match self.subscriber.receive() {
-            Ok(sample) => sample
-                .map(|sample| Received::checked(sample, &self.run.manifest.limits))
-                .transpose(),
-            // The publisher has just died or is being restarted. Its next message is found at the next wake-up.
-            Err(ReceiveError::ConnectionFailure(_)) => Ok(None),
-            Err(error) => Err(StageError::transport(
-                format!("receive {}", M::TOPIC),
-                error,
-            )),
-        }
+        let sample = self.subscriber.receive()?;
+        sample
+            .map(|sample| Received::checked(sample, &self.run.manifest.limits))
+            .transpose()
     }
 
     /// Sleeps until the publisher notifies, and on until [`REST`] has passed since the last look.

@@ -1,10 +1,8 @@
 //! The publisher of a topic whose messages come as bytes: from a recording, or from another machine.
 
-use gyre_messages::{
-    Header, Item, Masked, Message, Motion, Refined, Rotation, Scan, StageId, flag,
-};
+use gyre_messages::{Item, Message, Pose, Sender, StageId, flag};
 
-use crate::{Launch, Listener, StageError, writer::Writer};
+use crate::{Launch, Listener, StageError, writer::UntypedWriter};
 
 /// A wire message outside of shared memory.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -24,72 +22,61 @@ impl RecordedMessage {
 }
 
 /// The publisher of a topic, whatever its type, in the place of the source.
-pub(crate) trait Outlet {
-    fn topic(&self) -> &'static str;
-    /// Publishes a message with this item.
-    fn send(&self, message: &RecordedMessage, item: Item) -> Result<(), StageError>;
-    /// Publishes the end of the stream.
-    fn end(&self, item: Item) -> Result<(), StageError>;
-    fn accept_readers(&self) -> Result<(), StageError>;
-    fn listener(&self) -> &Listener;
-}
+pub(crate) struct Outlet(UntypedWriter);
 
-/// Opens a topic of the stream for publishing.
-pub(crate) fn outlet(launch: &Launch, topic: &str) -> Result<Box<dyn Outlet>, StageError> {
-    let (node, manifest) = (&launch.node, &launch.manifest);
-    Ok(match topic {
-        Scan::TOPIC => Box::new(Writer::<Scan>::open(node, manifest)?),
-        Masked::TOPIC => Box::new(Writer::<Masked>::open(node, manifest)?),
-        Rotation::TOPIC => Box::new(Writer::<Rotation>::open(node, manifest)?),
-        Motion::TOPIC => Box::new(Writer::<Motion>::open(node, manifest)?),
-        Refined::TOPIC => Box::new(Writer::<Refined>::open(node, manifest)?),
-        _ => {
+impl Outlet {
+    /// Opens a topic of the stream for publishing.
+    pub(crate) fn open(launch: &Launch, topic: &str) -> Result<Self, StageError> {
+        let of_stream = gyre_messages::topic(topic)
+            .filter(|topic| matches!(topic.sender, Sender::Stage(_)) && topic.name != Pose::TOPIC);
+        let Some(topic) = of_stream else {
             let reason = format!("a source does not publish the topic `{topic}`");
             return Err(StageError::Configuration(reason));
-        }
-    })
-}
-
-impl<M: Message> Outlet for Writer<M> {
-    fn topic(&self) -> &'static str {
-        M::TOPIC
+        };
+        UntypedWriter::open(&launch.node, &launch.manifest, topic).map(Self)
     }
 
-    fn send(&self, message: &RecordedMessage, item: Item) -> Result<(), StageError> {
-        let mut draft = self.loan()?;
-        let (header, payload) = draft.parts::<u8>();
+    pub(crate) fn topic(&self) -> &'static str {
+        self.0.topic()
+    }
+
+    /// Publishes a message with this item.
+    pub(crate) fn send(&self, message: &RecordedMessage, item: Item) -> Result<(), StageError> {
+        let mut loan = self.0.loan()?;
+        let (header, payload) = loan.parts();
         let (bytes, room) = (message.payload.len(), payload.len());
-        let is_whole = message.header.len() == size_of::<M::Header>();
+        let is_whole = message.header.len() == header.len();
         let Some(content) = payload.get_mut(..bytes).filter(|_| is_whole) else {
             return Err(StageError::Input(format!(
                 "the recorded message {} of topic `{}` has {bytes} bytes, and this run has room for {room}: its configuration is not that of the recorded run",
                 item.seq,
-                M::TOPIC
+                self.topic()
             )));
         };
         content.copy_from_slice(&message.payload);
         // What is behind it in memory has no meaning, and is not to differ from run to run.
         payload[bytes..].fill(0);
-        *header = bytemuck::pod_read_unaligned(&message.header);
-        *header.item_mut() = item;
-        Writer::send(self, draft, StageId::RadarReplay)
+        header.copy_from_slice(&message.header);
+        *loan.item() = item;
+        self.0.send(loan, StageId::RadarReplay)
     }
 
-    fn end(&self, item: Item) -> Result<(), StageError> {
-        let mut draft = self.loan()?;
-        *draft.header().item_mut() = Item {
+    /// Publishes the end of the stream.
+    pub(crate) fn end(&self, item: Item) -> Result<(), StageError> {
+        let mut loan = self.0.loan()?;
+        *loan.item() = Item {
             flags: flag::END,
             ..item
         };
-        Writer::send(self, draft, StageId::RadarReplay)
+        self.0.send(loan, StageId::RadarReplay)
     }
 
-    fn accept_readers(&self) -> Result<(), StageError> {
-        Writer::accept_readers(self)
+    pub(crate) fn accept_readers(&self) -> Result<(), StageError> {
+        self.0.accept_readers()
     }
 
-    fn listener(&self) -> &Listener {
-        Writer::listener(self)
+    pub(crate) fn listener(&self) -> &Listener {
+        self.0.listener()
     }
 }
 

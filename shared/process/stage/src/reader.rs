@@ -1,21 +1,21 @@
 //! The subscriber of a topic: the raw queue, or its items in order.
 
+use std::marker::PhantomData;
+
 use bytemuck::Pod;
-use gyre_messages::{Header, Item, Limits, Message};
-use iceoryx2::{
-    port::{ReceiveError, subscriber::Subscriber},
-    sample::Sample,
-};
+use gyre_messages::{Header, Item, Limits, Message, Topic};
 
 use crate::{
     Launch, Manifest, StageError, clock,
     outlet::RecordedMessage,
-    services::{self, Ipc, Listener, Node, Notifier},
+    services,
+    transport::{Listener, Node, Notifier, Sample, Service, Subscriber},
 };
 
 /// A message in shared memory, borrowed from its publisher until it is dropped.
 pub struct Received<M: Message> {
-    sample: Sample<Ipc, [M::Element], M::Header>,
+    sample: Sample,
+    message: PhantomData<M>,
     /// Time at which it was taken from the queue, `CLOCK_MONOTONIC`, ns.
     pub received_ns: i64,
 }
@@ -25,15 +25,13 @@ impl<M: Message> Received<M> {
     ///
     /// # Errors
     /// A violation of its contract, with the sender's name.
-    pub(crate) fn checked(
-        sample: Sample<Ipc, [M::Element], M::Header>,
-        limits: &Limits,
-    ) -> Result<Self, StageError> {
+    pub(crate) fn checked(sample: Sample, limits: &Limits) -> Result<Self, StageError> {
         let received = Self {
             sample,
+            message: PhantomData,
             received_ns: clock::now_ns(),
         };
-        match M::check(received.header(), received.sample.payload(), limits) {
+        match M::check(received.header(), received.values(), limits) {
             Ok(()) => Ok(received),
             Err(violation) => Err(received.malformed(violation.to_string())),
         }
@@ -41,7 +39,7 @@ impl<M: Message> Received<M> {
 
     /// Returns the header.
     pub fn header(&self) -> &M::Header {
-        self.sample.user_header()
+        bytemuck::from_bytes(self.sample.header())
     }
 
     /// Returns the scan that the message is about.
@@ -78,9 +76,9 @@ impl<M: Message> Received<M> {
 /// The raw queue of a topic.
 pub struct Port<M: Message> {
     limits: Limits,
-    subscriber: Subscriber<Ipc, [M::Element], M::Header>,
+    subscriber: Subscriber,
     data: Listener,
-    handshake: Notifier,
+    message: PhantomData<M>,
 }
 
 impl<M: Message> Port<M> {
@@ -98,9 +96,7 @@ impl<M: Message> Port<M> {
     /// A failure of the transport.
     pub fn on(node: &Node, manifest: &Manifest) -> Result<Self, StageError> {
         let port = Self::silent(node, manifest)?;
-        port.handshake.notify().map_err(|e| {
-            StageError::transport(format!("notify the publisher of {}", M::TOPIC), e)
-        })?;
+        notify_publisher(node, M::TOPIC)?;
         Ok(port)
     }
 
@@ -109,16 +105,12 @@ impl<M: Message> Port<M> {
     /// # Errors
     /// A failure of the transport.
     pub fn silent(node: &Node, manifest: &Manifest) -> Result<Self, StageError> {
-        let subscriber = services::open_topic::<M>(node)?
-            .subscriber_builder()
-            .create()
-            .map_err(|e| StageError::transport(format!("subscribe to {}", M::TOPIC), e))?;
-        let data = services::listener(node, &services::data_event(M::TOPIC))?;
+        let service = Service::open(node, &Topic::of::<M>())?;
         Ok(Self {
             limits: manifest.limits,
-            subscriber,
-            data,
-            handshake: services::notifier(node, &services::handshake_event(M::TOPIC))?,
+            subscriber: Subscriber::create(&service)?,
+            data: Listener::open(node, &services::data_event(M::TOPIC))?,
+            message: PhantomData,
         })
     }
 
@@ -127,23 +119,22 @@ impl<M: Message> Port<M> {
     /// # Errors
     /// A message that violates its contract; a failure of the transport.
     pub fn receive(&self) -> Result<Option<Received<M>>, StageError> {
-        match self.subscriber.receive() {
-            Ok(sample) => sample
-                .map(|sample| Received::checked(sample, &self.limits))
-                .transpose(),
-            // Samples of a dead publisher are still borrowed. The next call succeeds once they are released.
-            Err(ReceiveError::ExceedsMaxBorrows) => Ok(None),
-            Err(error) => Err(StageError::transport(
-                format!("receive {}", M::TOPIC),
-                error,
-            )),
-        }
+        let sample = self.subscriber.receive()?;
+        sample
+            .map(|sample| Received::checked(sample, &self.limits))
+            .transpose()
     }
 
     /// Returns the listener that the publisher notifies.
     pub fn listener(&self) -> &Listener {
         &self.data
     }
+}
+
+/// Notifies the publisher of a topic, which then connects to its new readers.
+pub(crate) fn notify_publisher(node: &Node, topic: &str) -> Result<(), StageError> {
+    Notifier::open(node, &services::handshake_event(topic))?
+        .notify(format_args!("notify the publisher of {topic}"))
 }
 
 /// The items of a topic in order, each once: the current and the previous one.

@@ -13,7 +13,6 @@ use std::{
 };
 
 use gyre_messages::{Limits, Window};
-use iceoryx2::prelude::{Config, FileName, Path as TransportPath, SemanticString};
 use rustix::{
     fs::Mode,
     io::Errno,
@@ -21,7 +20,7 @@ use rustix::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::StageError;
+use crate::{StageError, transport::Transport};
 
 pub use root::{
     RootError, RunRoot, SHARED_MEMORY, close_to_others, free_shared_memory, own_files, root_of,
@@ -118,22 +117,12 @@ impl Manifest {
         Ok(())
     }
 
-    /// Returns the configuration of the transport. Names and paths are unique to the run, and only the supervisor cleans up.
+    /// Returns the transport of the run.
     ///
     /// # Errors
-    /// A name or a path that the transport does not take.
-    pub fn transport(&self) -> Result<Config, StageError> {
-        let mut config = Config::default();
-        config.global.prefix = FileName::new(self.prefix.as_bytes())
-            .map_err(|e| StageError::transport("name the run", e))?;
-        let root = format!("{}/", self.root.display());
-        let root = TransportPath::new(root.as_bytes())
-            .map_err(|e| StageError::transport("use the run's root", e))?;
-        config.global.set_root_path(&root);
-        config.global.node.cleanup_dead_nodes_on_creation = false;
-        config.global.node.cleanup_dead_nodes_on_destruction = false;
-        config.global.service.cleanup_dead_nodes_on_open = false;
-        Ok(config)
+    /// A failure of the transport.
+    pub fn transport(&self) -> Result<Transport, StageError> {
+        Transport::of(self)
     }
 }
 

@@ -5,7 +5,7 @@ use gyre_messages::{Header, Item, Masked, Message, MotionHeader, Pose, PoseHeade
 use crate::{
     Launch, StageCounters, StageError, allocations, clock,
     reader::{Reader, Received},
-    services::Listener,
+    transport::Listener,
     wake,
     writer::Writer,
 };

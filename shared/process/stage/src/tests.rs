@@ -5,6 +5,7 @@
 mod followers;
 mod hand_over;
 mod observers;
+mod typed;
 mod wake_up;
 mod zero_copy;
 
@@ -14,11 +15,7 @@ use gyre_messages::{Item, Limits, Message, Pose, StageId, Window};
 use tempfile::TempDir;
 
 use crate::{
-    Manifest,
-    reader::Reader,
-    run::RunRoot,
-    services::{self, Node, Services},
-    wake::Signals,
+    Manifest, reader::Reader, run::RunRoot, services::Services, transport::Node, wake::Signals,
     writer::Writer,
 };
 
@@ -80,7 +77,7 @@ impl Run {
 }
 
 fn node(manifest: &Manifest) -> Node {
-    services::node(&manifest.transport().unwrap(), "test").unwrap()
+    manifest.transport().unwrap().join("test").unwrap()
 }
 
 fn writer<M: Message>(manifest: &Manifest) -> Writer<M> {

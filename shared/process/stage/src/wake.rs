@@ -14,7 +14,6 @@ use std::{
     time::Duration,
 };
 
-use iceoryx2::prelude::FileDescriptorBased;
 use rustix::{
     event::{PollFd, PollFlags, Timespec, poll},
     io::Errno,
@@ -24,7 +23,7 @@ use signal_hook::{consts, low_level::pipe};
 use crate::{
     StageError,
     heartbeat::{Activity, HeartbeatWriter},
-    services::Listener,
+    transport::Listener,
 };
 
 pub use crate::heartbeat::MAX_WAIT;
@@ -148,7 +147,7 @@ impl Signals {
         limit: Duration,
     ) -> Result<Woken, StageError> {
         let mut polled = vec![self.stop.as_fd(), self.child.as_fd()];
-        polled.extend(data.iter().chain(handshakes).map(|it| descriptor(it)));
+        polled.extend(data.iter().chain(handshakes).map(|it| it.as_fd()));
         polled.extend(connection);
         let mut polled: Vec<_> = polled
             .into_iter()
@@ -190,7 +189,7 @@ impl Signals {
 
 /// Sleeps until a listener is notified or `limit` has passed, and consumes its notifications.
 pub(crate) fn wait_for(listener: &Listener, limit: Duration) -> Result<(), StageError> {
-    let polled = PollFd::from_borrowed_fd(descriptor(listener), PollFlags::IN);
+    let polled = PollFd::new(listener, PollFlags::IN);
     match sleep_until_ready(&mut [polled], limit)? {
         true => Ok(()),
         false => consume(listener),
@@ -211,14 +210,7 @@ fn sleep_until_ready(polled: &mut [PollFd<'_>], limit: Duration) -> Result<bool,
 }
 
 fn consume(listener: &Listener) -> Result<(), StageError> {
-    let read = listener.try_wait(|_| ());
-    read.map(drop)
-        .map_err(|e| StageError::transport("read notifications", e))
-}
-
-fn descriptor(listener: &Listener) -> BorrowedFd<'_> {
-    // SAFETY: the listener owns the descriptor, and the borrow has the listener's lifetime.
-    unsafe { BorrowedFd::borrow_raw(listener.file_descriptor().native_handle()) }
+    listener.take(format_args!("read notifications")).map(drop)
 }
 
 fn drain(mut socket: &UnixStream) -> bool {

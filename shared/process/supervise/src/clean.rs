@@ -17,11 +17,7 @@ use std::{
 use gyre_stage::{
     Manifest, observer,
     run::{self, SHARED_MEMORY},
-    services,
-};
-use iceoryx2::{
-    node::NodeView,
-    prelude::{CallbackProgression, Config, NodeState},
+    transport::Transport,
 };
 
 use crate::SuperviseError;
@@ -33,13 +29,11 @@ const UNFINISHED: Duration = Duration::from_millis(200);
 /// File mode of an incomplete tag. A complete one is read-only.
 const INCOMPLETE: u32 = 0o600;
 
-type TransportNode = iceoryx2::node::Node<services::Ipc>;
-
 /// Removes all resources of dead processes. This must precede a restart: a topic has room for exactly one publisher, and old and
 /// new samples must not mix.
 pub(crate) fn remove_dead(
     manifest: &Manifest,
-    transport: &Config,
+    transport: &Transport,
     all_dead: bool,
 ) -> Result<(), SuperviseError> {
     let (manifest, transport) = (manifest.clone(), transport.clone());
@@ -49,7 +43,7 @@ pub(crate) fn remove_dead(
 /// Removes all resources of dead observers, and the files that would make a stage wait for a stopped one.
 pub(crate) fn remove_dead_observers(
     manifest: &Manifest,
-    transport: &Config,
+    transport: &Transport,
 ) -> Result<(), SuperviseError> {
     let (manifest, transport) = (manifest.clone(), transport.clone());
     within_limit(move || {
@@ -76,37 +70,26 @@ fn within_limit(clean: impl Fn() -> bool + Clone + Send + 'static) -> Result<(),
     }
 }
 
-fn clean(manifest: &Manifest, transport: &Config, all_dead: bool) -> bool {
-    let dead = dead_nodes(transport);
+fn clean(manifest: &Manifest, transport: &Transport, all_dead: bool) -> bool {
+    let dead = transport.dead_nodes();
     let ports = ports_of(manifest, &dead);
     let is_dead = |name: &str| all_dead || ports.iter().any(|port| name.contains(port.as_str()));
     let empty = empty_files(Path::new(SHARED_MEMORY), &manifest.prefix, is_dead);
     empty
         .into_iter()
         .for_each(|file| drop(fs::remove_file(file)));
-    if remove_dead_nodes(transport) {
+    if transport.remove_dead_nodes() {
         return true;
     }
     for node in &dead {
         unlink_incomplete_tags(&manifest.root.join("nodes").join(node));
     }
-    remove_dead_nodes(transport)
-}
-
-fn dead_nodes(transport: &Config) -> Vec<String> {
-    let mut dead = Vec::new();
-    let _ = TransportNode::list(transport, |state| {
-        if let NodeState::Dead(node) = state {
-            dead.push(node.id().value().to_string());
-        }
-        CallbackProgression::Continue
-    });
-    dead
+    transport.remove_dead_nodes()
 }
 
 /// Removes empty files of living observers that stay empty: an observer was stopped while it created them.
-fn unlink_unfinished_files(manifest: &Manifest, transport: &Config) {
-    let ports = ports_of(manifest, &living_observers(transport));
+fn unlink_unfinished_files(manifest: &Manifest, transport: &Transport) {
+    let ports = ports_of(manifest, &transport.living_nodes(observer::NAME));
     let unfinished = || {
         let is_of_observer = |name: &str| ports.iter().any(|port| name.contains(port.as_str()));
         empty_files(Path::new(SHARED_MEMORY), &manifest.prefix, is_of_observer)
@@ -117,31 +100,6 @@ fn unlink_unfinished_files(manifest: &Manifest, transport: &Config) {
         let still = unfinished().into_iter().filter(|file| seen.contains(file));
         still.for_each(|file| drop(fs::remove_file(file)));
     }
-}
-
-fn living_observers(transport: &Config) -> Vec<String> {
-    let mut observers = Vec::new();
-    let _ = TransportNode::list(transport, |state| {
-        if let NodeState::Alive(node) = state {
-            let name = node.details().as_ref().map(|details| details.name());
-            if name.is_some_and(|name| name.as_str() == observer::NAME) {
-                observers.push(node.id().value().to_string());
-            }
-        }
-        CallbackProgression::Continue
-    });
-    observers
-}
-
-fn remove_dead_nodes(transport: &Config) -> bool {
-    let mut all = true;
-    let listed = TransportNode::list(transport, |state| {
-        if let NodeState::Dead(node) = state {
-            all &= node.try_remove_stale_resources().is_ok();
-        }
-        CallbackProgression::Continue
-    });
-    all && listed.is_ok()
 }
 
 /// Returns the ids of the ports of dead processes: each has a tag `<prefix><port id>.port_tag` in the directory of its node.
@@ -221,7 +179,7 @@ mod tests {
         let transport = manifest.transport().unwrap();
         let observed = ObservedRun::at(&manifest.root).unwrap();
         let _observer = observed.observe::<Pose>().unwrap();
-        let of_observer = ports_of(manifest, &living_observers(&transport));
+        let of_observer = ports_of(manifest, &transport.living_nodes(observer::NAME));
         let file = |port: &str| {
             let name = format!("{}0_{port}.connection", manifest.prefix);
             let path = Path::new(SHARED_MEMORY).join(name);

@@ -9,17 +9,17 @@ mod recorded;
 use std::{collections::BTreeSet, fs, os::fd::BorrowedFd, path::PathBuf, time::Duration};
 
 use gyre_messages::{
-    Correction, Fix, Loop, Masked, Message, Motion, Pose, Refined, Rotation, Scan, StageId,
+    Correction, Fix, Loop, Masked, Message, Motion, Pose, Refined, Rotation, Scan, StageId, Topic,
 };
 use gyre_stage::{
     Launch, Manifest, StageError,
     reader::Port,
     run::{self, RunRoot},
-    services::{self, Listener, Node, Services, Topic},
+    services::Services,
+    transport::{self, Listener, Node, Service, Transport},
     wake::Signals,
     writer::Writer,
 };
-use iceoryx2::prelude::{Config, LogLevel, set_log_level};
 use rustix::process::{Pid, getpgid};
 
 use crate::{
@@ -39,7 +39,7 @@ pub struct Rig<'a> {
     services: Option<Services>,
     node: Node,
     guardian: Guardian,
-    transport: Config,
+    transport: Transport,
     signals: &'a Signals,
     // Last: removes all files of the run.
     _root: RunRoot,
@@ -118,7 +118,7 @@ impl<'a> Rig<'a> {
         guardian: &[String],
         signals: &'a Signals,
     ) -> Result<Self, SuperviseError> {
-        set_log_level(LogLevel::Fatal);
+        transport::silence();
         let unusable = |e: run::RootError| StageError::Input(e.to_string());
         let root = RunRoot::acquire(&manifest.out, signals).map_err(unusable)?;
         (manifest.prefix, manifest.root) = (root.prefix(), root.path().to_owned());
@@ -126,7 +126,7 @@ impl<'a> Rig<'a> {
         let transport = manifest.transport()?;
         Ok(Self {
             services: None,
-            node: services::node(&transport, "supervisor")?,
+            node: transport.join("supervisor")?,
             guardian: Guardian::start(guardian, &manifest)?,
             manifest,
             transport,
@@ -196,8 +196,7 @@ impl<'a> Rig<'a> {
     }
 
     fn services_folder(&self) -> PathBuf {
-        let folder = &self.transport.global.service.directory;
-        self.manifest.root.join(folder.to_string())
+        self.manifest.root.join(self.transport.services_folder())
     }
 
     /// Opens a topic of a stage for publishing.
@@ -312,7 +311,7 @@ impl<'a> Ports<'a> {
     fn open_feed<M: Message<Header: Copy>>(&self) -> Result<Box<dyn Feed>, StageError> {
         Ok(Box::new(TypedFeed::<M> {
             writer: Writer::open(self.node, self.manifest)?,
-            topic: services::open_topic::<M>(self.node)?,
+            topic: Service::open(self.node, &Topic::of::<M>())?,
         }))
     }
 
@@ -370,7 +369,7 @@ impl Process {
 
 struct TypedFeed<M: Message> {
     writer: Writer<M>,
-    topic: Topic<M>,
+    topic: Service,
 }
 
 impl<M: Message<Header: Copy>> Feed for TypedFeed<M> {
@@ -392,8 +391,7 @@ impl<M: Message<Header: Copy>> Feed for TypedFeed<M> {
     }
 
     fn subscribers(&self) -> usize {
-        use iceoryx2::prelude::PortFactory;
-        self.topic.dynamic_config().number_of_subscribers()
+        self.topic.subscribers()
     }
 
     fn listener(&self) -> &Listener {

@@ -1,17 +1,14 @@
 //! The run that is supervised: what all parts of the supervisor share.
 
-use std::{
-    path::Path,
-    time::{Duration, Instant},
-};
+use std::time::{Duration, Instant};
 
 use gyre_stage::{
     Manifest, StageError,
     run::close_to_others,
-    services::{self, Node, Services},
+    services::Services,
+    transport::{Node, Transport},
     wake::{self, Signals},
 };
-use iceoryx2::prelude::{Config, FilePath, SemanticString};
 
 use crate::{
     Event, Plan, SuperviseError, child::Child, clean, guardian::Guardian, roles::Roles,
@@ -29,7 +26,7 @@ pub(crate) struct Run<'a> {
     // Dropped in this order: services, node.
     services: Services,
     pub node: Node,
-    transport: Config,
+    transport: Transport,
     pub signals: Signals,
 }
 
@@ -42,8 +39,8 @@ impl<'a> Run<'a> {
     ) -> Result<Self, SuperviseError> {
         let manifest = &plan.manifest;
         let transport = manifest.transport()?;
-        use_as_global(&manifest.root.join("iox.toml"))?;
-        let node = services::node(&transport, "supervisor")?;
+        Transport::use_as_global(&manifest.root.join("iox.toml"))?;
+        let node = transport.join("supervisor")?;
         close_to_others(&manifest.prefix)
             .map_err(|e| StageError::transport("close shared memory to other users", e))?;
         let services = Services::create(&node, &manifest.window)?;
@@ -119,16 +116,4 @@ impl<'a> Run<'a> {
             groups.for_each(|group| self.guardian.remember(group));
         }
     }
-}
-
-/// Makes the run's configuration of the transport the global one, which the transport uses to clean up incomplete nodes.
-fn use_as_global(path: &Path) -> Result<(), StageError> {
-    let failed = |reason: String| StageError::Manifest {
-        path: path.to_owned(),
-        reason,
-    };
-    let file =
-        FilePath::new(path.as_os_str().as_encoded_bytes()).map_err(|e| failed(format!("{e:?}")))?;
-    Config::setup_global_config_from_file(&file).map_err(|e| failed(format!("{e:?}")))?;
-    Ok(())
 }

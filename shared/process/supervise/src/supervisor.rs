@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use gyre_stage::{
-    StageCounters,
+    StageCounters, transport,
     wake::{self, Signals},
 };
 
@@ -35,7 +35,7 @@ pub fn supervise(
     signals: Signals,
     observe: &mut dyn FnMut(Event<'_>),
 ) -> Result<Report, SuperviseError> {
-    iceoryx2::prelude::set_log_level(iceoryx2::prelude::LogLevel::Fatal);
+    transport::silence();
     let mut supervisor = Supervisor::new(plan, signals, observe)?;
     let ending = supervisor.start().and_then(|()| supervisor.watch());
     supervisor.stop(ending.as_ref().ok().copied())?;

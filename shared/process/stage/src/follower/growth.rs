@@ -1,10 +1,6 @@
 //! Wakes the followers when a log has grown.
 
-use crate::{
-    Launch, StageError,
-    log_id::LogId,
-    services::{self, Notifier},
-};
+use crate::{Launch, StageError, log_id::LogId, transport::Notifier};
 
 /// Notifies the followers of a log. A run without SLAM has no such events.
 pub struct Growth {
@@ -18,7 +14,7 @@ impl Growth {
     /// # Errors
     /// A failure of the transport.
     pub fn of(launch: &Launch, log: LogId) -> Result<Self, StageError> {
-        let notifier = services::notifier(&launch.node, log.event())?;
+        let notifier = Notifier::open(&launch.node, log.event())?;
         Ok(Self { log, notifier })
     }
 
@@ -27,8 +23,7 @@ impl Growth {
     /// # Errors
     /// A failure of the transport.
     pub fn notify(&self) -> Result<(), StageError> {
-        let notified = self.notifier.notify();
-        let failed = |e| StageError::transport(format!("notify {}", self.log.event()), e);
-        notified.map(drop).map_err(failed)
+        self.notifier
+            .notify(format_args!("notify {}", self.log.event()))
     }
 }

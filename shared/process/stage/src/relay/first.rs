@@ -6,7 +6,7 @@ use gyre_messages::{Hop, Item, Message, Motion, Scan, StageId};
 
 use crate::{
     Launch, StageCounters, StageError, clock,
-    outlet::{Outlet, RecordedMessage, item_of, outlet},
+    outlet::{Outlet, RecordedMessage, item_of},
     reader::Reader,
     schedule::ScheduleWriter,
     source::{ALIVE_NS, Credit},
@@ -20,7 +20,7 @@ pub struct FirstStages<'a> {
     credit: Credit,
     /// What goes back to the first stages besides poses.
     motions: Option<Reader<Motion>>,
-    outlets: Vec<Box<dyn Outlet>>,
+    outlets: Vec<Outlet>,
     schedule: ScheduleWriter,
     counters: StageCounters,
     /// The supervisor takes its publisher for a sign that the source has started.
@@ -39,7 +39,7 @@ impl<'a> FirstStages<'a> {
     ) -> Result<Self, StageError> {
         let (node, manifest) = (&launch.node, &launch.manifest);
         let motions = reads_motions.then(|| Reader::open(launch, None));
-        let outlets = topics.iter().map(|topic| outlet(launch, topic));
+        let outlets = topics.iter().map(|topic| Outlet::open(launch, topic));
         let publishes_scans = topics.contains(&Scan::TOPIC);
         Ok(Self {
             launch,

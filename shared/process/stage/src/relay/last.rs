@@ -9,7 +9,7 @@ use gyre_messages::{
 
 use crate::{
     Launch, StageCounters, StageError, elsewhere::ElsewhereWriter, outlet::RecordedMessage,
-    reader::Reader, services::Listener, sink, wake, writer::Writer,
+    reader::Reader, sink, transport::Listener, wake, writer::Writer,
 };
 
 /// Reads what the last stages read, which are on another machine, and publishes the poses that come back from them.

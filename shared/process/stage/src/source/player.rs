@@ -8,7 +8,7 @@ use gyre_messages::{Hop, Item, Scan, StageId, flag};
 use super::{Credit, Pace};
 use crate::{
     Launch, StageCounters, StageError, clock,
-    outlet::{Outlet, RecordedMessage, item_of, outlet},
+    outlet::{Outlet, RecordedMessage, item_of},
     schedule::ScheduleWriter,
     wake,
     writer::Writer,
@@ -42,7 +42,10 @@ pub fn run_player(
     }
     let credit = Credit::open(launch)?;
     let schedule = ScheduleWriter::create(&launch.manifest)?;
-    let outputs = recorded.topics().iter().map(|topic| outlet(launch, topic));
+    let outputs = recorded
+        .topics()
+        .iter()
+        .map(|topic| Outlet::open(launch, topic));
     let outputs = outputs.collect::<Result<_, _>>()?;
     let mut player = Player {
         launch,
@@ -62,7 +65,7 @@ struct Player<'a, R: Recorded> {
     launch: &'a Launch,
     recorded: &'a mut R,
     credit: Credit,
-    outputs: Vec<Box<dyn Outlet>>,
+    outputs: Vec<Outlet>,
     schedule: ScheduleWriter,
     counters: StageCounters,
     _scans: Writer<Scan>,

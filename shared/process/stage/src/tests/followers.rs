@@ -9,7 +9,7 @@ use crate::{
     Manifest,
     follower::LogId,
     observer::{Next, ObservedRun},
-    services,
+    transport::{Listener, Notifier},
 };
 
 #[test]
@@ -60,16 +60,13 @@ fn all_followers_of_a_log_are_woken_and_a_dead_one_does_not_matter() {
     let manifest: &Manifest = &run.manifest;
     let node = node(manifest);
     let event = LogId::Keyframes.event();
-    let notifier = services::notifier(&node, event).unwrap();
-    let [first, second] = [(); 2].map(|()| services::listener(&node, event).unwrap());
-    let woken = |listener: &crate::Listener| {
-        let mut woken = false;
-        listener.try_wait(|_| woken = true).unwrap();
-        woken
-    };
-    notifier.notify().unwrap();
+    let notifier = Notifier::open(&node, event).unwrap();
+    let [first, second] = [(); 2].map(|()| Listener::open(&node, event).unwrap());
+    let notify = || notifier.notify(format_args!("notify")).unwrap();
+    let woken = |listener: &Listener| listener.take(format_args!("read")).unwrap() > 0;
+    notify();
     assert!(woken(&first) && woken(&second) && !woken(&first));
     drop(first);
-    notifier.notify().unwrap();
+    notify();
     assert!(woken(&second));
 }

@@ -3,8 +3,8 @@
 use std::{fs, rc::Rc, time::Duration};
 
 use gyre_messages::{
-    Correction, Fix, Footprint, Loop, Masked, Message, Motion, Pose, Refined, Rotation, Scan, flag,
-    topics,
+    Correction, Fix, Footprint, Loop, Masked, Message, Motion, Pose, Refined, Rotation, Scan,
+    Topic, flag, topics,
 };
 
 use super::{Run, WINDOW, reader, send, writer};
@@ -12,8 +12,10 @@ use crate::{
     StageError,
     observer::{Next, ObservedRun, Observer},
     reader::{Port, Received},
-    services,
+    transport::Service,
 };
+
+const POSE: Topic = Topic::of::<Pose>();
 
 /// The sequence number of the next message and what was missed before it.
 fn next(observer: &mut Observer<'_, Pose>) -> Option<(u64, u64)> {
@@ -110,16 +112,16 @@ fn observers_leave_the_places_of_the_stages_free() {
     let run = Run::new();
     let observed = ObservedRun::at(&run.manifest.root).unwrap();
     let attached: Vec<_> = (0..WINDOW.observers)
-        .map(|_| observed.try_observe::<Pose>().unwrap())
+        .map(|_| observed.try_attach(&POSE).unwrap())
         .collect();
-    let one_too_many = observed.try_observe::<Pose>().map(drop);
+    let one_too_many = observed.try_attach(&POSE).map(drop);
     assert!(matches!(one_too_many, Err(StageError::NoPlace { .. })));
     let readers: Vec<_> = (0..Pose::READERS)
         .map(|_| reader::<Pose>(&run.manifest, None))
         .collect();
     // An observer that leaves makes room at once.
     drop(attached);
-    assert!(observed.try_observe::<Pose>().is_ok());
+    assert!(observed.try_attach(&POSE).is_ok());
     drop(readers);
 }
 
@@ -135,7 +137,7 @@ fn an_observer_of_an_earlier_run_does_not_disturb_a_later_one_with_the_same_resu
     drop(observer);
     drop(observed);
     // A restarted stage opens its topics anew.
-    services::open_topic::<Pose>(&super::node(&later.manifest)).unwrap();
+    Service::open(&super::node(&later.manifest), &POSE).unwrap();
     reader::<Pose>(&later.manifest, None);
 }
 

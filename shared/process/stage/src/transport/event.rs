@@ -1,0 +1,104 @@
+//! Events: notifications without content.
+
+use std::{
+    fmt::Arguments,
+    os::fd::{AsFd, BorrowedFd},
+};
+
+use iceoryx2::{
+    port::{listener, notifier},
+    prelude::FileDescriptorBased,
+    service::port_factory::event,
+};
+
+use super::{Ipc, Node, Sealed, service_name};
+use crate::StageError;
+
+/// Spare ports of an event: a listener that is killed during its creation can occupy one until the run ends.
+const HEADROOM: usize = 6;
+
+/// Numbers of ports that an event has room for, without the spare ones.
+#[derive(Clone, Copy)]
+pub(crate) struct EventSizes {
+    pub(crate) listeners: usize,
+    pub(crate) notifiers: usize,
+    pub(crate) nodes: usize,
+}
+
+/// An event. It exists as long as a process has it open.
+pub(crate) struct Event(Sealed<event::PortFactory<Ipc>>);
+
+/// The receiver of an event's notifications.
+pub struct Listener(Sealed<listener::Listener<Ipc>>);
+
+/// The sender of an event's notifications.
+pub(crate) struct Notifier(Sealed<notifier::Notifier<Ipc>>);
+
+impl Event {
+    pub(crate) fn create(node: &Node, name: &str, sizes: EventSizes) -> Result<Self, StageError> {
+        node.0
+            .service_builder(&service_name(name)?)
+            .event()
+            .max_listeners(sizes.listeners + HEADROOM)
+            .max_notifiers(sizes.notifiers + HEADROOM)
+            .max_nodes(sizes.nodes)
+            .event_id_max_value(1)
+            .create()
+            .map(|event| Self(Sealed::new(event)))
+            .map_err(|e| StageError::transport(format!("create the event {name}"), e))
+    }
+
+    fn open(node: &Node, name: &str) -> Result<Self, StageError> {
+        node.0
+            .service_builder(&service_name(name)?)
+            .event()
+            .open()
+            .map(|event| Self(Sealed::new(event)))
+            .map_err(|e| StageError::transport(format!("open the event {name}"), e))
+    }
+}
+
+impl Listener {
+    pub(crate) fn open(node: &Node, event: &str) -> Result<Self, StageError> {
+        Event::open(node, event)?
+            .0
+            .listener_builder()
+            .create()
+            .map(|listener| Self(Sealed::new(listener)))
+            .map_err(|e| StageError::transport(format!("listen to {event}"), e))
+    }
+
+    /// Takes the notifications that have arrived, and returns their number. `action` is named in an error.
+    pub(crate) fn take(&self, action: Arguments<'_>) -> Result<usize, StageError> {
+        let mut notifications = 0;
+        let taken = self.0.try_wait(|_| notifications += 1);
+        taken.map_err(|e| StageError::transport(action.to_string(), e))?;
+        Ok(notifications)
+    }
+}
+
+impl AsFd for Listener {
+    fn as_fd(&self) -> BorrowedFd<'_> {
+        // SAFETY: the listener owns the descriptor, and the borrow has the listener's lifetime.
+        unsafe { BorrowedFd::borrow_raw(self.0.file_descriptor().native_handle()) }
+    }
+}
+
+impl Notifier {
+    pub(crate) fn open(node: &Node, event: &str) -> Result<Self, StageError> {
+        Event::open(node, event)?
+            .0
+            .notifier_builder()
+            .create()
+            .map(|notifier| Self(Sealed::new(notifier)))
+            .map_err(|e| StageError::transport(format!("notify {event}"), e))
+    }
+
+    /// Wakes the listeners. `action` is named in an error.
+    pub(crate) fn notify(&self, action: Arguments<'_>) -> Result<(), StageError> {
+        let notified = self.0.notify();
+        notified
+            .map(drop)
+            .map_err(|e| StageError::transport(action.to_string(), e))
+    }
+}

@@ -1,0 +1,105 @@
+//! Topics of the transport.
+
+use gyre_messages::{Topic, Window, WireType};
+use iceoryx2::{
+    prelude::{CallbackProgression, PortFactory},
+    service::{
+        builder::publish_subscribe::Builder,
+        port_factory::publish_subscribe,
+        static_config::message_type_details::{TypeDetail, TypeVariant},
+    },
+};
+
+use super::{AnyHeader, AnyPayload, Ipc, Node, Sealed, service_name};
+use crate::StageError;
+
+/// A topic that this process has open.
+pub struct Service {
+    pub(super) topic: Topic,
+    pub(super) factory: Sealed<publish_subscribe::PortFactory<Ipc, AnyPayload, AnyHeader>>,
+}
+
+impl Service {
+    /// Creates a topic with the sizes of the window.
+    pub(crate) fn create(node: &Node, topic: &Topic, window: &Window) -> Result<Self, StageError> {
+        let sizes = (topic.sizes)(window);
+        let factory = builder(node, topic)?
+            .enable_safe_overflow(true)
+            .history_size(sizes.history)
+            .subscriber_max_buffer_size(sizes.buffer)
+            .subscriber_max_borrowed_samples(sizes.borrowed)
+            .max_publishers(1)
+            .max_subscribers(sizes.subscribers())
+            .max_nodes(sizes.nodes())
+            .create()
+            .map_err(|e| StageError::transport(format!("create the topic {}", topic.name), e))?;
+        Ok(Self::new(topic, factory))
+    }
+
+    /// Opens a topic, which the supervisor has created.
+    ///
+    /// # Errors
+    /// A failure of the transport.
+    pub fn open(node: &Node, topic: &Topic) -> Result<Self, StageError> {
+        let factory = builder(node, topic)?
+            .open()
+            .map_err(|e| StageError::transport(format!("open the topic {}", topic.name), e))?;
+        Ok(Self::new(topic, factory))
+    }
+
+    fn new(
+        topic: &Topic,
+        factory: publish_subscribe::PortFactory<Ipc, AnyPayload, AnyHeader>,
+    ) -> Self {
+        Self {
+            topic: *topic,
+            factory: Sealed::new(factory),
+        }
+    }
+
+    /// Returns whether a process publishes it. A dead one counts until its resources are removed.
+    pub(crate) fn has_publisher(&self) -> bool {
+        self.factory.dynamic_config().number_of_publishers() > 0
+    }
+
+    /// Returns the number of subscribers.
+    pub fn subscribers(&self) -> usize {
+        self.factory.dynamic_config().number_of_subscribers()
+    }
+
+    /// Returns the number of subscribers of this name.
+    pub(crate) fn subscribers_named(&self, name: &str) -> usize {
+        let mut named = 0;
+        self.factory
+            .dynamic_config()
+            .list_subscribers(|subscriber| {
+                named += usize::from(subscriber.subscriber_name.as_str() == name);
+                CallbackProgression::Continue
+            });
+        named
+    }
+}
+
+fn builder(node: &Node, topic: &Topic) -> Result<Builder<AnyPayload, AnyHeader, Ipc>, StageError> {
+    let (header, elements) = (
+        detail(TypeVariant::FixedSize, &topic.header)?,
+        detail(TypeVariant::Dynamic, &topic.element)?,
+    );
+    let builder = node
+        .0
+        .service_builder(&service_name(topic.name)?)
+        .publish_subscribe::<AnyPayload>()
+        .user_header::<AnyHeader>();
+    // SAFETY: these are the sizes and alignments of the types whose values are read and written as bytes here.
+    Ok(unsafe {
+        builder
+            .__internal_set_user_header_type_details(&header)
+            .__internal_set_payload_type_details(&elements)
+    })
+}
+
+/// Describes a type as the transport does itself for a type that it is generic in.
+fn detail(variant: TypeVariant, of: &WireType) -> Result<TypeDetail, StageError> {
+    TypeDetail::__internal_new_from_parts(variant, of.name, of.bytes, of.alignment)
+        .map_err(|e| StageError::transport(format!("describe {}", of.name), e))
+}

@@ -1,0 +1,90 @@
+//! The port that receives a topic.
+
+use std::slice;
+
+use iceoryx2::{
+    port::{ReceiveError, port_name::PortName, subscriber},
+    sample,
+};
+
+use super::{AnyHeader, AnyPayload, Ipc, Sealed, Service};
+use crate::StageError;
+
+/// The port that receives a topic.
+pub(crate) struct Subscriber {
+    topic: &'static str,
+    header_bytes: usize,
+    is_observer: bool,
+    port: Sealed<subscriber::Subscriber<Ipc, AnyPayload, AnyHeader>>,
+}
+
+/// A message in shared memory, borrowed from its publisher until it is dropped.
+pub(crate) struct Sample {
+    sample: Sealed<sample::Sample<Ipc, AnyPayload, AnyHeader>>,
+    header_bytes: usize,
+}
+
+impl Subscriber {
+    /// Subscribes as a process of the run.
+    pub(crate) fn create(service: &Service) -> Result<Self, StageError> {
+        let topic = service.topic.name;
+        let port = service.factory.subscriber_builder().create();
+        let port = port.map_err(|e| StageError::transport(format!("subscribe to {topic}"), e))?;
+        Ok(Self::new(service, port, false))
+    }
+
+    /// Subscribes as an observer, under a name by which observers are counted.
+    pub(crate) fn observe(service: &Service, name: &str) -> Result<Self, StageError> {
+        let name =
+            PortName::new(name).map_err(|e| StageError::transport("name the observer", e))?;
+        let topic = service.topic.name;
+        let port = service.factory.subscriber_builder().name(&name).create();
+        let port = port.map_err(|e| StageError::transport(format!("observe {topic}"), e))?;
+        Ok(Self::new(service, port, true))
+    }
+
+    fn new(
+        service: &Service,
+        port: subscriber::Subscriber<Ipc, AnyPayload, AnyHeader>,
+        is_observer: bool,
+    ) -> Self {
+        Self {
+            topic: service.topic.name,
+            header_bytes: service.topic.header.bytes,
+            is_observer,
+            port: Sealed::new(port),
+        }
+    }
+
+    /// Receives the next message; `None` if the queue is empty, or cannot be read now.
+    pub(crate) fn receive(&self) -> Result<Option<Sample>, StageError> {
+        match self.port.receive() {
+            Ok(sample) => Ok(sample.map(|sample| Sample {
+                sample: Sealed::new(sample),
+                header_bytes: self.header_bytes,
+            })),
+            // Samples of a dead publisher are still borrowed. The next call succeeds once they are released.
+            Err(ReceiveError::ExceedsMaxBorrows) if !self.is_observer => Ok(None),
+            // The publisher has just died or is being restarted. Its next message is found at the next wake-up.
+            Err(ReceiveError::ConnectionFailure(_)) if self.is_observer => Ok(None),
+            Err(e) => Err(StageError::transport(format!("receive {}", self.topic), e)),
+        }
+    }
+}
+
+impl Sample {
+    /// Returns the bytes of the header.
+    pub(crate) fn header(&self) -> &[u8] {
+        let header = std::ptr::from_ref(self.sample.user_header()).cast::<u8>();
+        // SAFETY: the topic was opened with this size of headers, so that the sample has as many bytes there, which its publisher
+        // does not write any more.
+        unsafe { slice::from_raw_parts(header, self.header_bytes) }
+    }
+
+    /// Returns the bytes of the payload.
+    pub(crate) fn payload(&self) -> &[u8] {
+        let payload = self.sample.payload();
+        // SAFETY: an element of `AnyPayload` is one byte.
+        unsafe { slice::from_raw_parts(payload.as_ptr().cast::<u8>(), payload.len()) }
+    }
+}
