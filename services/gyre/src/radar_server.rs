@@ -3,7 +3,7 @@
 use std::{net::TcpListener, ops::Range, path::Path, process::ExitCode, time::Duration};
 
 use gyre_live_radar::{
-    Address, Settings,
+    Address,
     capture::{self, Capture},
     server::{self, Audience, ByteOrder, ClockFormat, Faults, Playback},
 };
@@ -64,22 +64,14 @@ fn record(file: &Path, radar: &str, arguments: &RadarServerArguments) -> Result<
         true => arguments.interface.to_string(),
         false => String::new(),
     };
-    let settings = Settings {
-        address: Address::parse(radar, &interface)?,
-        // What is captured is not decoded.
-        encoder_counts: 0,
-        silence: Duration::MAX,
-        scans: None,
-        constants: Default::default(),
-    };
+    let address = Address::parse(radar, &interface)?;
     let signals = Signals::install()?;
     print::note(format_args!(
-        "gyre: capturing the radar at {} into {}",
-        settings.address,
+        "gyre: capturing the radar at {address} into {}",
         file.display()
     ));
     let stop = || signals.sleep(Duration::ZERO).unwrap_or(true);
-    let captured = capture::record(&settings, file, &stop)?;
+    let captured = capture::record(&address, file, &stop)?;
     print::line(format_args!(
         "captured {} bytes in {} records",
         captured.bytes, captured.records

@@ -1,4 +1,4 @@
-//! Where a radar is received.
+//! The address at which a radar is received.
 
 use std::{
     fmt,
@@ -8,15 +8,15 @@ use std::{
 use gyre_colossus::PORT;
 use thiserror::Error;
 
-/// Before the address of datagrams.
+/// The prefix of an address of datagrams.
 const UDP: &str = "udp://";
 
-/// Where a radar is received.
+/// The address at which a radar is received.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Address {
     /// Host and port of the radar, which is connected to by TCP.
     Tcp(String),
-    /// Where the radar sends its datagrams to.
+    /// The destination of the radar's datagrams.
     Udp {
         /// A multicast group, or an address of this machine, and the port.
         to: SocketAddrV4,
@@ -28,24 +28,25 @@ pub enum Address {
 /// An address that cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum BadAddress {
-    /// None for datagrams.
+    /// The address is none for datagrams.
     #[error(
         "address `{0}` is none for datagrams: give group and port, as in `udp://239.192.43.78:4378`"
     )]
     Udp(String),
-    /// None of this machine.
+    /// The interface is no address of this machine.
     #[error("interface `{0}` is no IPv4 address: give this machine's, as in `192.168.0.2`")]
     Interface(String),
-    /// A connection needs none.
+    /// A connection by TCP needs no interface.
     #[error("interface is set, but only an address that begins with `udp://` needs one: remove it")]
     Unused,
 }
 
 impl Address {
-    /// Parses an address: `HOST`, `HOST:PORT` or `udp://GROUP:PORT`, and the interface for the last, which may be empty.
+    /// Parses an address: `HOST`, `HOST:PORT` or `udp://GROUP:PORT`, and the interface for the
+    /// last, which may be empty.
     ///
     /// # Errors
-    /// It is none.
+    /// The text is no address.
     pub fn parse(text: &str, interface: &str) -> Result<Self, BadAddress> {
         let Some(to) = text.strip_prefix(UDP) else {
             return match interface {
@@ -63,6 +64,11 @@ impl Address {
                 interface => interface.parse().map_err(own)?,
             },
         })
+    }
+
+    /// Returns whether the radar is received by UDP.
+    pub fn is_udp(&self) -> bool {
+        matches!(self, Self::Udp { .. })
     }
 }
 

@@ -12,22 +12,22 @@ use gyre_colossus::{
 use gyre_radar::ScanLimits;
 use thiserror::Error;
 
-use crate::{Address, Settings, connection::Link, messages::Messages};
+use crate::{Address, Settings, connection::RadarSocket};
 
 /// The longest wait for an answer.
-const PATIENCE: Duration = Duration::from_secs(5);
-/// Time between two looks for it.
+const MAX_WAIT: Duration = Duration::from_secs(5);
+/// Time between two looks for the answer.
 const POLL: Duration = Duration::from_millis(10);
 
-/// Why a radar cannot be used.
+/// A radar that cannot be used.
 #[derive(Debug, Error)]
 pub enum AskError {
-    /// There is none.
+    /// No radar answers.
     #[error(
         "no radar answers at {address} ({source}): check source.address, and that the radar is on and in reach"
     )]
     NoAnswer {
-        /// Its address.
+        /// The address of the radar.
         address: String,
         /// The system's reason.
         source: std::io::Error,
@@ -35,40 +35,40 @@ pub enum AskError {
     /// Something else answers.
     #[error(
         "{address} sent no configuration of a radar within {} s: is it a Navtech radar, and has it less than three clients?",
-        PATIENCE.as_secs()
+        MAX_WAIT.as_secs()
     )]
     NoConfiguration {
-        /// Its address.
+        /// The address of the radar.
         address: String,
     },
     /// No datagram arrives.
     #[error(
         "nothing arrives at {address} within {} s: check that the radar's data output is CAT-240 to this address, and that source.interface is this machine's address on the radar's network",
-        PATIENCE.as_secs()
+        MAX_WAIT.as_secs()
     )]
     NoDatagrams {
-        /// Where the radar sends to.
+        /// The destination of the datagrams.
         address: String,
     },
-    /// What arrives are no azimuths.
+    /// The datagrams are no azimuths.
     #[error("what arrives at {address} are no scans: {source}")]
     NoScans {
-        /// Where the radar sends to.
+        /// The destination of the datagrams.
         address: String,
-        /// What is wrong.
+        /// The reason.
         source: Damage,
     },
-    /// Its configuration is not usable.
+    /// The configuration is not usable.
     #[error("the radar at {address} cannot be used: {source}")]
     Unusable {
-        /// Its address.
+        /// The address of the radar.
         address: String,
-        /// What is wrong.
+        /// The reason.
         source: BadConfiguration,
     },
 }
 
-/// What a radar says of its scans.
+/// The sizes of a radar's scans.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sizes {
     /// Time of a turn, ns.
@@ -95,7 +95,7 @@ pub fn ask(settings: &Settings) -> Result<Sizes, AskError> {
     }
 }
 
-/// Waits for what a radar says of itself.
+/// Waits for the radar's description of itself.
 fn configuration(settings: &Settings) -> Result<Configuration, AskError> {
     let address = settings.address.to_string();
     let no_answer = |source| AskError::NoAnswer {
@@ -104,10 +104,10 @@ fn configuration(settings: &Settings) -> Result<Configuration, AskError> {
     };
     // No azimuths: a recording that is played as a radar begins with the first request for them.
     let requests = [Request::RequestConfiguration];
-    let mut radar = Link::open(&settings.address, &requests).map_err(no_answer)?;
-    let (mut messages, mut damage) = (Messages::new(settings), None);
+    let mut radar = RadarSocket::open(&settings.address, &requests).map_err(no_answer)?;
+    let (mut messages, mut damage) = (settings.parser(), None);
     let started = Instant::now();
-    while started.elapsed() < PATIENCE {
+    while started.elapsed() < MAX_WAIT {
         match radar.read(messages.space()) {
             Ok((count, _)) => messages.filled(count),
             Err(error) if error.kind() == ErrorKind::UnexpectedEof => break,

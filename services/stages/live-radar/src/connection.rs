@@ -1,4 +1,5 @@
-//! A connection to a radar, made anew when it breaks or falls silent: TCP, or a socket that receives its datagrams.
+//! A connection to a radar, made anew when it breaks or falls silent: TCP, or a socket that
+//! receives its datagrams.
 
 use std::{
     fmt::Display,
@@ -11,25 +12,25 @@ use std::{
 use gyre_colossus::{Request, write_request};
 use rustix::net::{AddressFamily, SocketFlags, SocketType, bind, socket_with, sockopt};
 
-use crate::{Address, Settings, messages::Messages};
+use crate::{Address, Settings, parser::RadarParser};
 
 /// The longest time for an attempt to connect.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(1);
-/// Pauses between attempts to connect: the first, and the longest, to which each doubles.
-const PAUSES: [Duration; 2] = [Duration::from_millis(100), Duration::from_secs(5)];
-/// Room for datagrams that are not read yet, as far as the system gives it: a scan, should this process be late.
+/// Pauses between attempts to connect: the first, and the limit up to which they double.
+const RETRY_PAUSES: [Duration; 2] = [Duration::from_millis(100), Duration::from_secs(5)];
+/// Buffer for datagrams that are not read yet, as far as the system allows: one scan.
 const RECEIVE_BYTES: usize = 4 << 20;
 
-/// What a connection has received.
+/// The result of reading from a connection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Received {
-    /// Bytes, which are in the parser.
+pub enum ReadResult {
+    /// Bytes were read, and are in the parser.
     Bytes,
-    /// It was opened.
+    /// The connection was opened.
     Opened,
-    /// Nothing; look again after this time.
+    /// Nothing was read; look again after this time.
     Nothing(Duration),
-    /// Nothing, and it was closed, or could not be opened; look again after this time.
+    /// The connection was closed, or could not be opened; look again after this time.
     Closed(Duration),
 }
 
@@ -38,37 +39,38 @@ pub enum Received {
 pub struct Connection {
     address: Address,
     silence: Duration,
-    link: Option<Link>,
-    /// The last azimuth, or the opening.
-    heard: Instant,
-    /// An azimuth has come since the opening.
-    is_heard: bool,
+    socket: Option<RadarSocket>,
+    /// The time of the last azimuth, or of the opening.
+    last_azimuth: Instant,
+    /// True from the first azimuth after the opening on.
+    receives_azimuths: bool,
     retry_at: Instant,
     pause: Duration,
-    /// Who has sent the last datagram.
+    /// The sender of the last datagram.
     from: Option<SocketAddr>,
-    /// The only one whose datagrams are taken.
+    /// The only sender whose datagrams are taken.
     sender: Option<SocketAddr>,
-    /// Its address also after it has fallen silent, once it has sent a scan: another radar of the same group is at another place.
+    /// The address of the radar once it has sent a scan, kept while it is silent: another radar of
+    /// the same group has another address.
     radar: Option<IpAddr>,
-    /// Connections so far.
+    /// The number of connections so far.
     pub opened: u64,
-    /// Datagrams of others.
+    /// The number of datagrams of other senders.
     pub foreign: u64,
 }
 
 impl Connection {
-    /// A connection that is opened when it is first read from.
+    /// Creates a connection that is opened when it is first read from.
     pub fn new(settings: &Settings) -> Self {
         let now = Instant::now();
         Self {
             address: settings.address.clone(),
             silence: settings.silence,
-            link: None,
-            heard: now,
-            is_heard: false,
+            socket: None,
+            last_azimuth: now,
+            receives_azimuths: false,
             retry_at: now,
-            pause: PAUSES[0],
+            pause: RETRY_PAUSES[0],
             from: None,
             sender: None,
             radar: None,
@@ -77,28 +79,28 @@ impl Connection {
         }
     }
 
-    /// The socket, while it is open.
+    /// Returns the socket, while it is open.
     pub fn socket(&self) -> Option<BorrowedFd<'_>> {
-        self.link.as_ref().map(Link::socket)
+        self.socket.as_ref().map(RadarSocket::as_fd)
     }
 
     /// Reads what has arrived, or opens the connection; does not wait for bytes.
-    pub fn receive(&mut self, messages: &mut Messages) -> Received {
-        let Some(link) = &mut self.link else {
+    pub fn receive(&mut self, messages: &mut RadarParser) -> ReadResult {
+        let Some(socket) = &mut self.socket else {
             return self.open();
         };
-        match link.read(messages.space()) {
+        match socket.read(messages.space()) {
             Ok((count, from)) => {
                 self.from = from;
                 if !self.is_foreign() {
                     messages.filled(count);
                 }
-                Received::Bytes
+                ReadResult::Bytes
             }
-            Err(error) if error.kind() == ErrorKind::Interrupted => Received::Bytes,
+            Err(error) if error.kind() == ErrorKind::Interrupted => ReadResult::Bytes,
             Err(error) if error.kind() == ErrorKind::WouldBlock => {
-                match self.silence.checked_sub(self.heard.elapsed()) {
-                    Some(left) if !left.is_zero() => Received::Nothing(left),
+                match self.silence.checked_sub(self.last_azimuth.elapsed()) {
+                    Some(left) if !left.is_zero() => ReadResult::Nothing(left),
                     _ => {
                         let silence = self.silence;
                         self.close(format_args!("it sent no azimuth for {silence:?}"))
@@ -109,20 +111,21 @@ impl Connection {
         }
     }
 
-    /// Says that an azimuth has come. Other messages don't count: a radar may go on to say that it is alive, and send no powers.
-    pub fn has_heard(&mut self) {
-        self.heard = Instant::now();
-        self.is_heard = true;
-        self.pause = PAUSES[0];
+    /// Notes that an azimuth has arrived. Other messages do not count: a radar may send no powers
+    /// and still say that it is alive.
+    pub fn note_azimuth(&mut self) {
+        self.last_azimuth = Instant::now();
+        self.receives_azimuths = true;
+        self.pause = RETRY_PAUSES[0];
     }
 
-    /// Whether azimuths come.
-    pub fn is_heard(&self) -> bool {
-        self.is_heard
+    /// Returns whether azimuths arrive.
+    pub fn receives_azimuths(&self) -> bool {
+        self.receives_azimuths
     }
 
-    /// Takes datagrams of the sender of the last one only.
-    pub fn take_sender(&mut self) {
+    /// Takes from now on only datagrams of the sender of the last one.
+    pub fn lock_sender(&mut self) {
         if self.sender.is_none()
             && let Some(from) = self.from
         {
@@ -131,12 +134,13 @@ impl Connection {
         }
     }
 
-    /// Says that a scan has come: no description that somebody sends makes them the radar of the run for good.
-    pub fn has_scan(&mut self) {
+    /// Notes that a scan has arrived. Only then is its sender the radar of the run: anybody can
+    /// send a description.
+    pub fn note_scan(&mut self) {
         self.radar = self.sender.map(|sender| sender.ip()).or(self.radar);
     }
 
-    /// Whether the last datagram is of another than the radar; counts those.
+    /// Returns whether the last datagram is of another sender than the radar, and counts it.
     fn is_foreign(&mut self) -> bool {
         let Some(from) = self.from else {
             return false;
@@ -156,52 +160,52 @@ impl Connection {
         true
     }
 
-    fn open(&mut self) -> Received {
+    fn open(&mut self) -> ReadResult {
         let left = self.retry_at.saturating_duration_since(Instant::now());
         if !left.is_zero() {
-            return Received::Nothing(left);
+            return ReadResult::Nothing(left);
         }
         let requests = [
             Request::RequestConfiguration,
             Request::StartFft,
             Request::StartHealth,
         ];
-        match Link::open(&self.address, &requests) {
-            Ok(link) => {
+        match RadarSocket::open(&self.address, &requests) {
+            Ok(socket) => {
                 tracing::info!(address = %self.address, "connected to the radar");
-                self.link = Some(link);
-                self.heard = Instant::now();
-                self.is_heard = false;
+                self.socket = Some(socket);
+                self.last_azimuth = Instant::now();
+                self.receives_azimuths = false;
                 self.opened += 1;
-                Received::Opened
+                ReadResult::Opened
             }
             Err(error) => self.close(error),
         }
     }
 
-    /// Closes it, to be opened anew after a pause.
-    pub fn close(&mut self, reason: impl Display) -> Received {
+    /// Closes the connection, to be opened anew after a pause.
+    pub fn close(&mut self, reason: impl Display) -> ReadResult {
         let pause = self.pause;
         tracing::warn!(
             address = %self.address,
             "no connection to the radar, trying again in {pause:?}: {reason}"
         );
-        self.link = None;
+        self.socket = None;
         self.sender = None;
-        self.is_heard = false;
+        self.receives_azimuths = false;
         self.retry_at = Instant::now() + pause;
-        self.pause = (2 * pause).min(PAUSES[1]);
-        Received::Closed(pause)
+        self.pause = (2 * pause).min(RETRY_PAUSES[1]);
+        ReadResult::Closed(pause)
     }
 }
 
 impl Drop for Connection {
-    /// The radar has room for few clients: leave properly.
+    /// Stops the azimuths: the radar has room for few clients.
     fn drop(&mut self) {
-        if let Some(Link::Tcp(stream)) = &mut self.link {
+        if let Some(RadarSocket::Tcp(stream)) = &mut self.socket {
             let mut bytes = Vec::new();
             write_request(&mut bytes, Request::StopFft);
-            // It notices the end of the connection too.
+            // The radar notices the end of the connection too.
             let _ = stream.write_all(&bytes);
         }
     }
@@ -209,12 +213,12 @@ impl Drop for Connection {
 
 /// An open connection, or the socket that receives datagrams.
 #[derive(Debug)]
-pub enum Link {
+pub enum RadarSocket {
     Tcp(TcpStream),
     Udp(UdpSocket),
 }
 
-impl Link {
+impl RadarSocket {
     /// Connects and sends requests, or begins to receive.
     pub fn open(address: &Address, requests: &[Request]) -> io::Result<Self> {
         match address {
@@ -223,10 +227,10 @@ impl Link {
         }
     }
 
-    /// Reads bytes, of datagrams one with its sender; does not wait.
+    /// Reads bytes of a stream, or one datagram with its sender; does not wait.
     ///
     /// # Errors
-    /// There are none, or the connection has ended.
+    /// Nothing has arrived, or the connection has ended.
     pub fn read(&mut self, space: &mut [u8]) -> io::Result<(usize, Option<SocketAddr>)> {
         match self {
             Self::Tcp(stream) => match stream.read(space)? {
@@ -243,7 +247,7 @@ impl Link {
         }
     }
 
-    fn socket(&self) -> BorrowedFd<'_> {
+    fn as_fd(&self) -> BorrowedFd<'_> {
         match self {
             Self::Tcp(stream) => stream.as_fd(),
             Self::Udp(socket) => socket.as_fd(),
@@ -251,12 +255,13 @@ impl Link {
     }
 }
 
-/// Receives what is sent to an address; a group is joined on an interface. Other programs may receive the same.
+/// Opens a socket for datagrams to an address; joins a group on an interface. Other programs may
+/// receive the same datagrams.
 fn join(to: SocketAddrV4, interface: Ipv4Addr) -> io::Result<UdpSocket> {
     let flags = SocketFlags::CLOEXEC | SocketFlags::NONBLOCK;
     let socket = socket_with(AddressFamily::INET, SocketType::DGRAM, flags, None)?;
     sockopt::set_socket_reuseaddr(&socket, true)?;
-    // The system gives as much of it as it allows.
+    // The system may allow less.
     sockopt::set_socket_recv_buffer_size(&socket, RECEIVE_BYTES)?;
     bind(&socket, &to)?;
     let socket = UdpSocket::from(socket);

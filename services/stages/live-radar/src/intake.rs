@@ -1,4 +1,4 @@
-//! What a live source makes of what arrives, however it arrives.
+//! Azimuths and configurations of a live source to scans, with counts, whatever the transport.
 
 use std::{fmt::Display, time::Duration};
 
@@ -7,46 +7,46 @@ use gyre_messages::ScanHeader;
 use gyre_stage::source::Received;
 use thiserror::Error;
 
-use crate::{sweeps::Sweeps, turns::Turns};
+use crate::{scan_assembly::ScanAssembly, turn_counter::TurnCounter};
 
-/// Configurations and azimuths of a radar to scans, with counts of what is lost.
+/// Assembles the scans of a live source, and counts what is lost.
 pub struct Intake {
     constants: Constants,
     /// `None` until the radar has sent its configuration.
-    sweeps: Option<Sweeps>,
-    turns: Turns,
-    /// What the source before has counted, if it died.
+    scans: Option<ScanAssembly>,
+    turns: TurnCounter,
+    /// The counts of the source process before this one, if it died.
     before: Received,
     missing: u64,
     damaged: u64,
     due_ns: Option<i64>,
 }
 
-/// Why a configuration makes no scans of this run.
+/// A configuration whose scans do not fit into this run.
 #[derive(Debug, Error)]
 pub enum NoScans {
-    /// Of none.
+    /// The configuration makes no scans.
     #[error(transparent)]
     Bad(#[from] BadConfiguration),
-    /// They are larger than those at its start.
+    /// The scans are larger than at the start of the run.
     #[error(
         "the scans of the radar have {bytes} bytes now, {room} at the start of the run: start the run again"
     )]
     TooLarge {
-        /// Bytes of a scan.
+        /// The bytes of a scan.
         bytes: usize,
-        /// Those that the run has for one.
+        /// The bytes that the run has for a scan.
         room: usize,
     },
 }
 
 impl Intake {
-    /// An intake without a configuration.
+    /// Creates an intake without a configuration.
     pub fn new(constants: Constants) -> Self {
         Self {
             constants,
-            sweeps: None,
-            turns: Turns::resume(None, 0),
+            scans: None,
+            turns: TurnCounter::resume(None, 0),
             before: Received::default(),
             missing: 0,
             damaged: 0,
@@ -54,36 +54,37 @@ impl Intake {
         }
     }
 
-    /// Begins the scans of a configuration; false if it is the one so far. `room` is what the run has for a scan, bytes.
+    /// Begins the scans of a configuration; false if it is not new. `room` are the bytes that the
+    /// run has for a scan.
     ///
     /// # Errors
-    /// It makes no scans of this run.
+    /// The scans do not fit into this run.
     pub fn configure(&mut self, radar: Configuration, room: usize) -> Result<bool, NoScans> {
-        let is_known = |sweeps: &Sweeps| sweeps.is_of(&radar);
-        if self.sweeps.as_ref().is_some_and(is_known) {
+        if self.scans.as_ref().is_some_and(|scans| scans.is_of(&radar)) {
             return Ok(false);
         }
-        let new = Sweeps::new(radar, self.constants)?;
+        let new = ScanAssembly::new(radar, self.constants)?;
         let bytes = new.bytes();
         if bytes > room {
             return Err(NoScans::TooLarge { bytes, room });
         }
         self.turns.configure(radar.period_ns());
-        self.sweeps = Some(new);
+        self.scans = Some(new);
         Ok(true)
     }
 
     /// Returns whether there is a configuration.
     pub fn is_configured(&self) -> bool {
-        self.sweeps.is_some()
+        self.scans.is_some()
     }
 
-    /// Forgets the configuration and the scan that is not complete: what follows is of a new connection.
+    /// Discards the configuration and the partial scan, for a new connection.
     pub fn restart(&mut self) {
-        self.sweeps = None;
+        self.scans = None;
     }
 
-    /// Adds an azimuth that arrived at `arrival_ns` (since 1970); true if a scan is complete. Without a configuration it is dropped.
+    /// Adds an azimuth that arrived at `arrival_ns` (since 1970); true if a scan is complete.
+    /// Without a configuration it is dropped.
     pub fn add(
         &mut self,
         azimuth: Azimuth<'_>,
@@ -91,9 +92,9 @@ impl Intake {
         header: &mut ScanHeader,
         bytes: &mut [u8],
     ) -> bool {
-        let sweeps = self.sweeps.as_mut();
-        let scan = sweeps
-            .and_then(|sweeps| sweeps.add(azimuth, arrival_ns, &mut self.turns, header, bytes));
+        let scans = self.scans.as_mut();
+        let scan =
+            scans.and_then(|scans| scans.add(azimuth, arrival_ns, &mut self.turns, header, bytes));
         if let Some(scan) = scan {
             self.missing += scan.missing as u64;
             self.due_ns = scan.due_ns;
@@ -115,25 +116,28 @@ impl Intake {
         }
     }
 
-    /// The time for which no scan can be complete, if it is that of a few azimuths: so many are then read at once.
+    /// Returns the time for which no scan can be complete, if it is that of a few azimuths: so many
+    /// are then read at once.
     pub fn pause(&self) -> Option<Duration> {
-        self.sweeps.as_ref().and_then(Sweeps::pause)
+        self.scans.as_ref().and_then(ScanAssembly::pause)
     }
 
-    /// When the last scan was complete by the radar's clock, `CLOCK_MONOTONIC`, ns; `None`: not known.
+    /// Returns the time at which the last scan was complete by the radar's clock,
+    /// `CLOCK_MONOTONIC`, ns; `None`: not known.
     pub fn due_ns(&self) -> Option<i64> {
         self.due_ns
     }
 
-    /// Goes on counting after a source that has died.
+    /// Continues the counts of a source process that has died.
     pub fn resume(&mut self, before: Received) {
-        self.turns = Turns::resume(before.last_scan, before.scans_left_out);
+        self.turns = TurnCounter::resume(before.last_scan, before.scans_left_out);
         self.before = before;
     }
 
-    /// Returns the counts since the start of the run; what else has arrived, and how, is that of the source before.
+    /// Returns the counts since the start of the run; those of connections are the earlier
+    /// source's.
     pub fn received(&self) -> Received {
-        let is_open = self.sweeps.as_ref().is_some_and(Sweeps::is_open);
+        let is_open = self.scans.as_ref().is_some_and(ScanAssembly::is_open);
         Received {
             missing_azimuths: self.before.missing_azimuths + self.missing,
             scans_left_out: self.turns.left_out(is_open),

@@ -1,18 +1,23 @@
-//! The source stage of a live radar: receives azimuths by Navtech's protocol Colossus (TCP), or as ASTERIX CAT-240 by UDP, and publishes
-//! each sweep on `scan`, written directly into shared memory. [`server`] is the other end: it plays a recording as a radar.
+//! The source stage of a live radar: receives azimuths by Navtech's protocol Colossus (TCP), or as
+//! ASTERIX CAT-240 by UDP, and publishes each sweep on `scan`, written directly into shared memory.
+//! [`server`] is the other end: it plays a recording as a radar.
+//!
+//! Reading order: `radar` (the sensor), `connection` and `parser` (bytes to messages), [`Intake`]
+//! and `scan_assembly` (azimuths to scans), `turn_counter` (turns without a scan), `read_delay`
+//! (the time at which a scan was complete).
 
 mod address;
 mod ask;
 pub mod capture;
 mod connection;
-mod delay;
-mod ills;
+mod health_log;
 mod intake;
-mod messages;
+mod parser;
 mod radar;
+mod read_delay;
+mod scan_assembly;
 pub mod server;
-mod sweeps;
-mod turns;
+mod turn_counter;
 
 use std::time::Duration;
 
@@ -24,10 +29,12 @@ pub use ask::{AskError, Sizes, ask};
 pub use gyre_colossus::PORT;
 pub use intake::{Intake, NoScans};
 
-/// How to reach a radar, and what it does not say of itself.
+use parser::RadarParser;
+
+/// The address of a radar, and the properties that it does not send.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// Where it is received.
+    /// The address at which it is received.
     pub address: Address,
     /// Encoder counts per turn, to which the angles of a radar are rounded that sends by UDP.
     pub encoder_counts: u16,
@@ -39,10 +46,17 @@ pub struct Settings {
     pub constants: Constants,
 }
 
+impl Settings {
+    fn parser(&self) -> RadarParser {
+        RadarParser::new(self.address.is_udp(), self.encoder_counts)
+    }
+}
+
 /// Receives the scans of a radar until SIGTERM, or until there are enough.
 ///
 /// # Errors
-/// A radar that is connected to by TCP and whose scans are larger than at the start of the run, or a failure of the transport.
+/// A radar that is connected to by TCP and whose scans are larger than at the start of the run, or
+/// a failure of the transport.
 pub fn run(launch: &Launch, settings: Settings) -> Result<StageCounters, StageError> {
     let scans = settings.scans;
     source::run_sensor(launch, &mut radar::Radar::new(settings), scans)

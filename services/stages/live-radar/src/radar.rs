@@ -1,64 +1,60 @@
 //! A radar as the source of a run.
 
-use std::{
-    os::fd::BorrowedFd,
-    time::{Duration, SystemTime},
-};
+use std::{os::fd::BorrowedFd, time::Duration};
 
 use gyre_colossus::{Configuration, Event, Message};
 use gyre_messages::{ScanHeader, StageId};
 use gyre_stage::{
-    StageError,
+    StageError, clock,
     source::{Arrival, Received as Counts, Sensor},
 };
 
 use crate::{
-    Address, Intake, NoScans, Settings,
-    connection::{Connection, Received},
-    ills::Ills,
-    messages::Messages,
+    Intake, NoScans, Settings,
+    connection::{Connection, ReadResult},
+    health_log::HealthLog,
+    parser::RadarParser,
 };
 
-/// Reads after which the process looks for signals and new readers, however much there is to read.
+/// The most reads between two looks for signals and new readers.
 const MAX_READS: usize = 64;
-/// Bytes without a message after which what is connected to is no radar.
+/// Bytes without a message after which the other end is taken for no radar.
 const MAX_SKIPPED_BYTES: usize = 1 << 22;
 
 /// A radar on the network.
 pub struct Radar {
     settings: Settings,
     connection: Connection,
-    messages: Messages,
+    messages: RadarParser,
     intake: Intake,
-    /// What the source before has counted, if it died.
+    /// The counts of the source process before this one, if it died.
     before: Counts,
     /// Descriptions of scans that do not fit into the run.
     refused: u64,
-    ills: Ills,
+    health: HealthLog,
 }
 
 impl Radar {
-    /// A radar that is connected to when it is first asked.
+    /// Creates a radar that is connected to when it is first read.
     pub fn new(settings: Settings) -> Self {
         Self {
             connection: Connection::new(&settings),
-            messages: Messages::new(&settings),
+            messages: settings.parser(),
             intake: Intake::new(settings.constants),
             settings,
             before: Counts::default(),
             refused: 0,
-            ills: Ills::default(),
+            health: HealthLog::default(),
         }
     }
 
-    /// Begins the scans of a configuration, unless it is the one so far. One that makes no scans of this run is passed over, if it came
-    /// in a datagram, which anybody can send.
+    /// Begins the scans of a new configuration. One whose scans do not fit into this run is ignored
+    /// if it came in a datagram, which anybody can send.
     fn configure(&mut self, radar: Configuration, room: usize) -> Result<(), StageError> {
-        let is_tcp = matches!(self.settings.address, Address::Tcp(_));
         match self.intake.configure(radar, room) {
-            Ok(true) => self.connection.take_sender(),
+            Ok(true) => self.connection.lock_sender(),
             Ok(false) => {}
-            Err(error @ NoScans::TooLarge { .. }) if is_tcp => {
+            Err(error @ NoScans::TooLarge { .. }) if !self.settings.address.is_udp() => {
                 return Err(StageError::Input(error.to_string()));
             }
             Err(error) => self.refuse(&error.to_string()),
@@ -66,7 +62,7 @@ impl Radar {
         Ok(())
     }
 
-    /// Passes over the radar's description, and what a datagram has beside it.
+    /// Ignores the radar's description, and the rest of its datagram.
     fn refuse(&mut self, reason: &str) {
         self.messages.refuse_description();
         self.refused += 1;
@@ -76,7 +72,8 @@ impl Radar {
         }
     }
 
-    /// How to wait for more: after a pause that is shorter than the time to the end of the scan, if the radar sends at all.
+    /// Returns how to wait for more: for a pause that ends before the scan does, if the radar
+    /// sends.
     fn wait(&self, limit: Duration, has_received: bool) -> Arrival {
         match self.intake.pause().filter(|_| has_received) {
             Some(pause) if pause < limit => Arrival::Later(pause),
@@ -84,27 +81,30 @@ impl Radar {
         }
     }
 
-    /// Forgets what a connection that is closed has sent: no later one goes on with it.
-    fn forget(&mut self) {
-        self.messages = Messages::new(&self.settings);
+    /// Discards the partial message and scan of a connection that was closed.
+    fn reset(&mut self) {
+        self.messages = self.settings.parser();
         self.intake.restart();
     }
 
-    /// Handles what is in the parser up to the next complete scan; true if there is one.
+    /// Handles the parsed messages up to the next complete scan; returns whether there is one.
     fn parse(&mut self, header: &mut ScanHeader, bytes: &mut [u8]) -> Result<bool, StageError> {
         while let Some(event) = self.messages.next() {
             match event {
                 Event::Message(Message::Azimuth(azimuth)) => {
-                    self.connection.has_heard();
-                    if self.intake.add(azimuth, now_ns(), header, bytes) {
-                        self.connection.has_scan();
+                    self.connection.note_azimuth();
+                    if self
+                        .intake
+                        .add(azimuth, clock::since_1970_ns(), header, bytes)
+                    {
+                        self.connection.note_scan();
                         return Ok(true);
                     }
                 }
                 Event::Message(Message::Configuration(radar)) => {
                     self.configure(radar, bytes.len())?
                 }
-                Event::Message(Message::Health(health)) => self.ills.note(&health),
+                Event::Message(Message::Health(health)) => self.health.update(&health),
                 Event::Message(_) => {}
                 Event::Damaged {
                     reason,
@@ -113,16 +113,10 @@ impl Radar {
             }
         }
         if self.messages.take_part() {
-            self.connection.has_heard();
+            self.connection.note_azimuth();
         }
         Ok(false)
     }
-}
-
-/// The host's clock, ns since 1970.
-fn now_ns() -> i64 {
-    let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
-    now.unwrap_or(Duration::ZERO).as_nanos() as i64
 }
 
 impl Sensor for Radar {
@@ -143,11 +137,11 @@ impl Sensor for Radar {
                 false => self.connection.receive(&mut self.messages),
             };
             match received {
-                Received::Bytes => has_received = true,
-                Received::Opened => {}
-                Received::Nothing(limit) => return Ok(self.wait(limit, has_received)),
-                Received::Closed(limit) => {
-                    self.forget();
+                ReadResult::Bytes => has_received = true,
+                ReadResult::Opened => {}
+                ReadResult::Nothing(limit) => return Ok(self.wait(limit, has_received)),
+                ReadResult::Closed(limit) => {
+                    self.reset();
                     return Ok(Arrival::Nothing(limit));
                 }
             }
@@ -169,7 +163,7 @@ impl Sensor for Radar {
         Counts {
             foreign_messages: before.foreign_messages + connection.foreign + self.refused,
             connections: before.connections + connection.opened,
-            is_receiving: connection.is_heard(),
+            is_receiving: connection.receives_azimuths(),
             ..self.intake.received()
         }
     }

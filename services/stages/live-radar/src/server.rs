@@ -1,15 +1,14 @@
-//! Plays a recording as a radar on the network, with the faults of one where asked for.
+//! Plays a recording as a radar on the network, with injected faults where asked for.
 
 mod clients;
 mod faults;
 mod group;
+mod output;
 
 use std::{
     f64::consts::TAU,
     io,
-    net::{Ipv4Addr, SocketAddrV4, TcpListener},
     ops::Range,
-    thread::sleep,
     time::{Duration, Instant},
 };
 
@@ -21,37 +20,17 @@ pub(crate) use clients::Clients;
 pub use faults::Faults;
 pub(crate) use group::Group;
 pub use gyre_colossus::{ByteOrder, ClockFormat};
+pub use output::Audience;
+pub(crate) use output::{Output, sleep_until};
 
 /// Encoder counts in a turn, where a recording does not say.
 const ENCODER_COUNTS: u16 = 5600;
 /// The longest wait within a recording: longer gaps are shortened to it.
 const MAX_WAIT: Duration = Duration::from_secs(2);
-/// The longest time without a look for a request to stop.
-const SLICE: Duration = Duration::from_millis(50);
-/// Time between two looks for a client.
-const POLL: Duration = Duration::from_millis(5);
-/// Time between two descriptions of a radar that sends no powers yet.
-const DESCRIBE_PERIOD: Duration = Duration::from_millis(100);
-/// What a garbled message is.
+/// The bytes of a garbled message.
 const GARBAGE: &[u8] = b"not a message of a radar";
 
-/// To whom a recording is played.
-#[derive(Debug)]
-pub enum Audience {
-    /// Who connects by TCP, from the first request for azimuths on.
-    Clients(TcpListener),
-    /// Who receives the datagrams, if anybody.
-    Group {
-        /// The group, or the address of one receiver.
-        to: SocketAddrV4,
-        /// The address of this machine from which they leave; unspecified: the system chooses.
-        interface: Ipv4Addr,
-        /// Time before the first scan, for which only the radar's description of itself is sent.
-        wait: Duration,
-    },
-}
-
-/// How to play.
+/// The options of a playback.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Playback {
     /// Factor of the recorded pace; `None`: as fast as the clients read.
@@ -60,13 +39,13 @@ pub struct Playback {
     pub scans: Range<usize>,
     /// Play the recording again and again, its times going on.
     pub repeats: bool,
-    /// Faults to make.
+    /// Faults to inject.
     pub faults: Faults,
-    /// How the times are written.
+    /// The format of the times.
     pub clock: ClockFormat,
 }
 
-/// Why a recording cannot be played as a radar.
+/// A failure to play a recording as a radar.
 #[derive(Debug, Error)]
 pub enum ServeError {
     /// A scan cannot be read.
@@ -87,7 +66,7 @@ pub enum ServeError {
     },
 }
 
-/// What was played.
+/// The counts of a playback.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Played {
     /// Scans.
@@ -116,18 +95,7 @@ pub fn serve(
     let mut scan = OwnedScan::with_limits(dataset.limits());
     scan.geometry = dataset.read(first, scan.slot())?;
     let radar = configuration(dataset, scan.view())?;
-    let mut wait = Duration::ZERO;
-    let output = match audience {
-        Audience::Clients(listener) => Output::Clients(Clients::accept(listener, &radar)?),
-        Audience::Group {
-            to,
-            interface,
-            wait: before,
-        } => {
-            wait = before;
-            Output::Group(Group::open(to, interface, playback.faults)?)
-        }
-    };
+    let output = Output::open(audience, &radar, playback.faults)?;
     let mut player = Player {
         output,
         radar,
@@ -139,7 +107,7 @@ pub fn serve(
         sweep_counter: 0,
         played: Played::default(),
     };
-    if !player.describe(wait) {
+    if !player.output.describe(&player.radar, stop) {
         return Ok(player.ended());
     }
     loop {
@@ -152,7 +120,7 @@ pub fn serve(
             last_ns = scan.view().stamp_ns.last().copied().unwrap_or(last_ns);
         }
         if !playback.repeats {
-            player.close();
+            player.output.close();
             return Ok(player.ended());
         }
         scan.geometry = dataset.read(first, scan.slot())?;
@@ -162,7 +130,7 @@ pub fn serve(
     }
 }
 
-/// What the radar says of itself.
+/// Returns the radar's description of itself.
 fn configuration(dataset: &dyn Dataset, scan: PolarScan<'_>) -> Result<Configuration, ServeError> {
     let geometry = scan.geometry;
     let (azimuths, bins) = (geometry.azimuths, geometry.bins);
@@ -184,12 +152,6 @@ fn configuration(dataset: &dyn Dataset, scan: PolarScan<'_>) -> Result<Configura
         range_offset: 0.0,
         range_resolution_m: Some(geometry.range_resolution_m),
     })
-}
-
-/// Where messages go.
-enum Output {
-    Clients(Clients),
-    Group(Group),
 }
 
 struct Player<'a> {
@@ -216,7 +178,8 @@ impl Player<'_> {
         if faults.stalls(self.played.scans) {
             self.played.stalls += 1;
             self.started = None;
-            if !self.pause(Duration::from_secs_f64(faults.stall_s)) {
+            let due = Instant::now() + Duration::from_secs_f64(faults.stall_s);
+            if !sleep_until(due, self.stop) {
                 return false;
             }
         }
@@ -246,32 +209,10 @@ impl Player<'_> {
         !(self.stop)()
     }
 
-    /// Sends only what the radar says of itself for some time, to a group; false on a request to stop.
-    fn describe(&mut self, wait: Duration) -> bool {
-        let end = Instant::now() + wait;
-        while let Output::Group(group) = &mut self.output
-            && Instant::now() < end
-        {
-            group.describe(&self.radar);
-            if (self.stop)() {
-                return false;
-            }
-            sleep(DESCRIBE_PERIOD);
-        }
-        true
-    }
-
-    /// Ends the connections when the clients have read all.
-    fn close(&self) {
-        if let Output::Clients(clients) = &self.output {
-            clients.close();
-        }
-    }
-
     fn ended(self) -> Played {
         let lost_datagrams = match &self.output {
             Output::Clients(_) => 0,
-            Output::Group(group) => group.lost,
+            Output::Group { group, .. } => group.lost,
         };
         Played {
             lost_datagrams,
@@ -279,35 +220,10 @@ impl Player<'_> {
         }
     }
 
-    /// Waits for a first client; one that plays as fast as it is read waits for one after each loss, too.
-    fn has_client(&mut self) -> bool {
-        let Output::Clients(clients) = &self.output else {
-            return true;
-        };
+    /// Waits for a first client; at the pace of the clients for one after each loss, too.
+    fn has_client(&self) -> bool {
         let waits = self.started.is_none() || self.playback.rate.is_none();
-        while waits && !clients.any_started() {
-            if (self.stop)() {
-                return false;
-            }
-            sleep(POLL);
-        }
-        true
-    }
-
-    /// Waits for a time; false on a request to stop.
-    fn pause(&self, time: Duration) -> bool {
-        let end = Instant::now() + time;
-        loop {
-            let left = end.saturating_duration_since(Instant::now());
-            if left.is_zero() {
-                return true;
-            }
-            // Between two azimuths there is no time to ask.
-            if left > SLICE && (self.stop)() {
-                return false;
-            }
-            sleep(left.min(SLICE));
-        }
+        !waits || self.output.await_client(self.stop)
     }
 
     /// Waits until an azimuth is due; false on a request to stop.
@@ -324,7 +240,7 @@ impl Player<'_> {
         if wait > MAX_WAIT {
             self.started = Some((Instant::now() + MAX_WAIT, stamp_ns));
         }
-        self.pause(wait.min(MAX_WAIT))
+        sleep_until(Instant::now() + wait.min(MAX_WAIT), self.stop)
     }
 
     fn send(&mut self, scan: &PolarScan<'_>, row: usize) {
@@ -341,22 +257,16 @@ impl Player<'_> {
             split_seconds,
             powers: Powers::Eight(scan.row(row)),
         };
-        let is_garbled = faults.garbles(self.played.scans, row);
+        if faults.garbles(self.played.scans, row) {
+            self.output.send(GARBAGE);
+        }
         match &mut self.output {
             Output::Clients(clients) => {
                 self.message.clear();
-                if is_garbled {
-                    self.message.extend_from_slice(GARBAGE);
-                }
                 write_azimuth(&mut self.message, &azimuth);
                 clients.send(&self.message);
             }
-            Output::Group(group) => {
-                if is_garbled {
-                    group.pass(GARBAGE);
-                }
-                group.send(&self.radar, &azimuth);
-            }
+            Output::Group { group, .. } => group.send(&self.radar, &azimuth),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The clock of all time stamps.
 
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 
 use rustix::time::{ClockId, clock_gettime};
 
@@ -8,6 +8,12 @@ use rustix::time::{ClockId, clock_gettime};
 pub fn now_ns() -> i64 {
     let now = clock_gettime(ClockId::Monotonic);
     now.tv_sec * 1_000_000_000 + now.tv_nsec
+}
+
+/// Returns the time of the host, ns since 1970.
+pub fn since_1970_ns() -> i64 {
+    let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
+    now.map_or(0, |now| now.as_nanos() as i64)
 }
 
 /// Returns the duration from now until `due_ns`; zero if that has passed.

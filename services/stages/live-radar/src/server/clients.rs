@@ -10,9 +10,9 @@ use std::{
 
 use gyre_colossus::{Configuration, Event, Message, Parser, Request, write_configuration};
 
-/// A radar serves no more.
-const MOST: usize = 3;
-/// A client that reads nothing for so long is given up.
+/// The most clients of a radar.
+const MAX_CLIENTS: usize = 3;
+/// Time without a read after which a client is given up.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(2);
 /// Time until the next connection is accepted after one that failed.
 const PAUSE: Duration = Duration::from_millis(50);
@@ -26,7 +26,7 @@ pub struct Clients {
 
 struct Client {
     stream: TcpStream,
-    /// It has asked for azimuths.
+    /// True once it has asked for azimuths.
     started: bool,
     number: u64,
 }
@@ -36,18 +36,19 @@ impl Clients {
     pub fn accept(listener: TcpListener, radar: &Configuration) -> io::Result<Self> {
         let all = Arc::default();
         let clients = Arc::clone(&all);
-        let mut greeting = Vec::new();
-        write_configuration(&mut greeting, radar);
+        let mut configuration = Vec::new();
+        write_configuration(&mut configuration, radar);
         thread::Builder::new()
             .name("accept".to_owned())
             .spawn(move || {
                 for (number, stream) in listener.incoming().enumerate() {
-                    // One that leaves at once is no reason to stop, nor are too many open files, which may pass.
+                    // A client that leaves at once is no reason to stop, nor are too many open
+                    // files.
                     let Ok(stream) = stream else {
                         thread::sleep(PAUSE);
                         continue;
                     };
-                    let _ = welcome(stream, number as u64, &greeting, &clients);
+                    let _ = admit(stream, number as u64, &configuration, &clients);
                 }
             })?;
         Ok(Self { all })
@@ -58,7 +59,8 @@ impl Clients {
         lock(&self.all).iter().any(|client| client.started)
     }
 
-    /// Sends bytes to those that have asked for azimuths. Who does not take them is given up.
+    /// Sends bytes to the clients that have asked for azimuths. One that does not take them is
+    /// given up.
     pub fn send(&self, bytes: &[u8]) {
         lock(&self.all).retain_mut(|client| {
             let takes = !client.started || write_in_time(&mut client.stream, bytes).is_ok();
@@ -102,19 +104,19 @@ fn write_in_time(stream: &mut TcpStream, mut bytes: &[u8]) -> io::Result<()> {
     Ok(())
 }
 
-/// Greets a client with the configuration, and reads its requests in a thread.
-fn welcome(
+/// Sends the configuration to a client, and reads its requests in a thread.
+fn admit(
     mut stream: TcpStream,
     number: u64,
-    greeting: &[u8],
+    configuration: &[u8],
     clients: &Arc<Mutex<Vec<Client>>>,
 ) -> io::Result<()> {
-    if lock(clients).len() >= MOST {
+    if lock(clients).len() >= MAX_CLIENTS {
         return stream.shutdown(Shutdown::Both);
     }
     stream.set_nodelay(true)?;
     stream.set_write_timeout(Some(WRITE_TIMEOUT))?;
-    stream.write_all(greeting)?;
+    stream.write_all(configuration)?;
     let reader = stream.try_clone()?;
     lock(clients).push(Client {
         stream,

@@ -1,6 +1,6 @@
-//! Faults of a radar and of its network, the same in each playback.
+//! Injected faults of a radar and of its network, the same in each playback.
 
-/// Faults to make while playing.
+/// The faults to inject while playing.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Faults {
     /// Share of the azimuths, or of the datagrams, that are lost.
@@ -60,7 +60,7 @@ fn is_nth(scan: u64, every: Option<u64>) -> bool {
     every.is_some_and(|every| (scan + 1).is_multiple_of(every.max(1)))
 }
 
-/// A number from 0 to 1 that scan and row determine (SplitMix64).
+/// Returns a number from 0 to 1 that scan and row determine (SplitMix64).
 fn uniform(scan: u64, row: u64) -> f64 {
     let mut z = (scan << 16 | row)
         .wrapping_add(1)

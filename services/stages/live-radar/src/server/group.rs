@@ -12,14 +12,14 @@ use gyre_colossus::{
 
 use super::Faults;
 
-/// Where datagrams are sent to.
+/// The socket and the destination of datagrams.
 pub struct Group {
     socket: UdpSocket,
     to: SocketAddrV4,
     faults: Faults,
     /// Number of the next datagram.
     number: u32,
-    /// One that is sent after the next.
+    /// A datagram that is sent after the next one.
     held: Option<Vec<u8>>,
     /// Datagrams that were not sent.
     pub lost: u64,
@@ -41,7 +41,7 @@ impl Group {
         })
     }
 
-    /// Sends what the radar says of itself, and no powers.
+    /// Sends the radar's description of itself, and no powers.
     pub fn describe(&mut self, radar: &Configuration) {
         let mut datagram = Vec::new();
         write_description(&mut datagram, radar, self.number);
@@ -62,7 +62,7 @@ impl Group {
         }
     }
 
-    /// Loses, doubles or holds back a datagram, as its number determines.
+    /// Loses, doubles or delays a datagram, as its number determines.
     fn send_or_fail(&mut self, number: u64, datagram: Vec<u8>) {
         if self.faults.loses_datagram(number) {
             self.lost += 1;

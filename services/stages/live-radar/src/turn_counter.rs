@@ -1,44 +1,45 @@
-//! The turns of the radar of which there is no scan, whatever the reason.
+//! The count of the radar's turns without a scan.
 
 use gyre_stage::source::LastScan;
 
-/// The radar's clock is not believed where it goes faster than this host's by this factor. Recordings may be played so fast.
+/// The factor up to which the radar's clock may be faster than this host's: recordings may be
+/// played so fast.
 const MAX_PACE: f64 = 4.0;
-/// Turns by which it may be ahead nevertheless: scans that were late when they were read.
+/// TurnCounter by which it may be ahead beyond that: scans that were read late.
 const SLACK_TURNS: f64 = 16.0;
 /// The clock was set back where it has advanced by less than this since the last scan, turns.
 const MIN_TURNS: f64 = 0.25;
 /// The weight of one more turn in the mean duration of a turn.
 const WEIGHT: f64 = 1.0 / 16.0;
 
-/// An azimuth, as far as turns are concerned.
+/// The angle and the times of an azimuth.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Moment {
+pub struct AzimuthTime {
     /// Part of the turn, from 0 to 1.
     pub fraction: f64,
-    /// Its time, ns.
+    /// The time on the radar's clock, ns.
     pub stamp_ns: i64,
-    /// When it was read, `CLOCK_MONOTONIC`, ns.
+    /// The time of reading, `CLOCK_MONOTONIC`, ns.
     pub at_ns: i64,
 }
 
-/// Counts the turns between scans by time: those of which azimuths arrived and no scan was made, and those of which nothing arrived, on
-/// one connection or between two, in this process or between it and the one before.
+/// Counts the turns between scans by time, with and without azimuths, also across connections and
+/// restarts of the process.
 ///
 /// The turn in which the first azimuth arrives is not counted if it had begun before.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Turns {
+pub struct TurnCounter {
     /// Duration of a turn: as configured, then as measured. 0: not known.
     turn_ns: f64,
     /// The configured one.
     configured_ns: i64,
     last: Option<LastScan>,
-    newest: Option<Moment>,
+    newest: Option<AzimuthTime>,
     left_out: u64,
 }
 
-impl Turns {
-    /// Goes on after an earlier process, whose last scan and count are given.
+impl TurnCounter {
+    /// Continues after an earlier process, whose last scan and count are given.
     pub fn resume(last: Option<LastScan>, left_out: u64) -> Self {
         Self {
             turn_ns: 0.0,
@@ -49,7 +50,7 @@ impl Turns {
         }
     }
 
-    /// Sets how long the radar says that it takes for a turn.
+    /// Sets the configured duration of a turn.
     pub fn configure(&mut self, period_ns: i64) {
         if self.configured_ns != period_ns {
             self.configured_ns = period_ns;
@@ -57,8 +58,9 @@ impl Turns {
         }
     }
 
-    /// Notes an azimuth. The first one of all is at the start of a turn, or in a turn of which the first part is not known.
-    pub fn note(&mut self, azimuth: Moment, is_start: bool) {
+    /// Notes an azimuth. The first of all is at the start of a turn, or in a turn that began
+    /// before.
+    pub fn note(&mut self, azimuth: AzimuthTime, is_start: bool) {
         self.newest = Some(azimuth);
         if self.last.is_none() {
             let turns = 0.5 - azimuth.fraction - if is_start { 1.0 } else { 0.0 };
@@ -83,12 +85,13 @@ impl Turns {
         self.last = Some(scan);
     }
 
-    /// The last scan.
+    /// Returns the last scan.
     pub fn last(&self) -> Option<LastScan> {
         self.last
     }
 
-    /// Turns of which there is no scan, and will be none. That of the newest azimuth can still become one if it `is_open`.
+    /// Returns the turns that have and will have no scan. That of the newest azimuth can still have
+    /// one if it `is_open`.
     pub fn left_out(&self, is_open: bool) -> u64 {
         let (Some(last), Some(newest)) = (self.last, self.newest) else {
             return self.left_out;
@@ -103,7 +106,8 @@ impl Turns {
         self.left_out + turns.saturating_sub(is_open.into())
     }
 
-    /// Turns between two moments, by the radar's clock, or by this host's where that was set.
+    /// Returns the turns between two scans, by the radar's clock, or by this host's where that was
+    /// set.
     fn since(&self, last: LastScan, here: LastScan) -> f64 {
         let turn_ns = self.turn_ns.max(1.0);
         let turns = |from: i64, to: i64| to.saturating_sub(from) as f64 / turn_ns;
@@ -133,17 +137,17 @@ mod tests {
         }
     }
 
-    fn azimuth(turn: i64, fraction: f64) -> Moment {
+    fn azimuth(turn: i64, fraction: f64) -> AzimuthTime {
         let at_ns = turn * TURN_NS + (fraction * TURN_NS as f64) as i64;
-        Moment {
+        AzimuthTime {
             fraction,
             stamp_ns: at_ns,
             at_ns,
         }
     }
 
-    fn turns() -> Turns {
-        let mut turns = Turns::resume(None, 0);
+    fn turns() -> TurnCounter {
+        let mut turns = TurnCounter::resume(None, 0);
         turns.configure(TURN_NS);
         turns
     }
@@ -188,7 +192,7 @@ mod tests {
 
     #[test]
     fn a_source_goes_on_with_the_count_of_the_one_before() {
-        let mut turns = Turns::resume(Some(scan(7, 0)), 3);
+        let mut turns = TurnCounter::resume(Some(scan(7, 0)), 3);
         turns.configure(TURN_NS);
         turns.note(azimuth(9, 0.6), false);
         assert_eq!(turns.left_out(false), 5);
@@ -204,7 +208,7 @@ mod tests {
             for (turn, set_ns) in [(0, 0), (1, set_ns), (2, set_ns)] {
                 let end = azimuth(turn, 0.999);
                 let stamp_ns = end.stamp_ns + set_ns;
-                turns.note(Moment { stamp_ns, ..end }, false);
+                turns.note(AzimuthTime { stamp_ns, ..end }, false);
                 turns.add(scan(turn, set_ns));
             }
             assert_eq!(turns.left_out(false), 0, "{set_ns}");

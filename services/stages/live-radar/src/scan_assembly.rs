@@ -1,4 +1,4 @@
-//! The scans of one connection to a radar.
+//! The assembly of azimuths to scans, for one connection to a radar.
 
 use std::time::Duration;
 
@@ -9,89 +9,92 @@ use gyre_messages::ScanHeader;
 use gyre_stage::{clock, source::LastScan};
 
 use crate::{
-    delay::Delay,
-    turns::{Moment, Turns},
+    read_delay::ReadDelay,
+    turn_counter::{AzimuthTime, TurnCounter},
 };
 
-/// Azimuths for which the connection need not wake, at most. The buffers of sockets hold many more.
+/// The most azimuths that are read at once. The buffers of sockets hold many more.
 const BATCH: f64 = 10.0;
-/// The part of the azimuths up to the end of a turn, for the radar may turn faster than it says.
+/// The part of the azimuths up to the end of a turn: the radar may turn faster than it says.
 const BATCH_SHARE: f64 = 0.5;
 
-/// The scans of one connection.
-pub struct Sweeps {
+/// Assembles the azimuths of one connection to scans.
+pub struct ScanAssembly {
     radar: Configuration,
     clock: RadarClock,
     assembler: SweepAssembler,
-    delay: Delay,
-    /// What was found out of the clock has been logged.
-    described: bool,
-    /// It has been logged that the delay of reception is not known.
-    told: bool,
+    delay: ReadDelay,
+    /// True once the kind of the clock is logged.
+    is_clock_logged: bool,
+    /// True once it is logged that the delay of reception is not known.
+    is_delay_logged: bool,
 }
 
 /// A scan that is complete.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Complete {
-    /// Azimuths that are missing.
+pub struct CompleteScan {
+    /// The number of missing azimuths.
     pub missing: usize,
-    /// When it was complete by the radar's clock, `CLOCK_MONOTONIC`, ns; `None`: not known.
+    /// The time at which it was complete by the radar's clock, `CLOCK_MONOTONIC`, ns; `None`: not
+    /// known.
     pub due_ns: Option<i64>,
 }
 
-impl Sweeps {
+impl ScanAssembly {
     pub fn new(radar: Configuration, constants: Constants) -> Result<Self, BadConfiguration> {
         Ok(Self {
             clock: RadarClock::new(&radar),
             assembler: SweepAssembler::new(&radar, constants)?,
-            delay: Delay::default(),
+            delay: ReadDelay::default(),
             radar,
-            described: false,
-            told: false,
+            is_clock_logged: false,
+            is_delay_logged: false,
         })
     }
 
-    /// Bytes of a scan.
+    /// Returns the bytes of a scan.
     pub fn bytes(&self) -> usize {
         self.assembler.limits().bytes
     }
 
-    /// Whether the turn of the newest azimuth can still become a scan.
+    /// Returns whether the turn of the newest azimuth can still become a scan.
     pub fn is_open(&self) -> bool {
         self.assembler.is_open()
     }
 
-    /// Adds an azimuth that arrived at `arrival_ns` (since 1970); returns the scan that it completes.
+    /// Adds an azimuth that arrived at `arrival_ns` (since 1970); returns the scan that it
+    /// completes.
     pub fn add(
         &mut self,
         azimuth: Azimuth<'_>,
         arrival_ns: i64,
-        turns: &mut Turns,
+        turns: &mut TurnCounter,
         header: &mut ScanHeader,
         bytes: &mut [u8],
-    ) -> Option<Complete> {
+    ) -> Option<CompleteScan> {
         let at_ns = clock::now_ns();
         let mut complete = None;
         for (azimuth, stamp_ns) in self.clock.stamp(azimuth, arrival_ns) {
             let fraction = f64::from(azimuth.encoder) / f64::from(self.radar.encoder_size);
             let is_start = f64::from(azimuth.encoder) <= self.radar.step();
-            let moment = Moment {
+            let time = AzimuthTime {
                 fraction: fraction.fract(),
                 stamp_ns,
                 at_ns,
             };
-            turns.note(moment, is_start);
+            turns.note(time, is_start);
             complete = self.assembler.add(&azimuth, stamp_ns, header.slot(bytes));
             if complete.is_some() {
                 break;
             }
         }
-        self.describe();
+        self.log_clock();
         let sweep = complete?;
         header.set_geometry(&sweep.geometry);
         let last_ns = header.slot(bytes).stamp_ns[sweep.geometry.azimuths - 1];
         let due_ns = self.due_ns(last_ns, at_ns);
-        // A clock that was set back in the middle of a sweep gives times that no later stage accepts.
+        // A clock that was set back in the middle of a sweep gives times that no later stage
+        // accepts.
         if let Some(Err(error)) = header.view(bytes).map(|scan| scan.check_times()) {
             tracing::warn!("a scan is left out: {error}");
             return None;
@@ -100,20 +103,21 @@ impl Sweeps {
             stamp_ns: sweep.geometry.stamp_ns,
             at_ns,
         });
-        Some(Complete {
+        Some(CompleteScan {
             missing: sweep.missing,
             due_ns,
         })
     }
 
-    /// When a scan was complete whose last azimuth has this stamp and was read at `at_ns`.
+    /// Returns the time at which a scan was complete whose last azimuth has this stamp and was read
+    /// at `at_ns`.
     fn due_ns(&mut self, last_ns: i64, at_ns: i64) -> Option<i64> {
         if self.clock.found() == Some(FoundClock::Arrival) {
             return None;
         }
         let due_ns = self.delay.add(last_ns, at_ns);
-        if let (None, false, Some(pace)) = (due_ns, self.told, self.delay.pace()) {
-            self.told = true;
+        if let (None, false, Some(pace)) = (due_ns, self.is_delay_logged, self.delay.pace()) {
+            self.is_delay_logged = true;
             tracing::info!(
                 "The radar's clock advances {:.2} times as fast as this host's: latencies are those from the reading of a scan.",
                 1.0 / pace
@@ -122,10 +126,10 @@ impl Sweeps {
         due_ns
     }
 
-    /// Logs once what was found out of the clock.
-    fn describe(&mut self) {
-        if let (false, Some(found)) = (self.described, self.clock.found()) {
-            self.described = true;
+    /// Logs once which clock the stamps are of.
+    fn log_clock(&mut self) {
+        if let (false, Some(found)) = (self.is_clock_logged, self.clock.found()) {
+            self.is_clock_logged = true;
             tracing::info!("{found}");
             if found == FoundClock::Arrival {
                 tracing::info!(
@@ -135,10 +139,11 @@ impl Sweeps {
         }
     }
 
-    /// The time for which no scan can be complete, if it is that of a few azimuths: so many are then read at once.
+    /// Returns the time for which no scan can be complete, if it is that of a few azimuths: so many
+    /// are then read at once.
     pub fn pause(&self) -> Option<Duration> {
         match self.clock.found() {
-            // Each azimuth is to be received when it arrives.
+            // Stamps are the times of arrival: each azimuth is read when it arrives.
             None | Some(FoundClock::Arrival) => return None,
             Some(_) => {}
         }
@@ -177,7 +182,7 @@ mod tests {
     const START_NS: i64 = 1_700_000_000_000_000_000;
     const AZIMUTHS: u16 = 400;
 
-    fn sweeps() -> Sweeps {
+    fn scans() -> ScanAssembly {
         let radar = Configuration {
             azimuth_samples: AZIMUTHS,
             bin_size: 438,
@@ -186,42 +191,57 @@ mod tests {
             rotation_mhz: 4000,
             ..Configuration::default()
         };
-        Sweeps::new(radar, Constants::default()).unwrap()
+        ScanAssembly::new(radar, Constants::default()).unwrap()
     }
 
-    /// Adds the azimuths of a turn, whose clock is set by `step_ns` in its middle; returns the missing azimuths of a complete scan.
-    fn turn(sweeps: &mut Sweeps, turns: &mut Turns, start_ns: i64, step_ns: i64) -> Option<usize> {
+    /// Adds an azimuth with this time; returns the missing azimuths of the scan that it completes.
+    fn add(
+        scans: &mut ScanAssembly,
+        turns: &mut TurnCounter,
+        row: u16,
+        stamp_ns: i64,
+    ) -> Option<usize> {
         let (mut header, mut bytes) = (ScanHeader::default(), vec![0; 400 * 16]);
+        let (seconds, split_seconds) = ClockFormat::default().fields(stamp_ns);
+        let azimuth = Azimuth {
+            sweep_counter: row,
+            encoder: row * 14,
+            seconds,
+            split_seconds,
+            powers: Powers::Eight(&[7; 16]),
+        };
+        let scan = scans.add(azimuth, stamp_ns, turns, &mut header, &mut bytes);
+        scan.map(|scan| scan.missing)
+    }
+
+    /// Adds a turn, in whose middle the clock is set by `step_ns`.
+    fn turn(
+        scans: &mut ScanAssembly,
+        turns: &mut TurnCounter,
+        start_ns: i64,
+        step_ns: i64,
+    ) -> Option<usize> {
         let mut complete = None;
         for row in 0..AZIMUTHS {
             let set_ns = if row < AZIMUTHS / 2 { 0 } else { step_ns };
             let stamp_ns = start_ns + i64::from(row) * 625_000 + set_ns;
-            let (seconds, split_seconds) = ClockFormat::default().fields(stamp_ns);
-            let azimuth = Azimuth {
-                sweep_counter: row,
-                encoder: row * 14,
-                seconds,
-                split_seconds,
-                powers: Powers::Eight(&[7; 16]),
-            };
-            let scan = sweeps.add(azimuth, stamp_ns, turns, &mut header, &mut bytes);
-            complete = scan.map(|scan| scan.missing).or(complete);
+            complete = add(scans, turns, row, stamp_ns).or(complete);
         }
         complete
     }
 
-    fn turns() -> Turns {
-        let mut turns = Turns::resume(None, 0);
+    fn turns() -> TurnCounter {
+        let mut turns = TurnCounter::resume(None, 0);
         turns.configure(250_000_000);
         turns
     }
 
     #[test]
     fn a_scan_in_which_the_clock_is_set_back_is_left_out_and_counted() {
-        let (mut sweeps, mut turns) = (sweeps(), turns());
+        let (mut scans, mut turns) = (scans(), turns());
         let mut turn = |start_ns, step_ns| {
-            let missing = turn(&mut sweeps, &mut turns, start_ns, step_ns);
-            (missing, turns.left_out(sweeps.is_open()))
+            let missing = turn(&mut scans, &mut turns, start_ns, step_ns);
+            (missing, turns.left_out(scans.is_open()))
         };
         assert_eq!(turn(START_NS, 0), (Some(0), 0));
         assert_eq!(turn(START_NS + 250_000_000, -20_000_000), (None, 1));
@@ -230,23 +250,14 @@ mod tests {
 
     #[test]
     fn the_source_sleeps_at_most_half_of_the_time_to_the_end_of_a_scan() {
-        let (mut sweeps, mut turns) = (sweeps(), turns());
-        assert_eq!(turn(&mut sweeps, &mut turns, START_NS, 0), Some(0));
-        let (mut header, mut bytes) = (ScanHeader::default(), vec![0; 400 * 16]);
+        let (mut scans, mut turns) = (scans(), turns());
+        assert_eq!(turn(&mut scans, &mut turns, START_NS, 0), Some(0));
         let mut pauses = 0;
         for row in 0..AZIMUTHS {
             let stamp_ns = START_NS + 250_000_000 + i64::from(row) * 625_000;
-            let (seconds, split_seconds) = ClockFormat::default().fields(stamp_ns);
-            let azimuth = Azimuth {
-                sweep_counter: row,
-                encoder: row * 14,
-                seconds,
-                split_seconds,
-                powers: Powers::Eight(&[7; 16]),
-            };
-            sweeps.add(azimuth, stamp_ns, &mut turns, &mut header, &mut bytes);
+            add(&mut scans, &mut turns, row, stamp_ns);
             let left = Duration::from_micros(625) * u32::from(AZIMUTHS - row);
-            if let Some(pause) = sweeps.pause() {
+            if let Some(pause) = scans.pause() {
                 assert!(2 * pause <= left && pause <= Duration::from_micros(6250));
                 pauses += 1;
             }
@@ -256,7 +267,7 @@ mod tests {
 
     #[test]
     fn a_configuration_that_differs_in_unused_numbers_is_the_same() {
-        let radar = sweeps().radar;
+        let radar = scans().radar;
         let unused = Configuration {
             range_gain: f32::NAN,
             packet_rate: 9,

@@ -1,29 +1,28 @@
-//! What a radar has sent, whether as a stream or as datagrams.
+//! The parser of a radar's messages, from a TCP stream or from datagrams.
 
 use gyre_colossus::{Datagrams, Event, Parser};
-
-use crate::{Address, Settings};
 
 /// Bytes to read of a stream at once: some ten azimuths.
 const CHUNK: usize = 1 << 16;
 
 /// The parser of a stream, or of datagrams.
 #[derive(Debug)]
-pub enum Messages {
+pub enum RadarParser {
     Stream(Parser),
     Datagrams(Datagrams),
 }
 
-impl Messages {
-    /// A parser at the start of what a radar sends.
-    pub fn new(settings: &Settings) -> Self {
-        match settings.address {
-            Address::Tcp(_) => Self::Stream(Parser::default()),
-            Address::Udp { .. } => Self::Datagrams(Datagrams::new(settings.encoder_counts)),
+impl RadarParser {
+    /// Creates a parser at the start of a stream, or of datagrams whose angles are rounded to
+    /// `encoder_counts` per turn.
+    pub fn new(is_udp: bool, encoder_counts: u16) -> Self {
+        match is_udp {
+            false => Self::Stream(Parser::default()),
+            true => Self::Datagrams(Datagrams::new(encoder_counts)),
         }
     }
 
-    /// Memory to read into.
+    /// Returns memory to read into.
     pub fn space(&mut self) -> &mut [u8] {
         match self {
             Self::Stream(parser) => parser.space(CHUNK),
@@ -31,7 +30,7 @@ impl Messages {
         }
     }
 
-    /// Adds what has been read: bytes, or one datagram.
+    /// Adds the bytes that were read into the space, or the one datagram.
     pub fn filled(&mut self, bytes: usize) {
         match self {
             Self::Stream(parser) => parser.filled(bytes),
@@ -39,7 +38,7 @@ impl Messages {
         }
     }
 
-    /// The next message or fault.
+    /// Returns the next message or fault.
     pub fn next(&mut self) -> Option<Event<'_>> {
         match self {
             Self::Stream(parser) => parser.next(),
@@ -47,15 +46,14 @@ impl Messages {
         }
     }
 
-    /// Passes over the description of the radar that was returned last, and the datagram that has it.
+    /// Discards the radar's description that was returned last, and the datagram that has it.
     pub fn refuse_description(&mut self) {
-        match self {
-            Self::Stream(_) => {}
-            Self::Datagrams(parser) => parser.refuse_description(),
+        if let Self::Datagrams(parser) = self {
+            parser.refuse_description();
         }
     }
 
-    /// Whether a part of the radar's azimuths has come in a datagram since the last call.
+    /// Returns whether a part of an azimuth has arrived in a datagram since the last call.
     pub fn take_part(&mut self) -> bool {
         match self {
             Self::Stream(_) => false,
@@ -63,7 +61,7 @@ impl Messages {
         }
     }
 
-    /// Bytes since the last event that are no message: they grow while a stream is not Colossus.
+    /// Returns the bytes of a stream since the last event: they grow while it is not Colossus.
     pub fn skipped_bytes(&self) -> usize {
         match self {
             Self::Stream(parser) => parser.skipped_bytes(),

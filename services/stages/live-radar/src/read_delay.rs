@@ -1,21 +1,23 @@
-//! When a scan was complete by the radar's clock, as this host's clock says it: so that the time for which a scan waited in the
-//! buffers of a source that was late is a part of its latency.
+//! The time at which a scan was complete by the radar's clock, on this host's clock: so the time
+//! for which it waited in the buffers of a late source is a part of its latency.
 
-/// Scans of a window. The smallest difference of the clocks is that of this window and the one before: of 8 to 16 s at 4 Hz, in which
-/// two clocks of 100 ppm drift apart by 1.6 ms. A source that stands still for longer than a window is killed by the supervisor.
+/// Scans of a window. The smallest difference of the clocks is that of this window and the one
+/// before: of 8 to 16 s at 4 Hz, in which two clocks of 100 ppm drift apart by 1.6 ms. The
+/// supervisor kills a source that stands still for longer.
 const WINDOW: usize = 32;
 /// Scans after which the pace of the radar's clock is known.
 const MIN_PACES: usize = 3;
-/// The part by which it may differ from this host's: less than a recording that is played at another pace, and more than the time between
-/// two scans varies on a busy machine.
+/// The part by which it may differ from this host's: less than that of a recording played at
+/// another pace, and more than the variation on a busy machine.
 const MAX_PACE_ERROR: f64 = 0.1;
 
-/// The clocks of the radar and of this host, compared at the last azimuth of each scan.
+/// Compares the clocks of the radar and of this host at the last azimuth of each scan.
 ///
-/// Of the differences host - radar the smallest is that of the scan that was read with the least delay. That scan was due when it was
-/// read; others were due earlier than they were read by as much as their difference is larger.
+/// The smallest difference host - radar is that of the scan that was read with the least delay.
+/// That scan was due when it was read; others were due earlier by as much as their difference is
+/// larger.
 #[derive(Clone, Debug, Default)]
-pub struct Delay {
+pub struct ReadDelay {
     last: Option<(i64, i64)>,
     /// Time of this host per time of the radar, between the last scans; the oldest is overwritten.
     paces: Vec<f64>,
@@ -24,10 +26,10 @@ pub struct Delay {
     smallest_ns: [Option<i64>; 2],
 }
 
-impl Delay {
-    /// Adds a scan that was complete at `stamp_ns` of the radar's clock and was read at `read_ns`, `CLOCK_MONOTONIC`. Returns when it
-    /// was complete, `CLOCK_MONOTONIC`, ns; `None` while the radar's clock does not advance as this host's: a recording that is played
-    /// at another pace, or the first scans.
+impl ReadDelay {
+    /// Adds a scan that was complete at `stamp_ns` of the radar's clock and was read at `read_ns`,
+    /// `CLOCK_MONOTONIC`. Returns when it was complete, `CLOCK_MONOTONIC`, ns; `None` for the first
+    /// scans, and where the radar's clock has another pace, as in a recording.
     pub fn add(&mut self, stamp_ns: i64, read_ns: i64) -> Option<i64> {
         if let Some((before_ns, before_read_ns)) = self.last.replace((stamp_ns, read_ns)) {
             let elapsed_ns = stamp_ns.saturating_sub(before_ns);
@@ -57,7 +59,8 @@ impl Delay {
         is_alike.then(|| stamp_ns.saturating_add(smallest_ns))
     }
 
-    /// The median of this host's time per the radar's: of a source that stood still, one is large and some after it are small.
+    /// Returns the median of this host's time per the radar's: after a source stood still, one is
+    /// large and some after it are small.
     pub fn pace(&self) -> Option<f64> {
         let mut paces = [0.0; WINDOW];
         let paces = &mut paces[..self.paces.len()];
@@ -83,9 +86,10 @@ mod tests {
     const AHEAD_NS: i64 = 1_700_000_000_000_000_000;
     const MS: i64 = 1_000_000;
 
-    /// How long before it was read each scan was due, if it is known. The radar's clock goes `pace` times as fast as the host's.
+    /// Returns the delay of each scan, if it is known. The radar's clock is `pace` times as fast as
+    /// the host's.
     fn delays(pace: f64, read_late_ns: impl Fn(i64) -> i64) -> Vec<Option<i64>> {
-        let mut delay = Delay::default();
+        let mut delay = ReadDelay::default();
         let scan = |k: i64| {
             let due_ns = (k * TURN_NS) as f64;
             let read_ns = due_ns as i64 + read_late_ns(k);
@@ -130,7 +134,7 @@ mod tests {
 
     #[test]
     fn a_clock_that_is_set_back_makes_no_scan_late() {
-        let mut delay = Delay::default();
+        let mut delay = ReadDelay::default();
         for k in 0..20 {
             delay.add(AHEAD_NS + k * TURN_NS, k * TURN_NS);
         }

@@ -1,33 +1,30 @@
-//! What a radar says of its health, in the log: once when it changes.
+//! The radar's health in the log: each change is logged once.
 
 use gyre_colossus::{Health, HealthStatus};
 
-/// What is wrong with a radar.
+/// The state of a radar's health that was logged last.
 #[derive(Clone, Debug, Default)]
-pub struct Ills {
-    /// The names of the readings that are not well.
-    of: Vec<&'static str>,
+pub struct HealthLog {
+    /// The names of the readings that are unhealthy.
+    unhealthy: Vec<&'static str>,
     is_silent: bool,
 }
 
-impl Ills {
-    /// Logs what has become worse or better.
-    pub fn note(&mut self, health: &Health) {
+impl HealthLog {
+    /// Logs the readings that have become worse or better.
+    pub fn update(&mut self, health: &Health) {
         for (name, reading) in health.readings() {
-            let is_ill = matches!(
-                reading.status,
-                HealthStatus::Unhealthy | HealthStatus::Warning
-            );
-            let place = self.of.iter().position(|ill| *ill == name);
             let (value, status) = (reading.value, reading.status);
-            match (is_ill, place) {
+            let is_unhealthy = matches!(status, HealthStatus::Unhealthy | HealthStatus::Warning);
+            let logged = self.unhealthy.iter().position(|it| *it == name);
+            match (is_unhealthy, logged) {
                 (true, None) => {
                     tracing::warn!("the radar says that its {name}, {value}, is {status}");
-                    self.of.push(name);
+                    self.unhealthy.push(name);
                 }
-                (false, Some(place)) => {
+                (false, Some(index)) => {
                     tracing::info!("the radar says that its {name}, {value}, is {status} again");
-                    self.of.swap_remove(place);
+                    self.unhealthy.swap_remove(index);
                 }
                 _ => {}
             }
