@@ -16,20 +16,21 @@ const TOKEN_BYTES: usize = 16;
 /// The shortest token that is taken from a file.
 const MIN_TOKEN: usize = 16;
 
-/// Where the pages of viewers come from: Foxglove's site, and the files of an application, which no site can name as its origin.
+/// The origins of viewers' pages: Foxglove's site, and the files of an application, which no site
+/// can name as its origin.
 const VIEWERS: [&str; 2] = ["https://app.foxglove.dev", "file://"];
 
-/// A secret that a reader has to know.
+/// The secret of readers.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Token(String);
 
-/// What a request needs.
+/// The conditions for an answer to a request.
 pub struct Access {
     /// The token; none is needed from this machine.
     token: Option<Token>,
     /// The cookie's name: cookies are shared by all ports of a host.
     cookie: String,
-    /// Whether the pages of viewers, which are served elsewhere, may read.
+    /// True if the pages of viewers, which are served elsewhere, may read.
     of_viewers: bool,
 }
 
@@ -40,9 +41,10 @@ pub enum Verdict {
     Granted,
     /// It may read, and gave the token in its address: a cookie replaces it from here on.
     GrantedByAddress,
-    /// It does not know the token.
+    /// It lacks the token.
     NoToken,
-    /// It names a host that is not this machine: another site's name may have been pointed here (DNS rebinding).
+    /// It names a host that is not this machine: another site's name may have been pointed here
+    /// (DNS rebinding).
     ForeignHost,
     /// A page of another site has sent it.
     ForeignOrigin,
@@ -106,7 +108,8 @@ impl Token {
 }
 
 impl Access {
-    /// The access to a server at this address. Without a token it is for this machine alone.
+    /// Creates the access to a server at this address. Without a token it is for this machine
+    /// alone.
     pub fn new(address: SocketAddr, token: Option<Token>) -> Self {
         Self {
             token,
@@ -115,8 +118,8 @@ impl Access {
         }
     }
 
-    /// The same for viewers: their page is another site's. With the token any may read; without it Foxglove's own site, an application
-    /// and a page of this machine.
+    /// Returns the same for viewers, whose page is another site's. With the token any may read;
+    /// without it Foxglove's own site, an application and a page of this machine.
     pub fn of_viewers(self) -> Self {
         Self {
             of_viewers: true,

@@ -14,12 +14,14 @@ use tokio::{
     time,
 };
 
-/// What connections may take.
+/// The limits of connections.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
-    /// The most connections with requests at once; further ones wait for a place. Streams have places of their own.
+    /// The most connections with requests at once; further ones wait for a place. Streams have
+    /// places of their own.
     pub connections: usize,
-    /// Time for the head of a request, from the connection or from the answer before: nobody keeps a place by silence.
+    /// Time for the head of a request, from the connection or from the answer before: nobody keeps
+    /// a place by silence.
     pub request: Duration,
 }
 
@@ -60,7 +62,7 @@ pub async fn serve(
         let (connection, mut stop) = (connection.with_upgrades(), stop.clone());
         tokio::spawn(async move {
             let mut connection = pin!(connection);
-            // That a reader goes away in the middle matters to nobody.
+            // A reader may disconnect at any time.
             tokio::select! {
                 _ = connection.as_mut() => {}
                 () = stopped(&mut stop) => {

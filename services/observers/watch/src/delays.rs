@@ -9,7 +9,8 @@ use serde::Serialize;
 const WINDOW_NS: i64 = 60_000_000_000;
 /// Width of a step of the time series.
 const STEP_NS: i64 = 1_000_000_000;
-/// The most samples that are kept: at more than 136 poses a second the window is shorter than a minute.
+/// The most samples that are kept: at more than 136 poses a second the window is shorter than a
+/// minute.
 const MAX_SAMPLES: usize = 8192;
 /// Delays of a pose: sensor to pose, then hand-over and work of each stage.
 const KINDS: usize = 1 + 2 * StageId::ALL.len();
@@ -17,11 +18,11 @@ const KINDS: usize = 1 + 2 * StageId::ALL.len();
 /// The delays of the poses of the last minute.
 #[derive(Debug, Default)]
 pub struct Delays {
-    samples: VecDeque<Sample>,
+    samples: VecDeque<DelaySample>,
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Sample {
+struct DelaySample {
     /// The end of the last work, `CLOCK_MONOTONIC`.
     at_ns: i64,
     /// In us; `None` where the run has no such stage.
@@ -37,7 +38,7 @@ pub struct Percentiles {
 
 /// Median and maximum of one second, ms: it has too few poses for a percentile beyond.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Second {
+pub struct SecondDelays {
     p50_ms: f64,
     max_ms: f64,
 }
@@ -52,16 +53,17 @@ pub struct StageDelays {
     work: Percentiles,
 }
 
-/// What the page shows of the delays.
+/// The delays as the page shows them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Report {
-    /// Poses that it is of.
+pub struct DelayReport {
+    /// The number of poses.
     samples: usize,
     /// From the complete sweep to its pose.
     sensor_to_pose: Percentiles,
     stages: Vec<StageDelays>,
-    /// Sensor to pose in each second of the last minute, oldest first; `None` in one without a pose.
-    series: Vec<Option<Second>>,
+    /// Sensor to pose in each second of the last minute, oldest first; `None` in one without a
+    /// pose.
+    series: Vec<Option<SecondDelays>>,
 }
 
 impl Delays {
@@ -76,15 +78,15 @@ impl Delays {
             delays_us[work] = Some(in_us(times.work_ns));
         }
         let at_ns = item.hops[StageId::PoseIntegration as usize].finished_ns;
-        self.samples.push_back(Sample { at_ns, delays_us });
+        self.samples.push_back(DelaySample { at_ns, delays_us });
         if self.samples.len() > MAX_SAMPLES {
             self.samples.pop_front();
         }
     }
 
-    /// Forgets what is older than a minute, and returns the percentiles of the rest.
-    pub fn report(&mut self, now_ns: i64) -> Report {
-        let is_old = |sample: &Sample| sample.at_ns < now_ns - WINDOW_NS;
+    /// Removes samples older than a minute, and returns the percentiles of the rest.
+    pub fn report(&mut self, now_ns: i64) -> DelayReport {
+        let is_old = |sample: &DelaySample| sample.at_ns < now_ns - WINDOW_NS;
         while self.samples.front().is_some_and(is_old) {
             self.samples.pop_front();
         }
@@ -103,7 +105,7 @@ impl Delays {
                 work: work?,
             })
         });
-        Report {
+        DelayReport {
             samples: self.samples.len(),
             sensor_to_pose: of_kind(0).unwrap_or_default(),
             stages: stages.collect(),
@@ -111,8 +113,8 @@ impl Delays {
         }
     }
 
-    /// The last second is not over, and is left out.
-    fn series(&self, now_ns: i64) -> Vec<Option<Second>> {
+    /// Returns the delays of each second; the last one is not over, and is left out.
+    fn series(&self, now_ns: i64) -> Vec<Option<SecondDelays>> {
         let steps = WINDOW_NS / STEP_NS;
         let mut of_step = vec![Vec::new(); steps as usize];
         let end = now_ns / STEP_NS;
@@ -138,18 +140,18 @@ fn in_us(duration_ns: i64) -> u32 {
     (duration_ns / 1000).clamp(0, u32::MAX.into()) as u32
 }
 
-/// `None` of no values.
+/// Returns the percentiles; `None` of no values.
 fn percentiles(delays_us: Vec<u32>) -> Option<Percentiles> {
     let [p50_ms, p99_ms] = at(delays_us, [0.5, 0.99])?;
     Some(Percentiles { p50_ms, p99_ms })
 }
 
-fn second(delays_us: Vec<u32>) -> Option<Second> {
+fn second(delays_us: Vec<u32>) -> Option<SecondDelays> {
     let [p50_ms, max_ms] = at(delays_us, [0.5, 1.0])?;
-    Some(Second { p50_ms, max_ms })
+    Some(SecondDelays { p50_ms, max_ms })
 }
 
-/// The values at these shares of their order, ms.
+/// Returns the values at these shares of their order, ms.
 fn at(mut delays_us: Vec<u32>, shares: [f64; 2]) -> Option<[f64; 2]> {
     let last = delays_us.len().checked_sub(1)? as f64;
     delays_us.sort_unstable();
@@ -162,7 +164,7 @@ mod tests {
 
     use super::*;
 
-    /// A pose whose sweep was complete so many ms before `at_ns`.
+    /// Returns a pose whose sweep was complete so many ms before `at_ns`.
     fn pose(at_ns: i64, delay_ms: i64) -> Item {
         let mut item = Item {
             due_ns: at_ns - delay_ms * 1_000_000,
@@ -193,16 +195,16 @@ mod tests {
         assert_eq!(report.series.len(), 60);
         assert_eq!(report.series.iter().flatten().count(), 50);
         let newest = report.series.last().copied().flatten();
-        let only = Second {
+        let only = SecondDelays {
             p50_ms: 1.0,
             max_ms: 1.0,
         };
         assert_eq!(newest, Some(only));
         assert_eq!(
             delays.report(now_ns + 2 * WINDOW_NS),
-            Report {
+            DelayReport {
                 series: vec![None; 60],
-                ..Report::default()
+                ..DelayReport::default()
             }
         );
     }

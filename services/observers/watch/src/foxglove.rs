@@ -1,18 +1,21 @@
-//! The topics of a run for Foxglove and Lichtblick, by their WebSocket protocol (`foxglove.sdk.v1`, once `foxglove.websocket.v1`).
+//! The topics of a run for Foxglove and Lichtblick, by their WebSocket protocol (`foxglove.sdk.v1`,
+//! once `foxglove.websocket.v1`).
 //!
-//! A channel is what a viewer can subscribe to. A topic of the run is observed only while a viewer wants one of its channels. Messages
-//! are encoded once, by the encoders of recordings ([`gyre_recording::view`]), and wait for each viewer in an `outbox` of bounded
-//! size: a slow viewer loses messages, and nobody waits for it.
+//! A channel is what a viewer can subscribe to. A topic of the run is observed only while a viewer
+//! wants one of its channels. Messages are encoded once, by the encoders of recordings
+//! ([`gyre_recording::view`]), and wait for each viewer in a `viewer_queue` of bounded size: a slow
+//! viewer loses messages, and nothing waits for it.
 //!
-//! Reading order: `channels`, `outbox`, `hub` (between the threads that observe and the viewers), `following` (those threads),
-//! `measurements` (latency and health), `viewer` (one connection).
+//! Reading order: `channels`, `viewer_queue`, `hub` (between the threads that observe and the
+//! viewers), `following` (those threads), `measurements` (latency and health), `viewer` (one
+//! connection).
 
 mod channels;
 mod following;
 mod hub;
 mod measurements;
-mod outbox;
 mod viewer;
+mod viewer_queue;
 
 pub use following::start;
 pub use hub::Hub;

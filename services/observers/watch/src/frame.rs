@@ -6,7 +6,8 @@ use axum::body::Bytes;
 use flate2::{Compression, write::DeflateEncoder};
 use serde::Serialize;
 
-/// A message to the page: the length of the header (u32, little-endian), the header in JSON, and the payload, deflated (RFC 1951).
+/// A message to the page: the length of the header (u32, little-endian), the header in JSON, and
+/// the payload, deflated (RFC 1951).
 ///
 /// # Errors
 /// The header is no JSON; memory has no room.

@@ -16,19 +16,19 @@ const POSE_BUCKETS_S: [f64; 14] = [
     0.001, 0.0025, 0.005, 0.0075, 0.01, 0.025, 0.05, 0.075, 0.1, 0.25, 0.5, 1.0, 2.5, 10.0,
 ];
 
-/// The delays of all poses that were seen.
+/// The delays of all observed poses.
 #[derive(Clone, Debug)]
 pub struct Histograms {
     pub sensor_to_pose: Histogram,
-    pub hops: Hops,
+    pub hops: HopHistograms,
 }
 
-/// Those of each hop.
-pub type Hops = Family<Hop, Histogram, fn() -> Histogram>;
+/// The histograms of each hop.
+pub type HopHistograms = Family<HopLabels, Histogram, fn() -> Histogram>;
 
 /// A part of a stage's time for a scan: `transport`, `wait` or `work`.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, EncodeLabelSet)]
-pub struct Hop {
+pub struct HopLabels {
     stage: &'static str,
     part: &'static str,
 }
@@ -59,7 +59,7 @@ impl Histograms {
                     continue;
                 };
                 let stage = StageId::name(times.stage);
-                let hop = self.hops.get_or_create(&Hop { stage, part });
+                let hop = self.hops.get_or_create(&HopLabels { stage, part });
                 hop.observe(seconds(duration_ns));
             }
         }

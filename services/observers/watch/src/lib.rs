@@ -1,15 +1,18 @@
-//! A page that shows a run in a browser, and its metrics for Prometheus. Where asked for, also its topics for Foxglove and traces.
+//! A page that shows a run in a browser, and metrics for Prometheus; on request also topics for
+//! Foxglove and traces.
 //!
-//! The process is an observer: the run does not wait for it, and it counts what it misses. Reading order:
+//! The process is an observer: the run does not wait for it, and missed messages are counted.
+//! Reading order:
 //!
-//! 1. `server`: listens, and ends with a signal; `connections`: how many at once; `access`: who may read; `page`: the files of the page.
-//! 2. `observing`: the threads that follow the run, and write what they see onto the `board`.
-//! 3. `track`, `delays`, `pictures`, `processes`: what is kept of it, in bounded memory.
+//! 1. `server`: listens, and ends with a signal; `connections`: how many at once; `access`: who may
+//!    read; `page`: the files of the page.
+//! 2. `observing`: the threads that follow the run, and write to the `run_view`.
+//! 3. `track`, `delays`, `pictures`, `processes`: the parts of the view, in bounded memory.
 //! 4. `stream`: one browser, which receives `messages`; `metrics`: one scrape of Prometheus.
-//! 5. `foxglove`: the topics for Foxglove; `traces`: a trace of each pose for a collector of OpenTelemetry.
+//! 5. `foxglove`: the topics for Foxglove; `traces`: a trace of each pose for a collector of
+//!    OpenTelemetry.
 
 mod access;
-mod board;
 mod connections;
 mod delays;
 mod foxglove;
@@ -21,6 +24,7 @@ mod observing;
 mod page;
 mod pictures;
 mod processes;
+mod run_view;
 mod server;
 mod stream;
 mod traces;

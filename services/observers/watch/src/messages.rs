@@ -1,11 +1,11 @@
-//! What a browser asks for, and what it is sent in JSON.
+//! The layers that a browser asks for, and the messages to it in JSON.
 
 use gyre_messages::PoseHeader;
 use serde::Serialize;
 
-use crate::{delays::Report, processes::Process, track::Vertex};
+use crate::{delays::DelayReport, processes::Process, track::Vertex};
 
-/// What a browser may ask for.
+/// A layer that a browser may ask for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layer {
     /// Powers as measured.
@@ -16,10 +16,10 @@ pub enum Layer {
     Points,
 }
 
-/// What was missed of the topics that are observed.
+/// The missed messages of the observed topics.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Missed {
-    /// Poses that were missed.
+    /// NewPoses that were missed.
     pub pose: u64,
     /// Scans that were missed.
     pub scan: u64,
@@ -51,17 +51,17 @@ impl RunState {
     }
 }
 
-/// The run as the page introduces it.
+/// The run as the page describes it.
 #[derive(Clone, Debug, Default, Serialize)]
 #[serde(tag = "kind", rename = "run")]
-pub struct Run {
+pub struct RunInfo {
     /// Another one at each start of a run.
     pub id: String,
     /// The folder of its results.
     pub out: String,
-    /// Whether it works, or how it has ended.
+    /// The state.
     pub state: RunState,
-    /// Whether it drops scans rather than wait.
+    /// True if it drops scans rather than wait.
     pub live: bool,
     /// Pace relative to the sensor's clock; none: as fast as it goes.
     pub rate: Option<f64>,
@@ -71,50 +71,50 @@ pub struct Run {
     pub version: &'static str,
 }
 
-/// Counts and delays, once a second.
+/// RunCounts and delays, once a second.
 #[derive(Debug, Serialize)]
 #[serde(tag = "kind", rename = "health")]
-pub struct Health {
-    /// Counts of the run.
+pub struct HealthReport {
+    /// RunCounts of the run.
     #[serde(flatten)]
-    pub counts: Counts,
-    /// Poses a second since the last report.
+    pub counts: RunCounts,
+    /// NewPoses a second since the last report.
     pub scans_per_s: f64,
     pub distance_m: f64,
-    pub delays: Report,
-    /// Why something is not shown.
+    pub delays: DelayReport,
+    /// The reason why something is not shown.
     pub notice: Option<String>,
     pub processes: Vec<Process>,
 }
 
-/// Counts of the run.
+/// RunCounts of the run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Counts {
+pub struct RunCounts {
     /// Scans that the source has published.
     pub published: u64,
-    /// Poses of the trajectory.
+    /// NewPoses of the trajectory.
     pub poses: u64,
     /// Scans that live mode has dropped.
     pub dropped: u64,
     /// Scans that were published and have no pose yet.
     pub in_flight: u64,
-    /// What this observer has missed.
+    /// The messages that this observer has missed.
     pub missed: Missed,
 }
 
 /// The trajectory's new vertices and the newest pose.
 #[derive(Serialize)]
 #[serde(tag = "kind", rename = "poses")]
-pub struct Poses<'a> {
+pub struct NewPoses<'a> {
     /// The vertices replace all earlier ones.
     pub replace: bool,
     pub vertices: &'a [Vertex],
-    pub pose: Option<Current>,
+    pub pose: Option<CurrentPose>,
 }
 
 /// The newest pose.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct Current {
+pub struct CurrentPose {
     pub seq: u64,
     pub scan: u64,
     pub stamp_ns: i64,
@@ -126,7 +126,7 @@ pub struct Current {
     pub stationary: bool,
 }
 
-impl Current {
+impl CurrentPose {
     /// The newest pose of the run.
     pub fn of(pose: &PoseHeader) -> Self {
         let interval_s = pose.motion.interval_ns as f64 * 1e-9;

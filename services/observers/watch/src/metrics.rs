@@ -9,9 +9,9 @@ use prometheus_client::{
     registry::{Registry, Unit},
 };
 
-use crate::{board::Board, messages::Counts, processes::Process};
+use crate::{messages::RunCounts, processes::Process, run_view::RunView};
 
-/// The type of the newer format, of which Prometheus says that it takes it.
+/// The type of the newer format, which Prometheus accepts in its requests.
 const OPEN_METRICS: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
 const TEXT: &str = "text/plain; version=0.0.4; charset=utf-8";
 
@@ -19,15 +19,16 @@ const TEXT: &str = "text/plain; version=0.0.4; charset=utf-8";
 #[derive(Debug)]
 struct Snapshot {
     is_up: bool,
-    counts: Counts,
+    counts: RunCounts,
     processes: Vec<Process>,
     /// Traces that were sent and dropped, where they were asked for.
     traces: Option<[u64; 2]>,
 }
 
-/// Returns the type of the answer and its text: OpenMetrics for one who accepts it, else the older format.
-pub fn scrape(board: &Board, accepted: &[u8]) -> (&'static str, String) {
-    let text = open_metrics(board);
+/// Returns the type of the answer and its text: OpenMetrics for one who accepts it, else the older
+/// format.
+pub fn scrape(view: &RunView, accepted: &[u8]) -> (&'static str, String) {
+    let text = open_metrics(view);
     let takes_open_metrics =
         String::from_utf8_lossy(accepted).contains("application/openmetrics-text");
     match takes_open_metrics {
@@ -36,9 +37,9 @@ pub fn scrape(board: &Board, accepted: &[u8]) -> (&'static str, String) {
     }
 }
 
-fn open_metrics(board: &Board) -> String {
+fn open_metrics(view: &RunView) -> String {
     let mut registry = Registry::with_prefix("gyre");
-    let run = board.run();
+    let run = view.run();
     let labels = vec![
         ("version", env!("CARGO_PKG_VERSION").to_owned()),
         ("out", run.out),
@@ -48,19 +49,19 @@ fn open_metrics(board: &Board) -> String {
         "sensor_to_pose",
         "Time from the complete sweep to its pose",
         Unit::Seconds,
-        board.histograms.sensor_to_pose.clone(),
+        view.histograms.sensor_to_pose.clone(),
     );
     registry.register_with_unit(
         "hop",
         "Time of a scan at each stage: transport from the stage before, wait, work",
         Unit::Seconds,
-        board.histograms.hops.clone(),
+        view.histograms.hops.clone(),
     );
     registry.register_collector(Box::new(Snapshot {
         is_up: run.state.is_up(),
-        counts: board.counts(),
-        processes: board.processes(),
-        traces: board.traces.get().map(|counts| counts.both()),
+        counts: view.counts(),
+        processes: view.processes(),
+        traces: view.traces.get().map(|counts| counts.both()),
     }));
     let mut text = String::new();
     // Writing to a string does not fail.
@@ -68,7 +69,8 @@ fn open_metrics(board: &Board) -> String {
     text
 }
 
-/// Returns the same in the older format, where the name of a counter has its `_total` everywhere, and an info is a gauge.
+/// Returns the same in the older format, where the name of a counter has its `_total` everywhere,
+/// and an info is a gauge.
 fn older(text: &str) -> String {
     let kind = |line: &'_ str| -> Option<(String, &'static str)> {
         let (name, kind) = line.strip_prefix("# TYPE ")?.split_once(' ')?;
@@ -110,54 +112,38 @@ impl Collector for Snapshot {
     }
 }
 
+fn counter(encoder: &mut DescriptorEncoder<'_>, name: &str, help: &str, count: u64) -> fmt::Result {
+    let counter = ConstCounter::new(count);
+    counter.encode(encoder.encode_descriptor(name, help, None, MetricType::Counter)?)
+}
+
+fn gauge(
+    encoder: &mut DescriptorEncoder<'_>,
+    name: &str,
+    help: &str,
+    value: impl Into<u64>,
+) -> fmt::Result {
+    let gauge = ConstGauge::new(value.into());
+    gauge.encode(encoder.encode_descriptor(name, help, None, MetricType::Gauge)?)
+}
+
 impl Snapshot {
     fn encode_counts(&self, encoder: &mut DescriptorEncoder<'_>) -> fmt::Result {
         let counts = &self.counts;
-        let counters = [
-            (
-                "scans_published",
-                "Scans that the source has published.",
-                counts.published,
-            ),
-            ("poses", "Poses of the trajectory.", counts.poses),
-            (
-                "scans_dropped",
-                "Scans that live mode has dropped.",
-                counts.dropped,
-            ),
-        ];
-        let traces = self.traces.into_iter().flat_map(|[sent, dropped]| {
-            [
-                ("traces_sent", "Traces that the collector has taken.", sent),
-                (
-                    "traces_dropped",
-                    "Traces that the collector has not taken.",
-                    dropped,
-                ),
-            ]
-        });
-        for (name, help, count) in counters.into_iter().chain(traces) {
-            let counter = ConstCounter::new(count);
-            counter.encode(encoder.encode_descriptor(
-                name,
-                help,
-                None,
-                counter.metric_type(),
-            )?)?;
+        let help = "Scans that the source has published.";
+        counter(encoder, "scans_published", help, counts.published)?;
+        counter(encoder, "poses", "Poses of the trajectory.", counts.poses)?;
+        let help = "Scans that live mode has dropped.";
+        counter(encoder, "scans_dropped", help, counts.dropped)?;
+        if let Some([sent, dropped]) = self.traces {
+            let help = "Traces that the collector has taken.";
+            counter(encoder, "traces_sent", help, sent)?;
+            let help = "Traces that the collector has not taken.";
+            counter(encoder, "traces_dropped", help, dropped)?;
         }
-        let gauges = [
-            ("up", "1 while a run works, else 0.", u64::from(self.is_up)),
-            (
-                "scans_in_flight",
-                "Scans that were published and have no pose yet.",
-                counts.in_flight,
-            ),
-        ];
-        for (name, help, value) in gauges {
-            let gauge = ConstGauge::new(value);
-            gauge.encode(encoder.encode_descriptor(name, help, None, gauge.metric_type())?)?;
-        }
-        Ok(())
+        gauge(encoder, "up", "1 while a run works, else 0.", self.is_up)?;
+        let help = "Scans that were published and have no pose yet.";
+        gauge(encoder, "scans_in_flight", help, counts.in_flight)
     }
 
     fn encode_missed(&self, encoder: &mut DescriptorEncoder<'_>) -> fmt::Result {
@@ -176,55 +162,36 @@ impl Snapshot {
         Ok(())
     }
 
-    /// Encodes what a live radar has not delivered, if the source receives one.
+    /// Encodes the losses of a live radar, if the source receives one.
     fn encode_received(&self, encoder: &mut DescriptorEncoder<'_>) -> fmt::Result {
         let Some(received) = self.processes.iter().find_map(|it| it.received) else {
             return Ok(());
         };
-        let counters = [
-            (
-                "radar_scans_left_out",
-                "Turns of the radar of which there is no scan.",
-                received.scans_left_out,
-            ),
-            (
-                "radar_missing_azimuths",
-                "Azimuths that are missing from the scans.",
-                received.missing_azimuths,
-            ),
-            (
-                "radar_damaged_messages",
-                "Messages of the radar that could not be read.",
-                received.damaged_messages,
-            ),
-            (
-                "radar_foreign_messages",
-                "Datagrams of others, and descriptions that do not fit into the run.",
-                received.foreign_messages,
-            ),
-            (
-                "radar_reconnections",
-                "Connections to the radar after the first.",
-                received.reconnections(),
-            ),
-        ];
-        for (name, help, count) in counters {
-            let counter = ConstCounter::new(count);
-            counter.encode(encoder.encode_descriptor(
-                name,
-                help,
-                None,
-                counter.metric_type(),
-            )?)?;
-        }
-        let gauge = ConstGauge::new(u64::from(received.is_receiving));
-        let help = "1 while azimuths arrive from the radar, else 0.";
-        gauge.encode(encoder.encode_descriptor(
-            "radar_receiving",
+        let help = "Turns of the radar of which there is no scan.";
+        counter(
+            encoder,
+            "radar_scans_left_out",
             help,
-            None,
-            gauge.metric_type(),
-        )?)
+            received.scans_left_out,
+        )?;
+        let help = "Azimuths that are missing from the scans.";
+        let missing = received.missing_azimuths;
+        counter(encoder, "radar_missing_azimuths", help, missing)?;
+        let help = "Messages of the radar that could not be read.";
+        let damaged = received.damaged_messages;
+        counter(encoder, "radar_damaged_messages", help, damaged)?;
+        let help = "Datagrams of others, and descriptions that do not fit into the run.";
+        let foreign = received.foreign_messages;
+        counter(encoder, "radar_foreign_messages", help, foreign)?;
+        let help = "Connections to the radar after the first.";
+        counter(
+            encoder,
+            "radar_reconnections",
+            help,
+            received.reconnections(),
+        )?;
+        let help = "1 while azimuths arrive from the radar, else 0.";
+        gauge(encoder, "radar_receiving", help, received.is_receiving)
     }
 
     fn encode_processes(&self, encoder: &mut DescriptorEncoder<'_>) -> fmt::Result {
@@ -277,8 +244,8 @@ mod tests {
 
     use super::*;
 
-    fn board() -> Board {
-        let board = Board::new("/a folder/\"quoted\"");
+    fn view() -> RunView {
+        let view = RunView::new("/a folder/\"quoted\"");
         let mut item = Item::default();
         for stage in [StageId::Masking, StageId::PoseIntegration] {
             *item.hop_mut(stage) = Hop {
@@ -288,8 +255,8 @@ mod tests {
                 published_ns: 6_000_000,
             };
         }
-        board.histograms.add(&item);
-        board
+        view.histograms.add(&item);
+        view
     }
 
     /// The families that a text describes, and the names of its samples.
@@ -300,7 +267,7 @@ mod tests {
 
     #[test]
     fn each_sample_of_the_older_format_is_of_a_family_with_a_type_and_a_help() {
-        let (kind, text) = scrape(&board(), b"text/plain");
+        let (kind, text) = scrape(&view(), b"text/plain");
         assert_eq!(kind, TEXT);
         let families = families(&text);
         for line in text.lines().filter(|line| !line.starts_with('#')) {
@@ -348,7 +315,7 @@ mod tests {
         };
         let snapshot = Snapshot {
             is_up: true,
-            counts: board().counts(),
+            counts: view().counts(),
             processes: vec![source],
             traces: None,
         };
@@ -371,7 +338,7 @@ mod tests {
     #[test]
     fn who_accepts_the_newer_format_receives_it() {
         let (kind, text) = scrape(
-            &board(),
+            &view(),
             b"application/openmetrics-text;version=1.0.0,*/*;q=0.1",
         );
         assert_eq!(kind, OPEN_METRICS);

@@ -16,16 +16,17 @@ use gyre_stage::{
 };
 
 use crate::{
-    board::Board,
     messages::{Layer, RunState},
     pictures,
     processes::ProcessMeter,
+    run_view::RunView,
     traces::Exporter,
 };
 
-/// Time between two looks for a run, for browsers that want a layer, and for a request to stop.
-const LOOK: Duration = Duration::from_millis(200);
-/// The shortest time between two pictures: all scans of a radar that turns four times a second, and some of one that is played faster.
+/// Time between two polls for a run, for browsers that want a layer, and for a request to stop.
+const POLL_INTERVAL: Duration = Duration::from_millis(200);
+/// The shortest time between two pictures: all scans of a radar that turns four times a second, and
+/// some of one that is played faster.
 const PICTURE_INTERVAL: Duration = Duration::from_millis(180);
 /// Time between two reports.
 const REPORT_INTERVAL: Duration = Duration::from_secs(1);
@@ -36,13 +37,13 @@ pub struct Followed {
     pub out: PathBuf,
     /// Returns whether a run that has ended in this folder has reached the end of its recording.
     pub is_complete: fn(&Path) -> bool,
-    /// What is seen of it.
-    pub board: Arc<Board>,
-    /// Where each pose is sent as a trace.
+    /// The view of the run.
+    pub view: Arc<RunView>,
+    /// The exporter of a trace of each pose.
     pub traces: Option<Exporter>,
 }
 
-/// Starts the threads. They end when the board is stopped.
+/// Starts the threads. They end when the view is stopped.
 ///
 /// # Errors
 /// The system refuses a thread.
@@ -66,34 +67,34 @@ pub fn start(followed: &Arc<Followed>) -> std::io::Result<Vec<JoinHandle<()>>> {
 
 /// Follows the run, and the next one in the same folder after its end.
 fn follow_runs(followed: &Followed) {
-    while !followed.board.is_stopping() {
+    while !followed.view.is_stopping() {
         match ObservedRun::writing_to(&followed.out) {
             Ok(run) => follow_run(followed, &run),
-            // There is none.
-            Err(_) => thread::sleep(LOOK),
+            // There is no run yet.
+            Err(_) => thread::sleep(POLL_INTERVAL),
         }
     }
 }
 
 fn follow_run(followed: &Followed, run: &ObservedRun) {
-    let board = &followed.board;
-    board.begin(run.manifest());
-    while !board.is_stopping() && !run.has_ended() {
+    let view = &followed.view;
+    view.begin(run.manifest());
+    while !view.is_stopping() && !run.has_ended() {
         match follow_poses(followed, run) {
-            Ok(()) if board.is_stopping() => return,
+            Ok(()) if view.is_stopping() => return,
             Ok(()) => {
-                board.set_state(RunState::Finishing);
-                await_end(board, run);
+                view.set_state(RunState::Finishing);
+                await_end(view, run);
             }
             Err(StageError::NotRunning(_)) => {}
             Err(error) => {
-                board.set_notice(Some(format!("Poses are not shown: {error}.")));
-                thread::sleep(LOOK);
+                view.set_notice(Some(format!("Poses are not shown: {error}.")));
+                thread::sleep(POLL_INTERVAL);
             }
         }
     }
-    if !board.is_stopping() {
-        board.end(match (followed.is_complete)(&followed.out) {
+    if !view.is_stopping() {
+        view.end(match (followed.is_complete)(&followed.out) {
             true => RunState::Complete,
             false => RunState::Interrupted,
         });
@@ -101,24 +102,24 @@ fn follow_run(followed: &Followed, run: &ObservedRun) {
 }
 
 /// Waits until the results are written and the run is gone.
-fn await_end(board: &Board, run: &ObservedRun) {
-    while !board.is_stopping() && !run.has_ended() {
-        thread::sleep(LOOK);
+fn await_end(view: &RunView, run: &ObservedRun) {
+    while !view.is_stopping() && !run.has_ended() {
+        thread::sleep(POLL_INTERVAL);
     }
 }
 
 /// Follows the poses to their end. Those of the journal come first.
 fn follow_poses(followed: &Followed, run: &ObservedRun) -> Result<(), StageError> {
-    let board = &followed.board;
+    let view = &followed.view;
     let mut poses = run.observe::<Pose>()?;
-    board.set_notice(None);
-    let journalled = add_journal(board, &run.manifest().out);
-    while !board.is_stopping() {
-        match poses.next(LOOK)? {
+    view.set_notice(None);
+    let journalled = add_journal(view, &run.manifest().out);
+    while !view.is_stopping() {
+        match poses.next(POLL_INTERVAL)? {
             Next::Message(message, _) => {
                 let pose = message.header();
                 let is_new = journalled.is_none_or(|last| pose.item.seq > last);
-                board.add_pose(pose, is_new);
+                view.add_pose(pose, is_new);
                 if let Some(traces) = &followed.traces {
                     traces.add(&run.manifest().prefix, pose);
                 }
@@ -126,70 +127,71 @@ fn follow_poses(followed: &Followed, run: &ObservedRun) -> Result<(), StageError
             Next::Idle => {}
             Next::Ended => break,
         }
-        board.set_missed(|missed| missed.pose = poses.missed());
+        view.set_missed(|missed| missed.pose = poses.missed());
     }
     Ok(())
 }
 
-/// Adds the poses of the journal, and returns the number of the last one. A journal that cannot be read is only not shown.
-fn add_journal(board: &Board, out: &Path) -> Option<u64> {
-    board.clear_track();
+/// Adds the poses of the journal, and returns the number of the last one. A journal that cannot be
+/// read is only not shown.
+fn add_journal(view: &RunView, out: &Path) -> Option<u64> {
+    view.clear_track();
     let records = journal::records(&journal::path(out)).ok()??;
     let poses = records.map_while(Result::ok);
     let add = |pose| {
-        board.add_earlier(&pose);
+        view.add_journalled(&pose);
         pose.item.seq
     };
     poses.map(add).last()
 }
 
-/// Follows a topic as long as a browser wants one of its layers.
+/// Follows a topic as long as a browser wants one of these layers.
 fn follow_pictures<M: Message>(
     followed: &Followed,
     layers: &[Layer],
-    picture: fn(&Board, &Received<M>),
+    picture: fn(&RunView, &Received<M>),
 ) {
-    let board = &followed.board;
-    let is_wanted = || !board.is_stopping() && layers.iter().any(|layer| board.is_wanted(*layer));
-    while !board.is_stopping() {
-        thread::sleep(LOOK);
-        if !is_wanted() || board.run().state != RunState::Working {
+    let view = &followed.view;
+    let is_wanted = || !view.is_stopping() && layers.iter().any(|layer| view.is_wanted(*layer));
+    while !view.is_stopping() {
+        thread::sleep(POLL_INTERVAL);
+        if !is_wanted() || view.run().state != RunState::Working {
             continue;
         }
         let seen = ObservedRun::writing_to(&followed.out)
-            .and_then(|run| follow_topic(board, &run, &is_wanted, picture));
+            .and_then(|run| follow_topic(view, &run, &is_wanted, picture));
         if !is_wanted() {
-            layers.iter().for_each(|layer| board.clear_pictures(*layer));
+            layers.iter().for_each(|layer| view.clear_pictures(*layer));
         }
         match seen {
             Ok(()) | Err(StageError::NotRunning(_)) => {}
-            Err(error) => board.set_notice(Some(format!("Not all is shown: {error}."))),
+            Err(error) => view.set_notice(Some(format!("Not all is shown: {error}."))),
         }
     }
 }
 
 fn follow_topic<M: Message>(
-    board: &Board,
+    view: &RunView,
     run: &ObservedRun,
     is_wanted: &impl Fn() -> bool,
-    picture: fn(&Board, &Received<M>),
+    picture: fn(&RunView, &Received<M>),
 ) -> Result<(), StageError> {
-    let before = board.counts().missed;
+    let before = view.counts().missed;
     let mut observer = run.observe::<M>()?;
     let mut drawn: Option<Instant> = None;
     while is_wanted() {
-        match observer.next(LOOK)? {
+        match observer.next(POLL_INTERVAL)? {
             Next::Message(message, _) => {
                 if drawn.is_none_or(|drawn| drawn.elapsed() >= PICTURE_INTERVAL) {
                     drawn = Some(Instant::now());
-                    picture(board, message);
+                    picture(view, message);
                 }
             }
             Next::Idle => {}
             Next::Ended => break,
         }
         let missed_now = observer.missed();
-        board.set_missed(|missed| match M::TOPIC {
+        view.set_missed(|missed| match M::TOPIC {
             Scan::TOPIC => missed.scan = before.scan + missed_now,
             _ => missed.masked = before.masked + missed_now,
         });
@@ -197,28 +199,28 @@ fn follow_topic<M: Message>(
     Ok(())
 }
 
-/// A scan whose rows do not fit its header was refused by the observer; one for whose picture there is no memory is left out.
-fn scan(board: &Board, message: &Received<Scan>) {
+/// Sends the picture of a scan; without memory for it, none.
+fn scan(view: &RunView, message: &Received<Scan>) {
     let item = message.item();
     let scan = message.header().view(message.values());
     let picture = scan.map(|scan| pictures::scan(&scan, item.seq, item.scan));
     if let Some(Ok(picture)) = picture {
-        board.news.scan.send_replace(picture);
+        view.updates.scan.send_replace(picture);
     }
 }
 
-fn masked(board: &Board, message: &Received<Masked>) {
+fn masked(view: &RunView, message: &Received<Masked>) {
     let (header, values, seq) = (message.header(), message.values(), message.item().seq);
-    if board.is_wanted(Layer::Raster)
+    if view.is_wanted(Layer::Raster)
         && let Some(pair) = header.pair(values, None)
         && let Ok(picture) = pictures::raster(pair.later, header.cell_m, seq)
     {
-        board.news.raster.send_replace(picture);
+        view.updates.raster.send_replace(picture);
     }
-    if board.is_wanted(Layer::Points)
+    if view.is_wanted(Layer::Points)
         && let Some(points) = header.points(values)
     {
-        board.add_points(pictures::points(points, header), seq);
+        view.add_points(pictures::points(points, header), seq);
     }
 }
 
@@ -226,17 +228,17 @@ fn masked(board: &Board, message: &Received<Masked>) {
 fn report(followed: &Followed) {
     let mut meter = ProcessMeter::default();
     let mut reported = Instant::now();
-    let board = &followed.board;
-    while !board.is_stopping() {
+    let view = &followed.view;
+    while !view.is_stopping() {
         if reported.elapsed() >= REPORT_INTERVAL {
             reported = Instant::now();
-            if board.run().state.is_up()
-                && let Some((status, processes)) = meter.look(&followed.out)
+            if view.run().state.is_up()
+                && let Some((status, processes)) = meter.read(&followed.out)
             {
-                board.set_processes(&status, processes);
+                view.set_processes(&status, processes);
             }
-            board.report();
+            view.report();
         }
-        thread::sleep(LOOK);
+        thread::sleep(POLL_INTERVAL);
     }
 }

@@ -11,7 +11,8 @@ use crate::frame;
 
 /// The most azimuths of a picture: no Navtech radar measures more.
 const MAX_AZIMUTHS: usize = 400;
-/// The most range bins of a picture: a display has about as many pixels from its middle to its edge.
+/// The most range bins of a picture: a display has about as many pixels from its middle to its
+/// edge.
 const MAX_BINS: usize = 256;
 /// The most cells on each side of a raster.
 const MAX_SIDE: usize = 256;
@@ -22,7 +23,8 @@ const NOISE_SHARE: f64 = 0.6;
 /// Unit of the coordinates of points, m: 16 bits reach 655 m.
 const POINT_UNIT_M: f64 = 0.02;
 
-/// A scan as a picture: `azimuths x bins` powers. Azimuth `a` looks at `2 pi a / azimuths`, counter-clockwise from straight ahead.
+/// A scan as a picture: `azimuths x bins` powers. Azimuth `a` looks at `2 pi a / azimuths`,
+/// counter-clockwise from straight ahead.
 #[derive(Serialize)]
 #[serde(tag = "kind", rename = "scan")]
 struct ScanPicture {
@@ -39,7 +41,7 @@ struct ScanPicture {
     floor: u8,
 }
 
-/// Makes a picture of a scan: the strongest return in each of its cells.
+/// Makes a picture of a scan: the strongest return in each cell.
 ///
 /// # Errors
 /// Memory has no room.
@@ -49,7 +51,7 @@ pub fn scan(scan: &PolarScan<'_>, seq: u64, number: u64) -> std::io::Result<Byte
     let bins_of_one = geometry.bins.div_ceil(MAX_BINS).max(1);
     let bins = geometry.bins.div_ceil(bins_of_one);
     let mut powers = vec![0; azimuths * bins];
-    let column = |row: usize| place(scan.azimuth_rad[row], geometry.sense, azimuths);
+    let column = |row: usize| column_of(scan.azimuth_rad[row], geometry.sense, azimuths);
     for row in 0..geometry.azimuths {
         let first = column(row) * bins;
         let cells = powers[first..first + bins].iter_mut();
@@ -94,8 +96,8 @@ fn floor(powers: &[u8]) -> u8 {
     counts.iter().position(is_above).unwrap_or_default() as u8
 }
 
-/// The column of an azimuth in a picture, counter-clockwise from straight ahead.
-fn place(azimuth_rad: f32, sense: Sense, azimuths: usize) -> usize {
+/// Returns the column of an azimuth in a picture, counter-clockwise from straight ahead.
+fn column_of(azimuth_rad: f32, sense: Sense, azimuths: usize) -> usize {
     let turns = f64::from(azimuth_rad) / std::f64::consts::TAU;
     let counter_clockwise = match sense {
         Sense::Clockwise => -turns,
@@ -104,7 +106,8 @@ fn place(azimuth_rad: f32, sense: Sense, azimuths: usize) -> usize {
     (counter_clockwise.rem_euclid(1.0) * azimuths as f64).round() as usize % azimuths
 }
 
-/// A raster as a picture: `side x side` cells, row 0 far ahead, column 0 far left, the sensor in the middle.
+/// A raster as a picture: `side x side` cells, row 0 far ahead, column 0 far left, the sensor in
+/// the middle.
 #[derive(Serialize)]
 #[serde(tag = "kind", rename = "raster")]
 struct RasterPicture {
@@ -114,7 +117,8 @@ struct RasterPicture {
     width_m: f64,
 }
 
-/// Makes a picture of a masked raster: the strongest value in each of its cells, relative to the strongest of all.
+/// Makes a picture of a masked raster: the strongest value in each of its cells, relative to the
+/// strongest of all.
 ///
 /// # Errors
 /// Memory has no room.
@@ -151,21 +155,22 @@ struct PointsPicture {
     unit_m: f64,
 }
 
-/// Points of a scan as x and y in units of [`POINT_UNIT_M`], 16 bits each, little-endian, in the frame of the scan.
-pub struct Points(Vec<u8>);
+/// PackedPoints of a scan as x and y in units of [`POINT_UNIT_M`], 16 bits each, little-endian, in
+/// the frame of the scan.
+pub struct PackedPoints(Vec<u8>);
 
 /// Returns the points of a scan, motion-compensated as its raster is.
-pub fn points(points: &[SparsePoint], header: &MaskedHeader) -> Points {
+pub fn points(points: &[SparsePoint], header: &MaskedHeader) -> PackedPoints {
     let in_units = |length_m: f64| {
         let units = (length_m / POINT_UNIT_M).round();
         units.clamp(i16::MIN.into(), i16::MAX.into()) as i16
     };
     let places = header.deskewed(points);
     let bytes = places.flat_map(|(place, _)| place.map(in_units).map(i16::to_le_bytes));
-    Points(bytes.flatten().collect())
+    PackedPoints(bytes.flatten().collect())
 }
 
-impl Points {
+impl PackedPoints {
     /// Makes a message of the points and the pose of their scan.
     ///
     /// # Errors
@@ -193,7 +198,7 @@ mod tests {
     const AZIMUTHS: usize = 800;
     const BINS: usize = 1000;
 
-    /// The picture of a clockwise scan with one strong return.
+    /// Returns the picture of a clockwise scan with one strong return.
     fn picture(azimuth: usize, bin: usize) -> (serde_json::Value, Vec<u8>) {
         let mut bytes = vec![10; AZIMUTHS * BINS];
         bytes[azimuth * BINS + bin] = 255;

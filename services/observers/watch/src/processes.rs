@@ -1,4 +1,4 @@
-//! The processes of the run: what the supervisor says of them, and what the kernel counts.
+//! The processes of the run: their states by the supervisor, and their usage by the kernel.
 
 use std::{collections::BTreeMap, path::Path, time::Instant};
 
@@ -12,7 +12,7 @@ use serde::Serialize;
 /// The name of the supervisor among the processes.
 const SUPERVISOR: &str = "supervisor";
 
-/// Reads the state of a run again and again.
+/// Reads the states of a run's processes, and measures their usage between two reads.
 #[derive(Debug, Default)]
 pub struct ProcessMeter {
     /// The last usage of each process, and its time.
@@ -26,70 +26,71 @@ pub struct Process {
     pub name: String,
     /// The process.
     pub pid: u32,
-    /// What it does.
+    /// The activity.
     pub state: &'static str,
-    /// How good that is: `good`, `warn`, or `bad`.
+    /// The rating of the activity: `good`, `warn`, or `bad`.
     pub level: &'static str,
-    /// Its restarts.
+    /// The number of restarts.
     pub restarts: usize,
     /// The cause of its last death.
     pub last_death: Option<String>,
-    /// What a live radar has delivered, and what is missing; `None` if it is no source of one.
+    /// The counts of a live radar; `None` if the process receives none.
     pub received: Option<Received>,
-    /// Share of one processor since the last look; `None` at the first.
+    /// Share of one processor since the last read; `None` at the first.
     pub processor_share: Option<f64>,
-    /// Processor time since its start, s, and memory of its own, bytes; `None` if it has just ended.
+    /// Processor time since the start, s; `None` if the process has just ended.
     pub cpu_s: Option<f64>,
-    /// See above.
+    /// Memory of its own, bytes; `None` if the process has just ended.
     pub own_bytes: Option<u64>,
 }
 
 impl ProcessMeter {
-    /// Returns what the supervisor says of the run that writes to `out`, and its processes. `None` if there is no answer: the run
-    /// is about to end, or its supervisor is stopped.
-    pub fn look(&mut self, out: &Path) -> Option<(Status, Vec<Process>)> {
+    /// Returns the supervisor's status of the run that writes to `out`, and its processes. `None`
+    /// if there is no answer: the run is about to end, or its supervisor is stopped.
+    pub fn read(&mut self, out: &Path) -> Option<(Status, Vec<Process>)> {
         let status = Control::of(out).and_then(|control| control.status()).ok()?;
-        let supervisor = (SUPERVISOR, status.pid, "running", "good", 0, None, None);
-        let others = status.processes.iter().map(|process| {
-            let (name, activity) = (process.name.as_str(), process.activity);
-            let death = process.last_death.clone();
-            (
-                name,
-                process.pid,
-                activity.name(),
-                level(activity),
-                process.restarts,
-                death,
-                process.received,
-            )
+        let process = |name: &str, pid| Process {
+            name: name.to_owned(),
+            pid,
+            state: "running",
+            level: "good",
+            restarts: 0,
+            last_death: None,
+            received: None,
+            processor_share: None,
+            cpu_s: None,
+            own_bytes: None,
+        };
+        let others = status.processes.iter().map(|it| Process {
+            state: it.activity.name(),
+            level: level(it.activity),
+            restarts: it.restarts,
+            last_death: it.last_death.clone(),
+            received: it.received,
+            ..process(&it.name, it.pid)
         });
+        let supervisor = process(SUPERVISOR, status.pid);
+        let mut processes: Vec<_> = [supervisor].into_iter().chain(others).collect();
+        self.measure(&mut processes);
+        Some((status, processes))
+    }
+
+    /// Sets the usage of each process that still runs.
+    fn measure(&mut self, processes: &mut [Process]) {
         let now = Instant::now();
         let mut after = BTreeMap::new();
-        let processes = [supervisor].into_iter().chain(others).map(
-            |(name, pid, state, level, restarts, last_death, received)| {
-                let usage = Usage::of(pid);
-                let before = self.before.get(&pid);
-                let share = usage.zip(before).map(|(usage, (at, before))| {
-                    usage.processor_share(before, now.duration_since(*at))
-                });
-                after.extend(usage.map(|usage| (pid, (now, usage))));
-                Process {
-                    name: name.to_owned(),
-                    pid,
-                    state,
-                    level,
-                    restarts,
-                    last_death,
-                    received,
-                    processor_share: share,
-                    cpu_s: usage.map(|usage| usage.cpu_s),
-                    own_bytes: usage.map(|usage| usage.own_bytes),
-                }
-            },
-        );
-        let processes = processes.collect();
+        for process in processes {
+            let Some(usage) = Usage::of(process.pid) else {
+                continue;
+            };
+            let before = self.before.get(&process.pid);
+            process.processor_share =
+                before.map(|(at, before)| usage.processor_share(before, now.duration_since(*at)));
+            process.cpu_s = Some(usage.cpu_s);
+            process.own_bytes = Some(usage.own_bytes);
+            after.insert(process.pid, (now, usage));
+        }
         self.before = after;
-        Some((status, processes))
     }
 }
 

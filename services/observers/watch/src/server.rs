@@ -26,12 +26,13 @@ use tokio::{runtime, sync::watch, time};
 
 use crate::{
     access::{Access, Token, Verdict},
-    board::Board,
     connections::{self, Limits},
     foxglove::{self, Hub},
     metrics,
     observing::{self, Followed},
-    page, stream,
+    page,
+    run_view::RunView,
+    stream,
     traces::Exporter,
 };
 
@@ -41,15 +42,15 @@ const MAX_READERS: usize = 16;
 const MAX_RECEIVED: usize = 1024;
 /// The longest request of a viewer, bytes.
 const MAX_REQUESTED: usize = 64 << 10;
-/// Time between two looks whether the server has failed.
-const LOOK: Duration = Duration::from_secs(1);
+/// Time between two checks whether the server has failed.
+const POLL_INTERVAL: Duration = Duration::from_secs(1);
 /// Time for the connections to end with the program.
 const STOP_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// A failure of the server.
 #[derive(Debug, Error)]
 pub enum WatchError {
-    /// It cannot listen.
+    /// The address cannot be listened at.
     #[error("cannot serve at {address}: {source}; choose another address")]
     Listen {
         /// The address.
@@ -57,7 +58,7 @@ pub enum WatchError {
         /// The reason.
         source: io::Error,
     },
-    /// It cannot work.
+    /// The server fails.
     #[error("cannot serve: {0}")]
     Serve(#[from] io::Error),
     /// Signals cannot be received.
@@ -65,14 +66,14 @@ pub enum WatchError {
     Stage(#[from] StageError),
 }
 
-/// An address that is listened at, and the token that those who connect need.
+/// An address that is listened at, and the token of its readers.
 pub struct Endpoint {
     listener: TcpListener,
     address: SocketAddr,
     token: Option<Token>,
 }
 
-/// A server.
+/// The server of a page, and on request of Foxglove and traces.
 pub struct Server {
     page: Endpoint,
     foxglove: Option<Endpoint>,
@@ -81,17 +82,18 @@ pub struct Server {
 
 #[derive(Clone)]
 struct Shared {
-    board: Arc<Board>,
+    view: Arc<RunView>,
     hub: Arc<Hub>,
     access: Arc<Access>,
     readers: Arc<AtomicUsize>,
 }
 
-/// A reader's place. Dropped, it is free again.
-struct Place(Arc<AtomicUsize>);
+/// One of the places for readers. Dropped, it is free again.
+struct ReaderSlot(Arc<AtomicUsize>);
 
 impl Endpoint {
-    /// Listens at an address. Readers need the token, if there is one; without one only this machine is answered.
+    /// Listens at an address. Readers need the token, if there is one; without one only this
+    /// machine is answered.
     ///
     /// # Errors
     /// The address cannot be listened at.
@@ -126,7 +128,7 @@ impl Endpoint {
 }
 
 impl Server {
-    /// A server of the page and the metrics.
+    /// Creates a server of the page and the metrics.
     pub fn new(page: Endpoint) -> Self {
         Self {
             page,
@@ -145,8 +147,9 @@ impl Server {
         Self { traces, ..self }
     }
 
-    /// Shows the runs that write to `out`, one after the other, until a signal arrives. `is_complete` returns whether a run that
-    /// has ended there has reached the end of its recording.
+    /// Shows the runs that write to `out`, one after the other, until a signal arrives.
+    /// `is_complete` returns whether a run that has ended there has reached the end of its
+    /// recording.
     ///
     /// # Errors
     /// The system refuses a thread or the listener.
@@ -156,22 +159,22 @@ impl Server {
         is_complete: fn(&Path) -> bool,
         signals: &Signals,
     ) -> Result<(), WatchError> {
-        let board = Arc::new(Board::new(&out.display().to_string()));
+        let view = Arc::new(RunView::new(&out.display().to_string()));
         if let Some(traces) = &self.traces {
-            let _ = board.traces.set(traces.counts());
+            let _ = view.traces.set(traces.counts());
         }
         let hub = Arc::new(Hub::default());
         let followed = Arc::new(Followed {
             out,
             is_complete,
-            board: Arc::clone(&board),
+            view: Arc::clone(&view),
             traces: self.traces.take(),
         });
         let mut threads = observing::start(&followed)?;
         if self.foxglove.is_some() {
             threads.extend(foxglove::start(&followed, &hub)?);
         }
-        let serving = Arc::clone(&board);
+        let serving = Arc::clone(&view);
         let server = thread::Builder::new().name("serve".to_owned());
         let server = server.spawn(move || {
             let served = self.serve(&serving, hub);
@@ -179,8 +182,8 @@ impl Server {
             serving.stop();
             served
         })?;
-        while !board.is_stopping() && !signals.sleep(LOOK)? {}
-        board.stop();
+        while !view.is_stopping() && !signals.sleep(POLL_INTERVAL)? {}
+        view.stop();
         for thread in threads {
             let _ = thread.join();
         }
@@ -188,14 +191,14 @@ impl Server {
         Ok(server.join().unwrap_or_else(|_| Err(died()))?)
     }
 
-    fn serve(self, board: &Arc<Board>, hub: Arc<Hub>) -> io::Result<()> {
+    fn serve(self, view: &Arc<RunView>, hub: Arc<Hub>) -> io::Result<()> {
         let shared = |access: Access| Shared {
-            board: Arc::clone(board),
+            view: Arc::clone(view),
             hub: Arc::clone(&hub),
             access: Arc::new(access),
             readers: Arc::default(),
         };
-        let stop = || board.news.stop.subscribe();
+        let stop = || view.updates.stop.subscribe();
         let access = Access::new(self.page.address, self.page.token.clone());
         let page = self.page.serve(router(shared(access)), stop());
         let foxglove = async {
@@ -272,18 +275,18 @@ async fn view(
         let other = "This is for Foxglove and Lichtblick: open a connection of the kind Foxglove WebSocket to this address.";
         return page::refusal(StatusCode::BAD_REQUEST, other);
     };
-    let Some(place) = Place::take(&shared.readers) else {
+    let Some(place) = ReaderSlot::take(&shared.readers) else {
         let full = "As many viewers as there is room for are connected: close one.";
         return page::refusal(StatusCode::SERVICE_UNAVAILABLE, full);
     };
     let upgrade = bounded(upgrade, MAX_REQUESTED);
     upgrade.on_upgrade(move |socket| async move {
-        foxglove::serve(socket, shared.hub, shared.board).await;
+        foxglove::serve(socket, shared.hub, shared.view).await;
         drop(place);
     })
 }
 
-/// Answers only who may read, whatever the path.
+/// Answers only requests that may read, whatever the path.
 async fn guard(State(shared): State<Shared>, request: Request, next: Next) -> Response {
     let mut response = match shared.access.judge(request.uri(), request.headers()) {
         Verdict::Granted => next.run(request).await,
@@ -311,29 +314,29 @@ async fn guard(State(shared): State<Shared>, request: Request, next: Next) -> Re
 }
 
 async fn stream(State(shared): State<Shared>, upgrade: WebSocketUpgrade) -> Response {
-    let Some(place) = Place::take(&shared.readers) else {
+    let Some(place) = ReaderSlot::take(&shared.readers) else {
         let full = "As many browsers as there is room for are connected: close one.";
         return page::refusal(StatusCode::SERVICE_UNAVAILABLE, full);
     };
     let upgrade = bounded(upgrade, MAX_RECEIVED);
     upgrade.on_upgrade(move |socket| async move {
-        stream::serve(socket, shared.board).await;
+        stream::serve(socket, shared.view).await;
         drop(place);
     })
 }
 
-/// Bounds what is kept of a message that arrives; a frame has a limit of its own.
+/// Bounds the bytes of a received message and of a frame.
 fn bounded(upgrade: WebSocketUpgrade, bytes: usize) -> WebSocketUpgrade {
     upgrade.max_message_size(bytes).max_frame_size(bytes)
 }
 
 async fn scrape(State(shared): State<Shared>, headers: HeaderMap) -> Response {
     let accepted = headers.get(header::ACCEPT).map(HeaderValue::as_bytes);
-    let (kind, text) = metrics::scrape(&shared.board, accepted.unwrap_or_default());
+    let (kind, text) = metrics::scrape(&shared.view, accepted.unwrap_or_default());
     ([(header::CONTENT_TYPE, kind)], text).into_response()
 }
 
-impl Place {
+impl ReaderSlot {
     fn take(readers: &Arc<AtomicUsize>) -> Option<Self> {
         let place = Self(Arc::clone(readers));
         let taken = readers.fetch_add(1, Ordering::Relaxed);
@@ -341,7 +344,7 @@ impl Place {
     }
 }
 
-impl Drop for Place {
+impl Drop for ReaderSlot {
     fn drop(&mut self) {
         self.0.fetch_sub(1, Ordering::Relaxed);
     }

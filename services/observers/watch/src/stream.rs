@@ -1,4 +1,4 @@
-//! One browser: what it has had, and what it wants.
+//! One browser: the layers that it wants, and the messages to it.
 
 use std::{sync::Arc, time::Duration};
 
@@ -8,7 +8,7 @@ use tokio::{
     time::{self, MissedTickBehavior},
 };
 
-use crate::{board::Board, messages::Layer, track::Cursor};
+use crate::{messages::Layer, run_view::RunView, track::Cursor};
 
 /// Time between two messages of poses.
 const POSES_INTERVAL: Duration = Duration::from_millis(200);
@@ -23,7 +23,7 @@ const LAYERS: [(&str, Layer); 3] = [
 
 /// The layers that a browser wants. Dropped, it wants none.
 struct Wanted {
-    board: Arc<Board>,
+    view: Arc<RunView>,
     layers: [bool; 3],
 }
 
@@ -34,7 +34,7 @@ impl Wanted {
             let is_wanted = names.split(' ').any(|named| named == name);
             let was_wanted = &mut self.layers[layer as usize];
             if *was_wanted != is_wanted {
-                self.board.want(layer, is_wanted);
+                self.view.want(layer, is_wanted);
                 *was_wanted = is_wanted;
             }
         }
@@ -51,27 +51,27 @@ impl Drop for Wanted {
     }
 }
 
-/// Sends news to a browser until it leaves, is too slow, or the program ends.
-pub async fn serve(mut socket: WebSocket, board: Arc<Board>) {
-    let news = &board.news;
-    let (mut run, mut health) = (news.run.subscribe(), news.health.subscribe());
+/// Sends updates to a browser until it disconnects, is too slow, or the program ends.
+pub async fn serve(mut socket: WebSocket, view: Arc<RunView>) {
+    let updates = &view.updates;
+    let (mut run, mut health) = (updates.run.subscribe(), updates.health.subscribe());
     let (mut scan, mut raster, mut points) = (
-        news.scan.subscribe(),
-        news.raster.subscribe(),
-        news.points.subscribe(),
+        updates.scan.subscribe(),
+        updates.raster.subscribe(),
+        updates.points.subscribe(),
     );
-    let mut stop = news.stop.subscribe();
-    // The newest of each is news to one who comes.
+    let mut stop = updates.stop.subscribe();
+    // The newest of each is new to this browser.
     run.mark_changed();
     health.mark_changed();
     for pictures in [&mut scan, &mut raster, &mut points] {
         pictures.mark_changed();
     }
     let mut wanted = Wanted {
-        board: Arc::clone(&board),
+        view: Arc::clone(&view),
         layers: [false; 3],
     };
-    let (mut cursor, mut had) = (Cursor::default(), None);
+    let (mut cursor, mut last) = (Cursor::default(), None);
     let mut tick = time::interval(POSES_INTERVAL);
     tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
@@ -88,7 +88,7 @@ pub async fn serve(mut socket: WebSocket, board: Arc<Board>) {
             },
             Ok(()) = run.changed() => text(&mut run),
             Ok(()) = health.changed() => text(&mut health),
-            _ = tick.tick() => board.poses(&mut cursor, &mut had).map(Message::Text),
+            _ = tick.tick() => view.poses(&mut cursor, &mut last).map(Message::Text),
             Ok(()) = points.changed(), if wanted.has(Layer::Points) => binary(&mut points),
             Ok(()) = raster.changed(), if wanted.has(Layer::Raster) => binary(&mut raster),
             Ok(()) = scan.changed(), if wanted.has(Layer::Scan) => binary(&mut scan),
@@ -102,13 +102,13 @@ pub async fn serve(mut socket: WebSocket, board: Arc<Board>) {
     }
 }
 
-/// The newest message of a channel; none if nothing was ever sent.
-fn text(news: &mut Receiver<axum::extract::ws::Utf8Bytes>) -> Option<Message> {
-    let newest = news.borrow_and_update().clone();
+/// Returns the newest message of a channel; `None` if nothing was ever sent.
+fn text(updates: &mut Receiver<axum::extract::ws::Utf8Bytes>) -> Option<Message> {
+    let newest = updates.borrow_and_update().clone();
     (!newest.is_empty()).then_some(Message::Text(newest))
 }
 
-fn binary(news: &mut Receiver<axum::body::Bytes>) -> Option<Message> {
-    let newest = news.borrow_and_update().clone();
+fn binary(updates: &mut Receiver<axum::body::Bytes>) -> Option<Message> {
+    let newest = updates.borrow_and_update().clone();
     (!newest.is_empty()).then_some(Message::Binary(newest))
 }

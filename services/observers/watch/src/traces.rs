@@ -1,7 +1,8 @@
 //! A trace of each pose for a collector of OpenTelemetry (OTLP over HTTP, in JSON).
 //!
-//! Each item carries the times at which every stage received, began, finished and published it, so a trace needs nothing of the stages.
-//! Traces wait in a queue of bounded length for the thread that sends them: what a collector does not take is dropped and counted.
+//! Each item carries the times at which every stage received, began, finished and published it, so
+//! a trace needs nothing of the stages. Traces wait in a queue of bounded length for the thread
+//! that sends them: those that a collector does not take are dropped and counted.
 //!
 //! Reading order: `spans` (a pose as spans), `sending` (the thread).
 
@@ -24,7 +25,8 @@ use thiserror::Error;
 use sending::Sending;
 use spans::Trace;
 
-/// Traces that wait at most: half a minute of the fastest radar, or four seconds of a recording at 500 scans/s. They take 700 kB.
+/// Traces that wait at most: half a minute of the fastest radar, or four seconds of a recording at
+/// 500 scans/s. They take 700 kB.
 const QUEUE: usize = 2048;
 /// The path of traces at a collector.
 const PATH: &str = "/v1/traces";
@@ -49,15 +51,15 @@ pub enum TraceError {
 
 /// Sends a trace of each pose. Dropped, it sends what waits.
 pub struct Exporter {
-    /// `None` when it ends.
+    /// `None` at the end.
     traces: Option<SyncSender<Trace>>,
-    counts: Arc<Counts>,
+    counts: Arc<TraceCounts>,
     thread: Option<JoinHandle<()>>,
 }
 
-/// The traces so far.
+/// The counts of traces.
 #[derive(Debug, Default)]
-pub struct Counts {
+pub struct TraceCounts {
     /// Traces that the collector has taken.
     pub sent: AtomicU64,
     /// Traces that did not fit into the queue, or that the collector has not taken.
@@ -65,12 +67,12 @@ pub struct Counts {
 }
 
 impl Exporter {
-    /// Sends to the collector at a URL. `say` prints a sentence when it cannot.
+    /// Sends to the collector at a URL. `say` prints a sentence when that fails.
     ///
     /// # Errors
     /// The URL is none of HTTP, or the system refuses a thread.
     pub fn start(url: &str, say: fn(&str)) -> Result<Self, TraceError> {
-        let counts = Arc::new(Counts::default());
+        let counts = Arc::new(TraceCounts::default());
         let (sender, receiver) = mpsc::sync_channel(QUEUE);
         let sending = Sending::new(endpoint(url)?, Arc::clone(&counts), say);
         let thread = thread::Builder::new().name("traces".to_owned());
@@ -93,13 +95,13 @@ impl Exporter {
         }
     }
 
-    /// Returns the counts, which go on.
-    pub fn counts(&self) -> Arc<Counts> {
+    /// Returns the counts, which continue.
+    pub fn counts(&self) -> Arc<TraceCounts> {
         Arc::clone(&self.counts)
     }
 }
 
-impl Counts {
+impl TraceCounts {
     /// Returns the numbers of traces sent and dropped.
     pub fn both(&self) -> [u64; 2] {
         [&self.sent, &self.dropped].map(|count| count.load(Ordering::Relaxed))

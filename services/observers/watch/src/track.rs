@@ -10,7 +10,8 @@ const SPACING_M: f64 = 0.25;
 /// The turn after which there is a vertex in any case, rad.
 const TURN_RAD: f64 = 0.1;
 
-/// A pose of the trajectory: x, y (m), yaw (rad), and the covariance of the position: xx, xy, yy (m^2).
+/// A pose of the trajectory: x, y (m), yaw (rad), and the covariance of the position: xx, xy, yy
+/// (m^2).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Vertex(pub [f64; 6]);
 
@@ -25,7 +26,7 @@ pub struct Track {
     version: u64,
 }
 
-/// A place in a track: what a reader has had of it.
+/// The vertices of a track that a reader has received.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Cursor {
     version: u64,
@@ -33,7 +34,7 @@ pub struct Cursor {
 }
 
 impl Vertex {
-    /// The vertex of a pose.
+    /// Returns the vertex of a pose.
     pub fn of(pose: &PoseHeader) -> Self {
         let [xx, xy, _, yy, _, _] = pose.covariance;
         Self([pose.x_m, pose.y_m, pose.yaw_rad, xx, xy, yy])
@@ -85,7 +86,7 @@ impl Track {
         self.length_m
     }
 
-    /// Returns the vertices that a reader has not had, and whether they replace those that it has had.
+    /// Returns the vertices that are new to a reader, and whether they replace the received ones.
     pub fn since(&self, cursor: &mut Cursor) -> (&[Vertex], bool) {
         let replaces = cursor.version != self.version;
         let first = if replaces { 0 } else { cursor.vertices };
@@ -96,7 +97,7 @@ impl Track {
         (&self.vertices[first..], replaces)
     }
 
-    /// Forgets all of it, for another run.
+    /// Removes all vertices, for another run.
     pub fn clear(&mut self) {
         *self = Self {
             version: self.version + 1,

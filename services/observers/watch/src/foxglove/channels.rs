@@ -12,16 +12,16 @@ use super::measurements::{HEALTH, LATENCY, health_schema, latency_schema};
 pub struct Channel {
     /// The name that viewers show.
     pub name: &'static str,
-    /// The topic of the run that it is made of; `None`: it is made of what every run has.
+    /// The topic of the run that it is made of; `None`: every run has the channel.
     pub topic: Option<&'static str>,
-    /// Whether a viewer that is slow is sent the newest message only.
+    /// True if a slow viewer is sent the newest message only.
     pub is_bulky: bool,
-    /// Its entry in the message `advertise`.
+    /// The entry in the message `advertise`.
     pub advertised: Value,
 }
 
 impl Channel {
-    /// Returns whether a run has what it is made of.
+    /// Returns whether a run has the topic of the channel.
     pub fn is_of(&self, manifest: &Manifest) -> bool {
         self.topic.is_none_or(|name| {
             let has = topics(&manifest.window).any(|topic| topic.name == name);
@@ -29,7 +29,7 @@ impl Channel {
         })
     }
 
-    /// A channel of JSON.
+    /// Returns a channel of JSON.
     fn measured(name: &'static str, topic: Option<&'static str>, schema: &Value) -> Self {
         let advertised = json!({
             "topic": name,

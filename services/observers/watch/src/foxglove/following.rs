@@ -15,7 +15,7 @@ use gyre_messages::{
 use gyre_recorder::LogTail;
 use gyre_recording::view::{LOG, POINTS, TRAJECTORY, View, views};
 use gyre_stage::{
-    StageError,
+    StageError, clock,
     observer::{Next, ObservedRun, Observer},
     reader::Received,
 };
@@ -26,25 +26,25 @@ use super::{
 };
 use crate::{messages::RunState, observing::Followed};
 
-/// Time between two looks for a run, for viewers that want a topic, and for a request to stop.
-const LOOK: Duration = Duration::from_millis(200);
-/// The shortest time between two pictures of a topic, for recordings that are played faster than any display shows them.
+/// Time between two polls for a run, for viewers that want a topic, and for a request to stop.
+const POLL_INTERVAL: Duration = Duration::from_millis(200);
+/// The shortest time between two pictures of a topic, for recordings that are played fast.
 const PICTURE_INTERVAL: Duration = Duration::from_millis(50);
 
 /// The shortest time between two trajectories, each of which has all of it.
 const TRAJECTORY_INTERVAL: Duration = Duration::from_secs(1);
 
-/// What is done with the messages of a topic.
-struct Topic<M: Message> {
+/// A topic that is published to viewers.
+struct FollowedTopic<M: Message> {
     hub: Arc<Hub>,
     followed: Arc<Followed>,
-    /// Publishes what is not made of the header alone.
-    more: fn(&mut Topic<M>, &Received<M>),
+    /// Publishes the views that need the payload.
+    more: fn(&mut FollowedTopic<M>, &Received<M>),
     /// When the last picture or trajectory was made.
     drawn: Option<Instant>,
 }
 
-/// Starts the threads. They end when the board is stopped.
+/// Starts the threads. They end when the view is stopped.
 ///
 /// # Errors
 /// The system refuses a thread.
@@ -71,9 +71,9 @@ pub fn start(followed: &Arc<Followed>, hub: &Arc<Hub>) -> io::Result<Vec<JoinHan
 fn follow<M: Message>(
     followed: &Arc<Followed>,
     hub: &Arc<Hub>,
-    more: fn(&mut Topic<M>, &Received<M>),
+    more: fn(&mut FollowedTopic<M>, &Received<M>),
 ) -> io::Result<JoinHandle<()>> {
-    let mut topic = Topic {
+    let mut topic = FollowedTopic {
         hub: Arc::clone(hub),
         followed: Arc::clone(followed),
         more,
@@ -83,15 +83,15 @@ fn follow<M: Message>(
     thread.spawn(move || topic.follow_runs())
 }
 
-impl<M: Message> Topic<M> {
+impl<M: Message> FollowedTopic<M> {
     fn is_wanted(&self) -> bool {
-        !self.followed.board.is_stopping() && self.hub.wants_topic(M::TOPIC)
+        !self.followed.view.is_stopping() && self.hub.wants_topic(M::TOPIC)
     }
 
     fn follow_runs(&mut self) {
-        while !self.followed.board.is_stopping() {
-            thread::sleep(LOOK);
-            if !self.is_wanted() || self.followed.board.run().state != RunState::Working {
+        while !self.followed.view.is_stopping() {
+            thread::sleep(POLL_INTERVAL);
+            if !self.is_wanted() || self.followed.view.run().state != RunState::Working {
                 continue;
             }
             match ObservedRun::writing_to(&self.followed.out).and_then(|run| self.follow(&run)) {
@@ -109,7 +109,7 @@ impl<M: Message> Topic<M> {
         let mut observer: Observer<'_, M> = run.observe()?;
         self.drawn = None;
         while self.is_wanted() {
-            match observer.next(LOOK)? {
+            match observer.next(POLL_INTERVAL)? {
                 Next::Message(message, _) => {
                     let stamp_ns = message.item().stamp_ns;
                     for view in views(M::TOPIC, bytes_of(message.header())) {
@@ -124,7 +124,7 @@ impl<M: Message> Topic<M> {
         Ok(())
     }
 
-    /// Publishes a view if it is wanted. One of a message that is shorter than its header says is left out.
+    /// Publishes a view if it is wanted. A message that is too short for its header has none.
     fn publish(&self, channel: &str, stamp_ns: i64, view: impl FnOnce() -> Option<View>) {
         if self.hub.is_wanted(channel)
             && let Some(view) = view()
@@ -143,15 +143,15 @@ impl<M: Message> Topic<M> {
     }
 }
 
-fn nothing<M: Message>(_: &mut Topic<M>, _: &Received<M>) {}
+fn nothing<M: Message>(_: &mut FollowedTopic<M>, _: &Received<M>) {}
 
-fn picture(topic: &mut Topic<Scan>, message: &Received<Scan>) {
+fn picture(topic: &mut FollowedTopic<Scan>, message: &Received<Scan>) {
     if topic.is_due(PICTURE_INTERVAL) {
         image(topic, "/scan", message);
     }
 }
 
-fn masked(topic: &mut Topic<Masked>, message: &Received<Masked>) {
+fn masked(topic: &mut FollowedTopic<Masked>, message: &Received<Masked>) {
     if !topic.is_due(PICTURE_INTERVAL) {
         return;
     }
@@ -163,7 +163,7 @@ fn masked(topic: &mut Topic<Masked>, message: &Received<Masked>) {
     });
 }
 
-fn image<M: Message>(topic: &Topic<M>, channel: &str, message: &Received<M>) {
+fn image<M: Message>(topic: &FollowedTopic<M>, channel: &str, message: &Received<M>) {
     let stamp_ns = message.item().stamp_ns;
     topic.publish(channel, stamp_ns, || {
         let header = bytes_of(message.header());
@@ -171,28 +171,28 @@ fn image<M: Message>(topic: &Topic<M>, channel: &str, message: &Received<M>) {
     });
 }
 
-fn pose(topic: &mut Topic<Pose>, message: &Received<Pose>) {
+fn pose(topic: &mut FollowedTopic<Pose>, message: &Received<Pose>) {
     let item = message.item();
     let stamp_ns = item.stamp_ns;
     if topic.hub.is_wanted(LATENCY) {
         topic.hub.publish(LATENCY, stamp_ns, latency(item));
     }
     if topic.hub.is_wanted(TRAJECTORY) && topic.is_due(TRAJECTORY_INTERVAL) {
-        let places = topic.followed.board.places();
-        let view = View::trajectory(places.into_iter(), stamp_ns);
+        let poses = topic.followed.view.trajectory();
+        let view = View::trajectory(poses.into_iter(), stamp_ns);
         topic.hub.publish(TRAJECTORY, stamp_ns, view.data);
     }
 }
 
-/// Publishes what is no topic of the run: its log, and the report of each second. Says which channels a run has.
+/// Publishes the log of the run and the report of each second, and announces the channels of a run.
 fn report(followed: &Followed, hub: &Hub) {
-    let board = &followed.board;
-    let mut health = board.news.health.subscribe();
+    let view = &followed.view;
+    let mut health = view.updates.health.subscribe();
     let mut run = String::new();
     let (mut path, mut log) = (None, None);
-    while !board.is_stopping() {
-        thread::sleep(LOOK);
-        let current = board.run().id;
+    while !view.is_stopping() {
+        thread::sleep(POLL_INTERVAL);
+        let current = view.run().id;
         if current != run {
             (run, log) = (current, None);
             path = announce(followed, hub);
@@ -200,15 +200,15 @@ fn report(followed: &Followed, hub: &Hub) {
         if !hub.is_wanted(LOG) {
             log = None;
         }
-        // Before the first pose there is no time of the sensor to place them at.
-        let Some(stamp_ns) = board.newest_stamp_ns() else {
+        // Before the first pose there is no time of the sensor for the messages.
+        let Some(stamp_ns) = view.newest_stamp_ns() else {
             continue;
         };
         if hub.is_wanted(LOG)
             && let Some(path) = &path
         {
             let log = log.get_or_insert_with(|| LogTail::new(path));
-            for line in log.lines(gyre_recorder::now_ns()) {
+            for line in log.lines(clock::since_1970_ns()) {
                 hub.publish(LOG, stamp_ns, View::log(&line).data);
             }
         }
@@ -219,7 +219,7 @@ fn report(followed: &Followed, hub: &Hub) {
     }
 }
 
-/// Says which channels the run has, and returns the path of its log.
+/// Announces the channels of the run, and returns the path of its log.
 fn announce(followed: &Followed, hub: &Hub) -> Option<PathBuf> {
     let run = ObservedRun::writing_to(&followed.out).ok()?;
     let channels = hub.channels.iter().enumerate();

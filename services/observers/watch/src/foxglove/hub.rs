@@ -9,7 +9,7 @@ use tokio::sync::watch;
 
 use super::{
     channels::{self, Channel},
-    outbox::{Encoded, Outbox},
+    viewer_queue::{EncodedMessage, ViewerQueue},
 };
 
 /// The channels, and the viewers that have subscribed to them.
@@ -18,18 +18,18 @@ pub struct Hub {
     pub channels: Vec<Channel>,
     /// The numbers of those that this run has.
     pub of_run: watch::Sender<Vec<usize>>,
-    /// The newest sentence about what is not shown.
+    /// The newest sentence about a topic that is not shown.
     pub notice: watch::Sender<String>,
     /// The number of subscriptions to each channel.
     wanted: Vec<AtomicUsize>,
-    viewers: Mutex<Vec<Arc<Outbox>>>,
+    viewers: Mutex<Vec<Arc<ViewerQueue>>>,
 }
 
-/// The place of a viewer in the hub. Dropped, it is gone, and its subscriptions with it.
-pub struct Seat {
+/// A viewer in the hub. Dropped, it is removed with its subscriptions.
+pub struct HubMember {
     hub: Arc<Hub>,
-    /// What waits for it.
-    pub outbox: Arc<Outbox>,
+    /// The messages that wait for it.
+    pub queue: Arc<ViewerQueue>,
 }
 
 impl Default for Hub {
@@ -46,7 +46,7 @@ impl Default for Hub {
 }
 
 impl Hub {
-    fn viewers(&self) -> MutexGuard<'_, Vec<Arc<Outbox>>> {
+    fn viewers(&self) -> MutexGuard<'_, Vec<Arc<ViewerQueue>>> {
         self.viewers.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -66,12 +66,12 @@ impl Hub {
         of_topic.any(|channel| self.is_wanted(channel.name))
     }
 
-    /// Gives a message to the viewers that have subscribed to its channel.
+    /// Queues a message for the viewers that have subscribed to the channel.
     pub fn publish(&self, name: &str, stamp_ns: i64, data: Vec<u8>) {
         let Some(channel) = self.position(name) else {
             return;
         };
-        let message = Encoded {
+        let message = EncodedMessage {
             channel,
             is_bulky: self.channels[channel].is_bulky,
             stamp_ns,
@@ -80,24 +80,24 @@ impl Hub {
         self.viewers().iter().for_each(|it| it.put(&message));
     }
 
-    /// Admits a viewer.
-    pub fn join(self: &Arc<Self>) -> Seat {
-        let outbox = Arc::new(Outbox::default());
-        self.viewers().push(Arc::clone(&outbox));
-        Seat {
+    /// Adds a viewer.
+    pub fn join(self: &Arc<Self>) -> HubMember {
+        let queue = Arc::new(ViewerQueue::default());
+        self.viewers().push(Arc::clone(&queue));
+        HubMember {
             hub: Arc::clone(self),
-            outbox,
+            queue,
         }
     }
 }
 
-impl Seat {
+impl HubMember {
     /// Subscribes to a channel; false if there is none with this number.
     pub fn subscribe(&self, channel: usize, subscription: u32) -> bool {
         let Some(wanted) = self.hub.wanted.get(channel) else {
             return false;
         };
-        if self.outbox.subscribe(channel, subscription) {
+        if self.queue.subscribe(channel, subscription) {
             wanted.fetch_add(1, Ordering::Relaxed);
         }
         true
@@ -105,18 +105,18 @@ impl Seat {
 
     /// Ends a subscription; one that there is not has ended already.
     pub fn unsubscribe(&self, subscription: u32) {
-        if let Some(channel) = self.outbox.unsubscribe(subscription) {
+        if let Some(channel) = self.queue.unsubscribe(subscription) {
             self.hub.wanted[channel].fetch_sub(1, Ordering::Relaxed);
         }
     }
 }
 
-impl Drop for Seat {
+impl Drop for HubMember {
     fn drop(&mut self) {
-        for channel in self.outbox.subscribed() {
+        for channel in self.queue.subscribed() {
             self.hub.wanted[channel].fetch_sub(1, Ordering::Relaxed);
         }
-        let is_other = |other: &Arc<Outbox>| !Arc::ptr_eq(other, &self.outbox);
+        let is_other = |other: &Arc<ViewerQueue>| !Arc::ptr_eq(other, &self.queue);
         self.hub.viewers().retain(is_other);
     }
 }

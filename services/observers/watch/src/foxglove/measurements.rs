@@ -1,4 +1,5 @@
-//! What Foxglove has no schema for, as JSON with a schema of its own: numbers to plot.
+//! Measurements for which Foxglove has no schema, as JSON with a schema of its own: numbers to
+//! plot.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +9,7 @@ use serde_json::{Value, json};
 
 /// The channel of the delays of each pose.
 pub const LATENCY: &str = "/latency";
-/// The channel of what the page shows once a second.
+/// The channel of the report that the page shows once a second.
 pub const HEALTH: &str = "/health";
 
 /// The delays of a pose, ms.
@@ -56,7 +57,7 @@ fn key(stage: StageId) -> String {
     stage.name().replace('-', "_")
 }
 
-/// The schema of [`latency`].
+/// Returns the schema of [`latency`].
 pub fn latency_schema() -> Value {
     let hop = object(numbers(["transport_ms", "wait_ms", "work_ms"]));
     let stages = StageId::ALL.map(|stage| (key(stage), hop.clone()));
@@ -64,7 +65,7 @@ pub fn latency_schema() -> Value {
     object(own.chain([("stages".to_owned(), object(stages))]))
 }
 
-/// The schema of the report that the page shows.
+/// Returns the schema of the report that the page shows.
 pub fn health_schema() -> Value {
     let counts = ["published", "poses", "dropped", "in_flight"];
     let missed = object(numbers(["pose", "scan", "masked"]));

@@ -1,4 +1,4 @@
-//! One viewer: what it asks for, and what it is sent.
+//! One viewer: its requests, and the messages to it.
 
 use std::{sync::Arc, time::Duration};
 
@@ -8,8 +8,8 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 use tokio::time::{self, Instant};
 
-use super::{Hub, hub::Seat, outbox::Encoded};
-use crate::board::Board;
+use super::{Hub, hub::HubMember, viewer_queue::EncodedMessage};
+use crate::run_view::RunView;
 
 /// The names of the protocol, the present one first.
 pub const PROTOCOLS: [&str; 2] = ["foxglove.sdk.v1", "foxglove.websocket.v1"];
@@ -24,7 +24,7 @@ const TIME: u8 = 2;
 const WARNING: u8 = 1;
 const ERROR: u8 = 2;
 
-/// What a viewer asks for. All else that the protocol knows is not offered, and ignored.
+/// A request of a viewer. All others of the protocol are not offered, and ignored.
 #[derive(Deserialize)]
 #[serde(tag = "op", rename_all = "camelCase")]
 enum Request {
@@ -50,49 +50,49 @@ struct Subscription {
 struct Viewer {
     socket: WebSocket,
     hub: Arc<Hub>,
-    seat: Seat,
-    /// The channels that it has been told of.
+    member: HubMember,
+    /// The advertised channels.
     advertised: Vec<usize>,
-    /// Its clock: the newest time of the sensor that it has been sent, ns.
+    /// The viewer's clock: the newest time of the sensor that it was sent, ns.
     time_ns: i64,
     skipped: u64,
-    said: Option<Instant>,
+    last_warning: Option<Instant>,
 }
 
-/// The viewer has left, or takes too long.
-struct Gone;
+/// The viewer has disconnected, or takes too long.
+struct Disconnected;
 
-/// Serves a viewer until it leaves, is too slow, or the program ends.
-pub async fn serve(socket: WebSocket, hub: Arc<Hub>, board: Arc<Board>) {
-    let seat = hub.join();
+/// Serves a viewer until it disconnects, is too slow, or the program ends.
+pub async fn serve(socket: WebSocket, hub: Arc<Hub>, view: Arc<RunView>) {
+    let member = hub.join();
     let mut viewer = Viewer {
         socket,
         hub,
-        seat,
+        member,
         advertised: Vec::new(),
         time_ns: 0,
         skipped: 0,
-        said: None,
+        last_warning: None,
     };
-    // Nothing more is sent: it is gone.
-    let _ = viewer.serve(&board).await;
+    // Nothing more can be sent.
+    let _ = viewer.serve(&view).await;
 }
 
 impl Viewer {
-    async fn serve(&mut self, board: &Board) -> Result<(), Gone> {
-        let mut stop = board.news.stop.subscribe();
+    async fn serve(&mut self, view: &RunView) -> Result<(), Disconnected> {
+        let mut stop = view.updates.stop.subscribe();
         let (mut of_run, mut notice) = (self.hub.of_run.subscribe(), self.hub.notice.subscribe());
         of_run.mark_changed();
-        let mut run = board.run().id;
-        self.send_json(&introduction()).await?;
-        let outbox = Arc::clone(&self.seat.outbox);
+        let mut run = view.run().id;
+        self.send_json(&server_info()).await?;
+        let queue = Arc::clone(&self.member.queue);
         loop {
             tokio::select! {
                 biased;
                 Ok(()) = stop.changed() => return self.send(Message::Close(None)).await,
                 received = self.socket.recv() => match received {
                     Some(Ok(Message::Text(text))) => self.answer(&text).await?,
-                    Some(Ok(Message::Close(_)) | Err(_)) | None => return Err(Gone),
+                    Some(Ok(Message::Close(_)) | Err(_)) | None => return Err(Disconnected),
                     Some(Ok(_)) => {}
                 },
                 Ok(()) = of_run.changed() => {
@@ -101,46 +101,46 @@ impl Viewer {
                 }
                 Ok(()) = notice.changed() => {
                     let sentence = notice.borrow_and_update().clone();
-                    self.say(WARNING, "run", &sentence).await?;
+                    self.send_status(WARNING, "run", &sentence).await?;
                 }
-                (subscription, message) = outbox.next() => {
-                    let current = board.run().id;
+                (subscription, message) = queue.next() => {
+                    let current = view.run().id;
                     if current != run {
                         // Another run: its sensor's time may be earlier.
                         (run, self.time_ns) = (current, 0);
                     }
-                    self.show(subscription, &message).await?;
+                    self.send_data(subscription, &message).await?;
                 }
             }
         }
     }
 
-    async fn answer(&mut self, text: &str) -> Result<(), Gone> {
+    async fn answer(&mut self, text: &str) -> Result<(), Disconnected> {
         match serde_json::from_str(text) {
             Ok(Request::Subscribe { subscriptions }) => {
                 for Subscription { id, channel_id } in subscriptions {
-                    if !self.seat.subscribe(channel_id, id) {
+                    if !self.member.subscribe(channel_id, id) {
                         let sentence = format!("There is no channel {channel_id}.");
-                        self.say(ERROR, "request", &sentence).await?;
+                        self.send_status(ERROR, "request", &sentence).await?;
                     }
                 }
                 Ok(())
             }
             Ok(Request::Unsubscribe { subscription_ids }) => {
                 let ids = subscription_ids.into_iter();
-                ids.for_each(|id| self.seat.unsubscribe(id));
+                ids.for_each(|id| self.member.unsubscribe(id));
                 Ok(())
             }
             Ok(Request::Other) => Ok(()),
             Err(error) => {
                 let sentence = format!("This is no request of the protocol: {error}.");
-                self.say(ERROR, "request", &sentence).await
+                self.send_status(ERROR, "request", &sentence).await
             }
         }
     }
 
-    /// Tells of channels that the run has and the one before had not, and takes back those that it has not.
-    async fn advertise(&mut self, of_run: Vec<usize>) -> Result<(), Gone> {
+    /// Advertises the new channels of a run, and unadvertises those that it does not have.
+    async fn advertise(&mut self, of_run: Vec<usize>) -> Result<(), Disconnected> {
         let is_in = |channels: &[usize], channel: &usize| channels.contains(channel);
         let gone = self.advertised.iter().filter(|it| !is_in(&of_run, it));
         let gone: Vec<usize> = gone.copied().collect();
@@ -163,7 +163,11 @@ impl Viewer {
     }
 
     /// Sends a message of a channel, and before it the time.
-    async fn show(&mut self, subscription: u32, message: &Encoded) -> Result<(), Gone> {
+    async fn send_data(
+        &mut self,
+        subscription: u32,
+        message: &EncodedMessage,
+    ) -> Result<(), Disconnected> {
         let log_ns = message.stamp_ns.max(0) as u64;
         if message.stamp_ns > self.time_ns {
             self.time_ns = message.stamp_ns;
@@ -177,56 +181,62 @@ impl Viewer {
         data.extend(log_ns.to_le_bytes());
         data.extend(&message.data);
         self.send(Message::Binary(data.into())).await?;
-        self.say_what_is_skipped().await
+        self.warn_of_skipped().await
     }
 
-    async fn say_what_is_skipped(&mut self) -> Result<(), Gone> {
+    async fn warn_of_skipped(&mut self) -> Result<(), Disconnected> {
         if self
-            .said
-            .is_some_and(|said| said.elapsed() < SENTENCE_PERIOD)
+            .last_warning
+            .is_some_and(|at| at.elapsed() < SENTENCE_PERIOD)
         {
             return Ok(());
         }
-        let skipped = self.seat.outbox.skipped();
+        let skipped = self.member.queue.skipped();
         if skipped == 0 {
             return Ok(());
         }
         self.skipped += skipped;
-        self.said = Some(Instant::now());
+        self.last_warning = Some(Instant::now());
         let sentence = format!(
             "{} messages were skipped so far: this connection is slower than the run.",
             self.skipped
         );
-        self.say(WARNING, "skipped", &sentence).await
+        self.send_status(WARNING, "skipped", &sentence).await
     }
 
-    /// Says a sentence, which replaces the one before with the same name.
-    async fn say(&mut self, level: u8, name: &str, sentence: &str) -> Result<(), Gone> {
+    /// Sends a status sentence, which replaces the one before with the same name.
+    async fn send_status(
+        &mut self,
+        level: u8,
+        name: &str,
+        sentence: &str,
+    ) -> Result<(), Disconnected> {
         let status = json!({"op": "status", "level": level, "id": name, "message": sentence});
         self.send_json(&status).await
     }
 
-    async fn send_json(&mut self, message: &Value) -> Result<(), Gone> {
+    async fn send_json(&mut self, message: &Value) -> Result<(), Disconnected> {
         self.send(Message::Text(message.to_string().into())).await
     }
 
-    async fn send(&mut self, message: Message) -> Result<(), Gone> {
+    async fn send(&mut self, message: Message) -> Result<(), Disconnected> {
         let sent = time::timeout(MAX_SEND, self.socket.send(message)).await;
         match sent {
             Ok(Ok(())) => Ok(()),
-            _ => Err(Gone),
+            _ => Err(Disconnected),
         }
     }
 }
 
-fn introduction() -> Value {
+fn server_info() -> Value {
     json!({
         "op": "serverInfo",
         "name": concat!("gyre ", env!("CARGO_PKG_VERSION")),
         // The viewer's clock is the sensor's.
         "capabilities": ["time"],
         "metadata": {},
-        // Another one after a restart of this program: the viewer forgets the subscriptions of the last one.
+        // New after a restart of this program: the viewer drops the subscriptions of the last
+        // session.
         "sessionId": format!("{}-{}", std::process::id(), clock::now_ns()),
     })
 }

@@ -13,7 +13,7 @@ use serde_json::Value;
 use ureq::Agent;
 
 use super::{
-    Counts,
+    TraceCounts,
     spans::{Request, Trace},
 };
 
@@ -30,14 +30,14 @@ const SENTENCE_PERIOD: Duration = Duration::from_secs(60);
 pub(super) struct Sending {
     agent: Agent,
     endpoint: String,
-    counts: Arc<Counts>,
+    counts: Arc<TraceCounts>,
     say: fn(&str),
-    /// When it last said that it fails; `None` while it does not.
-    said: Option<Instant>,
+    /// The time of the last sentence about a failure; `None` while there is none.
+    last_complaint: Option<Instant>,
 }
 
 impl Sending {
-    pub fn new(endpoint: String, counts: Arc<Counts>, say: fn(&str)) -> Self {
+    pub fn new(endpoint: String, counts: Arc<TraceCounts>, say: fn(&str)) -> Self {
         let configuration = Agent::config_builder()
             .timeout_global(Some(TIMEOUT))
             .proxy(None)
@@ -47,7 +47,7 @@ impl Sending {
             endpoint,
             counts,
             say,
-            said: None,
+            last_complaint: None,
         }
     }
 
@@ -81,7 +81,7 @@ impl Sending {
         if let Some(reason) = rejected(answer) {
             (self.say)(&format!("{} takes not all spans: {reason}", self.endpoint));
         }
-        if self.said.take().is_some() {
+        if self.last_complaint.take().is_some() {
             let [_, dropped] = self.counts.both();
             (self.say)(&format!(
                 "traces reach {} again; {dropped} were dropped",
@@ -94,10 +94,10 @@ impl Sending {
         let dropped = &self.counts.dropped;
         let before = dropped.fetch_add(traces as u64, Ordering::Relaxed);
         if self
-            .said
-            .is_none_or(|said| said.elapsed() > SENTENCE_PERIOD)
+            .last_complaint
+            .is_none_or(|at| at.elapsed() > SENTENCE_PERIOD)
         {
-            self.said = Some(Instant::now());
+            self.last_complaint = Some(Instant::now());
             (self.say)(&format!(
                 "traces do not reach {}: {error}; {} dropped so far, the rest goes on",
                 self.endpoint,

@@ -18,13 +18,13 @@ pub struct Trace {
     id: u128,
     /// The number of the first span; those of the others follow.
     first_span: u64,
-    /// What is to be added to `CLOCK_MONOTONIC` for the time since 1970, ns.
+    /// The offset from `CLOCK_MONOTONIC` to the time since 1970, ns.
     since_1970_ns: i64,
     item: Item,
     stationary: bool,
 }
 
-/// What a request holds.
+/// The body of a request.
 #[derive(Serialize)]
 #[serde(rename_all = "camelCase")]
 pub struct Request {
@@ -100,7 +100,7 @@ impl Attribute {
 }
 
 impl Request {
-    /// The request that sends these traces.
+    /// Returns the request that sends these traces.
     pub fn of(traces: &[Trace]) -> Self {
         let service = Attribute::text("service.name", "gyre");
         let version = Attribute::text("service.version", env!("CARGO_PKG_VERSION"));
@@ -121,7 +121,7 @@ impl Request {
 }
 
 impl Trace {
-    /// The trace of a pose of a run. Its number is the same whoever makes it.
+    /// Returns the trace of a pose of a run. The number depends on the run and the pose alone.
     pub fn of(run: &str, pose: &PoseHeader) -> Self {
         let seq = pose.item.seq.to_le_bytes();
         let digest: [u8; 32] = Sha256::digest([run.as_bytes(), &seq].concat()).into();
@@ -132,7 +132,7 @@ impl Trace {
         Self {
             id,
             first_span: first_span as u64,
-            since_1970_ns: gyre_recorder::now_ns() - clock::now_ns(),
+            since_1970_ns: clock::since_1970_ns() - clock::now_ns(),
             item: pose.item,
             stationary: pose.motion.refinement.is_stationary(),
         }

@@ -1,4 +1,4 @@
-//! What is known of the run: the threads that observe it write here, and browsers and Prometheus read.
+//! The view of the run: written by the threads that observe it, read by browsers and Prometheus.
 
 use std::{
     collections::VecDeque,
@@ -17,31 +17,31 @@ use tokio::sync::watch;
 use crate::{
     delays::Delays,
     histograms::Histograms,
-    messages::{Counts, Current, Health, Layer, Missed, Poses, Run, RunState},
-    pictures::Points,
+    messages::{CurrentPose, HealthReport, Layer, Missed, NewPoses, RunCounts, RunInfo, RunState},
+    pictures::PackedPoints,
     processes::Process,
-    traces,
+    traces::TraceCounts,
     track::{Cursor, Track, Vertex},
 };
 
 /// Poses that are kept to find that of a scan whose points come later.
 const RECENT: usize = 256;
 
-/// What is known of the run.
-pub struct Board {
-    known: Mutex<Known>,
-    /// The newest pictures and reports. One who is slow receives the newest, and not those between.
-    pub news: News,
+/// The view of the run.
+pub struct RunView {
+    state: Mutex<ViewState>,
+    /// The newest pictures and reports. A slow browser receives the newest, and not those between.
+    pub updates: Updates,
     /// Browsers that want each layer.
     wanted: [AtomicUsize; 3],
     /// Delays of all poses.
     pub histograms: Histograms,
     /// The traces, where they are sent.
-    pub traces: OnceLock<Arc<traces::Counts>>,
+    pub traces: OnceLock<Arc<TraceCounts>>,
 }
 
 /// The newest of each kind of message to a browser.
-pub struct News {
+pub struct Updates {
     /// The run.
     pub run: watch::Sender<Utf8Bytes>,
     /// Counts and delays.
@@ -57,28 +57,28 @@ pub struct News {
 }
 
 #[derive(Default)]
-struct Known {
-    run: Run,
+struct ViewState {
+    run: RunInfo,
     track: Track,
     delays: Delays,
-    latest: Option<Current>,
-    counts: Counts,
+    latest: Option<CurrentPose>,
+    counts: RunCounts,
     /// The numbers and poses of the last scans.
     recent: VecDeque<(u64, [f64; 3])>,
     /// Points that wait for the pose of their scan.
-    pending: Option<(u64, Points)>,
+    pending: Option<(u64, PackedPoints)>,
     /// Time and number of poses at the last report.
     reported: Option<(i64, u64)>,
     notice: Option<String>,
     processes: Vec<Process>,
 }
 
-impl Board {
-    /// An empty one, for the run that writes to `out`.
+impl RunView {
+    /// Creates an empty view of the run that writes to `out`.
     pub fn new(out: &str) -> Self {
-        let board = Self {
-            known: Mutex::default(),
-            news: News {
+        let view = Self {
+            state: Mutex::default(),
+            updates: Updates {
                 run: watch::Sender::default(),
                 health: watch::Sender::default(),
                 scan: watch::Sender::default(),
@@ -90,34 +90,34 @@ impl Board {
             histograms: Histograms::default(),
             traces: OnceLock::new(),
         };
-        board.introduce(|run| out.clone_into(&mut run.out));
-        board
+        view.update_run(|run| out.clone_into(&mut run.out));
+        view
     }
 
-    fn known(&self) -> MutexGuard<'_, Known> {
-        self.known.lock().unwrap_or_else(PoisonError::into_inner)
+    fn state(&self) -> MutexGuard<'_, ViewState> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Returns the run.
-    pub fn run(&self) -> Run {
-        self.known().run.clone()
+    pub fn run(&self) -> RunInfo {
+        self.state().run.clone()
     }
 
-    /// Begins with a run: all that was known is of an earlier one.
+    /// Begins with a run, and removes all of an earlier one.
     pub fn begin(&self, manifest: &Manifest) {
         {
-            let mut known = self.known();
-            let mut track = std::mem::take(&mut known.track);
+            let mut state = self.state();
+            let mut track = std::mem::take(&mut state.track);
             track.clear();
-            *known = Known {
+            *state = ViewState {
                 track,
-                ..Known::default()
+                ..ViewState::default()
             };
         }
         for layer in [Layer::Scan, Layer::Raster, Layer::Points] {
             self.clear_pictures(layer);
         }
-        self.introduce(|run| {
+        self.update_run(|run| {
             run.id.clone_from(&manifest.prefix);
             run.out = manifest.out.display().to_string();
             run.state = RunState::Working;
@@ -127,170 +127,171 @@ impl Board {
         });
     }
 
-    /// Forgets the newest picture of a layer, so that one who comes later is not shown an old one.
+    /// Removes the newest picture of a layer, so that a later browser is not shown an old one.
     pub fn clear_pictures(&self, layer: Layer) {
         let pictures = match layer {
-            Layer::Scan => &self.news.scan,
-            Layer::Raster => &self.news.raster,
-            Layer::Points => &self.news.points,
+            Layer::Scan => &self.updates.scan,
+            Layer::Raster => &self.updates.raster,
+            Layer::Points => &self.updates.points,
         };
         pictures.send_replace(Bytes::new());
     }
 
-    /// The run has ended, and its processes with it.
+    /// Ends the run, and its processes with it.
     pub fn end(&self, state: RunState) {
         {
-            let mut known = self.known();
-            known.counts.in_flight = 0;
-            known.processes.iter_mut().for_each(Process::end);
+            let mut state = self.state();
+            state.counts.in_flight = 0;
+            state.processes.iter_mut().for_each(Process::end);
         }
         self.set_state(state);
         self.report();
     }
 
-    /// Forgets the trajectory, which is about to be read from the journal.
+    /// Removes the trajectory, which is about to be read from the journal.
     pub fn clear_track(&self) {
-        self.known().track.clear();
+        self.state().track.clear();
     }
 
     /// Changes the state of the run.
     pub fn set_state(&self, state: RunState) {
-        self.introduce(|run| run.state = state);
+        self.update_run(|run| run.state = state);
     }
 
-    fn introduce(&self, change: impl FnOnce(&mut Run)) {
-        let mut known = self.known();
-        change(&mut known.run);
-        known.run.version = env!("CARGO_PKG_VERSION");
-        send_json(&self.news.run, &known.run);
+    fn update_run(&self, change: impl FnOnce(&mut RunInfo)) {
+        let mut state = self.state();
+        change(&mut state.run);
+        state.run.version = env!("CARGO_PKG_VERSION");
+        send_json(&self.updates.run, &state.run);
     }
 
-    /// Adds a pose of the journal: it was before this program looked.
-    pub fn add_earlier(&self, pose: &PoseHeader) {
-        self.known().track.add(pose);
+    /// Adds a pose of the journal.
+    pub fn add_journalled(&self, pose: &PoseHeader) {
+        self.state().track.add(pose);
     }
 
-    /// Adds a pose, if it was not added before: an observer that comes again receives the last ones again. `is_new` is false for one that
-    /// was in the journal.
+    /// Adds a pose, unless it was added before: an observer that attaches again receives the last
+    /// ones again. `is_new` is false for one that was in the journal.
     pub fn add_pose(&self, pose: &PoseHeader, is_new: bool) {
-        let mut known = self.known();
-        let known = &mut *known;
-        let has_had = |latest: Current| latest.seq >= pose.item.seq;
-        if known.latest.is_some_and(has_had) {
+        let mut state = self.state();
+        let state = &mut *state;
+        let has_pose = |latest: CurrentPose| latest.seq >= pose.item.seq;
+        if state.latest.is_some_and(has_pose) {
             return;
         }
         self.histograms.add(&pose.item);
         if is_new {
-            known.track.add(pose);
+            state.track.add(pose);
         }
-        known.delays.add(&pose.item);
-        known.latest = Some(Current::of(pose));
-        known.counts.poses = pose.item.seq + 1;
-        known.counts.dropped = pose.item.dropped();
+        state.delays.add(&pose.item);
+        state.latest = Some(CurrentPose::of(pose));
+        state.counts.poses = pose.item.seq + 1;
+        state.counts.dropped = pose.item.dropped();
         // The supervisor is asked once a second.
-        let with_pose = known.counts.poses + known.counts.dropped;
-        known.counts.published = known.counts.published.max(with_pose);
+        let with_pose = state.counts.poses + state.counts.dropped;
+        state.counts.published = state.counts.published.max(with_pose);
         let (seq, place) = (pose.item.seq, [pose.x_m, pose.y_m, pose.yaw_rad]);
-        known.recent.push_back((seq, place));
-        if known.recent.len() > RECENT {
-            known.recent.pop_front();
+        state.recent.push_back((seq, place));
+        if state.recent.len() > RECENT {
+            state.recent.pop_front();
         }
-        let waits_for_this = |pending: &mut (u64, Points)| pending.0 == seq;
-        if let Some((_, points)) = known.pending.take_if(waits_for_this) {
+        let waits_for_this = |pending: &mut (u64, PackedPoints)| pending.0 == seq;
+        if let Some((_, points)) = state.pending.take_if(waits_for_this) {
             self.send_points(&points, place, seq);
         }
     }
 
     /// Adds the points of a scan. They are sent with its pose, now or when it comes.
-    pub fn add_points(&self, points: Points, seq: u64) {
-        let mut known = self.known();
-        match known.recent.iter().rev().find(|(of, _)| *of == seq) {
+    pub fn add_points(&self, points: PackedPoints, seq: u64) {
+        let mut state = self.state();
+        match state.recent.iter().rev().find(|(of, _)| *of == seq) {
             Some((_, place)) => self.send_points(&points, *place, seq),
-            None => known.pending = Some((seq, points)),
+            None => state.pending = Some((seq, points)),
         }
     }
 
-    fn send_points(&self, points: &Points, place: [f64; 3], seq: u64) {
+    fn send_points(&self, points: &PackedPoints, place: [f64; 3], seq: u64) {
         if let Ok(message) = points.at(place, seq) {
-            self.news.points.send_replace(message);
+            self.updates.points.send_replace(message);
         }
     }
 
-    /// Sets what the supervisor says of the run, and its processes.
+    /// Sets the supervisor's status of the run, and the processes.
     pub fn set_processes(&self, status: &Status, processes: Vec<Process>) {
-        let mut known = self.known();
+        let mut state = self.state();
         let with_pose = status.poses + status.dropped;
         // A replaced source need not say what it has published.
         let published = status.published.unwrap_or_default().max(with_pose);
         // Poses that came since are counted already: a counter never decreases.
-        known.counts.published = known.counts.published.max(published);
-        known.counts.in_flight = published - with_pose;
-        known.processes = processes;
+        state.counts.published = state.counts.published.max(published);
+        state.counts.in_flight = published - with_pose;
+        state.processes = processes;
     }
 
     /// Returns the processes.
     pub fn processes(&self) -> Vec<Process> {
-        self.known().processes.clone()
+        self.state().processes.clone()
     }
 
-    /// Changes what was missed.
+    /// Changes the counts of missed messages.
     pub fn set_missed(&self, change: impl FnOnce(&mut Missed)) {
-        change(&mut self.known().counts.missed);
+        change(&mut self.state().counts.missed);
     }
 
-    /// Says why something is not shown; `None`: all is.
+    /// Sets the reason why something is not shown; `None`: all is.
     pub fn set_notice(&self, notice: Option<String>) {
-        self.known().notice = notice;
+        self.state().notice = notice;
     }
 
     /// Returns the counts.
-    pub fn counts(&self) -> Counts {
-        self.known().counts
+    pub fn counts(&self) -> RunCounts {
+        self.state().counts
     }
 
     /// Sends the report of this second.
     pub fn report(&self) {
         let now_ns = clock::now_ns();
-        let mut known = self.known();
-        let counts = known.counts;
-        let reported = known.reported.replace((now_ns, counts.poses));
+        let mut state = self.state();
+        let counts = state.counts;
+        let reported = state.reported.replace((now_ns, counts.poses));
         let scans_per_s = reported.map_or(0.0, |(at_ns, poses)| {
             let elapsed_s = (now_ns - at_ns).max(1) as f64 * 1e-9;
             counts.poses.saturating_sub(poses) as f64 / elapsed_s
         });
-        let health = Health {
+        let health = HealthReport {
             counts,
             scans_per_s,
-            distance_m: known.track.length_m(),
-            delays: known.delays.report(now_ns),
-            notice: known.notice.clone(),
-            processes: known.processes.clone(),
+            distance_m: state.track.length_m(),
+            delays: state.delays.report(now_ns),
+            notice: state.notice.clone(),
+            processes: state.processes.clone(),
         };
-        send_json(&self.news.health, &health);
+        send_json(&self.updates.health, &health);
     }
 
-    /// Returns the message of poses for a browser; `None` if it has had all of them.
-    pub fn poses(&self, cursor: &mut Cursor, had: &mut Option<u64>) -> Option<Utf8Bytes> {
-        let known = self.known();
-        let seq = known.latest.map(|latest| latest.seq);
-        let (vertices, replace) = known.track.since(cursor);
-        if vertices.is_empty() && !replace && seq == *had {
+    /// Returns the message of new poses for a browser that has received those up to `last`; `None`
+    /// if there is none.
+    pub fn poses(&self, cursor: &mut Cursor, last: &mut Option<u64>) -> Option<Utf8Bytes> {
+        let state = self.state();
+        let seq = state.latest.map(|latest| latest.seq);
+        let (vertices, replace) = state.track.since(cursor);
+        if vertices.is_empty() && !replace && seq == *last {
             return None;
         }
-        *had = seq;
-        let poses = Poses {
+        *last = seq;
+        let poses = NewPoses {
             replace,
             vertices,
-            pose: known.latest,
+            pose: state.latest,
         };
         serde_json::to_string(&poses).ok().map(Utf8Bytes::from)
     }
 
-    /// Returns the places of the trajectory: x, y (m), yaw (rad).
-    pub fn places(&self) -> Vec<[f64; 3]> {
-        let known = self.known();
-        let latest = known.latest.map(|latest| latest.vertex);
-        let (vertices, _) = known.track.since(&mut Cursor::default());
+    /// Returns the trajectory: x, y (m), yaw (rad).
+    pub fn trajectory(&self) -> Vec<[f64; 3]> {
+        let state = self.state();
+        let latest = state.latest.map(|latest| latest.vertex);
+        let (vertices, _) = state.track.since(&mut Cursor::default());
         let vertices = vertices.iter().chain(&latest);
         vertices
             .map(|Vertex([x, y, yaw, ..])| [*x, *y, *yaw])
@@ -299,7 +300,7 @@ impl Board {
 
     /// Returns the time of the newest pose on the sensor's clock, ns.
     pub fn newest_stamp_ns(&self) -> Option<i64> {
-        self.known().latest.map(|latest| latest.stamp_ns)
+        self.state().latest.map(|latest| latest.stamp_ns)
     }
 
     /// Counts one more or one less browser that wants a layer.
@@ -318,12 +319,12 @@ impl Board {
 
     /// Ends all threads and connections.
     pub fn stop(&self) {
-        self.news.stop.send_replace(true);
+        self.updates.stop.send_replace(true);
     }
 
     /// Returns whether the program ends.
     pub fn is_stopping(&self) -> bool {
-        *self.news.stop.borrow()
+        *self.updates.stop.borrow()
     }
 }
 
@@ -356,7 +357,7 @@ mod tests {
         }
     }
 
-    fn points() -> Points {
+    fn points() -> PackedPoints {
         let point = SparsePoint {
             weight: 1.0,
             ..SparsePoint::default()
@@ -366,26 +367,26 @@ mod tests {
 
     #[test]
     fn points_are_sent_with_the_pose_of_their_scan_whichever_comes_first() {
-        let board = Board::new("out");
+        let view = RunView::new("out");
         let sent = || {
-            let message = board.news.points.borrow().clone();
+            let message = view.updates.points.borrow().clone();
             frame::decode(&message).map(|(header, _)| header["pose"][0].as_f64())
         };
-        board.add_pose(&pose(3), true);
-        board.add_points(points(), 4);
+        view.add_pose(&pose(3), true);
+        view.add_points(points(), 4);
         assert_eq!(sent(), None);
-        board.add_pose(&pose(4), true);
+        view.add_pose(&pose(4), true);
         assert_eq!(sent(), Some(Some(4.0)));
-        board.add_points(points(), 3);
+        view.add_points(points(), 3);
         assert_eq!(sent(), Some(Some(3.0)));
     }
 
     #[test]
     fn a_browser_receives_what_is_new_and_nothing_twice() {
-        let board = Board::new("out");
-        let (mut cursor, mut had) = (Cursor::default(), None);
+        let view = RunView::new("out");
+        let (mut cursor, mut last) = (Cursor::default(), None);
         let mut next = || -> Option<Value> {
-            let message = board.poses(&mut cursor, &mut had)?;
+            let message = view.poses(&mut cursor, &mut last)?;
             Some(serde_json::from_str(&message).unwrap())
         };
         let first = next().unwrap();
@@ -394,8 +395,8 @@ mod tests {
             (&"poses".into(), &Value::Null)
         );
         assert_eq!(next(), None);
-        board.add_earlier(&pose(0));
-        board.add_pose(&pose(1), true);
+        view.add_journalled(&pose(0));
+        view.add_pose(&pose(1), true);
         let second = next().unwrap();
         assert_eq!(second["vertices"].as_array().unwrap().len(), 2);
         assert_eq!(
@@ -407,10 +408,10 @@ mod tests {
 
     #[test]
     fn reports_have_counts_delays_and_processes_at_one_level() {
-        let board = Board::new("out");
-        board.add_pose(&pose(6), true);
-        board.report();
-        let health: Value = serde_json::from_str(&board.news.health.borrow()).unwrap();
+        let view = RunView::new("out");
+        view.add_pose(&pose(6), true);
+        view.report();
+        let health: Value = serde_json::from_str(&view.updates.health.borrow()).unwrap();
         assert_eq!(
             (&health["kind"], &health["poses"]),
             (&"health".into(), &7.into())
