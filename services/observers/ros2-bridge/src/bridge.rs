@@ -13,29 +13,30 @@ use gyre_ros2_messages::{
     tf2_msgs::TFMessage,
 };
 use gyre_slam::EstimatorKind;
-use gyre_stage::{StageError, wake::Signals};
+use gyre_stage::{StageError, clock, wake::Signals};
 
 use crate::{
-    Domain, Mounting, NodeError, clock,
-    following::{LOOK, PoseTopics, follow_corrections, follow_poses},
+    Domain, Mounting, NodeError,
+    following::{POLL_INTERVAL, PoseTopics, follow_corrections, follow_poses},
     health::report,
     live_map::follow_maps,
     node::{Keep, Node},
     outlet::Outlet,
-    shared::Shared,
+    run_state::Shared,
 };
 
 /// The name of the node.
 const NODE: &str = "gyre";
-/// Messages that are kept for readers that are behind: 25 s of a radar that turns four times a second.
+/// Messages that are kept for readers that are behind: 25 s of a radar that turns four times a
+/// second.
 const DEPTH: usize = 100;
 
-/// What is published, and where.
+/// The options of the bridge.
 #[derive(Clone, Debug)]
 pub struct Settings {
     /// The folder of the results of the run, and of the next one.
     pub out: PathBuf,
-    /// Where on the network.
+    /// The domain and the network.
     pub domain: Domain,
     /// The namespace of `odom` and `map`, such as `/` or `/robot`.
     pub namespace: String,
@@ -43,34 +44,36 @@ pub struct Settings {
     pub frames: Frames,
     /// The radar on the vehicle.
     pub mounting: Mounting,
-    /// Whether `odom` -> `base_link` and `map` -> `odom` are published: two programs that do make the vehicle jump.
+    /// True to publish `odom` -> `base_link` and `map` -> `odom`: if two programs do, the vehicle
+    /// jumps.
     pub transforms: bool,
-    /// How the map of a run with SLAM is drawn; `None`: not at all.
-    pub map: Option<MapOf>,
+    /// The settings of the map of a run with SLAM; `None`: no map.
+    pub map: Option<MapSettingsOf>,
 }
 
-/// Returns how the map of the run that writes to a folder is drawn, or a sentence that says why it is not.
-pub type MapOf = fn(&Path) -> Result<MapSettings, String>;
+/// Returns the settings of the map of the run that writes to a folder, or the reason why it has
+/// none.
+pub type MapSettingsOf = fn(&Path) -> Result<MapSettings, String>;
 
-/// How a map is drawn.
+/// The settings of a map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MapSettings {
     /// Cells and ranges.
     pub options: MapOptions,
-    /// How the poses of keyframes are corrected by loops.
+    /// The estimator that corrects the poses of keyframes by loops.
     pub estimator: EstimatorKind,
 }
 
 /// A node that publishes the runs of a folder, one after the other.
 pub struct Bridge {
     shared: Shared,
-    map_settings: Option<MapOf>,
+    map_settings: Option<MapSettingsOf>,
     poses: PoseTopics,
-    /// Kept open, for those who come later.
+    /// Kept open for later readers.
     mounting: Outlet<TFMessage>,
     diagnostics: Outlet<DiagnosticArray>,
     maps: Outlet<OccupancyGrid>,
-    /// Dropped last: the topics are its own.
+    /// Dropped last: it owns the topics.
     _node: Node,
 }
 
@@ -113,7 +116,7 @@ impl Bridge {
                 threads.spawn(move || follow_maps(shared, settings, self.maps));
             }
             let stopped = loop {
-                match signals.sleep(LOOK) {
+                match signals.sleep(POLL_INTERVAL) {
                     Ok(false) => {}
                     Ok(true) => break Ok(()),
                     Err(error) => break Err(error),
@@ -125,12 +128,12 @@ impl Bridge {
     }
 }
 
-/// The radar on the vehicle.
+/// Returns the transform of the radar on the vehicle.
 fn mounted(shared: &Shared) -> TFMessage {
     let (frames, radar) = (&shared.frames, shared.mounting.radar());
     TFMessage {
         transforms: vec![frames::transform(
-            clock::now_ns(),
+            clock::since_1970_ns(),
             &frames.base,
             &frames.radar,
             radar,

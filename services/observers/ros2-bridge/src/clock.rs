@@ -1,15 +1,15 @@
 //! Stamps on the clock of ROS.
 
-use std::{
-    ops::Range,
-    time::{Duration, SystemTime},
-};
+use std::ops::Range;
+
+use gyre_stage::clock;
 
 /// 2001-01-01, and the last second that ROS 2 can write, ns since 1970.
 const YEARS_NS: Range<i64> = 978_307_200_000_000_000..(i32::MAX as i64) * 1_000_000_000;
 
-/// The clock of a run in that of ROS, whose stamps are times since 1970. The stamps of a radar or a recording that has the time are left as
-/// they are. To all others the same offset is added, so that the first one is now: intervals stay those of the sensor.
+/// Converts the stamps of a run to those of ROS, which are times since 1970. The stamps of a radar
+/// or a recording that has the time are left as they are. To all others the same offset is added,
+/// so that the first one is now: intervals stay those of the sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Clock {
     offset_ns: i64,
@@ -18,7 +18,7 @@ pub struct Clock {
 impl Clock {
     /// Returns the clock of a run whose first stamp, received now, is this one.
     pub fn of(first_ns: i64) -> Self {
-        Self::at(first_ns, now_ns())
+        Self::at(first_ns, clock::since_1970_ns())
     }
 
     fn at(first_ns: i64, now_ns: i64) -> Self {
@@ -39,12 +39,6 @@ impl Clock {
     pub fn stamp_ns(self, time_ns: i64) -> i64 {
         time_ns.saturating_add(self.offset_ns)
     }
-}
-
-/// The host's clock, ns since 1970.
-pub fn now_ns() -> i64 {
-    let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
-    now.unwrap_or(Duration::ZERO).as_nanos() as i64
 }
 
 #[cfg(test)]

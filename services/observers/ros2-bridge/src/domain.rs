@@ -1,4 +1,4 @@
-//! Where on the network: the domain of ROS 2 and the interface.
+//! The domain of ROS 2 and the network interface.
 
 use std::{
     env,
@@ -29,13 +29,13 @@ pub struct Domain {
 /// A domain that cannot be joined.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum DomainError {
-    /// No number of a domain.
+    /// The variable is no number of a domain.
     #[error("ROS_DOMAIN_ID is `{0}`, but must be a number from 0 to {MAX_DOMAIN}")]
     Variable(String),
-    /// A number that is too high.
+    /// The number is too high.
     #[error("domain {0} does not exist: domains of ROS 2 are numbers from 0 to {MAX_DOMAIN}")]
     TooHigh(u16),
-    /// No address of this machine.
+    /// The interface is no address of this machine.
     #[error(
         "interface `{0}` is no IPv4 address: give this machine's, as in `192.168.0.2`, or `127.0.0.1` for this computer alone"
     )]
@@ -43,9 +43,10 @@ pub enum DomainError {
 }
 
 impl Domain {
-    /// Returns the domain of this number, or of the variable `ROS_DOMAIN_ID`, or 0; on the network on which this machine has this address, or
-    /// on all. Where ROS 2 is told to stay on this computer (`ROS_LOCALHOST_ONLY=1`, `ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST`), no address
-    /// means that of the loopback.
+    /// Returns the domain of this number, or of the variable `ROS_DOMAIN_ID`, or 0; on the network
+    /// on which this machine has this address, or on all. Where ROS 2 is restricted to this
+    /// computer (`ROS_LOCALHOST_ONLY=1`, `ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST`), no address
+    /// means the loopback.
     ///
     /// # Errors
     /// No such domain, or no address.
@@ -91,7 +92,7 @@ impl Domain {
         self.interface.is_none_or(|address| !address.is_loopback())
     }
 
-    /// Joins it, or returns why not.
+    /// Joins the domain, or returns the reason why it cannot be joined.
     pub(crate) fn join(&self) -> Result<DomainParticipant, String> {
         let builder = DomainParticipantBuilder::new(self.id);
         let builder = match self.interface {
@@ -112,7 +113,7 @@ mod tests {
         set: &[(&str, &str)],
     ) -> Result<Domain, DomainError> {
         let variable = |name: &str| {
-            let found = set.iter().find(|(known, _)| *known == name);
+            let found = set.iter().find(|(variable, _)| *variable == name);
             found.map(|(_, value)| (*value).to_owned())
         };
         Domain::of(id, interface, &variable)

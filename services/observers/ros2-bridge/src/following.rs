@@ -16,11 +16,11 @@ use gyre_stage::{
 use crate::{
     clock::Clock,
     outlet::Outlet,
-    shared::{Known, KnownRun, Shared, State},
+    run_state::{RunPhase, RunState, Shared, SharedRunState},
 };
 
-/// Time between two looks for a run, and for a request to stop.
-pub const LOOK: Duration = Duration::from_millis(200);
+/// Time between two polls for a run, and for a request to stop.
+pub const POLL_INTERVAL: Duration = Duration::from_millis(200);
 
 /// The topics that each pose is published on.
 pub struct PoseTopics {
@@ -29,25 +29,25 @@ pub struct PoseTopics {
     pub transforms: Option<Outlet<TFMessage>>,
 }
 
-/// Calls `follow` for each run, with what is known of it, until the bridge stops. A run that could not be followed is tried again until it
-/// ends.
+/// Calls `follow` for each run, with its state, until the bridge stops. A run that could not be
+/// followed is tried again until it ends.
 pub fn each_run(
     shared: &Shared,
-    mut follow: impl FnMut(&ObservedRun, &KnownRun) -> Result<(), StageError>,
+    mut follow: impl FnMut(&ObservedRun, &SharedRunState) -> Result<(), StageError>,
 ) {
     while !shared.is_stopping() {
         let Ok(run) = ObservedRun::writing_to(&shared.out) else {
-            // There is none.
-            thread::sleep(LOOK);
+            // There is no run yet.
+            thread::sleep(POLL_INTERVAL);
             continue;
         };
-        let known = shared.begin(run.manifest());
-        match follow(&run, &known) {
+        let state = shared.begin(run.manifest());
+        match follow(&run, &state) {
             Ok(()) => await_end(shared, &run),
             Err(StageError::NotRunning(_)) => {}
             Err(error) => {
-                known.lock().notice = Some(error.to_string());
-                thread::sleep(LOOK);
+                state.lock().notice = Some(error.to_string());
+                thread::sleep(POLL_INTERVAL);
             }
         }
     }
@@ -56,75 +56,75 @@ pub fn each_run(
 /// Waits until the results are written and the run is gone.
 fn await_end(shared: &Shared, run: &ObservedRun) {
     while !shared.is_stopping() && !run.has_ended() {
-        thread::sleep(LOOK);
+        thread::sleep(POLL_INTERVAL);
     }
 }
 
 /// Publishes the poses of each run.
 pub fn follow_poses(shared: &Shared, mut topics: PoseTopics, say: fn(&str)) {
-    each_run(shared, |run, known| {
-        shared.show(known);
-        let followed = follow_run(shared, run, known, &mut topics, say);
+    each_run(shared, |run, state| {
+        shared.show(state);
+        let followed = follow_run(shared, run, state, &mut topics, say);
         if followed.is_ok() {
-            known.lock().state = State::Finishing;
+            state.lock().phase = RunPhase::Finishing;
             await_end(shared, run);
         }
         if run.has_ended() {
-            known.lock().state = State::Ended;
-            let sentence = sentence(&known.lock());
+            state.lock().phase = RunPhase::Ended;
+            let sentence = sentence(&state.lock());
             say(&sentence);
         }
         followed
     });
 }
 
-/// What was published of a run.
-fn sentence(known: &Known) -> String {
-    let first = known.first.unwrap_or_default();
+/// Returns the counts of a run in a sentence.
+fn sentence(state: &RunState) -> String {
+    let first = state.first.unwrap_or_default();
     format!(
         "the run has ended: {} poses from number {first} on and {} maps published, {} poses missed; {} messages not sent because readers were behind",
-        known.poses, known.maps, known.missed, known.unsent
+        state.poses, state.maps, state.missed, state.unsent
     )
 }
 
 fn follow_run(
     shared: &Shared,
     run: &ObservedRun,
-    known: &KnownRun,
+    state: &SharedRunState,
     topics: &mut PoseTopics,
     say: fn(&str),
 ) -> Result<(), StageError> {
     let mut poses = run.observe::<Pose>()?;
-    known.lock().notice = None;
+    state.lock().notice = None;
     let mut unsent = topics.unsent();
     while !shared.is_stopping() {
-        match poses.next(LOOK)? {
-            Next::Message(message, _) => publish(shared, known, message.header(), topics, say),
+        match poses.next(POLL_INTERVAL)? {
+            Next::Message(message, _) => publish(shared, state, message.header(), topics, say),
             Next::Idle => {}
             Next::Ended => break,
         }
-        known.lock().unsent += topics.unsent() - unsent;
+        state.lock().unsent += topics.unsent() - unsent;
         unsent = topics.unsent();
     }
     Ok(())
 }
 
-/// Publishes a pose as odometry and as transforms, of which that of the map comes from the loops of a run with SLAM.
+/// Publishes a pose as odometry and as transforms; that of the map comes from the loops of SLAM.
 fn publish(
     shared: &Shared,
-    known: &KnownRun,
+    state: &SharedRunState,
     pose: &PoseHeader,
     topics: &mut PoseTopics,
     say: fn(&str),
 ) {
     let (clock, map_from_odometry) = {
-        let mut known = known.lock();
-        // One that was published before the stream was lost and found again.
-        if !known.count(pose.item.seq) {
+        let mut state = state.lock();
+        // The pose was published before the stream was interrupted.
+        if !state.count(pose.item.seq) {
             return;
         }
-        let is_first = known.clock.is_none();
-        let clock = *known
+        let is_first = state.clock.is_none();
+        let clock = *state
             .clock
             .get_or_insert_with(|| Clock::of(pose.item.stamp_ns));
         if is_first && !clock.is_sensors() {
@@ -132,7 +132,7 @@ fn publish(
                 "the times of this run do not count from 1970: its stamps in ROS begin with this computer's time at the first pose",
             );
         }
-        (clock, known.map_from_odometry)
+        (clock, state.map_from_odometry)
     };
     let (frames, mounting) = (&shared.frames, &shared.mounting);
     let stamp_ns = clock.stamp_ns(pose.item.stamp_ns);
@@ -165,16 +165,16 @@ impl PoseTopics {
 
 /// Takes the corrections of each run with SLAM.
 pub fn follow_corrections(shared: &Shared) {
-    each_run(shared, |run, known| {
+    each_run(shared, |run, state| {
         if !run.manifest().window.slam {
             return Ok(());
         }
         let mut corrections = run.observe::<Correction>()?;
         while !shared.is_stopping() {
-            match corrections.next(LOOK)? {
+            match corrections.next(POLL_INTERVAL)? {
                 Next::Message(message, _) => {
                     let correction = message.header().map_from_odometry();
-                    known.lock().map_from_odometry = Some(correction);
+                    state.lock().map_from_odometry = Some(correction);
                 }
                 Next::Idle => {}
                 Next::Ended => break,

@@ -6,21 +6,23 @@ use gyre_ros2_messages::{
     builtin_interfaces::Time,
     diagnostic_msgs::{DiagnosticArray, DiagnosticStatus, ERROR, KeyValue, OK, STALE, WARN},
 };
-use gyre_stage::control::{Activity, Control, ProcessStatus, Status};
+use gyre_stage::{
+    clock,
+    control::{Activity, Control, ProcessStatus, Status},
+};
 
 use crate::{
-    clock,
-    following::LOOK,
+    following::POLL_INTERVAL,
     outlet::Outlet,
-    shared::{Known, Shared, State},
+    run_state::{RunPhase, RunState, Shared},
 };
 
 /// Time between two reports.
 const PERIOD: Duration = Duration::from_secs(1);
 
-/// What a report is compared with.
+/// The counts of the last report.
 #[derive(Default)]
-struct Before {
+struct LastCounts {
     poses: u64,
     /// `None` before the supervisor has answered.
     dropped: Option<u64>,
@@ -29,26 +31,31 @@ struct Before {
 
 /// Reports once a second until the bridge stops.
 pub fn report(shared: &Shared, mut diagnostics: Outlet<DiagnosticArray>) {
-    let (mut before, mut due) = (Before::default(), Instant::now());
+    let (mut before, mut due) = (LastCounts::default(), Instant::now());
     while !shared.is_stopping() {
         if Instant::now() >= due {
             due = Instant::now() + PERIOD;
             let answer = Control::of(&shared.out).and_then(|run| run.status());
-            let known = shared.shown().lock().clone();
+            let state = shared.shown().lock().clone();
             diagnostics.send(array(
                 &shared.out.display().to_string(),
-                &known,
+                &state,
                 answer.ok(),
                 &mut before,
             ));
         }
-        std::thread::sleep(LOOK.min(due.saturating_duration_since(Instant::now())));
+        std::thread::sleep(POLL_INTERVAL.min(due.saturating_duration_since(Instant::now())));
     }
 }
 
-/// The run and its processes.
-fn array(out: &str, known: &Known, status: Option<Status>, before: &mut Before) -> DiagnosticArray {
-    let mut parts = vec![run(known, status.as_ref(), before)];
+/// Returns the diagnostics of the run and its processes.
+fn array(
+    out: &str,
+    state: &RunState,
+    status: Option<Status>,
+    before: &mut LastCounts,
+) -> DiagnosticArray {
+    let mut parts = vec![run(state, status.as_ref(), before)];
     let processes = status.iter().flat_map(|status| &status.processes);
     parts.extend(processes.map(process));
     for part in &mut parts {
@@ -58,14 +65,14 @@ fn array(out: &str, known: &Known, status: Option<Status>, before: &mut Before) 
         status: parts,
         ..DiagnosticArray::default()
     };
-    array.header.stamp = Time::from_ns(clock::now_ns());
+    array.header.stamp = Time::from_ns(clock::since_1970_ns());
     array
 }
 
-/// The run as a whole.
-fn run(known: &Known, status: Option<&Status>, before: &mut Before) -> DiagnosticStatus {
+/// Returns the diagnostics of the run as a whole.
+fn run(state: &RunState, status: Option<&Status>, before: &mut LastCounts) -> DiagnosticStatus {
     let dropped = status.map(|status| status.dropped);
-    let lost = known.missed + known.unsent;
+    let lost = state.missed + state.unsent;
     let drops = before.dropped.zip(dropped);
     let fell = [
         (
@@ -74,26 +81,26 @@ fn run(known: &Known, status: Option<&Status>, before: &mut Before) -> Diagnosti
         ),
         (lost > before.lost, "the bridge loses messages"),
     ];
-    let poses = known.poses.saturating_sub(before.poses);
-    *before = Before {
-        poses: known.poses,
+    let poses = state.poses.saturating_sub(before.poses);
+    *before = LastCounts {
+        poses: state.poses,
         dropped: dropped.or(before.dropped),
         lost,
     };
     let trouble = fell.iter().find(|(is_so, _)| *is_so).map(|(_, what)| *what);
-    let (level, message) = match (known.state, trouble, &known.notice) {
-        (State::Waiting, ..) => (STALE, "there is no run yet".to_owned()),
-        (State::Ended, ..) => (STALE, "the run has ended".to_owned()),
+    let (level, message) = match (state.phase, trouble, &state.notice) {
+        (RunPhase::Waiting, ..) => (STALE, "there is no run yet".to_owned()),
+        (RunPhase::Ended, ..) => (STALE, "the run has ended".to_owned()),
         (_, _, Some(notice)) => (WARN, notice.clone()),
         (_, Some(trouble), _) => (WARN, trouble.to_owned()),
-        (State::Finishing, ..) => (OK, "the results are being written".to_owned()),
-        (State::Working, ..) => (OK, format!("{poses} poses in the last second")),
+        (RunPhase::Finishing, ..) => (OK, "the results are being written".to_owned()),
+        (RunPhase::Working, ..) => (OK, format!("{poses} poses in the last second")),
     };
     let of_bridge = [
-        ("poses published", known.poses),
-        ("poses missed", known.missed),
-        ("messages not sent", known.unsent),
-        ("maps published", known.maps),
+        ("poses published", state.poses),
+        ("poses missed", state.missed),
+        ("messages not sent", state.unsent),
+        ("maps published", state.maps),
     ];
     let of_bridge = of_bridge.map(|(key, count)| value(key, count));
     let mut part = part("gyre", level, message);
@@ -102,7 +109,7 @@ fn run(known: &Known, status: Option<&Status>, before: &mut Before) -> Diagnosti
     part
 }
 
-/// Figures of the supervisor.
+/// Returns the values of the supervisor.
 fn figures(status: &Status) -> Vec<KeyValue> {
     let mut figures = vec![
         value("phase", status.phase.name()),
@@ -117,7 +124,7 @@ fn figures(status: &Status) -> Vec<KeyValue> {
     figures
 }
 
-/// One process.
+/// Returns the diagnostics of one process.
 fn process(process: &ProcessStatus) -> DiagnosticStatus {
     let level = match process.activity {
         Activity::Waiting | Activity::Working | Activity::Running => OK,
@@ -192,28 +199,29 @@ mod tests {
 
     #[test]
     fn levels_follow_the_run_and_its_processes() {
-        let (mut before, mut known) = (Before::default(), Known::default());
-        let mut levels = |known: &Known, status| {
-            let array = array("out", known, status, &mut before);
+        let (mut before, mut state) = (LastCounts::default(), RunState::default());
+        let mut levels = |state: &RunState, status| {
+            let array = array("out", state, status, &mut before);
             array
                 .status
                 .iter()
                 .map(|part| part.level)
                 .collect::<Vec<_>>()
         };
-        assert_eq!(levels(&known, None), [STALE]);
-        // What was dropped before the bridge began, or while the supervisor did not answer, is not dropped now.
-        known.state = State::Working;
-        assert_eq!(levels(&known, Some(status(9))), [OK, OK, ERROR]);
-        assert_eq!(levels(&known, None), [OK]);
-        assert_eq!(levels(&known, Some(status(9))), [OK, OK, ERROR]);
+        assert_eq!(levels(&state, None), [STALE]);
+        // What was dropped before the bridge began, or while the supervisor did not answer, is not
+        // dropped now.
+        state.phase = RunPhase::Working;
+        assert_eq!(levels(&state, Some(status(9))), [OK, OK, ERROR]);
+        assert_eq!(levels(&state, None), [OK]);
+        assert_eq!(levels(&state, Some(status(9))), [OK, OK, ERROR]);
         // The next run begins at zero.
-        assert_eq!(levels(&known, Some(status(0))), [OK, OK, ERROR]);
-        assert_eq!(levels(&known, Some(status(3))), [WARN, OK, ERROR]);
-        assert_eq!(levels(&known, Some(status(3))), [OK, OK, ERROR]);
-        known.unsent = 1;
-        assert_eq!(levels(&known, Some(status(3))), [WARN, OK, ERROR]);
-        known.state = State::Ended;
-        assert_eq!(levels(&known, None), [STALE]);
+        assert_eq!(levels(&state, Some(status(0))), [OK, OK, ERROR]);
+        assert_eq!(levels(&state, Some(status(3))), [WARN, OK, ERROR]);
+        assert_eq!(levels(&state, Some(status(3))), [OK, OK, ERROR]);
+        state.unsent = 1;
+        assert_eq!(levels(&state, Some(status(3))), [WARN, OK, ERROR]);
+        state.phase = RunPhase::Ended;
+        assert_eq!(levels(&state, None), [STALE]);
     }
 }

@@ -9,21 +9,21 @@ use gyre_geometry::Pose;
 use gyre_mapping::{Evidence, MapError, grid};
 use gyre_ros2_messages::nav_msgs::OccupancyGrid;
 use gyre_slam::{Keyframe, Query, RecordReader, TrajectoryEstimator, TrajectoryOptions};
-use gyre_stage::observer::ObservedRun;
+use gyre_stage::{clock, observer::ObservedRun};
 use gyre_storage::LogError;
 use thiserror::Error;
 
 use crate::{
-    MapOf, MapSettings, clock,
-    following::{LOOK, each_run},
+    MapSettings, MapSettingsOf,
+    following::{POLL_INTERVAL, each_run},
     outlet::Outlet,
-    shared::{KnownRun, Shared},
+    run_state::{Shared, SharedRunState},
 };
 
 /// The shortest time between two maps.
 const INTERVAL: Duration = Duration::from_secs(5);
-/// A map is drawn for at most so much of the time: the next one waits so many times longer than the last one took.
-const REST: u32 = 9;
+/// The factor by which the pause before the next map is longer than the drawing of the last one.
+const PAUSE_FACTOR: u32 = 9;
 
 /// A map that cannot be drawn.
 #[derive(Debug, Error)]
@@ -44,7 +44,8 @@ struct LiveMap {
     keyframes: RecordReader<Keyframe>,
     queries: RecordReader<Query>,
     estimator: TrajectoryEstimator,
-    /// The radar on the vehicle: the map is drawn along the vehicle's axes, since Nav2 ignores the rotation of a grid.
+    /// The pose of the radar on the vehicle: the map is drawn along the vehicle's axes, since Nav2
+    /// ignores the rotation of a grid.
     radar: Pose,
     evidence: Evidence,
     /// The number of each keyframe's scan in the run.
@@ -53,17 +54,17 @@ struct LiveMap {
 }
 
 /// Publishes the map of each run with SLAM, when it has new keyframes, until the bridge stops.
-pub fn follow_maps(shared: &Shared, settings: MapOf, mut maps: Outlet<OccupancyGrid>) {
-    each_run(shared, |run, known| {
+pub fn follow_maps(shared: &Shared, settings: MapSettingsOf, mut maps: Outlet<OccupancyGrid>) {
+    each_run(shared, |run, state| {
         if !run.manifest().window.slam {
             return Ok(());
         }
         let settings = settings(&shared.out).map_err(LiveMapError::Settings);
         let followed =
-            settings.and_then(|settings| follow(shared, run, known, &settings, &mut maps));
-        // It is not tried again: it would read all keyframes each time.
+            settings.and_then(|settings| follow(shared, run, state, &settings, &mut maps));
+        // Not tried again: that would read all keyframes each time.
         if let Err(error) = followed {
-            known.lock().notice = Some(format!("the map is not published: {error}"));
+            state.lock().notice = Some(format!("the map is not published: {error}"));
         }
         Ok(())
     });
@@ -72,7 +73,7 @@ pub fn follow_maps(shared: &Shared, settings: MapOf, mut maps: Outlet<OccupancyG
 fn follow(
     shared: &Shared,
     run: &ObservedRun,
-    known: &KnownRun,
+    state: &SharedRunState,
     settings: &MapSettings,
     maps: &mut Outlet<OccupancyGrid>,
 ) -> Result<(), LiveMapError> {
@@ -83,7 +84,7 @@ fn follow(
     while !ended && !shared.is_stopping() {
         ended = run.has_ended() || map.has_ended();
         if !ended && Instant::now() < due {
-            std::thread::sleep(LOOK);
+            std::thread::sleep(POLL_INTERVAL);
             continue;
         }
         let begun = Instant::now();
@@ -91,12 +92,12 @@ fn follow(
             let before = maps.sent();
             maps.send(grid(
                 &mut map.evidence,
-                clock::now_ns(),
+                clock::since_1970_ns(),
                 &shared.frames.map,
             )?);
-            known.lock().maps += maps.sent() - before;
+            state.lock().maps += maps.sent() - before;
         }
-        due = Instant::now() + INTERVAL.max(begun.elapsed() * REST);
+        due = Instant::now() + INTERVAL.max(begun.elapsed() * PAUSE_FACTOR);
     }
     Ok(())
 }
@@ -125,11 +126,12 @@ impl LiveMap {
         self.queries.has_ended() && self.keyframes.has_ended()
     }
 
-    /// Reads what is new, and draws what is new or has moved; true if something has changed.
+    /// Reads new keyframes, and draws those that are new or have moved; true if something has
+    /// changed.
     fn update(&mut self, out: &Path) -> Result<bool, LiveMapError> {
         self.keyframes.refresh()?;
         self.queries.refresh()?;
-        // Some of those that were read have been cut off after a power failure or a crash.
+        // Records that were read have been cut off after a power failure or a crash.
         if self.keyframes.unchanged() < self.seqs.len() || self.queries.unchanged() < self.closed {
             *self = Self::open(out, &self.settings.clone(), self.radar)?;
         }
@@ -146,7 +148,7 @@ impl LiveMap {
         let closed = self.closed;
         while self.closed < self.queries.len() {
             let query = self.queries.read(self.closed)?;
-            // Its keyframe is read the next time.
+            // The keyframe of the query is read the next time.
             if query.keyframe >= self.seqs.len() {
                 break;
             }

@@ -11,7 +11,8 @@ use thiserror::Error;
 
 use crate::{Domain, outlet::Outlet};
 
-/// The longest wait for readers that are behind. A message that has no room then is not sent, and is counted.
+/// The longest wait for readers that are behind. A message without room then is not sent, and
+/// counted.
 const MAX_WAIT: Duration = Duration::from_millis(100);
 
 /// A node that cannot be made, or a topic.
@@ -25,7 +26,7 @@ pub enum NodeError {
         /// The reason.
         reason: String,
     },
-    /// A name that ROS 2 does not know.
+    /// The name is invalid in ROS 2.
     #[error(
         "`{name}` is no name of ROS 2: {reason}; names are letters, digits and single `_`, between single `/`"
     )]
@@ -51,7 +52,7 @@ pub struct Node {
     context: Context,
 }
 
-/// How a topic is kept for those who read it.
+/// The messages of a topic that are kept for its readers.
 #[derive(Clone, Copy, Debug)]
 pub enum Keep {
     /// The last messages, for readers that are behind.
@@ -61,7 +62,7 @@ pub enum Keep {
 }
 
 impl Keep {
-    /// Reliable in each case: that of a reader who asks for less, too.
+    /// Returns a reliable quality of service, which also serves readers of best effort.
     fn qos(self) -> QosProfile {
         let (durability, depth) = match self {
             Self::Last(depth) => (Durability::Volatile, depth),
@@ -102,7 +103,8 @@ impl Node {
         Ok(Self { node, context })
     }
 
-    /// Returns the name on DDS of a topic, which is relative to the namespace unless it begins with `/`.
+    /// Returns the name on DDS of a topic, which is relative to the namespace unless it begins with
+    /// `/`.
     ///
     /// # Errors
     /// The name is none.
@@ -110,7 +112,8 @@ impl Node {
         Ok(format!("rt{}", self.absolute(topic)?))
     }
 
-    /// The name of a topic from the root on. The library makes `//` of a relative one in the root's namespace.
+    /// Returns the absolute name of a topic. The library makes `//` of a relative one in the root's
+    /// namespace.
     fn absolute(&self, topic: &str) -> Result<Name, NodeError> {
         let name = name(topic)?;
         match name.is_absolute() {

@@ -3,7 +3,7 @@
 use ros2_client::{Publisher, WriteError};
 use serde::Serialize;
 
-/// A topic that is published. What has no room is not sent, and is counted.
+/// A topic that is published. A message without room is not sent, and counted.
 pub struct Outlet<M: Serialize> {
     publisher: Publisher<M>,
     sent: u64,
@@ -35,12 +35,12 @@ impl<M: Serialize> Outlet<M> {
         }
     }
 
-    /// Returns the messages that were sent.
+    /// Returns the number of messages that were sent.
     pub fn sent(&self) -> u64 {
         self.sent
     }
 
-    /// Returns the messages that were not.
+    /// Returns the number of messages that were not sent.
     pub fn unsent(&self) -> u64 {
         self.unsent
     }

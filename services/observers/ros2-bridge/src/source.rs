@@ -1,8 +1,9 @@
-//! A radar that Navtech's driver publishes in ROS 2, as the source of a run: each azimuth is a message on `radar_data/fft_data`.
+//! A radar that Navtech's driver publishes in ROS 2, as the source of a run: each azimuth is a
+//! message on `radar_data/fft_data`.
 
 mod ask;
+mod configuration_estimate;
 mod driver;
-mod guess;
 mod radar;
 mod wakeups;
 
@@ -16,10 +17,10 @@ use crate::Domain;
 pub use ask::{AskError, ask};
 pub use gyre_live_radar::Sizes;
 
-/// Where a driver publishes, and what it does not say of its radar.
+/// The topics of a driver, and the properties of its radar that it does not publish.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// Where on the network.
+    /// The domain and the network.
     pub domain: Domain,
     /// The topic of the azimuths, such as `/radar_data/fft_data`. The configuration is beside it.
     pub topic: String,
@@ -46,7 +47,8 @@ impl Settings {
 /// Receives the scans of a radar until SIGTERM, or until there are enough.
 ///
 /// # Errors
-/// A domain that cannot be joined, a radar whose scans are larger than at the start of the run, or a failure of the transport.
+/// A domain that cannot be joined, a radar whose scans are larger than at the start of the run, or
+/// a failure of the transport.
 pub fn run(launch: &Launch, settings: Settings) -> Result<StageCounters, StageError> {
     let scans = settings.scans;
     let radar = radar::Radar::open(settings).map_err(|error| StageError::Input(error.to_string()));

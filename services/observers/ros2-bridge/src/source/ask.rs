@@ -11,19 +11,20 @@ use thiserror::Error;
 
 use super::{
     Settings,
+    configuration_estimate::ConfigurationEstimate,
     driver::{Driver, DriverError},
-    guess::Guess,
 };
 
-/// The longest wait for the configuration, which the driver repeats every four turns, and for azimuths that tell it.
+/// The longest wait for the configuration, which the driver repeats every four turns, and for
+/// azimuths to estimate it from.
 const MAX_WAIT: Duration = Duration::from_secs(6);
-/// Time between two looks.
-const LOOK: Duration = Duration::from_millis(10);
+/// Time between two polls.
+const POLL_INTERVAL: Duration = Duration::from_millis(10);
 
-/// Why a driver's radar cannot be used.
+/// A driver's radar that cannot be used.
 #[derive(Debug, Error)]
 pub enum AskError {
-    /// The node or the topic.
+    /// The node or the topic cannot be opened.
     #[error(transparent)]
     Driver(#[from] DriverError),
     /// Nobody publishes.
@@ -52,17 +53,18 @@ pub enum AskError {
         /// The topic of configurations.
         topic: String,
     },
-    /// Its configuration is not usable.
+    /// The configuration is not usable.
     #[error("the radar on {topic} cannot be used: {source}")]
     Unusable {
         /// The topic.
         topic: String,
-        /// What is wrong.
+        /// The reason.
         source: gyre_colossus::BadConfiguration,
     },
 }
 
-/// Asks a driver for the sizes of its radar's scans. Where it does not publish its configuration they are found from its azimuths.
+/// Asks a driver for the sizes of its radar's scans. Without a published configuration they are
+/// estimated from azimuths.
 ///
 /// # Errors
 /// No driver, or a radar that cannot be used.
@@ -70,7 +72,7 @@ pub fn ask(settings: &Settings) -> Result<Sizes, AskError> {
     let mut driver = Driver::open(settings)?;
     let configuration = match published(&driver, settings)? {
         Some(configuration) => configuration,
-        None => guessed(&mut driver, settings)?,
+        None => estimated(&mut driver, settings)?,
     };
     let unusable = |source| AskError::Unusable {
         topic: settings.topic.clone(),
@@ -91,7 +93,7 @@ fn published(driver: &Driver, settings: &Settings) -> Result<Option<Configuratio
         if let Ok(Some(described)) = driver.configuration() {
             return Ok(Some(described.radar));
         }
-        sleep(LOOK);
+        sleep(POLL_INTERVAL);
     }
     match driver.found()? {
         Some(_) => Ok(None),
@@ -102,23 +104,23 @@ fn published(driver: &Driver, settings: &Settings) -> Result<Option<Configuratio
     }
 }
 
-/// Finds the configuration from azimuths.
-fn guessed(driver: &mut Driver, settings: &Settings) -> Result<Configuration, AskError> {
+/// Estimates the configuration from azimuths.
+fn estimated(driver: &mut Driver, settings: &Settings) -> Result<Configuration, AskError> {
     let Some(resolution_m) = settings.constants.range_resolution_m else {
         return Err(AskError::NoConfiguration {
             topic: settings.configuration_topic(),
         });
     };
-    let (mut guess, started) = (Guess::default(), Instant::now());
+    let (mut estimate, started) = (ConfigurationEstimate::default(), Instant::now());
     while started.elapsed() < MAX_WAIT {
         driver.receive()?;
         while let Ok(Some(packet)) = driver.packet() {
-            guess.add_message(&packet.message, packet.message.arrival_ns());
+            estimate.add_message(&packet.message, packet.message.arrival_ns());
         }
-        if let Some(found) = guess.configuration(settings.encoder_counts, resolution_m) {
+        if let Some(found) = estimate.configuration(settings.encoder_counts, resolution_m) {
             return Ok(found);
         }
-        sleep(LOOK);
+        sleep(POLL_INTERVAL);
     }
     Err(AskError::Silent {
         topic: settings.topic.clone(),

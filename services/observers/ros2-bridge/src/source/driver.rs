@@ -9,15 +9,17 @@ use gyre_ros2_messages::{
     navtech_msgs::{RadarBScanMsg, RadarConfigurationMsg, RadarFftDataMsg},
     std_msgs::Header,
 };
+use gyre_stage::clock;
 use ros2_client::{Gid, ReadError, Subscription};
 use thiserror::Error;
 
 use super::{Settings, wakeups::Wakeups};
-use crate::{NodeError, clock, node::Node};
+use crate::{NodeError, node::Node};
 
 /// The name of the node.
 const NODE: &str = "gyre_source";
-/// Azimuths that are kept until they are taken: ten turns, 2.5 s. The driver keeps one turn for those who are behind.
+/// Azimuths that are kept until they are taken: ten turns, 2.5 s. The driver keeps one turn for
+/// those who are behind.
 const AZIMUTHS: usize = 4_000;
 /// Turns, and configurations, that are kept.
 const TURNS: usize = 10;
@@ -25,18 +27,18 @@ const TURNS: usize = 10;
 /// A driver that cannot be received.
 #[derive(Debug, Error)]
 pub enum DriverError {
-    /// The node.
+    /// The node cannot be made.
     #[error(transparent)]
     Node(#[from] NodeError),
     /// The system refuses a descriptor.
     #[error("cannot wait for topics of ROS 2: {0}")]
     Wait(#[from] io::Error),
-    /// Another type.
+    /// The topic has another type.
     #[error("{topic} carries {found}, but Gyre reads {}", names().join(", "))]
     Type {
         /// The topic.
         topic: String,
-        /// Its type on DDS.
+        /// The type on DDS.
         found: String,
     },
 }
@@ -44,10 +46,10 @@ pub enum DriverError {
 /// A message that cannot be used.
 #[derive(Debug, Error)]
 pub enum BadPacket {
-    /// It is not CDR of its type.
+    /// The message is not CDR of its type.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// One of its numbers.
+    /// A number of the message is invalid.
     #[error(transparent)]
     Message(#[from] BadMessage),
 }
@@ -62,11 +64,11 @@ fn names() -> [String; 3] {
     .map(|definition| definition.dds_name())
 }
 
-/// What a driver has published, and who.
+/// A message of a driver, and its publisher.
 pub struct Packet {
     /// The message.
     pub message: PacketMessage,
-    /// Its publisher.
+    /// The publisher.
     pub publisher: Gid,
 }
 
@@ -81,7 +83,7 @@ pub enum PacketMessage {
 }
 
 impl PacketMessage {
-    /// The driver's header.
+    /// Returns the driver's header.
     pub fn header(&self) -> &Header {
         match self {
             Self::Azimuth(message) => &message.header,
@@ -90,15 +92,15 @@ impl PacketMessage {
         }
     }
 
-    /// The driver's time of receipt, or this one where it gives none, ns.
+    /// Returns the driver's time of receipt, or the present time without one, ns.
     pub fn arrival_ns(&self) -> i64 {
         match self.header().stamp.ns() {
-            0 => clock::now_ns(),
+            0 => clock::since_1970_ns(),
             stamp_ns => stamp_ns,
         }
     }
 
-    /// The only azimuth; `None` of a turn.
+    /// Returns the only azimuth; `None` of a turn.
     ///
     /// # Errors
     /// A number that has not the bytes of its type.
@@ -135,7 +137,7 @@ pub struct Driver {
 
 /// The radar's description of itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Described {
+pub struct DescribedRadar {
     /// The description.
     pub radar: Configuration,
     /// Rows by which images of turns are turned.
@@ -181,7 +183,8 @@ impl Driver {
         }
     }
 
-    /// Subscribes to the azimuths once somebody publishes them, and returns whether they are subscribed to.
+    /// Subscribes to the azimuths once somebody publishes them, and returns whether they are
+    /// subscribed to.
     ///
     /// # Errors
     /// The topic has another type, or cannot be opened.
@@ -204,12 +207,12 @@ impl Driver {
         Ok(true)
     }
 
-    /// What becomes readable when there is a message.
+    /// Returns the descriptor that becomes readable when there is a message.
     pub fn descriptor(&self) -> BorrowedFd<'_> {
         self.wakeups.descriptor()
     }
 
-    /// To be called before all messages are taken.
+    /// Clears the descriptor: take all messages after this.
     ///
     /// # Errors
     /// The system refuses.
@@ -217,16 +220,16 @@ impl Driver {
         self.wakeups.clear()
     }
 
-    /// Takes the next configuration. A reader is given what is published on its topic in the other form too, and may decode it as numbers of
-    /// no sense: the published type decides.
+    /// Takes the next configuration. A reader also receives messages of the other type, and may
+    /// decode them to meaningless numbers: the published type decides.
     ///
     /// # Errors
     /// The counts of a message are none of a radar.
-    pub fn configuration(&self) -> Result<Option<Described>, BadPacket> {
+    pub fn configuration(&self) -> Result<Option<DescribedRadar>, BadPacket> {
         if let Ok(Some((message, _))) = self.configurations.take()
             && self.is_described_as(RadarConfigurationMsg::DEFINITION)
         {
-            return Ok(Some(Described {
+            return Ok(Some(DescribedRadar {
                 radar: message.configuration(),
                 azimuth_offset: message.azimuth_offset,
             }));
@@ -235,7 +238,7 @@ impl Driver {
             Ok(Some((message, _)))
                 if self.is_described_as(RadarConfigurationMessage::DEFINITION) =>
             {
-                Ok(Some(Described {
+                Ok(Some(DescribedRadar {
                     radar: message.configuration()?,
                     azimuth_offset: 0,
                 }))

@@ -10,23 +10,23 @@ use gyre_live_radar::{Intake, NoScans};
 use gyre_messages::{ScanHeader, StageId};
 use gyre_ros2_messages::navtech_msgs::RadarBScanMsg;
 use gyre_stage::{
-    StageError,
+    StageError, clock,
     source::{Arrival, Received, Sensor},
 };
 use ros2_client::Gid;
 
 use super::{
     Settings,
-    driver::{Described, Driver, DriverError, Packet, PacketMessage},
-    guess::Guess,
+    configuration_estimate::ConfigurationEstimate,
+    driver::{DescribedRadar, Driver, DriverError, Packet, PacketMessage},
 };
-use crate::clock;
 
-/// Messages after which the process looks for signals and new readers, however many there are.
+/// The most messages between two looks for signals and new readers.
 const MAX_MESSAGES: usize = 512;
-/// Time between two looks for a driver.
-const LOOK: Duration = Duration::from_millis(100);
-/// Time without a configuration after which it is found from the azimuths: the driver repeats it every four turns.
+/// Time between two polls for a driver.
+const POLL_INTERVAL: Duration = Duration::from_millis(100);
+/// Time without a configuration after which it is estimated: the driver repeats it every four
+/// turns.
 const CONFIGURATION_WAIT: Duration = Duration::from_secs(3);
 /// Time without an azimuth of a publisher after which another one is received in its place.
 const PUBLISHER_WAIT: Duration = Duration::from_secs(1);
@@ -37,17 +37,17 @@ pub struct Radar {
     driver: Driver,
     intake: Intake,
     /// The configuration so far, which a driver that was started again need not repeat.
-    described: Option<Described>,
-    guess: Guess,
+    described: Option<DescribedRadar>,
+    estimate: ConfigurationEstimate,
     opened: Instant,
     /// A turn, and how many of its rows were added: a scan can be complete before its end.
     turn: Option<(RadarBScanMsg, usize)>,
     /// Who publishes the azimuths, and how often that has changed.
     publisher: Option<Gid>,
     changes: u64,
-    /// What the source before has counted, if it died.
+    /// The counts of the source process before this one, if it died.
     before: Received,
-    heard: Instant,
+    last_azimuth: Instant,
     is_silent: bool,
 }
 
@@ -63,13 +63,13 @@ impl Radar {
             driver: Driver::open(&settings)?,
             settings,
             described: None,
-            guess: Guess::default(),
+            estimate: ConfigurationEstimate::default(),
             opened: now,
             turn: None,
             publisher: None,
             changes: 0,
             before: Received::default(),
-            heard: now,
+            last_azimuth: now,
             is_silent: false,
         })
     }
@@ -85,7 +85,7 @@ impl Radar {
         }
     }
 
-    fn configure(&mut self, described: Described, room: usize) -> Result<(), StageError> {
+    fn configure(&mut self, described: DescribedRadar, room: usize) -> Result<(), StageError> {
         self.described = Some(described);
         match self.intake.configure(described.radar, room) {
             Err(error @ NoScans::TooLarge { .. }) => Err(StageError::Input(error.to_string())),
@@ -97,19 +97,19 @@ impl Radar {
         }
     }
 
-    /// Adds what a publisher has sent; true if a scan is complete.
+    /// Adds a message; true if a scan is complete.
     fn add(
         &mut self,
         packet: Packet,
         header: &mut ScanHeader,
         bytes: &mut [u8],
     ) -> Result<bool, StageError> {
-        if !self.is_heard(packet.publisher, bytes.len())? {
+        if !self.takes(packet.publisher, bytes.len())? {
             return Ok(false);
         }
         let arrival_ns = packet.message.arrival_ns();
         if !self.intake.is_configured() {
-            self.guess(&packet.message, arrival_ns, bytes.len())?;
+            self.estimate(&packet.message, arrival_ns, bytes.len())?;
         }
         match packet.message.azimuth() {
             Ok(Some(azimuth)) => {
@@ -124,7 +124,8 @@ impl Radar {
         })
     }
 
-    /// Adds the rows of a turn from number `from` on; true if a scan is complete. Without a configuration they are dropped.
+    /// Adds the rows of a turn from number `from` on; true if a scan is complete. Without a
+    /// configuration they are dropped.
     fn add_turn(
         &mut self,
         turn: RadarBScanMsg,
@@ -132,14 +133,14 @@ impl Radar {
         header: &mut ScanHeader,
         bytes: &mut [u8],
     ) -> bool {
-        let Some(Described {
+        let Some(DescribedRadar {
             radar,
             azimuth_offset,
         }) = self.described
         else {
             return false;
         };
-        let completed = match turn.rows(&radar, azimuth_offset, clock::now_ns()) {
+        let completed = match turn.rows(&radar, azimuth_offset, clock::since_1970_ns()) {
             Ok(rows) => rows.enumerate().skip(from).find_map(|(index, row)| {
                 let is_complete = self.intake.add(row.azimuth, row.arrived_ns, header, bytes);
                 is_complete.then_some(index + 1)
@@ -153,12 +154,13 @@ impl Radar {
         completed.is_some()
     }
 
-    /// Returns whether this publisher is the one that is received. Another one takes its place when it has fallen silent: the driver was
-    /// started again, and what it sends does not continue the scan before.
-    fn is_heard(&mut self, publisher: Gid, room: usize) -> Result<bool, StageError> {
-        let silent = self.heard.elapsed();
+    /// Returns whether this publisher is the one that is received. Another one takes its place when
+    /// it has fallen silent: the driver was restarted, and its messages do not continue the scan
+    /// before.
+    fn takes(&mut self, publisher: Gid, room: usize) -> Result<bool, StageError> {
+        let silent = self.last_azimuth.elapsed();
         match self.publisher {
-            Some(heard) if heard == publisher => {}
+            Some(current) if current == publisher => {}
             Some(_) if silent < PUBLISHER_WAIT => {
                 let reason =
                     "two publishers send azimuths on the topic, and only the first is received";
@@ -174,7 +176,7 @@ impl Radar {
                 }
             }
         }
-        self.heard = Instant::now();
+        self.last_azimuth = Instant::now();
         if mem::take(&mut self.is_silent) {
             let topic = &self.settings.topic;
             tracing::info!(topic, "azimuths arrive again after {silent:.1?}");
@@ -182,14 +184,14 @@ impl Radar {
         Ok(true)
     }
 
-    /// Finds the configuration from azimuths, where none is published.
-    fn guess(
+    /// Estimates the configuration from azimuths, where none is published.
+    fn estimate(
         &mut self,
         message: &PacketMessage,
         arrival_ns: i64,
         room: usize,
     ) -> Result<(), StageError> {
-        self.guess.add_message(message, arrival_ns);
+        self.estimate.add_message(message, arrival_ns);
         let resolution_m = self.settings.constants.range_resolution_m;
         let Some(resolution_m) =
             resolution_m.filter(|_| self.opened.elapsed() >= CONFIGURATION_WAIT)
@@ -197,7 +199,7 @@ impl Radar {
             return Ok(());
         };
         let counts = self.settings.encoder_counts;
-        let Some(radar) = self.guess.configuration(counts, resolution_m) else {
+        let Some(radar) = self.estimate.configuration(counts, resolution_m) else {
             return Ok(());
         };
         let (azimuths, bins) = (radar.azimuth_samples, radar.range_in_bins);
@@ -206,17 +208,17 @@ impl Radar {
             bins,
             "the driver publishes no configuration: it was found from azimuths"
         );
-        let described = Described {
+        let described = DescribedRadar {
             radar,
             azimuth_offset: 0,
         };
         self.configure(described, room)
     }
 
-    /// How to wait for more. Silence is reported once.
+    /// Returns how to wait for more. Silence is reported once.
     fn wait(&mut self, has_received: bool) -> Arrival {
         let silence = self.settings.silence;
-        let left = silence.saturating_sub(self.heard.elapsed());
+        let left = silence.saturating_sub(self.last_azimuth.elapsed());
         if left.is_zero() && !mem::replace(&mut self.is_silent, true) {
             let topic = &self.settings.topic;
             tracing::warn!(
@@ -258,7 +260,7 @@ impl Sensor for Radar {
                 }
                 Ok(None) if !is_received => {
                     self.wait(false);
-                    return Ok(Arrival::Nothing(LOOK));
+                    return Ok(Arrival::Nothing(POLL_INTERVAL));
                 }
                 Ok(None) => return Ok(self.wait(taken > 0)),
                 Err(error) => self.intake.damaged(error, 0),

@@ -22,7 +22,7 @@ pub struct Wakeups {
 }
 
 impl Wakeups {
-    /// Without a topic.
+    /// Creates one without a topic.
     ///
     /// # Errors
     /// The system refuses a descriptor.
@@ -49,7 +49,7 @@ impl Wakeups {
             .register(topic, token, Interest::READABLE)
     }
 
-    /// The descriptor.
+    /// Returns the descriptor.
     pub fn descriptor(&self) -> BorrowedFd<'_> {
         self.poll.registry().as_fd()
     }

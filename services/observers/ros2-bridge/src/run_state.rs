@@ -1,4 +1,4 @@
-//! What the threads of the bridge share.
+//! The state of the runs, which the threads of the bridge share.
 
 use std::{
     collections::VecDeque,
@@ -15,7 +15,7 @@ use gyre_stage::Manifest;
 
 use crate::{Mounting, clock::Clock};
 
-/// What the threads share.
+/// The state that the threads share.
 pub struct Shared {
     /// The folder of the results of the run.
     pub out: PathBuf,
@@ -25,21 +25,22 @@ pub struct Shared {
     pub mounting: Mounting,
     stopping: AtomicBool,
     /// The last runs by their names, which are others at each start.
-    runs: Mutex<VecDeque<(String, KnownRun)>>,
+    runs: Mutex<VecDeque<(String, SharedRunState)>>,
     /// The run whose poses are published, or were.
-    shown: Mutex<KnownRun>,
+    shown: Mutex<SharedRunState>,
 }
 
 /// Runs that are kept for threads that begin with them late.
-const KEPT: usize = 4;
+const MAX_RUNS: usize = 4;
 
-/// What is known of one run. Each thread has that of the run it follows: another one may be at the next run already.
+/// The state of one run. Each thread has that of the run it follows: another thread may follow the
+/// next run already.
 #[derive(Clone, Debug, Default)]
-pub struct KnownRun(Arc<Mutex<Known>>);
+pub struct SharedRunState(Arc<Mutex<RunState>>);
 
-impl KnownRun {
-    /// Returns it for reading and writing.
-    pub fn lock(&self) -> MutexGuard<'_, Known> {
+impl SharedRunState {
+    /// Locks it for reading and writing.
+    pub fn lock(&self) -> MutexGuard<'_, RunState> {
         locked(&self.0)
     }
 }
@@ -48,11 +49,11 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What is known of a run.
+/// The state of a run.
 #[derive(Clone, Debug, Default)]
-pub struct Known {
-    /// Where it is.
-    pub state: State,
+pub struct RunState {
+    /// The phase.
+    pub phase: RunPhase,
     /// The clock of its stamps, from its first pose on.
     pub clock: Option<Clock>,
     /// The odometry frame in the map frame, both of the radar, in a run with SLAM.
@@ -69,11 +70,11 @@ pub struct Known {
     pub unsent: u64,
     /// Maps that were published.
     pub maps: u64,
-    /// Why something is not published.
+    /// The reason why something is not published.
     pub notice: Option<String>,
 }
 
-impl Known {
+impl RunState {
     /// Counts a pose, and what is missing before it. False for one that was published before.
     pub fn count(&mut self, seq: u64) -> bool {
         let next = self.newest.map_or(seq, |newest| newest + 1);
@@ -88,9 +89,9 @@ impl Known {
     }
 }
 
-/// Where a run is.
+/// The phase of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum State {
+pub enum RunPhase {
     /// There is none yet.
     #[default]
     Waiting,
@@ -103,7 +104,7 @@ pub enum State {
 }
 
 impl Shared {
-    /// Before the first run.
+    /// Creates the state before the first run.
     pub fn new(out: PathBuf, frames: Frames, mounting: Mounting) -> Self {
         Self {
             out,
@@ -115,37 +116,37 @@ impl Shared {
         }
     }
 
-    /// Begins with a run, or returns what is known of it if another thread has begun.
-    pub fn begin(&self, manifest: &Manifest) -> KnownRun {
+    /// Begins with a run, or returns its state if another thread has begun.
+    pub fn begin(&self, manifest: &Manifest) -> SharedRunState {
         self.begin_named(&manifest.prefix, manifest.window.slam)
     }
 
-    fn begin_named(&self, name: &str, slam: bool) -> KnownRun {
+    fn begin_named(&self, name: &str, slam: bool) -> SharedRunState {
         let mut runs = locked(&self.runs);
-        if let Some((_, known)) = runs.iter().find(|(run, _)| run == name) {
-            return known.clone();
+        if let Some((_, state)) = runs.iter().find(|(run, _)| run == name) {
+            return state.clone();
         }
-        let known = KnownRun::default();
-        *known.lock() = Known {
-            state: State::Working,
+        let state = SharedRunState::default();
+        *state.lock() = RunState {
+            phase: RunPhase::Working,
             // Before the first loop both frames are one.
             map_from_odometry: slam.then(Pose::identity),
-            ..Known::default()
+            ..RunState::default()
         };
-        runs.push_back((name.to_owned(), known.clone()));
-        if runs.len() > KEPT {
+        runs.push_back((name.to_owned(), state.clone()));
+        if runs.len() > MAX_RUNS {
             runs.pop_front();
         }
-        known
+        state
     }
 
     /// Makes a run the one that is shown.
-    pub fn show(&self, known: &KnownRun) {
-        *locked(&self.shown) = known.clone();
+    pub fn show(&self, state: &SharedRunState) {
+        *locked(&self.shown) = state.clone();
     }
 
     /// Returns the run that is shown.
-    pub fn shown(&self) -> KnownRun {
+    pub fn shown(&self) -> SharedRunState {
         locked(&self.shown).clone()
     }
 
@@ -154,7 +155,7 @@ impl Shared {
         self.stopping.store(true, Ordering::Relaxed);
     }
 
-    /// Returns whether they are to end.
+    /// Returns whether the threads are to end.
     pub fn is_stopping(&self) -> bool {
         self.stopping.load(Ordering::Relaxed)
     }
@@ -166,11 +167,11 @@ mod tests {
 
     #[test]
     fn each_pose_is_counted_once_and_gaps_are_missed() {
-        let mut known = Known::default();
-        let counted: Vec<bool> = [7, 8, 8, 7, 11, 12].map(|seq| known.count(seq)).to_vec();
+        let mut state = RunState::default();
+        let counted: Vec<bool> = [7, 8, 8, 7, 11, 12].map(|seq| state.count(seq)).to_vec();
         assert_eq!(counted, [true, true, false, false, true, true]);
-        assert_eq!((known.first, known.newest), (Some(7), Some(12)));
-        assert_eq!((known.poses, known.missed), (4, 2));
+        assert_eq!((state.first, state.newest), (Some(7), Some(12)));
+        assert_eq!((state.poses, state.missed), (4, 2));
     }
 
     fn shared() -> Shared {
@@ -185,12 +186,12 @@ mod tests {
         assert!(earlier.lock().count(7));
         let next = shared.begin_named("b", true);
         assert!(earlier.lock().count(8));
-        earlier.lock().state = State::Ended;
-        // It looks at the earlier run late, and begins with what is known of it.
+        earlier.lock().phase = RunPhase::Ended;
+        // A thread that begins with the earlier run late gets its state.
         assert_eq!(shared.begin_named("a", false).lock().poses, 2);
-        assert_eq!(next.lock().state, State::Working);
+        assert_eq!(next.lock().phase, RunPhase::Working);
         assert!(next.lock().count(0), "a pose of another run is none before");
-        assert_eq!(shared.shown().lock().state, State::Ended);
+        assert_eq!(shared.shown().lock().phase, RunPhase::Ended);
         shared.show(&next);
         let shown = shared.shown().lock().clone();
         assert_eq!((shown.poses, shown.missed), (1, 0));
@@ -198,14 +199,14 @@ mod tests {
     }
 
     #[test]
-    fn threads_that_follow_one_run_know_the_same_of_it() {
+    fn threads_that_follow_one_run_share_its_state() {
         let shared = shared();
         let of_maps = shared.begin_named("a", true);
         shared.begin_named("a", true).lock().maps += 1;
         assert_eq!(of_maps.lock().maps, 1);
-        for later in 0..KEPT {
+        for later in 0..MAX_RUNS {
             shared.begin_named(&later.to_string(), true);
         }
-        assert_eq!(locked(&shared.runs).len(), KEPT);
+        assert_eq!(locked(&shared.runs).len(), MAX_RUNS);
     }
 }

@@ -1,17 +1,17 @@
-//! The configuration of a radar whose driver does not publish it, from its azimuths.
+//! The estimate of a radar's configuration from azimuths, where its driver does not publish it.
 
 use gyre_colossus::Configuration;
 
 use super::driver::PacketMessage;
 
-/// Azimuths that are looked at, at most: some ten turns.
+/// The most azimuths that are used: some ten turns.
 const MAX_AZIMUTHS: usize = 4_000;
 /// Whole turns that are needed.
 const TURNS: usize = 2;
 
-/// What azimuths say of the radar.
+/// The estimate of a radar's configuration.
 #[derive(Clone, Debug, Default)]
-pub struct Guess {
+pub struct ConfigurationEstimate {
     /// The last encoder count.
     last: Option<u16>,
     /// Encoder counts from one azimuth to the next in a turn.
@@ -23,8 +23,8 @@ pub struct Guess {
     azimuths: Option<u16>,
 }
 
-impl Guess {
-    /// Adds what arrived at this time, ns. A message that is damaged tells nothing.
+impl ConfigurationEstimate {
+    /// Adds a message that arrived at this time, ns. A damaged one is ignored.
     pub fn add_message(&mut self, message: &PacketMessage, arrival_ns: i64) {
         match message.azimuth() {
             Ok(Some(azimuth)) => self.add(azimuth.encoder, azimuth.powers.bins(), arrival_ns),
@@ -59,8 +59,8 @@ impl Guess {
         }
     }
 
-    /// Returns the configuration of a radar with so many encoder counts per turn and this depth of a range bin, m; `None` before two whole
-    /// turns.
+    /// Returns the configuration of a radar with so many encoder counts per turn and this depth of
+    /// a range bin, m; `None` before two whole turns.
     pub fn configuration(
         &self,
         encoder_counts: u16,
@@ -86,7 +86,7 @@ impl Guess {
         })
     }
 
-    /// The mean step, without those over azimuths that were lost.
+    /// Returns the mean step, without those over azimuths that were lost.
     fn step(&self) -> Option<f64> {
         let mut sorted = self.steps.clone();
         sorted.sort_unstable();
@@ -103,21 +103,25 @@ mod tests {
     use super::*;
 
     #[test]
-    fn azimuths_tell_their_number_and_the_time_of_a_turn() {
+    fn the_number_of_azimuths_and_the_time_of_a_turn_are_estimated_from_azimuths() {
         for (counts, lost) in [(5600, 0), (5600, 8), (5595, 0), (5595, 31)] {
-            let mut guess = Guess::default();
+            let mut estimate = ConfigurationEstimate::default();
             for azimuth in 0..400 * 4_i64 {
                 if lost > 0 && azimuth % lost == 3 {
                     continue;
                 }
                 let encoder = (azimuth % 400 * counts / 400) as u16;
-                assert_eq!(guess.configuration(counts as u16, 0.04), None, "{azimuth}");
-                guess.add(encoder, 3768, azimuth * 625_000);
+                assert_eq!(
+                    estimate.configuration(counts as u16, 0.04),
+                    None,
+                    "{azimuth}"
+                );
+                estimate.add(encoder, 3768, azimuth * 625_000);
                 if azimuth == 1_200 {
                     break;
                 }
             }
-            let found = guess.configuration(counts as u16, 0.04).unwrap();
+            let found = estimate.configuration(counts as u16, 0.04).unwrap();
             assert_eq!(found.azimuth_samples, 400, "{counts} {lost}");
             assert_eq!(found.range_in_bins, 3768);
             assert_eq!(found.rotation_mhz, 4000);
@@ -126,13 +130,13 @@ mod tests {
     }
 
     #[test]
-    fn turns_tell_their_rows_and_their_time() {
-        let mut guess = Guess::default();
+    fn rows_and_time_are_estimated_from_turns() {
+        let mut estimate = ConfigurationEstimate::default();
         for turn in 0..3 {
-            assert_eq!(guess.configuration(5595, 0.04), None, "{turn}");
-            guess.add_turn(400, 3768, turn * 250_000_000);
+            assert_eq!(estimate.configuration(5595, 0.04), None, "{turn}");
+            estimate.add_turn(400, 3768, turn * 250_000_000);
         }
-        let found = guess.configuration(5595, 0.04).unwrap();
+        let found = estimate.configuration(5595, 0.04).unwrap();
         assert_eq!((found.azimuth_samples, found.range_in_bins), (400, 3768));
         assert_eq!((found.rotation_mhz, found.encoder_size), (4000, 5595));
         found.check().unwrap();
