@@ -56,10 +56,10 @@ fn receive(arguments: &ReceiveArguments) -> Result<ExitCode, Failure> {
     sweep();
     let network = network(&arguments.network);
     let signals = Signals::install()?;
-    let Some(seen) = gyre_link::ask(&network, &signals)? else {
+    let Some(remote) = gyre_link::ask(&network, &signals)? else {
         return Ok(ExitCode::from(INTERRUPTED));
     };
-    let manifest = seen.manifest(out.path());
+    let manifest = remote.manifest(out.path());
     preflight::check_shared_memory(&Footprint::new(&manifest.window, &manifest.limits))?;
     print::note(format_args!(
         "gyre link: the run {} is here as {}",
@@ -72,7 +72,7 @@ fn receive(arguments: &ReceiveArguments) -> Result<ExitCode, Failure> {
         gyre: program::own().to_string_lossy().into_owned(),
         topics: arguments.topics.clone(),
     };
-    let received = gyre_link::receive(&options, seen, &signals)?;
+    let received = gyre_link::receive(&options, remote, &signals)?;
     print::note(format_args!("gyre link: {received}"));
     Ok(match received.is_complete() {
         _ if received.is_interrupted => ExitCode::from(INTERRUPTED),

@@ -1,7 +1,9 @@
-//! The base's side of a split run: in the place of the source and the first stages, which the robot has.
+//! The base's side of a split run: in the place of the source and the first stages, which the robot
+//! has.
 //!
-//! It publishes what the robot's stages have published, from the item of the newest pose on, and lets the robot have the poses, from the
-//! journal, and the motions. The poses are the credit of the robot's source: while the link is cut, it stays away.
+//! It publishes the messages of the robot's stages, from the item of the newest pose on, and sends
+//! the poses, from the journal, and the motions to the robot. The poses are the credit of the
+//! robot's source: while the link is cut, no credit arrives.
 
 use std::{
     collections::VecDeque,
@@ -24,20 +26,21 @@ use zenoh::{
 
 use crate::{
     LinkConfig, LinkError, Side,
-    begin::{self, Agreement, Answer},
+    connection_log::ConnectionLog,
     fetch::{Fetcher, Request},
+    handshake::{self, Agreement, StartAnswer},
+    replay_buffer::{MemoryBuffer, PoseBuffer, PoseLog, ReplayBuffer},
     serve::{Offer, Server},
-    status::Status,
-    tape::{Message, PoseLog, Poses, Ring},
-    wake::Sleeper,
+    waker::Waker,
 };
 
-/// Time, when the run has ended, for the robot to learn that this side has all of it. After 2 s the supervisor ends this process.
-const FAREWELL: Duration = Duration::from_millis(1500);
-/// Time for the last answers to leave.
+/// Time at the end for the robot to learn that this side has all of the run. After 2 s the
+/// supervisor ends this process.
+const END_TIMEOUT: Duration = Duration::from_millis(1500);
+/// Time to send the last answers.
 const LAST_ANSWERS: Duration = Duration::from_millis(300);
-/// Time between two looks whether the robot knows.
-const LOOK: Duration = Duration::from_millis(20);
+/// Time between two checks whether the robot has confirmed the end.
+const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
 /// Runs the base's side until SIGTERM.
 ///
@@ -51,8 +54,8 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let manifest = &launch.manifest;
     let topics = config.cut.topics(manifest.refines, manifest.window.slam);
     let mut stages = FirstStages::open(launch, &topics, config.returns_motions())?;
-    let sleeper = Sleeper::new().map_err(|e| LinkError::zenoh("make a socket", &e))?;
-    let sleep = || Ok(stages.sleep(sleeper.descriptor())?);
+    let waker = Waker::new()?;
+    let sleep = || Ok(stages.sleep(waker.descriptor())?);
     let Some(session) = config.network().open(sleep)? else {
         return Ok(stages.counters());
     };
@@ -64,7 +67,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
         published: None,
         resumed: Item::default(),
         drive: None,
-        sleeper,
+        waker,
         session,
     };
     let worked = base.work();
@@ -76,31 +79,31 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
 struct Base<'a> {
     launch: &'a Launch,
     config: LinkConfig,
-    /// What crosses the link, the cut last.
+    /// The topics that cross the link, the cut last.
     topics: Vec<&'static str>,
     stages: FirstStages<'a>,
     /// The newest item that was published here.
     published: Option<u64>,
     /// The newest pose when this process started.
     resumed: Item,
-    /// The drive of the robot that was last let go on.
+    /// The drive of the robot that was admitted last.
     drive: Option<String>,
     session: Session,
-    sleeper: Sleeper,
+    waker: Waker,
 }
 
-/// What is offered to the robot.
-struct PosesOnOffer {
-    poses: Arc<Poses>,
-    asked: Arc<Offer>,
-    motions: Arc<Ring>,
-    begins: Receiver<Query>,
-    _begin: Queryable<()>,
+/// The topics that are offered to the robot, and its requests to start.
+struct ToRobot {
+    poses: Arc<PoseBuffer>,
+    pose_offer: Arc<Offer>,
+    motions: Arc<MemoryBuffer>,
+    starts: Receiver<Query>,
+    _start: Queryable<()>,
     _server: Server,
 }
 
 /// A topic that comes from the robot.
-struct Coming {
+struct FromRobot {
     fetcher: Fetcher,
     header_bytes: usize,
     messages: VecDeque<RecordedMessage>,
@@ -111,67 +114,68 @@ impl Base<'_> {
         let Some(start) = self.start()? else {
             return Ok(());
         };
-        let offered = self.offer()?;
-        let mut coming = self.fetch(start);
-        let mut status = Status::of("robot");
+        let to_robot = self.offer()?;
+        let mut topics = self.fetch(start);
+        let mut connection = ConnectionLog::of("robot");
         let mut end = None;
         loop {
-            self.sleeper.clear();
+            self.waker.clear();
             self.stages.update()?;
-            self.give_back(&offered)?;
-            for query in offered.begins.try_iter() {
-                let others = coming.iter().any(|topic| topic.fetcher.is_connected());
+            self.offer_new(&to_robot)?;
+            for query in to_robot.starts.try_iter() {
+                let others = topics.iter().any(|topic| topic.fetcher.is_connected());
                 if self.answer(&query, others)? {
-                    coming = self.fetch(self.published.map_or(start, |newest| newest + 1));
+                    topics = self.fetch(self.published.map_or(start, |newest| newest + 1));
                 }
             }
-            coming.iter_mut().try_for_each(Coming::receive)?;
-            while end.is_none() && self.publish(&mut coming, &offered, &mut end)? {}
-            self.confirm(end.as_ref(), &coming);
-            let is_connected = coming.iter().all(|topic| topic.fetcher.is_connected());
-            status.update(is_connected, self.next());
-            if self.stages.sleep(self.sleeper.descriptor())? {
+            topics.iter_mut().try_for_each(FromRobot::receive)?;
+            while end.is_none() && self.publish(&mut topics, &to_robot, &mut end)? {}
+            self.confirm(end.as_ref(), &topics);
+            let is_connected = topics.iter().all(|topic| topic.fetcher.is_connected());
+            connection.update(is_connected, self.next());
+            if self.stages.sleep(self.waker.descriptor())? {
                 break;
             }
         }
         self.stages.update()?;
         if let Some(end) = end.filter(|_| self.stages.has_ended()) {
-            self.say_farewell(&end, &coming);
+            self.await_confirmation(&end, &topics);
         }
         Ok(())
     }
 
-    /// Waits until the robot knows that all of the run is here, without which it would wait for that.
-    fn say_farewell(&self, end: &Item, coming: &[Coming]) {
+    /// Waits until the robot knows that all of the run is here: it waits for that to end.
+    fn await_confirmation(&self, end: &Item, topics: &[FromRobot]) {
         let next = end.seq.saturating_add(1);
         let since = Instant::now();
-        let is_confirmed = |topic: &Coming| topic.fetcher.is_confirmed(next);
-        while !coming.iter().all(is_confirmed) {
-            if since.elapsed() > FAREWELL {
+        let is_confirmed = |topic: &FromRobot| topic.fetcher.is_confirmed(next);
+        while !topics.iter().all(is_confirmed) {
+            if since.elapsed() > END_TIMEOUT {
                 tracing::warn!(
                     "the robot is out of reach at the end, and waits for this side: it has all poses, and ends by Ctrl-C"
                 );
                 return;
             }
-            self.confirm(Some(end), coming);
-            thread::sleep(LOOK);
+            self.confirm(Some(end), topics);
+            thread::sleep(POLL_INTERVAL);
         }
         thread::sleep(LAST_ANSWERS);
     }
 
-    /// Lets the robot know that this side has the end in its journal.
-    fn confirm(&self, end: Option<&Item>, coming: &[Coming]) {
+    /// Confirms to the robot that this side has the end in its journal.
+    fn confirm(&self, end: Option<&Item>, topics: &[FromRobot]) {
         if let Some(end) = end.filter(|_| self.stages.has_ended()) {
             let next = end.seq.saturating_add(1);
-            coming.iter().for_each(|topic| topic.fetcher.confirm(next));
+            topics.iter().for_each(|topic| topic.fetcher.confirm(next));
         }
     }
 
-    /// Waits until pose-integration has told the newest pose; returns the first item that the stages need. `None` on a request to stop.
+    /// Waits until pose-integration has published the newest pose; returns the first item that the
+    /// stages need. `None` on a request to stop.
     fn start(&mut self) -> Result<Option<u64>, LinkError> {
         loop {
             // Sleep first, as the source of scans does.
-            if self.stages.sleep(self.sleeper.descriptor())? {
+            if self.stages.sleep(self.waker.descriptor())? {
                 return Ok(None);
             }
             self.stages.update()?;
@@ -192,52 +196,52 @@ impl Base<'_> {
         }
     }
 
-    fn offer(&self) -> Result<PosesOnOffer, LinkError> {
+    fn offer(&self) -> Result<ToRobot, LinkError> {
         let manifest = &self.launch.manifest;
-        let prefix = begin::prefix(&self.config, Side::Base);
-        let mut server = Server::new(&self.session, &prefix, Some(self.sleeper.waker()));
-        let poses = Arc::new(Poses::of(PoseLog::of(&manifest.out)));
-        let motions = Arc::new(Ring::of(Motion::sizes(&manifest.window).buffer));
-        let (sender, begins) = channel();
-        let waker = self.sleeper.waker();
-        let begin = self
+        let prefix = handshake::prefix(&self.config, Side::Base);
+        let mut server = Server::new(&self.session, &prefix, Some(self.waker.clone()));
+        let poses = Arc::new(PoseBuffer::of(PoseLog::of(&manifest.out)));
+        let motions = Arc::new(MemoryBuffer::of(Motion::sizes(&manifest.window).buffer));
+        let (sender, starts) = channel();
+        let waker = self.waker.clone();
+        let start = self
             .session
-            .declare_queryable(begin::key(&self.config))
+            .declare_queryable(handshake::start_key(&self.config))
             .callback(move |query| {
                 let _ = sender.send(query);
                 waker.wake();
             })
             .wait()
             .map_err(|e| LinkError::zenoh("wait for the robot", &e))?;
-        let asked = server.offer(Pose::TOPIC, poses.clone())?;
+        let pose_offer = server.offer(Pose::TOPIC, poses.clone())?;
         server.offer(Motion::TOPIC, motions.clone())?;
-        Ok(PosesOnOffer {
+        Ok(ToRobot {
             poses,
-            asked,
+            pose_offer,
             motions,
-            begins,
-            _begin: begin,
+            starts,
+            _start: start,
             _server: server,
         })
     }
 
-    /// Asks the robot for all items from one on.
-    fn fetch(&self, from: u64) -> Vec<Coming> {
-        let prefix = begin::prefix(&self.config, Side::Robot);
-        let coming = self.topics.iter().map(|name| {
+    /// Requests all items from one on of the robot.
+    fn fetch(&self, from: u64) -> Vec<FromRobot> {
+        let prefix = handshake::prefix(&self.config, Side::Robot);
+        let topics = self.topics.iter().map(|name| {
             let request = Request {
                 key: format!("{prefix}/{name}"),
                 from,
                 receiver: self.session.zid().to_string(),
                 priority: Priority::Data,
             };
-            Coming {
-                fetcher: Fetcher::start(&self.session, request, self.sleeper.waker()),
+            FromRobot {
+                fetcher: Fetcher::start(&self.session, request, self.waker.clone()),
                 header_bytes: topic(name).map_or(0, |topic| topic.header.bytes),
                 messages: VecDeque::new(),
             }
         });
-        coming.collect()
+        topics.collect()
     }
 
     /// Returns the number of the item that is published next.
@@ -248,19 +252,19 @@ impl Base<'_> {
     }
 
     /// Offers the new poses and motions.
-    fn give_back(&mut self, offered: &PosesOnOffer) -> Result<(), LinkError> {
+    fn offer_new(&mut self, to_robot: &ToRobot) -> Result<(), LinkError> {
         let resumed = (!self.resumed.is(flag::BASE)).then_some(self.resumed.seq);
         let newest = self.stages.newest_pose().max(resumed);
-        offered
+        to_robot
             .poses
-            .have_come(newest.map_or(0, |newest| newest.saturating_add(1)));
+            .set_published(newest.map_or(0, |newest| newest.saturating_add(1)));
         while let Some(motion) = self.stages.next_motion()? {
-            offered.motions.push(Message::of(&motion));
+            to_robot.motions.add(&motion);
         }
         Ok(())
     }
 
-    /// Answers a robot that starts; true if it goes on from here.
+    /// Answers a robot that starts; true if it is admitted.
     fn answer(&mut self, query: &Query, another_is_there: bool) -> Result<bool, LinkError> {
         let ours = Agreement::of(&self.launch.manifest, &self.config, &self.topics);
         let bytes = query
@@ -270,48 +274,47 @@ impl Base<'_> {
         let drive = theirs.as_ref().ok().and_then(|theirs| theirs.drive.clone());
         let is_other = self.drive.is_some() && drive != self.drive && self.next() > 0;
         let answer = match theirs.map(|theirs| ours.difference(&theirs)) {
-            Err(_) => Answer::Refused(
-                "the base is another version of gyre: install the same on both".to_owned(),
-            ),
-            Ok(Some(difference)) => Answer::Refused(difference),
-            Ok(None) if is_other => Answer::Refused(
+            Err(_) => StartAnswer::Refused(LinkError::other_version("the base").to_string()),
+            Ok(Some(difference)) => StartAnswer::Refused(difference),
+            Ok(None) if is_other => StartAnswer::Refused(
                 "the base has poses of another drive: begin both anew with --fresh".to_owned(),
             ),
-            Ok(None) if another_is_there => Answer::Wait(
+            Ok(None) if another_is_there => StartAnswer::Wait(
                 "another robot is on this link, or was a moment ago: each has a name of its own (link.name)".to_owned(),
             ),
-            Ok(None) => Answer::Go(self.next().checked_sub(1)),
+            Ok(None) => StartAnswer::Go(self.next().checked_sub(1)),
         };
-        if let Answer::Refused(why) = &answer {
+        if let StartAnswer::Refused(why) = &answer {
             tracing::warn!("a robot was refused: {why}");
         }
         let text = serde_json::to_vec(&answer).map_err(|e| LinkError::zenoh("answer", &e))?;
-        let replied = query.reply(begin::key(&self.config), text).wait();
-        let goes_on = replied.is_ok() && matches!(answer, Answer::Go(_));
-        if goes_on {
+        let replied = query.reply(handshake::start_key(&self.config), text).wait();
+        let is_admitted = replied.is_ok() && matches!(answer, StartAnswer::Go(_));
+        if is_admitted {
             self.drive = drive;
         }
-        Ok(goes_on)
+        Ok(is_admitted)
     }
 
-    /// Publishes the next item if all of it has come; returns whether it has.
+    /// Publishes the next item if all of it has arrived; returns whether it has.
     fn publish(
         &mut self,
-        coming: &mut [Coming],
-        offered: &PosesOnOffer,
+        topics: &mut [FromRobot],
+        to_robot: &ToRobot,
         end: &mut Option<Item>,
     ) -> Result<bool, LinkError> {
-        let items = coming.iter().map(|topic| topic.messages.front()?.item());
+        let items = topics.iter().map(|topic| topic.messages.front()?.item());
         let Some(items) = items.collect::<Option<Vec<Item>>>() else {
             return Ok(false);
         };
         let Some(item) = items.iter().min_by_key(|item| item.seq).copied() else {
             return Ok(false);
         };
-        self.judge(&item, &items)?;
+        self.check_next(&item, &items)?;
         if item.is(flag::END) {
-            // This side ends when the robot has all poses, and the robot when this side has journalled the end.
-            if offered.asked.asked() < item.seq {
+            // This side ends when the robot has all poses, and the robot when this side has
+            // journalled the end.
+            if to_robot.pose_offer.asked() < item.seq {
                 return Ok(false);
             }
             self.stages.end(item)?;
@@ -321,18 +324,16 @@ impl Base<'_> {
         if !self.stages.admits(item.seq) {
             return Ok(false);
         }
-        let messages: Vec<_> = coming
-            .iter_mut()
-            .map(|topic| topic.take(item.seq))
-            .collect();
-        self.stages.publish(&messages, item.seq)?;
+        let messages = topics.iter_mut().map(|topic| topic.take(item.seq));
+        self.stages
+            .publish(&messages.collect::<Vec<_>>(), item.seq)?;
         self.published = Some(item.seq);
         Ok(true)
     }
 
-    /// Checks that the next item follows what was published, and is of the same drive. After a start it may be there to begin with alone, and
-    /// then some of the topics need not have it.
-    fn judge(&self, item: &Item, all: &[Item]) -> Result<(), LinkError> {
+    /// Checks that the next item follows the published ones, and is of the same drive. After a
+    /// start some topics may lack an item that was published before.
+    fn check_next(&self, item: &Item, all: &[Item]) -> Result<(), LinkError> {
         let begins = self.published.is_none() && item.seq < self.next();
         let is_whole = all.iter().all(|other| other.seq == item.seq);
         let follows = is_whole && item.seq == self.next();
@@ -354,8 +355,8 @@ impl Base<'_> {
     }
 }
 
-impl Coming {
-    /// Takes the message about an item, if it has come.
+impl FromRobot {
+    /// Takes the message about an item, if it has arrived.
     fn take(&mut self, seq: u64) -> Option<RecordedMessage> {
         let first = self.messages.front()?.item();
         first
@@ -364,15 +365,8 @@ impl Coming {
     }
 
     fn receive(&mut self) -> Result<(), LinkError> {
-        while let Some(bytes) = self.fetcher.next() {
-            let Some((header, payload)) = bytes.split_at_checked(self.header_bytes) else {
-                let reason = format!("a message of {} bytes is too short", bytes.len());
-                return Err(LinkError::Refused(reason));
-            };
-            self.messages.push_back(RecordedMessage {
-                header: header.to_vec(),
-                payload: payload.to_vec(),
-            });
+        while let Some(message) = self.fetcher.next_with_payload(self.header_bytes)? {
+            self.messages.push_back(message);
         }
         Ok(())
     }

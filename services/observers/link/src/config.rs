@@ -21,15 +21,17 @@ pub enum Side {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct LinkConfig {
-    /// The side that this machine has: `robot`, with the source and the stages up to the cut, or `base`, with those after it. Default: the run is
-    /// not split.
+    /// The side that this machine has: `robot`, with the source and the stages up to the cut, or
+    /// `base`, with those after it. Default: the run is not split.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub side: Option<Side>,
-    /// Topic at which the run is split: `scan`, `masked`, `rotation`, `motion` or `refined`. The stage that publishes it is the last one on the robot.
+    /// Topic at which the run is split: `scan`, `masked`, `rotation`, `motion` or `refined`. The
+    /// stage that publishes it is the last one on the robot.
     pub cut: PlayedFrom,
     /// Name of the link, the same on both sides, and another one for each robot.
     pub name: String,
-    /// Where this side waits for the other, as in `tls/0.0.0.0:7447`; `tcp/` on loopback addresses alone.
+    /// Where this side waits for the other, as in `tls/0.0.0.0:7447`; `tcp/` on loopback addresses
+    /// alone.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub listen: Vec<String>,
     /// Where this side reaches the other, or a router between them, as in `tls/base.internal:7447`.
@@ -44,7 +46,8 @@ pub struct LinkConfig {
     /// Private key of the certificate, PEM.
     #[serde(skip_serializing_if = "is_empty")]
     pub key: PathBuf,
-    /// Whether a robot sends masked scans beside a later cut: the keyframes of SLAM need them. Set by `slam.kind`.
+    /// True if a robot sends masked scans beside a later cut: the keyframes of SLAM need them. Set
+    /// by `slam.kind`.
     #[serde(skip_serializing_if = "is_false")]
     pub keyframes: bool,
 }
@@ -74,7 +77,7 @@ impl Default for LinkConfig {
 }
 
 impl LinkConfig {
-    /// Returns how the other side is reached.
+    /// Returns the endpoints and certificates.
     pub fn network(&self) -> Network {
         Network {
             name: self.name.clone(),
@@ -86,7 +89,8 @@ impl LinkConfig {
         }
     }
 
-    /// Returns whether motions go back to masking, which is before the cut, from the searches, which are behind it.
+    /// Returns whether motions go back to masking, which is before the cut, from the searches,
+    /// which are behind it.
     pub fn returns_motions(&self) -> bool {
         matches!(self.cut, PlayedFrom::Masked | PlayedFrom::Rotation)
     }

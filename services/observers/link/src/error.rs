@@ -9,13 +9,13 @@ use thiserror::Error;
 
 use crate::NetworkError;
 
-/// Why a link fails. What a restart of its process may help against is told from what it would not.
+/// A failure of a link, by whether a restart of its process may help.
 #[derive(Debug, Error)]
 pub enum LinkError {
-    /// The endpoints or the certificates.
+    /// The endpoints or the certificates cannot be used.
     #[error("link: {0}")]
     Network(#[from] NetworkError),
-    /// The network layer.
+    /// The network layer fails.
     #[error("cannot {action}: {reason}")]
     Zenoh {
         /// The operation.
@@ -35,7 +35,7 @@ pub enum LinkError {
     /// The journal cannot be read or written.
     #[error(transparent)]
     Journal(#[from] JournalError),
-    /// A file.
+    /// A file cannot be read or written.
     #[error("{path}: {source}")]
     File {
         /// The file.
@@ -46,9 +46,16 @@ pub enum LinkError {
 }
 
 impl LinkError {
+    /// Creates the error for a side of another version.
+    pub(crate) fn other_version(other: &str) -> Self {
+        Self::Refused(format!(
+            "{other} is another version of gyre: install the same on both"
+        ))
+    }
+
     /// Creates an error of the network layer.
     pub(crate) fn zenoh(action: &str, error: &dyn std::fmt::Display) -> Self {
-        // It adds the place in its sources.
+        // zenoh appends the place in its sources.
         let text = error.to_string();
         let reason = text.split(" at /").next().unwrap_or_default().to_owned();
         Self::Zenoh {

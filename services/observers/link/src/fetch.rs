@@ -1,4 +1,4 @@
-//! The end of a topic that receives: asks for all messages from one on, and again after each cut.
+//! The receiving end of a topic: requests all messages from one on, and again after each cut.
 
 use std::{
     sync::{
@@ -11,6 +11,7 @@ use std::{
 };
 
 use gyre_messages::{Item, flag};
+use gyre_stage::source::RecordedMessage;
 use zenoh::{
     Session, Wait,
     qos::{CongestionControl, Priority},
@@ -18,25 +19,26 @@ use zenoh::{
 };
 
 use crate::{
-    serve::{ANSWERED_FOR, DONE, ENDED, FROM, RECEIVER},
-    wake::Waker,
+    LinkError,
+    serve::{DONE, ENDED, FROM, RECEIVER, REQUEST_LIFETIME},
+    waker::Waker,
 };
 
-/// Time after which a request that nobody has ended is made again.
-const GIVEN_UP: Duration = ANSWERED_FOR.saturating_add(Duration::from_secs(10));
-/// The same for one that is not answered, and for one whose answers cease: a request can be lost at the moment of a cut, without an end. A scan
-/// may take seconds on a slow network.
-const UNANSWERED: Duration = Duration::from_secs(3);
-const SILENT: Duration = Duration::from_secs(12);
-/// Time for the answer to the word that nothing more is wanted, and how often it is said.
-const DONE_ANSWER: Duration = Duration::from_secs(1);
-const DONE_TIMES: usize = 3;
-/// Time between two looks whether to go on.
-const LOOK: Duration = Duration::from_millis(200);
-/// Pauses between requests that nobody has answered, from the first to the longest.
+/// Time after which a request that has not ended is repeated.
+const REQUEST_TIMEOUT: Duration = REQUEST_LIFETIME.saturating_add(Duration::from_secs(10));
+/// The same for a request without an answer, and for one whose answers cease: a cut can lose a
+/// request without an end. A scan may take seconds on a slow network.
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(3);
+const SILENCE_TIMEOUT: Duration = Duration::from_secs(12);
+/// Time for the answer to the message that nothing more is wanted, and the number of attempts.
+const DONE_TIMEOUT: Duration = Duration::from_secs(1);
+const DONE_ATTEMPTS: usize = 3;
+/// Time between two checks whether to continue.
+const POLL_INTERVAL: Duration = Duration::from_millis(200);
+/// Pauses between unanswered requests, from the first to the longest.
 const PAUSES: (Duration, Duration) = (Duration::from_millis(50), Duration::from_secs(1));
 
-/// A topic that is being received, by a thread.
+/// A topic that a thread receives.
 pub(crate) struct Fetcher {
     messages: Receiver<Vec<u8>>,
     state: Arc<State>,
@@ -45,28 +47,29 @@ pub(crate) struct Fetcher {
 
 struct State {
     stop: AtomicBool,
-    /// Whether to say to the sender, at the stop, that nothing more is wanted.
+    /// True if the thread tells the sender, at the stop, that nothing more is wanted.
     leaves: AtomicBool,
+    /// True if the thread requests again, from `confirmed` on.
     again: AtomicBool,
     is_connected: AtomicBool,
     has_ended: AtomicBool,
     /// The first message of the newest request.
-    asked: AtomicU64,
+    requested: AtomicU64,
     /// The first message of the newest request that was answered.
     answered: AtomicU64,
     /// The first message of those to come: see [`Fetcher::confirm`].
     confirmed: AtomicU64,
 }
 
-/// What is asked for.
+/// A request for the messages of a topic.
 pub(crate) struct Request {
     /// The key of the topic.
     pub key: String,
     /// The first message.
     pub from: u64,
-    /// What tells this receiver from others, and is the same when it begins again.
+    /// The identity of this receiver, the same after its restart.
     pub receiver: String,
-    /// Poses go before scans.
+    /// The priority: poses go before scans.
     pub priority: Priority,
 }
 
@@ -80,11 +83,11 @@ impl Fetcher {
             again: AtomicBool::new(false),
             is_connected: AtomicBool::new(false),
             has_ended: AtomicBool::new(false),
-            asked: AtomicU64::new(request.from),
+            requested: AtomicU64::new(request.from),
             answered: AtomicU64::new(0),
             confirmed: AtomicU64::new(request.from),
         });
-        let asking = Asking {
+        let requests = RequestLoop {
             session: session.clone(),
             request,
             sender,
@@ -95,20 +98,40 @@ impl Fetcher {
         Self {
             messages,
             state,
-            thread: Some(thread::spawn(move || asking.run())),
+            thread: Some(thread::spawn(move || requests.run())),
         }
     }
 
-    /// Returns the next message that has come.
+    /// Returns the next message that has arrived.
     pub fn next(&self) -> Option<Vec<u8>> {
         self.messages.try_recv().ok()
     }
 
-    /// Tells the other side that all before message `next` has arrived, by asking from there. The end of a stream is asked for again until
-    /// it is confirmed.
+    /// Returns the next message that has arrived, as its header of so many bytes and its payload.
+    pub fn next_with_payload(
+        &self,
+        header_bytes: usize,
+    ) -> Result<Option<RecordedMessage>, LinkError> {
+        let Some(bytes) = self.next() else {
+            return Ok(None);
+        };
+        match bytes.split_at_checked(header_bytes) {
+            Some((header, payload)) => Ok(Some(RecordedMessage {
+                header: header.to_vec(),
+                payload: payload.to_vec(),
+            })),
+            None => {
+                let reason = format!("a message of {} bytes is too short", bytes.len());
+                Err(LinkError::Refused(reason))
+            }
+        }
+    }
+
+    /// Confirms to the other side that all before message `next` has arrived, by a request from
+    /// there. The end of a stream is requested again until it is confirmed.
     pub fn confirm(&self, next: u64) {
         self.state.confirmed.fetch_max(next, Ordering::Relaxed);
-        if self.state.asked.load(Ordering::Relaxed) < next {
+        if self.state.requested.load(Ordering::Relaxed) < next {
             self.state.again.store(true, Ordering::Relaxed);
         }
     }
@@ -118,22 +141,23 @@ impl Fetcher {
         self.state.answered.load(Ordering::Relaxed) >= next
     }
 
-    /// Has the other side told that nothing more is wanted, if it can be reached.
+    /// Begins to tell the other side that nothing more is wanted, if it can be reached.
     pub fn begin_to_leave(&self) {
         self.state.leaves.store(true, Ordering::Relaxed);
         self.state.stop.store(true, Ordering::Relaxed);
     }
 
-    /// Tells the other side that nothing more is wanted, and waits until it knows or cannot be reached.
+    /// Tells the other side that nothing more is wanted, and waits until it knows or cannot be
+    /// reached.
     pub fn leave(mut self) {
         self.begin_to_leave();
         if let Some(thread) = self.thread.take() {
-            // It does not panic.
+            // The thread does not panic.
             let _ = thread.join();
         }
     }
 
-    /// Returns whether no message follows those that have come.
+    /// Returns whether no message follows those that have arrived.
     pub fn has_ended(&self) -> bool {
         self.state.has_ended.load(Ordering::Acquire)
     }
@@ -150,21 +174,22 @@ impl Drop for Fetcher {
     }
 }
 
-struct Asking {
+/// The requests of a thread, one after the other.
+struct RequestLoop {
     session: Session,
     request: Request,
     sender: Sender<Vec<u8>>,
     waker: Waker,
-    /// Whether the end of the stream has come.
+    /// True once the end of the stream has arrived.
     has_end: bool,
     state: Arc<State>,
 }
 
-impl Asking {
+impl RequestLoop {
     fn run(mut self) {
         let mut pause = PAUSES.0;
         while !self.has_stopped() {
-            match self.ask() {
+            match self.request() {
                 true => pause = PAUSES.0,
                 false => {
                     self.set_connected(false);
@@ -173,18 +198,18 @@ impl Asking {
                 }
             }
         }
-        let has_said = self.state.has_ended.load(Ordering::Relaxed);
-        if self.state.leaves.load(Ordering::Relaxed) && !has_said {
-            self.say_done();
+        let has_ended = self.state.has_ended.load(Ordering::Relaxed);
+        if self.state.leaves.load(Ordering::Relaxed) && !has_ended {
+            self.send_done();
         }
     }
 
     /// Tells the sender that nothing more is wanted, so that it need not wait for this receiver.
-    fn say_done(&self) {
+    fn send_done(&self) {
         let Request { key, receiver, .. } = &self.request;
-        for _ in 0..DONE_TIMES {
+        for _ in 0..DONE_ATTEMPTS {
             let selector = format!("{key}?{DONE}=1;{RECEIVER}={receiver}");
-            let asked = self.session.get(selector).timeout(DONE_ANSWER).wait();
+            let asked = self.session.get(selector).timeout(DONE_TIMEOUT).wait();
             let answer = asked.ok().and_then(|answers| answers.recv().ok());
             if answer.is_some_and(|answer| answer.into_result().is_err_and(|it| is_end(&it))) {
                 return;
@@ -192,9 +217,9 @@ impl Asking {
         }
     }
 
-    /// Asks once, and takes the answers until they end; returns whether there were any.
-    fn ask(&mut self) -> bool {
-        // Before the number is read: what is confirmed after that is asked for again.
+    /// Sends one request, and takes the answers until they end; returns whether there were any.
+    fn request(&mut self) -> bool {
+        // Before the number is read: what is confirmed after that is requested again.
         self.state.again.store(false, Ordering::Relaxed);
         let confirmed = self.state.confirmed.load(Ordering::Relaxed);
         self.request.from = self.request.from.max(confirmed);
@@ -211,23 +236,26 @@ impl Asking {
             .consolidation(ConsolidationMode::None)
             .congestion_control(CongestionControl::Block)
             .priority(*priority)
-            .timeout(GIVEN_UP)
+            .timeout(REQUEST_TIMEOUT)
             .wait();
         let Ok(replies) = asked else {
             return false;
         };
         let mut was_answered = false;
-        self.state.asked.store(*from, Ordering::Relaxed);
-        let mut heard = Instant::now();
+        self.state.requested.store(*from, Ordering::Relaxed);
+        let mut last_answer = Instant::now();
         loop {
-            match replies.recv_timeout(LOOK) {
+            match replies.recv_timeout(POLL_INTERVAL) {
                 Ok(Some(reply)) => {
                     was_answered |= self.take(reply);
-                    heard = Instant::now();
+                    last_answer = Instant::now();
                 }
                 Ok(None) => {
-                    let limit = if was_answered { SILENT } else { UNANSWERED };
-                    if heard.elapsed() > limit {
+                    let limit = match was_answered {
+                        true => SILENCE_TIMEOUT,
+                        false => ANSWER_TIMEOUT,
+                    };
+                    if last_answer.elapsed() > limit {
                         return false;
                     }
                 }
@@ -239,13 +267,13 @@ impl Asking {
         }
     }
 
-    /// Takes an answer; false if it is none.
+    /// Takes an answer; false if it is an error.
     fn take(&mut self, reply: Reply) -> bool {
         let sample = match reply.into_result() {
             Ok(sample) => sample,
             Err(error) => {
                 if is_end(&error) {
-                    self.say_done();
+                    self.send_done();
                     self.state.has_ended.store(true, Ordering::Release);
                     self.state.stop.store(true, Ordering::Relaxed);
                     self.waker.wake();
@@ -254,8 +282,8 @@ impl Asking {
             }
         };
         self.set_connected(true);
-        let asked = self.state.asked.load(Ordering::Relaxed);
-        self.state.answered.store(asked, Ordering::Relaxed);
+        let requested = self.state.requested.load(Ordering::Relaxed);
+        self.state.answered.store(requested, Ordering::Relaxed);
         let bytes = sample.payload().to_bytes().into_owned();
         // The first answer is empty.
         let item = bytes.get(..size_of::<Item>());
@@ -273,7 +301,7 @@ impl Asking {
         true
     }
 
-    /// What was asked for twice may come twice.
+    /// Returns whether a message is new: what was requested twice may arrive twice.
     fn is_new(&self, item: &Item) -> bool {
         item.seq >= self.request.from && !(self.has_end && item.is(flag::END))
     }
@@ -294,7 +322,7 @@ impl Asking {
     }
 }
 
-/// Returns whether an answer says that no message follows; others are of the network layer.
+/// Returns whether an error says that no message follows; others are of the network layer.
 fn is_end(error: &ReplyError) -> bool {
     *error.payload().to_bytes() == *ENDED.as_bytes()
 }

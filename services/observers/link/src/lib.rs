@@ -1,14 +1,18 @@
 //! The topics of a run on another machine, over [zenoh](https://zenoh.io).
 //!
-//! Two things are built on it: a run that is split between two machines (`robot` has the first stages and `base` the last ones), and
-//! looking on from another machine (`send` observes a run, `receive` publishes what comes as a run of its own).
+//! Two things are built on it: a run that is split between two machines (`robot` has the first
+//! stages and `base` the last ones), and a copy of a run on another machine (`send` observes a run,
+//! `receive` publishes the messages that arrive as a run of its own).
 //!
-//! The receiver asks: a request names a topic and the first message that is wanted, and is answered by that message and all that
-//! follow, as they come. After a cut it asks again from where it is. So a message that is still there is neither lost nor doubled, and
-//! the sender keeps no state of a receiver. What is still there depends on the topic: see `tape`.
+//! The receiver asks: a request names a topic and the first message that is wanted, and is answered
+//! by that message and all that follow, as they come. After a cut the receiver asks again from
+//! where it is. So a message that is still there is neither lost nor doubled, and the sender keeps
+//! no state of a receiver. The messages that are still there depend on the topic: see
+//! `replay_buffer`.
 //!
-//! Reading order: [`config`], `network` (who may connect, and how), `tape` (what is kept to be sent), `serve` and `fetch` (the two ends of
-//! a topic), then `robot` and `base`, then `send` and `receive`.
+//! Reading order: [`config`], `network` and `session` (endpoints and certificates), `replay_buffer`
+//! (the messages that can be sent), `serve` and `fetch` (the two ends of a topic), `handshake` with
+//! `robot` and `base`, then `send` and `receive`.
 
 pub mod config;
 mod network;
@@ -16,15 +20,19 @@ mod network;
 #[cfg(feature = "zenoh")]
 mod base;
 #[cfg(feature = "zenoh")]
-mod begin;
+mod connection_log;
 #[cfg(feature = "zenoh")]
 mod error;
 #[cfg(feature = "zenoh")]
 mod fetch;
 #[cfg(feature = "zenoh")]
-mod observing;
+mod handshake;
 #[cfg(feature = "zenoh")]
 mod receive;
+#[cfg(feature = "zenoh")]
+mod replay_buffer;
+#[cfg(feature = "zenoh")]
+mod request;
 #[cfg(feature = "zenoh")]
 mod robot;
 #[cfg(feature = "zenoh")]
@@ -32,13 +40,13 @@ mod send;
 #[cfg(feature = "zenoh")]
 mod serve;
 #[cfg(feature = "zenoh")]
-mod status;
-#[cfg(feature = "zenoh")]
-mod tape;
+mod session;
 #[cfg(all(test, feature = "zenoh"))]
 mod tests;
 #[cfg(feature = "zenoh")]
-mod wake;
+mod topic_observer;
+#[cfg(feature = "zenoh")]
+mod waker;
 
 pub use config::{LinkConfig, Side};
 pub use network::{Network, NetworkError, ONE_THREAD};
@@ -46,9 +54,9 @@ pub use network::{Network, NetworkError, ONE_THREAD};
 #[cfg(feature = "zenoh")]
 pub use base::run as run_base;
 #[cfg(feature = "zenoh")]
-pub use begin::{Scans, ask_robot};
-#[cfg(feature = "zenoh")]
 pub use error::LinkError;
+#[cfg(feature = "zenoh")]
+pub use handshake::{ScanSize, ask_robot};
 #[cfg(feature = "zenoh")]
 pub use receive::{ReceiveOptions, Received, ask, receive};
 #[cfg(feature = "zenoh")]

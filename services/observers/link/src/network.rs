@@ -1,19 +1,20 @@
-//! Who may connect, and how: plain on this machine, else by TLS with certificates of both sides.
+//! Endpoints and certificates: plain TCP on this machine, else TLS with certificates of both sides.
 
 use std::{net::IpAddr, path::PathBuf};
 
 use thiserror::Error;
 
-/// The environment variable, and its value, with which the network layer does all its work in one thread.
+/// The environment variable, and its value, with which zenoh does all its work in one thread.
 ///
-/// By itself zenoh (1.10) reads from and writes to a TLS connection in two threads at once, which the connection does not allow
-/// (eclipse-zenoh/zenoh#2557): under load it breaks within seconds. Set it before the program starts; TLS is refused without.
+/// By itself zenoh (1.10) reads from and writes to a TLS connection in two threads at once, which
+/// the connection does not allow (eclipse-zenoh/zenoh#2557): under load it breaks within seconds.
+/// Set it before the program starts; TLS is refused without.
 pub const ONE_THREAD: (&str, &str) = (
     "ZENOH_RUNTIME",
     "(rx:(handover:app),tx:(handover:app),acc:(handover:app),net:(handover:app),app:(worker_threads:1))",
 );
 
-/// How one side reaches the other.
+/// The endpoints and certificates of one side.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Network {
     /// The name of the link, the same on both sides.
@@ -30,53 +31,53 @@ pub struct Network {
     pub key: PathBuf,
 }
 
-/// Why a link cannot be made.
+/// A network that cannot be used.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum NetworkError {
-    /// Nothing to connect.
+    /// No endpoint is given.
     #[error(
         "no endpoint is named: give one side `listen`, as in tls/0.0.0.0:7447, and the other `connect`, as in tls/base.internal:7447"
     )]
     NoEndpoint,
-    /// Not an endpoint.
+    /// The text is no endpoint.
     #[error("`{0}` is no endpoint: it is tls/HOST:PORT, or on this machine tcp/127.0.0.1:PORT")]
     Malformed(String),
-    /// Plain text on a network.
+    /// The endpoint is plain text on a network.
     #[error(
         "{0} would leave this machine unencrypted, and anybody could connect: use tls/ with certificates (docs/link.md); tcp/ is for loopback addresses alone"
     )]
     Plain(String),
-    /// TLS without a certificate.
+    /// The endpoint needs a certificate.
     #[error(
         "{endpoint} needs {what}: both sides show a certificate that the same authority has signed (docs/link.md has the recipe)"
     )]
     NoCertificate {
         /// The endpoint.
         endpoint: String,
-        /// What is missing.
+        /// The missing file.
         what: &'static str,
     },
-    /// A file that is named is not there.
+    /// A file cannot be read.
     #[error("{what} {path} cannot be read: {reason}")]
     File {
-        /// What it is.
+        /// The kind of the file.
         what: &'static str,
         /// The file.
         path: PathBuf,
         /// The system's reason.
         reason: String,
     },
-    /// A host for which a public authority might sign a certificate of somebody else.
+    /// A public authority might certify the host for somebody else.
     #[error(
         "{0} has a public name or address, for which others can obtain a publicly trusted certificate: connect to a private address, or to a name within `.internal` (in /etc/hosts, and in the certificate)"
     )]
     Public(String),
-    /// A name that cannot be part of a key.
+    /// The name of the link cannot be part of a key.
     #[error("`{0}` is no name of a link: it has letters, digits, `-` and `_`")]
     Name(String),
 }
 
-/// The ends of names that no public authority certifies: private zones, and those of documents.
+/// The suffixes of names that no public authority certifies: private zones, and those of documents.
 const PRIVATE_ZONES: [&str; 7] = [
     ".internal",
     ".lan",
@@ -112,7 +113,8 @@ impl Network {
             Protocol::Tcp => Ok(()),
             Protocol::Tls => self.check_certificates(endpoint),
         })?;
-        // A side that connects also believes the public authorities (zenoh adds `ca` to them), whose certificates others can have.
+        // A side that connects also trusts the public authorities (zenoh adds `ca` to them), whose
+        // certificates others can have.
         match self.connect.iter().find(|endpoint| is_public(endpoint)) {
             Some(endpoint) => Err(NetworkError::Public(endpoint.clone())),
             None => Ok(()),
@@ -149,7 +151,7 @@ impl Network {
 fn protocol(endpoint: &str) -> Result<Protocol, NetworkError> {
     let malformed = || NetworkError::Malformed(endpoint.to_owned());
     let (protocol, address) = endpoint.split_once('/').ok_or_else(malformed)?;
-    // Behind these signs zenoh would read settings of its own, certificates among them.
+    // After these characters zenoh reads settings of its own, certificates among them.
     if address.contains(['#', '?', ';', '/']) {
         return Err(malformed());
     }
@@ -171,7 +173,7 @@ fn is_public(endpoint: &str) -> bool {
     let host = address.rsplit_once(':').map_or(address, |(host, _)| host);
     match host.trim_matches(['[', ']']).parse::<IpAddr>() {
         Ok(IpAddr::V4(it)) => {
-            // 100.64.0.0/10 is of networks behind a provider, as of most private overlays.
+            // 100.64.0.0/10: networks behind a provider, and most private overlays.
             let is_shared = it.octets()[0] == 100 && (64..128).contains(&it.octets()[1]);
             !(it.is_private() || it.is_loopback() || it.is_link_local() || is_shared)
         }
@@ -192,113 +194,6 @@ fn is_loopback(host: &str) -> bool {
         .map(|address| address.is_loopback());
     // A name could be resolved to any address.
     loopback.unwrap_or(false)
-}
-
-#[cfg(feature = "zenoh")]
-mod open {
-    use std::{
-        path::Path,
-        sync::mpsc::{TryRecvError, channel},
-        thread,
-    };
-
-    use serde_json::{Value, json};
-    use zenoh::{Config, Session, Wait};
-
-    use super::{Network, ONE_THREAD};
-    use crate::LinkError;
-
-    /// Time without a sign of life after which a connection is given up, ms. A robot drives on meanwhile, and what is sent waits.
-    const LEASE_MS: u64 = 3000;
-
-    impl Network {
-        /// Opens the network. A side that connects tries again and again until the other is there, more and more seldom until 4 s are between
-        /// two attempts; meanwhile `pause` is called, which returns true on a request to stop. `None` after one.
-        ///
-        /// # Errors
-        /// An endpoint or a certificate that cannot be used, or an error of `pause`.
-        pub(crate) fn open(
-            &self,
-            mut pause: impl FnMut() -> Result<bool, LinkError>,
-        ) -> Result<Option<Session>, LinkError> {
-            self.check()?;
-            self.require_one_thread()?;
-            let config = Config::from_json5(&self.settings().to_string())
-                .map_err(|e| LinkError::zenoh("use the settings of the link", &e))?;
-            let (sender, opened) = channel();
-            // It does not return before it is connected, whatever signal arrives.
-            thread::spawn(move || sender.send(zenoh::open(config).wait()));
-            loop {
-                match opened.try_recv() {
-                    Ok(session) => {
-                        let failed = |e| LinkError::zenoh("open the link", &e);
-                        return session.map(Some).map_err(failed);
-                    }
-                    Err(TryRecvError::Disconnected) => {
-                        return Err(LinkError::zenoh("open the link", &"it has failed"));
-                    }
-                    Err(TryRecvError::Empty) if pause()? => return Ok(None),
-                    Err(TryRecvError::Empty) => {}
-                }
-            }
-        }
-
-        fn require_one_thread(&self) -> Result<(), LinkError> {
-            let (name, value) = ONE_THREAD;
-            let is_set = std::env::var_os(name).is_some_and(|set| set == value);
-            match is_set || self.certificate.as_os_str().is_empty() {
-                true => Ok(()),
-                false => Err(LinkError::Refused(format!(
-                    "TLS needs {name}='{value}' in the environment, which `gyre run` and `gyre link` set"
-                ))),
-            }
-        }
-
-        fn settings(&self) -> Value {
-            // A client reaches the others through the side or the router that it connects to.
-            let mode = match self.listen.is_empty() {
-                true => "client",
-                false => "peer",
-            };
-            json!({
-                "mode": mode,
-                "connect": {
-                    "endpoints": self.connect,
-                    "timeout_ms": -1,
-                    "exit_on_failure": false,
-                    "retry": { "period_init_ms": 250, "period_max_ms": 4000, "period_increase_factor": 2 },
-                },
-                "listen": { "endpoints": self.listen },
-                // Nobody is looked for: the endpoints are named.
-                "scouting": { "multicast": { "enabled": false }, "gossip": { "enabled": false } },
-                "transport": {
-                    "unicast": { "compression": { "enabled": false } },
-                    "link": {
-                        "protocols": ["tcp", "tls"],
-                        "tls": self.tls(),
-                        "tx": { "lease": LEASE_MS },
-                    },
-                },
-            })
-        }
-
-        fn tls(&self) -> Value {
-            if self.certificate.as_os_str().is_empty() {
-                return json!({});
-            }
-            let file = |path: &Path| path.to_string_lossy().into_owned();
-            json!({
-                "root_ca_certificate": file(&self.ca),
-                "listen_private_key": file(&self.key),
-                "listen_certificate": file(&self.certificate),
-                "connect_private_key": file(&self.key),
-                "connect_certificate": file(&self.certificate),
-                "enable_mtls": true,
-                "verify_name_on_connect": true,
-                "close_link_on_expiration": true,
-            })
-        }
-    }
 }
 
 #[cfg(test)]
@@ -370,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn who_connects_believes_no_public_authority() {
+    fn a_side_that_connects_trusts_no_public_authority() {
         for host in [
             "10.1.2.3",
             "192.168.0.7",

@@ -1,7 +1,8 @@
 //! The robot's side of a split run: in the place of the last stages, which the base has.
 //!
-//! It journals the poses that come back as pose-integration does, so this side has all results too, and goes on after a restart. It begins
-//! when the base has said which items will have poses: only then does it publish the newest pose, at which the source goes on.
+//! It journals the poses that come back as pose-integration does, so this side has all results too,
+//! and continues after a restart. It begins when the base has said which items will have poses:
+//! only then does it publish the newest pose, at which the source continues.
 
 use std::{collections::VecDeque, sync::Arc};
 
@@ -12,16 +13,17 @@ use gyre_messages::{
 };
 use gyre_radar_replay::PlayedFrom;
 use gyre_stage::{Launch, StageCounters, StageError, clock, relay::LastStages};
-use zenoh::{Session, Wait, qos::Priority, query::Queryable};
+use zenoh::{Session, Wait, qos::Priority};
 
 use crate::{
     LinkConfig, LinkError, Side,
-    begin::{self, Agreement, Answer, Scans},
+    connection_log::ConnectionLog,
     fetch::{Fetcher, Request},
+    handshake::{self, Agreement, ScanSize, StartAnswer},
+    replay_buffer::{MemoryBuffer, ReplayBuffer},
+    request,
     serve::{Offer, Server},
-    status::Status,
-    tape::{Message, Ring},
-    wake::Sleeper,
+    waker::Waker,
 };
 
 /// Runs the robot's side until SIGTERM.
@@ -35,8 +37,8 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let config: LinkConfig = launch.section("link")?;
     let journal = Journal::open(&journal::path(&launch.manifest.out)).map_err(LinkError::from)?;
     let mut stages = LastStages::open(launch, config.returns_motions())?;
-    let sleeper = Sleeper::new().map_err(|e| LinkError::zenoh("make a socket", &e))?;
-    let sleep = || Ok(stages.sleep(sleeper.descriptor())?);
+    let waker = Waker::new()?;
+    let sleep = || Ok(stages.sleep(waker.descriptor())?);
     let Some(session) = config.network().open(sleep)? else {
         return Ok(stages.counters());
     };
@@ -47,7 +49,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
         poses: VecDeque::new(),
         sent: VecDeque::new(),
         session,
-        sleeper,
+        waker,
         config,
     };
     let worked = robot.work();
@@ -66,18 +68,22 @@ struct Robot<'a> {
     /// The newest items of the cut, with their times on this machine.
     sent: VecDeque<Item>,
     session: Session,
-    sleeper: Sleeper,
+    waker: Waker,
 }
 
-/// A topic that the base asks for.
-struct AskedTopic {
-    tape: Arc<Ring>,
+/// A topic that the base requests.
+struct SentTopic {
+    buffer: Arc<MemoryBuffer>,
     offer: Arc<Offer>,
 }
 
 impl Robot<'_> {
     fn work(&mut self) -> Result<(), LinkError> {
-        let _scans = self.tell_of_scans()?;
+        let size = ScanSize {
+            bytes: self.launch.manifest.limits.scan_bytes,
+        };
+        let key = handshake::scan_size_key(&self.config);
+        let _scan_size = request::answer(&self.session, key, "tell of the scans", move || size)?;
         if self.restore()? {
             return self.repeat_end();
         }
@@ -93,20 +99,6 @@ impl Robot<'_> {
         self.relay(&poses)
     }
 
-    /// Answers a base that wants to know how large scans are.
-    fn tell_of_scans(&self) -> Result<Queryable<()>, LinkError> {
-        let bytes = self.launch.manifest.limits.scan_bytes;
-        let key = begin::scans_key(&self.config);
-        let text = serde_json::to_string(&Scans { bytes });
-        let text = text.map_err(|e| LinkError::zenoh("tell of the scans", &e))?;
-        let answered = key.clone();
-        self.session
-            .declare_queryable(key)
-            .callback(move |query| drop(query.reply(&answered, &text).wait()))
-            .wait()
-            .map_err(|e| LinkError::zenoh("tell of the scans", &e))
-    }
-
     /// Reads the last poses of the journal; returns whether the stream has ended.
     fn restore(&mut self) -> Result<bool, LinkError> {
         let (poses, ended) = self.journal.last(self.stages.history().max(1))?;
@@ -114,7 +106,7 @@ impl Robot<'_> {
         Ok(ended)
     }
 
-    /// The run before has ended, and only its results are missing.
+    /// Publishes the end again: the run has ended before, and only its results are missing.
     fn repeat_end(&mut self) -> Result<(), LinkError> {
         self.stages.republish(self.poses.make_contiguous())?;
         self.stages
@@ -130,24 +122,25 @@ impl Robot<'_> {
             .map_or(0, |pose| pose.item.seq.saturating_add(1))
     }
 
-    /// Asks the base where to go on until it answers: `Some` with the number of items that have poses or will; `None` on a request to stop.
+    /// Asks the base where to continue until it answers; returns the number of items that have
+    /// poses or will. `None` on a request to stop.
     fn begin(&mut self) -> Result<Option<u64>, LinkError> {
         let topics = self.topics();
         let agreement = Agreement::of(&self.launch.manifest, &self.config, &topics);
-        let mut said = String::new();
+        let mut logged = String::new();
         loop {
-            let waits = match begin::ask(&self.session, &self.config, &agreement)? {
-                Some(Answer::Go(newest)) => {
+            let waits = match handshake::ask_base(&self.session, &self.config, &agreement)? {
+                Some(StartAnswer::Go(newest)) => {
                     let received = newest.map_or(0, |newest| newest + 1);
-                    return self.judge(received).map(|()| Some(received));
+                    return self.check_start(received).map(|()| Some(received));
                 }
-                Some(Answer::Refused(why)) => return Err(LinkError::Refused(why)),
-                Some(Answer::Wait(why)) => why,
+                Some(StartAnswer::Refused(why)) => return Err(LinkError::Refused(why)),
+                Some(StartAnswer::Wait(why)) => why,
                 None => "the base does not answer yet".to_owned(),
             };
-            if waits != said {
+            if waits != logged {
                 tracing::info!("waiting: {waits}");
-                said = waits;
+                logged = waits;
             }
             if self.sleep()? {
                 return Ok(None);
@@ -155,15 +148,15 @@ impl Robot<'_> {
         }
     }
 
-    /// Checks that this side can go on after so many items.
-    fn judge(&self, received: u64) -> Result<(), LinkError> {
+    /// Checks that this side can continue after so many items.
+    fn check_start(&self, received: u64) -> Result<(), LinkError> {
         let (poses, base) = (self.next_pose(), received);
         let window = self.launch.manifest.window.scans as u64;
         match self.config.cut {
             _ if base < poses => Err(LinkError::Refused(format!(
                 "this run has {poses} poses, but the base begins at {base}: begin both anew with --fresh, or go on with the base's --out of this run"
             ))),
-            // Its local map is here, and is not made of poses.
+            // The local map is here, and cannot be restored from poses.
             PlayedFrom::Refined if base > poses.saturating_add(window) => {
                 Err(LinkError::Refused(format!(
                     "the base has {base} poses and this run {poses}, and the local map of the refinement, which is here, cannot be made up: begin both anew with --fresh"
@@ -173,10 +166,11 @@ impl Robot<'_> {
         }
     }
 
-    /// Journals the poses of all items that the base had received before this side began; false on a request to stop.
+    /// Journals the poses of all items that the base had received before this side began; false on
+    /// a request to stop.
     fn catch_up(&mut self, poses: &Fetcher, received: u64) -> Result<bool, LinkError> {
         while self.next_pose() < received {
-            self.sleeper.clear();
+            self.waker.clear();
             while let Some(bytes) = poses.next() {
                 self.journal(&bytes)?;
             }
@@ -187,17 +181,17 @@ impl Robot<'_> {
         Ok(true)
     }
 
-    /// Sends what the stages here publish, and publishes what comes back, until SIGTERM.
+    /// Sends the messages of the stages here, and publishes those that come back, until SIGTERM.
     fn relay(&mut self, poses: &Fetcher) -> Result<(), LinkError> {
         let topics = self.topics();
         self.stages.read(&topics)?;
-        let prefix = begin::prefix(&self.config, Side::Robot);
-        let mut server = Server::new(&self.session, &prefix, Some(self.sleeper.waker()));
+        let prefix = handshake::prefix(&self.config, Side::Robot);
+        let mut server = Server::new(&self.session, &prefix, Some(self.waker.clone()));
         let depth = Masked::sizes(&self.launch.manifest.window).buffer;
         let sent = topics.iter().map(|topic| {
-            let tape = Arc::new(Ring::of(depth));
-            let offer = server.offer(topic, tape.clone())?;
-            Ok(AskedTopic { tape, offer })
+            let buffer = Arc::new(MemoryBuffer::of(depth));
+            let offer = server.offer(topic, buffer.clone())?;
+            Ok(SentTopic { buffer, offer })
         });
         let sent = sent.collect::<Result<Vec<_>, LinkError>>()?;
         let motions = self
@@ -205,9 +199,9 @@ impl Robot<'_> {
             .returns_motions()
             .then(|| self.fetch(Motion::TOPIC));
         let (mut end, mut has_ended) = (None, false);
-        let mut status = Status::of("base");
+        let mut connection = ConnectionLog::of("base");
         loop {
-            self.sleeper.clear();
+            self.waker.clear();
             for (place, sent) in sent.iter().enumerate() {
                 end = self.send(place, sent, topics.len(), depth)?.or(end);
             }
@@ -216,7 +210,7 @@ impl Robot<'_> {
                     .publish_motion(self.checked::<Motion, MotionHeader>(&bytes)?)?;
             }
             self.take_poses(poses)?;
-            status.update(poses.is_connected(), self.next_pose());
+            connection.update(poses.is_connected(), self.next_pose());
             if let Some(end) = end.filter(|end| !has_ended && self.next_pose() == end.seq) {
                 has_ended = self.end(&end, &sent, poses)?;
             }
@@ -226,11 +220,12 @@ impl Robot<'_> {
         }
     }
 
-    /// Gives the base what a topic has; returns the item of the end if it is among it.
+    /// Buffers the messages of a topic for the base; returns the item of the end if it is among
+    /// them.
     fn send(
         &mut self,
         place: usize,
-        sent: &AskedTopic,
+        sent: &SentTopic,
         topics: usize,
         depth: usize,
     ) -> Result<Option<Item>, LinkError> {
@@ -245,7 +240,7 @@ impl Robot<'_> {
                     .has_handed_over(item.published.saturating_add(1))?;
                 end = item.is(flag::END).then_some(item);
             }
-            sent.tape.push(Message::of(&message));
+            sent.buffer.add(&message);
         }
         Ok(end)
     }
@@ -259,7 +254,7 @@ impl Robot<'_> {
         Ok(())
     }
 
-    /// Journals a pose that has come; `None` if it was there already.
+    /// Journals a pose; `None` if it was there already.
     fn journal(&mut self, bytes: &[u8]) -> Result<Option<PoseHeader>, LinkError> {
         let mut pose = self.checked::<Pose, PoseHeader>(bytes)?;
         let (expected, got) = (self.next_pose(), pose.item.seq);
@@ -282,8 +277,8 @@ impl Robot<'_> {
         Ok(Some(pose))
     }
 
-    /// Returns the item of a pose with the times on this machine, whose clock is another one: all that the base does is the work of the
-    /// last stage here.
+    /// Returns the item of a pose with the times on this machine's clock: the work of the base
+    /// counts as that of the last stage here.
     fn timed(&self, item: Item) -> Item {
         let now_ns = clock::now_ns();
         let sent = self.sent.iter().find(|sent| sent.seq == item.seq);
@@ -306,11 +301,12 @@ impl Robot<'_> {
         timed
     }
 
-    /// Ends this side when the base has the end too; false if it has not yet. Until it asks for what follows the end, it may not have it.
-    fn end(&mut self, end: &Item, sent: &[AskedTopic], poses: &Fetcher) -> Result<bool, LinkError> {
+    /// Ends this side when the base has the end too; false if it has not yet. It has the end when
+    /// it requests what follows.
+    fn end(&mut self, end: &Item, sent: &[SentTopic], poses: &Fetcher) -> Result<bool, LinkError> {
         // The base ends when it knows that all poses are here.
         poses.confirm(self.next_pose());
-        let has_end = |sent: &AskedTopic| sent.offer.asked() > end.seq;
+        let has_end = |sent: &SentTopic| sent.offer.asked() > end.seq;
         if !sent.iter().all(has_end) {
             return Ok(false);
         }
@@ -333,15 +329,15 @@ impl Robot<'_> {
 
     fn fetch(&self, topic: &str) -> Fetcher {
         let request = Request {
-            key: format!("{}/{topic}", begin::prefix(&self.config, Side::Base)),
+            key: format!("{}/{topic}", handshake::prefix(&self.config, Side::Base)),
             from: self.next_pose(),
             receiver: self.session.zid().to_string(),
             priority: Priority::InteractiveHigh,
         };
-        Fetcher::start(&self.session, request, self.sleeper.waker())
+        Fetcher::start(&self.session, request, self.waker.clone())
     }
 
-    /// Returns the header of a message from the network, if it keeps the contract of its topic.
+    /// Returns the header of a message from the network, if it is valid for its topic.
     fn checked<M: gyre_messages::Message<Header = H>, H: Pod>(
         &self,
         bytes: &[u8],
@@ -360,6 +356,6 @@ impl Robot<'_> {
     }
 
     fn sleep(&mut self) -> Result<bool, LinkError> {
-        Ok(self.stages.sleep(self.sleeper.descriptor())?)
+        Ok(self.stages.sleep(self.waker.descriptor())?)
     }
 }

@@ -1,8 +1,9 @@
-//! Lets other machines look on at a run.
+//! Sends the topics of a run to other machines.
 //!
-//! To the run this process is an observer: the run neither waits for it nor fails with it. What must not be lost is sent from where it is
-//! kept: poses and their motions from the journal of the run, and loops from the logs of its SLAM, so that a receiver has all of them whenever
-//! it comes and however long the link was cut; the other messages without a payload from memory. Of scans and masked scans only the newest are
+//! This process is an observer: the run neither waits for it nor fails with it. Poses and their
+//! motions are sent from the journal of the run, and loops from the logs of its SLAM, so that a
+//! receiver has all of them whenever it connects and however long the link was cut; the other
+//! messages without a payload are kept in memory. Of scans and masked scans only the newest are
 //! kept.
 
 use std::{
@@ -27,9 +28,10 @@ use zenoh::{Session, Wait, query::Queryable};
 
 use crate::{
     LinkError, Network,
-    observing::{Observing, observe},
+    replay_buffer::{LoopBuffer, MemoryBuffer, MotionBuffer, PoseBuffer, PoseLog, ReplayBuffer},
+    request,
     serve::{Offer, Server},
-    tape::{Loops, Message, Motions, PoseLog, Poses, Ring, Tape},
+    topic_observer::{TopicObserver, observe},
 };
 
 /// The name of this process in the log of the run.
@@ -37,18 +39,18 @@ const NAME: &str = "link";
 /// The topics that are sent unless others are named, of those that the run has.
 const DEFAULT: [&str; 6] = ["motion", "refined", "pose", "loop", "correction", "fix"];
 /// Bytes that are kept of a topic without payloads: hours.
-const KEPT_BYTES: usize = 64 << 20;
-/// Time in which a receiver comes back whose sender has begun again just before the end.
-const RECONNECTS: Duration = Duration::from_secs(6);
-/// Scans that are kept. With one more the newest would come later.
-const KEPT_SCANS: usize = 2;
+const MAX_BYTES: usize = 64 << 20;
+/// Time in which a receiver reconnects whose sender was restarted just before the end.
+const RECONNECT_TIME: Duration = Duration::from_secs(6);
+/// Scans that are kept. With one more the newest would arrive later.
+const MAX_SCANS: usize = 2;
 
-/// What to send, and to whom.
+/// The options of a sender.
 #[derive(Clone, Debug)]
 pub struct SendOptions {
     /// The folder of the run's results.
     pub out: PathBuf,
-    /// How receivers connect.
+    /// The endpoints and certificates for receivers.
     pub network: Network,
     /// The topics; empty: all that the run has but scans and rasters.
     pub topics: Vec<String>,
@@ -56,12 +58,12 @@ pub struct SendOptions {
     pub linger: Duration,
 }
 
-/// What was sent of each topic: messages and bytes, to all receivers together.
+/// The messages and bytes that were sent to all receivers together.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Sent {
-    /// By topic.
+    /// The counts by topic.
     pub topics: BTreeMap<String, (u64, u64)>,
-    /// Whether a receiver was out of reach when this ended, which had not received everything.
+    /// True if a receiver was out of reach at the end, and has not received everything.
     pub is_incomplete: bool,
 }
 
@@ -83,18 +85,18 @@ impl fmt::Display for Sent {
     }
 }
 
-/// What a receiver needs to know of the run.
+/// The description of a run that a receiver needs.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub(crate) struct Greeting {
+pub(crate) struct RunOffer {
     pub window: Window,
     pub limits: Limits,
     pub live: bool,
     pub refines: bool,
     pub rate: Option<f64>,
     pub configuration: String,
-    /// Tells one sender from the next: it is part of the keys.
+    /// The identity of the sender, a part of the keys.
     pub sender: String,
-    /// Time of the first pose, ns since 1970, if there is one: it tells one drive from another.
+    /// The time of the first pose, ns since 1970, if there is one: it identifies the drive.
     pub began_ns: Option<i64>,
     pub topics: Vec<OfferedTopic>,
 }
@@ -105,7 +107,7 @@ pub(crate) struct OfferedTopic {
     pub name: String,
     /// The type of its header, with the version.
     pub version: String,
-    /// Whether no message of it may be missed.
+    /// True if no message of it may be missed.
     pub is_lossless: bool,
 }
 
@@ -114,12 +116,13 @@ pub(crate) fn prefix(name: &str, sender: &str) -> String {
     format!("gyre/view/{name}/from/{sender}")
 }
 
-/// Returns the key at which any sender of a link says what it offers.
-pub(crate) fn greeting_key(name: &str) -> String {
+/// Returns the key at which any sender of a link describes its run.
+pub(crate) fn offer_key(name: &str) -> String {
     format!("gyre/view/{name}/greeting")
 }
 
-/// Sends the topics of a run until it ends and all receivers have what they are to have, or a signal requests a stop.
+/// Sends the topics of a run until it ends and all receivers have everything, or a signal requests
+/// a stop.
 ///
 /// # Errors
 /// There is no such run or topic, or the network cannot be used.
@@ -140,15 +143,15 @@ pub fn send(options: &SendOptions) -> Result<Sent, LinkError> {
 
 struct Sending<'run> {
     run: &'run ObservedRun,
-    topics: Vec<Topic<'run>>,
+    topics: Vec<SentTopic<'run>>,
     _server: Server,
-    _greeting: Queryable<()>,
+    _offer: Queryable<()>,
 }
 
-struct Topic<'run> {
+struct SentTopic<'run> {
     name: &'static str,
-    observer: Box<dyn Observing + 'run>,
-    kept: Store,
+    observer: Box<dyn TopicObserver + 'run>,
+    buffer: Arc<dyn ReplayBuffer>,
     offer: Arc<Offer>,
 }
 
@@ -168,19 +171,19 @@ impl<'run> Sending<'run> {
         let names = topics(&options.topics, manifest)?;
         let topics = names.iter().copied().map(|name| {
             let observer = observe(run, name).ok_or_else(|| no_topic(name))??;
-            let (tape, kept) = logs.tape(name, manifest);
-            Ok(Topic {
+            let buffer = logs.buffer(name, manifest);
+            Ok(SentTopic {
                 name,
                 observer,
-                kept,
-                offer: server.offer(name, tape)?,
+                offer: server.offer(name, buffer.clone())?,
+                buffer,
             })
         });
         let topics = topics.collect::<Result<Vec<_>, LinkError>>()?;
         Ok(Self {
             run,
             topics,
-            _greeting: greet(session, options, manifest, &names, logs.poses)?,
+            _offer: offer(session, options, manifest, &names, logs.poses)?,
             _server: server,
         })
     }
@@ -188,19 +191,21 @@ impl<'run> Sending<'run> {
     fn run(mut self, signals: &Signals, linger: Duration) -> Result<Sent, LinkError> {
         let mut ended: Option<Instant> = None;
         loop {
-            // Before the look: what was published before the end is still in the queues.
+            // Before the queues are read: messages from before the end are still in them.
             let has_ended = self.run.has_ended();
-            self.topics.iter_mut().try_for_each(Topic::take)?;
+            self.topics.iter_mut().try_for_each(SentTopic::take)?;
             let has_ended = has_ended || self.topics.iter().all(|it| it.observer.has_ended());
             if has_ended && ended.is_none() {
                 ended = Some(Instant::now());
-                self.topics.iter().try_for_each(|topic| topic.kept.end())?;
+                self.topics
+                    .iter()
+                    .try_for_each(|topic| topic.buffer.end())?;
             }
             if let Some(ended) = ended {
-                let is_expected = ended.elapsed() < RECONNECTS && !self.has_receivers();
+                let is_expected = ended.elapsed() < RECONNECT_TIME && !self.has_receivers();
                 let is_complete = self.is_complete() && !is_expected;
                 if is_complete || ended.elapsed() > linger {
-                    // The last answer is on its way.
+                    // Time to send the last answer.
                     signals.sleep(MAX_WAIT)?;
                     return Ok(self.sent(self.is_complete()));
                 }
@@ -240,50 +245,21 @@ impl<'run> Sending<'run> {
     }
 }
 
-impl Topic<'_> {
-    /// Takes what the run has published.
+impl SentTopic<'_> {
+    /// Buffers the messages that the run has published.
     fn take(&mut self) -> Result<(), StageError> {
         while let Some(message) = self.observer.take()? {
-            let come = message.item().map_or(0, |item| item.seq.saturating_add(1));
-            match &self.kept {
-                Store::Ring(ring) => ring.push(Message::of(&message)),
-                Store::Poses(poses) => poses.have_come(come),
-                Store::Loops(loops) => loops.have_come(come),
-                Store::WithPoses => {}
-            }
+            self.buffer.add(&message);
         }
         Ok(())
     }
 }
 
-/// Where the messages of a topic are kept.
-enum Store {
-    Ring(Arc<Ring>),
-    Poses(Arc<Poses>),
-    Loops(Arc<Loops>),
-    /// Its messages are made of the poses.
-    WithPoses,
-}
-
-impl Store {
-    fn end(&self) -> Result<(), LinkError> {
-        match self {
-            Self::Ring(ring) => {
-                ring.end();
-                Ok(())
-            }
-            Self::Poses(poses) => poses.end(),
-            Self::Loops(loops) => loops.end(),
-            Self::WithPoses => Ok(()),
-        }
-    }
-}
-
-/// The logs of a run, from which messages are sent that must not be missed.
+/// The logs of a run.
 struct Logs {
-    poses: Arc<Poses>,
-    /// In a run with SLAM.
-    loops: Option<Arc<Loops>>,
+    poses: Arc<PoseBuffer>,
+    /// `None` in a run without SLAM.
+    loops: Option<Arc<LoopBuffer>>,
 }
 
 impl Logs {
@@ -293,38 +269,37 @@ impl Logs {
             .slam
             .then(|| LoggedLoops::open(&manifest.out));
         Ok(Self {
-            poses: Arc::new(Poses::of(PoseLog::of(&manifest.out))),
-            loops: loops.transpose()?.map(|loops| Arc::new(Loops::of(loops))),
+            poses: Arc::new(PoseBuffer::of(PoseLog::of(&manifest.out))),
+            loops: loops
+                .transpose()?
+                .map(|loops| Arc::new(LoopBuffer::of(loops))),
         })
     }
 
-    /// Returns what a topic is sent from, and what is to be told of new messages.
-    fn tape(&self, name: &str, manifest: &Manifest) -> (Arc<dyn Tape>, Store) {
+    /// Returns the messages of a topic.
+    fn buffer(&self, name: &str, manifest: &Manifest) -> Arc<dyn ReplayBuffer> {
         let composed = match manifest.refines {
             true => Refined::TOPIC,
             false => Motion::TOPIC,
         };
-        let poses = || self.poses.clone();
-        let ring = match (name, &self.loops) {
-            (Pose::TOPIC, _) => return (poses(), Store::Poses(poses())),
-            (Loop::TOPIC, Some(loops)) => return (loops.clone(), Store::Loops(loops.clone())),
-            _ if name == composed => return (Arc::new(Motions(poses())), Store::WithPoses),
-            _ if is_lossless(name) => Ring::bounded(usize::MAX, KEPT_BYTES),
-            _ => Ring::of(KEPT_SCANS),
-        };
-        let ring = Arc::new(ring);
-        (ring.clone(), Store::Ring(ring))
+        match (name, &self.loops) {
+            (Pose::TOPIC, _) => self.poses.clone(),
+            (Loop::TOPIC, Some(loops)) => loops.clone(),
+            _ if name == composed => Arc::new(MotionBuffer(self.poses.clone())),
+            _ if is_lossless(name) => Arc::new(MemoryBuffer::bounded(usize::MAX, MAX_BYTES)),
+            _ => Arc::new(MemoryBuffer::of(MAX_SCANS)),
+        }
     }
 }
 
-/// Returns whether no message of a topic may be missed: all but those with payloads, of which there are many bytes.
+/// Returns whether no message of a topic may be missed: all but those with payloads, which are
+/// large.
 fn is_lossless(topic: &str) -> bool {
     topic != Scan::TOPIC && topic != Masked::TOPIC
 }
 
 /// Returns the topics to send; poses are among them, since the motions come with them.
 fn topics(named: &[String], manifest: &Manifest) -> Result<Vec<&'static str>, LinkError> {
-    let known = |name: &str| topic(name).ok_or_else(|| no_topic(name));
     let has = |name: &&str| match topic(name).map(|topic| topic.sender) {
         Some(Sender::Follower(follower)) => follower.is_in(&manifest.window),
         _ => *name != Refined::TOPIC || manifest.refines,
@@ -335,7 +310,7 @@ fn topics(named: &[String], manifest: &Manifest) -> Result<Vec<&'static str>, Li
     };
     let mut topics = Vec::new();
     for name in named.into_iter().chain([Pose::TOPIC]) {
-        let name = known(name)?.name;
+        let name = topic(name).ok_or_else(|| no_topic(name))?.name;
         if !topics.contains(&name) {
             topics.push(name);
         }
@@ -349,13 +324,13 @@ fn no_topic(name: &str) -> LinkError {
     ))
 }
 
-/// Answers receivers that come.
-fn greet(
+/// Offers the run to receivers.
+fn offer(
     session: &Session,
     options: &SendOptions,
     manifest: &Manifest,
     names: &[&'static str],
-    poses: Arc<Poses>,
+    poses: Arc<PoseBuffer>,
 ) -> Result<Queryable<()>, LinkError> {
     let path = manifest.root.join("config.toml");
     let offered = |name: &&'static str| OfferedTopic {
@@ -363,7 +338,7 @@ fn greet(
         version: topic(name).map_or("", |topic| topic.header.name).to_owned(),
         is_lossless: is_lossless(name),
     };
-    let greeting = Greeting {
+    let run = RunOffer {
         window: manifest.window,
         limits: manifest.limits,
         live: manifest.live,
@@ -375,20 +350,12 @@ fn greet(
         began_ns: None,
         topics: names.iter().map(offered).collect(),
     };
-    let key = greeting_key(&options.network.name);
-    let answered = key.clone();
-    session
-        .declare_queryable(key)
-        .callback(move |query| {
-            let first = poses.read(0).ok().flatten();
-            let greeting = Greeting {
-                began_ns: first.map(|pose| pose.item.stamp_ns),
-                ..greeting.clone()
-            };
-            if let Ok(text) = serde_json::to_vec(&greeting) {
-                let _ = query.reply(&answered, text).wait();
-            }
-        })
-        .wait()
-        .map_err(|e| LinkError::zenoh("offer a run", &e))
+    let key = offer_key(&options.network.name);
+    request::answer(session, key, "offer a run", move || {
+        let first = poses.read(0).ok().flatten();
+        RunOffer {
+            began_ns: first.map(|pose| pose.item.stamp_ns),
+            ..run.clone()
+        }
+    })
 }

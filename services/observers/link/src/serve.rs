@@ -1,4 +1,4 @@
-//! The end of a topic that sends: answers each request by the messages from the one that it names on.
+//! The sending end of a topic: answers a request with the messages from the requested one on.
 
 use std::{
     collections::BTreeMap,
@@ -17,17 +17,18 @@ use zenoh::{
 
 use crate::{
     LinkError,
-    tape::{Next, Tape},
-    wake::Waker,
+    replay_buffer::{Next, ReplayBuffer},
+    waker::Waker,
 };
 
-/// Time for which a request is answered. Then the receiver asks again, so that a sender forgets one that has gone.
-pub(crate) const ANSWERED_FOR: Duration = Duration::from_secs(20);
-/// Time without a message after which the receiver is told that this end is still there.
-const ALIVE: Duration = Duration::from_secs(1);
-/// Time between two looks whether a request is still wanted.
-const LOOK: Duration = Duration::from_millis(200);
-/// Requests of a topic that are answered at once. A receiver has one of each topic.
+/// Time for which a request is answered. Then the receiver asks again, so that a sender forgets one
+/// that has gone.
+pub(crate) const REQUEST_LIFETIME: Duration = Duration::from_secs(20);
+/// Time without a message after which an empty one tells the receiver that this end is still there.
+const KEEP_ALIVE: Duration = Duration::from_secs(1);
+/// Time between two checks whether a request is still wanted.
+const POLL_INTERVAL: Duration = Duration::from_millis(200);
+/// The most requests of a topic that are answered at once. A receiver has one of each topic.
 const MAX_REQUESTS: usize = 64;
 
 /// The answer that says that no message follows.
@@ -50,30 +51,30 @@ pub(crate) struct Server {
 
 /// A topic that is offered.
 pub(crate) struct Offer {
-    tape: Arc<dyn Tape>,
+    buffer: Arc<dyn ReplayBuffer>,
     key: String,
-    /// The highest number that was asked for: all before it has arrived.
+    /// The highest number that was requested: all before it has arrived.
     asked: AtomicU64,
     /// The newest request of each receiver, which replaces those before.
-    receivers: Mutex<BTreeMap<String, Asking>>,
+    receivers: Mutex<BTreeMap<String, ReceiverState>>,
     running: AtomicU64,
-    /// Messages and bytes that were sent.
+    /// The messages and bytes that were sent.
     messages: AtomicU64,
     bytes: AtomicU64,
     waker: Option<Waker>,
     stop: Arc<AtomicBool>,
 }
 
-/// A receiver of a topic.
-struct Asking {
-    /// Number of its newest request.
+/// The state of a receiver of a topic.
+struct ReceiverState {
+    /// The number of its newest request.
     request: u64,
-    /// Whether it has said that it wants no more.
+    /// True once it has said that it wants no more.
     is_done: bool,
 }
 
 impl Server {
-    /// Offers topics under this prefix of keys. `waker` is told of each request.
+    /// Creates a server of topics with this prefix of keys. Each request wakes `waker`.
     pub fn new(session: &Session, prefix: &str, waker: Option<Waker>) -> Self {
         Self {
             session: session.clone(),
@@ -85,9 +86,13 @@ impl Server {
     }
 
     /// Offers a topic.
-    pub fn offer(&mut self, topic: &str, tape: Arc<dyn Tape>) -> Result<Arc<Offer>, LinkError> {
+    pub fn offer(
+        &mut self,
+        topic: &str,
+        buffer: Arc<dyn ReplayBuffer>,
+    ) -> Result<Arc<Offer>, LinkError> {
         let offer = Arc::new(Offer {
-            tape,
+            buffer,
             key: format!("{}/{topic}", self.prefix),
             asked: AtomicU64::new(0),
             receivers: Mutex::default(),
@@ -116,7 +121,7 @@ impl Drop for Server {
 }
 
 impl Offer {
-    /// Returns the highest number that was asked for: all messages before it have arrived.
+    /// Returns the highest number that was requested: all messages before it have arrived.
     pub fn asked(&self) -> u64 {
         self.asked.load(Ordering::Relaxed)
     }
@@ -127,17 +132,18 @@ impl Offer {
         (read(&self.messages), read(&self.bytes))
     }
 
-    /// Returns whether anybody has asked.
+    /// Returns whether there was a request.
     pub fn has_receivers(&self) -> bool {
         !self.receivers().is_empty()
     }
 
-    /// Returns whether all receivers have said that they want no more. That an answer was sent does not tell that it has arrived.
+    /// Returns whether all receivers have said that they want no more. An answer that was sent need
+    /// not have arrived.
     pub fn is_done(&self) -> bool {
-        self.receivers().values().all(|asking| asking.is_done)
+        self.receivers().values().all(|receiver| receiver.is_done)
     }
 
-    fn receivers(&self) -> MutexGuard<'_, BTreeMap<String, Asking>> {
+    fn receivers(&self) -> MutexGuard<'_, BTreeMap<String, ReceiverState>> {
         self.receivers
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
@@ -182,23 +188,23 @@ impl Offer {
         receiver: &str,
         request: u64,
     ) -> Result<(), LinkError> {
-        // The receiver learns at once that somebody is there.
+        // The receiver learns at once that this end is there.
         self.reply(query, &[])?;
-        let mut said = Instant::now();
-        let until = said + ANSWERED_FOR;
+        let mut last_reply = Instant::now();
+        let until = last_reply + REQUEST_LIFETIME;
         while Instant::now() < until && self.is_wanted(receiver, request) {
-            match self.tape.next(next, LOOK)? {
+            match self.buffer.next(next, POLL_INTERVAL)? {
                 Next::Message(message) => {
                     self.reply(query, &message.bytes)?;
                     self.messages.fetch_add(1, Ordering::Relaxed);
                     let bytes = message.bytes.len() as u64;
                     self.bytes.fetch_add(bytes, Ordering::Relaxed);
                     next = message.seq.saturating_add(1);
-                    said = Instant::now();
+                    last_reply = Instant::now();
                 }
-                Next::Nothing if said.elapsed() > ALIVE => {
+                Next::Nothing if last_reply.elapsed() > KEEP_ALIVE => {
                     self.reply(query, &[])?;
-                    said = Instant::now();
+                    last_reply = Instant::now();
                 }
                 Next::Nothing => {}
                 Next::Ended => {
@@ -215,20 +221,22 @@ impl Offer {
         reply.wait().map_err(|e| LinkError::zenoh("send", &e))
     }
 
-    /// Counts the requests of a receiver; returns the number of this one.
+    /// Notes a request of a receiver, which replaces those before; returns its number.
     fn replace(&self, receiver: &str, is_done: bool) -> u64 {
         let mut receivers = self.receivers();
-        let before = receivers.get(receiver).map_or(0, |asking| asking.request);
-        let asking = Asking {
+        let before = receivers
+            .get(receiver)
+            .map_or(0, |receiver| receiver.request);
+        let state = ReceiverState {
             request: before + 1,
             is_done,
         };
-        receivers.insert(receiver.to_owned(), asking);
+        receivers.insert(receiver.to_owned(), state);
         before + 1
     }
 
     fn is_wanted(&self, receiver: &str, request: u64) -> bool {
-        let newest = self.receivers().get(receiver).map(|asking| asking.request);
+        let newest = self.receivers().get(receiver).map(|state| state.request);
         !self.stop.load(Ordering::Relaxed) && newest == Some(request)
     }
 }

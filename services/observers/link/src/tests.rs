@@ -1,4 +1,4 @@
-//! Both ends of a topic over the network layer, on this machine.
+//! Tests of both ends of a topic over the network layer, on this machine.
 
 #![allow(clippy::unwrap_used)]
 use std::{
@@ -10,17 +10,18 @@ use std::{
 
 use gyre_journal::{self as journal, Journal};
 use gyre_messages::{Item, MotionHeader, PoseHeader, flag};
+use gyre_stage::source::RecordedMessage;
 use zenoh::{Session, Wait, qos::Priority};
 
 use crate::{
     Network,
     fetch::{Fetcher, Request},
+    replay_buffer::{MemoryBuffer, Message, MotionBuffer, Next, PoseBuffer, PoseLog, ReplayBuffer},
     serve::{Offer, Server},
-    tape::{Message, Motions, Next, PoseLog, Poses, Ring, Tape},
-    wake::Sleeper,
+    waker::Waker,
 };
 
-const PATIENCE: Duration = Duration::from_secs(60);
+const MAX_WAIT: Duration = Duration::from_secs(60);
 
 fn item(seq: u64) -> Item {
     Item {
@@ -34,6 +35,13 @@ fn message(seq: u64) -> Message {
         seq,
         bytes: bytemuck::bytes_of(&item(seq)).into(),
     }
+}
+
+fn add(buffer: &MemoryBuffer, seq: u64) {
+    buffer.add(&RecordedMessage {
+        header: bytemuck::bytes_of(&item(seq)).to_vec(),
+        payload: Vec::new(),
+    });
 }
 
 fn seq(bytes: &[u8]) -> u64 {
@@ -69,15 +77,14 @@ fn connecting(endpoint: &str) -> Network {
     }
 }
 
-fn fetcher(session: &Session, from: u64) -> (Fetcher, Sleeper) {
-    let sleeper = Sleeper::new().unwrap();
+fn fetcher(session: &Session, from: u64) -> Fetcher {
     let request = Request {
         key: "gyre/test/topic".to_owned(),
         from,
         receiver: session.zid().to_string(),
         priority: Priority::Data,
     };
-    (Fetcher::start(session, request, sleeper.waker()), sleeper)
+    Fetcher::start(session, request, Waker::new().unwrap())
 }
 
 /// Waits until so many messages have come.
@@ -85,7 +92,7 @@ fn take(fetcher: &Fetcher, count: usize) -> Vec<u64> {
     let since = Instant::now();
     let mut taken = Vec::new();
     while taken.len() < count {
-        assert!(since.elapsed() < PATIENCE, "only {taken:?} came");
+        assert!(since.elapsed() < MAX_WAIT, "only {taken:?} came");
         match fetcher.next() {
             Some(bytes) => taken.push(seq(&bytes)),
             None => thread::sleep(Duration::from_millis(5)),
@@ -97,7 +104,7 @@ fn take(fetcher: &Fetcher, count: usize) -> Vec<u64> {
 fn until(what: &str, mut is_so: impl FnMut() -> bool) {
     let since = Instant::now();
     while !is_so() {
-        assert!(since.elapsed() < PATIENCE, "waited in vain until {what}");
+        assert!(since.elapsed() < MAX_WAIT, "waited in vain until {what}");
         thread::sleep(Duration::from_millis(5));
     }
 }
@@ -112,14 +119,14 @@ fn a_receiver_gets_all_from_the_message_that_it_asks_for_and_knows_the_end() {
     };
     let here = open(listening(&address));
     let there = there.join().unwrap();
-    let (fetcher, _sleeper) = fetcher(&there, 3);
-    let ring = Arc::new(Ring::of(100));
-    (0..5).for_each(|seq| ring.push(message(seq)));
+    let fetcher = fetcher(&there, 3);
+    let buffer = Arc::new(MemoryBuffer::of(100));
+    (0..5).for_each(|seq| add(&buffer, seq));
     let mut server = Server::new(&here, "gyre/test", None);
-    let offer = server.offer("topic", ring.clone()).unwrap();
+    let offer = server.offer("topic", buffer.clone()).unwrap();
     assert_eq!(take(&fetcher, 2), [3, 4]);
     assert!(fetcher.is_connected() && offer.asked() == 3);
-    ring.push(message(5));
+    add(&buffer, 5);
     assert_eq!(take(&fetcher, 1), [5]);
     fetcher.confirm(6);
     until("the sender knows that all have arrived", || {
@@ -129,7 +136,7 @@ fn a_receiver_gets_all_from_the_message_that_it_asks_for_and_knows_the_end() {
         fetcher.is_confirmed(6)
     });
     assert!(!offer.is_done());
-    ring.end();
+    buffer.end().unwrap();
     until("the receiver knows the end", || fetcher.has_ended());
     assert!(offer.is_done(), "the receiver has said so before");
     assert_eq!(offer.sent().0, 3);
@@ -141,15 +148,15 @@ fn a_receiver_goes_on_where_it_was_when_the_sender_comes_back() {
     let mut there = None;
     for (first, end) in [(0, 3), (2, 6)] {
         let here = open(listening(&address));
-        let (_, fetcher, _sleeper) = there.get_or_insert_with(|| {
+        let (_, fetcher) = there.get_or_insert_with(|| {
             let session = open(connecting(&address));
-            let (fetcher, sleeper) = fetcher(&session, 0);
-            (session, fetcher, sleeper)
+            let fetcher = fetcher(&session, 0);
+            (session, fetcher)
         });
-        let ring = Arc::new(Ring::of(100));
-        (first..end).for_each(|seq| ring.push(message(seq)));
+        let buffer = Arc::new(MemoryBuffer::of(100));
+        (first..end).for_each(|seq| add(&buffer, seq));
         let mut server = Server::new(&here, "gyre/test", None);
-        server.offer("topic", ring).unwrap();
+        server.offer("topic", buffer).unwrap();
         let taken = take(fetcher, 3);
         assert_eq!(taken, [end - 3, end - 2, end - 1], "each once");
         drop(server);
@@ -160,11 +167,10 @@ fn a_receiver_goes_on_where_it_was_when_the_sender_comes_back() {
 
 /// A sender of a topic, and a receiver that has its first message.
 struct Ends {
-    ring: Arc<Ring>,
+    buffer: Arc<MemoryBuffer>,
     offer: Arc<Offer>,
     fetcher: Fetcher,
     there: Session,
-    _sleeper: Sleeper,
     _server: Server,
     _here: Session,
 }
@@ -174,19 +180,18 @@ impl Ends {
         let address = endpoint();
         let here = open(listening(&address));
         let there = open(connecting(&address));
-        let ring = Arc::new(Ring::of(100));
-        ring.push(message(0));
+        let buffer = Arc::new(MemoryBuffer::of(100));
+        add(&buffer, 0);
         let mut server = Server::new(&here, "gyre/test", None);
-        let offer = server.offer("topic", ring.clone()).unwrap();
-        let (fetcher, sleeper) = fetcher(&there, 0);
+        let offer = server.offer("topic", buffer.clone()).unwrap();
+        let fetcher = fetcher(&there, 0);
         assert_eq!(take(&fetcher, 1), [0]);
         assert!(!offer.is_done());
         Self {
-            ring,
+            buffer,
             offer,
             fetcher,
             there,
-            _sleeper: sleeper,
             _server: server,
             _here: here,
         }
@@ -199,7 +204,7 @@ fn an_end_that_has_not_arrived_is_not_taken_for_known() {
     // The receiver dies: the end is sent to nobody.
     drop(ends.fetcher);
     ends.there.close().wait().unwrap();
-    ends.ring.end();
+    ends.buffer.end().unwrap();
     thread::sleep(Duration::from_secs(1));
     assert!(!ends.offer.is_done());
 }
@@ -221,29 +226,29 @@ fn a_router_of_zenoh_may_be_between_the_ends() {
         .wait()
         .unwrap();
     let [here, there] = [(); 2].map(|()| open(connecting(&address)));
-    let ring = Arc::new(Ring::of(100));
-    ring.push(message(0));
+    let buffer = Arc::new(MemoryBuffer::of(100));
+    add(&buffer, 0);
     let mut server = Server::new(&here, "gyre/test", None);
-    server.offer("topic", ring).unwrap();
-    let (fetcher, _sleeper) = fetcher(&there, 0);
+    server.offer("topic", buffer).unwrap();
+    let fetcher = fetcher(&there, 0);
     assert_eq!(take(&fetcher, 1), [0]);
 }
 
 #[test]
-fn a_ring_keeps_the_newest_messages() {
-    let ring = Ring::of(3);
-    (0..5).for_each(|seq| ring.push(message(seq)));
-    let next = |seq| ring.next(seq, Duration::ZERO).unwrap();
+fn a_memory_buffer_keeps_the_newest_messages() {
+    let buffer = MemoryBuffer::of(3);
+    (0..5).for_each(|seq| add(&buffer, seq));
+    let next = |seq| buffer.next(seq, Duration::ZERO).unwrap();
     assert_eq!(next(0), Next::Message(message(2)));
     assert_eq!(next(4), Next::Message(message(4)));
     assert_eq!(next(5), Next::Nothing);
-    ring.end();
+    buffer.end().unwrap();
     assert_eq!(next(5), Next::Ended);
     let bytes = message(0).bytes.len();
-    let ring = Ring::bounded(100, 2 * bytes);
-    (0..5).for_each(|seq| ring.push(message(seq)));
+    let buffer = MemoryBuffer::bounded(100, 2 * bytes);
+    (0..5).for_each(|seq| add(&buffer, seq));
     assert_eq!(
-        ring.next(0, Duration::ZERO).unwrap(),
+        buffer.next(0, Duration::ZERO).unwrap(),
         Next::Message(message(3))
     );
 }
@@ -258,12 +263,12 @@ fn poses_and_their_motions_are_sent_from_the_journal_whenever_they_are_asked_for
         ..PoseHeader::default()
     };
     (0..40).for_each(|seq| journal.append(&pose(seq)).unwrap());
-    let poses = Arc::new(Poses::of(PoseLog::of(out.path())));
-    let motions = Motions(poses.clone());
-    let next = |tape: &dyn Tape, seq| tape.next(seq, Duration::ZERO).unwrap();
+    let poses = Arc::new(PoseBuffer::of(PoseLog::of(out.path())));
+    let motions = MotionBuffer(poses.clone());
+    let next = |buffer: &dyn ReplayBuffer, seq| buffer.next(seq, Duration::ZERO).unwrap();
     // Journalled before it is published, a pose is not sent before.
     assert_eq!(next(&*poses, 0), Next::Nothing);
-    poses.have_come(30);
+    poses.set_published(30);
     let sent = |seq| {
         let bytes: Arc<[u8]> = bytemuck::bytes_of(&pose(seq)).into();
         Next::Message(Message { seq, bytes })

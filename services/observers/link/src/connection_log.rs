@@ -1,16 +1,16 @@
-//! Says in the log when the other side goes and comes.
+//! Logs when the other side is lost and found.
 
 use std::time::Instant;
 
-/// Whether the other side answers, as far as the log knows.
-pub(crate) struct Status {
+/// The logged state of the connection to the other side.
+pub(crate) struct ConnectionLog {
     other: &'static str,
     is_connected: bool,
     since: Instant,
 }
 
-impl Status {
-    /// Begins without the other side.
+impl ConnectionLog {
+    /// Creates a log that begins without the other side.
     pub fn of(other: &'static str) -> Self {
         Self {
             other,
@@ -19,7 +19,7 @@ impl Status {
         }
     }
 
-    /// Tells the log of a change. `next`: the first message that has not come.
+    /// Logs a change. `next` is the first message that has not arrived.
     pub fn update(&mut self, is_connected: bool, next: u64) {
         if self.is_connected == is_connected {
             return;

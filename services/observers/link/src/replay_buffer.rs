@@ -1,4 +1,4 @@
-//! What is kept of a topic to be sent, from a given message on.
+//! The messages of a topic that can be sent, from any number on.
 
 use std::{
     collections::VecDeque,
@@ -18,9 +18,9 @@ use crate::LinkError;
 /// A message on its way: the bytes of its header, then those of its payload.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Message {
-    /// Its place in its topic.
+    /// The number of the message in its topic.
     pub seq: u64,
-    /// Shared by all receivers.
+    /// The bytes, shared by all receivers.
     pub bytes: Arc<[u8]>,
 }
 
@@ -34,26 +34,32 @@ impl Message {
     }
 }
 
-/// What follows on a tape.
+/// The next message of a buffer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Next {
     /// A message.
     Message(Message),
-    /// Nothing yet.
+    /// There is none yet.
     Nothing,
-    /// Nothing any more.
+    /// There will be none.
     Ended,
 }
 
 /// The messages of a topic.
-pub(crate) trait Tape: Send + Sync {
+pub(crate) trait ReplayBuffer: Send + Sync {
     /// Returns the first message from number `seq` on, and waits for it at most `limit`.
     fn next(&self, seq: u64, limit: Duration) -> Result<Next, LinkError>;
+
+    /// Adds a message that the run has published.
+    fn add(&self, message: &RecordedMessage);
+
+    /// Ends the stream: no message follows.
+    fn end(&self) -> Result<(), LinkError>;
 }
 
 /// The newest messages of a topic, in memory.
-pub(crate) struct Ring {
-    kept: Mutex<Held>,
+pub(crate) struct MemoryBuffer {
+    held: Mutex<Held>,
     changed: Condvar,
     max_messages: usize,
     max_bytes: usize,
@@ -66,70 +72,70 @@ struct Held {
     has_ended: bool,
 }
 
-impl Ring {
-    /// Keeps at most so many messages.
+impl MemoryBuffer {
+    /// Creates a buffer of at most so many messages.
     pub fn of(messages: usize) -> Self {
         Self::bounded(messages, usize::MAX)
     }
 
-    /// Keeps at most so many messages and bytes, and the newest message in any case.
+    /// Creates a buffer of at most so many messages and bytes, and of the newest message in any
+    /// case.
     pub fn bounded(messages: usize, bytes: usize) -> Self {
         Self {
-            kept: Mutex::default(),
+            held: Mutex::default(),
             changed: Condvar::new(),
             max_messages: messages,
             max_bytes: bytes,
         }
     }
+}
 
-    /// Adds a message.
-    pub fn push(&self, message: Message) {
-        let kept = &mut *lock(&self.kept);
-        kept.bytes += message.bytes.len();
-        kept.messages.push_back(message);
-        while kept.messages.len() > 1
-            && (kept.messages.len() > self.max_messages || kept.bytes > self.max_bytes)
+impl ReplayBuffer for MemoryBuffer {
+    fn next(&self, seq: u64, limit: Duration) -> Result<Next, LinkError> {
+        let first = |held: &Held| {
+            let at = held.messages.partition_point(|message| message.seq < seq);
+            let message = held.messages.get(at).cloned().map(Next::Message);
+            message.or(held.has_ended.then_some(Next::Ended))
+        };
+        Ok(wait(&self.held, &self.changed, limit, first).unwrap_or(Next::Nothing))
+    }
+
+    fn add(&self, message: &RecordedMessage) {
+        let message = Message::of(message);
+        let held = &mut *lock(&self.held);
+        held.bytes += message.bytes.len();
+        held.messages.push_back(message);
+        while held.messages.len() > 1
+            && (held.messages.len() > self.max_messages || held.bytes > self.max_bytes)
         {
-            kept.bytes -= kept.messages.pop_front().map_or(0, |it| it.bytes.len());
+            held.bytes -= held.messages.pop_front().map_or(0, |it| it.bytes.len());
         }
         self.changed.notify_all();
     }
 
-    /// No message follows.
-    pub fn end(&self) {
-        lock(&self.kept).has_ended = true;
+    fn end(&self) -> Result<(), LinkError> {
+        lock(&self.held).has_ended = true;
         self.changed.notify_all();
+        Ok(())
     }
 }
 
-impl Tape for Ring {
-    fn next(&self, seq: u64, limit: Duration) -> Result<Next, LinkError> {
-        let first = |kept: &Held| {
-            let at = kept.messages.partition_point(|message| message.seq < seq);
-            let message = kept.messages.get(at).cloned().map(Next::Message);
-            message.or(kept.has_ended.then_some(Next::Ended))
-        };
-        Ok(wait(&self.kept, &self.changed, limit, first).unwrap_or(Next::Nothing))
-    }
-}
-
-/// The messages in a log of a run: all of them, however long nobody has asked.
-pub(crate) struct Logged<L> {
+/// The messages in a log of a run: all of them, however long the receiver was away.
+pub(crate) struct LogBuffer<L> {
     log: Mutex<L>,
-    come: Mutex<Come>,
+    published: Mutex<Published>,
     changed: Condvar,
 }
 
 #[derive(Clone, Copy, Default)]
-struct Come {
-    /// The number of messages that have been published.
+struct Published {
     messages: u64,
     has_ended: bool,
 }
 
 /// A log on the disk.
 pub(crate) trait Log: Send {
-    /// What it holds.
+    /// The header of its messages.
     type Header: Pod;
 
     /// Returns a message by its number, if it is there.
@@ -137,15 +143,15 @@ pub(crate) trait Log: Send {
 }
 
 /// The poses in the journal of a run.
-pub(crate) type Poses = Logged<PoseLog>;
+pub(crate) type PoseBuffer = LogBuffer<PoseLog>;
 /// The loops in the log of a run.
-pub(crate) type Loops = Logged<LoggedLoops>;
+pub(crate) type LoopBuffer = LogBuffer<LoggedLoops>;
 
 /// The journal of a run.
 pub(crate) struct PoseLog(PathBuf);
 
 impl PoseLog {
-    /// Reads the journal of the run that writes to `out`.
+    /// Returns the journal of the run that writes to `out`.
     pub fn of(out: &Path) -> Self {
         Self(journal::path(out))
     }
@@ -172,34 +178,20 @@ impl Log for LoggedLoops {
     }
 }
 
-impl<L: Log> Logged<L> {
-    /// Sends from this log what has been published.
+impl<L: Log> LogBuffer<L> {
+    /// Creates a buffer of those messages of a log that have been published.
     pub fn of(log: L) -> Self {
         Self {
             log: Mutex::new(log),
-            come: Mutex::default(),
+            published: Mutex::default(),
             changed: Condvar::new(),
         }
     }
 
-    /// So many messages have been published.
-    pub fn have_come(&self, messages: u64) {
-        lock(&self.come).messages = messages;
+    /// Sets the number of messages that have been published.
+    pub fn set_published(&self, messages: u64) {
+        lock(&self.published).messages = messages;
         self.changed.notify_all();
-    }
-
-    /// No message follows those of the log.
-    pub fn end(&self) -> Result<(), LinkError> {
-        let mut messages = lock(&self.come).messages;
-        while self.read(messages)?.is_some() {
-            messages += 1;
-        }
-        *lock(&self.come) = Come {
-            messages,
-            has_ended: true,
-        };
-        self.changed.notify_all();
-        Ok(())
     }
 
     /// Returns a message of the log.
@@ -207,40 +199,60 @@ impl<L: Log> Logged<L> {
         lock(&self.log).read(seq)
     }
 
-    /// Returns what is to be sent of message `seq`.
+    /// Returns message `seq` with the header that `header` makes of the log's.
     fn next_as<H: Pod>(
         &self,
         seq: u64,
         limit: Duration,
         header: impl Fn(L::Header) -> H,
     ) -> Result<Next, LinkError> {
-        let has_come = |come: &Come| (seq < come.messages || come.has_ended).then_some(*come);
-        let Some(come) = wait(&self.come, &self.changed, limit, has_come) else {
+        let is_decided =
+            |it: &Published| (seq < it.messages || it.has_ended).then_some(it.messages);
+        let Some(published) = wait(&self.published, &self.changed, limit, is_decided) else {
             return Ok(Next::Nothing);
         };
-        if seq >= come.messages {
+        if seq >= published {
             return Ok(Next::Ended);
         }
-        let message = |found| {
+        let message = |logged| {
             Next::Message(Message {
                 seq,
-                bytes: bytemuck::bytes_of(&header(found)).into(),
+                bytes: bytemuck::bytes_of(&header(logged)).into(),
             })
         };
         Ok(self.read(seq)?.map_or(Next::Nothing, message))
     }
 }
 
-impl<L: Log> Tape for Logged<L> {
+impl<L: Log> ReplayBuffer for LogBuffer<L> {
     fn next(&self, seq: u64, limit: Duration) -> Result<Next, LinkError> {
         self.next_as(seq, limit, |header| header)
     }
+
+    fn add(&self, message: &RecordedMessage) {
+        self.set_published(message.item().map_or(0, |item| item.seq.saturating_add(1)));
+    }
+
+    /// Ends the stream with the last message of the log.
+    fn end(&self) -> Result<(), LinkError> {
+        let mut messages = lock(&self.published).messages;
+        while self.read(messages)?.is_some() {
+            messages += 1;
+        }
+        *lock(&self.published) = Published {
+            messages,
+            has_ended: true,
+        };
+        self.changed.notify_all();
+        Ok(())
+    }
 }
 
-/// The motions of the poses in a journal, as the topic has them from which poses are composed.
-pub(crate) struct Motions(pub Arc<Poses>);
+/// The motions of the poses in a journal, as in the topic that poses are composed from. They come
+/// and end with the poses.
+pub(crate) struct MotionBuffer(pub Arc<PoseBuffer>);
 
-impl Tape for Motions {
+impl ReplayBuffer for MotionBuffer {
     fn next(&self, seq: u64, limit: Duration) -> Result<Next, LinkError> {
         self.0.next_as(seq, limit, |pose| {
             let mut motion = MotionHeader {
@@ -251,6 +263,12 @@ impl Tape for Motions {
             motion
         })
     }
+
+    fn add(&self, _: &RecordedMessage) {}
+
+    fn end(&self) -> Result<(), LinkError> {
+        Ok(())
+    }
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -258,18 +276,18 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Waits until there is what is looked for, at most `limit`.
+/// Waits until `find` returns a value, at most `limit`.
 fn wait<T, U>(
     mutex: &Mutex<T>,
     changed: &Condvar,
     limit: Duration,
-    look: impl Fn(&T) -> Option<U>,
+    find: impl Fn(&T) -> Option<U>,
 ) -> Option<U> {
     let deadline = Instant::now() + limit;
     let mut guard = lock(mutex);
     loop {
         let left = deadline.saturating_duration_since(Instant::now());
-        match look(&guard) {
+        match find(&guard) {
             None if !left.is_zero() => {}
             found => return found,
         }

@@ -1,4 +1,4 @@
-//! The observers of a run's topics, whose messages become bytes.
+//! Observers of a run's topics that return the messages as bytes.
 
 use std::time::Duration;
 
@@ -12,7 +12,7 @@ use gyre_stage::{
 };
 
 /// The observer of a topic, whatever its type.
-pub(crate) trait Observing {
+pub(crate) trait TopicObserver {
     /// Takes the next message that is there.
     fn take(&mut self) -> Result<Option<RecordedMessage>, StageError>;
     /// Returns the listener that the publisher notifies.
@@ -30,7 +30,7 @@ struct Typed<'run, M: Message> {
 pub(crate) fn observe<'run>(
     run: &'run ObservedRun,
     topic: &str,
-) -> Option<Result<Box<dyn Observing + 'run>, StageError>> {
+) -> Option<Result<Box<dyn TopicObserver + 'run>, StageError>> {
     Some(match topic {
         Scan::TOPIC => Typed::<Scan>::on(run),
         Masked::TOPIC => Typed::<Masked>::on(run),
@@ -46,7 +46,7 @@ pub(crate) fn observe<'run>(
 }
 
 impl<'run, M: Message> Typed<'run, M> {
-    fn on(run: &'run ObservedRun) -> Result<Box<dyn Observing + 'run>, StageError> {
+    fn on(run: &'run ObservedRun) -> Result<Box<dyn TopicObserver + 'run>, StageError> {
         Ok(Box::new(Self {
             observer: run.observe::<M>()?,
             has_ended: false,
@@ -54,7 +54,7 @@ impl<'run, M: Message> Typed<'run, M> {
     }
 }
 
-impl<M: Message> Observing for Typed<'_, M> {
+impl<M: Message> TopicObserver for Typed<'_, M> {
     fn take(&mut self) -> Result<Option<RecordedMessage>, StageError> {
         while !self.has_ended {
             match self.observer.next(Duration::ZERO) {

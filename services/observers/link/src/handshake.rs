@@ -1,0 +1,180 @@
+//! The agreement of both sides of a split run on the item at which they continue, each time when
+//! the robot's side starts.
+
+use std::{fs, path::Path, thread, time::Duration};
+
+use gyre_messages::{Limits, topic};
+use gyre_stage::{Manifest, run::BEGUN_WITH};
+use serde::{Deserialize, Serialize};
+use zenoh::{Session, Wait};
+
+use crate::{LinkConfig, LinkError, Side, request::Question};
+
+/// Time between two questions before there is a run that waits by itself.
+const PAUSE: Duration = Duration::from_millis(200);
+
+const ASK_FOR_SCANS: Question = Question {
+    action: "ask the robot for its scans",
+    other: "the robot",
+};
+const ASK_FOR_START: Question = Question {
+    action: "ask the base where to go on",
+    other: "the base",
+};
+
+/// Returns the prefix of the keys of what one side sends.
+pub(crate) fn prefix(config: &LinkConfig, sender: Side) -> String {
+    let side = match sender {
+        Side::Robot => "robot",
+        Side::Base => "base",
+    };
+    format!("gyre/split/{}/{side}", config.name)
+}
+
+/// Returns the key at which a base says where to continue.
+pub(crate) fn start_key(config: &LinkConfig) -> String {
+    format!("{}/begin", prefix(config, Side::Base))
+}
+
+/// Returns the key at which a robot says how large its scans are.
+pub(crate) fn scan_size_key(config: &LinkConfig) -> String {
+    format!("{}/scans", prefix(config, Side::Robot))
+}
+
+/// The size of a robot's scans.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ScanSize {
+    /// The bytes of the largest scan.
+    pub bytes: usize,
+}
+
+/// Waits for the robot and asks for the size of its scans, which a base needs that receives them.
+///
+/// # Errors
+/// A link that cannot be opened.
+pub fn ask_robot(config: &LinkConfig) -> Result<ScanSize, LinkError> {
+    let pause = || {
+        thread::sleep(PAUSE);
+        Ok(false)
+    };
+    let session = config.network().open(pause)?;
+    let failed = || LinkError::zenoh(ASK_FOR_SCANS.action, &"it was interrupted");
+    let session = session.ok_or_else(failed)?;
+    loop {
+        if let Some(size) = ASK_FOR_SCANS.ask(&session, scan_size_key(config), [])? {
+            let _ = session.close().wait();
+            return Ok(size);
+        }
+        thread::sleep(PAUSE);
+    }
+}
+
+/// The properties of a run on which both sides must agree.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Agreement {
+    cut: String,
+    live: bool,
+    refines: bool,
+    window: usize,
+    look_back: usize,
+    limits: Limits,
+    /// The topics that cross the link, with the versions of their messages.
+    topics: Vec<(String, String)>,
+    /// The checksum of the robot's recording, if it plays one.
+    pub drive: Option<String>,
+}
+
+/// The answer to a robot that starts.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum StartAnswer {
+    /// Items up to this one will have poses; `None`: there are none yet.
+    Go(Option<u64>),
+    /// The robot has to ask again, for this reason.
+    Wait(String),
+    /// The robot is a side of another run, for this reason.
+    Refused(String),
+}
+
+impl Agreement {
+    /// Returns that of this side.
+    pub fn of(manifest: &Manifest, config: &LinkConfig, topics: &[&'static str]) -> Self {
+        let versioned = |name: &&'static str| {
+            let version = topic(name).map_or("", |topic| topic.header.name);
+            ((*name).to_owned(), version.to_owned())
+        };
+        Self {
+            cut: config.cut.name().to_owned(),
+            live: manifest.live,
+            refines: manifest.refines,
+            window: manifest.window.scans,
+            look_back: manifest.window.look_back,
+            limits: manifest.limits,
+            topics: topics
+                .iter()
+                .chain(&["motion", "pose"])
+                .map(versioned)
+                .collect(),
+            drive: drive(&manifest.out),
+        }
+    }
+
+    /// Returns the properties by the names that a user knows.
+    fn properties(&self) -> [(&'static str, String); 9] {
+        let limits = &self.limits;
+        let mode = if self.live { "live" } else { "lossless" };
+        [
+            ("link.cut", self.cut.clone()),
+            ("run.mode", mode.to_owned()),
+            ("run.window", self.window.to_string()),
+            ("raster.n", limits.side().to_string()),
+            ("raster.cell_m", limits.cell_m.to_string()),
+            ("points.capacity", limits.points.to_string()),
+            ("the number of scans of a mask", limits.rasters.to_string()),
+            ("refinement", self.refines.to_string()),
+            (
+                "the scans that stages look back",
+                self.look_back.to_string(),
+            ),
+        ]
+    }
+
+    fn version_of(&self, topic: &str) -> String {
+        let found = self.topics.iter().find(|(name, _)| name == topic);
+        found.map_or("none", |(_, version)| version).to_owned()
+    }
+
+    /// Returns a sentence that says why the robot's side is of another run; `None` if it is not.
+    pub fn difference(&self, robot: &Self) -> Option<String> {
+        let properties = robot.properties().into_iter().zip(self.properties());
+        let properties = properties.map(|((key, robot), (_, base))| (key.to_owned(), robot, base));
+        // A topic that only one side has would be waited for to the end.
+        let topics = self.topics.iter().chain(&robot.topics).map(|(name, _)| {
+            let key = format!("topic `{name}`");
+            (key, robot.version_of(name), self.version_of(name))
+        });
+        let mut all = properties.chain(topics);
+        let (key, robot, base) = all.find(|(_, robot, base)| robot != base)?;
+        Some(format!(
+            "{key} is {robot} on the robot and {base} on the base: give both the same"
+        ))
+    }
+}
+
+/// Returns the checksum of the recording that a run plays; `None` of a radar, and on the base.
+fn drive(out: &Path) -> Option<String> {
+    let text = fs::read_to_string(out.join(BEGUN_WITH)).ok()?;
+    let begun: toml::Table = text.parse().ok()?;
+    Some(begun.get("recording")?.get("sha256")?.as_str()?.to_owned())
+}
+
+/// Asks the base where to continue; `None`: it does not answer.
+pub(crate) fn ask_base(
+    session: &Session,
+    config: &LinkConfig,
+    agreement: &Agreement,
+) -> Result<Option<StartAnswer>, LinkError> {
+    let payload = serde_json::to_vec(agreement);
+    let payload = payload.map_err(|e| LinkError::zenoh(ASK_FOR_START.action, &e))?;
+    ASK_FOR_START.ask(session, start_key(config), payload)
+}

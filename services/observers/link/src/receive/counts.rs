@@ -1,0 +1,48 @@
+//! The counts of a receiver.
+
+use std::{collections::BTreeMap, fmt};
+
+/// The messages that were received and missed.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Received {
+    /// The counts by topic.
+    pub topics: BTreeMap<String, ReceivedCount>,
+    /// True if it ended on a request to stop, before the run.
+    pub is_interrupted: bool,
+}
+
+/// The messages of a topic.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ReceivedCount {
+    /// Messages that arrived.
+    pub received: u64,
+    /// Messages between them that did not arrive.
+    pub missed: u64,
+    /// True if none may be missed.
+    pub is_lossless: bool,
+}
+
+impl Received {
+    /// Returns whether nothing was missed that must not be.
+    pub fn is_complete(&self) -> bool {
+        let mut topics = self.topics.values();
+        topics.all(|count| !count.is_lossless || count.missed == 0)
+    }
+}
+
+impl fmt::Display for Received {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let list = |number: fn(&ReceivedCount) -> u64| {
+            let topics = self.topics.iter().filter(|(_, count)| number(count) > 0);
+            let topics: Vec<String> = topics
+                .map(|(topic, count)| format!("{} {topic}", number(count)))
+                .collect();
+            match topics.is_empty() {
+                true => "nothing".to_owned(),
+                false => topics.join(", "),
+            }
+        };
+        let (received, missed) = (list(|it| it.received), list(|it| it.missed));
+        write!(f, "received {received}; missed {missed}")
+    }
+}

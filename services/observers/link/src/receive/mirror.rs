@@ -1,0 +1,236 @@
+//! The copy of a run of another machine.
+
+use gyre_journal::Journal;
+use gyre_messages::{Correction, Limits, Message as _, Pose, PoseHeader, flag, topic};
+use gyre_stage::{source::RecordedMessage, wake::MAX_WAIT};
+use gyre_supervise::rig::{Feed, Recorded, Rig};
+use zenoh::{Session, qos::Priority};
+
+use super::{ASK_FOR_RUN, Received, ReceivedCount, began_ns, require_same};
+use crate::{
+    LinkError,
+    connection_log::ConnectionLog,
+    fetch::{Fetcher, Request},
+    request::Answers,
+    send::{OfferedTopic, RunOffer, offer_key, prefix},
+    waker::Waker,
+};
+
+/// The copy of a run of another machine.
+pub(super) struct Mirror<'a> {
+    pub session: Session,
+    /// The name of the link.
+    pub link: String,
+    /// The identity of this receiver.
+    pub receiver: String,
+    pub offer: RunOffer,
+    /// The answers to the question for another sender, while nothing arrives.
+    pub answers: Option<Answers>,
+    pub topics: Vec<MirroredTopic>,
+    /// The poses that have arrived: they are not requested again.
+    pub journal: Journal,
+    pub next_pose: u64,
+    pub waker: Waker,
+    pub rig: Rig<'a>,
+}
+
+/// A topic of the copy.
+pub(super) struct MirroredTopic {
+    name: &'static str,
+    header_bytes: usize,
+    pub fetcher: Fetcher,
+    feed: Box<dyn Feed>,
+    next: Option<u64>,
+    count: ReceivedCount,
+}
+
+impl Mirror<'_> {
+    /// Opens a topic for publishing, and requests its messages.
+    pub fn open(&self, offered: &OfferedTopic) -> Result<MirroredTopic, LinkError> {
+        let other_version = || LinkError::other_version(ASK_FOR_RUN.other);
+        let topic = topic(&offered.name).ok_or_else(other_version)?;
+        let from = match topic.name {
+            Pose::TOPIC => self.next_pose,
+            _ => 0,
+        };
+        Ok(MirroredTopic {
+            name: topic.name,
+            header_bytes: topic.header.bytes,
+            fetcher: self.fetch(topic.name, from, offered.is_lossless),
+            feed: self.rig.feed(topic.name)?,
+            next: None,
+            count: ReceivedCount {
+                is_lossless: offered.is_lossless,
+                ..ReceivedCount::default()
+            },
+        })
+    }
+
+    /// Requests the messages of a topic from one on.
+    fn fetch(&self, topic: &str, from: u64, is_lossless: bool) -> Fetcher {
+        let request = Request {
+            key: format!("{}/{topic}", prefix(&self.link, &self.offer.sender)),
+            from,
+            receiver: self.receiver.clone(),
+            // A scan takes long: poses go before it.
+            priority: match is_lossless {
+                true => Priority::InteractiveHigh,
+                false => Priority::DataLow,
+            },
+        };
+        Fetcher::start(&self.session, request, self.waker.clone())
+    }
+
+    /// Asks for another sender, and continues with it if it sends the same drive.
+    fn find_another_sender(&mut self) -> Result<(), LinkError> {
+        let Some(answers) = &self.answers else {
+            let key = offer_key(&self.link);
+            self.answers = Some(ASK_FOR_RUN.send(&self.session, key, [])?);
+            return Ok(());
+        };
+        let reply = match answers.try_recv() {
+            Ok(None) => return Ok(()),
+            Ok(reply) => reply,
+            Err(_) => None,
+        };
+        self.answers = None;
+        let offer = reply.map(|reply| ASK_FOR_RUN.parse(reply)).transpose()?;
+        match offer.flatten() {
+            Some(offer) => self.continue_with(offer),
+            None => Ok(()),
+        }
+    }
+
+    /// Continues with another sender of the same drive.
+    fn continue_with(&mut self, other: RunOffer) -> Result<(), LinkError> {
+        if other.sender == self.offer.sender {
+            return Ok(());
+        }
+        other.topics.iter().try_for_each(require_same)?;
+        if !self.is_same_drive(&other)? {
+            return Err(LinkError::Refused(
+                "the sender is at another drive now: what came of this one is whole up to here; receive the other one into another folder".to_owned(),
+            ));
+        }
+        let is_sent = |topic: &MirroredTopic| other.topics.iter().any(|it| it.name == topic.name);
+        if let Some(topic) = self.topics.iter().find(|topic| !is_sent(topic)) {
+            return Err(LinkError::Refused(format!(
+                "the sender has begun again and does not send `{}` any more: give it the same --topics",
+                topic.name
+            )));
+        }
+        self.offer = other;
+        for place in 0..self.topics.len() {
+            let topic = &self.topics[place];
+            if topic.fetcher.has_ended() {
+                continue;
+            }
+            let from = match topic.name {
+                Pose::TOPIC => self.next_pose,
+                _ => topic.next.unwrap_or_default(),
+            };
+            self.topics[place].fetcher = self.fetch(topic.name, from, topic.count.is_lossless);
+        }
+        Ok(())
+    }
+
+    fn is_same_drive(&self, other: &RunOffer) -> Result<bool, LinkError> {
+        let properties = |of: &RunOffer| (of.window, of.limits, of.live, of.refines);
+        let began_ns = match self.next_pose {
+            0 => self.offer.began_ns,
+            _ => began_ns(&self.rig.manifest().out)?,
+        };
+        let continues = match began_ns {
+            Some(_) => other.began_ns == began_ns,
+            // Without a pose of the drive nothing of it may be there.
+            None => self.topics.iter().all(|topic| topic.next.is_none()),
+        };
+        Ok(properties(&self.offer) == properties(other) && continues)
+    }
+
+    /// Publishes the messages that arrive until all topics have ended, or a signal arrives.
+    pub fn run(&mut self) -> Result<Received, LinkError> {
+        let mut connection = ConnectionLog::of("sender");
+        let limits = self.rig.manifest().limits;
+        loop {
+            self.waker.clear();
+            let have_ended = self.topics.iter().all(|topic| topic.fetcher.has_ended());
+            for topic in &mut self.topics {
+                while let Some(message) = topic.next_message()? {
+                    if topic.name == Pose::TOPIC {
+                        self.next_pose =
+                            append(&mut self.journal, &message, self.next_pose, &limits)?;
+                    }
+                    topic.feed.send(&Recorded::from_bytes(message))?;
+                }
+            }
+            if have_ended {
+                return Ok(self.received(false));
+            }
+            let is_live =
+                |topic: &MirroredTopic| topic.fetcher.is_connected() && !topic.fetcher.has_ended();
+            let is_connected = self.topics.iter().any(is_live);
+            connection.update(is_connected, self.next_pose);
+            match is_connected {
+                true => self.answers = None,
+                false => self.find_another_sender()?,
+            }
+            let feeds: Vec<&dyn Feed> = self.topics.iter().map(|topic| &*topic.feed).collect();
+            for feed in &feeds {
+                feed.answer_handshakes()?;
+            }
+            let descriptor = self.waker.descriptor();
+            if self
+                .rig
+                .sleep_until_readable(&feeds, descriptor, MAX_WAIT)?
+            {
+                return Ok(self.received(true));
+            }
+        }
+    }
+
+    fn received(&self, is_interrupted: bool) -> Received {
+        let topics = self.topics.iter();
+        Received {
+            is_interrupted,
+            topics: topics
+                .map(|topic| (topic.name.to_owned(), topic.count))
+                .collect(),
+        }
+    }
+}
+
+impl MirroredTopic {
+    /// Returns the next message that has arrived, and counts those missed before it.
+    fn next_message(&mut self) -> Result<Option<RecordedMessage>, LinkError> {
+        let Some(message) = self.fetcher.next_with_payload(self.header_bytes)? else {
+            return Ok(None);
+        };
+        let seq = message.item().map_or(0, |item| item.seq);
+        self.count.received += 1;
+        // The numbers of corrections count the poses in them, and each replaces those before.
+        if self.name != Correction::TOPIC {
+            self.count.missed += seq.saturating_sub(self.next.unwrap_or(seq));
+        }
+        self.next = Some(seq.saturating_add(1));
+        Ok(Some(message))
+    }
+}
+
+/// Journals a valid pose, and returns the number of the next one.
+fn append(
+    journal: &mut Journal,
+    message: &RecordedMessage,
+    next: u64,
+    limits: &Limits,
+) -> Result<u64, LinkError> {
+    let pose: Option<PoseHeader> = bytemuck::try_pod_read_unaligned(&message.header).ok();
+    let is_new = |pose: &PoseHeader| {
+        pose.item.seq == next && !pose.item.is(flag::END) && Pose::check(pose, &[], limits).is_ok()
+    };
+    let Some(pose) = pose.filter(is_new) else {
+        return Ok(next);
+    };
+    journal.append(&pose)?;
+    Ok(next + 1)
+}

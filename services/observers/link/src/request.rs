@@ -1,0 +1,81 @@
+//! Single questions and answers between the two sides, in JSON.
+
+use std::time::Duration;
+
+use serde::{Serialize, de::DeserializeOwned};
+use zenoh::{
+    Session, Wait, bytes::ZBytes, handlers::FifoChannelHandler, query::Queryable, query::Reply,
+};
+
+use crate::LinkError;
+
+/// Time for an answer. Without one the question is asked again.
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(1);
+
+/// A question that is asked again until it is answered.
+#[derive(Clone, Copy)]
+pub(crate) struct Question {
+    /// The action, as in "ask for a run".
+    pub action: &'static str,
+    /// The side that answers, as in "the base".
+    pub other: &'static str,
+}
+
+/// The answers to a question, as far as they have arrived.
+pub(crate) type Answers = FifoChannelHandler<Reply>;
+
+impl Question {
+    /// Sends the question.
+    pub fn send(
+        self,
+        session: &Session,
+        key: String,
+        payload: impl Into<ZBytes>,
+    ) -> Result<Answers, LinkError> {
+        let asked = session.get(key).payload(payload).timeout(ANSWER_TIMEOUT);
+        asked.wait().map_err(|e| LinkError::zenoh(self.action, &e))
+    }
+
+    /// Sends the question and waits for the answer; `None` if there is none.
+    pub fn ask<A: DeserializeOwned>(
+        self,
+        session: &Session,
+        key: String,
+        payload: impl Into<ZBytes>,
+    ) -> Result<Option<A>, LinkError> {
+        match self.send(session, key, payload)?.recv() {
+            Ok(reply) => self.parse(reply),
+            Err(_) => Ok(None),
+        }
+    }
+
+    /// Parses an answer; `None` if it is an error of the network layer.
+    pub fn parse<A: DeserializeOwned>(self, reply: Reply) -> Result<Option<A>, LinkError> {
+        let Ok(sample) = reply.into_result() else {
+            return Ok(None);
+        };
+        let answer = serde_json::from_slice(&sample.payload().to_bytes());
+        answer
+            .map(Some)
+            .map_err(|_| LinkError::other_version(self.other))
+    }
+}
+
+/// Answers the questions of a key until the queryable is dropped.
+pub(crate) fn answer<A: Serialize>(
+    session: &Session,
+    key: String,
+    action: &str,
+    answer: impl Fn() -> A + Send + Sync + 'static,
+) -> Result<Queryable<()>, LinkError> {
+    let reply_key = key.clone();
+    session
+        .declare_queryable(key)
+        .callback(move |query| {
+            if let Ok(text) = serde_json::to_vec(&answer()) {
+                let _ = query.reply(&reply_key, text).wait();
+            }
+        })
+        .wait()
+        .map_err(|e| LinkError::zenoh(action, &e))
+}

@@ -1,0 +1,105 @@
+//! The session of zenoh: opened with the endpoints and certificates of a [`Network`] alone.
+
+use std::{
+    path::Path,
+    sync::mpsc::{TryRecvError, channel},
+    thread,
+};
+
+use serde_json::{Value, json};
+use zenoh::{Config, Session, Wait};
+
+use crate::{LinkError, Network, ONE_THREAD};
+
+/// Time without a sign of life after which a connection is given up, ms. Messages wait meanwhile.
+const LEASE_MS: u64 = 3000;
+
+impl Network {
+    /// Opens the session. A side that connects tries again until the other is there, with pauses
+    /// that grow to 4 s; meanwhile `pause` is called, which returns true on a request to stop.
+    /// `None` after one.
+    ///
+    /// # Errors
+    /// An endpoint or a certificate that cannot be used, or an error of `pause`.
+    pub(crate) fn open(
+        &self,
+        mut pause: impl FnMut() -> Result<bool, LinkError>,
+    ) -> Result<Option<Session>, LinkError> {
+        self.check()?;
+        self.require_one_thread()?;
+        let config = Config::from_json5(&self.settings().to_string())
+            .map_err(|e| LinkError::zenoh("use the settings of the link", &e))?;
+        let (sender, opened) = channel();
+        // The call does not return before it is connected, whatever signal arrives.
+        thread::spawn(move || sender.send(zenoh::open(config).wait()));
+        loop {
+            match opened.try_recv() {
+                Ok(session) => {
+                    let failed = |e| LinkError::zenoh("open the link", &e);
+                    return session.map(Some).map_err(failed);
+                }
+                Err(TryRecvError::Disconnected) => {
+                    return Err(LinkError::zenoh("open the link", &"it has failed"));
+                }
+                Err(TryRecvError::Empty) if pause()? => return Ok(None),
+                Err(TryRecvError::Empty) => {}
+            }
+        }
+    }
+
+    fn require_one_thread(&self) -> Result<(), LinkError> {
+        let (name, value) = ONE_THREAD;
+        let is_set = std::env::var_os(name).is_some_and(|set| set == value);
+        match is_set || self.certificate.as_os_str().is_empty() {
+            true => Ok(()),
+            false => Err(LinkError::Refused(format!(
+                "TLS needs {name}='{value}' in the environment, which `gyre run` and `gyre link` set"
+            ))),
+        }
+    }
+
+    fn settings(&self) -> Value {
+        // A client reaches the others through the side or the router that it connects to.
+        let mode = match self.listen.is_empty() {
+            true => "client",
+            false => "peer",
+        };
+        json!({
+            "mode": mode,
+            "connect": {
+                "endpoints": self.connect,
+                "timeout_ms": -1,
+                "exit_on_failure": false,
+                "retry": { "period_init_ms": 250, "period_max_ms": 4000, "period_increase_factor": 2 },
+            },
+            "listen": { "endpoints": self.listen },
+            // No discovery: the endpoints are named.
+            "scouting": { "multicast": { "enabled": false }, "gossip": { "enabled": false } },
+            "transport": {
+                "unicast": { "compression": { "enabled": false } },
+                "link": {
+                    "protocols": ["tcp", "tls"],
+                    "tls": self.tls(),
+                    "tx": { "lease": LEASE_MS },
+                },
+            },
+        })
+    }
+
+    fn tls(&self) -> Value {
+        if self.certificate.as_os_str().is_empty() {
+            return json!({});
+        }
+        let file = |path: &Path| path.to_string_lossy().into_owned();
+        json!({
+            "root_ca_certificate": file(&self.ca),
+            "listen_private_key": file(&self.key),
+            "listen_certificate": file(&self.certificate),
+            "connect_private_key": file(&self.key),
+            "connect_certificate": file(&self.certificate),
+            "enable_mtls": true,
+            "verify_name_on_connect": true,
+            "close_link_on_expiration": true,
+        })
+    }
+}
