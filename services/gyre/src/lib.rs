@@ -62,60 +62,33 @@ pub type Failure = Box<dyn std::error::Error + Send + Sync>;
 /// One sentence that says what, where and what to do.
 pub fn execute(command: Command) -> Result<ExitCode, Failure> {
     gyre_stage::wake::report_file_size_limit()?;
+    if is_private(&command) {
+        gyre_stage::run::keep_files_private();
+    }
     match command {
         Command::Stage { name } => Ok(stage::run(&name)),
         Command::Guard => {
             gyre_supervise::guard(std::io::stdin().lock());
             Ok(ExitCode::SUCCESS)
         }
-        Command::Run(arguments) => {
-            gyre_stage::run::keep_files_private();
-            run::run(&arguments)
-        }
-        Command::Up(arguments) => {
-            gyre_stage::run::keep_files_private();
-            operate::up(&arguments)
-        }
+        Command::Run(arguments) => run::run(&arguments),
+        Command::Up(arguments) => operate::up(&arguments),
         Command::Down(run) => operate::down(&run),
         Command::Ps(arguments) => operate::ps(&arguments),
         Command::Logs(arguments) => operate::logs(&arguments),
         Command::Top(arguments) => operate::top(&arguments),
         Command::Restart(arguments) => operate::restart(&arguments),
         Command::Swap(arguments) => operate::swap(&arguments),
-        Command::Echo(arguments) => {
-            gyre_stage::run::keep_files_private();
-            echo::echo(&arguments)
-        }
-        Command::Watch(arguments) => {
-            gyre_stage::run::keep_files_private();
-            watch::watch(&arguments)
-        }
-        Command::Ros2(arguments) => {
-            gyre_stage::run::keep_files_private();
-            ros2::publish(&arguments)
-        }
-        Command::Shadow(arguments) => {
-            gyre_stage::run::keep_files_private();
-            shadow::shadow(&arguments)
-        }
-        Command::Batch(arguments) => {
-            gyre_stage::run::keep_files_private();
-            batch::batch(&arguments)
-        }
+        Command::Echo(arguments) => echo::echo(&arguments),
+        Command::Watch(arguments) => watch::watch(&arguments),
+        Command::Ros2(arguments) => ros2::publish(&arguments),
+        Command::Shadow(arguments) => shadow::shadow(&arguments),
+        Command::Batch(arguments) => batch::batch(&arguments),
         Command::BatchDrive(arguments) => batch::drive(&arguments),
-        Command::Stress(arguments) => {
-            gyre_stage::run::keep_files_private();
-            stress::stress(&arguments)
-        }
+        Command::Stress(arguments) => stress::stress(&arguments),
         Command::StressHelper { words } => stress::help(&words),
-        Command::Record(arguments) => {
-            gyre_stage::run::keep_files_private();
-            Ok(record::record(&arguments))
-        }
-        Command::Link(arguments) => {
-            gyre_stage::run::keep_files_private();
-            link::link(&arguments)
-        }
+        Command::Record(arguments) => Ok(record::record(&arguments)),
+        Command::Link(arguments) => link::link(&arguments),
         Command::Doctor(arguments) => doctor::doctor(&arguments),
         Command::RadarServer(arguments) => radar_server::serve(&arguments),
         Command::Inspect(arguments) => inspect::inspect(&arguments),
@@ -126,12 +99,27 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::Masks(arguments) => masks::masks(&arguments),
         Command::Export(arguments) => export::export(&arguments),
         Command::Simulate(arguments) => simulate::simulate(&arguments),
-        Command::Conformance(arguments) => {
-            gyre_stage::run::keep_files_private();
-            conformance::conformance(&arguments)
-        }
+        Command::Conformance(arguments) => conformance::conformance(&arguments),
         Command::Schema(arguments) => schema::schema(&arguments),
     }
+}
+
+/// Returns whether the files of a command are its user's alone: those of a run and of its observers.
+fn is_private(command: &Command) -> bool {
+    matches!(
+        command,
+        Command::Run(_)
+            | Command::Up(_)
+            | Command::Echo(_)
+            | Command::Watch(_)
+            | Command::Ros2(_)
+            | Command::Shadow(_)
+            | Command::Batch(_)
+            | Command::Stress(_)
+            | Command::Record(_)
+            | Command::Link(_)
+            | Command::Conformance(_)
+    )
 }
 
 /// Parses the command line. Help is printed to standard output, a wrong argument to standard error, and the exit code is returned.
