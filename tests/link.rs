@@ -12,7 +12,7 @@ use gyre_journal as journal;
 
 use crate::common::{Ended, Run, gyre, recording, undisturbed, wrapped};
 
-const PATIENCE: Duration = Duration::from_secs(60);
+const MAX_WAIT: Duration = Duration::from_secs(60);
 /// Time for which the link is cut: longer than the time after which a connection is given up.
 const CUT: Duration = Duration::from_secs(5);
 
@@ -301,7 +301,7 @@ fn poses(out: &Path) -> usize {
 fn await_poses(out: &Path) {
     let since = Instant::now();
     while poses(out) < 2 {
-        assert!(since.elapsed() < PATIENCE, "waited in vain for poses");
+        assert!(since.elapsed() < MAX_WAIT, "waited in vain for poses");
         thread::sleep(Duration::from_millis(20));
     }
 }

@@ -35,7 +35,7 @@ const MAX_REQUESTS: usize = 64;
 pub(crate) const ENDED: &str = "ended";
 /// The parameter with the first message that is wanted.
 pub(crate) const FROM: &str = "from";
-/// The parameter that tells one receiver from another.
+/// The parameter with the identity of a receiver.
 pub(crate) const RECEIVER: &str = "receiver";
 /// The parameter of a receiver that has everything, or wants no more.
 pub(crate) const DONE: &str = "done";

@@ -155,7 +155,7 @@ impl Node {
         subscription.map_err(|error| topic_error(topic, &error))
     }
 
-    /// Returns the type on DDS of a topic by its name on DDS; `None` while nobody publishes it.
+    /// Returns the type on DDS of a topic by its name on DDS; `None` while there is no publisher.
     pub fn type_of(&self, dds_name: &str) -> Option<String> {
         let participant = self.context.domain_participant();
         let writers = participant.discovered_writers();

@@ -16,7 +16,7 @@ use crate::{Address, Settings, connection::RadarSocket};
 
 /// The longest wait for an answer.
 const MAX_WAIT: Duration = Duration::from_secs(5);
-/// Time between two looks for the answer.
+/// Time between two polls for the answer.
 const POLL: Duration = Duration::from_millis(10);
 
 /// A radar that cannot be used.

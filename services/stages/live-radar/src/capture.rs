@@ -26,7 +26,7 @@ use crate::{
 pub const MAGIC: &[u8; 8] = b"GYRERAD1";
 /// The most bytes of a record.
 const MAX_RECORD_BYTES: usize = 1 << 16;
-/// Time between two looks for bytes.
+/// Time between two polls for bytes.
 const POLL: Duration = Duration::from_millis(2);
 /// Encoder counts of a description by UDP, which has none. They are not sent.
 const ENCODER_COUNTS: u16 = 5600;

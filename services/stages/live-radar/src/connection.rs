@@ -1,4 +1,4 @@
-//! A connection to a radar, made anew when it breaks or falls silent: TCP, or a socket that
+//! A connection to a radar, opened again when it breaks or falls silent: TCP, or a socket that
 //! receives its datagrams.
 
 use std::{
@@ -28,9 +28,9 @@ pub enum ReadResult {
     Bytes,
     /// The connection was opened.
     Opened,
-    /// Nothing was read; look again after this time.
+    /// Nothing was read; try again after this time.
     Nothing(Duration),
-    /// The connection was closed, or could not be opened; look again after this time.
+    /// The connection was closed, or could not be opened; try again after this time.
     Closed(Duration),
 }
 
@@ -183,7 +183,7 @@ impl Connection {
         }
     }
 
-    /// Closes the connection, to be opened anew after a pause.
+    /// Closes the connection, to be opened again after a pause.
     pub fn close(&mut self, reason: impl Display) -> ReadResult {
         let pause = self.pause;
         tracing::warn!(

@@ -38,7 +38,7 @@ pub struct Settings {
     pub address: Address,
     /// Encoder counts per turn, to which the angles of a radar are rounded that sends by UDP.
     pub encoder_counts: u16,
-    /// Time without an azimuth after which it is connected to anew.
+    /// Time without an azimuth after which the run reconnects.
     pub silence: Duration,
     /// Scans to receive; `None`: without end.
     pub scans: Option<u64>,

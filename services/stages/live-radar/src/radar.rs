@@ -16,7 +16,7 @@ use crate::{
     parser::RadarParser,
 };
 
-/// The most reads between two looks for signals and new readers.
+/// The most reads between two checks for signals and new readers.
 const MAX_READS: usize = 64;
 /// Bytes without a message after which the other end is taken for no radar.
 const MAX_SKIPPED_BYTES: usize = 1 << 22;

@@ -169,7 +169,7 @@ impl Driver {
         })
     }
 
-    /// Returns the type of the azimuths' topic on DDS; `None` while nobody publishes it.
+    /// Returns the type of the azimuths' topic on DDS; `None` while there is no publisher.
     ///
     /// # Errors
     /// It is none that is read.
@@ -183,7 +183,7 @@ impl Driver {
         }
     }
 
-    /// Subscribes to the azimuths once somebody publishes them, and returns whether they are
+    /// Subscribes to the azimuths once there is a publisher, and returns whether they are
     /// subscribed to.
     ///
     /// # Errors

@@ -21,7 +21,7 @@ use super::{
     driver::{DescribedRadar, Driver, DriverError, Packet, PacketMessage},
 };
 
-/// The most messages between two looks for signals and new readers.
+/// The most messages between two checks for signals and new readers.
 const MAX_MESSAGES: usize = 512;
 /// Time between two polls for a driver.
 const POLL_INTERVAL: Duration = Duration::from_millis(100);

@@ -11,9 +11,9 @@ use gyre_colossus::Configuration;
 
 use super::{Clients, Faults, Group};
 
-/// The longest time between two looks for a request to stop.
+/// The longest time between two checks for a request to stop.
 const SLICE: Duration = Duration::from_millis(50);
-/// Time between two looks for a client.
+/// Time between two polls for a client.
 const POLL: Duration = Duration::from_millis(5);
 /// Time between two descriptions of a radar that sends no powers yet.
 const DESCRIBE_PERIOD: Duration = Duration::from_millis(100);
