@@ -1,5 +1,4 @@
-//! The base's side of a split run: in the place of the source and the first stages, which the robot
-//! has.
+//! The base's side of a split run, in the place of the source and the first stages.
 //!
 //! It publishes the messages of the robot's stages, from the item of the newest pose on, and sends
 //! the poses, from the journal, and the motions to the robot. The poses are the credit of the
@@ -312,8 +311,7 @@ impl Base<'_> {
         };
         self.check_next(&item, &items)?;
         if item.is(flag::END) {
-            // This side ends when the robot has all poses, and the robot when this side has
-            // journalled the end.
+            // The base ends after the robot has all poses, the robot after the base has the end.
             if to_robot.pose_offer.asked() < item.seq {
                 return Ok(false);
             }

@@ -89,8 +89,7 @@ impl LinkConfig {
         }
     }
 
-    /// Returns whether motions go back to masking, which is before the cut, from the searches,
-    /// which are behind it.
+    /// Returns whether motions go back from the searches to masking, over the cut.
     pub fn returns_motions(&self) -> bool {
         matches!(self.cut, PlayedFrom::Masked | PlayedFrom::Rotation)
     }

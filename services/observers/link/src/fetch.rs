@@ -147,8 +147,7 @@ impl Fetcher {
         self.state.stop.store(true, Ordering::Relaxed);
     }
 
-    /// Tells the other side that nothing more is wanted, and waits until it knows or cannot be
-    /// reached.
+    /// Tells the other side that nothing more is wanted, and waits while it can be reached.
     pub fn leave(mut self) {
         self.begin_to_leave();
         if let Some(thread) = self.thread.take() {

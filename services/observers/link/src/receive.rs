@@ -114,8 +114,7 @@ impl RemoteRun {
 /// Receives until the run ends, or a signal requests a stop.
 ///
 /// # Errors
-/// The folder has poses of another drive, shared memory cannot be used, or a failure of the
-/// transport.
+/// The folder has poses of another drive, or shared memory or the transport fails.
 pub fn receive(
     options: &ReceiveOptions,
     remote: RemoteRun,
@@ -176,8 +175,7 @@ fn receiver(out: &Path, session: &Session) -> Result<String, LinkError> {
     }
 }
 
-/// Returns the number of the first pose that is not in the journal, which is of this drive or
-/// empty.
+/// Returns the number of the next pose of a journal, which is of this drive or empty.
 fn next_pose(journal: &Journal, offer: &RunOffer, out: &Path) -> Result<u64, LinkError> {
     let (last, ended) = journal.last(1)?;
     let Some(last) = last.first() else {

@@ -78,8 +78,7 @@ impl MemoryBuffer {
         Self::bounded(messages, usize::MAX)
     }
 
-    /// Creates a buffer of at most so many messages and bytes, and of the newest message in any
-    /// case.
+    /// Creates a buffer of at most so many messages and bytes, but at least the newest message.
     pub fn bounded(messages: usize, bytes: usize) -> Self {
         Self {
             held: Mutex::default(),

@@ -1,4 +1,4 @@
-//! The robot's side of a split run: in the place of the last stages, which the base has.
+//! The robot's side of a split run, in the place of the last stages.
 //!
 //! It journals the poses that come back as pose-integration does, so this side has all results too,
 //! and continues after a restart. It begins when the base has said which items will have poses:
@@ -166,8 +166,7 @@ impl Robot<'_> {
         }
     }
 
-    /// Journals the poses of all items that the base had received before this side began; false on
-    /// a request to stop.
+    /// Journals the poses of all items of an earlier start; false on a request to stop.
     fn catch_up(&mut self, poses: &Fetcher, received: u64) -> Result<bool, LinkError> {
         while self.next_pose() < received {
             self.waker.clear();
@@ -220,8 +219,7 @@ impl Robot<'_> {
         }
     }
 
-    /// Buffers the messages of a topic for the base; returns the item of the end if it is among
-    /// them.
+    /// Buffers the messages of a topic for the base; returns the item of the end, if it is there.
     fn send(
         &mut self,
         place: usize,
@@ -301,8 +299,7 @@ impl Robot<'_> {
         timed
     }
 
-    /// Ends this side when the base has the end too; false if it has not yet. It has the end when
-    /// it requests what follows.
+    /// Ends this side once the base requests what follows the end; false before.
     fn end(&mut self, end: &Item, sent: &[SentTopic], poses: &Fetcher) -> Result<bool, LinkError> {
         // The base ends when it knows that all poses are here.
         poses.confirm(self.next_pose());

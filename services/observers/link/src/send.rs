@@ -121,8 +121,7 @@ pub(crate) fn offer_key(name: &str) -> String {
     format!("gyre/view/{name}/greeting")
 }
 
-/// Sends the topics of a run until it ends and all receivers have everything, or a signal requests
-/// a stop.
+/// Sends the topics of a run until all receivers have everything, or a signal requests a stop.
 ///
 /// # Errors
 /// There is no such run or topic, or the network cannot be used.
@@ -292,8 +291,7 @@ impl Logs {
     }
 }
 
-/// Returns whether no message of a topic may be missed: all but those with payloads, which are
-/// large.
+/// Returns whether no message of a topic may be missed: all but the large ones with payloads.
 fn is_lossless(topic: &str) -> bool {
     topic != Scan::TOPIC && topic != Masked::TOPIC
 }

@@ -21,8 +21,7 @@ use crate::{
     waker::Waker,
 };
 
-/// Time for which a request is answered. Then the receiver asks again, so that a sender forgets one
-/// that has gone.
+/// Time after which the receiver asks again, so that a sender forgets one that has gone.
 pub(crate) const REQUEST_LIFETIME: Duration = Duration::from_secs(20);
 /// Time without a message after which an empty one tells the receiver that this end is still there.
 const KEEP_ALIVE: Duration = Duration::from_secs(1);
@@ -137,8 +136,7 @@ impl Offer {
         !self.receivers().is_empty()
     }
 
-    /// Returns whether all receivers have said that they want no more. An answer that was sent need
-    /// not have arrived.
+    /// Returns whether all receivers have confirmed the end: what was sent need not have arrived.
     pub fn is_done(&self) -> bool {
         self.receivers().values().all(|receiver| receiver.is_done)
     }

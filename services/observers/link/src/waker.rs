@@ -11,8 +11,7 @@ use std::{
 
 use crate::LinkError;
 
-/// Two connected sockets: a byte in one makes the descriptor of the other readable. Clones share
-/// them.
+/// Two connected sockets: a byte in one makes the other readable. Clones share them.
 #[derive(Clone, Debug)]
 pub(crate) struct Waker(Arc<[UnixStream; 2]>);
 

@@ -27,8 +27,7 @@ use crate::{
 
 /// The name of the node.
 const NODE: &str = "gyre";
-/// Messages that are kept for readers that are behind: 25 s of a radar that turns four times a
-/// second.
+/// Messages that are kept for slow readers: 25 s at four turns a second.
 const DEPTH: usize = 100;
 
 /// The options of the bridge.
@@ -44,15 +43,13 @@ pub struct Settings {
     pub frames: Frames,
     /// The radar on the vehicle.
     pub mounting: Mounting,
-    /// True to publish `odom` -> `base_link` and `map` -> `odom`: if two programs do, the vehicle
-    /// jumps.
+    /// True to publish `odom` -> `base_link` and `map` -> `odom`: only one program may.
     pub transforms: bool,
     /// The settings of the map of a run with SLAM; `None`: no map.
     pub map: Option<MapSettingsOf>,
 }
 
-/// Returns the settings of the map of the run that writes to a folder, or the reason why it has
-/// none.
+/// Returns the settings of the map of the run in a folder, or why it has none.
 pub type MapSettingsOf = fn(&Path) -> Result<MapSettings, String>;
 
 /// The settings of a map.

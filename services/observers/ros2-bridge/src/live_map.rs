@@ -126,8 +126,7 @@ impl LiveMap {
         self.queries.has_ended() && self.keyframes.has_ended()
     }
 
-    /// Reads new keyframes, and draws those that are new or have moved; true if something has
-    /// changed.
+    /// Reads new keyframes, and draws those that are new or have moved; true if there are any.
     fn update(&mut self, out: &Path) -> Result<bool, LiveMapError> {
         self.keyframes.refresh()?;
         self.queries.refresh()?;

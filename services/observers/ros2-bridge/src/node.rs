@@ -11,8 +11,7 @@ use thiserror::Error;
 
 use crate::{Domain, outlet::Outlet};
 
-/// The longest wait for readers that are behind. A message without room then is not sent, and
-/// counted.
+/// The longest wait for slow readers, after which a message is dropped and counted.
 const MAX_WAIT: Duration = Duration::from_millis(100);
 
 /// A node that cannot be made, or a topic.
@@ -103,8 +102,7 @@ impl Node {
         Ok(Self { node, context })
     }
 
-    /// Returns the name on DDS of a topic, which is relative to the namespace unless it begins with
-    /// `/`.
+    /// Returns the name on DDS of a topic, absolute or relative to the namespace.
     ///
     /// # Errors
     /// The name is none.
@@ -112,8 +110,7 @@ impl Node {
         Ok(format!("rt{}", self.absolute(topic)?))
     }
 
-    /// Returns the absolute name of a topic. The library makes `//` of a relative one in the root's
-    /// namespace.
+    /// Returns the absolute name of a topic: the library makes `//` of one in the root.
     fn absolute(&self, topic: &str) -> Result<Name, NodeError> {
         let name = name(topic)?;
         match name.is_absolute() {

@@ -33,8 +33,7 @@ pub struct Shared {
 /// Runs that are kept for threads that begin with them late.
 const MAX_RUNS: usize = 4;
 
-/// The state of one run. Each thread has that of the run it follows: another thread may follow the
-/// next run already.
+/// The state of one run. Another thread may follow the next run already.
 #[derive(Clone, Debug, Default)]
 pub struct SharedRunState(Arc<Mutex<RunState>>);
 

@@ -108,8 +108,7 @@ impl Token {
 }
 
 impl Access {
-    /// Creates the access to a server at this address. Without a token it is for this machine
-    /// alone.
+    /// Creates the access to a server: without a token it is for this machine alone.
     pub fn new(address: SocketAddr, token: Option<Token>) -> Self {
         Self {
             token,

@@ -9,8 +9,7 @@ use serde::Serialize;
 const WINDOW_NS: i64 = 60_000_000_000;
 /// Width of a step of the time series.
 const STEP_NS: i64 = 1_000_000_000;
-/// The most samples that are kept: at more than 136 poses a second the window is shorter than a
-/// minute.
+/// The most samples: above 136 poses a second the window is shorter than a minute.
 const MAX_SAMPLES: usize = 8192;
 /// Delays of a pose: sensor to pose, then hand-over and work of each stage.
 const KINDS: usize = 1 + 2 * StageId::ALL.len();
@@ -61,8 +60,7 @@ pub struct DelayReport {
     /// From the complete sweep to its pose.
     sensor_to_pose: Percentiles,
     stages: Vec<StageDelays>,
-    /// Sensor to pose in each second of the last minute, oldest first; `None` in one without a
-    /// pose.
+    /// Sensor to pose in each second of the last minute, oldest first; `None` without a pose.
     series: Vec<Option<SecondDelays>>,
 }
 

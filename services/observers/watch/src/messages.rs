@@ -19,7 +19,7 @@ pub enum Layer {
 /// The missed messages of the observed topics.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Missed {
-    /// NewPoses that were missed.
+    /// Poses that were missed.
     pub pose: u64,
     /// Scans that were missed.
     pub scan: u64,
@@ -71,14 +71,14 @@ pub struct RunInfo {
     pub version: &'static str,
 }
 
-/// RunCounts and delays, once a second.
+/// Counts and delays, once a second.
 #[derive(Debug, Serialize)]
 #[serde(tag = "kind", rename = "health")]
 pub struct HealthReport {
-    /// RunCounts of the run.
+    /// Counts of the run.
     #[serde(flatten)]
     pub counts: RunCounts,
-    /// NewPoses a second since the last report.
+    /// Poses a second since the last report.
     pub scans_per_s: f64,
     pub distance_m: f64,
     pub delays: DelayReport,
@@ -87,12 +87,12 @@ pub struct HealthReport {
     pub processes: Vec<Process>,
 }
 
-/// RunCounts of the run.
+/// Counts of the run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct RunCounts {
     /// Scans that the source has published.
     pub published: u64,
-    /// NewPoses of the trajectory.
+    /// Poses of the trajectory.
     pub poses: u64,
     /// Scans that live mode has dropped.
     pub dropped: u64,

@@ -25,8 +25,7 @@ struct Snapshot {
     traces: Option<[u64; 2]>,
 }
 
-/// Returns the type of the answer and its text: OpenMetrics for one who accepts it, else the older
-/// format.
+/// Returns the type of the answer and its text: OpenMetrics if accepted, else the older format.
 pub fn scrape(view: &RunView, accepted: &[u8]) -> (&'static str, String) {
     let text = open_metrics(view);
     let takes_open_metrics =
@@ -69,8 +68,7 @@ fn open_metrics(view: &RunView) -> String {
     text
 }
 
-/// Returns the same in the older format, where the name of a counter has its `_total` everywhere,
-/// and an info is a gauge.
+/// Returns the older format: `_total` in all names of a counter, and an info is a gauge.
 fn older(text: &str) -> String {
     let kind = |line: &'_ str| -> Option<(String, &'static str)> {
         let (name, kind) = line.strip_prefix("# TYPE ")?.split_once(' ')?;

@@ -132,8 +132,7 @@ fn follow_poses(followed: &Followed, run: &ObservedRun) -> Result<(), StageError
     Ok(())
 }
 
-/// Adds the poses of the journal, and returns the number of the last one. A journal that cannot be
-/// read is only not shown.
+/// Adds the poses of the journal, if it can be read; returns the number of the last one.
 fn add_journal(view: &RunView, out: &Path) -> Option<u64> {
     view.clear_track();
     let records = journal::records(&journal::path(out)).ok()??;

@@ -11,8 +11,7 @@ use crate::frame;
 
 /// The most azimuths of a picture: no Navtech radar measures more.
 const MAX_AZIMUTHS: usize = 400;
-/// The most range bins of a picture: a display has about as many pixels from its middle to its
-/// edge.
+/// The most range bins of a picture: a display has about as many pixels from middle to edge.
 const MAX_BINS: usize = 256;
 /// The most cells on each side of a raster.
 const MAX_SIDE: usize = 256;
@@ -117,8 +116,7 @@ struct RasterPicture {
     width_m: f64,
 }
 
-/// Makes a picture of a masked raster: the strongest value in each of its cells, relative to the
-/// strongest of all.
+/// Makes a picture of a masked raster: the strongest value of each cell, relative to the maximum.
 ///
 /// # Errors
 /// Memory has no room.
@@ -155,7 +153,7 @@ struct PointsPicture {
     unit_m: f64,
 }
 
-/// PackedPoints of a scan as x and y in units of [`POINT_UNIT_M`], 16 bits each, little-endian, in
+/// Points of a scan as x and y in units of [`POINT_UNIT_M`], 16 bits each, little-endian, in
 /// the frame of the scan.
 pub struct PackedPoints(Vec<u8>);
 

@@ -92,8 +92,7 @@ struct Shared {
 struct ReaderSlot(Arc<AtomicUsize>);
 
 impl Endpoint {
-    /// Listens at an address. Readers need the token, if there is one; without one only this
-    /// machine is answered.
+    /// Listens at an address. Without a token only this machine is answered.
     ///
     /// # Errors
     /// The address cannot be listened at.

@@ -10,8 +10,7 @@ const SPACING_M: f64 = 0.25;
 /// The turn after which there is a vertex in any case, rad.
 const TURN_RAD: f64 = 0.1;
 
-/// A pose of the trajectory: x, y (m), yaw (rad), and the covariance of the position: xx, xy, yy
-/// (m^2).
+/// A pose: x, y (m), yaw (rad), and the covariance of the position: xx, xy, yy (m^2).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Vertex(pub [f64; 6]);
 

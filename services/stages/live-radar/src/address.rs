@@ -42,8 +42,7 @@ pub enum BadAddress {
 }
 
 impl Address {
-    /// Parses an address: `HOST`, `HOST:PORT` or `udp://GROUP:PORT`, and the interface for the
-    /// last, which may be empty.
+    /// Parses `HOST`, `HOST:PORT` or `udp://GROUP:PORT`, for the last with an interface or "".
     ///
     /// # Errors
     /// The text is no address.

@@ -134,8 +134,7 @@ impl Connection {
         }
     }
 
-    /// Notes that a scan has arrived. Only then is its sender the radar of the run: anybody can
-    /// send a description.
+    /// Notes a scan: its sender is the radar of the run. Anybody can send a description.
     pub fn note_scan(&mut self) {
         self.radar = self.sender.map(|sender| sender.ip()).or(self.radar);
     }

@@ -54,8 +54,7 @@ impl Intake {
         }
     }
 
-    /// Begins the scans of a configuration; false if it is not new. `room` are the bytes that the
-    /// run has for a scan.
+    /// Begins the scans of a configuration of at most `room` bytes; false if it is not new.
     ///
     /// # Errors
     /// The scans do not fit into this run.
@@ -116,8 +115,7 @@ impl Intake {
         }
     }
 
-    /// Returns the time for which no scan can be complete, if it is that of a few azimuths: so many
-    /// are then read at once.
+    /// Returns the pause until a scan can be complete, if it is that of a few azimuths.
     pub fn pause(&self) -> Option<Duration> {
         self.scans.as_ref().and_then(ScanAssembly::pause)
     }
@@ -134,8 +132,7 @@ impl Intake {
         self.before = before;
     }
 
-    /// Returns the counts since the start of the run; those of connections are the earlier
-    /// source's.
+    /// Returns the counts since the start of the run, connections not included.
     pub fn received(&self) -> Received {
         let is_open = self.scans.as_ref().is_some_and(ScanAssembly::is_open);
         Received {

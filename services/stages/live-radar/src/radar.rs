@@ -72,8 +72,7 @@ impl Radar {
         }
     }
 
-    /// Returns how to wait for more: for a pause that ends before the scan does, if the radar
-    /// sends.
+    /// Returns how to wait for more: the pause ends before the scan does.
     fn wait(&self, limit: Duration, has_received: bool) -> Arrival {
         match self.intake.pause().filter(|_| has_received) {
             Some(pause) if pause < limit => Arrival::Later(pause),

@@ -86,8 +86,7 @@ mod tests {
     const AHEAD_NS: i64 = 1_700_000_000_000_000_000;
     const MS: i64 = 1_000_000;
 
-    /// Returns the delay of each scan, if it is known. The radar's clock is `pace` times as fast as
-    /// the host's.
+    /// Returns the known delays. The radar's clock is `pace` times as fast as the host's.
     fn delays(pace: f64, read_late_ns: impl Fn(i64) -> i64) -> Vec<Option<i64>> {
         let mut delay = ReadDelay::default();
         let scan = |k: i64| {

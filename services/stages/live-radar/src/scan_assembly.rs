@@ -35,8 +35,7 @@ pub struct ScanAssembly {
 pub struct CompleteScan {
     /// The number of missing azimuths.
     pub missing: usize,
-    /// The time at which it was complete by the radar's clock, `CLOCK_MONOTONIC`, ns; `None`: not
-    /// known.
+    /// The time of completion by the radar's clock, `CLOCK_MONOTONIC`, ns; `None`: unknown.
     pub due_ns: Option<i64>,
 }
 
@@ -62,8 +61,7 @@ impl ScanAssembly {
         self.assembler.is_open()
     }
 
-    /// Adds an azimuth that arrived at `arrival_ns` (since 1970); returns the scan that it
-    /// completes.
+    /// Adds an azimuth with its time of arrival, ns since 1970; returns the completed scan.
     pub fn add(
         &mut self,
         azimuth: Azimuth<'_>,
@@ -93,8 +91,7 @@ impl ScanAssembly {
         header.set_geometry(&sweep.geometry);
         let last_ns = header.slot(bytes).stamp_ns[sweep.geometry.azimuths - 1];
         let due_ns = self.due_ns(last_ns, at_ns);
-        // A clock that was set back in the middle of a sweep gives times that no later stage
-        // accepts.
+        // A clock that was set back in the middle of a sweep: no later stage accepts such times.
         if let Some(Err(error)) = header.view(bytes).map(|scan| scan.check_times()) {
             tracing::warn!("a scan is left out: {error}");
             return None;
@@ -109,8 +106,7 @@ impl ScanAssembly {
         })
     }
 
-    /// Returns the time at which a scan was complete whose last azimuth has this stamp and was read
-    /// at `at_ns`.
+    /// Returns when a scan was complete by its last azimuth's stamp, read at `at_ns`.
     fn due_ns(&mut self, last_ns: i64, at_ns: i64) -> Option<i64> {
         if self.clock.found() == Some(FoundClock::Arrival) {
             return None;
@@ -139,8 +135,7 @@ impl ScanAssembly {
         }
     }
 
-    /// Returns the time for which no scan can be complete, if it is that of a few azimuths: so many
-    /// are then read at once.
+    /// Returns the pause until a scan can be complete, if it is that of a few azimuths.
     pub fn pause(&self) -> Option<Duration> {
         match self.clock.found() {
             // Stamps are the times of arrival: each azimuth is read when it arrives.

@@ -2,10 +2,9 @@
 
 use gyre_stage::source::LastScan;
 
-/// The factor up to which the radar's clock may be faster than this host's: recordings may be
-/// played so fast.
+/// The limit of the pace of the radar's clock: recordings may be played so fast.
 const MAX_PACE: f64 = 4.0;
-/// TurnCounter by which it may be ahead beyond that: scans that were read late.
+/// Turns by which it may be ahead beyond that: scans that were read late.
 const SLACK_TURNS: f64 = 16.0;
 /// The clock was set back where it has advanced by less than this since the last scan, turns.
 const MIN_TURNS: f64 = 0.25;
@@ -23,8 +22,7 @@ pub struct AzimuthTime {
     pub at_ns: i64,
 }
 
-/// Counts the turns between scans by time, with and without azimuths, also across connections and
-/// restarts of the process.
+/// Counts the turns between scans by time, also across connections and restarts.
 ///
 /// The turn in which the first azimuth arrives is not counted if it had begun before.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,8 +56,7 @@ impl TurnCounter {
         }
     }
 
-    /// Notes an azimuth. The first of all is at the start of a turn, or in a turn that began
-    /// before.
+    /// Notes an azimuth. The first of all may be in a turn that began before.
     pub fn note(&mut self, azimuth: AzimuthTime, is_start: bool) {
         self.newest = Some(azimuth);
         if self.last.is_none() {
@@ -90,8 +87,7 @@ impl TurnCounter {
         self.last
     }
 
-    /// Returns the turns that have and will have no scan. That of the newest azimuth can still have
-    /// one if it `is_open`.
+    /// Returns the turns without a scan; the newest does not count if it `is_open`.
     pub fn left_out(&self, is_open: bool) -> u64 {
         let (Some(last), Some(newest)) = (self.last, self.newest) else {
             return self.left_out;
@@ -106,8 +102,7 @@ impl TurnCounter {
         self.left_out + turns.saturating_sub(is_open.into())
     }
 
-    /// Returns the turns between two scans, by the radar's clock, or by this host's where that was
-    /// set.
+    /// Returns the turns between two scans, by the host's clock where the radar's was set.
     fn since(&self, last: LastScan, here: LastScan) -> f64 {
         let turn_ns = self.turn_ns.max(1.0);
         let turns = |from: i64, to: i64| to.saturating_sub(from) as f64 / turn_ns;

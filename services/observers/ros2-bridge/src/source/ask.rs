@@ -63,8 +63,7 @@ pub enum AskError {
     },
 }
 
-/// Asks a driver for the sizes of its radar's scans. Without a published configuration they are
-/// estimated from azimuths.
+/// Asks a driver for the sizes of its radar's scans, or estimates them from azimuths.
 ///
 /// # Errors
 /// No driver, or a radar that cannot be used.

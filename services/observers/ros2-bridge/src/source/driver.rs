@@ -18,8 +18,7 @@ use crate::{NodeError, node::Node};
 
 /// The name of the node.
 const NODE: &str = "gyre_source";
-/// Azimuths that are kept until they are taken: ten turns, 2.5 s. The driver keeps one turn for
-/// those who are behind.
+/// Azimuths that are kept until they are taken: ten turns. The driver keeps one turn.
 const AZIMUTHS: usize = 4_000;
 /// Turns, and configurations, that are kept.
 const TURNS: usize = 10;
@@ -183,8 +182,7 @@ impl Driver {
         }
     }
 
-    /// Subscribes to the azimuths once there is a publisher, and returns whether they are
-    /// subscribed to.
+    /// Subscribes to the azimuths once there is a publisher; returns whether there is one.
     ///
     /// # Errors
     /// The topic has another type, or cannot be opened.

@@ -25,8 +25,7 @@ use super::{
 const MAX_MESSAGES: usize = 512;
 /// Time between two polls for a driver.
 const POLL_INTERVAL: Duration = Duration::from_millis(100);
-/// Time without a configuration after which it is estimated: the driver repeats it every four
-/// turns.
+/// Time after which a configuration is estimated: the driver sends it every four turns.
 const CONFIGURATION_WAIT: Duration = Duration::from_secs(3);
 /// Time without an azimuth of a publisher after which another one is received in its place.
 const PUBLISHER_WAIT: Duration = Duration::from_secs(1);

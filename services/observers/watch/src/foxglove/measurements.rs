@@ -1,5 +1,4 @@
-//! Measurements for which Foxglove has no schema, as JSON with a schema of its own: numbers to
-//! plot.
+//! Measurements without a schema of Foxglove, as JSON with a schema of its own, to plot.
 
 use std::collections::BTreeMap;
 

@@ -235,8 +235,7 @@ fn server_info() -> Value {
         // The viewer's clock is the sensor's.
         "capabilities": ["time"],
         "metadata": {},
-        // New after a restart of this program: the viewer drops the subscriptions of the last
-        // session.
+        // New after a restart: the viewer drops the subscriptions of the last session.
         "sessionId": format!("{}-{}", std::process::id(), clock::now_ns()),
     })
 }

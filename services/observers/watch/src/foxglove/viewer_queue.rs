@@ -53,8 +53,7 @@ impl ViewerQueue {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Subscribes to a channel, and returns whether it is new. The newer number of a channel
-    /// replaces the older one.
+    /// Subscribes to a channel, or changes its number; returns whether the channel is new.
     pub fn subscribe(&self, channel: usize, subscription: u32) -> bool {
         let mut queue = self.queue();
         queue.subscriptions.insert(channel, subscription).is_none()
@@ -75,8 +74,7 @@ impl ViewerQueue {
         self.queue().subscriptions.keys().copied().collect()
     }
 
-    /// Adds a message, if the viewer has subscribed to the channel. The oldest messages that do not
-    /// fit any more are skipped.
+    /// Adds a message of a subscribed channel, and skips the oldest that do not fit any more.
     pub fn put(&self, message: &EncodedMessage) {
         let mut queue = self.queue();
         if !queue.subscriptions.contains_key(&message.channel) {

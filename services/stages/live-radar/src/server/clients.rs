@@ -42,8 +42,7 @@ impl Clients {
             .name("accept".to_owned())
             .spawn(move || {
                 for (number, stream) in listener.incoming().enumerate() {
-                    // A client that leaves at once is no reason to stop, nor are too many open
-                    // files.
+                    // A client that leaves at once or too many open files are no reason to stop.
                     let Ok(stream) = stream else {
                         thread::sleep(PAUSE);
                         continue;
@@ -59,8 +58,7 @@ impl Clients {
         lock(&self.all).iter().any(|client| client.started)
     }
 
-    /// Sends bytes to the clients that have asked for azimuths. One that does not take them is
-    /// given up.
+    /// Sends bytes to the clients that have asked for azimuths, and drops those that fail.
     pub fn send(&self, bytes: &[u8]) {
         lock(&self.all).retain_mut(|client| {
             let takes = !client.started || write_in_time(&mut client.stream, bytes).is_ok();
