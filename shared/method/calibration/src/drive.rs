@@ -120,9 +120,9 @@ impl Drive {
                 Outcome::Start => 0.0,
                 _ => registered.interval_ns as f64 * 1e-9,
             },
-            searched: registered.searched.map_or(Pose::identity(), |found| {
-                gyre_geometry::pose(found.motion.x_m, found.motion.y_m, found.motion.yaw_rad)
-            }),
+            searched: registered
+                .searched
+                .map_or(Pose::identity(), |found| found.motion.pose()),
             points,
             row_time_s: row_times_s(&scan, self.sense),
         });

@@ -1,5 +1,6 @@
 //! The shift between two scans whose angle is known, and the whole motion.
 
+use gyre_geometry::{Pose, pose};
 use nalgebra::{Matrix3, Rotation2, Vector2};
 use ndarray::ArrayView2;
 use serde::{Deserialize, Serialize};
@@ -44,6 +45,13 @@ pub struct MotionMatch {
     pub runner_up: Option<MotionRunnerUp>,
     /// The angle half a turn from the given one matched better.
     pub half_turn: bool,
+}
+
+impl MotionMatch {
+    /// Returns the motion as the pose of the later scan's frame in the earlier scan's frame.
+    pub fn pose(&self) -> Pose {
+        pose(self.x_m, self.y_m, self.yaw_rad)
+    }
 }
 
 /// Finds the shift between two scans whose angle is known (Weston et al., Algorithm 1, lines 16 to 21).

@@ -3,8 +3,8 @@
 use gyre_geometry::{Pose, UncertainMotion};
 
 use super::{
-    COARSE_STRIDE, DeskewedPoints, RefinementConfig, alignment::align, local_map::LocalMap,
-    uncertainty,
+    DeskewedPoints, RefinementConfig, alignment::align, local_map::LocalMap,
+    registration::COARSE_STRIDE, uncertainty,
 };
 use crate::{ConfigError, Submap};
 

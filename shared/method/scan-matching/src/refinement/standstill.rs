@@ -1,23 +1,29 @@
 //! Standstill: holds the pose of a standing vehicle, whose estimates jitter about one place.
 //!
-//! Estimates are compared with an anchor, at first one of them. If those of a second are within their noise of it, the vehicle stands:
-//! its pose is held, and the anchor becomes the mean of the estimates. One that is farther from it than noise goes says that the
-//! vehicle has moved. The motion is then the whole displacement from the held pose, so that nothing of a slow motion is lost. Only
-//! reported poses are held: registration, prediction and the map go on with the estimates.
+//! Estimates are compared with an anchor, at first one of them. If those of a second are within
+//! their noise of it, the vehicle stands: its pose is held, and the anchor becomes the mean of the
+//! estimates. One that is farther from it than noise goes says that the vehicle has moved. The
+//! motion is then the whole displacement from the held pose, so that nothing of a slow motion is
+//! lost. Only reported poses are held: registration, prediction and the map go on with the
+//! estimates.
+
+#[cfg(test)]
+mod tests;
 
 use gyre_geometry::{Pose, UncertainMotion, interpolate, xy_yaw};
 use nalgebra::Vector3;
 
 use super::Outcome;
 
-/// Squared Mahalanobis distance from the anchor beyond which a standing vehicle has moved: four standard deviations.
+/// Squared Mahalanobis distance from the anchor beyond which a standing vehicle has moved: four
+/// standard deviations.
 const LIMIT: f64 = 16.0;
 /// The same before it stands: one estimate in nine is farther off.
 const ARRIVAL_LIMIT: f64 = 6.0;
 /// Degrees of freedom of a pose, the mean of that square.
 const DEGREES_OF_FREEDOM: f64 = 3.0;
-/// Time at the anchor after which the vehicle stands, s: four turns of a radar that turns four times a second. At 0.3 m/s or more it is
-/// beyond the limit by then.
+/// Time at the anchor after which the vehicle stands, s: four turns of a radar that turns four
+/// times a second. At 0.3 m/s or more it is beyond the limit by then.
 const MIN_TIME_S: f64 = 0.95;
 /// The anchor is the mean of so many estimates at most; older ones fade.
 const MEAN_SCANS: u32 = 16;
@@ -33,13 +39,15 @@ const MAX_JITTER: f64 = 4.0;
 pub struct Standstill {
     /// The last reported pose, in the first scan's frame.
     pub reported: Pose,
-    /// An estimate, and the mean of those after it while the vehicle stands, in the first scan's frame.
+    /// An estimate, and the mean of those after it while the vehicle stands, in the first scan's
+    /// frame.
     pub anchor: Pose,
     /// Number of estimates in that mean.
     pub scans: u32,
     /// Time since the first of them, s.
     pub time_s: f64,
-    /// Mean squared jitter from scan to scan while the vehicle stood, over what the covariances say.
+    /// Mean squared jitter from scan to scan while the vehicle stood, over what the covariances
+    /// say.
     pub jitter: f64,
     /// Number of scans in that mean.
     pub jitter_scans: u32,
@@ -57,8 +65,31 @@ pub(super) struct Estimate {
     pub interval_s: f64,
 }
 
+impl Estimate {
+    /// Returns the motion as estimated, of a vehicle that is not held.
+    pub fn unheld(&self) -> Report {
+        let motion = self.previous.inv_mul(&self.pose.motion);
+        Report {
+            motion: UncertainMotion {
+                motion,
+                ..self.pose
+            },
+            stationary: false,
+        }
+    }
+}
+
+/// A motion to be reported.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Report {
+    pub motion: UncertainMotion,
+    /// The vehicle stands: the motion is zero.
+    pub stationary: bool,
+}
+
 impl Default for Standstill {
-    /// A chain of motions starts at its first scan's pose. The vehicle stands until it is seen to move.
+    /// A chain of motions starts at its first scan's pose. The vehicle stands until it is seen to
+    /// move.
     fn default() -> Self {
         Self {
             reported: Pose::identity(),
@@ -78,7 +109,7 @@ impl Standstill {
     }
 
     /// Returns the motion to report for the next estimate, and updates the state.
-    pub(super) fn next(&mut self, estimate: &Estimate) -> UncertainMotion {
+    pub(super) fn next(&mut self, estimate: &Estimate) -> Report {
         let before = *self;
         if self.is_left_by(estimate) {
             self.move_to(estimate.pose.motion);
@@ -92,10 +123,14 @@ impl Standstill {
             self.reported = estimate.pose.motion;
             before.reported.inv_mul(&self.reported)
         };
-        UncertainMotion { motion, covariance }
+        Report {
+            motion: UncertainMotion { motion, covariance },
+            stationary: self.stands(),
+        }
     }
 
-    /// Returns whether the vehicle is no longer at the anchor. A prediction cannot tell, and continues what was.
+    /// Returns whether the vehicle is no longer at the anchor. A prediction cannot tell, and
+    /// continues what was.
     fn is_left_by(&self, estimate: &Estimate) -> bool {
         match estimate.outcome {
             Outcome::Predicted => !self.stands(),
@@ -150,8 +185,9 @@ impl Standstill {
 
     /// The variance of a reported motion over that of the estimate's.
     ///
-    /// A motion can hide until it comes to the limit, whose variance per coordinate is `hidden`. Of a vehicle that has stood for n
-    /// scans, about one in n is the one in which it drives off. The motion that ends a standstill takes in what had been hidden.
+    /// A motion can hide until it comes to the limit, whose variance per coordinate is `hidden`. Of
+    /// a vehicle that has stood for n scans, about one in n is the one in which it drives off. The
+    /// motion that ends a standstill takes in what had been hidden.
     fn covariance_factor(&self, before: &Self) -> f64 {
         let hidden = self.standing_limit() / DEGREES_OF_FREEDOM;
         if self.stands() {
@@ -164,234 +200,10 @@ impl Standstill {
     }
 }
 
-/// Returns the squared Mahalanobis distance of an estimate from a pose with the same heading but for noise; `None` without a proper
-/// covariance.
+/// Returns the squared Mahalanobis distance of an estimate from a pose with the same heading but
+/// for noise; `None` without a proper covariance.
 fn squared_distance(from: &Pose, estimate: &Estimate) -> Option<f64> {
     let apart = Vector3::from(xy_yaw(&from.inv_mul(&estimate.pose.motion)));
     let factor = estimate.pose.covariance.cholesky()?;
     Some(apart.dot(&factor.solve(&apart)))
-}
-
-#[cfg(test)]
-mod tests {
-    use gyre_geometry::pose;
-    use nalgebra::{Matrix3, Vector3};
-
-    use super::*;
-
-    const INTERVAL_S: f64 = 0.25;
-    /// Standard deviations of an estimate: x, y (m), yaw (rad).
-    const SIGMA: [f64; 3] = [0.055, 0.055, 0.0035];
-
-    /// A drive along x, with what is estimated and reported of it.
-    struct Drive {
-        standstill: Standstill,
-        random: u64,
-        /// Standard deviation of the jitter over that of the covariances.
-        jitter: f64,
-        true_m: f64,
-        estimate: Pose,
-        reported: Pose,
-        path_m: f64,
-    }
-
-    /// One scan of it.
-    struct Step {
-        stationary: bool,
-        /// Distance of the reported pose from the estimated one.
-        lag_m: f64,
-    }
-
-    impl Drive {
-        fn with_jitter(jitter: f64) -> Self {
-            Self {
-                standstill: Standstill::default(),
-                random: 1,
-                jitter,
-                true_m: 0.0,
-                estimate: Pose::identity(),
-                reported: Pose::identity(),
-                path_m: 0.0,
-            }
-        }
-
-        /// A number of mean 0 and variance 1.
-        fn noise(&mut self) -> f64 {
-            let mut sum = -6.0;
-            for _ in 0..12 {
-                self.random = self
-                    .random
-                    .wrapping_mul(6_364_136_223_846_793_005)
-                    .wrapping_add(1_442_695_040_888_963_407);
-                sum += (self.random >> 40) as f64 / f64::from(1 << 24);
-            }
-            self.jitter * sum
-        }
-
-        /// Drives for so many scans at a speed that changes evenly between two, m/s.
-        fn drive(&mut self, scans: usize, [from, to]: [f64; 2]) -> Vec<Step> {
-            (0..scans)
-                .map(|k| {
-                    let share = (k as f64 + 0.5) / scans as f64;
-                    self.true_m += (from + share * (to - from)) * INTERVAL_S;
-                    self.step(Outcome::Refined, 0.0)
-                })
-                .collect()
-        }
-
-        /// The next scan, whose estimate is off by `off_m`.
-        fn step(&mut self, outcome: Outcome, off_m: f64) -> Step {
-            let [x_m, y_m, yaw_rad] = SIGMA.map(|sigma| sigma * self.noise());
-            let previous = self.estimate;
-            self.estimate = pose(self.true_m + x_m + off_m, y_m, yaw_rad);
-            let variances = Vector3::from(SIGMA.map(|sigma| sigma * sigma));
-            let motion = self.standstill.next(&Estimate {
-                pose: UncertainMotion {
-                    motion: self.estimate,
-                    covariance: Matrix3::from_diagonal(&variances),
-                },
-                previous,
-                outcome,
-                interval_s: INTERVAL_S,
-            });
-            self.reported *= motion.motion;
-            self.path_m += motion.motion.translation.vector.norm();
-            Step {
-                stationary: self.standstill.stands(),
-                lag_m: (self.reported.translation.vector - self.estimate.translation.vector).norm(),
-            }
-        }
-    }
-
-    fn stationary(steps: &[Step]) -> usize {
-        steps.iter().filter(|step| step.stationary).count()
-    }
-
-    #[test]
-    fn jitter_does_not_add_up_while_the_vehicle_stands() {
-        for jitter in [0.1, 0.5, 1.0] {
-            let mut drive = Drive::with_jitter(jitter);
-            drive.drive(20, [8.0, 8.0]);
-            drive.drive(16, [8.0, 0.0]);
-            let driven_m = drive.path_m;
-            let steps = drive.drive(400, [0.0, 0.0]);
-            assert!(
-                stationary(&steps) >= 388,
-                "{jitter}: {}",
-                stationary(&steps)
-            );
-            let path_m = drive.path_m - driven_m;
-            assert!(path_m < 1.0, "{jitter}: {path_m} m");
-        }
-    }
-
-    #[test]
-    fn nothing_of_a_creep_is_lost() {
-        for jitter in [0.1, 1.0] {
-            let mut drive = Drive::with_jitter(jitter);
-            drive.drive(80, [0.0, 0.0]);
-            drive.drive(200, [0.2, 0.2]);
-            drive.drive(80, [0.0, 0.0]);
-            let reported_m = drive.reported.translation.x;
-            assert!((reported_m - 10.0).abs() < 0.25, "{jitter}: {reported_m} m");
-        }
-    }
-
-    #[test]
-    fn a_vehicle_that_drives_off_is_not_held_back() {
-        for (jitter, max_lag_m) in [(0.2, 0.13), (1.0, 0.5)] {
-            let mut drive = Drive::with_jitter(jitter);
-            drive.drive(80, [0.0, 0.0]);
-            let steps = drive.drive(20, [0.0, 10.0]);
-            let held = stationary(&steps);
-            assert!(held <= 2, "{jitter}: {held} scans");
-            assert!(steps.iter().all(|step| step.lag_m < max_lag_m), "{jitter}");
-            assert!(steps[held..].iter().all(|step| step.lag_m < 1e-9));
-        }
-    }
-
-    #[test]
-    fn a_slow_drive_is_no_standstill() {
-        for jitter in [0.2, 1.0] {
-            let mut drive = Drive::with_jitter(jitter);
-            drive.drive(20, [4.0, 4.0]);
-            drive.drive(8, [4.0, 0.5]);
-            let steps = drive.drive(400, [0.5, 0.5]);
-            assert!(stationary(&steps) <= 2, "{jitter}: {}", stationary(&steps));
-        }
-    }
-
-    #[test]
-    fn what_a_passing_vehicle_pulls_at_the_estimates_does_not_stay() {
-        let mut drive = Drive::with_jitter(0.5);
-        drive.drive(80, [0.0, 0.0]);
-        for _ in 0..10 {
-            for off_m in [0.03, 0.06, 0.06, 0.03, 0.0, 0.0, 0.0, 0.0] {
-                drive.step(Outcome::Refined, off_m);
-            }
-        }
-        assert_eq!(drive.reported, Pose::identity());
-        // Pulled away farther than jitter goes, the pose comes back.
-        for _ in 0..8 {
-            drive.step(Outcome::Refined, 0.6);
-        }
-        drive.drive(40, [0.0, 0.0]);
-        assert!(drive.reported.translation.vector.norm() < 0.2);
-    }
-
-    #[test]
-    fn predictions_neither_begin_nor_end_a_standstill() {
-        let mut drive = Drive::with_jitter(0.0);
-        drive.drive(80, [0.0, 0.0]);
-        for _ in 0..8 {
-            drive.step(Outcome::Predicted, 5.0);
-        }
-        assert!(drive.standstill.stands());
-        drive.drive(8, [5.0, 5.0]);
-        assert!(!drive.standstill.stands());
-        for _ in 0..8 {
-            drive.step(Outcome::Predicted, 0.0);
-        }
-        assert!(!drive.standstill.stands());
-    }
-
-    #[test]
-    fn motions_of_a_moving_vehicle_are_the_estimates_to_the_bit() {
-        let mut drive = Drive::with_jitter(1.0);
-        drive.drive(4, [8.0, 8.0]);
-        let (before, reported) = (drive.estimate, drive.reported);
-        drive.drive(1, [8.0, 8.0]);
-        let motion = before.inv_mul(&drive.estimate);
-        assert_eq!(drive.reported, reported * motion);
-        assert_eq!(drive.standstill.reported, drive.estimate);
-    }
-
-    /// The squared errors of the reported motions over their variances, on average.
-    #[test]
-    fn covariances_describe_a_stop_and_go() {
-        let (mut sum, mut count) = (0.0, 0);
-        let mut drive = Drive::with_jitter(1.0);
-        let mut add = |drive: &mut Drive, scans: usize, speeds: [f64; 2]| {
-            for k in 0..scans {
-                let share =
-                    |k: usize| speeds[0] + k as f64 / scans as f64 * (speeds[1] - speeds[0]);
-                let (before, from_m) = (drive.standstill, drive.true_m);
-                drive.true_m += share(k) * INTERVAL_S;
-                let at = drive.reported.translation.x;
-                drive.step(Outcome::Refined, 0.0);
-                let error = drive.reported.translation.x - at - (drive.true_m - from_m);
-                let factor = drive.standstill.covariance_factor(&before);
-                sum += error * error / (factor * SIGMA[0] * SIGMA[0]);
-                count += 1;
-            }
-        };
-        for _ in 0..20 {
-            add(&mut drive, 10, [0.0, 5.0]);
-            add(&mut drive, 40, [5.0, 5.0]);
-            add(&mut drive, 10, [5.0, 0.0]);
-            add(&mut drive, 120, [0.0, 0.0]);
-        }
-        let mean = sum / f64::from(count);
-        assert!((0.3..3.0).contains(&mean), "{mean}");
-    }
 }

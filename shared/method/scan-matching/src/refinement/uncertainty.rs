@@ -1,16 +1,75 @@
-//! Covariances of refined and predicted motions.
+//! Covariances of refined and predicted motions, and the shares of them that accumulate.
 
 use gyre_geometry::Pose;
 use nalgebra::{Matrix3, Vector3};
 
-use super::{RefinementConfig, alignment::Alignment, points::DeskewedPoints};
+use super::{
+    Outcome, RefinementConfig, alignment::Alignment, local_map::LocalMap, points::DeskewedPoints,
+    registration::Scan, standstill::Report,
+};
 
-/// Drift share of a prediction, whose error the next match takes back, and of that match. Not zero, since edges of a pose graph need a
-/// covariance that has an inverse.
-pub(super) const MIN_DRIFT_SHARE: f64 = 1e-3;
+/// Factor on the covariance of a weak match.
+pub(super) const WEAK_FACTOR: f64 = 4.0;
+/// Drift share of a prediction, whose error the next match takes back, and of that match. Not zero,
+/// since edges of a pose graph need a covariance that has an inverse.
+const MIN_DRIFT_SHARE: f64 = 1e-3;
 
-/// The covariance of the motion from `previous` to an alignment, from the information matrix; `None` if the points do not
-/// determine the pose.
+/// The uncertainty of a motion by what comes before its scan: the map, and the predictions since
+/// the last match.
+pub(super) struct Uncertainty {
+    /// The covariance of one prediction over the scan's interval.
+    of_prediction: Matrix3<f64>,
+    /// Predictions in a row whose error a match takes back.
+    predictions: u32,
+    /// The share of a match's covariance by which the map drifts.
+    of_map: f64,
+}
+
+impl Uncertainty {
+    /// The uncertainty before the scan is registered with the map.
+    pub fn before(
+        scan: &Scan<'_>,
+        map: &LocalMap,
+        predictions: u32,
+        config: &RefinementConfig,
+    ) -> Self {
+        Self {
+            of_prediction: of_prediction(scan.interval_s, config),
+            predictions,
+            of_map: drift_share(map.len(), config),
+        }
+    }
+
+    /// Returns the covariance of the motion to the predicted pose.
+    pub fn of_prediction(&self) -> Matrix3<f64> {
+        self.of_prediction
+    }
+
+    /// Returns the covariance of a reported motion. One that takes back the error of predictions
+    /// has theirs too.
+    pub fn of_report(&self, report: &Report) -> Matrix3<f64> {
+        let covariance = report.motion.covariance;
+        match report.stationary {
+            true => covariance,
+            false => covariance + self.of_prediction * f64::from(self.predictions),
+        }
+    }
+
+    /// Returns the share of the covariance that accumulates. `map` is the one after the scan: with
+    /// one that was given up nothing is taken back.
+    pub fn drift_share(&self, outcome: Outcome, map: &LocalMap) -> f64 {
+        if map.is_empty() {
+            1.0
+        } else if outcome == Outcome::Predicted || self.predictions > 0 {
+            MIN_DRIFT_SHARE
+        } else {
+            self.of_map
+        }
+    }
+}
+
+/// The covariance of the motion from `previous` to an alignment, from the information matrix;
+/// `None` if the points do not determine the pose.
 pub(super) fn of_alignment(
     alignment: &Alignment,
     points: &DeskewedPoints,
@@ -38,17 +97,19 @@ pub(super) fn of_alignment(
 
 /// The share of a match's covariance by which a map of `keyframes` drifts.
 ///
-/// A scan becomes one of the map's k keyframes with the noise of its registration, and the map's mean follows. A mean of k values that
-/// keeps up with itself in this way is a random walk, whose steps are 2 / (k + 1) of the noise. What a vehicle has passed drops out of
-/// the mean earlier, and neighbouring scans err alike: hence the factor. A slow vehicle, not all of whose scans become keyframes, drifts
-/// less in simulation, but not on real drives.
-pub(super) fn drift_share(keyframes: usize, config: &RefinementConfig) -> f64 {
+/// A scan becomes one of the map's k keyframes with the noise of its registration, and the map's
+/// mean follows. A mean of k values that keeps up with itself in this way is a random walk, whose
+/// steps are 2 / (k + 1) of the noise. What a vehicle has passed drops out of the mean earlier, and
+/// neighbouring scans err alike: hence the factor. A slow vehicle, not all of whose scans become
+/// keyframes, drifts less in simulation, but not on real drives.
+fn drift_share(keyframes: usize, config: &RefinementConfig) -> f64 {
     let step = config.drift_scale * 2.0 / (keyframes as f64 + 1.0);
     step.powi(2).min(1.0)
 }
 
-/// The covariance of a motion predicted at constant velocity, whose acceleration is within the limits.
-pub(super) fn of_prediction(interval_s: f64, config: &RefinementConfig) -> Matrix3<f64> {
+/// The covariance of a motion predicted at constant velocity, whose acceleration is within the
+/// limits.
+fn of_prediction(interval_s: f64, config: &RefinementConfig) -> Matrix3<f64> {
     let variance =
         |jitter: f64, acceleration: f64| (jitter + acceleration * interval_s.powi(2)).powi(2) / 3.0;
     let shift = variance(config.jitter_m, config.acceleration_mps2);
@@ -75,12 +136,14 @@ mod tests {
         assert!((share(10) - 4.0 / 121.0).abs() < 1e-12);
     }
 
-    /// Poses that are each the mean of the last ten, with noise of their own: what is left of the noise after a long time.
+    /// Poses that are each the mean of the last ten, with noise of their own: what is left of the
+    /// noise after a long time.
     #[test]
     fn a_mean_that_keeps_up_with_itself_drifts_by_two_over_k_plus_one_of_the_noise() {
         const KEYFRAMES: usize = 10;
         let mut poses = vec![0.0; KEYFRAMES];
-        // The noise of one pose alone. The walk is linear: this is what each one contributes in the end.
+        // The noise of one pose alone. The walk is linear: this is what each one contributes in the
+        // end.
         poses.push(1.0);
         for _ in 0..1000 {
             let last = &poses[poses.len() - KEYFRAMES..];

@@ -1,0 +1,186 @@
+//! Registration of a scan with the local map: first on the coarse level from several initial
+//! guesses, then on the fine one.
+
+use gyre_geometry::{Pose, SparsePoint};
+
+use super::{
+    InitialGuess, RefinementConfig, TrackerState,
+    alignment::{Alignment, align},
+    initial_guess::{initial_guesses, yaw_offsets},
+    local_map::LocalMap,
+    points::DeskewedPoints,
+};
+
+const COARSE_ITERATIONS: usize = 10;
+const FINE_ITERATIONS: usize = 6;
+/// On the coarse map every third point is enough.
+pub(super) const COARSE_STRIDE: usize = 3;
+/// Times that the points are deskewed by the newest motion and aligned on the fine map.
+const FINE_ROUNDS: usize = 2;
+/// Initial guesses closer to each other than this lie in one basin of attraction.
+const SAME_BASIN_COARSE_CELLS: f64 = 0.5;
+const SAME_BASIN_RAD: f64 = 0.035;
+/// A later guess is preferred to an earlier one if its coarse overlap is better by this factor.
+const CLEARLY_BETTER: f64 = 1.02;
+
+/// A scan to be registered.
+pub(super) struct Scan<'a> {
+    pub id: u64,
+    pub points: &'a [SparsePoint],
+    /// Pose in the map by the motion that the search found.
+    pub searched: Pose,
+    /// Time since the scan before, s.
+    pub interval_s: f64,
+}
+
+/// The registration of one scan.
+pub(super) struct Registration<'a> {
+    pub scan: &'a Scan<'a>,
+    pub map: &'a LocalMap,
+    pub state: &'a TrackerState,
+    pub config: &'a RefinementConfig,
+    /// Memory for the deskewed points: afterwards those of the last alignment.
+    pub points: &'a mut DeskewedPoints,
+}
+
+/// An alignment on the fine map and how well it fits.
+pub(super) struct Candidate {
+    pub guess: InitialGuess,
+    pub alignment: Alignment,
+    pub overlap: f64,
+    /// Sum of the points' weights, and the same as a share of its running mean.
+    pub weight: f64,
+    pub support: f64,
+    /// A vehicle can have driven there, and the scan overlaps the map about as much as the scans
+    /// before.
+    pub is_plausible: bool,
+}
+
+/// An alignment on the coarse map.
+struct CoarseMatch {
+    guess: InitialGuess,
+    coarse: Alignment,
+    is_reachable: bool,
+}
+
+impl CoarseMatch {
+    /// Returns whether a vehicle can have driven there but not to the other, or else the overlap is
+    /// clearly larger.
+    fn is_better_than(&self, other: &Self) -> bool {
+        if self.is_reachable == other.is_reachable {
+            self.coarse.normal.overlap > CLEARLY_BETTER * other.coarse.normal.overlap
+        } else {
+            self.is_reachable
+        }
+    }
+}
+
+impl Registration<'_> {
+    /// Returns the best match of all initial guesses. Yaw offsets are tried where no other guess
+    /// gives a plausible match.
+    pub fn best(&mut self) -> Candidate {
+        let best = self.match_prediction_or_search();
+        if best.is_plausible {
+            return best;
+        }
+        let [predicted, _] = self.state.predict(self.scan.interval_s);
+        let offset = self.align(&yaw_offsets(predicted));
+        if offset.is_plausible { offset } else { best }
+    }
+
+    /// Returns the best match of the predictions and the searched motion.
+    pub fn match_prediction_or_search(&mut self) -> Candidate {
+        let predicted = self.state.predict(self.scan.interval_s);
+        self.align(&initial_guesses(predicted, self.scan.searched))
+    }
+
+    /// Aligns the scan from each initial guess on the coarse map, and from the best of them on the
+    /// fine map.
+    fn align(&mut self, guesses: &[(InitialGuess, Pose)]) -> Candidate {
+        let (guess, coarse) = self.align_coarse(guesses);
+        let alignment = self.align_fine(coarse);
+        self.assess(guess, alignment)
+    }
+
+    fn align_coarse(&mut self, guesses: &[(InitialGuess, Pose)]) -> (InitialGuess, Pose) {
+        let mut best: Option<CoarseMatch> = None;
+        for (k, (guess, initial)) in guesses.iter().enumerate() {
+            if guesses[..k]
+                .iter()
+                .any(|(_, other)| self.in_same_basin(initial, other))
+            {
+                continue;
+            }
+            // Each guess deskews with its own motion. With a sweep of a second, the motion of the
+            // scan before is ten degrees off where a bend begins.
+            self.deskew(initial);
+            self.points.thin(COARSE_STRIDE);
+            let coarse = align(&self.map.coarse(), self.points, initial, COARSE_ITERATIONS);
+            let found = CoarseMatch {
+                guess: *guess,
+                is_reachable: self.is_reachable(&coarse.pose, 1.0),
+                coarse,
+            };
+            if best.as_ref().is_none_or(|best| found.is_better_than(best)) {
+                best = Some(found);
+            }
+        }
+        best.map_or((InitialGuess::Prediction, self.state.pose), |best| {
+            (best.guess, best.coarse.pose)
+        })
+    }
+
+    fn in_same_basin(&self, a: &Pose, b: &Pose) -> bool {
+        let apart = a.inv_mul(b);
+        let cell_m = self.config.cell_m * self.config.coarse;
+        apart.translation.vector.norm() <= SAME_BASIN_COARSE_CELLS * cell_m
+            && apart.rotation.angle().abs() <= SAME_BASIN_RAD
+    }
+
+    fn align_fine(&mut self, coarse: Pose) -> Alignment {
+        let mut pose = coarse;
+        for _ in 1..FINE_ROUNDS {
+            pose = self.align_fine_once(&pose).pose;
+        }
+        self.align_fine_once(&pose)
+    }
+
+    fn align_fine_once(&mut self, pose: &Pose) -> Alignment {
+        self.deskew(pose);
+        align(&self.map.fine(), self.points, pose, FINE_ITERATIONS)
+    }
+
+    /// Deskews the scan with the motion that leads to `pose`.
+    fn deskew(&mut self, pose: &Pose) {
+        let twist = self.state.twist_to(pose, self.scan.interval_s);
+        self.points.deskew(self.scan.points, &twist);
+    }
+
+    fn assess(&self, guess: InitialGuess, alignment: Alignment) -> Candidate {
+        let weight = self.points.total_weight();
+        let overlap = if weight > 0.0 {
+            alignment.normal.overlap / weight
+        } else {
+            0.0
+        };
+        let support = if self.state.mean_weight > 0.0 {
+            weight / self.state.mean_weight
+        } else {
+            1.0
+        };
+        let fits = overlap > 0.0 && overlap >= self.config.min_overlap * self.state.mean_overlap;
+        Candidate {
+            is_plausible: fits && self.is_reachable(&alignment.pose, support.min(1.0)),
+            guess,
+            alignment,
+            overlap,
+            weight,
+            support,
+        }
+    }
+
+    fn is_reachable(&self, pose: &Pose, jitter_share: f64) -> bool {
+        self.state
+            .can_reach(pose, self.scan.interval_s, jitter_share, self.config)
+    }
+}
