@@ -69,7 +69,8 @@ pub fn registration(error: OdometryError) -> PyErr {
     match error {
         OdometryError::Scan(_) | OdometryError::Mask(MaskError::Raster(_)) => scan(error),
         OdometryError::Mask(MaskError::Network(_) | MaskError::MissingPrevious(_))
-        | OdometryError::Search(_) => other(error),
+        | OdometryError::Search(_)
+        | OdometryError::Own(_) => other(error),
     }
 }
 

@@ -87,7 +87,8 @@ impl Preparation {
         let searched = found.map_or([f64::NAN; 3], |found| {
             [found.motion.x_m, found.motion.y_m, found.motion.yaw_rad]
         });
-        self.odometry.integrate(found, None);
+        let registered = self.odometry.integrate(found, None);
+        self.odometry.advance(&registered);
         let stamp_ns = scan.geometry.stamp_ns;
         self.chain.push_back((stamp_ns, pose));
         if self.chain.len() > self.lag + 1 {

@@ -6,6 +6,7 @@ use gyre::{Failure, configuration::Configuration};
 use gyre_masking::{MaskKind, network::Network};
 use gyre_odometry::Odometry;
 use gyre_radar::OwnedScan;
+use gyre_scan_matching::{JointMatch, Refined};
 use ndarray::Array3;
 
 use crate::models::Model;
@@ -82,7 +83,7 @@ impl Timer {
         if self.next == 0 {
             self.odometry.mask(&self.scans[0].view(), None)?;
             let start = self.odometry.search()?;
-            self.odometry.integrate(start, None);
+            self.integrate(start, None);
             self.next = 1;
         }
         self.odometry.mask(&self.scans[self.next].view(), None)?;
@@ -99,9 +100,14 @@ impl Timer {
         };
         let refined = found.as_ref().and_then(|found| self.odometry.refine(found));
         let time_ms = start.elapsed().as_secs_f64() * 1e3;
-        self.odometry.integrate(found, black_box(refined));
+        self.integrate(found, black_box(refined));
         self.next += 1;
         Ok(time_ms)
+    }
+
+    fn integrate(&mut self, searched: Option<JointMatch>, refined: Option<Refined>) {
+        let registered = self.odometry.integrate(searched, refined);
+        self.odometry.advance(&registered);
     }
 
     /// Returns the median of all passes, ms; NaN without any.

@@ -154,7 +154,7 @@ impl MaskInspector {
             masker.mask(&sweep, None, raster.view_mut(), None)?;
         }
         let [whole, above_floor] = plain;
-        let factors = self.odometry.masker().factors(scan);
+        let factors = self.odometry.factors(scan);
         let mask = mask_above(self.floor, &above_floor, factors);
         Ok(MaskedRaster {
             whole,
@@ -167,9 +167,8 @@ impl MaskInspector {
     /// The cell of each point of the last scan, and the factor of the mask on its weight.
     fn point_factors(&mut self) -> Result<Vec<([usize; 2], f32)>, Failure> {
         let twist = self.odometry.twist();
-        let plain = &mut self.points;
-        let count = self.plain[1].points(&self.last[0].view(), twist, plain)?;
-        let masker = self.odometry.masker();
+        let (masker, plain) = (&mut self.plain[1], &mut self.points);
+        let count = masker.points(&self.last[0].view(), twist, plain)?;
         let points = plain[..count].iter().zip(self.odometry.points());
         let factor = |(plain, weighed): (&SparsePoint, &SparsePoint)| {
             Some((masker.cell_of(plain, twist)?, weighed.weight / plain.weight))

@@ -4,8 +4,8 @@ use std::collections::VecDeque;
 
 use gyre_geometry::Twist;
 
-/// Delays velocities: each scan is compensated with the velocity of the scan `lag` scans earlier. With a lag of 2 or more the
-/// stages of a pipeline overlap across scans.
+/// Delays velocities: each scan is compensated with the velocity of the scan `lag` scans earlier.
+/// With a lag of 2 or more the stages of a pipeline overlap across scans.
 #[derive(Debug)]
 pub(crate) struct LaggedTwists {
     lag: usize,

@@ -5,8 +5,8 @@ use gyre_radar::{PointsConfig, RasterConfig};
 use gyre_scan_matching::{ExhaustiveConfig, RefinementConfig, RotationConfig, TranslationConfig};
 use serde::{Deserialize, Serialize};
 
-/// The settings of the method, by section of a run's configuration. A run's file can be read as this: other sections are
-/// ignored.
+/// The settings of the method, by section of a run's configuration. A run's file can be read as
+/// this: other sections are ignored.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default)]
 pub struct OdometryConfig {

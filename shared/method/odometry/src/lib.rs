@@ -1,7 +1,11 @@
 //! Radar odometry in one process: the whole method on one page.
 //!
-//! [`Odometry::register`] is the method: compensate, rasterise, mask, rotate, translate, refine, compose. The processes of a run
-//! compose the same parts from [`gyre_masking`] and [`gyre_scan_matching`], so their motions are the same bits.
+//! [`Odometry::register`] is the method: compensate, rasterise, mask, rotate, translate, refine,
+//! compose. The processes of a run compose the same parts from [`gyre_masking`] and
+//! [`gyre_scan_matching`], so their motions are the same bits.
+//!
+//! Reading order: [`Odometry`]; [`Pair`], the two scans; [`Parts`], the mask, the search and the
+//! refinement, each of which can be one of your own; [`DecoupledSearch`].
 //!
 //! # Frames and units
 //! As in [`gyre_geometry`]: x forward, y left, yaw counter-clockwise; m, rad, s.
@@ -34,9 +38,15 @@
 
 mod compensation;
 mod config;
+mod decoupled;
 mod odometry;
+mod pair;
+mod parts;
 mod registered;
 
 pub use config::{OdometryConfig, SearchConfig, SearchKind};
+pub use decoupled::DecoupledSearch;
 pub use odometry::Odometry;
+pub use pair::Pair;
+pub use parts::{Mask, Parts, Rasters, Refine, Search};
 pub use registered::{OdometryError, Outcome, Registered, SetupError};

@@ -1,6 +1,8 @@
 //! The results and errors of a registration.
 
-use gyre_geometry::{OdometryMotion, UncertainMotion};
+use std::error::Error as StdError;
+
+use gyre_geometry::{OdometryMotion, Twist, UncertainMotion};
 use gyre_masking::{MaskError, MaskerError};
 use gyre_radar::ScanError;
 use gyre_scan_matching::{ConfigError, JointMatch, Refined, ShapeError};
@@ -11,7 +13,8 @@ use thiserror::Error;
 pub struct Registered {
     /// Sequence number in the chain of motions, from 0.
     pub seq: u64,
-    /// The pose of this scan's frame in the previous scan's frame, with its covariance. The identity where the chain starts.
+    /// The pose of this scan's frame in the previous scan's frame, with its covariance. The
+    /// identity where the chain starts.
     pub motion: OdometryMotion,
     /// The pose in the frame of the first scan, with its covariance.
     pub pose: UncertainMotion,
@@ -25,6 +28,16 @@ pub struct Registered {
     pub refined: Option<Refined>,
 }
 
+impl Registered {
+    /// Returns the mean velocity since the previous scan, as searched; `None` where the chain
+    /// starts.
+    pub fn searched_twist(&self) -> Option<Twist> {
+        let interval_s = self.interval_ns as f64 * 1e-9;
+        let twist = |found: &JointMatch| Twist::from_motion(&found.motion.pose(), interval_s);
+        self.searched.as_ref().map(twist)
+    }
+}
+
 /// The origin of a motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
@@ -34,7 +47,8 @@ pub enum Outcome {
     Searched,
     /// The refinement against the local map.
     Refined,
-    /// A refinement with little support: the covariance is larger, and the scan does not enter the map.
+    /// A refinement with little support: the covariance is larger, and the scan does not enter the
+    /// map.
     Weak,
     /// A prediction from previous motions, since nothing matched.
     Predicted,
@@ -68,6 +82,9 @@ pub enum OdometryError {
     /// The raster cannot be searched.
     #[error(transparent)]
     Search(#[from] ShapeError),
+    /// Of a part that is not Gyre's.
+    #[error(transparent)]
+    Own(#[from] Box<dyn StdError + Send + Sync>),
 }
 
 impl From<gyre_scan_matching::Outcome> for Outcome {

@@ -1,17 +1,21 @@
-//! The examples that people copy: `examples/own_sensor.rs` and `examples/own_dataset.rs`.
+//! The examples that people copy: `examples/own_sensor.rs`, `examples/own_dataset.rs` and `examples/own_search.rs`.
 #![allow(clippy::unwrap_used)]
 
 #[allow(dead_code)] // Its `main`.
 #[path = "../../../../examples/own_dataset.rs"]
 mod own_dataset;
 #[allow(dead_code)] // Its `main`.
+#[path = "../../../../examples/own_search.rs"]
+mod own_search;
+#[allow(dead_code)] // Its `main`.
 #[path = "../../../../examples/own_sensor.rs"]
 mod own_sensor;
 
 use std::fs;
 
+use gyre_odometry::Outcome;
 use gyre_radar::{DatasetOptions, inspect_dataset};
-use gyre_simulator::{Profile, SimulatedDrive, SimulationConfig};
+use gyre_simulator::{Profile, SimulatedDrive, SimulationConfig, Simulator};
 use own_dataset::RawSweeps;
 
 #[test]
@@ -53,4 +57,30 @@ fn an_own_dataset_is_registered_and_inspected() {
         report.contains("other") && report.contains("has 9 bytes"),
         "{report}"
     );
+}
+
+#[test]
+fn an_own_search_turns_as_its_gyroscope_says() {
+    let config = SimulationConfig {
+        scans: Some(8),
+        ..SimulationConfig::default()
+    };
+    let simulator = Simulator::new(&config).unwrap();
+    let registered = own_search::drive(&simulator).unwrap();
+    for (k, scan) in registered.iter().enumerate().skip(1) {
+        let truth = simulator.pose(k - 1).inv_mul(&simulator.pose(k));
+        let searched = scan.searched.unwrap();
+        assert_eq!(
+            searched.rotation.variance_rad2,
+            own_search::SIGMA_RAD.powi(2)
+        );
+        let off_rad = searched.rotation.angle_rad - truth.rotation.angle();
+        assert!(
+            off_rad.abs() < 3.0 * own_search::SIGMA_RAD,
+            "{k}: {off_rad}"
+        );
+        let off_m = searched.motion.pose().translation.vector - truth.translation.vector;
+        assert!(off_m.norm() < 0.3, "{k}: {off_m}");
+        assert_eq!(scan.outcome, Outcome::Refined);
+    }
 }

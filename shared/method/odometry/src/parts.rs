@@ -1,0 +1,234 @@
+//! The replaceable parts of the method: mask, search and refinement.
+
+use gyre_geometry::{Pose, SparsePoint, Twist};
+use gyre_masking::{Masker, Sweep};
+use gyre_radar::PolarScan;
+use gyre_scan_matching::{ExhaustiveSearch, JointMatch, Refined, RefinementKind, Refiner};
+use ndarray::{ArrayView2, ArrayViewMut2};
+
+use crate::{DecoupledSearch, OdometryConfig, OdometryError, Pair, SearchKind, SetupError};
+
+/// Masks scans: makes a raster and sparse points of each.
+pub trait Mask: Send + Sync {
+    /// Returns the number of scans that the mask takes and of rasters that it fills in: 1, or 2
+    /// (the scan and the one before).
+    fn scans(&self) -> usize {
+        1
+    }
+
+    /// Rasterises and masks a scan. Returns the velocity that was used for motion compensation.
+    ///
+    /// # Errors
+    /// A scan that cannot be masked; it is left out.
+    fn mask(
+        &mut self,
+        sweep: &Sweep<'_>,
+        rasters: &mut Rasters<'_>,
+    ) -> Result<Option<Twist>, OdometryError>;
+
+    /// Writes the scan's points to the start of `out` and returns their number. `twist` is what
+    /// [`Mask::mask`] returned.
+    ///
+    /// # Errors
+    /// A scan that cannot be used; it is left out.
+    fn points(
+        &mut self,
+        scan: &PolarScan<'_>,
+        twist: Option<Twist>,
+        out: &mut [SparsePoint],
+    ) -> Result<usize, OdometryError>;
+
+    /// Returns the factors from 0 to 1, n x n, of the last masked scan (0) or of the one before
+    /// (1). `None` if there are none.
+    fn factors(&self, _scan: usize) -> Option<ArrayView2<'_, f32>> {
+        None
+    }
+}
+
+/// The rasters that a mask fills in: n x n, row 0 far ahead.
+pub struct Rasters<'a> {
+    /// The raster of the scan.
+    pub later: ArrayViewMut2<'a, f32>,
+    /// The raster of the scan before, masked for this pair, if the mask takes two scans.
+    pub earlier: Option<ArrayViewMut2<'a, f32>>,
+    /// The number of the scan before; `None` where the chain of motions starts: the scan is then
+    /// its own scan before.
+    pub follows: Option<u64>,
+}
+
+/// Searches the motion between two scans.
+pub trait Search: Send + Sync {
+    /// Finds the pose of the later scan's frame in the earlier one's; `None` where the chain of
+    /// motions starts.
+    ///
+    /// # Errors
+    /// A pair that cannot be searched; its later scan is left out.
+    fn search(&mut self, pair: &Pair) -> Result<Option<JointMatch>, OdometryError>;
+}
+
+/// Refines searched motions.
+pub trait Refine: Send + Sync {
+    /// Refines the motion between two scans that the search found.
+    fn refine(&mut self, pair: &Pair, searched: &Pose) -> Refined;
+
+    /// Forgets all scans: the next one starts a new chain of motions.
+    fn reset(&mut self);
+}
+
+/// The parts that an [`Odometry`](crate::Odometry) is composed of. Those of a configuration, of
+/// which each can be replaced:
+///
+/// ```
+/// use gyre_geometry::{SparsePoint, Twist};
+/// use gyre_masking::Sweep;
+/// use gyre_odometry::{Mask, Odometry, OdometryConfig, OdometryError, Parts, Rasters};
+/// use gyre_radar::PolarScan;
+/// use ndarray::s;
+///
+/// /// Masks what is behind the vehicle, where it pulls a trailer.
+/// struct WithoutTrailer(Box<dyn Mask>);
+///
+/// impl Mask for WithoutTrailer {
+///     fn mask(
+///         &mut self,
+///         sweep: &Sweep<'_>,
+///         rasters: &mut Rasters<'_>,
+///     ) -> Result<Option<Twist>, OdometryError> {
+///         let twist = self.0.mask(sweep, rasters)?;
+///         let (rows, columns) = rasters.later.dim();
+///         let behind = s![rows / 2.., columns / 2 - 5..columns / 2 + 6];
+///         rasters.later.slice_mut(behind).fill(0.0);
+///         Ok(twist)
+///     }
+///
+///     fn points(
+///         &mut self,
+///         scan: &PolarScan<'_>,
+///         twist: Option<Twist>,
+///         out: &mut [SparsePoint],
+///     ) -> Result<usize, OdometryError> {
+///         let count = self.0.points(scan, twist, out)?;
+///         for point in &mut out[..count] {
+///             if point.x_m < 0.0 && point.y_m.abs() < 3.0 {
+///                 point.weight = 0.0;
+///             }
+///         }
+///         Ok(count)
+///     }
+/// }
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let config = OdometryConfig::default();
+/// let mut parts = Parts::new(&config)?;
+/// parts.masker = Box::new(WithoutTrailer(parts.masker));
+/// let mut odometry = Odometry::with_parts(&config, parts);
+/// # use gyre_simulator::{SimulationConfig, Simulator};
+/// # let drive = Simulator::new(&SimulationConfig { scans: Some(1), ..SimulationConfig::default() })?;
+/// # let scan = drive.render_scan(0).scan;
+/// odometry.register(&scan.view())?;
+/// assert!(odometry.raster().slice(s![128.., 122..133]).iter().all(|power| *power == 0.0));
+/// assert!(odometry.raster().iter().any(|power| *power > 0.0));
+/// # Ok(())
+/// # }
+/// ```
+///
+/// `examples/own_search.rs` replaces the search.
+pub struct Parts {
+    /// Makes masked rasters and points.
+    pub masker: Box<dyn Mask>,
+    /// Searches the motion between two masked scans.
+    pub search: Box<dyn Search>,
+    /// Refines the searched motion; `None`: it is the result.
+    pub refiner: Option<Box<dyn Refine>>,
+}
+
+impl Parts {
+    /// Makes the parts of a configuration, with all their buffers.
+    ///
+    /// # Errors
+    /// The first setting out of its bounds; a network that cannot be used.
+    pub fn new(config: &OdometryConfig) -> Result<Self, SetupError> {
+        Ok(Self {
+            masker: Box::new(Masker::new(
+                &config.raster,
+                &config.points,
+                &config.masking,
+            )?),
+            refiner: refiner(config)?,
+            search: search(config)?,
+        })
+    }
+}
+
+fn search(config: &OdometryConfig) -> Result<Box<dyn Search>, SetupError> {
+    let (n, cell_m) = (config.raster.n, config.raster.cell_m.into());
+    Ok(match config.search.kind {
+        SearchKind::Decoupled => Box::new(DecoupledSearch::new(
+            n,
+            cell_m,
+            &config.rotation,
+            &config.translation,
+        )?),
+        SearchKind::Exhaustive => Box::new(ExhaustiveSearch::new(n, cell_m, &config.exhaustive)?),
+    })
+}
+
+fn refiner(config: &OdometryConfig) -> Result<Option<Box<dyn Refine>>, SetupError> {
+    let capacity = config.points.capacity;
+    match config.refinement.kind {
+        RefinementKind::None => Ok(None),
+        RefinementKind::LocalMap if capacity == 0 => Err(SetupError::NoPoints),
+        RefinementKind::LocalMap => {
+            let refiner = Refiner::new(&config.refinement, capacity)?;
+            Ok(Some(Box::new(refiner)))
+        }
+    }
+}
+
+impl Mask for Masker {
+    fn scans(&self) -> usize {
+        Masker::scans(self)
+    }
+
+    fn mask(
+        &mut self,
+        sweep: &Sweep<'_>,
+        rasters: &mut Rasters<'_>,
+    ) -> Result<Option<Twist>, OdometryError> {
+        let earlier = rasters.earlier.as_mut().map(|raster| raster.view_mut());
+        let later = rasters.later.view_mut();
+        Ok(Masker::mask(self, sweep, rasters.follows, later, earlier)?)
+    }
+
+    fn points(
+        &mut self,
+        scan: &PolarScan<'_>,
+        twist: Option<Twist>,
+        out: &mut [SparsePoint],
+    ) -> Result<usize, OdometryError> {
+        Ok(Masker::points(self, scan, twist, out)?)
+    }
+
+    fn factors(&self, scan: usize) -> Option<ArrayView2<'_, f32>> {
+        Masker::factors(self, scan)
+    }
+}
+
+impl Search for ExhaustiveSearch {
+    fn search(&mut self, pair: &Pair) -> Result<Option<JointMatch>, OdometryError> {
+        let search = |earlier| ExhaustiveSearch::search(self, pair.later(), earlier);
+        Ok(pair.earlier().map(search).transpose()?)
+    }
+}
+
+impl Refine for Refiner {
+    fn refine(&mut self, pair: &Pair, searched: &Pose) -> Refined {
+        let (later, earlier) = (pair.later_points(), pair.earlier_points());
+        let interval_s = pair.interval_ns() as f64 * 1e-9;
+        Refiner::refine(self, pair.seq(), later, earlier, searched, interval_s)
+    }
+
+    fn reset(&mut self) {
+        Refiner::reset(self);
+    }
+}
