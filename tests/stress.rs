@@ -321,7 +321,7 @@ fn the_memory_that_is_taken_is_reported() {
     let mut helper = gyre()
         .arg("stress-helper")
         .arg(std::process::id().to_string())
-        .args(["memory", "0.01"])
+        .args([r#"{"memory":0.01}"#])
         .stdout(Stdio::piped())
         .spawn()
         .unwrap();

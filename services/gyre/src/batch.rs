@@ -10,7 +10,9 @@ use std::{
     thread,
 };
 
-use gyre_batch::{Batch, Ended, List, Outcome, Settings, Slice, Table, collect, compute, table};
+use gyre_batch::{
+    Batch, DriveOutcome, Ended, List, Settings, Slice, Table, collect, compute, table,
+};
 use gyre_stage::wake::Signals;
 
 use crate::{Failure, cli::BatchArguments, out::Out, print, program, run::INTERRUPTED};
@@ -102,7 +104,7 @@ fn written(list: &List, settings: &Settings, out: &Path) -> Result<Table, Failur
 }
 
 fn concluded(
-    counts: &BTreeMap<Outcome, usize>,
+    counts: &BTreeMap<DriveOutcome, usize>,
     earlier: usize,
     out: &Path,
     interrupted: bool,
@@ -118,7 +120,7 @@ fn concluded(
 }
 
 /// The number of drives by outcome, in a sentence.
-fn sentence(counts: &BTreeMap<Outcome, usize>, earlier: usize) -> String {
+fn sentence(counts: &BTreeMap<DriveOutcome, usize>, earlier: usize) -> String {
     let drives: usize = counts.values().sum();
     let each = counts
         .iter()
@@ -136,8 +138,10 @@ fn sentence(counts: &BTreeMap<Outcome, usize>, earlier: usize) -> String {
     }
 }
 
-fn exit_code(counts: &BTreeMap<Outcome, usize>, interrupted: bool) -> ExitCode {
-    let is_whole = counts.keys().all(|outcome| *outcome == Outcome::Complete);
+fn exit_code(counts: &BTreeMap<DriveOutcome, usize>, interrupted: bool) -> ExitCode {
+    let is_whole = counts
+        .keys()
+        .all(|outcome| *outcome == DriveOutcome::Complete);
     match (interrupted, is_whole) {
         (true, _) => ExitCode::from(INTERRUPTED),
         (false, true) => ExitCode::SUCCESS,

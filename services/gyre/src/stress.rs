@@ -3,7 +3,9 @@
 use std::{fs, path::Path, process::ExitCode, time::Duration};
 
 use gyre_messages::{Masked, Message, Motion, Scan, StageId, topics};
-use gyre_stress::{Kind, Options, Provenance, Report, Scenario, Subject, report::Verdict};
+use gyre_stress::{
+    MessageKind, Options, Provenance, Report, Scenario, TestedPipeline, report::Verdict,
+};
 
 use crate::{
     Failure,
@@ -75,7 +77,7 @@ fn carry_out(arguments: &StressArguments) -> Result<Report, Failure> {
     let file = out.join("config.toml");
     fs::write(&file, configuration.to_toml()?)?;
     let stages = StageId::ALL.into_iter();
-    let subject = Subject {
+    let tested = TestedPipeline {
         program: program::own(),
         configuration: file,
         out: out.path().to_owned(),
@@ -97,9 +99,9 @@ fn carry_out(arguments: &StressArguments) -> Result<Report, Failure> {
         stages: arguments.stages.clone(),
         seed: arguments.seed,
     };
-    require_stages(&subject, &options.stages)?;
+    require_stages(&tested, &options.stages)?;
     let provenance = provenance(arguments, &configuration)?;
-    let mut report = gyre_stress::stress(&subject, &options, &mut |line| print::note(line));
+    let mut report = gyre_stress::stress(&tested, &options, &mut |line| print::note(line));
     report.provenance = provenance;
     report.write(out.path())?;
     for outcome in &report.outcomes {
@@ -128,11 +130,11 @@ fn render(configuration: &mut Configuration, out: &Out) -> Result<(), Failure> {
 }
 
 /// The messages whose hand-over is compared with copies: the largest ones, and one without a payload.
-fn kinds(checked: &Preflight) -> Vec<Kind> {
+fn kinds(checked: &Preflight) -> Vec<MessageKind> {
     let kind = |name| {
         let mut topics = topics(&checked.window);
         let topic = topics.find(|topic| topic.name == name);
-        Kind {
+        MessageKind {
             topic: name,
             bytes: topic.map_or(0, |topic| topic.max_sample_bytes(&checked.limits)),
         }
@@ -142,8 +144,8 @@ fn kinds(checked: &Preflight) -> Vec<Kind> {
         .to_vec()
 }
 
-fn require_stages(subject: &Subject, stages: &[StageId]) -> Result<(), Failure> {
-    match stages.iter().find(|stage| !subject.stages.contains(stage)) {
+fn require_stages(tested: &TestedPipeline, stages: &[StageId]) -> Result<(), Failure> {
+    match stages.iter().find(|stage| !tested.stages.contains(stage)) {
         None => Ok(()),
         Some(stage) => Err(format!("this run has no stage {}", stage.name()).into()),
     }

@@ -7,7 +7,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_batch::Outcome;
+use gyre_batch::DriveOutcome;
 use gyre_configuration::{AutomaticError, ConfigurationError};
 use gyre_masking::MaskerError;
 use gyre_radar::OpenError;
@@ -55,7 +55,7 @@ enum DriveError {
 /// The system does not let the process end with the batch.
 pub fn drive(arguments: &BatchDriveArguments) -> Result<ExitCode, Failure> {
     if !end_with(arguments.parent, Signal::TERM)? {
-        return Ok(Outcome::Interrupted.exit_code(false).into());
+        return Ok(DriveOutcome::Interrupted.exit_code(false).into());
     }
     let (outcome, earlier) = match computed(&arguments.run) {
         Ok(ended) => ended,
@@ -68,7 +68,7 @@ pub fn drive(arguments: &BatchDriveArguments) -> Result<ExitCode, Failure> {
 }
 
 /// Returns how the drive has ended, and whether it had before.
-fn computed(arguments: &RunArguments) -> Result<(Outcome, bool), Failure> {
+fn computed(arguments: &RunArguments) -> Result<(DriveOutcome, bool), Failure> {
     let path = arguments.data.as_ref().or(arguments.configuration.as_ref());
     if let Some(path) = path.filter(|path| matches!(path.try_exists(), Ok(false))) {
         return Err(DriveError::Missing(path.display().to_string()).into());
@@ -85,8 +85,8 @@ fn computed(arguments: &RunArguments) -> Result<(Outcome, bool), Failure> {
     let discards = !continues(&out, &configuration)?;
     let code = run::compute(configuration, out, discards)?;
     Ok(match code == ExitCode::from(INTERRUPTED) {
-        true => (Outcome::Interrupted, false),
-        false => (Outcome::Complete, false),
+        true => (DriveOutcome::Interrupted, false),
+        false => (DriveOutcome::Complete, false),
     })
 }
 
@@ -110,14 +110,14 @@ fn is_finished(out: &Out, configuration: &Configuration) -> bool {
 }
 
 /// Returns how a finished drive has ended, and says again what is wrong with it.
-fn finished(out: &Out) -> Result<Outcome, Failure> {
+fn finished(out: &Out) -> Result<DriveOutcome, Failure> {
     let text = gyre_storage::read_text(&out.join(SUMMARY), gyre_storage::SETTINGS)?;
     let summary: serde_json::Value = serde_json::from_str(&text)?;
     Ok(match summary["problem"].as_str() {
-        None => Outcome::Complete,
+        None => DriveOutcome::Complete,
         Some(problem) => {
             print::note(format_args!("gyre: {problem}"));
-            Outcome::Corrupt
+            DriveOutcome::Corrupt
         }
     })
 }
@@ -142,21 +142,21 @@ fn of_settings(error: Failure) -> Failure {
     }
 }
 
-fn outcome_of(failure: &Failure) -> Outcome {
+fn outcome_of(failure: &Failure) -> DriveOutcome {
     if is_of_full_disk(failure) {
-        return Outcome::DiskFull;
+        return DriveOutcome::DiskFull;
     }
     if let Some(error) = failure.downcast_ref::<DriveError>() {
         return match error {
-            DriveError::Missing(_) => Outcome::Missing,
-            DriveError::Endless(_) | DriveError::Configuration(_) => Outcome::Configuration,
+            DriveError::Missing(_) => DriveOutcome::Missing,
+            DriveError::Endless(_) | DriveError::Configuration(_) => DriveOutcome::Configuration,
         };
     }
     if let Some(error) = failure.downcast_ref::<AutomaticError>() {
         return match error {
             AutomaticError::Open(error) => outcome_of_open(error),
-            AutomaticError::Read(_) | AutomaticError::Empty => Outcome::NotADataset,
-            _ => Outcome::Configuration,
+            AutomaticError::Read(_) | AutomaticError::Empty => DriveOutcome::NotADataset,
+            _ => DriveOutcome::Configuration,
         };
     }
     if let Some(error) = failure.downcast_ref::<PreflightError>() {
@@ -167,28 +167,32 @@ fn outcome_of(failure: &Failure) -> Outcome {
         || failure.is::<SimulatorError>();
     match failure.downcast_ref::<OpenError>() {
         Some(error) => outcome_of_open(error),
-        None if is_configuration => Outcome::Configuration,
-        None if failure.is::<Problem>() => Outcome::Corrupt,
-        None if matches!(failure.downcast_ref(), Some(OutError::Held { .. })) => Outcome::InUse,
-        None => Outcome::Failed,
+        None if is_configuration => DriveOutcome::Configuration,
+        None if failure.is::<Problem>() => DriveOutcome::Corrupt,
+        None if matches!(failure.downcast_ref(), Some(OutError::Held { .. })) => {
+            DriveOutcome::InUse
+        }
+        None => DriveOutcome::Failed,
     }
 }
 
-fn outcome_of_open(error: &OpenError) -> Outcome {
+fn outcome_of_open(error: &OpenError) -> DriveOutcome {
     match error {
-        OpenError::Missing { .. } => Outcome::Missing,
-        OpenError::BadOption { .. } | OpenError::DatasetToml { .. } => Outcome::Configuration,
-        _ => Outcome::NotADataset,
+        OpenError::Missing { .. } => DriveOutcome::Missing,
+        OpenError::BadOption { .. } | OpenError::DatasetToml { .. } => DriveOutcome::Configuration,
+        _ => DriveOutcome::NotADataset,
     }
 }
 
-fn outcome_of_preflight(error: &PreflightError) -> Outcome {
+fn outcome_of_preflight(error: &PreflightError) -> DriveOutcome {
     match error {
-        PreflightError::TooFew { .. } | PreflightError::NoRecording { .. } => Outcome::NotADataset,
-        PreflightError::NoData | PreflightError::Radar { .. } => Outcome::Configuration,
+        PreflightError::TooFew { .. } | PreflightError::NoRecording { .. } => {
+            DriveOutcome::NotADataset
+        }
+        PreflightError::NoData | PreflightError::Radar { .. } => DriveOutcome::Configuration,
         PreflightError::SharedMemory { .. }
         | PreflightError::OpenFiles { .. }
-        | PreflightError::NoSharedMemory(_) => Outcome::Machine,
+        | PreflightError::NoSharedMemory(_) => DriveOutcome::Machine,
     }
 }
 
@@ -206,26 +210,32 @@ mod tests {
     #[test]
     fn failures_of_one_kind_have_one_outcome() {
         let path = || "a".into();
-        let cases: [(Failure, Outcome); 8] = [
-            (DriveError::Missing("a".into()).into(), Outcome::Missing),
-            (OpenError::Missing { path: path() }.into(), Outcome::Missing),
+        let cases: [(Failure, DriveOutcome); 8] = [
+            (
+                DriveError::Missing("a".into()).into(),
+                DriveOutcome::Missing,
+            ),
+            (
+                OpenError::Missing { path: path() }.into(),
+                DriveOutcome::Missing,
+            ),
             (
                 OpenError::NoImages { path: path() }.into(),
-                Outcome::NotADataset,
+                DriveOutcome::NotADataset,
             ),
             (
                 AutomaticError::Open(OpenError::NoImages { path: path() }).into(),
-                Outcome::NotADataset,
+                DriveOutcome::NotADataset,
             ),
             (
                 PreflightError::OpenFiles { limit: 1 }.into(),
-                Outcome::Machine,
+                DriveOutcome::Machine,
             ),
-            (of_settings("a card".into()), Outcome::Configuration),
-            ("masking died".into(), Outcome::Failed),
+            (of_settings("a card".into()), DriveOutcome::Configuration),
+            ("masking died".into(), DriveOutcome::Failed),
             (
                 "cannot write b: No space left on device (os error 28)".into(),
-                Outcome::DiskFull,
+                DriveOutcome::DiskFull,
             ),
         ];
         for (failure, outcome) in cases {

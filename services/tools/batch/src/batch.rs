@@ -1,10 +1,10 @@
-//! What a batch is: its drives, and the folder of their results.
+//! A batch: its drives, and the folder of their results.
 
 use std::path::PathBuf;
 
 use crate::{Drive, List, Settings};
 
-/// What is to be computed.
+/// A batch that is to be computed.
 #[derive(Clone, Debug)]
 pub struct Batch<'a> {
     /// The program `gyre`.
@@ -13,7 +13,7 @@ pub struct Batch<'a> {
     pub list: &'a List,
     /// Those of its drives that are computed.
     pub drives: Vec<Drive>,
-    /// What they have in common.
+    /// Their common settings.
     pub settings: Settings,
     /// The folder of the batch, an absolute path without links.
     pub out: PathBuf,

@@ -1,4 +1,4 @@
-//! The process of a drive, from its start to what it said.
+//! The process of a drive, from its start to its last sentence.
 
 use std::{
     fs::{File, OpenOptions},
@@ -11,21 +11,21 @@ use std::{
 use gyre_supervise::last_line;
 use rustix::process::{Pid, Signal, kill_process};
 
-use crate::{BatchError, Drive, Outcome, batch::Batch, list::is_configuration};
+use crate::{BatchError, Drive, DriveOutcome, batch::Batch, list::is_configuration};
 
 /// The command of `gyre` that computes a drive.
 pub const COMMAND: &str = "batch-drive";
-/// What a sentence of `gyre` begins with.
+/// The start of a sentence of `gyre`.
 const PREFIX: &str = "gyre: ";
 /// Bytes at the end of an output in which the last sentence is looked for.
 const TAIL: u64 = 1 << 16;
 
-/// How a process has ended.
+/// The end of a process.
 pub(crate) struct End {
-    pub outcome: Outcome,
-    /// Whether the drive had ended so before.
+    pub outcome: DriveOutcome,
+    /// True if the drive had ended so before.
     pub earlier: bool,
-    /// Why it is not complete.
+    /// The reason why it is not complete.
     pub sentence: String,
 }
 
@@ -34,7 +34,7 @@ pub(crate) struct Child<'a> {
     pub drive: &'a Drive,
     process: process::Child,
     output: PathBuf,
-    /// Where in the file of its output it begins.
+    /// The place in the file of its output at which this process begins.
     begin: u64,
 }
 
@@ -70,7 +70,7 @@ impl<'a> Child<'a> {
         Some(self.end(status, out, false))
     }
 
-    /// Asks it to end, waits, and returns how it has ended. What it has computed is kept.
+    /// Asks it to end, waits, and returns its end. Its results so far are kept.
     pub fn interrupt(&mut self, out: &Path) -> Result<End, BatchError> {
         self.ask_to_end();
         let status = self
@@ -92,17 +92,17 @@ impl<'a> Child<'a> {
 
     fn end(&self, status: ExitStatus, out: &Path, stopped: bool) -> End {
         let (outcome, earlier) = match (status.code(), status.signal()) {
-            (Some(code), _) => Outcome::of_exit_code(code),
+            (Some(code), _) => DriveOutcome::of_exit_code(code),
             // It was asked to end before it had anything to write.
-            (None, Some(_)) if stopped => (Outcome::Interrupted, false),
-            (None, _) => (Outcome::Killed, false),
+            (None, Some(_)) if stopped => (DriveOutcome::Interrupted, false),
+            (None, _) => (DriveOutcome::Killed, false),
         };
         let sentence = match outcome {
-            Outcome::Complete => String::new(),
-            Outcome::Interrupted => {
+            DriveOutcome::Complete => String::new(),
+            DriveOutcome::Interrupted => {
                 "the batch was interrupted: the same command goes on".to_owned()
             }
-            Outcome::Killed => format!(
+            DriveOutcome::Killed => format!(
                 "its supervisor was killed by signal {}: the same command goes on",
                 status.signal().unwrap_or_default()
             ),
@@ -214,7 +214,7 @@ mod tests {
         assert_eq!(of(2), ["/c.toml", "--set=raster.n=127"]);
     }
 
-    /// How a drive ends whose program is a shell script.
+    /// Returns the end of a drive whose program is a shell script.
     fn end_of(script: &str) -> End {
         use std::os::unix::fs::PermissionsExt;
         let folder = tempfile::tempdir().unwrap();
@@ -223,7 +223,7 @@ mod tests {
         fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
         let list = list(folder.path(), "a\n");
         let batch = batch(&list, folder.path(), program.to_str().unwrap());
-        // What an earlier attempt has said is not what this one says.
+        // The sentence of an earlier attempt is not that of this one.
         fs::write(folder.path().join("output/a.txt"), "gyre: earlier\n").unwrap();
         let mut child = Child::start(&batch, &list.drives()[0]).unwrap();
         let status = child.process.wait().unwrap();
@@ -231,23 +231,23 @@ mod tests {
     }
 
     #[test]
-    fn an_end_is_told_by_exit_code_and_last_sentence() {
-        let missing = Outcome::Missing.exit_code(false);
+    fn an_end_is_known_by_exit_code_and_last_sentence() {
+        let missing = DriveOutcome::Missing.exit_code(false);
         let end = end_of(&format!(
             "echo 'gyre: no /batch/drives/a' >&2; echo end; exit {missing}"
         ));
-        assert_eq!(end.outcome, Outcome::Missing);
+        assert_eq!(end.outcome, DriveOutcome::Missing);
         assert_eq!(end.sentence, "no drives/a");
         let end = end_of("echo some words; exit 101");
         assert_eq!(
             (end.outcome, end.sentence.as_str()),
-            (Outcome::Failed, "some words")
+            (DriveOutcome::Failed, "some words")
         );
         let end = end_of("kill -9 $$");
-        assert_eq!(end.outcome, Outcome::Killed);
+        assert_eq!(end.outcome, DriveOutcome::Killed);
         assert!(end.sentence.contains("signal 9"), "{}", end.sentence);
-        let end = end_of(&format!("exit {}", Outcome::Complete.exit_code(true)));
-        assert_eq!((end.outcome, end.earlier), (Outcome::Complete, true));
+        let end = end_of(&format!("exit {}", DriveOutcome::Complete.exit_code(true)));
+        assert_eq!((end.outcome, end.earlier), (DriveOutcome::Complete, true));
         assert_eq!(end.sentence, "");
     }
 }

@@ -3,28 +3,29 @@
 use std::{collections::BTreeMap, time::Duration};
 
 use gyre_stage::wake::Signals;
+use serde_json::Value;
 
 use crate::{
-    Batch, BatchError, Drive, Outcome, Row,
+    Batch, BatchError, Drive, DriveOutcome, DriveRow,
     child::{Child, End},
 };
 
-/// The longest time after which the processes are looked at; the end of one is noticed at once.
-const LOOK: Duration = Duration::from_secs(1);
+/// The longest time between two polls of the processes; the end of one is noticed at once.
+const POLL_PERIOD: Duration = Duration::from_secs(1);
 
-/// How the drives have ended.
+/// The outcomes of the drives.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Ended {
     /// The number of drives by outcome.
-    pub counts: BTreeMap<Outcome, usize>,
+    pub counts: BTreeMap<DriveOutcome, usize>,
     /// Those of them that had been computed before.
     pub earlier: usize,
-    /// Whether the batch was interrupted before its end.
+    /// True if the batch was interrupted before its end.
     pub interrupted: bool,
 }
 
-/// Computes all drives, and writes the row of each when it has ended. `say` gets a line for each. A request to stop ends the runs too, which
-/// keep what they have.
+/// Computes all drives, and writes the row of each when it has ended. `say` gets a line for each. A
+/// request to stop ends the runs too, whose results so far are kept.
 ///
 /// # Errors
 /// A process that cannot be started, or a row that cannot be written. The runs are ended then.
@@ -49,7 +50,7 @@ pub fn compute(
         if running.is_empty() {
             return Ok(progress.ended);
         }
-        if signals.sleep(LOOK)? {
+        if signals.sleep(POLL_PERIOD)? {
             return progress.interrupt(running);
         }
         let mut going_on = Vec::new();
@@ -87,11 +88,11 @@ impl Progress<'_> {
         } = self.batch;
         let results = self.batch.results(drive);
         let kept = match end.outcome.leaves_results() {
-            true => Row::of_results(out, drive, settings)?,
+            true => DriveRow::of_results(out, drive, settings)?,
             false => None,
         };
         let (line, outcome, earlier) = match kept {
-            // What was computed is there, though it could not be looked at again.
+            // The results are there, though they could not be checked again.
             Some(row) => {
                 let line = format!(
                     "{}; not looked at again: {}",
@@ -101,7 +102,7 @@ impl Progress<'_> {
                 (line, row.outcome, true)
             }
             None => {
-                let row = Row::of(drive, settings, end.outcome, end.sentence, &results);
+                let row = DriveRow::of(drive, settings, end.outcome, end.sentence, &results);
                 row.write(out)?;
                 (line(&row, end.earlier), row.outcome, end.earlier)
             }
@@ -125,9 +126,9 @@ impl Progress<'_> {
     }
 }
 
-/// A drive in a line.
-fn line(row: &Row, earlier: bool) -> String {
-    let Row {
+/// Returns a line about a drive.
+fn line(row: &DriveRow, earlier: bool) -> String {
+    let DriveRow {
         drive,
         outcome,
         sentence,
@@ -136,9 +137,9 @@ fn line(row: &Row, earlier: bool) -> String {
     } = row;
     let name = &drive.name;
     let earlier = if earlier { " before" } else { "" };
-    match (outcome, figures.poses) {
-        (Outcome::Complete, Some(poses)) => {
-            let ate = figures.ate_rmse_m;
+    match (outcome, figures.get("poses")) {
+        (DriveOutcome::Complete, Some(poses)) => {
+            let ate = figures.get("ate_rmse_m").and_then(Value::as_f64);
             let ate = ate.map_or(String::new(), |ate_m| format!(", ATE {ate_m:.3} m"));
             format!("{name}: complete{earlier}, {poses} poses{ate}")
         }

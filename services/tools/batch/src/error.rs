@@ -1,4 +1,4 @@
-//! Why a batch could not be carried out.
+//! Errors of a batch.
 
 use std::{io, path::PathBuf};
 
@@ -24,7 +24,7 @@ pub enum BatchError {
         path: PathBuf,
         /// The line, from 1; of a folder the entry.
         line: u64,
-        /// What is wrong, and what is expected.
+        /// The fault, and what is expected.
         reason: String,
     },
     /// Nothing to do.
@@ -71,7 +71,7 @@ pub enum BatchError {
     Unknown {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The fault.
         reason: String,
     },
     /// A file that cannot be written.

@@ -24,7 +24,8 @@ const COLUMNS: [&str; 4] = [DRIVE, "name", "configuration", "set"];
 pub struct Drive {
     /// Its name, which no other drive of the batch has: the folder of its results.
     pub name: String,
-    /// Path of a recording's folder, of a recorded run (`.mcap`) or of a configuration (`.toml`), as the list has it.
+    /// Path of a recording's folder, of a recorded run (`.mcap`) or of a configuration (`.toml`), as the
+    /// list has it.
     pub path: String,
     /// Path of the configuration, as the list has it; `None`: that of the batch.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -34,7 +35,8 @@ pub struct Drive {
     pub set: Vec<String>,
 }
 
-/// The part of a batch that one of many tasks computes: each `tasks`-th drive, so that long drives that lie side by side are shared out.
+/// The part of a batch that one of many tasks computes: each `tasks`-th drive, so that long drives that
+/// lie side by side are divided.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Slice {
     /// The task, from 0.
@@ -104,7 +106,7 @@ impl List {
     }
 }
 
-/// The sub-folders of a folder, and the recorded runs in it, by name.
+/// Returns the sub-folders of a folder, and the recorded runs in it, by name.
 fn entries(folder: &Path) -> Result<Vec<(u64, Drive)>, BatchError> {
     let unread = |source| BatchError::List {
         path: folder.to_owned(),
@@ -142,7 +144,7 @@ pub(crate) fn is_configuration(path: &str) -> bool {
     Path::new(path).extension().is_some_and(|it| it == "toml")
 }
 
-/// The drives of a text, with their lines.
+/// Returns the drives of a text, with their lines.
 fn lines(path: &Path, text: &str) -> Result<Vec<(u64, Drive)>, BatchError> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let lines = (1..).zip(text.lines().map(str::trim));
@@ -159,7 +161,7 @@ fn lines(path: &Path, text: &str) -> Result<Vec<(u64, Drive)>, BatchError> {
     }
 }
 
-/// The drives of a CSV file with a header.
+/// Returns the drives of a CSV file with a header.
 fn table(path: &Path, text: &str) -> Result<Vec<(u64, Drive)>, BatchError> {
     let mut reader = csv::ReaderBuilder::new()
         .comment(Some(b'#'))
@@ -207,7 +209,7 @@ fn of_cells(cells: &BTreeMap<&str, &str>) -> Result<Drive, String> {
     })
 }
 
-/// A drive by its path, named after that without a name of its own.
+/// Returns a drive by its path, named after that without a name of its own.
 fn drive(path: &str, name: Option<&str>) -> Result<Drive, String> {
     let of_path = Path::new(path);
     let last = match is_recorded(of_path) || is_configuration(path) {

@@ -1,4 +1,4 @@
-//! How a drive can end.
+//! The outcomes of a drive.
 
 use std::fmt;
 
@@ -9,10 +9,10 @@ const CODES: u8 = 40;
 /// Added to the exit code of a drive that was complete before.
 const EARLIER: u8 = 20;
 
-/// How a drive has ended: the column `outcome` of the table.
+/// The outcome of a drive: the column `outcome` of the table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Outcome {
+pub enum DriveOutcome {
     /// All scans have been played, and all results are there.
     Complete,
     /// All scans have been played, but too many of them cannot be read.
@@ -29,7 +29,8 @@ pub enum Outcome {
     DiskFull,
     /// Another process is writing to its results.
     InUse,
-    /// The run could not begin, or has failed: a stage died or hung more often than it may, for instance. The sentence says what.
+    /// The run could not begin, or has failed: a stage died or hung more often than it may, for
+    /// instance. The sentence has the reason.
     Failed,
     /// The process of its supervisor was killed.
     Killed,
@@ -39,7 +40,7 @@ pub enum Outcome {
     NotRun,
 }
 
-impl Outcome {
+impl DriveOutcome {
     /// All of them, in the order in which they are reported.
     pub const ALL: [Self; 12] = [
         Self::Complete,
@@ -92,7 +93,8 @@ impl Outcome {
         CODES + self as u8 + if earlier { EARLIER } else { 0 }
     }
 
-    /// Returns what an exit code means, and whether it had ended so before. Any other code is that of a process which has failed.
+    /// Returns the outcome of an exit code, and whether it had ended so before. Any other code is that of
+    /// a process which has failed.
     pub(crate) fn of_exit_code(code: i32) -> (Self, bool) {
         let has_code = |earlier| {
             let mut all = Self::ALL.into_iter();
@@ -105,7 +107,7 @@ impl Outcome {
     }
 }
 
-impl fmt::Display for Outcome {
+impl fmt::Display for DriveOutcome {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())
     }
@@ -117,22 +119,25 @@ mod tests {
 
     #[test]
     fn each_outcome_has_its_exit_codes_and_no_other_program_has_them() {
-        for outcome in Outcome::ALL {
+        for outcome in DriveOutcome::ALL {
             for earlier in [false, true] {
                 let code = i32::from(outcome.exit_code(earlier));
-                assert_eq!(Outcome::of_exit_code(code), (outcome, earlier));
+                assert_eq!(DriveOutcome::of_exit_code(code), (outcome, earlier));
                 // Success, failure, wrong arguments, a panic, and what shells and interrupts give.
                 assert!(![0, 1, 2, 101].contains(&code) && code < 126, "{code}");
             }
         }
         for code in [1, 2, 101] {
-            assert_eq!(Outcome::of_exit_code(code), (Outcome::Failed, false));
+            assert_eq!(
+                DriveOutcome::of_exit_code(code),
+                (DriveOutcome::Failed, false)
+            );
         }
     }
 
     #[test]
     fn names_are_those_in_files() {
-        for outcome in Outcome::ALL {
+        for outcome in DriveOutcome::ALL {
             let written = serde_json::to_string(&outcome).unwrap_or_default();
             assert_eq!(written, format!("\"{outcome}\""));
         }

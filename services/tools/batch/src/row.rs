@@ -1,22 +1,24 @@
-//! What is kept of a drive: `rows/NAME.json`, which the table is made of.
-
-mod read;
+//! The row of a drive: `rows/NAME.json`, which the table is made of.
 
 use std::path::{Path, PathBuf};
 
 use gyre_stage::run::COMPLETE;
 use serde::{Deserialize, Serialize};
 
-use crate::{BatchError, Drive, Outcome};
+use crate::{
+    BatchError, Drive, DriveOutcome, Values,
+    columns::{self, optional_text, unknown},
+};
 
 /// The version of the file. It is raised when a key changes its meaning or goes.
 const VERSION: u32 = 1;
 
-/// What the drives of a batch have in common.
+/// The settings that the drives of a batch have in common.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Settings {
-    /// The configuration of the drives that name none and are none, an absolute path; `None`: by their formats and scans.
+    /// The configuration of the drives that name none and are none, an absolute path; `None`: by their
+    /// formats and scans.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub configuration: Option<PathBuf>,
     /// Overrides of each configuration, `section.key=value`. Those of a drive hold over them.
@@ -24,113 +26,32 @@ pub struct Settings {
     pub set: Vec<String>,
 }
 
-/// How a drive has ended, and its results.
+/// The outcome of a drive, and its results.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Row {
+pub struct DriveRow {
     version: u32,
     /// The drive.
     pub drive: Drive,
-    /// What else it was computed with.
+    /// The settings that it was computed with.
     pub settings: Settings,
-    /// How it has ended.
-    pub outcome: Outcome,
-    /// Why it is not complete, in a sentence; else empty.
+    /// Its outcome.
+    pub outcome: DriveOutcome,
+    /// The reason why it is not complete, in a sentence; else empty.
     pub sentence: String,
-    /// What follows from its scans and its configuration; empty unless all scans were played.
-    pub figures: Figures,
-    /// What does not: times, restarts, the computer.
-    pub times: Times,
+    /// The columns of `results.csv` that follow from its scans and its configuration; empty unless all
+    /// scans were played.
+    pub figures: Values,
+    /// The columns of `times.csv`: times, restarts, the computer.
+    pub times: Values,
 }
 
-/// Results of a drive. On one kind of processor the same scans and configuration give the same, whatever was killed on the way.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Figures {
-    /// Gyre's version.
-    pub version: Option<String>,
-    /// SHA-256 of the program that began the run, its first twelve digits.
-    pub build: Option<String>,
-    /// Scans to play.
-    pub scans: Option<u64>,
-    /// Scans with a pose.
-    pub poses: Option<u64>,
-    /// Scans that live mode has dropped.
-    pub dropped: Option<u64>,
-    /// Scans that cannot be read.
-    pub unreadable: Option<u64>,
-    /// Scans that the recording lacks, by its stamps.
-    pub missing: Option<u64>,
-    /// Places where the chain of motions starts anew.
-    pub breaks: Option<u64>,
-    /// From the first pose to the last, s.
-    pub duration_s: Option<f64>,
-    /// Length of the estimated path, m.
-    pub path_m: Option<f64>,
-    /// Motions that were refined.
-    pub refined: Option<u64>,
-    /// Motions with little support.
-    pub weak: Option<u64>,
-    /// Motions that nothing matched.
-    pub predicted: Option<u64>,
-    /// Motions of a standing vehicle.
-    pub stationary: Option<u64>,
-    /// Length of the true path, m. This and what follows, up to the loops, needs ground truth.
-    pub truth_path_m: Option<f64>,
-    /// Absolute trajectory error, m: root of the mean square.
-    pub ate_rmse_m: Option<f64>,
-    /// The largest, m.
-    pub ate_max_m: Option<f64>,
-    /// KITTI odometry error, %; needs 100 m.
-    pub kitti_translation_percent: Option<f64>,
-    /// KITTI odometry error of the heading, degrees in 100 m.
-    pub kitti_rotation_deg_per_100m: Option<f64>,
-    /// Segment error, %; needs 100 m.
-    pub seg_percent: Option<f64>,
-    /// Error of a motion, m: root of the mean square.
-    pub rpe_translation_rmse_m: Option<f64>,
-    /// The same of its rotation, degrees.
-    pub rpe_rotation_rmse_deg: Option<f64>,
-    /// Keyframes, with SLAM.
-    pub keyframes: Option<u64>,
-    /// Loops that the corrected trajectory is made with.
-    pub loops_used: Option<u64>,
-    /// Loops that contradict the others.
-    pub loops_rejected: Option<u64>,
-    /// Absolute trajectory error of the corrected trajectory, m.
-    pub slam_ate_rmse_m: Option<f64>,
-}
-
-/// Times of a drive, and what else depends on the computer and on what was killed.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Times {
-    /// The processor's model.
-    pub processor: Option<String>,
-    /// Processors that the run was allowed to use.
-    pub cores: Option<u64>,
-    /// Poses that an earlier session had computed.
-    pub resumed_after: Option<u64>,
-    /// Time of the last session, s.
-    pub wall_s: Option<f64>,
-    /// Scans of the last session in a second.
-    pub scans_per_s: Option<f64>,
-    /// Restarts of stages in the last session.
-    pub restarts: Option<u64>,
-    /// From the completion of a scan to its pose, the median, ms.
-    pub sensor_to_pose_p50_ms: Option<f64>,
-    /// The same, of 99 in 100 scans.
-    pub sensor_to_pose_p99_ms: Option<f64>,
-    /// The stage that worked most of the time.
-    pub bound_by: Option<String>,
-}
-
-impl Row {
+impl DriveRow {
     /// The row of a drive that has ended, whose run has left its results in `out`.
     pub fn of(
         drive: &Drive,
         settings: &Settings,
-        outcome: Outcome,
+        outcome: DriveOutcome,
         sentence: String,
         out: &Path,
     ) -> Self {
@@ -141,14 +62,14 @@ impl Row {
         if !outcome.has_results() {
             return row;
         }
-        match read::results(out) {
+        match columns::read(out) {
             Ok((figures, times)) => Self {
                 figures,
                 times,
                 ..row
             },
             Err(error) => Self {
-                outcome: Outcome::Failed,
+                outcome: DriveOutcome::Failed,
                 sentence: error.to_string(),
                 ..row
             },
@@ -159,19 +80,19 @@ impl Row {
     pub fn not_run(drive: &Drive, settings: &Settings, sentence: &str) -> Self {
         Self {
             sentence: sentence.to_owned(),
-            ..Self::without_results(drive, settings, Outcome::NotRun)
+            ..Self::without_results(drive, settings, DriveOutcome::NotRun)
         }
     }
 
-    fn without_results(drive: &Drive, settings: &Settings, outcome: Outcome) -> Self {
+    fn without_results(drive: &Drive, settings: &Settings, outcome: DriveOutcome) -> Self {
         Self {
             version: VERSION,
             drive: drive.clone(),
             settings: settings.clone(),
             outcome,
             sentence: String::new(),
-            figures: Figures::default(),
-            times: Times::default(),
+            figures: Values::new(),
+            times: Values::new(),
         }
     }
 
@@ -186,10 +107,7 @@ impl Row {
     /// A file that cannot be written.
     pub fn write(&self, batch: &Path) -> Result<(), BatchError> {
         let path = Self::path(batch, &self.drive);
-        let text = serde_json::to_string_pretty(self).map_err(|error| BatchError::Unknown {
-            path: path.clone(),
-            reason: error.to_string(),
-        })?;
+        let text = serde_json::to_string_pretty(self).map_err(unknown(&path))?;
         Ok(gyre_storage::write(&path, text)?)
     }
 
@@ -199,21 +117,18 @@ impl Row {
     /// A file that cannot be read, or that is none of this version.
     pub fn read(batch: &Path, drive: &Drive) -> Result<Option<Self>, BatchError> {
         let path = Self::path(batch, drive);
-        let Some(text) = read::optional_text(&path)? else {
+        let Some(text) = optional_text(&path)? else {
             return Ok(None);
         };
-        let unknown = |reason: String| BatchError::Unknown {
-            path: path.clone(),
-            reason,
-        };
-        let row: Self = serde_json::from_str(&text).map_err(|error| unknown(error.to_string()))?;
+        let row: Self = serde_json::from_str(&text).map_err(unknown(&path))?;
         match row.version {
             VERSION => Ok(Some(row)),
-            version => Err(unknown(format!("version {version}"))),
+            version => Err(unknown(&path)(format!("version {version}"))),
         }
     }
 
-    /// Reads that of a drive with these settings whose results are there; `None`: there are none, or they are being computed anew.
+    /// Reads that of a drive with these settings whose results are there; `None`: there are none, or they
+    /// are being computed anew.
     ///
     /// # Errors
     /// A file that cannot be read.
@@ -264,16 +179,21 @@ mod tests {
     fn a_row_is_read_as_it_was_written_and_a_part_of_one_is_refused() {
         let batch = tempfile::tempdir().unwrap();
         fs::create_dir(batch.path().join("rows")).unwrap();
-        assert_eq!(Row::read(batch.path(), &drive()).unwrap(), None);
-        let mut row = Row::not_run(&drive(), &Settings::default(), "not yet");
-        row.figures.ate_rmse_m = Some(0.0123);
+        assert_eq!(DriveRow::read(batch.path(), &drive()).unwrap(), None);
+        let mut row = DriveRow::not_run(&drive(), &Settings::default(), "not yet");
+        row.figures.insert("ate_rmse_m".to_owned(), 0.0123.into());
         row.write(batch.path()).unwrap();
-        assert_eq!(Row::read(batch.path(), &drive()).unwrap().unwrap(), row);
+        assert_eq!(
+            DriveRow::read(batch.path(), &drive()).unwrap().unwrap(),
+            row
+        );
 
-        let path = Row::path(batch.path(), &drive());
+        let path = DriveRow::path(batch.path(), &drive());
         let text = fs::read_to_string(&path).unwrap();
         fs::write(&path, &text[..text.len() / 2]).unwrap();
-        let error = Row::read(batch.path(), &drive()).unwrap_err().to_string();
+        let error = DriveRow::read(batch.path(), &drive())
+            .unwrap_err()
+            .to_string();
         assert!(error.contains("a.json is not what"), "{error}");
     }
 
@@ -283,7 +203,7 @@ mod tests {
             set: vec!["slam.kind=graph".to_owned()],
             ..Settings::default()
         };
-        let row = Row::not_run(&drive(), &settings, "");
+        let row = DriveRow::not_run(&drive(), &settings, "");
         assert!(row.is_of(&drive(), &settings));
         assert!(!row.is_of(&drive(), &Settings::default()));
     }
@@ -293,8 +213,14 @@ mod tests {
         let out = tempfile::tempdir().unwrap();
         let settings = Settings::default();
         let sentence = String::new();
-        let row = Row::of(&drive(), &settings, Outcome::Complete, sentence, out.path());
-        assert_eq!(row.outcome, Outcome::Failed);
+        let row = DriveRow::of(
+            &drive(),
+            &settings,
+            DriveOutcome::Complete,
+            sentence,
+            out.path(),
+        );
+        assert_eq!(row.outcome, DriveOutcome::Failed);
         assert!(row.sentence.contains("summary.json"), "{}", row.sentence);
     }
 }

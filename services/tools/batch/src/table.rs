@@ -2,34 +2,23 @@
 
 use std::{collections::BTreeMap, path::Path};
 
-use serde::Serialize;
+use serde_json::Value;
 
-use crate::{BatchError, Drive, List, Outcome, Row, Settings};
+use crate::{
+    BatchError, Drive, DriveOutcome, DriveRow, List, Settings, Values,
+    columns::{self, Column},
+};
 
-/// What follows from the drives and their configurations: the same bytes whatever was killed.
+/// The file of the results that follow from the drives and their configurations: the same bytes
+/// whatever was killed.
 pub const RESULTS: &str = "results.csv";
-/// What does not.
+/// The file of all others.
 pub const TIMES: &str = "times.csv";
 
 /// The rows of all drives of a list, in its order.
 #[derive(Clone, Debug)]
 pub struct Table {
-    rows: Vec<Row>,
-}
-
-/// The first columns of the results.
-#[derive(Serialize)]
-struct Head<'a> {
-    name: &'a str,
-    drive: &'a str,
-    outcome: Outcome,
-    sentence: &'a str,
-}
-
-/// The first columns of the times.
-#[derive(Serialize)]
-struct Name<'a> {
-    name: &'a str,
+    rows: Vec<DriveRow>,
 }
 
 /// Reads the row of each drive in the folder of a batch.
@@ -47,20 +36,20 @@ pub fn collect(list: &List, settings: &Settings, out: &Path) -> Result<Table, Ba
     Ok(Table { rows: rows? })
 }
 
-fn row(drive: &Drive, settings: &Settings, out: &Path) -> Result<Row, BatchError> {
-    Ok(match Row::read(out, drive) {
+fn row(drive: &Drive, settings: &Settings, out: &Path) -> Result<DriveRow, BatchError> {
+    Ok(match DriveRow::read(out, drive) {
         Ok(Some(row)) if row.is_of(drive, settings) => match row.outcome.has_results() {
-            true if !row.has_its_results(out) => Row::not_run(
+            true if !row.has_its_results(out) => DriveRow::not_run(
                 drive,
                 settings,
                 "its results are being computed anew, or were removed",
             ),
             _ => row,
         },
-        Ok(Some(_)) => Row::not_run(drive, settings, "it was computed with other settings"),
-        Ok(None) => Row::not_run(drive, settings, "it has not been computed yet"),
+        Ok(Some(_)) => DriveRow::not_run(drive, settings, "it was computed with other settings"),
+        Ok(None) => DriveRow::not_run(drive, settings, "it has not been computed yet"),
         Err(error @ BatchError::Unknown { .. }) => {
-            Row::not_run(drive, settings, &error.to_string())
+            DriveRow::not_run(drive, settings, &error.to_string())
         }
         Err(error) => return Err(error),
     })
@@ -68,7 +57,7 @@ fn row(drive: &Drive, settings: &Settings, out: &Path) -> Result<Row, BatchError
 
 impl Table {
     /// Returns the number of drives by outcome.
-    pub fn counts(&self) -> BTreeMap<Outcome, usize> {
+    pub fn counts(&self) -> BTreeMap<DriveOutcome, usize> {
         let mut counts = BTreeMap::new();
         for row in &self.rows {
             *counts.entry(row.outcome).or_default() += 1;
@@ -78,9 +67,9 @@ impl Table {
 
     /// Returns the drives that are not complete, a line each.
     pub fn failures(&self) -> impl Iterator<Item = String> {
-        let failed = |row: &&Row| row.outcome != Outcome::Complete;
+        let failed = |row: &&DriveRow| row.outcome != DriveOutcome::Complete;
         self.rows.iter().filter(failed).map(|row| {
-            let Row {
+            let DriveRow {
                 drive,
                 outcome,
                 sentence,
@@ -95,7 +84,7 @@ impl Table {
         let builds = self
             .rows
             .iter()
-            .filter_map(|row| row.figures.build.as_deref());
+            .filter_map(|row| row.figures.get("build")?.as_str());
         let mut builds: Vec<_> = builds.collect();
         builds.sort_unstable();
         builds.dedup();
@@ -107,33 +96,49 @@ impl Table {
     /// # Errors
     /// A file that cannot be written.
     pub fn write(&self, out: &Path) -> Result<(), BatchError> {
-        let results = csv(self.rows.iter().map(|row| {
-            let head = Head {
-                name: &row.drive.name,
-                drive: &row.drive.path,
-                outcome: row.outcome,
-                sentence: &row.sentence,
-            };
-            (head, &row.figures)
-        }))?;
-        let times = self.rows.iter().map(|row| {
-            let name = &row.drive.name;
-            (Name { name }, &row.times)
-        });
+        let results = csv(
+            &["name", "drive", "outcome", "sentence"],
+            &columns::FIGURES,
+            self.rows.iter().map(|row| {
+                let DriveRow {
+                    drive,
+                    outcome,
+                    sentence,
+                    figures,
+                    ..
+                } = row;
+                let head = [&drive.name, &drive.path, outcome.name(), sentence];
+                (head.map(str::to_owned).to_vec(), figures)
+            }),
+        )?;
+        let times = self.rows.iter();
+        let times = times.map(|row| (vec![row.drive.name.clone()], &row.times));
         gyre_storage::write(&out.join(RESULTS), results)?;
-        Ok(gyre_storage::write(&out.join(TIMES), csv(times)?)?)
+        let times = csv(&["name"], &columns::TIMES, times)?;
+        Ok(gyre_storage::write(&out.join(TIMES), times)?)
     }
 }
 
-fn csv(rows: impl Iterator<Item = impl Serialize>) -> Result<Vec<u8>, BatchError> {
-    let mut bytes = Vec::new();
-    let mut writer = csv::Writer::from_writer(&mut bytes);
-    for row in rows {
-        writer.serialize(row)?;
+/// Returns a table: of each row the first cells and its values.
+fn csv<'a>(
+    head: &[&str],
+    columns: &[Column],
+    rows: impl Iterator<Item = (Vec<String>, &'a Values)>,
+) -> Result<Vec<u8>, BatchError> {
+    let cell = |value: Option<&Value>| match value {
+        None | Some(Value::Null) => String::new(),
+        Some(Value::String(text)) => text.clone(),
+        Some(other) => other.to_string(),
+    };
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    writer.write_record(head.iter().copied().chain(columns.iter().map(|it| it.0)))?;
+    for (mut cells, values) in rows {
+        cells.extend(columns.iter().map(|(name, _)| cell(values.get(*name))));
+        writer.write_record(cells)?;
     }
-    writer.flush().map_err(csv::Error::from)?;
-    drop(writer);
-    Ok(bytes)
+    writer
+        .into_inner()
+        .map_err(|error| csv::Error::from(error.into_error()).into())
 }
 
 #[cfg(test)]
@@ -154,11 +159,12 @@ mod tests {
         let [b, a, c] = list.drives() else {
             panic!("{list:?}")
         };
-        let mut row = Row::not_run(a, &settings, "");
-        row.outcome = Outcome::Complete;
-        row.figures.ate_rmse_m = Some(0.25);
-        row.figures.build = Some("0a1b".to_owned());
-        row.times.restarts = Some(2);
+        let mut row = DriveRow::not_run(a, &settings, "");
+        row.outcome = DriveOutcome::Complete;
+        let set = |values: &mut Values, name: &str, value| values.insert(name.to_owned(), value);
+        set(&mut row.figures, "ate_rmse_m", 0.25.into());
+        set(&mut row.figures, "build", "0a1b".into());
+        set(&mut row.times, "restarts", 2.into());
         row.write(out.path()).unwrap();
         let without = collect(&list, &settings, out.path()).unwrap();
         assert!(
@@ -173,8 +179,8 @@ mod tests {
             set: vec!["raster.n=127".to_owned()],
             ..settings.clone()
         };
-        Row::not_run(b, &other, "").write(out.path()).unwrap();
-        fs::write(Row::path(out.path(), c), "{").unwrap();
+        DriveRow::not_run(b, &other, "").write(out.path()).unwrap();
+        fs::write(DriveRow::path(out.path(), c), "{").unwrap();
 
         let table = collect(&list, &settings, out.path()).unwrap();
         table.write(out.path()).unwrap();

@@ -1,4 +1,4 @@
-//! The section `[budget]`: what a run must keep, and the verdict on what was measured.
+//! The section `[budget]`: limits of a run, and their comparison with the measured figures.
 
 use std::collections::BTreeMap;
 
@@ -6,48 +6,66 @@ use serde::{Deserialize, Serialize};
 
 use crate::scenario::{Judged, Scenario};
 
-/// Limits on what `gyre stress` measures. One that is left out is not judged.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Limits {
+/// Defines the limits, each an optional number with its key.
+macro_rules! limits {
+    ($($(#[doc = $doc:literal])+ $key:ident,)+) => {
+        /// Limits on what `gyre stress` measures. One that is left out is not judged.
+        #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+        #[serde(default, deny_unknown_fields)]
+        pub struct Limits {
+            $(
+                $(#[doc = $doc])+
+                #[serde(skip_serializing_if = "Option::is_none")]
+                pub $key: Option<f64>,
+            )+
+        }
+
+        impl Limits {
+            /// Returns these limits, and those of `other` where there are none.
+            #[must_use]
+            pub fn or(&self, other: &Self) -> Self {
+                Self {
+                    $($key: self.$key.or(other.$key),)+
+                }
+            }
+
+            /// Returns the first key whose limit is not a number of at least 0.
+            pub fn invalid(&self) -> Option<(&'static str, f64)> {
+                let keys = [$((stringify!($key), self.$key),)+];
+                let mut set = keys.into_iter().filter_map(|(key, limit)| Some((key, limit?)));
+                set.find(|(_, limit)| !(limit.is_finite() && *limit >= 0.0))
+            }
+        }
+    };
+}
+
+limits! {
     /// Median of the time from sensor to pose, ms. A scan that was dropped counts until the pose of the
     /// next one that was not.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub p50_ms: Option<f64>,
+    p50_ms,
     /// 90th percentile of it, ms.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub p90_ms: Option<f64>,
+    p90_ms,
     /// 99th percentile of it, ms. Of fewer than a hundred scans that is the maximum.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub p99_ms: Option<f64>,
+    p99_ms,
     /// 99.9th percentile of it, ms. Of fewer than a thousand scans that is the maximum.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub p99_9_ms: Option<f64>,
+    p99_9_ms,
     /// Maximum of it, ms.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub max_ms: Option<f64>,
+    max_ms,
     /// Scans that were due and have no pose.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub drops: Option<f64>,
+    drops,
     /// The same, % of those that were due.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub drops_percent: Option<f64>,
+    drops_percent,
     /// Time from a fault (the kill, or the end of the stop) to the first pose that the stage has worked
     /// on since, ms.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub recovery_ms: Option<f64>,
+    recovery_ms,
     /// Processor time of all processes of the run, % of one processor.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub cpu_percent: Option<f64>,
+    cpu_percent,
     /// Own memory of all processes of the run and its shared memory, MB.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub memory_mb: Option<f64>,
+    memory_mb,
     /// Smallest rate of the knee that `ramp` finds, scans/s.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub rate_hz: Option<f64>,
+    rate_hz,
     /// Smallest number of 4 Hz radars that `fleet` finds.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub radars: Option<f64>,
+    radars,
 }
 
 /// The budget of a run: `[budget]` for all scenarios, `[budget.NAME]` for one of them.
@@ -59,54 +77,6 @@ pub struct Budget {
     /// The limits for one scenario, over those for all.
     #[serde(flatten)]
     pub scenarios: BTreeMap<String, Limits>,
-}
-
-impl Limits {
-    /// Returns these limits, and those of `other` where there are none.
-    #[must_use]
-    pub fn or(&self, other: &Self) -> Self {
-        Self {
-            p50_ms: self.p50_ms.or(other.p50_ms),
-            p90_ms: self.p90_ms.or(other.p90_ms),
-            p99_ms: self.p99_ms.or(other.p99_ms),
-            p99_9_ms: self.p99_9_ms.or(other.p99_9_ms),
-            max_ms: self.max_ms.or(other.max_ms),
-            drops: self.drops.or(other.drops),
-            drops_percent: self.drops_percent.or(other.drops_percent),
-            recovery_ms: self.recovery_ms.or(other.recovery_ms),
-            cpu_percent: self.cpu_percent.or(other.cpu_percent),
-            memory_mb: self.memory_mb.or(other.memory_mb),
-            rate_hz: self.rate_hz.or(other.rate_hz),
-            radars: self.radars.or(other.radars),
-        }
-    }
-
-    /// Returns the first key whose limit is not a number of at least 0.
-    pub fn invalid(&self) -> Option<(&'static str, f64)> {
-        let keys = self.keys();
-        let set = keys
-            .into_iter()
-            .filter_map(|(key, limit)| Some((key, limit?)));
-        set.into_iter()
-            .find(|(_, limit)| !(limit.is_finite() && *limit >= 0.0))
-    }
-
-    fn keys(&self) -> [(&'static str, Option<f64>); 12] {
-        [
-            ("p50_ms", self.p50_ms),
-            ("p90_ms", self.p90_ms),
-            ("p99_ms", self.p99_ms),
-            ("p99_9_ms", self.p99_9_ms),
-            ("max_ms", self.max_ms),
-            ("drops", self.drops),
-            ("drops_percent", self.drops_percent),
-            ("recovery_ms", self.recovery_ms),
-            ("cpu_percent", self.cpu_percent),
-            ("memory_mb", self.memory_mb),
-            ("rate_hz", self.rate_hz),
-            ("radars", self.radars),
-        ]
-    }
 }
 
 impl Budget {
@@ -135,7 +105,7 @@ impl Budget {
 pub struct Check {
     /// The key of `[budget]`.
     pub key: &'static str,
-    /// What was measured; `None`: nothing, which misses the limit.
+    /// The measured figure; `None`: there is none, which misses the limit.
     pub measured: Option<f64>,
     /// The limit.
     pub limit: f64,

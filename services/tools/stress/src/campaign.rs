@@ -6,14 +6,15 @@ use gyre_messages::StageId;
 use gyre_stage::run::{free_shared_memory, sweep};
 
 use crate::{
-    Limits, Report, StressError, Subject,
+    Limits, Report, StressError, TestedPipeline,
     budget::Check,
     copying,
     fault::{self, FaultKind},
     pipeline::{Gate, Measured, Setup, measure},
-    report::{Figures, Outcome, Step, Verdict},
+    report::{Figures, ScenarioOutcome, Step, Verdict},
     scenario::{RADAR_HZ, Scenario},
-    search::{Steps, largest, step_duration},
+    search::{Found, Steps, largest, step_duration},
+    work::Work,
 };
 
 /// Scans of a burst.
@@ -35,7 +36,7 @@ const MOST_RADARS: u32 = 64;
 /// The rate of the source has a limit: 1000 times the sensor's own.
 const MOST_HZ: f64 = 1000.0;
 
-/// What is to be done.
+/// The scenarios to carry out, and their options.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// The scenarios, in this order.
@@ -48,21 +49,21 @@ pub struct Options {
     pub seed: u64,
 }
 
-/// Carries out all scenarios. `note` says what is done.
+/// Carries out all scenarios. `note` receives lines about the progress.
 ///
 /// A scenario that could not be carried out has that as its verdict, and the next ones follow.
-pub fn stress(subject: &Subject, options: &Options, note: &mut dyn FnMut(&str)) -> Report {
+pub fn stress(tested: &TestedPipeline, options: &Options, note: &mut dyn FnMut(&str)) -> Report {
     let mut outcomes = Vec::new();
     for scenario in &options.scenarios {
         note(&format!("{scenario}: {}", scenario.line()));
         let campaign = Campaign {
-            subject,
+            tested,
             options,
             scenario: *scenario,
-            limits: subject.budget.of(*scenario),
+            limits: tested.budget.of(*scenario),
         };
         let outcome = campaign.outcome(note);
-        let outcome = outcome.unwrap_or_else(|error| Outcome {
+        let outcome = outcome.unwrap_or_else(|error| ScenarioOutcome {
             verdict: Verdict::NotCarriedOut,
             problem: Some(error.to_string()),
             ..campaign.empty()
@@ -70,27 +71,27 @@ pub fn stress(subject: &Subject, options: &Options, note: &mut dyn FnMut(&str)) 
         note(&outcome.sentence());
         outcomes.push(outcome);
     }
-    // Helpers that were killed have left what they had in shared memory.
+    // Helpers that were killed have left files in shared memory.
     sweep();
     Report::of(outcomes)
 }
 
 struct Campaign<'a> {
-    subject: &'a Subject,
+    tested: &'a TestedPipeline,
     options: &'a Options,
     scenario: Scenario,
     limits: Limits,
 }
 
 impl Campaign<'_> {
-    fn outcome(&self, note: &mut dyn FnMut(&str)) -> Result<Outcome, StressError> {
+    fn outcome(&self, note: &mut dyn FnMut(&str)) -> Result<ScenarioOutcome, StressError> {
         match self.scenario {
             Scenario::Ramp => self.ramp(note),
             Scenario::Fleet => self.fleet(note),
             Scenario::Copying => {
                 let rows =
-                    copying::compare(self.subject, self.options.duration.as_secs_f64(), note)?;
-                Ok(Outcome {
+                    copying::compare(self.tested, self.options.duration.as_secs_f64(), note)?;
+                Ok(ScenarioOutcome {
                     copying: rows,
                     ..self.empty()
                 })
@@ -99,12 +100,12 @@ impl Campaign<'_> {
         }
     }
 
-    fn empty(&self) -> Outcome {
-        Outcome::new(self.scenario, self.options.duration)
+    fn empty(&self) -> ScenarioOutcome {
+        ScenarioOutcome::new(self.scenario, self.options.duration)
     }
 
     /// One run.
-    fn single(&self) -> Result<Outcome, StressError> {
+    fn single(&self) -> Result<ScenarioOutcome, StressError> {
         let setup = self.setup();
         if setup.faults.is_some() && setup.duration < fault::LEAST {
             return Err(StressError::TooShort {
@@ -112,10 +113,10 @@ impl Campaign<'_> {
                 least_s: fault::LEAST.as_secs(),
             });
         }
-        let mut measured = measure(self.subject, &setup, &Gate::of(1))?;
+        let mut measured = measure(self.tested, &setup, &Gate::of(1))?;
         let (problem, omitted) = (problem(&measured), measured.omitted.take());
-        let figures = Figures::of(measured);
-        Ok(Outcome {
+        let figures = measured.figures;
+        Ok(ScenarioOutcome {
             checks: checks(&self.limits, &figures),
             problem,
             figures: Some(figures),
@@ -136,7 +137,7 @@ impl Campaign<'_> {
             }
             Scenario::Hogs => {
                 let processors = thread::available_parallelism().map_or(1, usize::from);
-                setup.loads = vec![vec!["spin".to_owned()]; processors];
+                setup.loads = vec![Work::Spin; processors];
             }
             Scenario::Memory => {
                 setup.memory_share = Some(MEMORY_SHARE);
@@ -156,7 +157,7 @@ impl Campaign<'_> {
 
     fn stages(&self) -> Vec<StageId> {
         match self.options.stages.is_empty() {
-            true => self.subject.stages.clone(),
+            true => self.tested.stages.clone(),
             false => self.options.stages.clone(),
         }
     }
@@ -187,25 +188,17 @@ impl Campaign<'_> {
         })
     }
 
-    fn ramp(&self, note: &mut dyn FnMut(&str)) -> Result<Outcome, StressError> {
+    fn ramp(&self, note: &mut dyn FnMut(&str)) -> Result<ScenarioOutcome, StressError> {
         let rate_hz = |level: u32| RADAR_HZ * 2_f64.powf(f64::from(level) / f64::from(LEVELS));
-        let most = (MOST_HZ.min(MOST_HZ / self.subject.period.as_secs_f64()) / RADAR_HZ).log2();
+        let most = (MOST_HZ.min(MOST_HZ / self.tested.period.as_secs_f64()) / RADAR_HZ).log2();
         let most = MOST_LEVELS.min((most * f64::from(LEVELS)) as u32);
         let mut steps = Steps::new("scans/s", note);
         let passes = |level| steps.passes(|| self.step(rate_hz(level), rate_hz(level), 1));
         let found = largest(0, most, |level| level + LEVELS, passes)?;
-        let best = found.best.map(rate_hz);
-        Ok(Outcome {
-            checks: checked("rate_hz", best, self.limits.rate_hz),
-            best,
-            failed: found.failed.map(rate_hz),
-            steps: steps.all,
-            ..self.empty()
-        }
-        .judged())
+        Ok(self.found(&found, rate_hz, steps, ("rate_hz", self.limits.rate_hz)))
     }
 
-    fn fleet(&self, note: &mut dyn FnMut(&str)) -> Result<Outcome, StressError> {
+    fn fleet(&self, note: &mut dyn FnMut(&str)) -> Result<ScenarioOutcome, StressError> {
         let mut steps = Steps::new("radars", note);
         let passes = |radars| {
             steps.passes(|| match self.lacks_memory(radars) {
@@ -214,20 +207,32 @@ impl Campaign<'_> {
             })
         };
         let found = largest(1, MOST_RADARS, |radars| radars * 2, passes)?;
-        let best = found.best.map(f64::from);
-        Ok(Outcome {
-            checks: checked("radars", best, self.limits.radars),
+        Ok(self.found(&found, f64::from, steps, ("radars", self.limits.radars)))
+    }
+
+    /// Returns the outcome of a search, whose levels stand for these loads.
+    fn found(
+        &self,
+        found: &Found,
+        load: impl Fn(u32) -> f64,
+        steps: Steps<'_>,
+        (key, limit): (&'static str, Option<f64>),
+    ) -> ScenarioOutcome {
+        let best = found.best.map(&load);
+        let check = limit.map(|limit| Check::at_least(key, Some(best.unwrap_or(0.0)), limit));
+        ScenarioOutcome {
+            checks: check.into_iter().collect(),
             best,
-            failed: found.failed.map(f64::from),
+            failed: found.failed.map(load),
             steps: steps.all,
             ..self.empty()
         }
-        .judged())
+        .judged()
     }
 
-    /// Returns why so many runs do not fit into shared memory.
+    /// Returns the reason why so many runs do not fit into shared memory.
     fn lacks_memory(&self, runs: u32) -> Option<String> {
-        let needed = self.subject.shared_bytes * u64::from(runs);
+        let needed = self.tested.shared_bytes * u64::from(runs);
         let free = free_shared_memory().ok().flatten()?;
         (needed > free).then(|| {
             let (needed, free) = (needed as f64 * 1e-6, free as f64 * 1e-6);
@@ -249,7 +254,7 @@ impl Campaign<'_> {
             let gate = &gate;
             let running = setups
                 .iter()
-                .map(|setup| scope.spawn(move || measure(self.subject, setup, gate)));
+                .map(|setup| scope.spawn(move || measure(self.tested, setup, gate)));
             let running: Vec<_> = running.collect();
             running.into_iter().map(|it| it.join()).collect()
         });
@@ -268,31 +273,29 @@ impl Campaign<'_> {
         let limits = self.step_limits();
         let judged = all.into_iter().map(|measured| {
             let problem = problem(&measured);
-            let figures = Figures::of(measured);
+            let figures = measured.figures;
             (checks(&limits, &figures), problem, figures)
         });
         Ok(Step::of(level, judged.collect()))
     }
 }
 
-/// Returns why a run does not count as one that works, whatever its latency.
+/// Returns the reason why a run has failed, whatever its latency.
 fn problem(measured: &Measured) -> Option<String> {
     if let Some(said) = &measured.died {
         return Some(format!("the run has ended: {said}"));
     }
-    if let Some(unseen) = measured.recorded.counts.omitted() {
+    if let Some(unseen) = measured.figures.latency.counts.omitted() {
         return Some(unseen);
     }
-    let lost = measured
-        .faults
-        .iter()
-        .find(|fault| fault.recovery_ms.is_none());
+    let mut faults = measured.figures.faults.iter();
+    let lost = faults.find(|fault| fault.recovery_ms.is_none());
     lost.map(|fault| format!("no pose has followed the fault of {}", fault.stage))
 }
 
 /// Compares the figures of a run with limits.
 fn checks(limits: &Limits, figures: &Figures) -> Vec<Check> {
-    let latency = &figures.sensor_to_pose;
+    let latency = &figures.latency.sensor_to_pose;
     let percentile = |percentile| latency.judged(percentile);
     let at_most = [
         ("p50_ms", percentile(latency.p50_ms), limits.p50_ms),
@@ -300,7 +303,11 @@ fn checks(limits: &Limits, figures: &Figures) -> Vec<Check> {
         ("p99_ms", percentile(latency.p99_ms), limits.p99_ms),
         ("p99_9_ms", percentile(latency.p99_9_ms), limits.p99_9_ms),
         ("max_ms", latency.max_ms, limits.max_ms),
-        ("drops", Some(figures.counts.dropped as f64), limits.drops),
+        (
+            "drops",
+            Some(figures.latency.counts.dropped as f64),
+            limits.drops,
+        ),
         (
             "drops_percent",
             figures.drops_percent(),
@@ -314,7 +321,7 @@ fn checks(limits: &Limits, figures: &Figures) -> Vec<Check> {
         ("memory_mb", Some(figures.memory_mb()), limits.memory_mb),
     ];
     // Without scans there is nothing to judge but what the processes cost.
-    let has_scans = figures.counts.due > 0;
+    let has_scans = figures.latency.counts.due > 0;
     let recovery = limits.recovery_ms.filter(|_| !figures.faults.is_empty());
     let recovery = recovery.map(|limit| {
         let longest = figures.faults.iter().filter_map(|fault| fault.recovery_ms);
@@ -326,9 +333,4 @@ fn checks(limits: &Limits, figures: &Figures) -> Vec<Check> {
         .filter_map(|(key, measured, limit)| Some(Check::at_most(key, measured, limit?)))
         .chain(recovery)
         .collect()
-}
-
-fn checked(key: &'static str, best: Option<f64>, limit: Option<f64>) -> Vec<Check> {
-    let check = limit.map(|limit| Check::at_least(key, Some(best.unwrap_or(0.0)), limit));
-    check.into_iter().collect()
 }

@@ -1,11 +1,11 @@
-//! Why a stress test could not be carried out.
+//! Errors of a stress test.
 
 use std::{io, path::PathBuf};
 
 use gyre_stage::StageError;
 use thiserror::Error;
 
-/// A stress test that could not be carried out, which says nothing of the pipeline's latency.
+/// A stress test that could not be carried out, which is no verdict on the pipeline's latency.
 #[derive(Debug, Error)]
 pub enum StressError {
     /// A process could not be started.
@@ -33,10 +33,10 @@ pub enum StressError {
         scenario: String,
         /// The time limit, s.
         limit_s: u64,
-        /// What the run printed.
+        /// The output of the run.
         log: PathBuf,
     },
-    /// A run that nobody may look at.
+    /// A run without places for observers.
     #[error(
         "run.observers is 0, and the stress test looks on as an observer: set run.observers to 1 or more"
     )]
@@ -54,9 +54,9 @@ pub enum StressError {
     /// A helper process ended or said something else than it should.
     #[error("the helper process `{helper}` {reason}")]
     Helper {
-        /// Its work.
+        /// The work of the helper.
         helper: String,
-        /// What is wrong with it.
+        /// The fault.
         reason: String,
     },
     /// A file cannot be read or written.

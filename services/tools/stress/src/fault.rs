@@ -1,4 +1,4 @@
-//! What is done to the stages of a run while it is measured.
+//! The faults of the stages of a run while it is measured.
 
 use std::time::Duration;
 
@@ -22,8 +22,8 @@ const FAULTS: u32 = 10;
 /// Time that is left after the last fault.
 const RECOVERY: Duration = Duration::from_secs(2);
 
-/// Time between two looks for a stage whose process is not there.
-const SEEK: Duration = Duration::from_millis(200);
+/// Time between two polls for a stage whose process is not there.
+const RETRY_PERIOD: Duration = Duration::from_millis(200);
 
 /// The shortest measurement that has time for a fault.
 pub const LEAST: Duration = Duration::from_secs(5);
@@ -45,10 +45,10 @@ pub struct Fault {
     pub kind: FaultKind,
     /// The stage.
     pub stage: &'static str,
-    /// When it began, s since the measurement began.
+    /// The time at which it began, s since the measurement began.
     pub at_s: f64,
-    /// Time from the kill, or from the end of the stop, to the first pose that the stage has worked on since, ms; `None`: there was
-    /// none.
+    /// Time from the kill, or from the end of the stop, to the first pose that the stage has worked on
+    /// since, ms; `None`: there was none.
     pub recovery_ms: Option<f64>,
 }
 
@@ -59,7 +59,7 @@ pub struct Faults {
     stages: Vec<StageId>,
     random: ChaCha8Rng,
     queue: Vec<StageId>,
-    /// When the measurement began and ends, `CLOCK_MONOTONIC`, ns.
+    /// The begin and the end of the measurement, `CLOCK_MONOTONIC`, ns.
     began_ns: i64,
     ends_ns: i64,
     next_ns: i64,
@@ -107,7 +107,7 @@ impl Faults {
         }
     }
 
-    /// Does what is due.
+    /// Begins and ends faults that are due.
     pub fn act(&mut self, processes: &mut Sampler) {
         let now_ns = clock::now_ns();
         if let Some(stopped) = self.stopped.take_if(|stopped| now_ns >= stopped.until_ns) {
@@ -126,7 +126,7 @@ impl Faults {
         if !self.strike(stage, processes.group_of(stage.name())) {
             // It may be just being restarted.
             self.sought = Some(stage);
-            self.next_ns = now_ns + nanoseconds(SEEK);
+            self.next_ns = now_ns + nanoseconds(RETRY_PERIOD);
             return;
         }
         // Not always at the same time before the next scan.
@@ -174,7 +174,7 @@ impl Faults {
         true
     }
 
-    /// Returns why the measurement says nothing of faults, or not of all stages whose turn it was.
+    /// Returns the reason why the measurement lacks faults of some stages.
     pub fn omitted(&self) -> Option<String> {
         match self.sought {
             Some(stage) => Some(format!(

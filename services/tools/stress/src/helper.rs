@@ -1,4 +1,5 @@
-//! Child processes that load the machine or take part in a measurement: `gyre stress-helper PARENT WORK ...`.
+//! Child processes that load the machine or take part in a measurement:
+//! `gyre stress-helper PARENT WORK`.
 //!
 //! A helper ends with the process that has started it, even if that is killed.
 
@@ -10,17 +11,17 @@ use std::{
 
 use serde::{Serialize, de::DeserializeOwned};
 
-use crate::StressError;
+use crate::{StressError, work::Work};
 
 /// The command of `gyre` that calls [`help`](crate::help).
 pub const COMMAND: &str = "stress-helper";
-/// What a helper prints when it works.
+/// The line that a helper prints when it works.
 const READY: &str = "ready";
 
 /// A helper process. It is killed when this is dropped.
 #[derive(Debug)]
 pub struct Helper {
-    work: String,
+    work: Work,
     process: Child,
     input: Option<ChildStdin>,
     output: BufReader<ChildStdout>,
@@ -31,8 +32,8 @@ impl Helper {
     ///
     /// # Errors
     /// It cannot be started.
-    pub fn start(program: &Path, work: &[String]) -> Result<Self, StressError> {
-        let mut command = command(program, work);
+    pub fn start(program: &Path, work: Work) -> Result<Self, StressError> {
+        let mut command = command(program, &work)?;
         command.stdin(Stdio::piped()).stdout(Stdio::piped());
         let started = command.spawn().map_err(|source| StressError::Start {
             program: program.display().to_string(),
@@ -40,12 +41,10 @@ impl Helper {
         });
         let mut process = started?;
         let (input, output) = (process.stdin.take(), process.stdout.take());
+        let output = output.ok_or_else(|| failed(&work, "has no output"))?;
         let mut helper = Self {
-            work: work.join(" "),
-            output: BufReader::new(output.ok_or_else(|| StressError::Helper {
-                helper: work.join(" "),
-                reason: "has no output".to_owned(),
-            })?),
+            output: BufReader::new(output),
+            work,
             process,
             input,
         };
@@ -59,22 +58,22 @@ impl Helper {
         let _ = self.process.wait();
     }
 
-    /// Returns what it says of a helper that has ended although it should still work.
+    /// Returns a sentence about a helper that has ended although it should still work.
     pub fn has_died(&mut self) -> Option<String> {
         let status = self.process.try_wait().ok().flatten()?;
-        Some(format!("`{}` has ended: {status}", self.work))
+        Some(format!("`{:?}` has ended: {status}", self.work))
     }
 
     /// Sends a line.
     ///
     /// # Errors
     /// The helper has ended.
-    pub fn tell(&mut self, line: &str) -> Result<(), StressError> {
-        let told = self
+    pub fn send_line(&mut self, line: &str) -> Result<(), StressError> {
+        let sent = self
             .input
             .as_mut()
             .map(|input| writeln!(input, "{line}").and_then(|()| input.flush()));
-        match told {
+        match sent {
             Some(Ok(())) => Ok(()),
             _ => Err(self.failed("has ended")),
         }
@@ -84,7 +83,7 @@ impl Helper {
     ///
     /// # Errors
     /// The helper has ended.
-    pub fn hear(&mut self) -> Result<String, StressError> {
+    pub fn read_line(&mut self) -> Result<String, StressError> {
         let mut line = String::new();
         match self.output.read_line(&mut line) {
             Ok(read) if read > 0 => Ok(line.trim_end().to_owned()),
@@ -96,13 +95,13 @@ impl Helper {
     ///
     /// # Errors
     /// The helper has ended, or said something else.
-    pub fn hear_result<T: DeserializeOwned>(&mut self) -> Result<T, StressError> {
-        let line = self.hear()?;
+    pub fn read_result<T: DeserializeOwned>(&mut self) -> Result<T, StressError> {
+        let line = self.read_line()?;
         serde_json::from_str(&line).map_err(|error| self.failed(&format!("says `{line}`: {error}")))
     }
 
     fn await_line(&mut self, expected: &str) -> Result<(), StressError> {
-        let line = self.hear()?;
+        let line = self.read_line()?;
         match line == expected {
             true => Ok(()),
             false => Err(self.failed(&format!("says `{line}`, not `{expected}`"))),
@@ -110,10 +109,14 @@ impl Helper {
     }
 
     fn failed(&self, reason: &str) -> StressError {
-        StressError::Helper {
-            helper: self.work.clone(),
-            reason: reason.to_owned(),
-        }
+        failed(&self.work, reason)
+    }
+}
+
+fn failed(work: &Work, reason: &str) -> StressError {
+    StressError::Helper {
+        helper: format!("{work:?}"),
+        reason: reason.to_owned(),
     }
 }
 
@@ -125,13 +128,18 @@ impl Drop for Helper {
 }
 
 /// Returns the command of a helper that is a child of this process.
-pub(crate) fn command(program: &Path, work: &[String]) -> Command {
+pub(crate) fn command(program: &Path, work: &Work) -> Result<Command, StressError> {
+    let work = json(work)?;
     let mut command = Command::new(program);
     command
         .arg(COMMAND)
         .arg(std::process::id().to_string())
-        .args(work);
-    command
+        .arg(work);
+    Ok(command)
+}
+
+fn json(value: &impl Serialize) -> Result<String, StressError> {
+    serde_json::to_string(value).map_err(|error| StressError::Usage(error.to_string()))
 }
 
 /// Says that the work has begun.
@@ -141,8 +149,7 @@ pub(crate) fn say_ready() {
 
 /// Prints a result for the process that has started this one.
 pub(crate) fn say_result(result: &impl Serialize) -> Result<(), StressError> {
-    let line = serde_json::to_string(result);
-    say(&line.map_err(|error| StressError::Usage(error.to_string()))?);
+    say(&json(result)?);
     Ok(())
 }
 

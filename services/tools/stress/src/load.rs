@@ -26,7 +26,7 @@ const PIECE: usize = 32 << 20;
 const PAGE: usize = 4096;
 /// Time in which memory is taken before the measurement. On a large machine all of it would take minutes.
 const TAKING: Duration = Duration::from_secs(20);
-/// Time between two looks for memory when there is no more to take.
+/// Time between two polls for memory when there is no more to take.
 const PAUSE: Duration = Duration::from_millis(20);
 const CACHE_LINE: usize = 64;
 

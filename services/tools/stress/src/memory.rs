@@ -1,4 +1,5 @@
-//! Memory that programs can still get, by the machine and by the control groups of this process; and what a load has taken of it.
+//! Memory that programs can still get, by the machine and by the control groups of this process; and
+//! the part that a load has taken.
 
 use std::{
     fs,
@@ -21,7 +22,7 @@ pub struct Taken {
 }
 
 impl Taken {
-    /// Returns why it is no load.
+    /// Returns the reason why it is no load.
     pub(crate) fn omitted(&self) -> Option<String> {
         (self.taken_mb == 0.0).then(|| {
             format!(
@@ -33,7 +34,7 @@ impl Taken {
     }
 }
 
-/// What the machine and the control groups leave.
+/// The memory that the machine and the control groups leave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Room {
     /// Bytes that programs of the machine can still get, if the kernel says so.

@@ -1,4 +1,4 @@
-//! One run from its start to its end, with what is done to it, as an observer of `pose` sees it.
+//! One run from its start to its end, with its load and faults, as an observer of `pose` sees it.
 
 mod gate;
 mod running;
@@ -19,13 +19,14 @@ use serde::Deserialize;
 
 use crate::{
     StressError,
-    fault::{Fault, FaultKind, Faults},
+    fault::{FaultKind, Faults},
     helper::Helper,
-    memory::Taken,
-    processes::{Cost, Sampler},
-    record::{Recorded, Recorder},
+    processes::Sampler,
+    record::Recorder,
+    report::Figures,
     scenario::Scenario,
-    subject::Subject,
+    tested::TestedPipeline,
+    work::Work,
 };
 
 pub use gate::Gate;
@@ -33,11 +34,11 @@ use running::Running;
 
 /// Time after the measurement in which late poses still count.
 const GRACE: Duration = Duration::from_secs(10);
-/// Time between two looks at faults and processes.
+/// Time between two polls of faults and processes.
 const TICK: Duration = Duration::from_millis(20);
 const SAMPLE_EVERY: Duration = Duration::from_secs(1);
 
-/// A run, and what is done to it.
+/// A run with its load and faults.
 #[derive(Clone, Debug)]
 pub struct Setup {
     /// The scenario.
@@ -53,19 +54,19 @@ pub struct Setup {
     /// Scans that become due at once.
     pub burst: u64,
     /// Helpers that load the machine while it is measured.
-    pub loads: Vec<Vec<String>>,
+    pub loads: Vec<Work>,
     /// Share of the available memory that a helper takes.
     pub memory_share: Option<f64>,
     /// Programs that read all topics.
     pub observers: usize,
-    /// What happens to these stages.
+    /// The fault of these stages.
     pub faults: Option<(FaultKind, Vec<StageId>)>,
     /// For the choice of faults.
     pub seed: u64,
 }
 
 impl Setup {
-    /// Returns a run that nothing is done to.
+    /// Returns a run without load and faults.
     pub fn undisturbed(scenario: Scenario, rate_hz: f64, duration: Duration) -> Self {
         Self {
             scenario,
@@ -83,28 +84,18 @@ impl Setup {
     }
 }
 
-/// What was measured of a run.
+/// A measured run.
 #[derive(Clone, Debug)]
 pub struct Measured {
-    /// Latency and counts.
-    pub recorded: Recorded,
-    /// What was done to its stages.
-    pub faults: Vec<Fault>,
-    /// What was to be done and was not, so that the figures say nothing of it.
+    /// The figures.
+    pub figures: Figures,
+    /// A load or a fault that was omitted, so that the figures are not of this scenario.
     pub omitted: Option<String>,
-    /// Memory that was taken beside it.
-    pub taken: Option<Taken>,
-    /// What its processes used.
-    pub processes: Vec<Cost>,
-    /// Its shared memory, bytes.
-    pub shared_bytes: u64,
-    /// What it says of itself.
-    pub summary: Summary,
-    /// Why it ended although it was still measured.
+    /// The reason why it ended although it was still measured.
     pub died: Option<String>,
 }
 
-/// What is read of `summary.json`.
+/// The part of `summary.json` that is read.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(default)]
 pub struct Summary {
@@ -126,13 +117,17 @@ pub struct Counters {
 ///
 /// # Errors
 /// A run that makes no first poses; a helper that fails.
-pub fn measure(subject: &Subject, setup: &Setup, gate: &Gate) -> Result<Measured, StressError> {
+pub fn measure(
+    tested: &TestedPipeline,
+    setup: &Setup,
+    gate: &Gate,
+) -> Result<Measured, StressError> {
     let mut ticket = gate.ticket();
-    let mut run = Running::start(subject, setup)?;
+    let mut run = Running::start(tested, setup)?;
     let observed = run.attach()?;
     let mut poses = observed.observe::<Pose>()?;
     let mut newest = run.warm_up(&mut poses)?;
-    let (mut loads, taken) = run.load(subject)?;
+    let (mut loads, taken) = run.load(tested)?;
     ticket.arrive();
     await_others(gate, &mut poses, &mut newest)?;
     let mut session = Session::begin(setup, run.pid(), run.out(), &newest);
@@ -140,27 +135,34 @@ pub fn measure(subject: &Subject, setup: &Setup, gate: &Gate) -> Result<Measured
     let ended_load = loads.iter_mut().find_map(Helper::has_died);
     drop(loads);
     let processes = session.processes.costs();
-    let recorded = session.recorder.finish(session.period_ns, clock::now_ns());
-    let struck = session.faults.as_ref().and_then(Faults::omitted);
+    let latency = session.recorder.finish(session.period_ns, clock::now_ns());
+    let omitted = session.faults.as_ref().and_then(Faults::omitted);
     let faults = session.faults.map(Faults::finish).unwrap_or_default();
     let manifest = observed.manifest();
     let shared_bytes = Footprint::new(&manifest.window, &manifest.limits).total() as u64;
     drop(poses);
     drop(observed);
+    let died = has_ended.then(|| run.last_words());
+    let summary = run.end();
+    let late = summary.stages.into_iter();
+    let late = late.map(|(stage, counters)| (stage, counters.wakes_caught_late));
     Ok(Measured {
-        faults,
-        omitted: struck
+        omitted: omitted
             .or_else(|| taken.and_then(|taken| taken.omitted()))
             .or_else(|| {
                 ended_load.map(|ended| format!("the load was not there all the time: {ended}"))
             })
-            .or_else(|| recorded.counts.omitted()),
-        recorded,
-        taken,
-        processes,
-        shared_bytes,
-        died: has_ended.then(|| run.last_words()),
-        summary: run.end(),
+            .or_else(|| latency.counts.omitted()),
+        figures: Figures {
+            latency,
+            faults,
+            restarts: summary.restarts,
+            wakes_caught_late: late.filter(|(_, late)| *late > 0).collect(),
+            processes,
+            shared_bytes,
+            taken,
+        },
+        died,
     })
 }
 
@@ -198,7 +200,7 @@ fn drain(
     }
 }
 
-/// What is measured, from the first scan after the warm-up on.
+/// The measurement, from the first scan after the warm-up on.
 struct Session {
     recorder: Recorder,
     processes: Sampler,
@@ -237,7 +239,7 @@ impl Session {
     ) -> Result<bool, StressError> {
         while !self.is_over() {
             let is_last = drain(poses, TICK, &mut |pose| self.add(pose))?;
-            self.look();
+            self.poll();
             // The stream ends first, then the process: that may be still there.
             if is_last || has_ended() {
                 return Ok(true);
@@ -253,7 +255,7 @@ impl Session {
         }
     }
 
-    fn look(&mut self) {
+    fn poll(&mut self) {
         if let Some(faults) = &mut self.faults {
             faults.act(&mut self.processes);
         }

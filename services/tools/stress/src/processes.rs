@@ -1,4 +1,4 @@
-//! What the processes of a run use.
+//! The resources that the processes of a run use.
 
 mod members;
 
@@ -14,7 +14,7 @@ use serde::Serialize;
 
 use members::Members;
 
-/// What the processes of one name have used while a run was measured.
+/// The resources that the processes of one name used while a run was measured.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Cost {
     /// The stage, the follower, `supervisor`, `guardian` or `other`.
@@ -29,6 +29,20 @@ pub struct Cost {
     pub preemptions_per_s: f64,
     /// Processes of this name: those that a stage has started, and those after restarts, included.
     pub processes: usize,
+}
+
+impl Cost {
+    /// Returns the sum over all processes; `None` without any.
+    pub(crate) fn sum(costs: &[Self]) -> Option<Self> {
+        costs.iter().cloned().reduce(|sum, cost| Self {
+            name: sum.name,
+            cpu_percent: sum.cpu_percent + cost.cpu_percent,
+            own_mb: sum.own_mb + cost.own_mb,
+            wake_ups_per_s: sum.wake_ups_per_s + cost.wake_ups_per_s,
+            preemptions_per_s: sum.preemptions_per_s + cost.preemptions_per_s,
+            processes: sum.processes + cost.processes,
+        })
+    }
 }
 
 /// Samples the processes of a run through `/proc`.
@@ -59,13 +73,13 @@ impl Sampler {
             own_bytes: BTreeMap::new(),
         };
         sampler.sample();
-        // What they had used before the measurement does not count.
+        // Their usage before the measurement does not count.
         let seen = sampler.seen.values_mut();
         seen.for_each(|seen| seen.first = seen.last);
         sampler
     }
 
-    /// Looks at all processes.
+    /// Reads the usage of all processes.
     pub fn sample(&mut self) {
         let mut own_bytes: BTreeMap<String, u64> = BTreeMap::new();
         for member in self.members.living() {

@@ -1,7 +1,8 @@
 //! Poses in, distributions out.
 //!
-//! Every scan that was due is a sample. One that was dropped counts until the pose of the next one that was not: the vehicle had no
-//! newer pose before that. So neither a drop nor a source that stands still makes the distribution look better (coordinated omission).
+//! Every scan that was due is a sample. One that was dropped counts until the pose of the next one that
+//! was not: the vehicle had no newer pose before that. So neither a drop nor a source that stands still
+//! makes the distribution look better (coordinated omission).
 
 mod distribution;
 
@@ -32,7 +33,7 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// Returns why the distributions say nothing: they lack poses that there were.
+    /// Returns the reason why the distributions are incomplete: poses were not seen.
     pub fn omitted(&self) -> Option<String> {
         (self.unseen > 0).then(|| {
             format!(
@@ -46,7 +47,7 @@ impl Counts {
 /// A scan on the timeline.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Sample {
-    /// When it was due, s since the measurement began.
+    /// The time at which it was due, s since the measurement began.
     pub due_s: f64,
     /// Time from then to its pose, or to the pose that replaced it, ms.
     pub latency_ms: f64,
@@ -67,20 +68,22 @@ pub struct Hop {
     pub work: Distribution,
 }
 
-/// What was recorded.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Recorded {
+/// The latency of a run.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct RunLatency {
     /// Counts of scans.
     pub counts: Counts,
-    /// From the time at which a scan was due to its pose, or to the pose that replaced it.
+    /// From the time at which a scan was due to its pose; a scan that was dropped counts until the pose
+    /// that replaced it.
     pub sensor_to_pose: Distribution,
     /// The same of the scans that have a pose alone.
     pub posed: Distribution,
-    /// What a closed loop would have measured: from the publication of a scan to its pose.
+    /// The figure of a closed loop: from the publication of a scan to its pose.
     pub closed_loop: Distribution,
     /// Stage by stage.
     pub hops: Vec<Hop>,
-    /// Scan by scan, in the order in which they were due.
+    /// Scan by scan, in the order in which they were due; written as CSV.
+    #[serde(skip)]
     pub timeline: Vec<Sample>,
 }
 
@@ -138,14 +141,15 @@ impl Recorder {
         self.closed_loop.add(posed_ns - published_ns);
     }
 
-    /// Adds the scans between two poses: a pose was missed for each number that `seq` lacks, and the rest was dropped.
+    /// Adds the scans between two poses: a pose was missed for each number that `seq` lacks, and the rest
+    /// was dropped.
     fn add_between(&mut self, before: &Item, item: &Item, posed_ns: i64) {
         let unseen = item.seq - before.seq - 1;
         let between = item.published.saturating_sub(before.published + 1);
         if self.window.contains(&item.due_ns) {
             self.counts.unseen += unseen;
         }
-        // Which of them were dropped is not known where poses were missed.
+        // Where poses were missed it is not known which of them were dropped.
         let dropped = between.saturating_sub(unseen).min(MAX_GAP);
         for number in (item.published - dropped)..item.published {
             let due_ns = self.due_between(before, item, number);
@@ -180,8 +184,9 @@ impl Recorder {
         newest.is_some_and(|due_ns| due_ns.saturating_add(period_ns) < self.window.end)
     }
 
-    /// Ends the recording at `now_ns`. Scans that were due, one each `period_ns`, and that no pose has replaced count until now.
-    pub fn finish(mut self, period_ns: i64, now_ns: i64) -> Recorded {
+    /// Ends the recording at `now_ns`. Scans that were due, one each `period_ns`, and that no pose has
+    /// replaced count until now.
+    pub fn finish(mut self, period_ns: i64, now_ns: i64) -> RunLatency {
         let period_ns = period_ns.max(1);
         let after = self
             .before
@@ -201,7 +206,7 @@ impl Recorder {
             wait: Distribution::of(&meter.wait),
             work: Distribution::of(&meter.work),
         };
-        Recorded {
+        RunLatency {
             counts: self.counts,
             sensor_to_pose: Distribution::of(&self.all),
             posed: Distribution::of(&self.posed),
@@ -218,7 +223,8 @@ mod tests {
 
     const MS: i64 = 1_000_000;
 
-    /// A pose of a scan that was due at `due_ms`, published `late_ms` after that, and has its pose 10 ms later.
+    /// A pose of a scan that was due at `due_ms`, published `late_ms` after that, and has its pose 10 ms
+    /// later.
     fn pose(seq: u64, published: u64, due_ms: i64, late_ms: i64) -> PoseHeader {
         let item = Item {
             seq,
@@ -239,7 +245,7 @@ mod tests {
         pose
     }
 
-    fn recorded(poses: &[PoseHeader], burst: u64, end_ms: i64) -> Recorded {
+    fn recorded(poses: &[PoseHeader], burst: u64, end_ms: i64) -> RunLatency {
         let mut recorder = Recorder::new(0..end_ms * MS, burst);
         poses.iter().for_each(|pose| recorder.add(pose));
         recorder.finish(250 * MS, end_ms * MS)

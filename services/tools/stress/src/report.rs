@@ -9,15 +9,18 @@ use std::{fmt::Write, fs, path::Path};
 
 use serde::Serialize;
 
-use crate::{StressError, record::Sample};
+use crate::{
+    StressError,
+    record::{RunLatency, Sample},
+};
 
-pub use outcome::{Figures, Outcome, Verdict};
+pub use outcome::{Figures, ScenarioOutcome, Verdict};
 pub use step::Step;
 
 /// The version of `report.json`. A key that changes its meaning or goes raises it; one that is added does not.
 const VERSION: u32 = 1;
 
-/// Where and of what a report was made.
+/// The origin of a report: computer, program, recording.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Provenance {
     /// The date, UTC.
@@ -32,7 +35,7 @@ pub struct Provenance {
     pub build: String,
     /// The file of the configuration; the resolved one lies beside the report.
     pub configuration: String,
-    /// What is played.
+    /// The recording.
     pub source: String,
     /// Load of the machine before the first scenario, in processes: the mean of a minute.
     pub load_before: Option<f64>,
@@ -42,15 +45,15 @@ pub struct Provenance {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
     version: u32,
-    /// Where and of what it was made.
+    /// The origin of the report.
     pub provenance: Provenance,
     /// The scenarios, in the order in which they were carried out.
-    pub outcomes: Vec<Outcome>,
+    pub outcomes: Vec<ScenarioOutcome>,
 }
 
 impl Report {
     /// A report of these outcomes.
-    pub fn of(outcomes: Vec<Outcome>) -> Self {
+    pub fn of(outcomes: Vec<ScenarioOutcome>) -> Self {
         Self {
             version: VERSION,
             provenance: Provenance::default(),
@@ -80,18 +83,12 @@ impl Report {
             json.map_err(|error| StressError::Usage(error.to_string()))?,
         )?;
         for outcome in &self.outcomes {
-            let Some(figures) = outcome
-                .figures
-                .as_ref()
-                .filter(|it| !it.timeline.is_empty())
-            else {
-                continue;
-            };
-            write(&format!("{}.csv", outcome.scenario), csv(figures))?;
-            write(
-                &format!("{}.svg", outcome.scenario),
-                plots::timeline(outcome, figures)?,
-            )?;
+            let measured = outcome.figures.iter();
+            for figures in measured.filter(|it| !it.latency.timeline.is_empty()) {
+                write(&format!("{}.csv", outcome.scenario), csv(&figures.latency))?;
+                let svg = plots::timeline(outcome, figures)?;
+                write(&format!("{}.svg", outcome.scenario), svg)?;
+            }
         }
         if let Some(svg) = plots::percentiles(&self.outcomes, &self.provenance.machine)? {
             write("report.svg", svg)?;
@@ -100,13 +97,13 @@ impl Report {
     }
 }
 
-fn csv(figures: &Figures) -> String {
+fn csv(latency: &RunLatency) -> String {
     let mut text = "due_s,latency_ms,dropped\n".to_owned();
     for Sample {
         due_s,
         latency_ms,
         dropped,
-    } in &figures.timeline
+    } in &latency.timeline
     {
         let _ = writeln!(text, "{due_s:.6},{latency_ms:.6},{dropped}");
     }

@@ -1,4 +1,4 @@
-//! The scenarios: names, and what they do to a run.
+//! The scenarios: names, descriptions, judgements.
 
 use std::{fmt, str::FromStr};
 
@@ -9,7 +9,7 @@ pub const RADAR_HZ: f64 = 4.0;
 /// Scans a second of [`Scenario::Fast`].
 const FAST_HZ: f64 = 10.0;
 
-/// What is done to a run while its latency is measured.
+/// The load or the faults of a run while its latency is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Scenario {
     /// No scans.
@@ -40,7 +40,7 @@ pub enum Scenario {
     Copying,
 }
 
-/// How a scenario is judged.
+/// The judgement of a scenario.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Judged {
     /// By all of `[budget]`.
@@ -73,76 +73,89 @@ impl Scenario {
         Self::Copying,
     ];
 
-    /// The name on the command line and in `[budget.NAME]`.
+    /// Returns the name on the command line and in `[budget.NAME]`, the judgement, and a line that
+    /// describes it.
+    const fn properties(self) -> (&'static str, Judged, &'static str) {
+        use Judged::{ButDrops, ByBudget, ByItself, ByRecovery, Never};
+        match self {
+            Self::Idle => ("idle", ByItself, "no scans: what waiting costs"),
+            Self::Steady => ("steady", ByBudget, "4 scans/s, nothing else"),
+            Self::Fast => ("fast", ByBudget, "10 scans/s"),
+            Self::Bursts => (
+                "bursts",
+                ButDrops,
+                "4 scans/s in the mean that arrive three at once, as from a network that holds them back",
+            ),
+            Self::Hogs => (
+                "hogs",
+                ByBudget,
+                "as many spinning processes as processors, at 4 scans/s",
+            ),
+            Self::Memory => (
+                "memory",
+                ByBudget,
+                "a process that takes 90 % of the available memory and churns it, at 4 scans/s",
+            ),
+            Self::Observers => (
+                "observers",
+                ByBudget,
+                "eight programs that read all topics, at 4 scans/s",
+            ),
+            Self::SlowStage => (
+                "slow-stage",
+                ByRecovery,
+                "a stage that takes longer than the radar's period, at 4 scans/s",
+            ),
+            Self::Stopped => (
+                "stopped",
+                ByRecovery,
+                "stages that are stopped for a second (SIGSTOP) and continued, at 4 scans/s",
+            ),
+            Self::Kills => (
+                "kills",
+                ByRecovery,
+                "stages that are killed (SIGKILL), at 4 scans/s",
+            ),
+            Self::Ramp => (
+                "ramp",
+                ByItself,
+                "rates that rise until scans are dropped or p99 is over its limit: the knee, in scans/s",
+            ),
+            Self::Fleet => (
+                "fleet",
+                ByItself,
+                "more and more pipelines until one misses its deadline: the number of 4 Hz radars",
+            ),
+            Self::Copying => (
+                "copying",
+                Never,
+                "the transport beside copies through Unix sockets, with 1, 4 and 8 readers",
+            ),
+        }
+    }
+
+    /// Returns the name on the command line and in `[budget.NAME]`.
     pub const fn name(self) -> &'static str {
-        match self {
-            Self::Idle => "idle",
-            Self::Steady => "steady",
-            Self::Fast => "fast",
-            Self::Ramp => "ramp",
-            Self::Bursts => "bursts",
-            Self::Hogs => "hogs",
-            Self::Memory => "memory",
-            Self::SlowStage => "slow-stage",
-            Self::Stopped => "stopped",
-            Self::Kills => "kills",
-            Self::Observers => "observers",
-            Self::Fleet => "fleet",
-            Self::Copying => "copying",
-        }
+        self.properties().0
     }
 
-    /// What it does, in a line.
+    /// Returns the judgement of its figures.
+    pub const fn judged(self) -> Judged {
+        self.properties().1
+    }
+
+    /// Returns a line that describes it.
     pub const fn line(self) -> &'static str {
-        match self {
-            Self::Idle => "no scans: what waiting costs",
-            Self::Steady => "4 scans/s, nothing else",
-            Self::Fast => "10 scans/s",
-            Self::Ramp => {
-                "rates that rise until scans are dropped or p99 is over its limit: the knee, in scans/s"
-            }
-            Self::Bursts => {
-                "4 scans/s in the mean that arrive three at once, as from a network that holds them back"
-            }
-            Self::Hogs => "as many spinning processes as processors, at 4 scans/s",
-            Self::Memory => {
-                "a process that takes 90 % of the available memory and churns it, at 4 scans/s"
-            }
-            Self::SlowStage => "a stage that takes longer than the radar's period, at 4 scans/s",
-            Self::Stopped => {
-                "stages that are stopped for a second (SIGSTOP) and continued, at 4 scans/s"
-            }
-            Self::Kills => "stages that are killed (SIGKILL), at 4 scans/s",
-            Self::Observers => "eight programs that read all topics, at 4 scans/s",
-            Self::Fleet => {
-                "more and more pipelines until one misses its deadline: the number of 4 Hz radars"
-            }
-            Self::Copying => {
-                "the transport beside copies through Unix sockets, with 1, 4 and 8 readers"
-            }
-        }
+        self.properties().2
     }
 
-    /// Scans a second.
+    /// Returns the scans a second.
     pub(crate) const fn rate_hz(self) -> f64 {
         match self {
             // One scan in a quarter of an hour and more.
             Self::Idle => 0.004,
             Self::Fast => FAST_HZ,
             _ => RADAR_HZ,
-        }
-    }
-
-    /// How it is judged.
-    pub const fn judged(self) -> Judged {
-        match self {
-            Self::Steady | Self::Fast | Self::Hogs | Self::Memory | Self::Observers => {
-                Judged::ByBudget
-            }
-            Self::Bursts => Judged::ButDrops,
-            Self::SlowStage | Self::Stopped | Self::Kills => Judged::ByRecovery,
-            Self::Idle | Self::Ramp | Self::Fleet => Judged::ByItself,
-            Self::Copying => Judged::Never,
         }
     }
 }

@@ -12,7 +12,7 @@ const STEP_SCANS: f64 = 110.0;
 /// Times that a level of a search may be tried. One hiccup of the machine does not decide.
 const TRIES: usize = 2;
 
-/// What a search has found.
+/// The result of a search.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Found {
     /// The largest level that passed; `None` if the first one failed.
@@ -24,7 +24,7 @@ pub struct Found {
 /// Returns the largest level from `first` on that passes, up to `most`. `grow` says which level to try after one that has passed.
 ///
 /// # Errors
-/// What `passes` returns.
+/// An error of `passes`.
 pub fn largest<E>(
     first: u32,
     most: u32,
@@ -65,7 +65,7 @@ pub struct Steps<'a> {
 }
 
 impl<'a> Steps<'a> {
-    /// No steps; `note` receives each, whose level is a number of these units.
+    /// Returns no steps; `note` receives each, whose level is a number of these units.
     pub fn new(unit: &'static str, note: &'a mut dyn FnMut(&str)) -> Self {
         Self {
             unit,
@@ -77,7 +77,7 @@ impl<'a> Steps<'a> {
     /// Returns whether a level passes, at the second try at the latest.
     ///
     /// # Errors
-    /// What `step` returns.
+    /// An error of `step`.
     pub fn passes(
         &mut self,
         mut step: impl FnMut() -> Result<Step, StressError>,

@@ -1,4 +1,4 @@
-//! A reader.
+//! The readers of a hand-over.
 
 use std::{
     hint::black_box,
@@ -11,7 +11,7 @@ use gyre_stage::{
     observer::{Next, ObservedRun},
 };
 
-use super::{Had, Plan, WARM_UP, Way, cpu_ns, own_bytes, socket};
+use super::{HandOver, Medium, Readings, WARM_UP, cpu_ns, own_bytes, socket};
 use crate::{
     StressError,
     helper::{say_ready, say_result},
@@ -21,60 +21,60 @@ use crate::{
 /// Time without a message after which none is expected any more.
 const LIMIT: Duration = Duration::from_secs(20);
 
-/// Reads the messages of a plan.
-pub(super) fn read(plan: &Plan) -> Result<(), StressError> {
-    let had = match plan.way {
-        Way::SharedMemory => read_in_place(plan)?,
-        Way::Sockets => read_copies(plan)?,
+/// Reads the messages of a hand-over.
+pub(crate) fn read(plan: &HandOver) -> Result<(), StressError> {
+    let log = match plan.medium {
+        Medium::SharedMemory => read_in_place(plan)?,
+        Medium::Sockets => read_copies(plan)?,
     };
-    say_result(&had.finish())
+    say_result(&log.finish())
 }
 
-fn read_in_place(plan: &Plan) -> Result<Readings, StressError> {
+fn read_in_place(plan: &HandOver) -> Result<ReadLog, StressError> {
     let place = &plan.place;
     let place = place.canonicalize().map_err(StressError::file(place))?;
     let run = ObservedRun::writing_to(&place)?;
     let mut parcels = run.observe::<Parcel>()?;
     say_ready();
-    let mut readings = Readings::new(plan);
-    while !readings.are_complete() {
+    let mut log = ReadLog::new(plan);
+    while !log.are_complete() {
         let Next::Message(parcel, _) = parcels.next(LIMIT)? else {
             break;
         };
         let item = *parcel.item();
         let sent_ns = item.hops[Parcel::HOP as usize].published_ns;
-        readings.add(item.seq, sent_ns, parcel.values());
+        log.add(item.seq, sent_ns, parcel.values());
     }
-    Ok(readings)
+    Ok(log)
 }
 
-fn read_copies(plan: &Plan) -> Result<Readings, StressError> {
+fn read_copies(plan: &HandOver) -> Result<ReadLog, StressError> {
     let mut stream = socket::Receiver::connect(plan)?;
     say_ready();
-    let mut readings = Readings::new(plan);
+    let mut log = ReadLog::new(plan);
     let deadline = || Instant::now() + LIMIT;
-    while !readings.are_complete() {
+    while !log.are_complete() {
         let Some(message) = stream.next(deadline())? else {
             break;
         };
-        readings.add(message.number, message.sent_ns, message.content);
+        log.add(message.number, message.sent_ns, message.content);
     }
-    Ok(readings)
+    Ok(log)
 }
 
-/// The messages that a reader has had.
-struct Readings {
+/// The messages that a reader has read so far.
+struct ReadLog {
     messages: u64,
-    had: Had,
+    readings: Readings,
     next: u64,
     began_ns: u64,
 }
 
-impl Readings {
-    fn new(plan: &Plan) -> Self {
+impl ReadLog {
+    fn new(plan: &HandOver) -> Self {
         Self {
             messages: plan.messages,
-            had: Had::default(),
+            readings: Readings::default(),
             next: 0,
             began_ns: 0,
         }
@@ -90,15 +90,15 @@ impl Readings {
         let after_ns = clock::now_ns() - sent_ns;
         self.next = number + 1;
         match number.checked_sub(WARM_UP) {
-            Some(measured) => self.had.after_ns.push((measured, after_ns)),
+            Some(measured) => self.readings.after_ns.push((measured, after_ns)),
             // All that follows is measured.
             None => self.began_ns = cpu_ns(),
         }
     }
 
-    fn finish(mut self) -> Had {
-        self.had.cpu_ns = cpu_ns() - self.began_ns;
-        self.had.own_bytes = own_bytes();
-        self.had
+    fn finish(mut self) -> Readings {
+        self.readings.cpu_ns = cpu_ns() - self.began_ns;
+        self.readings.own_bytes = own_bytes();
+        self.readings
     }
 }

@@ -1,43 +1,58 @@
-//! The sender.
+//! The sender of a hand-over.
 
 use std::thread;
 
-use gyre_stage::{clock, hand_over::HandOver};
+use gyre_stage::{clock, hand_over};
 use rustix::time::{ClockId, clock_gettime};
 
-use super::{Plan, RATE_HZ, Sent, WARM_UP, Way, own_bytes, send::Send, socket};
+use super::{HandOver, Medium, RATE_HZ, Sent, WARM_UP, own_bytes, socket};
 use crate::{
     StressError,
     helper::{say_ready, say_result},
 };
 
-/// Sends the messages of a plan.
-pub(super) fn send(plan: &Plan) -> Result<(), StressError> {
-    match plan.way {
-        Way::SharedMemory => send_by(plan, Loaned::create(plan)?),
-        Way::Sockets => send_by(plan, socket::Sender::create(plan)?),
+/// A medium as its sender uses it.
+pub(super) trait Send {
+    /// Waits until all readers are there, after they have said so.
+    fn begin(&mut self) -> Result<(), StressError>;
+
+    /// Writes a message anew.
+    fn write(&mut self, number: u64) -> Result<(), StressError>;
+
+    /// Sends it.
+    fn send(&mut self) -> Result<(), StressError>;
+
+    /// Returns the bytes of shared memory.
+    fn shared_bytes(&self) -> u64;
+}
+
+/// Sends the messages of a hand-over.
+pub(crate) fn send(plan: &HandOver) -> Result<(), StressError> {
+    match plan.medium {
+        Medium::SharedMemory => send_by(plan, Loaned::create(plan)?),
+        Medium::Sockets => send_by(plan, socket::Sender::create(plan)?),
     }
 }
 
-fn send_by(plan: &Plan, mut way: impl Send) -> Result<(), StressError> {
+fn send_by(plan: &HandOver, mut medium: impl Send) -> Result<(), StressError> {
     say_ready();
     let mut go = String::new();
     let _ = std::io::stdin().read_line(&mut go);
-    way.begin()?;
+    medium.begin()?;
     let mut sent = Sent::default();
     let began_ns = clock::now_ns();
     let period_ns = (1e9 / RATE_HZ) as i64;
     for number in 0..WARM_UP + plan.messages {
         thread::sleep(clock::until(began_ns + number as i64 * period_ns));
-        way.write(number)?;
+        medium.write(number)?;
         let before_ns = cpu_ns();
-        way.send()?;
+        medium.send()?;
         if number >= WARM_UP {
             sent.cpu_ns += cpu_ns() - before_ns;
         }
     }
     sent.own_bytes = own_bytes();
-    sent.shared_bytes = way.shared_bytes();
+    sent.shared_bytes = medium.shared_bytes();
     say_result(&sent)?;
     // Readers may still read.
     let _ = std::io::stdin().read_line(&mut go);
@@ -52,16 +67,16 @@ fn cpu_ns() -> u64 {
 
 /// Through shared memory: a message is written where its readers read it.
 struct Loaned {
-    topic: HandOver,
-    draft: Option<gyre_stage::writer::Draft<gyre_stage::hand_over::Parcel>>,
+    topic: hand_over::HandOver,
+    draft: Option<gyre_stage::writer::Draft<hand_over::Parcel>>,
 }
 
 impl Loaned {
-    fn create(plan: &Plan) -> Result<Self, StressError> {
+    fn create(plan: &HandOver) -> Result<Self, StressError> {
         let place = &plan.place;
         let place = place.canonicalize().map_err(StressError::file(place))?;
         Ok(Self {
-            topic: HandOver::create(&place, plan.bytes, plan.readers)?,
+            topic: hand_over::HandOver::create(&place, plan.bytes, plan.readers)?,
             draft: None,
         })
     }

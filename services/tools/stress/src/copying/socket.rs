@@ -1,4 +1,5 @@
-//! Copies through Unix stream sockets. Each message is its number and the time of its sending, 16 bytes, then its content.
+//! Copies through Unix stream sockets. Each message is its number and the time of its sending, 16
+//! bytes, then its content.
 
 use std::{
     io::{ErrorKind, Read, Write},
@@ -12,7 +13,7 @@ use std::{
 use gyre_stage::clock;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
-use super::{Plan, send::Send};
+use super::{HandOver, sender::Send};
 use crate::StressError;
 
 const HEAD: usize = 16;
@@ -26,7 +27,7 @@ pub(super) struct Sender {
 }
 
 impl Sender {
-    pub fn create(plan: &Plan) -> Result<Self, StressError> {
+    pub fn create(plan: &HandOver) -> Result<Self, StressError> {
         let path = plan.socket();
         let listener = UnixListener::bind(&path).map_err(StressError::file(&path))?;
         Ok(Self {
@@ -109,7 +110,7 @@ pub(super) struct Receiver {
 }
 
 impl Receiver {
-    pub fn connect(plan: &Plan) -> Result<Self, StressError> {
+    pub fn connect(plan: &HandOver) -> Result<Self, StressError> {
         let path = plan.socket();
         let stream = UnixStream::connect(&path).map_err(StressError::file(&path))?;
         let set = stream.set_nonblocking(true);
@@ -171,13 +172,13 @@ mod tests {
     use std::{thread, time::Duration};
 
     use super::*;
-    use crate::copying::Way;
+    use crate::copying::Medium;
 
     #[test]
     fn each_reader_gets_all_bytes_of_each_message() {
         let folder = tempfile::tempdir().unwrap();
-        let plan = Plan {
-            way: Way::Sockets,
+        let plan = HandOver {
+            medium: Medium::Sockets,
             place: folder.path().to_owned(),
             // More than a socket holds.
             bytes: 1 << 20,

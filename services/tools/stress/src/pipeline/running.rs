@@ -25,7 +25,8 @@ use crate::{
     helper::{self, Helper},
     memory::Taken,
     scenario::Scenario,
-    subject::Subject,
+    tested::TestedPipeline,
+    work::Work,
 };
 
 /// Poses before the measurement: buffers grow, and memory is touched for the first time.
@@ -34,8 +35,8 @@ const WARM_UP: u64 = 8;
 const START_LIMIT: Duration = Duration::from_secs(300);
 /// Time for a run to write its results.
 const END_LIMIT: Duration = Duration::from_secs(120);
-/// Time between two looks at a run that starts or ends.
-const LOOK: Duration = Duration::from_millis(20);
+/// Time between two polls of a run that starts or ends.
+const POLL_PERIOD: Duration = Duration::from_millis(20);
 
 /// A run as a child process. It is ended when this is dropped.
 pub(super) struct Running<'a> {
@@ -43,13 +44,13 @@ pub(super) struct Running<'a> {
     process: Child,
     out: PathBuf,
     log: PathBuf,
-    /// When it must have made its first poses.
+    /// The time at which it must have made its first poses.
     deadline: Instant,
 }
 
 impl<'a> Running<'a> {
-    pub fn start(subject: &Subject, setup: &'a Setup) -> Result<Self, StressError> {
-        let runs = subject.out.join("runs");
+    pub fn start(tested: &TestedPipeline, setup: &'a Setup) -> Result<Self, StressError> {
+        let runs = tested.out.join("runs");
         fs::create_dir_all(&runs).map_err(StressError::file(&runs))?;
         let (out, log) = (
             runs.join(&setup.name),
@@ -59,11 +60,11 @@ impl<'a> Running<'a> {
         let errors = output.try_clone().map_err(StressError::file(&log))?;
         // What a run before this one has left, if it had to be killed.
         sweep();
-        let words = words(subject, setup, &out);
-        let mut command = helper::command(&subject.program, &words);
+        let work = Work::Run(words(tested, setup, &out));
+        let mut command = helper::command(&tested.program, &work)?;
         command.stdin(Stdio::null()).stdout(output).stderr(errors);
         let process = command.spawn().map_err(|source| StressError::Start {
-            program: subject.program.display().to_string(),
+            program: tested.program.display().to_string(),
             source,
         })?;
         Ok(Self {
@@ -89,7 +90,8 @@ impl<'a> Running<'a> {
         !matches!(self.process.try_wait(), Ok(None))
     }
 
-    /// Returns why it has ended, in its own words, which are complete when its process has ended too.
+    /// Returns the reason why it has ended, in its own words, which are complete when its process has
+    /// ended too.
     pub fn last_words(&mut self) -> String {
         self.await_end(Instant::now() + END_LIMIT);
         match self.process.try_wait() {
@@ -105,7 +107,7 @@ impl<'a> Running<'a> {
 
     fn await_end(&mut self, deadline: Instant) {
         while !self.has_ended() && Instant::now() < deadline {
-            thread::sleep(LOOK);
+            thread::sleep(POLL_PERIOD);
         }
     }
 
@@ -114,7 +116,7 @@ impl<'a> Running<'a> {
         // Another one with these results may be there still, if it was killed.
         while !self.is_supervised_by_its_process() {
             self.require_life()?;
-            thread::sleep(LOOK);
+            thread::sleep(POLL_PERIOD);
         }
         loop {
             if let Ok(run) = ObservedRun::writing_to(&self.out) {
@@ -129,7 +131,7 @@ impl<'a> Running<'a> {
                 }
             }
             self.require_life()?;
-            thread::sleep(LOOK);
+            thread::sleep(POLL_PERIOD);
         }
     }
 
@@ -176,23 +178,25 @@ impl<'a> Running<'a> {
         Ok(newest)
     }
 
-    /// Starts what loads the machine; returns it with the memory that it has taken.
-    pub fn load(&self, subject: &Subject) -> Result<(Vec<Helper>, Option<Taken>), StressError> {
-        let observe = ["observe".to_owned(), self.out.display().to_string()];
-        let observers = (0..self.setup.observers).map(|_| observe.to_vec());
+    /// Starts the helpers that load the machine; returns them with the memory that they have taken.
+    pub fn load(
+        &self,
+        tested: &TestedPipeline,
+    ) -> Result<(Vec<Helper>, Option<Taken>), StressError> {
+        let observers = (0..self.setup.observers).map(|_| Work::Observe(self.out.clone()));
         let loads = self.setup.loads.iter().cloned().chain(observers);
-        let start = |work: Vec<String>| Helper::start(&subject.program, &work);
+        let start = |work| Helper::start(&tested.program, work);
         let mut helpers: Vec<_> = loads.map(start).collect::<Result<_, _>>()?;
         let Some(share) = self.setup.memory_share else {
             return Ok((helpers, None));
         };
-        let mut memory = start(vec!["memory".to_owned(), share.to_string()])?;
-        let taken = memory.hear_result()?;
+        let mut memory = start(Work::Memory(share))?;
+        let taken = memory.read_result()?;
         helpers.push(memory);
         Ok((helpers, Some(taken)))
     }
 
-    /// Ends the run and reads what it says of itself.
+    /// Ends the run and reads its summary.
     pub fn end(mut self) -> Summary {
         self.stop();
         let summary = fs::read_to_string(self.out.join("summary.json"));
@@ -220,15 +224,14 @@ impl Drop for Running<'_> {
     }
 }
 
-/// The words of the helper that becomes the run.
-fn words(subject: &Subject, setup: &Setup, out: &Path) -> Vec<String> {
+/// Returns the arguments of `gyre` for the run.
+fn words(tested: &TestedPipeline, setup: &Setup, out: &Path) -> Vec<String> {
     // Relative to the sensor's own pace.
-    let rate = (setup.rate_hz * subject.period.as_secs_f64()).clamp(0.001, 1000.0);
-    let configuration = subject.configuration.display().to_string();
+    let rate = (setup.rate_hz * tested.period.as_secs_f64()).clamp(0.001, 1000.0);
+    let configuration = tested.configuration.display().to_string();
     let out = out.display().to_string();
     let rate = rate.to_string();
     let fixed = [
-        "run",
         "run",
         &configuration,
         "--fresh",

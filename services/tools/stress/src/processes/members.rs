@@ -1,7 +1,7 @@
-//! Which processes belong to a run, and to which of its stages.
+//! The processes of a run, and the stages that they belong to.
 //!
-//! The supervisor knows its stages whatever their programs are called. Each leads a process group, in which are the processes that it starts, as
-//! those behind a shell.
+//! The supervisor knows its stages whatever their programs are called. Each leads a process group, with
+//! the processes that it starts, as those behind a shell.
 
 use std::{
     collections::BTreeMap,
@@ -29,9 +29,9 @@ pub struct Members {
     names: BTreeMap<u32, String>,
 }
 
-/// A row of `/proc`.
+/// The identity of a process in `/proc`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Row {
+struct ProcessIds {
     pid: u32,
     parent: u32,
     group: u32,
@@ -59,12 +59,12 @@ impl Members {
         let rows = rows();
         self.learn(&rows);
         let mut children = rows.iter().filter(|row| row.parent == self.supervisor);
-        let is_it = |row: &&Row| self.names.get(&row.pid).is_some_and(|known| known == name);
+        let is_it = |row: &&ProcessIds| self.names.get(&row.pid).is_some_and(|known| known == name);
         children.find(is_it).map(|row| row.group)
     }
 
     /// Asks the supervisor for the names of its processes if there is one that has none.
-    fn learn(&mut self, rows: &[Row]) {
+    fn learn(&mut self, rows: &[ProcessIds]) {
         let children = || rows.iter().filter(|row| row.parent == self.supervisor);
         if children().all(|row| self.names.contains_key(&row.pid)) {
             return;
@@ -81,7 +81,7 @@ impl Members {
 }
 
 /// Returns the supervisor, its children, and all that are in their groups.
-fn members(rows: &[Row], supervisor: u32, names: &BTreeMap<u32, String>) -> Vec<Member> {
+fn members(rows: &[ProcessIds], supervisor: u32, names: &BTreeMap<u32, String>) -> Vec<Member> {
     let children = rows.iter().filter(|row| row.parent == supervisor);
     let name = |pid: u32| names.get(&pid).map_or("other", String::as_str);
     let leaders: BTreeMap<u32, &str> = children.map(|row| (row.pid, name(row.pid))).collect();
@@ -99,11 +99,11 @@ fn members(rows: &[Row], supervisor: u32, names: &BTreeMap<u32, String>) -> Vec<
 }
 
 /// The living processes of the machine.
-fn rows() -> Vec<Row> {
+fn rows() -> Vec<ProcessIds> {
     let processes = all_processes().into_iter().flatten().flatten();
     let stats = processes.filter_map(|process| process.stat().ok());
     let living = stats.filter(|stat| stat.state != 'Z');
-    let row = |stat: procfs::process::Stat| Row {
+    let row = |stat: procfs::process::Stat| ProcessIds {
         pid: stat.pid as u32,
         parent: stat.ppid as u32,
         group: stat.pgrp as u32,
@@ -123,8 +123,8 @@ mod tests {
 
     const SUPERVISOR: u32 = 10;
 
-    fn row(pid: u32, parent: u32, group: u32) -> Row {
-        Row { pid, parent, group }
+    fn row(pid: u32, parent: u32, group: u32) -> ProcessIds {
+        ProcessIds { pid, parent, group }
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Percentiles, and how far they can be relied on.
+//! Percentiles, and their support by samples.
 
 use gyre_latency::Durations;
 use serde::Serialize;
@@ -6,7 +6,8 @@ use serde::Serialize;
 /// Samples beyond a percentile from which on it is firm.
 const FIRM: f64 = 10.0;
 
-/// Percentiles of a duration, ms, as far as the number of samples supports them: the share q needs 1 / (1 - q) samples.
+/// Percentiles of a duration, ms, as far as the number of samples supports them: the share q needs
+/// 1 / (1 - q) samples.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Distribution {
     /// Number of samples.
@@ -55,7 +56,8 @@ impl Distribution {
         }
     }
 
-    /// Returns ` of N` for the percentile of a share that rests on fewer than ten of the N samples: it depends on the luck of few scans.
+    /// Returns ` of N` for the percentile of a share with fewer than ten of the N samples beyond it: it
+    /// depends on chance.
     pub fn mark(&self, percentile: Option<f64>, share: f64) -> String {
         let beyond = (self.samples as f64 * (1.0 - share)).round();
         match percentile.is_some() && beyond < FIRM {

@@ -1,4 +1,4 @@
-//! What a scenario has shown: figures and the verdict.
+//! The outcome of a scenario: figures and the verdict.
 
 use std::{collections::BTreeMap, fmt::Write, time::Duration};
 
@@ -7,12 +7,11 @@ use serde::Serialize;
 use super::Step;
 use crate::{
     budget::Check,
-    copying::Row,
+    copying::HandOverCost,
     fault::Fault,
     memory::Taken,
-    pipeline::Measured,
     processes::Cost,
-    record::{Counts, Distribution, Hop, Sample},
+    record::{Counts, RunLatency},
     scenario::{Judged, Scenario},
 };
 
@@ -26,7 +25,7 @@ pub enum Verdict {
     Failed,
     /// There is no limit for it.
     NotJudged,
-    /// It could not be carried out, which says nothing of the pipeline.
+    /// It could not be carried out, which is no verdict on the pipeline.
     NotCarriedOut,
 }
 
@@ -45,76 +44,36 @@ impl Verdict {
 /// The figures of a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Figures {
-    /// Counts of scans.
-    pub counts: Counts,
-    /// From the time at which a scan was due to its pose; a scan that was dropped counts until the pose that replaced it.
-    pub sensor_to_pose: Distribution,
-    /// The same of the scans that have a pose alone.
-    pub posed: Distribution,
-    /// What a closed loop would have measured: from the publication of a scan to its pose.
-    pub closed_loop: Distribution,
-    /// Stage by stage.
-    pub hops: Vec<Hop>,
+    /// The latency.
+    #[serde(flatten)]
+    pub latency: RunLatency,
     /// Faults and recoveries.
     pub faults: Vec<Fault>,
     /// Restarts by stage.
     pub restarts: BTreeMap<String, usize>,
     /// Lost wake-ups by stage, each found after up to 200 ms.
     pub wakes_caught_late: BTreeMap<String, u64>,
-    /// What each process has used.
+    /// The resources of each process.
     pub processes: Vec<Cost>,
     /// Shared memory, bytes.
     pub shared_bytes: u64,
     /// Memory that a load has taken beside it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub taken: Option<Taken>,
-    /// Scan by scan; written as CSV.
-    #[serde(skip)]
-    pub timeline: Vec<Sample>,
 }
 
 impl Figures {
-    /// Returns the figures of a run that was measured.
-    pub fn of(measured: Measured) -> Self {
-        let Measured {
-            recorded,
-            faults,
-            processes,
-            shared_bytes,
-            summary,
-            taken,
-            omitted: _,
-            died: _,
-        } = measured;
-        let late = summary.stages.into_iter();
-        let late = late.map(|(stage, counters)| (stage, counters.wakes_caught_late));
-        Self {
-            counts: recorded.counts,
-            sensor_to_pose: recorded.sensor_to_pose,
-            posed: recorded.posed,
-            closed_loop: recorded.closed_loop,
-            hops: recorded.hops,
-            faults,
-            restarts: summary.restarts,
-            wakes_caught_late: late.filter(|(_, late)| *late > 0).collect(),
-            processes,
-            shared_bytes,
-            taken,
-            timeline: recorded.timeline,
-        }
-    }
-
     /// Returns the share of the scans that were due and have no pose, %.
     pub fn drops_percent(&self) -> Option<f64> {
-        let Counts { due, dropped, .. } = self.counts;
+        let Counts { due, dropped, .. } = self.latency.counts;
         (due > 0).then(|| 100.0 * dropped as f64 / due as f64)
     }
 
     /// Returns `p50 4.5, p99 7.0 of 480, max 7.2 ms; 0 of 480 scans dropped`.
     fn sentence(&self) -> String {
-        let latency = &self.sensor_to_pose;
+        let latency = &self.latency.sensor_to_pose;
         let ms = |ms: Option<f64>| ms.map_or("-".to_owned(), |ms| format!("{ms:.1}"));
-        let Counts { due, dropped, .. } = self.counts;
+        let Counts { due, dropped, .. } = self.latency.counts;
         let (p50, max) = (ms(latency.p50_ms), ms(latency.max_ms));
         let p99 = ms(latency.p99_ms) + &latency.mark(latency.p99_ms, 0.99);
         let faults = match self.faults.len() {
@@ -139,16 +98,16 @@ impl Figures {
 
 /// The outcome of a scenario.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Outcome {
+pub struct ScenarioOutcome {
     /// The scenario.
     pub scenario: Scenario,
-    /// What it does.
+    /// A line that describes it.
     pub line: &'static str,
     /// The verdict.
     pub verdict: Verdict,
     /// The figures that have limits.
     pub checks: Vec<Check>,
-    /// What went wrong, whatever the latency.
+    /// A failure that does not depend on the latency.
     pub problem: Option<String>,
     /// Scans a second.
     pub rate_hz: f64,
@@ -168,10 +127,10 @@ pub struct Outcome {
     pub steps: Vec<Step>,
     /// The transport beside copies.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub copying: Vec<Row>,
+    pub copying: Vec<HandOverCost>,
 }
 
-impl Outcome {
+impl ScenarioOutcome {
     /// An outcome without any figure.
     pub fn new(scenario: Scenario, duration: Duration) -> Self {
         Self {
@@ -207,7 +166,7 @@ impl Outcome {
         self
     }
 
-    /// The same, not carried out, if something that was to be done to the run was not. That it has failed all the same stands.
+    /// The same, not carried out, if a load or a fault was omitted. A failure stands all the same.
     #[must_use]
     pub fn unless(mut self, omitted: Option<String>) -> Self {
         if self.verdict != Verdict::Failed && omitted.is_some() {
@@ -230,7 +189,7 @@ impl Outcome {
             let _ = write!(sentence, "; {reason}");
         }
         if let Some(figures) = &self.figures
-            && figures.counts.due > 0
+            && figures.latency.counts.due > 0
         {
             let _ = write!(sentence, " ({})", figures.sentence());
         }
@@ -252,8 +211,8 @@ mod tests {
     use super::*;
     use crate::{fault::FaultKind, report::Report};
 
-    fn outcome(scenario: Scenario) -> Outcome {
-        Outcome::new(scenario, Duration::from_secs(1))
+    fn outcome(scenario: Scenario) -> ScenarioOutcome {
+        ScenarioOutcome::new(scenario, Duration::from_secs(1))
     }
 
     fn check(passed: bool) -> Check {
@@ -278,14 +237,14 @@ mod tests {
         assert!(Report::of(vec![failed]).has(Verdict::Failed));
     }
 
-    fn with_faults(scenario: Scenario, faults: &[Option<f64>]) -> Outcome {
+    fn with_faults(scenario: Scenario, faults: &[Option<f64>]) -> ScenarioOutcome {
         let fault = |recovery_ms: &Option<f64>| Fault {
             kind: FaultKind::Kill,
             stage: "masking",
             at_s: 1.5,
             recovery_ms: *recovery_ms,
         };
-        Outcome {
+        ScenarioOutcome {
             figures: Some(Figures {
                 faults: faults.iter().map(fault).collect(),
                 ..Figures::default()

@@ -12,7 +12,7 @@ use plotters::{
     style::text_anchor::{HPos, Pos, VPos},
 };
 
-use super::{Figures, Outcome};
+use super::{Figures, ScenarioOutcome};
 use crate::fault::FaultKind;
 
 /// Size of a document, px.
@@ -46,11 +46,14 @@ type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64
 ///
 /// # Errors
 /// A plot that cannot be drawn.
-pub fn percentiles(outcomes: &[Outcome], machine: &str) -> Result<Option<String>, PlotError> {
+pub fn percentiles(
+    outcomes: &[ScenarioOutcome],
+    machine: &str,
+) -> Result<Option<String>, PlotError> {
     let curves: Vec<_> = outcomes
         .iter()
         .filter_map(|outcome| {
-            let latency = &outcome.figures.as_ref()?.sensor_to_pose;
+            let latency = &outcome.figures.as_ref()?.latency.sensor_to_pose;
             (!latency.curve.is_empty()).then(|| (outcome.scenario.name(), latency.curve.as_slice()))
         })
         .collect();
@@ -89,8 +92,8 @@ pub fn percentiles(outcomes: &[Outcome], machine: &str) -> Result<Option<String>
 ///
 /// # Errors
 /// A plot that cannot be drawn.
-pub fn timeline(outcome: &Outcome, figures: &Figures) -> Result<String, PlotError> {
-    let samples = &figures.timeline;
+pub fn timeline(outcome: &ScenarioOutcome, figures: &Figures) -> Result<String, PlotError> {
+    let samples = &figures.latency.timeline;
     let mut range_ms = range_of(samples.iter().map(|it| it.latency_ms)).ok_or(PlotError::Empty)?;
     if !figures.faults.is_empty() {
         range_ms.end *= HEADROOM;
@@ -126,7 +129,7 @@ pub fn timeline(outcome: &Outcome, figures: &Figures) -> Result<String, PlotErro
 }
 
 fn caption(figures: &Figures) -> String {
-    let counts = figures.counts;
+    let counts = figures.latency.counts;
     let mut parts = vec![format!("dots: {} scans with a pose", counts.posed)];
     if counts.dropped > 0 {
         parts.push(format!(

@@ -22,7 +22,7 @@ pub struct Step {
     pub p99_ms: Option<f64>,
     /// Processor time of all pipelines, % of one processor.
     pub cpu_percent: f64,
-    /// Why it has not passed.
+    /// The reason why it has not passed.
     pub reason: Option<String>,
 }
 
@@ -43,29 +43,24 @@ impl Step {
 
     /// A step with the checks, the problem and the figures of each of its pipelines.
     pub fn of(level: f64, pipelines: Vec<(Vec<Check>, Option<String>, Figures)>) -> Self {
-        let largest = |of: &dyn Fn(&Distribution) -> Option<f64>| {
-            let all = pipelines
-                .iter()
-                .map(|(.., figures)| &figures.sensor_to_pose);
-            all.filter_map(of).reduce(f64::max)
+        let figures = || pipelines.iter().map(|(.., figures)| figures);
+        let largest = |of: fn(&Distribution) -> Option<f64>| {
+            let latencies = figures().map(|it| &it.latency.sensor_to_pose);
+            latencies
+                .filter_map(|it| it.judged(of(it)))
+                .reduce(f64::max)
         };
         let reason = pipelines.iter().find_map(|(checks, problem, _)| {
-            let failed = || {
-                checks
-                    .iter()
-                    .find(|check| !check.passed)
-                    .map(Check::sentence)
-            };
-            problem.clone().or_else(failed)
+            let failed = checks.iter().find(|check| !check.passed);
+            problem.clone().or_else(|| failed.map(Check::sentence))
         });
-        let figures = || pipelines.iter().map(|(.., figures)| figures);
         Self {
             level,
             passed: reason.is_none(),
-            due: figures().map(|it| it.counts.due).sum(),
-            dropped: figures().map(|it| it.counts.dropped).sum(),
-            p50_ms: largest(&|latency| latency.judged(latency.p50_ms)),
-            p99_ms: largest(&|latency| latency.judged(latency.p99_ms)),
+            due: figures().map(|it| it.latency.counts.due).sum(),
+            dropped: figures().map(|it| it.latency.counts.dropped).sum(),
+            p50_ms: largest(|latency| latency.p50_ms),
+            p99_ms: largest(|latency| latency.p99_ms),
             cpu_percent: figures().map(Figures::cpu_percent).sum(),
             reason,
         }

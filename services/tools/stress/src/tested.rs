@@ -1,4 +1,4 @@
-//! What is stressed.
+//! The pipeline that is tested.
 
 use std::{path::PathBuf, time::Duration};
 
@@ -6,9 +6,9 @@ use gyre_messages::StageId;
 
 use crate::budget::Budget;
 
-/// What is stressed.
+/// The pipeline that is tested.
 #[derive(Clone, Debug)]
-pub struct Subject {
+pub struct TestedPipeline {
     /// The program `gyre`.
     pub program: PathBuf,
     /// The resolved configuration, whose source is a recording.
@@ -19,18 +19,18 @@ pub struct Subject {
     pub period: Duration,
     /// The stages of the run.
     pub stages: Vec<StageId>,
-    /// Its budget.
+    /// The budget.
     pub budget: Budget,
-    /// The messages whose hand-over is compared with copies.
-    pub kinds: Vec<Kind>,
+    /// The messages whose transport is compared with copies.
+    pub kinds: Vec<MessageKind>,
     /// Shared memory of a run, bytes.
     pub shared_bytes: u64,
 }
 
-/// A kind of message.
+/// A kind of message, by its size.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Kind {
-    /// The topic whose messages are so large.
+pub struct MessageKind {
+    /// The topic of this size.
     pub topic: &'static str,
     /// Bytes of a message.
     pub bytes: usize,
