@@ -9,72 +9,62 @@ const CODES: u8 = 40;
 /// Added to the exit code of a drive that was complete before.
 const EARLIER: u8 = 20;
 
-/// The outcome of a drive: the column `outcome` of the table.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum DriveOutcome {
+/// Defines the outcomes with their names in the table.
+macro_rules! outcomes {
+    ($($(#[doc = $doc:literal])+ $outcome:ident: $name:literal,)+) => {
+        /// The outcome of a drive: the column `outcome` of the table.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+        pub enum DriveOutcome {
+            $(
+                $(#[doc = $doc])+
+                #[serde(rename = $name)]
+                $outcome,
+            )+
+        }
+
+        impl DriveOutcome {
+            /// All of them, in the order in which they are reported.
+            pub const ALL: [Self; [$($name,)+].len()] = [$(Self::$outcome,)+];
+
+            /// Returns the name in the table.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Self::$outcome => $name,)+
+                }
+            }
+        }
+    };
+}
+
+outcomes! {
     /// All scans have been played, and all results are there.
-    Complete,
+    Complete: "complete",
     /// All scans have been played, but too many of them cannot be read.
-    Corrupt,
+    Corrupt: "corrupt",
     /// There is nothing at its path.
-    Missing,
+    Missing: "missing",
     /// What is at its path is no recording, has too few scans, or a first one that cannot be read.
-    NotADataset,
+    NotADataset: "not-a-dataset",
     /// Its configuration was refused.
-    Configuration,
+    Configuration: "configuration",
     /// The computer lacks something: shared memory, open files.
-    Machine,
+    Machine: "machine",
     /// The disk of the results is full.
-    DiskFull,
+    DiskFull: "disk-full",
     /// Another process is writing to its results.
-    InUse,
+    InUse: "in-use",
     /// The run could not begin, or has failed: a stage died or hung more often than it may, for
     /// instance. The sentence has the reason.
-    Failed,
+    Failed: "failed",
     /// The process of its supervisor was killed.
-    Killed,
+    Killed: "killed",
     /// The batch was interrupted.
-    Interrupted,
+    Interrupted: "interrupted",
     /// It has not been computed yet, or with other settings.
-    NotRun,
+    NotRun: "not-run",
 }
 
 impl DriveOutcome {
-    /// All of them, in the order in which they are reported.
-    pub const ALL: [Self; 12] = [
-        Self::Complete,
-        Self::Corrupt,
-        Self::Missing,
-        Self::NotADataset,
-        Self::Configuration,
-        Self::Machine,
-        Self::DiskFull,
-        Self::InUse,
-        Self::Failed,
-        Self::Killed,
-        Self::Interrupted,
-        Self::NotRun,
-    ];
-
-    /// The name in the table.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Complete => "complete",
-            Self::Corrupt => "corrupt",
-            Self::Missing => "missing",
-            Self::NotADataset => "not-a-dataset",
-            Self::Configuration => "configuration",
-            Self::Machine => "machine",
-            Self::DiskFull => "disk-full",
-            Self::InUse => "in-use",
-            Self::Failed => "failed",
-            Self::Killed => "killed",
-            Self::Interrupted => "interrupted",
-            Self::NotRun => "not-run",
-        }
-    }
-
     /// Returns whether all scans were played, so that there are results of the whole drive.
     pub fn has_results(self) -> bool {
         matches!(self, Self::Complete | Self::Corrupt)
@@ -88,7 +78,7 @@ impl DriveOutcome {
         )
     }
 
-    /// The exit code of the drive's process; `earlier`: it had ended so before.
+    /// Returns the exit code of the drive's process; `earlier`: it had ended so before.
     pub fn exit_code(self, earlier: bool) -> u8 {
         CODES + self as u8 + if earlier { EARLIER } else { 0 }
     }

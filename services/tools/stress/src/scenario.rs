@@ -9,37 +9,6 @@ pub const RADAR_HZ: f64 = 4.0;
 /// Scans a second of [`Scenario::Fast`].
 const FAST_HZ: f64 = 10.0;
 
-/// The load or the faults of a run while its latency is measured.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Scenario {
-    /// No scans.
-    Idle,
-    /// 4 Hz.
-    Steady,
-    /// 10 Hz.
-    Fast,
-    /// Rates that rise to the knee.
-    Ramp,
-    /// Scans in clumps.
-    Bursts,
-    /// A spinning process for each processor.
-    Hogs,
-    /// A process that takes and churns memory.
-    Memory,
-    /// A stage that is slower than the radar.
-    SlowStage,
-    /// Stages that are stopped and continued.
-    Stopped,
-    /// Stages that are killed.
-    Kills,
-    /// Programs that read all topics.
-    Observers,
-    /// Several pipelines.
-    Fleet,
-    /// The transport beside copies.
-    Copying,
-}
-
 /// The judgement of a scenario.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Judged {
@@ -55,100 +24,76 @@ pub enum Judged {
     Never,
 }
 
-impl Scenario {
-    /// All scenarios, in the order in which they are carried out.
-    pub const ALL: [Self; 13] = [
-        Self::Idle,
-        Self::Steady,
-        Self::Fast,
-        Self::Bursts,
-        Self::Hogs,
-        Self::Memory,
-        Self::Observers,
-        Self::SlowStage,
-        Self::Stopped,
-        Self::Kills,
-        Self::Ramp,
-        Self::Fleet,
-        Self::Copying,
-    ];
-
-    /// Returns the name on the command line and in `[budget.NAME]`, the judgement, and a line that
-    /// describes it.
-    const fn properties(self) -> (&'static str, Judged, &'static str) {
-        use Judged::{ButDrops, ByBudget, ByItself, ByRecovery, Never};
-        match self {
-            Self::Idle => ("idle", ByItself, "no scans: what waiting costs"),
-            Self::Steady => ("steady", ByBudget, "4 scans/s, nothing else"),
-            Self::Fast => ("fast", ByBudget, "10 scans/s"),
-            Self::Bursts => (
-                "bursts",
-                ButDrops,
-                "4 scans/s in the mean that arrive three at once, as from a network that holds them back",
-            ),
-            Self::Hogs => (
-                "hogs",
-                ByBudget,
-                "as many spinning processes as processors, at 4 scans/s",
-            ),
-            Self::Memory => (
-                "memory",
-                ByBudget,
-                "a process that takes 90 % of the available memory and churns it, at 4 scans/s",
-            ),
-            Self::Observers => (
-                "observers",
-                ByBudget,
-                "eight programs that read all topics, at 4 scans/s",
-            ),
-            Self::SlowStage => (
-                "slow-stage",
-                ByRecovery,
-                "a stage that takes longer than the radar's period, at 4 scans/s",
-            ),
-            Self::Stopped => (
-                "stopped",
-                ByRecovery,
-                "stages that are stopped for a second (SIGSTOP) and continued, at 4 scans/s",
-            ),
-            Self::Kills => (
-                "kills",
-                ByRecovery,
-                "stages that are killed (SIGKILL), at 4 scans/s",
-            ),
-            Self::Ramp => (
-                "ramp",
-                ByItself,
-                "rates that rise until scans are dropped or p99 is over its limit: the knee, in scans/s",
-            ),
-            Self::Fleet => (
-                "fleet",
-                ByItself,
-                "more and more pipelines until one misses its deadline: the number of 4 Hz radars",
-            ),
-            Self::Copying => (
-                "copying",
-                Never,
-                "the transport beside copies through Unix sockets, with 1, 4 and 8 readers",
-            ),
+/// Defines the scenarios: name, judgement, and a line that describes it.
+macro_rules! scenarios {
+    ($($scenario:ident: $name:literal, $judged:ident, $line:literal;)+) => {
+        /// The load or the faults of a run while its latency is measured.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum Scenario {
+            $(
+                #[doc = concat!("`", $name, "`: ", $line, ".")]
+                $scenario,
+            )+
         }
-    }
 
-    /// Returns the name on the command line and in `[budget.NAME]`.
-    pub const fn name(self) -> &'static str {
-        self.properties().0
-    }
+        impl Scenario {
+            /// All scenarios, in the order in which they are carried out.
+            pub const ALL: [Self; [$($name,)+].len()] = [$(Self::$scenario,)+];
 
-    /// Returns the judgement of its figures.
-    pub const fn judged(self) -> Judged {
-        self.properties().1
-    }
+            /// Returns the name on the command line and in `[budget.NAME]`.
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$scenario => $name,)+
+                }
+            }
 
-    /// Returns a line that describes it.
-    pub const fn line(self) -> &'static str {
-        self.properties().2
-    }
+            /// Returns the judgement of its figures.
+            pub const fn judged(self) -> Judged {
+                match self {
+                    $(Self::$scenario => Judged::$judged,)+
+                }
+            }
 
+            /// Returns a line that describes it.
+            pub const fn line(self) -> &'static str {
+                match self {
+                    $(Self::$scenario => $line,)+
+                }
+            }
+        }
+    };
+}
+
+scenarios! {
+    Idle: "idle", ByItself,
+        "no scans: what waiting costs";
+    Steady: "steady", ByBudget,
+        "4 scans/s, nothing else";
+    Fast: "fast", ByBudget,
+        "10 scans/s";
+    Bursts: "bursts", ButDrops,
+        "4 scans/s in the mean that arrive three at once, as from a network that holds them back";
+    Hogs: "hogs", ByBudget,
+        "as many spinning processes as processors, at 4 scans/s";
+    Memory: "memory", ByBudget,
+        "a process that takes 90 % of the available memory and churns it, at 4 scans/s";
+    Observers: "observers", ByBudget,
+        "eight programs that read all topics, at 4 scans/s";
+    SlowStage: "slow-stage", ByRecovery,
+        "a stage that takes longer than the radar's period, at 4 scans/s";
+    Stopped: "stopped", ByRecovery,
+        "stages that are stopped for a second (SIGSTOP) and continued, at 4 scans/s";
+    Kills: "kills", ByRecovery,
+        "stages that are killed (SIGKILL), at 4 scans/s";
+    Ramp: "ramp", ByItself,
+        "rates that rise until scans are dropped or p99 is over its limit: the knee, in scans/s";
+    Fleet: "fleet", ByItself,
+        "more and more pipelines until one misses its deadline: the number of 4 Hz radars";
+    Copying: "copying", Never,
+        "the transport beside copies through Unix sockets, with 1, 4 and 8 readers";
+}
+
+impl Scenario {
     /// Returns the scans a second.
     pub(crate) const fn rate_hz(self) -> f64 {
         match self {
@@ -170,9 +115,7 @@ impl FromStr for Scenario {
     type Err = String;
 
     fn from_str(name: &str) -> Result<Self, String> {
-        let found = Self::ALL
-            .into_iter()
-            .find(|scenario| scenario.name() == name);
+        let found = Self::ALL.into_iter().find(|it| it.name() == name);
         found.ok_or_else(|| {
             let names = Self::ALL.map(Self::name).join(", ");
             format!("there is no scenario `{name}`; there are {names}")

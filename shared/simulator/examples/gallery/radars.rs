@@ -38,11 +38,6 @@ fn range_point_spread() -> Exhibit {
             ("K2Pi's, 0.75 m", picture(Profile::K2pi)),
         ],
     )
-    .words(
-        "Two posts 0.5 m apart and two 1.2 m apart, within 7 degrees: the width of a point depends on the chirp's bandwidth and the window, from \
-         several bins to less than two.",
-        "Harris 1978, the spectrum of a Hann window; cells measured on isolated points of real scans",
-    )
 }
 
 fn range_law() -> Exhibit {
@@ -53,10 +48,9 @@ fn range_law() -> Exhibit {
         .map(|(i, range_m)| (range_m, (4.0 + 8.0 * i as f64) * PI / 200.0));
     let shot = Shot::drawn(scenes::posts_at(places, 10.0));
     let frame = Frame::polar(0.0..56.0, 0.0..165.0).shades(BLACK, 140.0);
-    Exhibit::of("Power against range", vec![("posts of 10 m²", frame.picture(&[shot.scan()]))]).words(
-        "Equal posts at 2.5, 5, 10, ... 160 m: power falls with the fourth power of range at long range and less steeply at short range, where \
-         the receiver filters low beat frequencies; the nearest lie below the beam.",
-        "the radar equation; gain by range fitted to Oxford's, RADIATE's and Boreas-RT's mean powers",
+    Exhibit::of(
+        "Power against range",
+        vec![("posts of 10 m²", frame.picture(&[shot.scan()]))],
     )
 }
 
@@ -67,10 +61,12 @@ fn quantisation() -> Exhibit {
             f64::from(counts(power, 1e7, whole)) / 30.0
         })
     };
-    Exhibit::of("Quantisation", vec![("RADIATE's, K2Pi's", ramp(false)), ("Oxford's, Boreas'", ramp(true))]).words(
-        "Power that rises by 15 dB from left to right: all radars send steps of half a decibel, but some round power to integers \
-         first, which leaves gaps: 0, 6, 9, 12, 14, 15, ...",
-        "the values that occur in real scans",
+    Exhibit::of(
+        "Quantisation",
+        vec![
+            ("RADIATE's, K2Pi's", ramp(false)),
+            ("Oxford's, Boreas'", ramp(true)),
+        ],
     )
 }
 
@@ -90,9 +86,5 @@ fn profiles() -> Result<Exhibit, SimulatorError> {
             strip("ras6", Profile::Ras6)?,
             strip("k2pi", Profile::K2pi)?,
         ],
-    )
-    .words(
-        "A whole sweep in the town, with all effects except random events, up to 165 m or the radar's maximum range (100 m for RADIATE's and K2Pi).",
-        "data sheets and recordings; Checchin et al. 2010 for K2Pi, whose floor is assumed",
     ))
 }

@@ -99,6 +99,13 @@ impl Shot {
         }
     }
 
+    /// Returns the same scan with other effects.
+    pub fn with_effects(&self, change: impl FnOnce(&mut Effects)) -> Self {
+        let mut shot = self.clone();
+        change(&mut shot.effects);
+        shot
+    }
+
     /// Measures the scan.
     pub fn scan(&self) -> OwnedScan {
         let sampling = self.sensor.sampling();
@@ -128,13 +135,12 @@ impl Shot {
 
     /// Measures `count` scans from this one on.
     pub fn scans(&self, count: u64) -> Vec<OwnedScan> {
-        (self.index..self.index + count)
+        let mut shot = self.clone();
+        let indices = self.index..self.index + count;
+        indices
             .map(|index| {
-                Self {
-                    index,
-                    ..self.clone()
-                }
-                .scan()
+                shot.index = index;
+                shot.scan()
             })
             .collect()
     }

@@ -20,9 +20,7 @@ pub fn exhibits() -> Result<Vec<Exhibit>, SimulatorError> {
 }
 
 fn weather(title: &'static str, weather: WeatherConfig, shot: Shot, frame: &Frame) -> Exhibit {
-    Exhibit::switched((title, "weather"), &Shot { weather, ..shot }, frame, |e| {
-        &mut e.weather
-    })
+    Exhibit::switched(title, &Shot { weather, ..shot }, frame, |e| &mut e.weather)
 }
 
 fn rain() -> Exhibit {
@@ -31,10 +29,7 @@ fn rain() -> Exhibit {
         rain_mm_h: 25.0,
         ..WeatherConfig::default()
     };
-    weather("Rain", heavy, shot, &Frame::map(95.0).shades(12.0, 70.0)).words(
-        "Posts 12 m apart in heavy rain of 25 mm/h: drops scatter back at short range, and echoes lose 2.3 dB per 100 m of range.",
-        "ITU-R P.838-3 (attenuation); Currie, Dyer and Hayes 1975 (reflectivity)",
-    )
+    weather("Rain", heavy, shot, &Frame::map(95.0).shades(12.0, 70.0))
 }
 
 fn fog() -> Exhibit {
@@ -49,10 +44,11 @@ fn fog() -> Exhibit {
         fog_g_m3: 3.0,
         ..WeatherConfig::default()
     };
-    weather("Fog", thick, shot, &Frame::polar(0.0..100.0, 50.0..300.0).shades(30.0, 70.0)).words(
-        "Rings of equally bright posts, 60 to 300 m around a RAS6, in fog of 3 g/m³, six times the density of 50 m visibility: the effect on \
-         a radar is small, up to 8 dB for the farthest.",
-        "ITU-R P.840",
+    weather(
+        "Fog",
+        thick,
+        shot,
+        &Frame::polar(0.0..100.0, 50.0..300.0).shades(30.0, 70.0),
     )
 }
 
@@ -62,10 +58,7 @@ fn snow() -> Exhibit {
         snow_mm_h: 8.0,
         ..WeatherConfig::default()
     };
-    weather("Snow", heavy, shot, &Frame::map(42.0).shades(BLACK, 40.0)).words(
-        "Posts 8 m apart in heavy snow, 8 mm/h of water: snow is clumped, so its backscatter is spottier than that of rain; snow on the radome attenuates, too.",
-        "middle values of widely varying literature",
-    )
+    weather("Snow", heavy, shot, &Frame::map(42.0).shades(BLACK, 40.0))
 }
 
 fn traffic() -> Exhibit {
@@ -79,10 +72,6 @@ fn traffic() -> Exhibit {
     Exhibit::of(
         "Traffic",
         vec![("one scan", picture(0)), ("1 s later", picture(4))],
-    )
-    .words(
-        "A car passes at 12 m/s between posts: it moves within a sweep and between sweeps.",
-        "bodies of scatterers with a velocity; in the town they follow its streets",
     )
 }
 
@@ -142,9 +131,5 @@ fn host_stamps() -> Result<Exhibit, SimulatorError> {
         ("even", plot(delays_s(HostStamps::Even)?)),
         ("stalling", plot(delays_s(HostStamps::Stalling)?)),
     ];
-    Ok(Exhibit::of("Host stamps", pictures).words(
-        "Delay of the host for each of 240 scans, up to 1.5 s: it stalls now and then and catches up, while the sensor turns evenly. \
-         RADIATE's format logs these times (`output.host_stamps`).",
-        "RADIATE's recordings: seven stalls in 466 scans",
-    ))
+    Ok(Exhibit::of("Host stamps", pictures))
 }

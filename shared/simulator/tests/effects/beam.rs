@@ -3,7 +3,7 @@
 use gyre_simulator::Effects;
 use gyre_simulator::profile::Profile;
 
-use crate::scene::{Setup, db, mean_db, peak_db, post, power};
+use crate::scene::{Setup, db, mean_db, only, peak_db, post, power};
 
 #[test]
 fn without_effects_only_the_points_response_remains() {
@@ -55,10 +55,7 @@ fn side_lobes_decrease_and_vanish_without_the_effect() {
     let measured = |side_lobes| {
         let setup = Setup::of(
             vec![post(40.0, 100.0, 200.0)],
-            Effects {
-                side_lobes,
-                ..Effects::NONE
-            },
+            only(|e| &mut e.side_lobes, side_lobes),
         );
         let (scan, bins) = (setup.scan(), setup.bins(39.0..41.0));
         [97, 95, 93, 103, 105, 107]
@@ -85,13 +82,7 @@ fn a_flat_beam_misses_most_faint_near_scatterers_and_few_strong_ones() {
             .step_by(5)
             .map(|azimuth| post(10.0, azimuth as f64, cross_section_m2))
             .collect();
-        let setup = Setup::of(
-            posts,
-            Effects {
-                elevation,
-                ..Effects::NONE
-            },
-        );
+        let setup = Setup::of(posts, only(|e| &mut e.elevation, elevation));
         let at = setup.sampling().bin(10.0).round() as usize;
         let scans = setup.scans(8);
         let changed = (0..400).step_by(5).filter(|azimuth| {

@@ -4,7 +4,7 @@ use gyre_radar::OwnedScan;
 use gyre_simulator::profile::{METADATA_BYTES, Profile};
 use gyre_simulator::{Effects, SimulationConfig, Simulator};
 
-use crate::scene::{Setup, power, powers};
+use crate::scene::{Setup, only, power, powers};
 
 fn k2pi(effects: Effects) -> Setup<'static> {
     Setup {
@@ -17,11 +17,7 @@ fn k2pi(effects: Effects) -> Setup<'static> {
 #[test]
 fn interference_occurs_0_6_times_a_scan_in_one_to_four_azimuths() {
     const SCANS: u64 = 500;
-    let scans = k2pi(Effects {
-        interference: true,
-        ..Effects::NONE
-    })
-    .scans(SCANS);
+    let scans = k2pi(only(|e| &mut e.interference, true)).scans(SCANS);
     let mut lengths = Vec::new();
     for scan in &scans {
         let interfered: Vec<bool> = powers(scan)
@@ -72,11 +68,7 @@ fn two_azimuths_in_a_thousand_are_lost_interpolated_and_marked() {
     }
     let share = f64::from(lost) / (118 * SCANS) as f64;
     assert!((share - 0.002).abs() < 0.000_8, "{share}");
-    let none = k2pi(Effects {
-        noise: true,
-        ..Effects::NONE
-    })
-    .scans(20);
+    let none = k2pi(only(|e| &mut e.noise, true)).scans(20);
     assert!(
         none.iter()
             .all(|scan| scan.flags.iter().all(|flags| *flags != 0))
@@ -139,14 +131,14 @@ fn switching_one_effect_keeps_the_random_numbers_of_all_others() {
 #[test]
 fn the_own_vehicle_is_the_same_with_and_without_ringing() {
     let beyond_4_m = |ringing| {
-        let setup = Setup {
-            effects: Effects {
+        let setup = Setup::of(
+            vec![],
+            Effects {
                 own_vehicle: true,
                 ringing,
                 ..Effects::NONE
             },
-            ..Setup::default()
-        };
+        );
         let (scan, first) = (setup.scan(), setup.bins(0.0..4.0).end);
         powers(&scan)
             .iter()
@@ -165,10 +157,7 @@ fn noise_does_not_depend_on_what_else_is_measured() {
         }
         .scan()
     };
-    let noise = Effects {
-        noise: true,
-        ..Effects::NONE
-    };
+    let noise = only(|e| &mut e.noise, true);
     let alone = scan(noise);
     // Power is only added where no other echo is.
     let more = Effects {

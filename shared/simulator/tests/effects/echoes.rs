@@ -4,20 +4,14 @@ use gyre_simulator::Effects;
 use gyre_simulator::body::{Aspect, Wall};
 use nalgebra::{Point2, Rotation2, Vector2};
 
-use crate::scene::{Setup, db, peak_db, post};
+use crate::scene::{Setup, db, only, peak_db, post};
 
 #[test]
 fn two_scatterers_cancel_or_add_in_amplitude_with_speckle_and_in_power_without() {
     let wavelength_m = Setup::default().receiver().wavelength_m();
     let peak = |speckle, apart_m: f64| {
         let pair = vec![post(20.0, 100.0, 0.5), post(20.0 + apart_m, 100.0, 0.5)];
-        let setup = Setup::of(
-            pair,
-            Effects {
-                speckle,
-                ..Effects::NONE
-            },
-        );
+        let setup = Setup::of(pair, only(|e| &mut e.speckle, speckle));
         peak_db(&setup.scan(), 100, setup.bins(18.0..22.0)) - setup.received_db(0.5, 20.0)
     };
     // Two-way: a quarter of a wavelength of range is half a wavelength of path.
@@ -49,13 +43,7 @@ fn a_panel_at_30_degrees_reflects_by_the_power_of_its_cosine_and_without_aspect_
             normal,
             sharpness: 20.0,
         };
-        let setup = Setup::of(
-            vec![panel],
-            Effects {
-                aspect,
-                ..Effects::NONE
-            },
-        );
+        let setup = Setup::of(vec![panel], only(|e| &mut e.aspect, aspect));
         peak_db(&setup.scan(), 100, setup.bins(29.0..31.0))
     };
     let fall_db = peak(true, 0.0) - peak(true, 30f64.to_radians());
@@ -74,10 +62,7 @@ fn a_wall_attenuates_by_its_transmission() {
     let peak = |occlusion, transmission: Option<f64>| {
         let mut setup = Setup::of(
             vec![post(30.0, 100.0, 20.0)],
-            Effects {
-                occlusion,
-                ..Effects::NONE
-            },
+            only(|e| &mut e.occlusion, occlusion),
         );
         let across = |x| Point2::new(x, -20.0);
         let wall = |transmission| Wall {
@@ -154,13 +139,7 @@ fn a_ghost_is_invisible_where_the_line_of_sight_misses_the_mirror() {
     };
     let mut thing = post(16.0, 100.0, 30.0);
     thing.position += Vector2::new(0.0, 12.0);
-    let mut setup = Setup::of(
-        vec![thing],
-        Effects {
-            multipath: true,
-            ..Effects::NONE
-        },
-    );
+    let mut setup = Setup::of(vec![thing], only(|e| &mut e.multipath, true));
     setup.body.walls = vec![short];
     assert!(peak_db(&setup.scan(), 100, setup.bins(15.5..16.5)) < 1.0);
 }

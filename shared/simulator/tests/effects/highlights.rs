@@ -8,7 +8,7 @@ use gyre_simulator::body::Wall;
 use gyre_simulator::{Body, Effects};
 use nalgebra::{Point2, Vector2};
 
-use crate::scene::{Setup, db, peak_bin, peak_db, post, powers};
+use crate::scene::{Setup, db, is_dark, peak_bin, peak_db, post};
 
 /// The azimuth to the right of Oxford's radar.
 const RIGHT: usize = 100;
@@ -41,10 +41,6 @@ fn mirror(range_m: f64, mirror: f64, ahead_m: std::ops::Range<f64>) -> Wall {
         mirror,
         body: 1,
     }
-}
-
-fn is_dark(scan: &OwnedScan) -> bool {
-    powers(scan).into_iter().flatten().all(|count| *count == 0)
 }
 
 #[test]

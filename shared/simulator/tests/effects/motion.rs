@@ -11,7 +11,7 @@ use gyre_simulator::{
 };
 use nalgebra::{Point2, Vector2};
 
-use crate::scene::{Setup, peak_bin, post, power};
+use crate::scene::{Setup, only, peak_bin, post, power};
 
 const AHEAD: Twist = Twist {
     vx_mps: 20.0,
@@ -43,10 +43,7 @@ fn azimuths_are_measured_from_their_own_poses_or_all_from_the_middle() {
     let measured = |sweep_motion| {
         let mut setup = Setup::of(
             vec![post(20.0, 100.0, 3.0)],
-            Effects {
-                sweep_motion,
-                ..Effects::NONE
-            },
+            only(|e| &mut e.sweep_motion, sweep_motion),
         );
         setup.path = &AHEAD;
         centre(&setup.scan())
@@ -88,10 +85,7 @@ fn a_moving_object_appears_where_it_is_when_the_beam_passes() {
     for (sweep_motion, expected_m) in [(true, [19.375, 24.375]), (false, [20.0, 25.0])] {
         let setup = Setup {
             movers: &leaving,
-            effects: Effects {
-                sweep_motion,
-                ..Effects::NONE
-            },
+            effects: only(|e| &mut e.sweep_motion, sweep_motion),
             ..Setup::default()
         };
         let scans = setup.scans(3);
@@ -111,10 +105,7 @@ fn approaching_objects_are_too_near_with_rising_chirps_and_too_far_with_falling_
         let measured = |doppler| {
             let mut setup = Setup::of(
                 vec![post(30.0, azimuth, 3.0)],
-                Effects {
-                    doppler,
-                    ..Effects::NONE
-                },
+                only(|e| &mut e.doppler, doppler),
             )
             .with(profile);
             setup.path = &AHEAD;
@@ -151,11 +142,7 @@ fn approaching_objects_are_too_near_with_rising_chirps_and_too_far_with_falling_
 
 #[test]
 fn an_azimuth_reports_its_chirp() {
-    let setup = Setup {
-        effects: Effects::ALL,
-        ..Setup::default()
-    }
-    .with(Profile::Ras6);
+    let setup = Setup::of(vec![], Effects::ALL).with(Profile::Ras6);
     let scan = setup.scan();
     for azimuth in 0..400 {
         let sign = if azimuth % 2 == 0 { 1.0 } else { -1.0 };
@@ -171,10 +158,7 @@ fn encoder_eccentricity_turns_the_beam_by_its_cosine() {
     const ECCENTRICITY_RAD: f64 = 0.02;
     for azimuth in [30.0, 100.0, 200.0, 250.0, 390.0] {
         let measured = |encoder_wobble| {
-            let effects = Effects {
-                encoder_wobble,
-                ..Effects::NONE
-            };
+            let effects = only(|e| &mut e.encoder_wobble, encoder_wobble);
             let mut setup = Setup::of(vec![post(30.0, azimuth, 3.0)], effects);
             setup.sensor = SensorConfig {
                 azimuth_eccentricity_rad: ECCENTRICITY_RAD,

@@ -1,22 +1,15 @@
 //! The kinds of noise, by their mean power.
 
 use gyre_geometry::Twist;
-use gyre_simulator::Effects;
 use gyre_simulator::profile::Profile;
 
-use crate::scene::{Setup, mean_db, post, powers};
+use crate::scene::{Setup, is_dark, mean_db, only, post, powers};
 
 const EVERYWHERE: std::ops::Range<usize> = 0..400;
 
 #[test]
 fn noise_has_the_profiles_floor_and_exponential_power() {
-    let setup = Setup {
-        effects: Effects {
-            noise: true,
-            ..Effects::NONE
-        },
-        ..Setup::default()
-    };
+    let setup = Setup::of(vec![], only(|e| &mut e.noise, true));
     let setup = setup.with(Profile::Cts350xRadiate);
     let scans = setup.scans(2);
     let bins = setup.bins(40.0..60.0);
@@ -44,14 +37,7 @@ fn noise_has_the_profiles_floor_and_exponential_power() {
 #[test]
 fn whole_powers_leave_gaps_in_the_counts() {
     let found = |profile| {
-        let setup = Setup {
-            effects: Effects {
-                noise: true,
-                ..Effects::NONE
-            },
-            ..Setup::default()
-        }
-        .with(profile);
+        let setup = Setup::of(vec![], only(|e| &mut e.noise, true)).with(profile);
         let scan = setup.scan();
         let mut found = [false; 256];
         powers(&scan)
@@ -80,10 +66,7 @@ fn phase_noise_is_60_db_below_the_echo_in_far_bins_of_its_azimuth() {
     let measured = |phase_noise| {
         let setup = Setup::of(
             vec![post(30.0, 100.0, 2e4)],
-            Effects {
-                phase_noise,
-                ..Effects::NONE
-            },
+            only(|e| &mut e.phase_noise, phase_noise),
         );
         let (scans, far) = (setup.scans(4), setup.bins(100.0..160.0));
         let below =
@@ -110,13 +93,7 @@ fn reverberation_follows_strong_echoes_and_never_precedes_them() {
         let posts = azimuths()
             .map(|azimuth| post(31.0, azimuth as f64, 2e4))
             .collect();
-        Setup::of(
-            posts,
-            Effects {
-                reverberation,
-                ..Effects::NONE
-            },
-        )
+        Setup::of(posts, only(|e| &mut e.reverberation, reverberation))
     };
     let on = setup(true);
     let scans = on.scans(4);
@@ -156,13 +133,7 @@ fn reverberation_follows_strong_echoes_and_never_precedes_them() {
 
 #[test]
 fn ringing_fills_the_first_metres_with_the_same_bytes_in_every_scan() {
-    let setup = |ringing| Setup {
-        effects: Effects {
-            ringing,
-            ..Effects::NONE
-        },
-        ..Setup::default()
-    };
+    let setup = |ringing| Setup::of(vec![], only(|e| &mut e.ringing, ringing));
     let scans = setup(true).scans(2);
     assert_eq!(powers(&scans[0]), powers(&scans[1]));
     let (range_resolution_m, tabulated) = (
@@ -183,24 +154,12 @@ fn ringing_fills_the_first_metres_with_the_same_bytes_in_every_scan() {
             .iter()
             .all(|row| row[90..].iter().all(|count| *count == 0))
     );
-    assert!(
-        powers(&setup(false).scan())
-            .into_iter()
-            .flatten()
-            .all(|count| *count == 0)
-    );
+    assert!(is_dark(&setup(false).scan()));
 }
 
 #[test]
 fn ringing_changes_smoothly_between_azimuths_and_across_the_seam() {
-    let scan = Setup {
-        effects: Effects {
-            ringing: true,
-            ..Effects::NONE
-        },
-        ..Setup::default()
-    }
-    .scan();
+    let scan = Setup::of(vec![], only(|e| &mut e.ringing, true)).scan();
     let rows = powers(&scan);
     // Differences between azimuths by their distance, dB, averaged over all bins up to 1.3 m.
     let apart_db = |azimuth: usize, apart: usize| {
@@ -232,13 +191,7 @@ fn ringing_changes_smoothly_between_azimuths_and_across_the_seam() {
 
 #[test]
 fn the_own_vehicle_is_behind_the_radar_at_any_heading() {
-    let setup = |own_vehicle| Setup {
-        effects: Effects {
-            own_vehicle,
-            ..Effects::NONE
-        },
-        ..Setup::default()
-    };
+    let setup = |own_vehicle| Setup::of(vec![], only(|e| &mut e.own_vehicle, own_vehicle));
     let turning = Twist {
         vx_mps: 5.0,
         vy_mps: 0.0,
@@ -266,23 +219,12 @@ fn the_own_vehicle_is_behind_the_radar_at_any_heading() {
         .filter(|row| row.iter().any(|count| *count > 25))
         .count();
     assert!(parts > 10, "{parts} azimuths");
-    assert!(
-        powers(&setup(false).scan())
-            .into_iter()
-            .flatten()
-            .all(|count| *count == 0)
-    );
+    assert!(is_dark(&setup(false).scan()));
 }
 
 #[test]
 fn spurious_lines_are_at_their_ranges_with_or_without_noise() {
-    let setup = Setup {
-        effects: Effects {
-            spurious_lines: true,
-            ..Effects::NONE
-        },
-        ..Setup::default()
-    };
+    let setup = Setup::of(vec![], only(|e| &mut e.spurious_lines, true));
     let setup = setup.with(Profile::Cts350xRadiate);
     let scans = setup.scans(4);
     let lit: Vec<usize> = (0..576)

@@ -125,6 +125,18 @@ pub fn post(range_m: f64, azimuth: f64, cross_section_m2: f64) -> Scatterer {
     }
 }
 
+/// Returns this effect alone, or none.
+pub fn only(switch: fn(&mut Effects) -> &mut bool, on: bool) -> Effects {
+    let mut effects = Effects::NONE;
+    *switch(&mut effects) = on;
+    effects
+}
+
+/// Returns whether nothing is received.
+pub fn is_dark(scan: &OwnedScan) -> bool {
+    powers(scan).into_iter().flatten().all(|count| *count == 0)
+}
+
 pub fn db(power: f64) -> f64 {
     10.0 * power.log10()
 }

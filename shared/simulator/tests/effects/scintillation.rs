@@ -2,11 +2,10 @@
 
 use gyre_geometry::Twist;
 use gyre_radar::OwnedScan;
-use gyre_simulator::Effects;
 use gyre_simulator::body::{Aspect, NO_BODY, Scatterer};
 use nalgebra::Point2;
 
-use crate::scene::{Setup, peak_db};
+use crate::scene::{Setup, only, peak_db};
 
 /// Number of scans in one turn around the post.
 const SCANS: u64 = 200;
@@ -27,13 +26,7 @@ fn scans(count: u64, scintillation: bool, yaw_rate_radps: f64) -> Vec<OwnedScan>
     };
     Setup {
         path: &round,
-        ..Setup::of(
-            vec![post],
-            Effects {
-                scintillation,
-                ..Effects::NONE
-            },
-        )
+        ..Setup::of(vec![post], only(|e| &mut e.scintillation, scintillation))
     }
     .scans(count)
 }
