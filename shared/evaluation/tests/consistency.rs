@@ -1,7 +1,4 @@
 //! NEES and error bands of motions whose covariance is known.
-#![allow(clippy::unwrap_used)]
-
-mod common;
 
 use std::num::NonZeroUsize;
 
@@ -52,7 +49,7 @@ struct Drive {
 impl Drive {
     fn new(motions: usize, seed: u64, scale: f64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let truth = common::drive(motions, 90.0);
+        let truth = crate::common::drive(motions, 90.0);
         let stamps_ns: Vec<_> = (0..truth.len() as i64).map(|k| k * INTERVAL_NS).collect();
         let spread = covariance().cholesky().unwrap().l();
         let motion = |k: usize| {

@@ -1,11 +1,8 @@
 //! The KITTI errors of published trajectories, compared with the published figures.
-#![allow(clippy::unwrap_used)]
-
-mod common;
 
 use std::{fs, num::NonZeroUsize, path::PathBuf};
 
-use common::chain;
+use crate::common::chain;
 use gyre_evaluation::{Association, Coverage, Evaluation, Kitti, Options, TimedPoses, evaluate};
 use gyre_geometry::{Pose, pose};
 use nalgebra::{Complex, Unit};

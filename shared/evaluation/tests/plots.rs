@@ -1,9 +1,6 @@
 //! The SVG documents.
-#![allow(clippy::unwrap_used)]
 
-mod common;
-
-use common::drive;
+use crate::common::drive;
 use gyre_evaluation::{
     Association, Evaluation, Options, PlotError, TimedPoses, evaluate,
     plot::{errors_svg, trajectory_svg},

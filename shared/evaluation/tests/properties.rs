@@ -1,11 +1,8 @@
 //! Properties of the metrics for random drives.
-#![allow(clippy::unwrap_used)]
-
-mod common;
 
 use std::num::NonZeroUsize;
 
-use common::{any_drive, any_pose, chain, drive};
+use crate::common::{any_drive, any_pose, chain, drive};
 use gyre_evaluation::{
     Association, Evaluation, MatchedPoses, Options, SEGMENT_LENGTHS_M, TimedPoses, align, ate,
     evaluate, kitti, rpe, seg,

@@ -1,13 +1,10 @@
 //! A dataset in Oxford's format: reproducible, in its conventions, and readable by the reader for real
 //! data.
-#![allow(clippy::unwrap_used)]
-
-mod common;
 
 use std::fs;
 use std::path::Path;
 
-use common::all_files;
+use crate::common::all_files;
 use gyre_geometry::Pose;
 use gyre_radar::scan::flag;
 use gyre_radar::{DatasetOptions, Format, OwnedScan};

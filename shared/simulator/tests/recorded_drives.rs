@@ -1,5 +1,4 @@
 //! Paths along real trajectories: distance from the poses, and limits of vehicle dynamics.
-#![allow(clippy::unwrap_used)]
 
 use std::path::PathBuf;
 use std::time::Instant;

@@ -1,15 +1,12 @@
 //! Datasets of each format: written, read by the readers for real data, interrupted, resumed, and streamed
 //! without a disk.
-#![allow(clippy::unwrap_used)]
-
-mod common;
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::num::NonZeroUsize;
 use std::path::Path;
 
-use common::all_files;
+use crate::common::all_files;
 use gyre_geometry::Pose;
 use gyre_radar::{
     Dataset, DatasetOptions, Format, OwnedScan, find_ground_truth, inspect, read_trajectory,

@@ -1,5 +1,4 @@
 //! Streets laid along drives: each once, wide enough, with side streets that keep their distance.
-#![allow(clippy::unwrap_used)]
 
 use std::f64::consts::PI;
 use std::time::Instant;

@@ -1,5 +1,4 @@
 //! Sweeps of known scenes: places of points, occlusion, distribution of powers.
-#![allow(clippy::unwrap_used)]
 
 use std::f64::consts::TAU;
 

@@ -1,5 +1,4 @@
 //! Towns along whole drives: free carriageways, and a size that can be rendered.
-#![allow(clippy::unwrap_used)]
 
 use gyre_simulator::body::NO_BODY;
 use gyre_simulator::path::recorded::{Excerpt, read};

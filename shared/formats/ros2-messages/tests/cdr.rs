@@ -1,5 +1,4 @@
 //! Messages as bytes.
-#![allow(clippy::unwrap_used)]
 
 use gyre_ros2_messages::{
     BadMessage, Ros2Message, decode,

@@ -1,5 +1,4 @@
 //! Navtech's messages and scans.
-#![allow(clippy::unwrap_used)]
 
 use std::f64::consts::TAU;
 

@@ -1,9 +1,6 @@
 //! Covariances agree with errors: the mean NEES of 200 simulated drives of 500 keyframes lies in its 95 % interval.
-#![allow(clippy::unwrap_used)]
 
-mod common;
-
-use common::{Drive, ODOMETRY};
+use crate::common::{Drive, ODOMETRY};
 use gyre_estimation::{Outcome, PoseGraph};
 use gyre_geometry::{Pose, UncertainMotion};
 use statrs::distribution::{ChiSquared, ContinuousCDF};

@@ -1,11 +1,8 @@
 //! The trajectory filter on cases worked by hand, and against a dense batch solution.
-#![allow(clippy::unwrap_used)]
-
-mod common;
 
 use std::f64::consts::FRAC_PI_2;
 
-use common::{Batch, Drive, LOOP, ODOMETRY, apart, dead_reckoning, exact};
+use crate::common::{Batch, Drive, LOOP, ODOMETRY, apart, dead_reckoning, exact};
 use gyre_estimation::{
     Constraint, EstimationError, FilterOptions, Kind, Outcome, TrajectoryFilter,
 };

@@ -1,11 +1,8 @@
 //! Files of pose graphs.
-#![allow(clippy::unwrap_used)]
-
-mod common;
 
 use std::f64::consts::FRAC_PI_2;
 
-use common::{Drive, ODOMETRY};
+use crate::common::{Drive, ODOMETRY};
 use gyre_estimation::{Constraint, G2o, G2oError, Kind, PoseGraph};
 use gyre_geometry::{Pose, pose, xy_yaw};
 use nalgebra::{Matrix3, Vector3};

@@ -1,9 +1,6 @@
 //! The pose graph against a dense batch solution, against the trajectory filter, and on odd input.
-#![allow(clippy::unwrap_used)]
 
-mod common;
-
-use common::{Batch, Drive, ODOMETRY, apart, dead_reckoning, exact, rms_apart};
+use crate::common::{Batch, Drive, ODOMETRY, apart, dead_reckoning, exact, rms_apart};
 use gyre_estimation::{
     Constraint, EstimationError, GraphOptions, Kernel, Kind, Outcome, PoseGraph, TrajectoryFilter,
 };

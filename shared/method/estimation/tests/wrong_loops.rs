@@ -1,11 +1,8 @@
 //! Wrong loops, single and in consistent tens, change the pose graph little.
-#![allow(clippy::unwrap_used)]
-
-mod common;
 
 use std::f64::consts::PI;
 
-use common::{Drive, LOOP, ODOMETRY, exact, rms_apart};
+use crate::common::{Drive, LOOP, ODOMETRY, exact, rms_apart};
 use gyre_estimation::{Constraint, GraphOptions, Kernel, Kind, Outcome, PoseGraph};
 use gyre_geometry::{Pose, pose};
 use rand::{Rng, SeedableRng};

@@ -1,10 +1,6 @@
 //! Learned masks against a reference computation of the same networks.
 
-#![allow(clippy::unwrap_used)]
-
-mod common;
-
-use common::{
+use crate::common::{
     N, assert_masked, backends, blank, card, learned_by, masker, raster, reference_masks, scan,
     sweep, unlearned, unmasked,
 };

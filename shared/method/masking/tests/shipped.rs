@@ -1,15 +1,11 @@
 //! The models of `models/`: their files have the checksums of their cards, and all backends load them and agree.
 
-#![allow(clippy::unwrap_used)]
-
-mod common;
-
 use std::{
     fs,
     path::{Path, PathBuf},
 };
 
-use common::{backends, learned, learned_by, runtime_is_installed, sweep, unlearned};
+use crate::common::{backends, learned, learned_by, runtime_is_installed, sweep, unlearned};
 use gyre_masking::{
     Backend, Masker,
     model::{Card, Model},

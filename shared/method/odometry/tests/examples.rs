@@ -1,5 +1,4 @@
 //! The examples that people copy: `examples/own_sensor.rs`, `examples/own_dataset.rs` and `examples/own_search.rs`.
-#![allow(clippy::unwrap_used)]
 
 #[allow(dead_code)] // Its `main`.
 #[path = "../../../../examples/own_dataset.rs"]

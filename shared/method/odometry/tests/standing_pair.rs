@@ -1,5 +1,4 @@
 //! Two scans of a standing vehicle, in both forms in which MulRan has them.
-#![allow(clippy::unwrap_used)]
 
 use std::{env, fs, path::Path};
 

@@ -1,5 +1,4 @@
 //! Odometry of a simulated vehicle that stands in traffic, creeps and drives off: `configs/stop-and-go.toml`.
-#![allow(clippy::unwrap_used)]
 
 use std::{fs, path::Path};
 

@@ -1,9 +1,6 @@
 //! Findings of `inspect` on real and generated datasets.
-#![allow(clippy::unwrap_used)]
 
-mod common;
-
-use common::{Sweep, real, write_oxford, write_radiate};
+use crate::common::{Sweep, real, write_oxford, write_radiate};
 use gyre_radar::inspect::Chirps;
 use gyre_radar::{DatasetOptions, Report, Trajectory, inspect, read_trajectory};
 
@@ -144,7 +141,7 @@ fn gaps_lost_rows_and_damaged_files_are_counted() {
     std::fs::write(&files[7], &whole[..whole.len() / 2]).unwrap();
     // Every tenth row interpolated, and one lost: since all images must have 40 rows, the last step is double.
     let sweep = Sweep {
-        start: common::START_US + 9 * common::PERIOD_US,
+        start: crate::common::START_US + 9 * crate::common::PERIOD_US,
         byte_ten: |row| if row % 10 == 3 { 0 } else { 255 },
         ..Sweep::default()
     };
@@ -154,7 +151,7 @@ fn gaps_lost_rows_and_damaged_files_are_counted() {
         pixels[row * sweep.width() + 8..][..2].copy_from_slice(&count.to_le_bytes());
     }
     pixels[39 * sweep.width() + 8..][..2].copy_from_slice(&5_u16.to_le_bytes());
-    common::write_png(&files[9], sweep.width(), sweep.rows, &pixels);
+    crate::common::write_png(&files[9], sweep.width(), sweep.rows, &pixels);
     let report = inspect(root.path(), &DatasetOptions::default(), None).unwrap();
     let timing = report.timing.as_ref().unwrap();
     assert_eq!(

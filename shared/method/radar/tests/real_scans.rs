@@ -1,12 +1,9 @@
 //! The readers on real scans.
-#![allow(clippy::unwrap_used)]
-
-mod common;
 
 use std::f32::consts::TAU;
 use std::path::Path;
 
-use common::{read, real};
+use crate::common::{read, real};
 use gyre_radar::scan::flag;
 use gyre_radar::{Dataset, DatasetOptions, Format, OwnedScan, Sense, open, read_trajectory};
 

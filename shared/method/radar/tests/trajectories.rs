@@ -1,11 +1,8 @@
 //! Ground truth and pose files, real and generated.
-#![allow(clippy::unwrap_used)]
-
-mod common;
 
 use std::fs;
 
-use common::real;
+use crate::common::real;
 use gyre_radar::{
     Trajectory, TrajectoryError, find_ground_truth, read_trajectory, write_kitti, write_tum,
 };

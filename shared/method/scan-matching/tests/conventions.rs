@@ -1,9 +1,6 @@
 //! Signs and frames, pinned by three points and no transform, and by single scatterers.
-#![allow(clippy::unwrap_used)]
 
-mod common;
-
-use common::{Motion, draw, search};
+use crate::common::{Motion, draw, search};
 use gyre_scan_matching::{RotationMatch, TranslationConfig, TranslationSearch};
 use ndarray::Array2;
 
@@ -119,7 +116,7 @@ fn scatterers_do_not_wrap_around_the_edges() {
 #[test]
 fn the_scene_behind_the_lever_moves_with_the_angle() {
     // All structure 20 m ahead: an angle that is wrong by e moves it to the side, and the shift compensates.
-    let scene: Vec<_> = common::scatterers(40, 6.0, 3)
+    let scene: Vec<_> = crate::common::scatterers(40, 6.0, 3)
         .iter()
         .map(|&([x, y], s)| ([x + 15.0, y + 4.0], s))
         .collect();

@@ -1,9 +1,6 @@
 //! The exhaustive search against direct sums and known motions, and the inputs that it rejects.
-#![allow(clippy::unwrap_used)]
 
-mod common;
-
-use common::{Motion, Numbers, draw, pair};
+use crate::common::{Motion, Numbers, draw, pair};
 use gyre_scan_matching::{ExhaustiveConfig, ExhaustiveSearch, JointMatch, Overlap, Peak};
 use ndarray::{Array2, ArrayView2};
 use proptest::prelude::*;
@@ -124,7 +121,7 @@ fn small_angles_are_not_pushed_off_zero() {
         // A new scene of speckles a cell wide, which blurring changes most.
         let found = |yaw_deg: f64| {
             let motion = Motion::degrees(1.2, 0.4, yaw_deg);
-            let scene = common::scatterers(1500, 60.0, 70 + seed);
+            let scene = crate::common::scatterers(1500, 60.0, 70 + seed);
             let earlier = draw(scene.iter().copied(), 127, 0.8, 0.6);
             let later = draw(
                 scene.iter().map(|&(p, s)| (motion.seen_from_later(p), s)),
@@ -262,7 +259,7 @@ fn an_angle_at_the_end_of_the_grid_is_uncertain() {
 #[test]
 fn the_covariance_couples_shift_and_angle_by_the_lever() {
     // All structure 15 m ahead and 4 m to the left: x and y follow the angle by -J centre.
-    let scene: Vec<_> = common::scatterers(40, 6.0, 3)
+    let scene: Vec<_> = crate::common::scatterers(40, 6.0, 3)
         .iter()
         .map(|&([x, y], s)| ([x + 15.0, y + 4.0], s))
         .collect();

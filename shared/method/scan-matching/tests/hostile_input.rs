@@ -1,9 +1,6 @@
 //! Nothing that a raster may hold makes the search panic, lie or allocate.
-#![allow(clippy::unwrap_used)]
 
-mod common;
-
-use common::{Motion, pair, search};
+use crate::common::{Motion, pair, search};
 use gyre_scan_matching::{
     Peak, RotationConfig, RotationForm, RotationSearch, TranslationConfig, TranslationSearch,
 };

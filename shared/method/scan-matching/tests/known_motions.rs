@@ -1,9 +1,6 @@
 //! Motions put into generated scenes come out of the search.
-#![allow(clippy::unwrap_used)]
 
-mod common;
-
-use common::{Motion, Numbers, draw, pair, search};
+use crate::common::{Motion, Numbers, draw, pair, search};
 use gyre_scan_matching::{
     MotionMatch, Overlap, Peak, RotationConfig, RotationForm, TranslationConfig,
 };
@@ -169,7 +166,7 @@ fn energy_normalisation_removes_the_bias_toward_zero_shift() {
         };
         let errors: Vec<f64> = (0..12)
             .map(|seed| {
-                let scene = common::scatterers(5000, 60.0, 900 + seed);
+                let scene = crate::common::scatterers(5000, 60.0, 900 + seed);
                 let earlier = draw(scene.iter().copied(), n, cell_m, 2.5);
                 let later = draw(
                     scene.iter().map(|&(p, s)| (motion.seen_from_later(p), s)),

@@ -1,11 +1,8 @@
 //! The refined trajectory of generated drives follows the true one.
 //!
 //! Bounds are about twice the worst that was measured over a few scenes.
-#![allow(clippy::unwrap_used)]
 
-mod common;
-
-use common::scenes::*;
+use crate::common::scenes::*;
 use gyre_geometry::{Pose, SparsePoint, mirrored as mirror};
 use gyre_scan_matching::{Outcome, Refiner, TrackerState};
 use nalgebra::{Matrix3, Vector3};

@@ -1,9 +1,6 @@
 //! Faults of a few scans do not corrupt the refined trajectory, and a restored refiner continues bit for bit.
-#![allow(clippy::unwrap_used)]
 
-mod common;
-
-use common::{Numbers, scenes::*};
+use crate::common::{Numbers, scenes::*};
 use gyre_geometry::{ComposedMotion, Pose, SparsePoint};
 use gyre_scan_matching::{Outcome, Refined, RefinementConfig, Refiner};
 

@@ -1,12 +1,9 @@
 //! A radar with a sweep of one second, as K2Pi (Checchin et al., Table 1): a vehicle drives far between two scans, and its
 //! velocity changes within one.
-#![allow(clippy::unwrap_used)]
-
-mod common;
 
 use std::f64::consts::TAU;
 
-use common::scenes::{point, posts};
+use crate::common::scenes::{point, posts};
 use gyre_geometry::{Pose, SparsePoint};
 use gyre_scan_matching::{Outcome, Refined, RefinementConfig, Refiner};
 use nalgebra::{Point2, Rotation2, Vector2};

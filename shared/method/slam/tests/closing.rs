@@ -1,9 +1,6 @@
 //! Loops depend on the keyframes, and not on when they come or on where the closing is stopped.
-#![allow(clippy::unwrap_used)]
 
-mod common;
-
-use common::{AROUND, Drive};
+use crate::common::{AROUND, Drive};
 use gyre_scan_matching::RefinementConfig;
 use gyre_slam::{LoopCloser, LoopOptions, LoopOutcome, Place, Query, Record};
 

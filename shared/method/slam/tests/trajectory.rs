@@ -1,9 +1,6 @@
 //! The trajectory from odometry and loops, right and wrong ones.
-#![allow(clippy::unwrap_used)]
 
-mod common;
-
-use common::{AROUND, Drive};
+use crate::common::{AROUND, Drive};
 use gyre_estimation::Constraint;
 use gyre_geometry::{Pose, UncertainMotion, pose};
 use gyre_slam::{EstimatorKind, JudgedLoop, LoopVerdict, TrajectoryEstimator, TrajectoryOptions};

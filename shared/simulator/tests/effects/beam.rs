@@ -3,7 +3,7 @@
 use gyre_simulator::Effects;
 use gyre_simulator::profile::Profile;
 
-use crate::scene::{Setup, db, mean_db, only, peak_db, post, power};
+use super::scene::{Setup, db, mean_db, only, peak_db, post, power};
 
 #[test]
 fn without_effects_only_the_points_response_remains() {

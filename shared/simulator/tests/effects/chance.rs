@@ -4,7 +4,7 @@ use gyre_radar::OwnedScan;
 use gyre_simulator::profile::{METADATA_BYTES, Profile};
 use gyre_simulator::{Effects, SimulationConfig, Simulator};
 
-use crate::scene::{Setup, only, power, powers};
+use super::scene::{Setup, only, power, powers};
 
 fn k2pi(effects: Effects) -> Setup<'static> {
     Setup {

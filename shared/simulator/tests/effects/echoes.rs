@@ -4,7 +4,7 @@ use gyre_simulator::Effects;
 use gyre_simulator::body::{Aspect, Wall};
 use nalgebra::{Point2, Rotation2, Vector2};
 
-use crate::scene::{Setup, db, only, peak_db, post};
+use super::scene::{Setup, db, only, peak_db, post};
 
 #[test]
 fn two_scatterers_cancel_or_add_in_amplitude_with_speckle_and_in_power_without() {

@@ -9,7 +9,7 @@ use gyre_simulator::profile::Profile;
 use gyre_simulator::{Effects, Path};
 use nalgebra::Point2;
 
-use crate::scene::{Setup, db, is_dark, mean_db, power, powers};
+use super::scene::{Setup, db, is_dark, mean_db, power, powers};
 
 const GROUND: Effects = Effects {
     ground: true,

@@ -8,7 +8,7 @@ use gyre_simulator::body::Wall;
 use gyre_simulator::{Body, Effects};
 use nalgebra::{Point2, Vector2};
 
-use crate::scene::{Setup, db, is_dark, peak_bin, peak_db, post};
+use super::scene::{Setup, db, is_dark, peak_bin, peak_db, post};
 
 /// The azimuth to the right of Oxford's radar.
 const RIGHT: usize = 100;

@@ -11,7 +11,7 @@ use gyre_simulator::{
 };
 use nalgebra::{Point2, Vector2};
 
-use crate::scene::{Setup, only, peak_bin, post, power};
+use super::scene::{Setup, only, peak_bin, post, power};
 
 const AHEAD: Twist = Twist {
     vx_mps: 20.0,

@@ -3,7 +3,7 @@
 use gyre_geometry::Twist;
 use gyre_simulator::profile::Profile;
 
-use crate::scene::{Setup, is_dark, mean_db, only, post, powers};
+use super::scene::{Setup, is_dark, mean_db, only, post, powers};
 
 const EVERYWHERE: std::ops::Range<usize> = 0..400;
 

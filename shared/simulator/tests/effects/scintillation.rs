@@ -5,7 +5,7 @@ use gyre_radar::OwnedScan;
 use gyre_simulator::body::{Aspect, NO_BODY, Scatterer};
 use nalgebra::Point2;
 
-use crate::scene::{Setup, only, peak_db};
+use super::scene::{Setup, only, peak_db};
 
 /// Number of scans in one turn around the post.
 const SCANS: u64 = 200;

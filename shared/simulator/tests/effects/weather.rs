@@ -4,7 +4,7 @@ use gyre_simulator::Effects;
 use gyre_simulator::profile::Profile;
 use gyre_simulator::weather::WeatherConfig;
 
-use crate::scene::{Setup, db, is_dark, mean_db, peak_db, post, power, powers};
+use super::scene::{Setup, db, is_dark, mean_db, peak_db, post, power, powers};
 
 const RAIN: WeatherConfig = WeatherConfig {
     from_s: 0.0,

@@ -7,7 +7,7 @@ use gyre_geometry::{Pose, pose, wrap_angle};
 use gyre_scan_matching::Submap;
 use proptest::prelude::*;
 
-use crate::scenes;
+use super::scenes;
 
 fn describe(submap: &Submap) -> Descriptor {
     let mut descriptor = Descriptor::default();

@@ -6,7 +6,7 @@ use std::path::Path;
 use gyre_estimation::places::{Candidate, Describer, Descriptor, PlaceIndex};
 use gyre_geometry::pose;
 
-use crate::scenes;
+use super::scenes;
 
 fn descriptors() -> Vec<Descriptor> {
     let mut describer = Describer::new();

@@ -9,7 +9,7 @@ use gyre_geometry::{Pose, pose, wrap_angle};
 use gyre_scan_matching::{RefinementConfig, Submap};
 use proptest::prelude::*;
 
-use crate::scenes;
+use super::scenes;
 
 fn verifier() -> LoopVerifier {
     LoopVerifier::new(&PlaceOptions::default(), &RefinementConfig::default(), 8192).unwrap()

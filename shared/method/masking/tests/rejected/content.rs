@@ -5,10 +5,8 @@ use std::fs;
 use gyre_masking::{Backend, network::Network};
 use ndarray::Array3;
 
-use super::{
-    common::{N, backends, card, learned_by, raster},
-    rejected, with_valid_checksum,
-};
+use super::{rejected, with_valid_checksum};
+use crate::common::{N, backends, card, learned_by, raster};
 
 #[test]
 fn a_model_that_the_backend_cannot_read_is_rejected() {

@@ -6,8 +6,8 @@ use std::path::Path;
 
 use gyre_radar::{AzimuthSource, DatasetOptions, Format, OpenError, open};
 
+use super::{first_scan, folder, opened, rejected};
 use crate::common::{PERIOD_US, START_US, Sweep, read, write_png, write_radiate};
-use crate::{first_scan, folder, opened, rejected};
 
 /// Writes three scans to `folder`, named by the stamp of row `named`; a microsecond has `unit` units of the stamps.
 fn write_named(folder: &Path, bins: usize, start_us: i64, named: i64, unit: i64) {

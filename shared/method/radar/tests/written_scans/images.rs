@@ -7,8 +7,8 @@ use gyre_radar::{
     DatasetOptions, Format, OpenError, OwnedScan, ReadError, ScanLimits, open, reopen,
 };
 
+use super::{first_scan, folder, opened, rejected};
 use crate::common::{PERIOD_US, START_US, Sweep, read, write_oxford, write_png, write_radiate};
-use crate::{first_scan, folder, opened, rejected};
 
 #[test]
 fn written_powers_are_read_back() {

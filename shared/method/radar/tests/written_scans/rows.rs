@@ -5,8 +5,8 @@ use std::f32::consts::TAU;
 use gyre_radar::scan::flag;
 use gyre_radar::{AzimuthSource, DatasetOptions, Format, ReadError, open};
 
+use super::{first_scan, folder};
 use crate::common::{START_US, Sweep, read, write_oxford, write_png};
-use crate::{first_scan, folder};
 
 #[test]
 fn rows_that_are_not_one_sweep_are_rejected() {

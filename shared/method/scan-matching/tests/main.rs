@@ -1,0 +1,13 @@
+//! The searches and the refinement on generated scenes. One program, so that all of it is linked once.
+
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+mod conventions;
+mod exhaustive;
+mod hostile_input;
+mod known_motions;
+mod refinement;
+mod refinement_faults;
+mod slow_sweeps;

@@ -1,0 +1,8 @@
+//! Keyframes, loops and the corrected trajectory. One program, so that all of it is linked once.
+
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+mod closing;
+mod trajectory;

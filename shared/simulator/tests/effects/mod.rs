@@ -1,0 +1,13 @@
+//! Quantitative tests of each effect of the sensor, on and off.
+
+mod beam;
+mod chance;
+mod documentation;
+mod echoes;
+mod ground;
+mod highlights;
+mod motion;
+mod noise;
+mod scene;
+mod scintillation;
+mod weather;

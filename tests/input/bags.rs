@@ -1,0 +1,239 @@
+//! Bags of ROS 2: what a run has found, written and read by a reader that is not Gyre's own, and its scans taken back to the same motions.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+use crate::common::{
+    Ended, Run, gyre, odometry, python, real_data, recording, recording::with_constants,
+};
+
+fn export(source: &Path, bag: &Path, arguments: &[&str]) -> Ended {
+    let mut command = gyre();
+    command.arg("export").arg(source).arg("--mcap").arg(bag);
+    command.args(arguments);
+    Ended::of(command)
+}
+
+/// A run of a bag, with the resolved configuration of another run and the constants of the radar, which a bag does not have.
+fn replayed(of: &Run, bag: &Path) -> Run {
+    let run = Run::of_file(&of.out().join("config.toml")).data(bag);
+    with_constants(run).set("record.file=''")
+}
+
+fn replay(of: &Run, bag: &Path) -> String {
+    replayed(of, bag).complete()
+}
+
+fn bag(run: &Run, name: &str) -> PathBuf {
+    run.folder().join(name)
+}
+
+/// Returns what the independent reader says of the bag of a run, and of one with a radar that looks to the left; `None` where it is not
+/// installed.
+fn checked(bag: &Path, out: &Path, turned: Option<&Path>) -> Option<Value> {
+    let can = Command::new(python())
+        .args(["-c", "import rosbags, numpy"])
+        .output();
+    if !can.is_ok_and(|output| output.status.success()) {
+        println!(
+            "skipped: {} has no package rosbags, or GYRE_PYTHON names another",
+            python()
+        );
+        return None;
+    }
+    let script = Path::new(crate::PROJECT).join("tests/input/bags/check.py");
+    let mut command = Command::new(python());
+    command.arg(script).arg(bag).arg(out).args(turned);
+    let ended = Ended::of(command);
+    ended.succeeded();
+    Some(serde_json::from_str(&ended.stdout).unwrap())
+}
+
+/// The small recording with all its rows measured: a radar's driver publishes no others.
+fn completed() -> TempDir {
+    let whole = recording::copy(recording::SCANS);
+    for image in recording::images(whole.path()) {
+        recording::complete(&image);
+    }
+    whole
+}
+
+fn inspect(path: &Path, options: &[&str]) -> Ended {
+    let mut command = gyre();
+    command.arg("inspect").arg(path).args(options);
+    Ended::of(command)
+}
+
+#[test]
+fn a_run_exported_in_any_form_is_taken_back_to_the_same_motions() {
+    let whole = completed();
+    let run = Run::small().data(whole.path());
+    let motions = run.complete();
+    for (name, form) in [("turns", "b-scan"), ("azimuths.mcap", "fft")] {
+        let bag = bag(&run, name);
+        export(run.out(), &bag, &["--scans", form]).succeeded();
+        assert_eq!(replay(&run, &bag), motions, "{form}");
+    }
+}
+
+#[test]
+fn real_scans_are_taken_back_to_the_same_motions() {
+    let Some(data) = real_data("radiate-2019-02-12") else {
+        return;
+    };
+    let configuration = Path::new(crate::PROJECT).join("configs/radiate.toml");
+    let run = Run::of_file(&configuration)
+        .data(&data)
+        .set("source.scans=30");
+    let motions = run.complete();
+    let path = bag(&run, "bag.mcap");
+    export(run.out(), &path, &[]).succeeded();
+    let again = Run::of_file(&configuration).data(&path);
+    assert_eq!(again.complete(), motions);
+    let inspected = inspect(&path, &[]);
+    inspected.succeeded();
+    assert!(
+        inspected.stdout.contains("ros2-bag"),
+        "{}",
+        inspected.stdout
+    );
+}
+
+#[test]
+fn odometry_transforms_and_the_map_are_those_of_the_run_to_another_reader() {
+    let whole = completed();
+    let run = Run::small().data(whole.path()).set("slam.kind=graph");
+    // Some motions are predicted.
+    let run = run.set("refinement.min_overlap=0.98");
+    let run = run.set("refinement.firm_overlap=0.98");
+    let motions = odometry::rows(&run.complete()).len();
+    let path = bag(&run, "bag");
+    let exported = export(run.out(), &path, &[]);
+    exported.succeeded();
+    assert!(path.join("metadata.yaml").is_file());
+    let turned = bag(&run, "turned");
+    export(run.out(), &turned, &["--mounting", "0,0,90"]).succeeded();
+    let Some(figures) = checked(&path, run.out(), Some(&turned)) else {
+        return;
+    };
+    assert_eq!(figures["odometry"], motions + 1);
+    assert_ne!(figures["predicted"], 0);
+    assert_eq!(figures["b_scans"], recording::SCANS);
+    let topics = figures["topics"].to_string();
+    for topic in [
+        "/map",
+        "/tf",
+        "/tf_static",
+        "/radar_data/configuration_data",
+    ] {
+        assert!(topics.contains(&format!("{topic:?}")), "{topics}");
+    }
+}
+
+#[test]
+fn a_recorded_run_becomes_the_same_bag() {
+    let whole = completed();
+    let run = Run::small().data(whole.path());
+    let recorded = bag(&run, "drive.mcap");
+    let run = run
+        .argument("--record", recorded.to_str().unwrap())
+        .set("run.window=32");
+    let motions = run.complete();
+    let path = bag(&run, "bag");
+    export(&recorded, &path, &[]).succeeded();
+    assert_eq!(replay(&run, &path), motions);
+    if let Some(figures) = checked(&path, run.out(), None) {
+        assert_eq!(figures["b_scans"], recording::SCANS);
+    }
+}
+
+#[test]
+fn a_dataset_becomes_a_bag_of_its_scans() {
+    let whole = completed();
+    let run = Run::small().data(whole.path());
+    let path = bag(&run, "scans.mcap");
+    let exported = export(whole.path(), &path, &["--scans", "b-scan,fft"]);
+    exported.succeeded();
+    let constants = fs::read_to_string(recording::small().join("dataset.toml")).unwrap();
+    let constants: toml::Table = constants.parse().unwrap();
+    let lost = ["range_offset_m", "doppler_s", "azimuth_eccentricity_rad"];
+    for key in lost.into_iter().filter(|key| constants.contains_key(*key)) {
+        let says = exported.stderr.contains(&format!("--set dataset.{key}="));
+        let is_zero = constants[key].as_float() == Some(0.0);
+        assert_ne!(says, is_zero, "{key}: {}", exported.stderr);
+    }
+    assert!(!exported.stderr.contains("interpolated"));
+    assert!(
+        exported.stdout.contains("/radar_data/fft_data 9600"),
+        "{}",
+        exported.stdout
+    );
+    Run::small().data(&path).finish().refused_with(&[
+        "scans on several topics",
+        "--set dataset.topic=/radar_data/",
+    ]);
+    let motions = run.complete();
+    let again = replayed(&run, &path).set("dataset.topic='/radar_data/fft_data'");
+    assert_eq!(again.complete(), motions);
+    inspect(&path, &[]).refused_with(&["scans on several topics"]);
+    inspect(&path, &["--set", "dataset.topic=/radar_data/fft_data"]).succeeded();
+}
+
+#[test]
+fn a_damaged_scan_is_skipped_and_counted() {
+    let run = Run::of_recording();
+    run.complete();
+    let path = bag(&run, "bag.mcap");
+    let exported = export(run.out(), &path, &[]);
+    exported.succeeded();
+    // A few rows of the recording are not measured, as in real ones.
+    let says = exported.stderr.contains("interpolated rows: ");
+    assert!(says, "{}", exported.stderr);
+    let bytes = fs::read(&path).unwrap();
+    // Zstandard's signature begins the content of each chunk; the fifth one has scans.
+    let magic = [0x28, 0xb5, 0x2f, 0xfd];
+    let chunks: Vec<usize> = (0..bytes.len() - 4)
+        .filter(|at| bytes[*at..*at + 4] == magic)
+        .collect();
+    let mut damaged = bytes.clone();
+    damaged[chunks[chunks.len() / 2] + 1000] ^= 0xff;
+    fs::write(&path, damaged).unwrap();
+    let again = Run::of_file(&run.out().join("config.toml")).data(&path);
+    again.complete();
+    let fewer = odometry::rows(&again.odometry()).len();
+    assert!(fewer > 0 && fewer < recording::SCANS - 1, "{fewer}");
+    // Cut within a chunk: what is before it is read.
+    let cut = bag(&run, "cut.mcap");
+    fs::write(&cut, &bytes[..chunks[chunks.len() / 2] + 1000]).unwrap();
+    let inspected = inspect(&cut, &[]);
+    inspected.succeeded();
+    assert!(
+        inspected.stdout.contains("has no end"),
+        "{}",
+        inspected.stdout
+    );
+}
+
+#[test]
+fn bags_that_cannot_be_read_are_refused_with_a_sentence() {
+    let run = Run::of_recording();
+    run.complete();
+    let odometry = bag(&run, "odometry");
+    export(run.out(), &odometry, &["--scans", "none"]).succeeded();
+    let of = |path: &Path| Run::small().data(path).finish();
+    of(&odometry).refused_with(&["has no scans of a radar", "/odom"]);
+    let database = bag(&run, "rosbag2_0.db3");
+    fs::write(&database, "SQLite format 3").unwrap();
+    of(&database).refused_with(&["SQLite", "ros2 bag convert"]);
+    let again = export(run.out(), &odometry, &[]);
+    again.failed_with(&["it exists"]);
+    let nothing = tempfile::tempdir().unwrap();
+    export(nothing.path(), &bag(&run, "nothing"), &[]).failed_with(&["no PNG images"]);
+    assert!(!bag(&run, "nothing").exists());
+}

@@ -1,0 +1,8 @@
+//! Input: recordings, times and files that are wrong, away or hostile, bags, and simulated drives.
+
+mod bags;
+pub mod breaks;
+mod hostile;
+mod lost;
+mod refused;
+mod simulation;

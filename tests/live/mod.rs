@@ -1,0 +1,5 @@
+//! Live runs: a radar does not wait.
+
+mod load;
+pub mod radar;
+mod radar_faults;

@@ -1,0 +1,282 @@
+//! What a live run does when a radar or its network fails: every scan is published or counted, and the radar is found again.
+
+use std::{
+    io::{self, Read, Write},
+    net::{Ipv4Addr, SocketAddrV4, TcpListener, TcpStream, UdpSocket},
+    ops::Range,
+    thread,
+    time::{Duration, Instant},
+};
+
+use gyre_colossus::{Azimuth, Configuration, Powers, asterix, write_keep_alive};
+use rustix::process::Signal;
+use serde_json::Value;
+
+use crate::{
+    common::{Run, Running, gyre, odometry, processes, recording},
+    live::radar::{Played, Radar, group, run_at},
+    operate::commands::await_status,
+};
+
+/// Ends a run of a radar that has ended, with a pose of each scan that it has published.
+fn interrupt(run: &Run, running: Running) -> Value {
+    // What is on its way arrives.
+    thread::sleep(Duration::from_millis(500));
+    await_status(run, "a pose of each scan", |status| {
+        let count = |key: &str| status[key].as_u64().unwrap_or_default();
+        count("published") == count("poses") + count("dropped")
+    });
+    running.signal(Signal::INT);
+    running.finish();
+    run.summary()
+}
+
+/// A count of the source.
+fn count(summary: &Value, key: &str) -> u64 {
+    summary["stages"]["radar-replay"][key].as_u64().unwrap()
+}
+
+/// Every scan that was played is published or counted, and no more azimuths are missing than were lost, but for those that were on their
+/// way when a connection ended.
+fn assert_all_counted(summary: &Value, played: &Played) {
+    let published = summary["published"].as_u64().unwrap();
+    let left_out = count(summary, "scans_left_out");
+    assert_eq!(
+        published + left_out,
+        played.scans,
+        "{played:?}: {published} published, {left_out} left out, {}",
+        summary["stages"]["radar-replay"]
+    );
+    let missing = count(summary, "missing_azimuths");
+    // Those of scans that were left out are not missing from any.
+    let of_scans = played.lost_azimuths.saturating_sub(missing);
+    assert!(
+        missing <= played.lost_azimuths + 400 * left_out && of_scans <= 400 * left_out + 4,
+        "{played:?}: {missing} missing"
+    );
+}
+
+#[test]
+fn every_scan_that_a_radar_plays_is_published_or_counted_also_by_a_source_that_dies() {
+    let faults = [
+        "--lose",
+        "0.01",
+        "--reset-every",
+        "5",
+        "--garbage-every",
+        "4",
+        "--rate",
+        "1",
+    ];
+    let mut radar = Radar::playing(recording::small(), &faults);
+    let run = run_at(&radar.address);
+    let mut running = run.start();
+    running.await_poses(6).kill("radar-replay");
+    let played = radar.played();
+    let summary = interrupt(&run, running);
+    assert_eq!(summary["restarts"]["radar-replay"], 1);
+    assert_all_counted(&summary, &played);
+    // Those of the process that was killed, too: three resets come after it.
+    assert!(count(&summary, "reconnections") > played.resets.min(3));
+    assert!(count(&summary, "damaged_messages") >= 1);
+    assert!(count(&summary, "scans_left_out") >= played.resets);
+    odometry::assert_unbroken(&odometry::rows(&run.odometry()));
+}
+
+#[test]
+fn a_source_that_stands_still_does_not_hide_its_delay() {
+    let mut radar = Radar::playing(recording::small(), &["--lose", "0.01", "--rate", "1"]);
+    let run = run_at(&radar.address);
+    let mut running = run.start();
+    let source = running.await_poses(6).await_stage("radar-replay");
+    processes::send(source, Signal::STOP);
+    thread::sleep(Duration::from_millis(1500));
+    processes::send(source, Signal::CONT);
+    let played = radar.played();
+    let summary = interrupt(&run, running);
+    assert_all_counted(&summary, &played);
+    let longest_us = summary["latency"]["sensor_to_pose"]["max_us"].as_f64();
+    // The first scan that it read was complete a turn after it was stopped, at the latest.
+    assert!(longest_us.unwrap() > 1e6, "{}", summary["latency"]);
+}
+
+/// Passes on what a group receives to another, but for those datagrams that come within a time of the first azimuth.
+fn relay_with_outage(from: &str, to: String, outage: Range<Duration>) {
+    let group = from.parse::<SocketAddrV4>().unwrap();
+    let receiver = UdpSocket::bind(group).unwrap();
+    receiver
+        .join_multicast_v4(group.ip(), &Ipv4Addr::LOCALHOST)
+        .unwrap();
+    let sender = UdpSocket::bind("127.0.0.1:0").unwrap();
+    // It ends with the process of the tests.
+    thread::spawn(move || {
+        let (mut datagram, mut begun) = ([0; 1 << 16], None);
+        loop {
+            let count = receiver.recv(&mut datagram).unwrap();
+            // A description has no powers.
+            if count > 200 {
+                begun.get_or_insert_with(Instant::now);
+            }
+            let is_lost = begun.is_some_and(|it: Instant| outage.contains(&it.elapsed()));
+            if !is_lost {
+                sender.send_to(&datagram[..count], &to).unwrap();
+            }
+        }
+    });
+}
+
+#[test]
+fn scans_of_which_no_datagram_arrives_are_counted() {
+    let outage = Duration::from_secs(2)..Duration::from_millis(4500);
+    relay_with_outage(&group(4), group(6), outage);
+    let mut radar = Radar::sending(&group(4), recording::small(), &["--rate", "1"]);
+    let run = run_at(&format!("udp://{}", group(6)))
+        .set("source.interface='127.0.0.1'")
+        .set("source.silence_s=10");
+    let running = run.start();
+    let mut played = radar.played();
+    let summary = interrupt(&run, running);
+    // On a busy machine the radar may have begun before the run.
+    let begun = odometry::columns(&run.odometry(), &["stamp_ns"])[0][0].clone();
+    let recorded = Run::small().data(recording::small()).complete();
+    let stamps = odometry::columns(&recorded, &["stamp_ns"]);
+    played.scans -= stamps.iter().position(|row| row[0] == begun).unwrap() as u64;
+    let published = summary["published"].as_u64().unwrap();
+    let left_out = count(&summary, "scans_left_out");
+    assert!(left_out >= 5, "{left_out}");
+    assert_eq!(published + left_out, played.scans, "{left_out} left out");
+}
+
+/// What a relay does with a connection.
+#[derive(Clone, Copy)]
+enum Connection {
+    /// Passes on what radar and client send.
+    Relayed,
+    /// Sends bytes that are no messages.
+    Junk,
+    /// Describes the radar, and says again and again that it is alive.
+    KeptAlive,
+}
+
+/// Listens for connections, and treats one after the other as told; all further ones are relayed.
+fn relay(radar: &str, all: &'static [Connection]) -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap().to_string();
+    let radar = radar.to_owned();
+    // They end with the process of the tests.
+    thread::spawn(move || {
+        for (k, client) in listener.incoming().enumerate() {
+            let (client, radar) = (client.unwrap(), radar.clone());
+            thread::spawn(move || match all.get(k) {
+                Some(Connection::Junk) => send_junk(client),
+                Some(Connection::KeptAlive) => keep_alive(client, &radar),
+                _ => pass_on(client, &radar),
+            });
+        }
+    });
+    address
+}
+
+fn pass_on(mut client: TcpStream, radar: &str) -> io::Result<()> {
+    let mut radar = TcpStream::connect(radar)?;
+    let (mut requests, mut to_radar) = (client.try_clone()?, radar.try_clone()?);
+    thread::spawn(move || io::copy(&mut requests, &mut to_radar));
+    io::copy(&mut radar, &mut client).map(|_| ())
+}
+
+fn send_junk(mut client: TcpStream) -> io::Result<()> {
+    for _ in 0..100 {
+        client.write_all(&[0x55; 1 << 16])?;
+    }
+    thread::sleep(Duration::from_secs(5));
+    Ok(())
+}
+
+fn keep_alive(mut client: TcpStream, radar: &str) -> io::Result<()> {
+    let mut described = [0; 256];
+    let count = TcpStream::connect(radar)?.read(&mut described)?;
+    client.write_all(&described[..count])?;
+    let mut alive = Vec::new();
+    write_keep_alive(&mut alive);
+    loop {
+        client.write_all(&alive)?;
+        thread::sleep(Duration::from_millis(200));
+    }
+}
+
+#[test]
+fn what_sends_no_azimuths_is_left_and_the_radar_is_found_again() {
+    let radar = Radar::playing(recording::small(), &["--repeat"]);
+    // Before the run it is asked for its configuration.
+    let connections = &[
+        Connection::Relayed,
+        Connection::Junk,
+        Connection::Junk,
+        Connection::KeptAlive,
+    ];
+    let run = run_at(&relay(&radar.address, connections)).set("source.scans=12");
+    let mut running = run.start();
+    running.await_stages();
+    // It is not well until azimuths come.
+    let ps = || {
+        let mut ps = gyre();
+        ps.args(["ps", "--check", "--out"]).arg(run.out());
+        ps.output().unwrap()
+    };
+    let deaf = "no azimuths arrive from the radar";
+    while !String::from_utf8_lossy(&ps().stderr).contains(deaf) {
+        assert!(running.poses() == 0, "it was never said");
+    }
+    running.finish().succeeded();
+    let summary = run.summary();
+    assert_eq!(summary["published"], 12);
+    assert_eq!(count(&summary, "reconnections"), 3);
+    let log = run.result("log.jsonl");
+    for words in ["it does not speak Colossus", "it sent no azimuth for 1s"] {
+        assert!(log.contains(words), "{log}");
+    }
+}
+
+#[test]
+fn datagrams_of_others_are_passed_over_and_counted() {
+    let to = group(5);
+    let radar = Radar::sending(&to, recording::small(), &["--repeat"]);
+    let run = radar.received(12);
+    let mut running = run.start();
+    running.await_poses(2);
+    let _other = Radar::to(
+        &["--udp", &to],
+        recording::small(),
+        &["--repeat", "--rate", "1"],
+    );
+    let forger = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let large = Configuration {
+        azimuth_samples: 400,
+        bin_size: 438,
+        range_in_bins: 60_000,
+        encoder_size: 5600,
+        rotation_mhz: 4000,
+        ..Configuration::default()
+    };
+    let mut number = 0;
+    while !running.is_over() {
+        let azimuth = Azimuth {
+            sweep_counter: 0,
+            encoder: 14,
+            seconds: [0; 4],
+            split_seconds: [0; 4],
+            powers: Powers::Eight(&[9; 4]),
+        };
+        asterix::write_azimuth(&large, &azimuth, &mut number, &mut |datagram| {
+            forger.send_to(datagram, &to).unwrap();
+        });
+        thread::sleep(Duration::from_millis(20));
+    }
+    running.finish().succeeded();
+    let summary = run.summary();
+    assert_eq!(summary["published"], 12);
+    assert_eq!(count(&summary, "reconnections"), 0);
+    // Some of each: a scan of the other, and one datagram in 20 ms.
+    assert!(count(&summary, "foreign_messages") > 100);
+    assert!(run.result("log.jsonl").contains("give each radar a group"));
+}

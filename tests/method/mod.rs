@@ -1,0 +1,11 @@
+//! The method by the processes of a run: the same bits every time, and the accuracy that is to be kept.
+
+pub mod in_process;
+mod joint_search;
+mod k2pi;
+pub mod learned_masks;
+mod masks;
+mod pipeline;
+mod real_scans;
+mod refinement;
+mod standstill;

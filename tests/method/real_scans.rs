@@ -1,0 +1,178 @@
+//! Real scans (`GYRE_DATA`) through the whole pipeline, with the accuracy that is to be kept.
+
+use std::path::{Path, PathBuf};
+
+use crate::common::{Ended, Run, odometry, real_data, runtime_is_installed};
+use serde_json::Value;
+
+fn configuration(name: &str) -> PathBuf {
+    Path::new(crate::PROJECT).join("configs").join(name)
+}
+
+fn figure(json: &Value, path: &str) -> f64 {
+    let value = json
+        .pointer(path)
+        .unwrap_or_else(|| panic!("no {path} in {json:#}"));
+    value
+        .as_f64()
+        .unwrap_or_else(|| panic!("{path} is {value}"))
+}
+
+#[test]
+fn oxford_turns_and_drives_as_its_ground_truth_says() {
+    let Some(data) = real_data("oxford-2019-01-10-14-36-48") else {
+        return;
+    };
+    let run = Run::of_file(&configuration("oxford.toml")).data(&data);
+    assert_eq!(odometry::rows(&run.complete()).len(), 10);
+    let summary = run.summary();
+    let rotation_deg = figure(&summary, "/evaluation/rpe/rotation_rmse_deg");
+    let forward = figure(&summary, "/evaluation/rpe/forward_ratio");
+    println!("rotation {rotation_deg:.3} deg a pair, forward {forward:.4} of the truth");
+    assert!(
+        rotation_deg <= 0.11 && (forward - 1.0).abs() <= 0.005,
+        "{rotation_deg} deg, {forward}"
+    );
+}
+
+#[test]
+#[ignore = "nightly: a whole drive"]
+fn radiate_drifts_less_than_cfear_2() {
+    let Some(data) = real_data("radiate-2019-02-12") else {
+        return;
+    };
+    let run = Run::of_file(&configuration("radiate.toml")).data(&data);
+    assert_eq!(odometry::rows(&run.complete()).len(), 465);
+    let summary = run.summary();
+    for (path, most) in [
+        ("/evaluation/kitti/translation_percent", 1.7),
+        ("/evaluation/kitti/rotation_deg_per_100m", 0.65),
+        ("/evaluation/ate/rmse_m", 1.7),
+        ("/evaluation/seg/percent", 0.33),
+    ] {
+        let value = figure(&summary, path);
+        println!("{path} {value:.3}");
+        assert!(value <= most, "{path} is {value}, more than {most}");
+    }
+}
+
+/// Translation (%), rotation (deg/100 m), ATE (m) and seg (%) of a run.
+fn drift(run: &Run) -> [f64; 4] {
+    run.complete();
+    let summary = run.summary();
+    [
+        "kitti/translation_percent",
+        "kitti/rotation_deg_per_100m",
+        "ate/rmse_m",
+        "seg/percent",
+    ]
+    .map(|path| figure(&summary, &format!("/evaluation/{path}")))
+}
+
+fn masked(run: Run, model: &str) -> Run {
+    run.masked_by(&configuration("../models").join(model))
+}
+
+#[test]
+#[ignore = "nightly: a whole drive"]
+fn masks_help_on_scans_of_a_kind_that_they_have_never_seen() {
+    let Some(data) = real_data("radiate-2019-02-12") else {
+        return;
+    };
+    if !runtime_is_installed() {
+        return;
+    }
+    let run = |file: &str| Run::of_file(&configuration(file)).data(&data);
+    // What radiate.toml says of the sensor.
+    let sensor = [
+        "format='radiate'",
+        "range_offset_m=-0.15",
+        "azimuth_eccentricity_rad=0.0025",
+        "doppler_s=0.042",
+    ];
+    let papers = || {
+        sensor.iter().fold(run("f-mbym.toml"), |run, fact| {
+            run.set(&format!("dataset.{fact}"))
+        })
+    };
+    let pairs = [
+        (
+            "the paper's form",
+            papers().set("masking.kind=none"),
+            masked(papers(), "light-255.toml"),
+            0.6,
+        ),
+        (
+            "Gyre",
+            run("radiate.toml"),
+            masked(run("radiate.toml"), "gyre-255.toml"),
+            1.03,
+        ),
+    ];
+    for (name, without, with, most) in pairs {
+        let [without, with] = [drift(&without), drift(&with)];
+        println!("{name}: {without:.3?} without a mask, {with:.3?} with it");
+        let worse = with
+            .iter()
+            .zip(&without)
+            .find(|(with, without)| **with > most * **without);
+        assert!(worse.is_none(), "{name}: {worse:?}");
+    }
+}
+
+#[test]
+fn fog_without_ground_truth_is_run_all_the_same() {
+    let Some(data) = real_data("radiate-tiny_foggy") else {
+        return;
+    };
+    let run = Run::of_file(&configuration("radiate.toml")).data(&data);
+    assert_eq!(odometry::rows(&run.complete()).len(), 17);
+    assert!(run.summary()["evaluation"].is_null());
+}
+
+#[test]
+fn a_sample_of_one_scan_is_refused_with_the_reason() {
+    let Some(data) = real_data("samples") else {
+        return;
+    };
+    for sample in ["boreas-rt-2024-12-03", "fomo-2025-10-14"] {
+        let run = Run::configured("").data(&data.join(sample));
+        run.finish()
+            .refused_with(&[sample, "has 1 scan:", "a motion is between two"]);
+    }
+}
+
+#[test]
+fn published_kitti_figures_are_reproduced() {
+    let Some(golden) = real_data("golden") else {
+        return;
+    };
+    let evaluate = |estimate: &Path, truth: &Path, step: &str| {
+        let mut command = crate::common::gyre();
+        command
+            .args(["evaluate", "--json", "--step", step, "--estimate"])
+            .arg(estimate);
+        command.arg("--ground-truth").arg(truth);
+        let json: Value = serde_json::from_str(&Ended::of(command).succeeded().stdout).unwrap();
+        let figures = ["/kitti/translation_percent", "/kitti/rotation_deg_per_100m"];
+        figures.map(|path| format!("{:.5}", figure(&json, path)))
+    };
+    let metric = golden.join("kitti-metric");
+    for (step, figures) in [
+        ("10", ["1.16688", "0.34558"]),
+        ("4", ["1.16084", "0.34663"]),
+        ("1", ["1.16168", "0.34696"]),
+    ] {
+        assert_eq!(
+            evaluate(
+                &metric.join("estimate.txt"),
+                &metric.join("ground_truth.txt"),
+                step
+            ),
+            figures
+        );
+    }
+    let truth = golden.join("../trajectories/oxford-2019-01-10-11-46-21.radar_odometry.csv");
+    let chain = evaluate(&golden.join("csv-chain/estimate.txt"), &truth, "10");
+    assert_eq!(chain, ["1.22286", "0.39305"]);
+}

@@ -1,0 +1,87 @@
+//! A vehicle that stops, stands and drives off: the run says so, and a death meanwhile changes nothing.
+
+use std::fmt::Write;
+
+use rustix::process::Signal;
+
+use crate::{
+    common::{Run, odometry::columns, recording, send},
+    method::in_process,
+};
+
+/// Poses a second of the trajectory.
+const RATE_HZ: usize = 4;
+/// Length of the drive, s.
+const DRIVE_S: usize = 14;
+/// The motions between the stop and the start.
+const STANDING: std::ops::Range<usize> = 3 * RATE_HZ..11 * RATE_HZ;
+
+/// Brakes from 6 m/s for 3 s, stands for 8 s, and drives off at 2 m/s².
+fn trajectory() -> String {
+    let speed_mps = |second: f64| match second {
+        ..3.0 => 6.0 - 2.0 * second,
+        11.0.. => 2.0 * (second - 11.0),
+        _ => 0.0,
+    };
+    const FINE: usize = 100;
+    let (mut text, mut x_m) = (String::new(), 0.0);
+    for k in 0..=DRIVE_S * RATE_HZ * FINE {
+        let second = k as f64 / (RATE_HZ * FINE) as f64;
+        if k % FINE == 0 {
+            let _ = writeln!(text, "{second} {x_m} 0 0 0 0 0 1");
+        }
+        x_m += speed_mps(second) / (RATE_HZ * FINE) as f64;
+    }
+    text
+}
+
+fn run() -> Run {
+    let recording = recording::along("stop-and-go", &trajectory());
+    Run::of_recording_named(recording.to_str().unwrap())
+}
+
+#[test]
+fn the_motions_of_a_standing_vehicle_are_zero_and_said_to_be() {
+    let run = run();
+    let csv = run.complete();
+    let rows = columns(&csv, &["stationary", "x_m", "y_m", "yaw_rad"]);
+    let standing: Vec<usize> = (0..rows.len()).filter(|row| rows[*row][0] == "1").collect();
+    assert_eq!(run.summary()["motions"]["stationary"], standing.len());
+    assert!(standing.len() > STANDING.len() * 9 / 10, "{standing:?}");
+    let stop_to_start = STANDING.start - 2..STANDING.end + 2;
+    assert!(
+        standing.iter().all(|row| stop_to_start.contains(row)),
+        "{standing:?}"
+    );
+    for row in standing {
+        assert!(
+            rows[row][1..].iter().all(|value| value == "0.000000000"),
+            "{:?}",
+            rows[row]
+        );
+    }
+}
+
+/// The state of the standstill is part of the checkpoint.
+#[test]
+fn refinement_killed_while_the_vehicle_stands_goes_on() {
+    let run = run();
+    let alone = run.clone().into(&run.folder().join("alone")).complete();
+    let run = run.rate("8").set("stages.refinement.restart.limit=1000");
+    let mut running = run.start();
+    for poses in [14, 20, 30, 40, 45, 46] {
+        running.await_poses(poses);
+        if let Some(pid) = running.stages().get("refinement") {
+            send(*pid, Signal::KILL);
+        }
+    }
+    let ended = running.finish();
+    ended.succeeded();
+    assert_eq!(run.odometry(), alone, "{}", ended.stderr);
+    assert!(run.summary()["restarts"]["refinement"].as_u64().unwrap() > 3);
+}
+
+#[test]
+fn one_process_holds_the_pose_as_a_run_does() {
+    assert_eq!(in_process::assert_same_bits(&run()), DRIVE_S * RATE_HZ);
+}

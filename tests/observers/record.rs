@@ -1,0 +1,455 @@
+//! Recordings of runs: they change nothing, survive kills and full disks, say what is missing, and replay to the same bytes.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+    thread,
+    time::Duration,
+};
+
+use gyre_recording::{Recording, open_recording, parts};
+use rustix::process::Signal;
+use serde_json::{Value, json};
+
+use crate::{
+    common::{Ended, Run, Running, gyre, processes, python, real_data, send},
+    operate::commands::{ask, await_status, process},
+};
+
+const SCANS: usize = 24;
+/// Every topic that a replay can begin with.
+const ALL: &str = "record.topics=['scan','masked','rotation','motion','refined','pose','log']";
+/// With so large a window the queues hold all scans of these tests: nothing is missed, however slow the machine is.
+const WINDOW: &str = "run.window=32";
+
+/// A drive that makes a loop, through small rasters.
+fn simulated() -> Run {
+    Run::configured(&format!(
+        "[simulation]\nscans = {SCANS}\n[raster]\nn = 127\ncell_m = 0.8\n"
+    ))
+    .set(WINDOW)
+}
+
+fn file(run: &Run) -> PathBuf {
+    run.folder().join("drive.mcap")
+}
+
+fn recorded(run: &Run) -> Run {
+    let path = file(run);
+    run.clone().argument("--record", path.to_str().unwrap())
+}
+
+/// A replay with the configuration that is in the recording.
+fn replay(recording: &Path, arguments: &[&str]) -> String {
+    let run = Run::configured("");
+    let mut command = gyre();
+    command.arg("run").arg("--data").arg(recording);
+    command.args(arguments).arg("--out").arg(run.out());
+    Ended::of(command).succeeded();
+    run.odometry()
+}
+
+fn seqs(recording: &Recording, topic: &str) -> Vec<u64> {
+    recording.entries(topic).map(|entry| entry.seq).collect()
+}
+
+/// Waits for the recorder of a run, another one than `not`.
+fn await_recorder(running: &mut Running, not: Option<u32>) -> u32 {
+    loop {
+        let recorder = processes::child_with(running.pid(), "record");
+        if let Some(pid) = recorder.filter(|pid| Some(*pid) != not) {
+            return pid;
+        }
+        assert!(!running.is_over(), "the run ended without a recorder");
+        thread::sleep(Duration::from_millis(5));
+    }
+}
+
+#[test]
+fn a_recorded_run_has_the_same_results_and_replays_to_them_from_every_topic() {
+    let undisturbed = simulated().complete();
+    let run = recorded(&simulated()).set(ALL);
+    let ended = run.finish();
+    ended.succeeded();
+    assert!(ended.stderr.contains("missed nothing"), "{}", ended.stderr);
+    assert_eq!(run.odometry(), undisturbed);
+    let recording = open_recording(&file(&run)).unwrap();
+    for topic in ["scan", "masked", "rotation", "motion", "refined", "pose"] {
+        let all: Vec<u64> = (0..SCANS as u64).collect();
+        assert_eq!(seqs(&recording, topic), all, "{topic}");
+    }
+    assert_eq!(recording.cut().count(), 0);
+    assert_eq!(replay(&file(&run), &[]), undisturbed);
+    for topic in ["masked", "rotation", "motion", "refined"] {
+        let odometry = replay(&file(&run), &["--from", topic]);
+        assert_eq!(odometry, undisturbed, "from {topic}");
+    }
+}
+
+#[test]
+fn a_killed_recorder_changes_no_byte_and_another_one_goes_on_in_the_next_part() {
+    let undisturbed = simulated().complete();
+    let run = recorded(&simulated()).rate("1");
+    let mut running = run.start();
+    running.await_poses(SCANS / 4);
+    let killed = await_recorder(&mut running, None);
+    send(killed, Signal::KILL);
+    await_recorder(&mut running, Some(killed));
+    let ended = running.finish();
+    ended.succeeded();
+    assert!(ended.stderr.contains("started again"), "{}", ended.stderr);
+    assert_eq!(run.odometry(), undisturbed);
+    assert_eq!(parts(&file(&run)).len(), 2);
+    let recording = open_recording(&file(&run)).unwrap();
+    assert_eq!(
+        recording.cut().count(),
+        1,
+        "the part of the killed one has no end"
+    );
+    let first = Recording::open(&[file(&run)]).unwrap();
+    let of_first = seqs(&first, "scan");
+    assert!(
+        !of_first.is_empty(),
+        "what was written before the kill can be read"
+    );
+    assert_eq!(seqs(&recording, "scan").len(), SCANS);
+    assert_eq!(replay(&file(&run), &[]), undisturbed);
+}
+
+#[test]
+fn a_recording_in_several_files_replays_to_the_same_bytes() {
+    let run = recorded(&simulated()).set(ALL).set("record.split_s=1.5");
+    let odometry = run.complete();
+    let files = parts(&file(&run));
+    // Six seconds of scans; a file may begin with a message of a scan that is in the one before.
+    assert!((4..8).contains(&files.len()), "{files:?}");
+    let recording = open_recording(&file(&run)).unwrap();
+    assert_eq!(seqs(&recording, "scan").len(), SCANS);
+    assert_eq!(recording.cut().count(), 0, "each file has its end");
+    assert_eq!(replay(run.folder(), &[]), odometry, "named by its folder");
+    assert_eq!(replay(&file(&run), &["--from", "masked"]), odometry);
+}
+
+#[test]
+fn a_recorder_that_is_killed_in_a_later_file_loses_none_of_the_earlier_ones() {
+    let run = recorded(&simulated()).rate("1").set("record.split_mb=1");
+    let mut running = run.start();
+    running.await_poses(SCANS / 2);
+    let killed = await_recorder(&mut running, None);
+    let before = parts(&file(&run));
+    assert!(before.len() > 1, "{before:?}");
+    send(killed, Signal::KILL);
+    await_recorder(&mut running, Some(killed));
+    running.finish().succeeded();
+    let recording = open_recording(&file(&run)).unwrap();
+    assert!(recording.cut().count() <= 1, "only the file of the kill");
+    assert!(parts(&file(&run)).len() > before.len());
+    assert_eq!(seqs(&recording, "scan").len(), SCANS);
+    assert_eq!(replay(&file(&run), &[]), run.odometry());
+}
+
+#[test]
+fn a_recorder_that_is_stopped_for_long_says_exactly_what_it_missed() {
+    let run = recorded(&simulated())
+        .set(ALL)
+        .rate("1")
+        .set("run.window=1");
+    let mut running = run.start();
+    running.await_poses(SCANS / 4);
+    let recorder = await_recorder(&mut running, None);
+    send(recorder, Signal::STOP);
+    running.await_poses(SCANS - 4);
+    send(recorder, Signal::CONT);
+    let ended = running.finish();
+    assert_eq!(run.odometry(), simulated().set("run.window=1").complete());
+    let missed = counted_as_missed(&run, &ended);
+    let recording = open_recording(&file(&run)).unwrap();
+    // The scans that are there are played, and those that are not are named; what needs every message is refused.
+    let again = Run::configured("")
+        .data(&file(&run))
+        .set("source.max_unreadable=100");
+    let sentence = format!("{missed} of the {SCANS} scans");
+    again.finish().failed_with(&[&sentence, "cannot be read"]);
+    let lost = (0..SCANS as u64)
+        .find(|seq| !seqs(&recording, "masked").contains(seq))
+        .unwrap();
+    let lacks = format!("lacks message {lost} of topic `masked`");
+    let from = Run::configured("")
+        .data(&file(&run))
+        .argument("--from", "masked");
+    from.finish().refused_with(&[&lacks]);
+}
+
+/// Returns the number of scans that are not there, four or more, which the recorder has said and written.
+fn counted_as_missed(run: &Run, ended: &Ended) -> usize {
+    let recording = open_recording(&file(run)).unwrap();
+    let there = seqs(&recording, "scan");
+    let missed = SCANS - there.len();
+    assert!(missed >= 4, "{there:?}");
+    assert_eq!(recording.missed()["scan"], missed as u64);
+    assert!(
+        ended.stderr.contains(&format!("missed {missed} scan")),
+        "{}",
+        ended.stderr
+    );
+    missed
+}
+
+#[test]
+fn what_a_killed_recorder_had_not_written_and_the_next_one_did_not_find_is_counted() {
+    let run = recorded(&simulated()).rate("1").set("run.window=1");
+    let mut running = run.start();
+    running.await_poses(SCANS / 4);
+    let killed = await_recorder(&mut running, None);
+    // It writes nothing from here on, so that the gap is longer than the history of the topics, however fast the machine is.
+    send(killed, Signal::STOP);
+    running.await_poses(SCANS - 8);
+    send(killed, Signal::KILL);
+    await_recorder(&mut running, Some(killed));
+    let ended = running.finish();
+    ended.succeeded();
+    counted_as_missed(&run, &ended);
+    assert!(!ended.stderr.contains("missed nothing"), "{}", ended.stderr);
+}
+
+#[test]
+fn a_recorder_that_dies_right_before_the_end_is_reported() {
+    let run = recorded(&simulated())
+        .rate("1")
+        .set("record.topics=['scan']");
+    let mut running = run.start();
+    running.await_poses(SCANS / 4);
+    let recorder = await_recorder(&mut running, None);
+    send(recorder, Signal::STOP);
+    running.await_poses(SCANS);
+    send(recorder, Signal::KILL);
+    let ended = running.finish();
+    ended.succeeded();
+    let has_said = ["end of the recording is missing", " scan: the recording"];
+    assert!(
+        has_said.iter().any(|it| ended.stderr.contains(it)),
+        "{}",
+        ended.stderr
+    );
+}
+
+#[test]
+fn a_recording_holds_the_health_of_the_run() {
+    let run = recorded(&simulated()).rate("1");
+    let mut running = run.start();
+    running.await_poses(SCANS / 4).kill("masking");
+    running.finish().succeeded();
+    let health = health(&file(&run));
+    let restarts = |health: &Value| {
+        let processes = health["status"]["processes"].as_array().unwrap();
+        let masking = processes.iter().find(|it| it["name"] == "masking").unwrap();
+        masking["restarts"].as_u64().unwrap()
+    };
+    assert!(
+        health.len() >= 2,
+        "once a second for six seconds: {}",
+        health.len()
+    );
+    assert_eq!(restarts(health.last().unwrap()), 1);
+}
+
+/// The messages on `/health`.
+fn health(recording: &Path) -> Vec<Value> {
+    let bytes = fs::read(recording).unwrap();
+    let messages = mcap::MessageStream::new(&bytes)
+        .unwrap()
+        .map(Result::unwrap);
+    messages
+        .filter(|message| message.channel.topic == "/health")
+        .map(|message| serde_json::from_slice(&message.data).unwrap())
+        .collect()
+}
+
+#[test]
+fn the_recorder_is_listed_with_the_processes_and_started_again_on_request() {
+    let undisturbed = simulated().complete();
+    let run = recorded(&simulated()).rate("1");
+    let mut running = run.start();
+    running.await_poses(SCANS / 4);
+    let recorder = |what, is_as_wanted: &dyn Fn(&Value) -> bool| {
+        let status = await_status(&run, what, |status| {
+            is_as_wanted(process(status, "recorder"))
+        });
+        process(&status, "recorder").clone()
+    };
+    let first = recorder("a heartbeat", &|it| it["activity"] == "waiting");
+    assert_eq!(
+        (&first["restarts"], &first["missed"]),
+        (&json!(0), &json!(0))
+    );
+    assert!(ask(&run, &["ps"]).stdout.contains("\n  recorder "));
+    assert!(ask(&run, &["top", "--once"]).stdout.contains("\nrecorder "));
+    ask(&run, &["restart", "recorder"]).succeeded();
+    let second = recorder("a restart", &|it| it["activity"] == "waiting");
+    assert_ne!(first["pid"], second["pid"]);
+    assert_eq!(
+        (&second["restarts"], &second["last_death"]),
+        (&json!(1), &Value::Null)
+    );
+    send(second["pid"].as_u64().unwrap() as u32, Signal::KILL);
+    recorder("a restart after its death", &|it| {
+        it["restarts"] == 2 && it["last_death"] == "signal 9"
+    });
+    running.finish().succeeded();
+    assert_eq!(run.odometry(), undisturbed);
+    assert_eq!(parts(&file(&run)).len(), 3);
+    assert_eq!(
+        seqs(&open_recording(&file(&run)).unwrap(), "scan").len(),
+        SCANS
+    );
+}
+
+#[test]
+fn a_player_and_a_stage_that_are_killed_change_no_byte_of_a_replay() {
+    let run = recorded(&simulated()).set(ALL);
+    let odometry = run.complete();
+    let again = Run::configured("");
+    let mut command = gyre();
+    command.arg("run").arg("--data").arg(file(&run));
+    command
+        .args(["--from", "masked", "--rate", "2", "--out"])
+        .arg(again.out());
+    let mut running = again.start_as(command);
+    running.await_poses(SCANS / 4).kill("radar-replay");
+    running.await_poses(SCANS / 2).kill("refinement");
+    running.finish().succeeded();
+    assert_eq!(again.odometry(), odometry);
+}
+
+#[test]
+fn a_recording_of_a_part_of_a_drive_replays_under_its_own_numbers() {
+    let run = recorded(&simulated()).set("source.first=5");
+    let odometry = run.complete();
+    assert_eq!(replay(&file(&run), &[]), odometry);
+}
+
+#[test]
+fn a_recording_from_the_middle_of_a_drive_is_refused_where_all_messages_are_needed() {
+    let run = simulated().rate("1").set("run.window=1");
+    let mut running = run.start();
+    running.await_poses(SCANS / 3);
+    let mut record = gyre();
+    record
+        .arg("record")
+        .arg(run.out())
+        .arg("--to")
+        .arg(file(&run));
+    let mut recorder = record.spawn().unwrap();
+    running.finish().succeeded();
+    recorder.wait().unwrap();
+    let recording = open_recording(&file(&run)).unwrap();
+    let scans = seqs(&recording, "scan");
+    assert!(!scans.is_empty() && scans[0] > 0, "{scans:?}");
+    // A scan before the recorder came is not there, and the stages after `masked` need it.
+    let replay = simulated().data(&file(&run)).argument("--from", "masked");
+    replay
+        .finish()
+        .refused_with(&["lacks message 0 of topic `masked`"]);
+}
+
+#[test]
+fn a_recording_is_not_overwritten() {
+    let run = recorded(&simulated());
+    fs::write(file(&run), "mine").unwrap();
+    run.finish()
+        .refused_with(&["drive.mcap exists", "never overwritten"]);
+    assert_eq!(fs::read_to_string(file(&run)).unwrap(), "mine");
+}
+
+#[test]
+fn a_full_disk_ends_the_recording_with_a_sentence_and_not_the_run() {
+    let run = simulated();
+    let place = run.folder().join("small");
+    fs::create_dir(&place).unwrap();
+    let recorded = run
+        .clone()
+        .argument("--record", place.join("drive.mcap").to_str().unwrap());
+    let Some(command) = recorded.with_tmpfs(&place, "size=512k") else {
+        return;
+    };
+    let ended = recorded.start_as(command).finish();
+    ended.succeeded();
+    for part in ["No space left", "the run goes on"] {
+        assert!(ended.stderr.contains(part), "{}", ended.stderr);
+    }
+    assert_eq!(run.odometry(), simulated().complete());
+}
+
+#[test]
+fn inspect_reports_a_recording_as_a_dataset() {
+    let run = recorded(&simulated());
+    run.complete();
+    let mut command = gyre();
+    command.arg("inspect").arg(file(&run)).arg("--json");
+    let report: Value = serde_json::from_str(&Ended::of(command).succeeded().stdout).unwrap();
+    assert_eq!(report["format"], "mcap");
+    assert_eq!(report["scans"], SCANS);
+    assert_eq!(report["unreadable"].as_array().unwrap().len(), 0);
+}
+
+#[test]
+fn real_scans_replay_to_the_same_bytes() {
+    let Some(data) = real_data("radiate-2019-02-12") else {
+        return;
+    };
+    let configuration = Path::new(crate::PROJECT).join("configs/radiate.toml");
+    let run = Run::of_file(&configuration)
+        .data(&data)
+        .set("source.scans=20")
+        .set(WINDOW);
+    let run = recorded(&run).set(ALL);
+    let odometry = run.complete();
+    assert_eq!(replay(&file(&run), &[]), odometry);
+    assert_eq!(replay(&file(&run), &["--from", "masked"]), odometry);
+    let configured = Run::of_file(&configuration).data(&file(&run));
+    assert_eq!(
+        configured.complete(),
+        odometry,
+        "constants that are the recorded ones"
+    );
+    let other = configured.set("dataset.range_offset_m=0.5");
+    other
+        .finish()
+        .refused_with(&["range_offset_m", "that they were recorded with"]);
+}
+
+/// Reads a recording with the Python package `mcap` and prints the messages by channel.
+const READ: &str = "
+import collections, sys
+from mcap.reader import make_reader
+from mcap_protobuf.decoder import DecoderFactory
+counts = collections.Counter()
+with open(sys.argv[1], 'rb') as file:
+    for schema, channel, message, decoded in make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages(
+        topics=['/scan', '/pose', '/tf', '/trajectory', '/motion', '/refined', '/log']
+    ):
+        counts[channel.topic] += 1
+        if channel.topic == '/scan':
+            assert len(decoded.data) == decoded.step * decoded.height, decoded.step
+print(dict(counts))
+";
+
+#[test]
+fn the_python_package_mcap_reads_a_recording() {
+    let import = Command::new(python())
+        .args(["-c", "import mcap_protobuf"])
+        .output();
+    if !import.is_ok_and(|output| output.status.success()) {
+        println!("skipped: {} has no package mcap-protobuf-support", python());
+        return;
+    }
+    let run = recorded(&simulated());
+    run.complete();
+    let mut command = Command::new(python());
+    command.args(["-c", READ]).arg(file(&run));
+    let ended = Ended::of(command);
+    ended.succeeded();
+    let counts = format!("'/scan': {SCANS}");
+    assert!(ended.stdout.contains(&counts), "{}", ended.stdout);
+}

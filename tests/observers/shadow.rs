@@ -1,0 +1,430 @@
+//! `gyre shadow`: a second program beside a stage of a running run. Whatever it does, the run is the same; what it answers is compared.
+
+use std::{
+    fs::{self, File},
+    path::{Path, PathBuf},
+    process::{Child, Command, Stdio},
+    sync::OnceLock,
+    thread,
+    time::{Duration, Instant},
+};
+
+use rustix::process::Signal;
+use serde_json::Value;
+
+use crate::{
+    common::{Ended, Pid, Run, Running, gyre, processes, send, undisturbed},
+    input::breaks,
+    method::learned_masks::{TWO_SCANS, card},
+    reach::{conformance, python_stage},
+};
+
+const SCANS: usize = 160;
+/// Such a run takes some seconds then.
+const RATE: &str = "16";
+const STAGES: [&str; 4] = [
+    "masking",
+    "rotation-search",
+    "translation-search",
+    "refinement",
+];
+
+/// A run of the small recording, again and again.
+fn long() -> Run {
+    let run = Run::of_recording().set("source.repeat=true");
+    run.set(&format!("source.scans={SCANS}"))
+}
+
+/// `odometry.csv` of such a run without a shadow.
+fn undisturbed_long() -> &'static str {
+    static ODOMETRY: OnceLock<String> = OnceLock::new();
+    ODOMETRY.get_or_init(|| long().complete())
+}
+
+/// Starts a run, and holds it after some poses: it does not end before shadows are there.
+fn held(run: &Run) -> Running {
+    let mut running = run.start();
+    running.await_poses(1);
+    hold(&running);
+    running
+}
+
+/// Lets no pose pass; all other stages answer the handshakes of observers.
+fn hold(running: &Running) {
+    send(running.stages()["refinement"], Signal::STOP);
+}
+
+fn release(running: &Running) {
+    send(running.stages()["refinement"], Signal::CONT);
+}
+
+/// A shadow that runs, and what it prints.
+struct Shadow {
+    child: Child,
+    /// The folder of its report.
+    report: PathBuf,
+}
+
+impl Shadow {
+    /// Starts one beside a run; `name` is that of its report.
+    fn start(run: &Run, name: &str, stage: &str, options: &[&str]) -> Self {
+        let report = run.folder().join(name);
+        fs::create_dir_all(&report).unwrap();
+        let file = |name: &str| File::create(report.join(name)).unwrap();
+        let mut command = gyre();
+        command.args(["shadow", stage, "--out"]).arg(run.out());
+        command.arg("--report").arg(&report).args(options);
+        command.stdin(Stdio::null());
+        command.stdout(file("stdout")).stderr(file("stderr"));
+        let child = command.spawn().unwrap();
+        Self { child, report }
+    }
+
+    /// Waits until it observes the run.
+    fn await_attached(&self) {
+        self.until("attached", |said| said.contains("beside"));
+    }
+
+    /// Waits until it has compared so many items.
+    fn await_rows(&self, rows: usize) {
+        self.until("rows", |_| self.rows() >= rows);
+    }
+
+    fn until(&self, what: &str, is_so: impl Fn(&str) -> bool) {
+        let since = Instant::now();
+        let said = || fs::read_to_string(self.report.join("stderr")).unwrap();
+        while !is_so(&said()) {
+            assert!(since.elapsed().as_secs() < 60, "no {what}: {}", said());
+            thread::sleep(Duration::from_millis(10));
+        }
+    }
+
+    /// Waits until it has started a stage.
+    fn await_process(&self) -> Pid {
+        let stage = || processes::stages_of(self.child.id()).into_values().next();
+        self.until("process", |_| stage().is_some());
+        stage().unwrap()
+    }
+
+    fn rows(&self) -> usize {
+        let rows = fs::read_to_string(self.report.join("shadow.csv"));
+        rows.map_or(0, |rows| rows.lines().count().saturating_sub(1))
+    }
+
+    /// Waits until it ends; returns its exit code and its report.
+    fn end(mut self) -> (Option<i32>, Value) {
+        let code = self.child.wait().unwrap().code();
+        let said = |name| fs::read_to_string(self.report.join(name)).unwrap();
+        println!("{}\n{}", said("stderr"), said("stdout"));
+        let report = fs::read_to_string(self.report.join("shadow.json"));
+        let report: Value = serde_json::from_str(&report.unwrap()).unwrap();
+        assert_accounted(&report["counts"]);
+        let rows = self.rows() as u64;
+        assert_eq!(Some(rows), report["counts"]["compared"].as_u64());
+        (code, report)
+    }
+}
+
+/// Asserts that each item that was seen is in one of the counts.
+fn assert_accounted(counts: &Value) {
+    let count = |key: &str| counts[key].as_u64().unwrap();
+    let fates = [
+        "compared",
+        "opening",
+        "skipped",
+        "while_starting",
+        "unanswered",
+        "left",
+    ];
+    let accounted: u64 = fates.into_iter().map(count).sum();
+    assert_eq!(accounted, count("observed"), "{counts:#}");
+}
+
+fn assert_identical((code, report): (Option<i32>, Value)) {
+    assert_eq!(code, Some(0), "{report:#}");
+    assert_eq!(report["verdict"], "identical");
+    assert!(
+        report["counts"]["compared"].as_u64() >= Some(5),
+        "{report:#}"
+    );
+    assert!(report["work"]["shadow"]["p50_us"].as_f64() > Some(0.0));
+    assert!(report["answer"]["real"]["p50_us"].as_f64() > Some(0.0));
+}
+
+#[test]
+fn own_stages_as_shadows_are_identical_item_for_item_and_the_run_is_untouched() {
+    let run = long().rate(RATE);
+    let running = held(&run);
+    let shadows = STAGES.map(|stage| Shadow::start(&run, stage, stage, &[]));
+    shadows.iter().for_each(Shadow::await_attached);
+    release(&running);
+    running.finish().succeeded();
+    for shadow in shadows {
+        assert_identical(shadow.end());
+    }
+    assert_eq!(run.odometry(), undisturbed_long());
+}
+
+#[test]
+fn shadows_that_fail_in_any_way_are_named_and_the_run_is_untouched() {
+    let run = long().rate(RATE);
+    let running = held(&run);
+    let shadow = |name: &str, breach: &str, options: &[&str]| {
+        let command = conformance::command(breach);
+        let options = [&["--command", &command], options].concat();
+        Shadow::start(&run, name, "rotation-search", &options)
+    };
+    let shadows = [
+        shadow("differs", "none", &[]),
+        shadow("slow", "is slow", &[]),
+        shadow("floods", "floods", &["--scans", "20"]),
+        shadow("dies", "dies", &[]),
+        shadow("silent", "falls silent", &["--patience-s", "2"]),
+    ];
+    shadows.iter().for_each(|shadow| shadow.await_rows(1));
+    release(&running);
+    running.finish().succeeded();
+    assert_eq!(run.odometry(), undisturbed_long());
+    let [differs, slow, floods, dies, silent] = shadows;
+
+    let (code, report) = differs.end();
+    assert_eq!((code, &report["verdict"]), (Some(0), &"differs".into()));
+    assert!(
+        report["differences"]["rotation_deg"]["max"].as_f64() > Some(0.0),
+        "{report:#}"
+    );
+    let (code, report) = slow.end();
+    assert_eq!(code, Some(0));
+    assert!(report["counts"]["skipped"].as_u64() > Some(0), "{report:#}");
+    assert!(
+        report["work"]["shadow"]["p50_us"].as_f64() > Some(290e3),
+        "{report:#}"
+    );
+    let (code, report) = floods.end();
+    assert_eq!(code, Some(1));
+    assert!(
+        report["breaches"].to_string().contains("it sent item"),
+        "{report:#}"
+    );
+    let (code, report) = dies.end();
+    assert_eq!(code, Some(1));
+    assert!(
+        report["ends"].to_string().contains("no memory is left"),
+        "{report:#}"
+    );
+    let (code, report) = silent.end();
+    assert_eq!(code, Some(1));
+    assert!(report["counts"]["hangs"].as_u64() > Some(0), "{report:#}");
+    assert!(
+        report["ends"].to_string().contains("has not answered item"),
+        "{report:#}"
+    );
+}
+
+#[test]
+fn a_program_that_does_not_come_is_given_up_while_the_run_goes_on() {
+    let run = Run::of_recording().rate("2");
+    let running = held(&run);
+    let silent = ["--command", "sleep 1000", "--start-timeout-s", "0.2"];
+    let silent = Shadow::start(&run, "silent", "masking", &silent);
+    let leaves = Shadow::start(&run, "leaves", "masking", &["--command", "false"]);
+    for (shadow, count, words) in [
+        (silent, "hangs", "has not opened `masked`"),
+        (leaves, "deaths", "exit code 1"),
+    ] {
+        let (code, report) = shadow.end();
+        assert_eq!((code, &report["verdict"]), (Some(1), &"nothing".into()));
+        assert_eq!(report["counts"][count], 3, "{report:#}");
+        assert!(report["ends"].to_string().contains(words), "{report:#}");
+    }
+    release(&running);
+    running.finish().succeeded();
+    assert_eq!(run.odometry(), undisturbed());
+}
+
+#[test]
+fn shadows_that_fall_behind_again_and_again_are_compared_exactly() {
+    // The mask takes two scans, and the motions of both.
+    let run = long().rate(RATE).masked_by(&card(TWO_SCANS));
+    let mut running = held(&run);
+    let shadows = ["masking", "translation-search"].map(|stage| {
+        let patience = ["--patience-s", "60"];
+        Shadow::start(&run, stage, stage, &patience)
+    });
+    shadows.iter().for_each(Shadow::await_attached);
+    let processes = shadows.each_ref().map(Shadow::await_process);
+    for poses in [40, 70, 100] {
+        processes.iter().for_each(|pid| send(*pid, Signal::STOP));
+        release(&running);
+        running.await_poses(poses);
+        hold(&running);
+        let rows = shadows.each_ref().map(Shadow::rows);
+        processes.iter().for_each(|pid| send(*pid, Signal::CONT));
+        for (shadow, rows) in shadows.iter().zip(rows) {
+            shadow.await_rows(rows + 1);
+        }
+    }
+    release(&running);
+    running.finish().succeeded();
+    for shadow in shadows {
+        let (code, report) = shadow.end();
+        assert!(
+            report["counts"]["skipped"].as_u64() > Some(20),
+            "{report:#}"
+        );
+        assert_identical((code, report));
+    }
+}
+
+#[test]
+fn shadows_are_compared_exactly_across_a_break_of_the_chain() {
+    let recording = breaks::with_a_gap();
+    let run = breaks::run_of(&recording).rate("2");
+    let run = run.masked_by(&card(TWO_SCANS));
+    let running = held(&run);
+    let shadows = STAGES.map(|stage| Shadow::start(&run, stage, stage, &[]));
+    shadows.iter().for_each(Shadow::await_attached);
+    release(&running);
+    running.finish().succeeded();
+    for shadow in shadows {
+        assert_identical(shadow.end());
+    }
+}
+
+#[test]
+fn masking_of_a_live_run_is_identical_for_the_scans_that_were_not_dropped() {
+    let run = long()
+        .rate(RATE)
+        .set("run.mode=live")
+        .set("stages.masking.delay_ms=30");
+    let mut running = run.start();
+    running.await_poses(1);
+    let shadow = Shadow::start(&run, "masking", "masking", &[]);
+    running.finish().succeeded();
+    assert!(run.summary()["dropped"].as_u64() > Some(0));
+    assert_identical(shadow.end());
+}
+
+#[test]
+fn a_shadow_of_a_joint_search_in_the_background_ends_after_so_many_items() {
+    let run = Run::of_recording()
+        .rate("0.3")
+        .set("search.kind=exhaustive")
+        .set("raster.n=63");
+    let mut up = gyre();
+    up.arg("up").args(run.command().get_args().skip(1));
+    Ended::of(up).succeeded();
+    let shadow = Shadow::start(
+        &run,
+        "joint",
+        "joint-search",
+        &["--scans", "3", "--nice", "15"],
+    );
+    let (code, report) = shadow.end();
+    assert_eq!((code, &report["verdict"]), (Some(0), &"identical".into()));
+    assert_eq!(report["counts"]["compared"], 3);
+    refused(
+        &run,
+        &["joint-search", "--command", "/nowhere/search"],
+        &["cannot start joint-search", "/nowhere/search"],
+    );
+    refused(
+        &run,
+        &["rotation-search"],
+        &["the run has no rotation-search", "joint-search"],
+    );
+    let mut down = gyre();
+    down.arg("down").arg("--out").arg(run.out());
+    Ended::of(down).succeeded();
+}
+
+#[test]
+fn an_interrupted_shadow_reports_what_it_has_compared() {
+    let run = Run::of_recording().rate("2");
+    let running = held(&run);
+    let shadow = Shadow::start(&run, "interrupted", "rotation-search", &[]);
+    shadow.await_rows(1);
+    send(shadow.child.id(), Signal::INT);
+    let (code, report) = shadow.end();
+    assert_eq!((code, &report["verdict"]), (Some(0), &"identical".into()));
+    release(&running);
+    running.finish().succeeded();
+    assert_eq!(run.odometry(), undisturbed());
+}
+
+#[test]
+fn the_program_of_a_killed_shadow_ends_and_the_run_does_not_notice() {
+    let run = Run::of_recording().rate("2");
+    let running = held(&run);
+    let mut shadow = Shadow::start(&run, "killed", "rotation-search", &[]);
+    shadow.await_rows(1);
+    let process = shadow.await_process();
+    send(shadow.child.id(), Signal::KILL);
+    shadow.child.wait().unwrap();
+    let since = Instant::now();
+    while Path::new("/proc").join(process.to_string()).exists() {
+        assert!(since.elapsed().as_secs() < 30, "it outlives its shadow");
+        thread::sleep(Duration::from_millis(10));
+    }
+    release(&running);
+    running.finish().succeeded();
+    assert_eq!(run.odometry(), undisturbed());
+}
+
+#[test]
+fn python_masking_beside_the_own_one_is_compared() {
+    if !python_stage::can_start() {
+        return;
+    }
+    let run = long().rate(RATE).set("masking.kind=threshold");
+    let running = held(&run);
+    let [python, script] = python_stage::command();
+    let command = format!("'{python}' '{script}'");
+    let shadow = Shadow::start(
+        &run,
+        "python",
+        "masking",
+        &["--command", &command, "--scans", "8"],
+    );
+    shadow.await_attached();
+    release(&running);
+    let (code, report) = shadow.end();
+    assert_eq!(code, Some(0), "{report:#}");
+    let largest = report["differences"]["mask"]["max"].as_f64();
+    assert!(largest.is_none_or(|largest| largest < 0.02), "{report:#}");
+    running.finish().succeeded();
+}
+
+fn refused(run: &Run, arguments: &[&str], words: &[&str]) {
+    let mut command: Command = gyre();
+    command
+        .arg("shadow")
+        .args(arguments)
+        .arg("--out")
+        .arg(run.out());
+    Ended::of(command).refused_with(words);
+}
+
+#[test]
+fn what_cannot_have_a_shadow_is_refused_in_a_sentence() {
+    let run = Run::of_recording();
+    refused(&run, &["radar-replay"], &["radar-replay", "is a source"]);
+    refused(
+        &run,
+        &["pose-integration"],
+        &["pose-integration", "journal"],
+    );
+    refused(&run, &["trajectory"], &["trajectory", "logs"]);
+    refused(&run, &["steering"], &["no stage `steering`", "masking"]);
+    refused(&run, &["masking"], &["no run is writing to"]);
+    refused(
+        &run,
+        &["masking", "--command", "python3 'x"],
+        &["--command", "quotes"],
+    );
+    refused(
+        &run,
+        &["masking", "--patience-s", "nan"],
+        &["--patience-s", "0 or more"],
+    );
+}

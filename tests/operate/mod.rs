@@ -1,0 +1,13 @@
+//! Operation: commands, services, swaps, load, and the machine that a run is on.
+
+pub mod batch;
+mod calibrate;
+pub mod commands;
+mod doctor;
+mod evaluate;
+mod resources;
+mod scheduling;
+mod slurm;
+mod stress;
+mod swap;
+mod systemd;

@@ -1,0 +1,223 @@
+//! Swaps: another program takes the place of a stage of a running run, or fails to.
+
+use std::{
+    fs,
+    os::unix::fs::PermissionsExt,
+    thread,
+    time::{Duration, Instant},
+};
+
+use crate::{
+    PROGRAM,
+    common::{Ended, Run, STAGES, gyre, undisturbed},
+    operate::commands::{ask, process, started, status},
+    reach::conformance,
+};
+
+/// A swap; the command comes last.
+fn swap(run: &Run, stage: &str, options: &[&str], command: &[&str]) -> Ended {
+    let mut words = gyre();
+    words
+        .args(["swap", stage, "--out"])
+        .arg(run.out())
+        .args(options);
+    if !command.is_empty() {
+        words.arg("--command").arg(shell_words(command));
+    }
+    Ended::of(words)
+}
+
+/// Words as one argument, each in quotes.
+fn shell_words(words: &[&str]) -> String {
+    let quoted = words
+        .iter()
+        .map(|word| format!("'{}'", word.replace('\'', r"'\''")));
+    quoted.collect::<Vec<_>>().join(" ")
+}
+
+#[test]
+fn each_stage_gives_way_to_another_program_and_back_without_a_lost_scan() {
+    // Twelve seconds, since the machine may be busy.
+    let run = Run::of_recording().rate("0.5");
+    let mut running = run.start();
+    running.await_poses(2);
+    for stage in STAGES {
+        swap(&run, stage, &[], &["nice", PROGRAM, "stage", stage]).succeeded();
+        let status = status(&run).unwrap();
+        assert_eq!(process(&status, stage)["is_swapped"], true, "{stage}");
+    }
+    swap(&run, "masking", &[], &[]).succeeded();
+    swap(&run, "rotation-search", &["--cold"], &[]).succeeded();
+    running.finish().succeeded();
+    assert_eq!(run.odometry(), undisturbed());
+    let summary = run.summary();
+    assert_eq!(summary["swaps"].as_array().unwrap().len(), STAGES.len() + 2);
+    assert_eq!(summary["dropped"], 0);
+}
+
+#[test]
+fn a_program_that_cannot_take_over_changes_nothing() {
+    let (run, mut running) = started();
+    let before = running.await_stage("masking");
+    for (command, reason) in [
+        (&["false"][..], "exit code 1"),
+        (&["sh", "-c", "echo no network >&2; exit 2"], "no network"),
+        (&["/nowhere/masking"], "cannot start masking"),
+    ] {
+        swap(&run, "masking", &[], command).refused_with(&[reason]);
+    }
+    swap(&run, "steering", &[], &["true"]).refused_with(&["steering"]);
+    assert_eq!(running.await_stage("masking"), before);
+    running.finish().succeeded();
+    assert_eq!(run.odometry(), undisturbed());
+}
+
+#[test]
+fn a_program_that_fails_after_taking_over_gives_way_to_the_one_before() {
+    let (run, running) = started();
+    let fails = script(&run, "fails.sh", FAILS);
+    swap(&run, "masking", &[], &[&fails]).refused_with(&[
+        "masking goes on as before",
+        "fails.sh` has failed",
+        "exit code 3",
+        "no such mask",
+    ]);
+    let back = status(&run).unwrap();
+    assert_eq!(process(&back, "masking")["is_swapped"], false);
+    assert_eq!(process(&back, "masking")["last_death"], "exit code 3");
+    let ended = running.finish();
+    assert!(
+        ended
+            .succeeded()
+            .stderr
+            .contains("goes back to the program before")
+    );
+    assert_eq!(run.odometry(), undisturbed());
+}
+
+/// An executable script.
+fn script(run: &Run, name: &str, text: &str) -> String {
+    let path = run.folder().join(name);
+    fs::write(&path, format!("#!/bin/sh\n{text}\n")).unwrap();
+    fs::set_permissions(&path, fs::Permissions::from_mode(0o700)).unwrap();
+    path.to_str().unwrap().to_owned()
+}
+
+/// A masking stage that stands by as the contract says, and then dies.
+const FAILS: &str = "touch $GYRE_RUN/masking.ready\ncat\necho no such mask >&2\nexit 3";
+
+#[test]
+fn a_cold_swap_to_a_program_that_cannot_be_started_changes_nothing() {
+    let (run, running) = started();
+    swap(&run, "masking", &["--cold"], &["/nowhere/masking"])
+        .refused_with(&["masking goes on as before", "/nowhere/masking"]);
+    let status = status(&run).unwrap();
+    assert_eq!(process(&status, "masking")["is_swapped"], false);
+    running.finish().succeeded();
+    assert_eq!(run.odometry(), undisturbed());
+}
+
+#[test]
+fn a_program_that_was_edited_is_taken_by_a_swap_alone_and_gives_way_when_it_fails() {
+    let run = Run::of_recording().rate("1");
+    let mut running = run.start();
+    running.await_poses(4);
+    let own = script(&run, "own.sh", &format!("exec {PROGRAM} stage masking"));
+    swap(&run, "masking", &[], &[&own]).succeeded();
+    let before = process(&status(&run).unwrap(), "masking")["pid"].clone();
+    script(&run, "own.sh", FAILS);
+    ask(&run, &["restart", "masking"]).refused_with(&["own.sh has changed", "gyre swap masking"]);
+    assert_eq!(process(&status(&run).unwrap(), "masking")["pid"], before);
+    // The one before is of a file that is another one by now: so it is the one that the run was begun with.
+    swap(&run, "masking", &[], &[&own]).refused_with(&["own.sh` has failed", "no such mask"]);
+    assert_eq!(
+        process(&status(&run).unwrap(), "masking")["is_swapped"],
+        false
+    );
+    running.finish().succeeded();
+    assert_eq!(run.odometry(), undisturbed());
+}
+
+#[test]
+fn a_program_that_fails_after_a_cold_swap_gives_way_and_the_swap_says_so() {
+    let (run, running) = started();
+    let fails = script(&run, "cold.sh", "echo no such mask >&2\nexit 3");
+    swap(&run, "masking", &["--cold"], &[&fails]).refused_with(&[
+        "cold.sh` has failed",
+        "exit code 3",
+        "no such mask",
+    ]);
+    running.finish().succeeded();
+    assert_eq!(run.odometry(), undisturbed());
+}
+
+#[test]
+fn a_program_whose_messages_no_stage_can_read_gives_way_and_does_not_end_the_run() {
+    let (run, running) = started();
+    let nonsense = ["sh", "-c", &conformance::command("sends only NaN")];
+    swap(&run, "rotation-search", &["--cold"], &nonsense).refused_with(&[
+        "rotation-search goes on as before",
+        "translation-search died after it",
+        "NaN",
+    ]);
+    running.finish().succeeded();
+    assert_eq!(run.odometry(), undisturbed());
+}
+
+#[test]
+fn a_swap_without_a_scan_to_try_the_program_says_so_with_a_code_of_its_own() {
+    // Nothing comes for a minute after the first scans.
+    let run = Run::of_recording().rate("0.01");
+    let mut running = run.start();
+    running.await_poses(1);
+    let ended = swap(
+        &run,
+        "rotation-search",
+        &[],
+        &["nice", PROGRAM, "stage", "rotation-search"],
+    );
+    assert_eq!(ended.code(), Some(2), "{}", ended.stderr);
+    assert!(
+        ended.stderr.contains("no scan has gone through it"),
+        "{}",
+        ended.stderr
+    );
+    ask(&run, &["down"]).succeeded();
+    running.end();
+}
+
+#[test]
+fn a_swap_that_is_interrupted_leaves_nobody_standing_by() {
+    let (run, running) = started();
+    let mut words = gyre();
+    words.args(["swap", "masking", "--command", "sleep 60", "--out"]);
+    let mut client = words.arg(run.out()).spawn().unwrap();
+    thread::sleep(Duration::from_millis(200));
+    client.kill().unwrap();
+    client.wait().unwrap();
+    let since = Instant::now();
+    let own = ["nice", PROGRAM, "stage", "masking"];
+    while !swap(&run, "masking", &[], &own).status.success() {
+        assert!(since.elapsed().as_secs() < 10, "the first one stands by");
+    }
+    running.finish().succeeded();
+    assert_eq!(run.odometry(), undisturbed());
+}
+
+#[test]
+fn a_live_run_drops_no_scan_when_its_stages_are_swapped_one_after_the_other() {
+    let run = Run::of_recording().rate("1").set("run.mode=live");
+    let mut running = run.start();
+    running.await_poses(4);
+    for stage in [
+        "rotation-search",
+        "translation-search",
+        "refinement",
+        "masking",
+    ] {
+        swap(&run, stage, &[], &["nice", PROGRAM, "stage", stage]).succeeded();
+    }
+    running.finish().succeeded();
+    // On a loaded machine a scan may be late for another reason.
+    assert!(run.summary()["dropped"].as_u64().unwrap() <= 1);
+}

@@ -1,0 +1,155 @@
+//! Replaced stages that send what no stage may send: the stage that receives it refuses it by the sender's name, and the poses
+//! before it are kept.
+
+mod stages;
+
+use std::{env, process};
+
+use gyre_stage::Launch;
+use rand::{Rng, SeedableRng, rngs::StdRng, seq::IndexedRandom};
+
+use crate::common::{Run, recording};
+use stages::{FAULT, FAULTY, Fault, ONCE};
+
+/// A run in which this program replaces a stage, and sends this fault.
+fn run_with(stage: &str, fault: &str, once: bool) -> Run {
+    let run = Run::of_recording();
+    let marker = run.folder().join("sent");
+    let once = match once {
+        true => format!("{ONCE}='{}'", marker.display()),
+        false => String::new(),
+    };
+    let program = env::current_exe().unwrap();
+    run.stage_script(
+        stage,
+        &format!(
+            "exec env {FAULT}='{fault}' {once} '{}' --exact reach::foreign_stages::plays_a_foreign_stage --nocapture",
+            program.display()
+        ),
+    )
+    .set(&format!("stages.{stage}.restart.backoff_ms=10"))
+}
+
+/// Asserts that the run ends because of this fault, in a sentence that names the stage and the field, and keeps good poses only.
+fn refuses(stage: &str, fault: &str, field: &str) {
+    let run = run_with(stage, fault, false);
+    let ended = run.finish();
+    ended.failed_with(&[stage, field, "giving up"]);
+    let odometry = run.odometry();
+    assert!(
+        !odometry.contains("NaN") && !odometry.contains("inf"),
+        "{fault}: {odometry}"
+    );
+    let processed = run.summary()["processed"].as_u64().unwrap();
+    assert!(processed <= FAULTY, "{fault}: {processed} poses");
+}
+
+#[test]
+fn a_motion_that_is_not_finite_is_refused() {
+    refuses("translation-search", "motion x nan", "x_m is NaN");
+}
+
+#[test]
+fn a_motion_farther_than_the_raster_is_refused() {
+    refuses("translation-search", "motion x 1e30", "x_m is 1");
+}
+
+#[test]
+fn a_covariance_that_is_none_is_refused() {
+    refuses("translation-search", "motion covariance -1", "covariance");
+    refuses("refinement", "refined covariance nan", "covariance");
+}
+
+#[test]
+fn a_rotation_that_is_none_is_refused() {
+    refuses("rotation-search", "rotation angle 4", "angle_rad is 4");
+}
+
+#[test]
+fn a_scan_whose_header_lies_is_refused() {
+    refuses("radar-replay", "scan bins 1000000", "payload");
+    refuses("radar-replay", "scan azimuths 2000", "azimuths");
+    refuses("radar-replay", "scan stamp 1e18", "stamp");
+}
+
+#[test]
+fn rasters_of_another_size_are_refused() {
+    refuses("masking", "masked n 126", "n is 126");
+    refuses("masking", "masked points 1000000", "points");
+    refuses("masking", "masked point nan", "point 0");
+}
+
+#[test]
+fn a_pose_that_is_not_finite_is_refused() {
+    let run = run_with("pose-integration", "pose x nan", false);
+    run.finish()
+        .failed_with(&["pose-integration", "x_m is NaN"]);
+}
+
+#[test]
+fn a_fault_that_does_not_come_again_costs_a_restart() {
+    let run = run_with("translation-search", "motion x nan", true);
+    run.finish().succeeded();
+    assert!(!run.odometry().contains("NaN"));
+    assert_eq!(run.summary()["processed"], recording::SCANS);
+    assert_ne!(run.summary()["restarts"], serde_json::json!({}));
+}
+
+/// Numbers that break most contracts, and some that keep them.
+const NUMBERS: [&str; 6] = ["NaN", "-inf", "-1", "1e300", "0", "0.5"];
+
+/// Runs in which a stage writes a number anywhere into a header: refused by its name, or no harm is done.
+fn any_word_is_refused_or_harmless(runs: u64) {
+    let stages = [
+        ("masking", "masked"),
+        ("rotation-search", "rotation"),
+        ("translation-search", "motion"),
+        ("refinement", "refined"),
+    ];
+    for seed in 0..runs {
+        let mut random = StdRng::seed_from_u64(seed);
+        let (stage, topic) = stages[seed as usize % stages.len()];
+        let (word, number) = (random.random_range(0..64), NUMBERS.choose(&mut random));
+        let fault = format!("{topic} word-{word} {}", number.unwrap());
+        println!("seed {seed}: {fault}");
+        let run = run_with(stage, &fault, false);
+        let ended = run.finish();
+        if !ended.status.success() {
+            ended.failed_with(&[stage]);
+            continue;
+        }
+        assert_eq!(run.summary()["processed"], recording::SCANS, "{fault}");
+        let odometry = run.odometry();
+        assert!(
+            !odometry.contains("NaN") && !odometry.contains("inf"),
+            "{fault}"
+        );
+    }
+}
+
+#[test]
+fn any_word_of_a_header_is_refused_or_harmless() {
+    any_word_is_refused_or_harmless(8);
+}
+
+#[test]
+#[ignore = "takes some minutes: the same with more words"]
+fn many_words_of_headers_are_refused_or_harmless() {
+    any_word_is_refused_or_harmless(200);
+}
+
+/// Not a test: the program of a replaced stage, if the environment says so.
+#[test]
+fn plays_a_foreign_stage() {
+    let Ok(fault) = env::var(FAULT) else { return };
+    let fault = Fault::parse(&fault);
+    let name = fault.topic.clone();
+    let ended = Launch::from_environment(&name).and_then(|launch| stages::play(&launch, fault));
+    process::exit(match ended {
+        Ok(_) => 0,
+        Err(error) => {
+            eprintln!("foreign {name}: {error}");
+            error.exit_code().into()
+        }
+    });
+}

@@ -1,0 +1,136 @@
+//! A run that receives a radar from its driver in ROS 2, which a peer plays that is not Gyre's own (Cyclone DDS).
+
+use std::{
+    io::{BufRead, BufReader},
+    path::Path,
+    process::{Child, Stdio},
+};
+
+use crate::{
+    common::{Run, gyre, odometry, recording, recording::with_constants},
+    reach::ros2::{Program, can_speak, domain},
+};
+
+/// The topic of a driver's azimuths.
+const FFT_DATA: &str = "/radar_data/fft_data";
+/// The topic of a driver's turns.
+const B_SCANS: &str = "/radar_data/b_scan_msg";
+
+/// A radar of a recording, behind a driver in ROS 2.
+struct Driver {
+    server: Child,
+    _driver: Program,
+}
+
+impl Driver {
+    fn playing(recording: &Path, domain: &str, publishes: &str, options: &[&str]) -> Self {
+        let mut command = gyre();
+        command.args(["radar-server", "--listen", "127.0.0.1:0", "--data"]);
+        let mut server = command
+            .arg(recording)
+            .args(options)
+            .stderr(Stdio::piped())
+            .stdout(Stdio::null())
+            .spawn()
+            .unwrap();
+        let mut said = String::new();
+        BufReader::new(server.stderr.take().unwrap())
+            .read_line(&mut said)
+            .unwrap();
+        let address = said.trim().rsplit(' ').next().unwrap();
+        let driver = Program::peer("driver.py", &[domain, address, publishes]);
+        Self {
+            server,
+            _driver: driver,
+        }
+    }
+}
+
+impl Drop for Driver {
+    fn drop(&mut self) {
+        let _ = self.server.kill();
+        let _ = self.server.wait();
+    }
+}
+
+/// A run that receives so many scans from a topic in a domain.
+fn receiving(run: Run, domain: &str, topic: &str, scans: usize) -> Run {
+    run.argument("--ros2", topic)
+        .set(&format!("source.domain={domain}"))
+        .set("source.interface='127.0.0.1'")
+        .set(&format!("source.scans={scans}"))
+}
+
+#[test]
+fn a_radar_behind_its_driver_gives_the_motions_of_the_recording() {
+    assert_motions_of_the_recording("configured", FFT_DATA, domain(2));
+}
+
+#[test]
+fn a_driver_of_before_2024_gives_the_motions_of_the_recording() {
+    assert_motions_of_the_recording("older", FFT_DATA, domain(5));
+}
+
+#[test]
+fn the_turns_of_a_driver_give_the_motions_of_the_recording() {
+    assert_motions_of_the_recording("turns", B_SCANS, domain(6));
+}
+
+fn assert_motions_of_the_recording(publishes: &str, topic: &str, domain: String) {
+    if !can_speak() {
+        return;
+    }
+    let scans = recording::SCANS / 2;
+    let whole = recording::copy(scans);
+    for image in recording::images(whole.path()) {
+        recording::complete(&image);
+    }
+    let recorded = Run::small().data(whole.path()).complete();
+    let _driver = Driver::playing(whole.path(), &domain, publishes, &[]);
+    let run = receiving(with_constants(Run::small()), &domain, topic, scans);
+    let live = run.complete();
+    let source = &run.summary()["stages"]["radar-replay"];
+    for lost in [
+        "missing_azimuths",
+        "damaged_messages",
+        "scans_left_out",
+        "reconnections",
+    ] {
+        assert_eq!(source[lost], 0, "{lost}");
+    }
+    assert_eq!(run.summary()["dropped"], 0);
+    assert!(live == recorded, "{live}\n{recorded}");
+}
+
+#[test]
+fn the_azimuths_of_a_driver_that_publishes_no_configuration_tell_it() {
+    assert_configuration_is_found("silent", FFT_DATA, domain(3));
+}
+
+#[test]
+fn the_turns_of_a_driver_that_publishes_no_configuration_tell_it() {
+    assert_configuration_is_found("silent-turns", B_SCANS, domain(8));
+}
+
+fn assert_configuration_is_found(publishes: &str, topic: &str, domain: String) {
+    if !can_speak() {
+        return;
+    }
+    let _driver = Driver::playing(recording::small(), &domain, publishes, &["--repeat"]);
+    let run = receiving(with_constants(Run::small()), &domain, topic, 6);
+    let motions = odometry::rows(&run.complete());
+    assert_eq!(motions.len(), 5);
+    odometry::assert_unbroken(&motions);
+    let log = run.result("log.jsonl");
+    assert!(log.contains("it was found from azimuths"), "{log}");
+}
+
+#[test]
+fn a_topic_that_nobody_publishes_is_named() {
+    let run = receiving(Run::small(), &domain(4), FFT_DATA, 4);
+    let ended = run.finish();
+    ended.refused_with(&[
+        "nobody publishes /radar_data/fft_data in domain",
+        "ROS_DOMAIN_ID",
+    ]);
+}

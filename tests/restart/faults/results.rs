@@ -1,0 +1,192 @@
+//! Faults where the results are written.
+
+use std::{
+    fs::{self, Permissions},
+    os::unix::fs::PermissionsExt,
+    path::Path,
+};
+
+use rand::{Rng, seq::IndexedRandom};
+use rustix::fs::{FallocateFlags, fallocate, statvfs};
+
+use super::{
+    scene::{Outcome, Scene, assert_one_sentence},
+    tools::{AS_NOBODY, Mount, give_to_nobody, limit},
+};
+use crate::common::{Run, Running, assert_nothing_left_of, wrapped};
+
+/// More than any results have.
+const PLENTY: u64 = 256 << 20;
+/// What fills a disk.
+const FILLER: &str = "filler";
+
+/// Leaves at most `leave` bytes of the file system at `place`.
+pub fn fill(place: &Path, leave: u64) {
+    let free = statvfs(place).unwrap();
+    let bytes = (free.f_bavail * free.f_frsize).saturating_sub(leave);
+    let filler = fs::File::create(place.join(FILLER)).unwrap();
+    // Fails if another process is faster.
+    let _ = fallocate(&filler, FallocateFlags::empty(), 0, bytes.max(1));
+}
+
+/// The disk is too small, or becomes full in the middle; then there is room again.
+pub fn disk_full(scene: &mut Scene) -> Option<Outcome> {
+    let bytes = scene.drive.undisturbed().bytes;
+    let run = scene.run();
+    let small = scene.one_in(2);
+    let size = match small {
+        true => scene.rng.random_range(16 << 10..bytes),
+        false => PLENTY,
+    };
+    let mount = Mount::tmpfs(run.out(), size);
+    let mut running = run.start();
+    if !small {
+        scene.moment(&mut running)?;
+        fill(run.out(), scene.rng.random_range(0..64 << 10));
+        if scene.one_in(2) {
+            scene.kill_stage(&running);
+        }
+    }
+    let ended = running.finish();
+    let _ = fs::remove_file(run.out().join(FILLER));
+    mount.remount(&format!("size={PLENTY}"));
+    Some(scene.survived(&run, &ended))
+}
+
+/// Calls of the system fail at random with an I/O error or a full disk. libfiu draws random numbers of its own.
+pub fn io_errors(scene: &mut Scene) -> Option<Outcome> {
+    let call = *[
+        "rw/write",
+        "rw/pwrite",
+        "rw/*",
+        "sync/*",
+        "dir/rename",
+        "oc/open",
+    ]
+    .choose(&mut scene.rng)?;
+    // As Linux numbers them.
+    let (io_error, no_space) = (5, 28);
+    let error = *[io_error, no_space].choose(&mut scene.rng)?;
+    let probability = 10_f64.powf(scene.rng.random_range(-4.0..-1.0));
+    let command =
+        format!("enable_random name=posix/io/{call},probability={probability:.5},failinfo={error}");
+    println!("{command}");
+    let run = scene.run();
+    let failing = wrapped(&["fiu-run", "-f", "", "-x", "-c", &command], &run.command());
+    let ended = run.start_as(failing).finish();
+    Some(scene.survived(&run, &ended))
+}
+
+/// No file may become longer: of the whole run, or of a process in the middle. A signal says so, unless it is ignored.
+pub fn file_size_limit(scene: &mut Scene) -> Option<Outcome> {
+    let run = scene.run();
+    let signal = if scene.one_in(2) {
+        "trap '' XFSZ; "
+    } else {
+        ""
+    };
+    let mut shell = vec!["sh", "-c"];
+    let start = format!("{signal}exec \"$@\"");
+    shell.extend([&start, "sh"]);
+    let most = (scene.drive.undisturbed().bytes as f64).log2();
+    let bytes = scene.rng.random_range(12.0..most).exp2() as u64;
+    let at_start = format!("--fsize={bytes}:");
+    if scene.one_in(3) {
+        shell.extend(["prlimit", &at_start]);
+        let ended = run.start_as(wrapped(&shell, &run.command())).finish();
+        return Some(scene.survived(&run, &ended));
+    }
+    let mut running = run.start_as(wrapped(&shell, &run.command()));
+    scene.moment(&mut running)?;
+    let pid = match scene.one_in(3) {
+        true => running.pid(),
+        false => scene.stage(&running)?,
+    };
+    limit(pid, "fsize", bytes);
+    let ended = running.finish();
+    Some(scene.survived(&run, &ended))
+}
+
+/// The folder of the results is mounted read-only, or loses its permissions in the middle.
+pub fn read_only(scene: &mut Scene) -> Option<Outcome> {
+    let run = scene.run();
+    if scene.one_in(3) {
+        let mount = Mount::tmpfs(run.out(), PLENTY);
+        mount.remount("ro");
+        let ended = run.finish();
+        assert_one_sentence(&ended);
+        mount.remount("rw");
+        return Some(scene.resumed(&run).refused());
+    }
+    give_to_nobody(&run);
+    let as_nobody = || wrapped(&AS_NOBODY, &run.command());
+    let mut running = run.start_as(as_nobody());
+    scene.moment(&mut running)?;
+    let root = running.root()?;
+    permit(run.out(), false);
+    if scene.one_in(2) {
+        scene.kill_stage(&running);
+    }
+    let ended = running.finish();
+    assert_nothing_left_of(&root);
+    permit(run.out(), true);
+    Some(scene.survived(&run, &ended))
+}
+
+/// Lets the owner write into a folder and all below, or not.
+fn permit(folder: &Path, write: bool) {
+    let mode = if write { 0o755 } else { 0o555 };
+    let _ = fs::set_permissions(folder, Permissions::from_mode(mode));
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        permit(&entry.path(), write);
+    }
+}
+
+/// The folder of the results is moved away, and comes back soon, after the end, or never.
+pub fn vanish(scene: &mut Scene) -> Option<Outcome> {
+    let run = scene.run();
+    let mut running = run.start();
+    running.await_poses_or_end(1);
+    scene.moment(&mut running)?;
+    let away = run.folder().join("away");
+    match scene.rng.random_range(0..3) {
+        0 => fs::remove_dir_all(run.out())
+            .or_else(|_| fs::remove_dir_all(run.out()))
+            .ok()?,
+        back => {
+            fs::rename(run.out(), &away).ok()?;
+            let soon = back == 1;
+            scene.pause(300);
+            soon.then(|| restore(&away, &run));
+        }
+    }
+    if scene.one_in(2) {
+        scene.kill_stage(&running);
+    }
+    let ended = running.finish();
+    restore(&away, &run);
+    Some(scene.survived(&run, &ended))
+}
+
+/// Moves the results back to where they were, unless they are there.
+fn restore(away: &Path, run: &Run) {
+    if away.exists() {
+        let _ = fs::remove_dir_all(run.out());
+        fs::rename(away, run.out()).unwrap();
+    }
+}
+
+/// Nothing can be written to standard output and standard error: a full disk, where both are files.
+pub fn full_terminal(scene: &mut Scene) -> Option<Outcome> {
+    let run = scene.run();
+    let silent = ["sh", "-c", "exec \"$@\" >/dev/full 2>/dev/full", "sh"];
+    let mut running: Running = run.start_as(wrapped(&silent, &run.command()));
+    scene.moment(&mut running)?;
+    scene.kill_stage(&running);
+    let ended = running.finish();
+    assert!(matches!(ended.code(), Some(0 | 1)), "{ended:?}");
+    match ended.status.success() {
+        true => Some(scene.finished(&run, &ended)),
+        false => Some(scene.resumed(&run)),
+    }
+}

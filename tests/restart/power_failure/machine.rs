@@ -1,0 +1,289 @@
+//! The writers of a run in one process: what the stages and `gyre run` write, in their order.
+
+use std::{fs, path::Path, sync::OnceLock, time::Duration};
+
+use gyre::{
+    Failure,
+    configuration::Configuration,
+    earlier::{self, Begun, Earlier},
+    identity::{Identity, Programs},
+    out::Out,
+    preflight::Preflight,
+    results,
+    summary::Session,
+};
+use gyre_geometry::SparsePoint;
+use gyre_journal::{
+    self as journal, Journal,
+    checkpoint::{self, Checkpoint},
+    keyframes::Keyframes,
+};
+use gyre_messages::{
+    Footprint, Item, Limits, MotionEstimate, MotionHeader, PoseHeader, Window, compose, flag,
+};
+use gyre_radar::DatasetOptions;
+use gyre_scan_matching::Refiner;
+use gyre_slam::{Keyframe, SlamKind, records_path};
+use gyre_supervise::Ending;
+use nalgebra::{Isometry2, Vector2};
+
+/// Scans of the drive: three groups of synchronised changes.
+pub const SCANS: u64 = 52;
+const WINDOW: usize = 4;
+const STEP_M: f64 = 1.0;
+const INTERVAL_NS: i64 = 250_000_000;
+const POINTS: usize = 200;
+/// The results that must be the same bytes.
+const RESULTS: [&str; 3] = ["odometry.csv", "trajectory.tum", "trajectory.svg"];
+/// Those of a run with SLAM besides.
+const SLAM_RESULTS: [&str; 3] = ["trajectory_slam.tum", "graph.g2o", "map.png"];
+
+/// A machine on which one run is begun, resumed and completed.
+pub struct Machine {
+    configuration: Configuration,
+    programs: Programs,
+    /// The results of a run that nothing disturbs.
+    undisturbed: OnceLock<Vec<Vec<u8>>>,
+}
+
+impl Machine {
+    /// A machine whose runs have SLAM or not.
+    pub fn new(slam: SlamKind) -> Self {
+        // A small map, whose slots are used again within the drive; and a small picture, because each of thousands of runs draws one.
+        let overrides = [
+            "points.max_range_m=10.0",
+            "refinement.keyframes=3",
+            "refinement.keyframe_distance_m=1.5",
+            "refinement.cell_m=1.0",
+            "refinement.reach_m=30.0",
+            match slam {
+                SlamKind::None => "slam.kind=none",
+                SlamKind::Filter => "slam.kind=filter",
+                SlamKind::Graph => "slam.kind=graph",
+            },
+        ]
+        .map(str::to_owned);
+        let configuration = Configuration::of_overrides(&overrides).unwrap();
+        let programs = Programs::now(&configuration).unwrap();
+        Self {
+            configuration,
+            programs,
+            undisturbed: OnceLock::new(),
+        }
+    }
+
+    /// Returns the results of a run that nothing disturbs.
+    pub fn undisturbed(&self) -> &[Vec<u8>] {
+        self.undisturbed.get_or_init(|| {
+            let folder = super::folder();
+            self.run(folder.path()).unwrap();
+            self.results(folder.path())
+        })
+    }
+
+    /// Returns the content of the files that must be the same bytes.
+    pub fn results(&self, out: &Path) -> Vec<Vec<u8>> {
+        let mut paths: Vec<_> = RESULTS.iter().map(|name| out.join(name)).collect();
+        if self.configuration.slam.is_on() {
+            paths.push(records_path::<Keyframe>(out));
+            paths.extend(SLAM_RESULTS.iter().map(|name| out.join(name)));
+        }
+        paths.iter().map(|path| fs::read(path).unwrap()).collect()
+    }
+
+    /// Does what the command does, to the end of the run.
+    pub fn run(&self, folder: &Path) -> Result<(), Failure> {
+        let out = Out::lock(folder)?;
+        let resumed = match Earlier::of(&out, &self.configuration, &self.programs, false)? {
+            Earlier::Ended(begun) => begun.poses,
+            Earlier::Unfinished(begun) => self.go_on(&out, Some(begun))?,
+            Earlier::Nothing => self.go_on(&out, None)?,
+        };
+        let session = Session {
+            scans: Some(SCANS as usize),
+            resumed: resumed as usize,
+            wall: Duration::ZERO,
+            footprint: None,
+            ending: Some(Ending::Complete),
+            report: None,
+        };
+        let written = results::write(&self.configuration, &out, &session)?;
+        assert!(written.ended);
+        earlier::mark_complete(&out, written.poses)
+    }
+
+    /// Returns whether the run in this folder is complete. A new run removes the journal first: without it the mark says nothing.
+    pub fn is_complete(&self, folder: &Path) -> bool {
+        folder.join("journal/complete").exists() && journal::path(folder).exists()
+    }
+
+    fn go_on(&self, out: &Out, begun: Option<Begun>) -> Result<u64, Failure> {
+        let resumed = begun.as_ref().map_or(0, |begun| begun.poses);
+        match &begun {
+            Some(begun) => earlier::resume(out, begun)?,
+            None => earlier::begin(out, &self.identity(), &self.configuration.to_toml()?)?,
+        }
+        let mut stages = Stages::start(out.path(), &self.configuration)?;
+        stages.play()?;
+        Ok(resumed)
+    }
+
+    fn identity(&self) -> Identity {
+        let window = Window {
+            scans: WINDOW,
+            lag: 0,
+            look_back: 1,
+            live_depth: 0,
+            observers: 0,
+            slam: self.configuration.slam.is_on(),
+            localises: false,
+        };
+        let limits = Limits {
+            scan_bytes: 1,
+            raster_cells: 1,
+            rasters: 1,
+            points: POINTS,
+            cell_m: 1.0,
+        };
+        let checked = Preflight {
+            scans: Some(SCANS as usize),
+            window,
+            limits,
+            footprint: Footprint::new(&window, &limits),
+            truth: None,
+            recording: None,
+        };
+        Identity::of(
+            &self.configuration,
+            &self.programs,
+            DatasetOptions::default(),
+            &checked,
+        )
+        .unwrap()
+    }
+}
+
+/// Refinement and pose-integration.
+struct Stages {
+    refiner: Refiner,
+    checkpoint: Checkpoint,
+    journal: Journal,
+    keyframes: Option<Keyframes>,
+    last: Option<PoseHeader>,
+    /// The journal has its end: a run that goes on waits for its followers alone, which this machine does not have.
+    ended: bool,
+}
+
+impl Stages {
+    fn start(out: &Path, configuration: &Configuration) -> Result<Self, Failure> {
+        let config = &configuration.odometry.refinement;
+        let refiner = Refiner::new(config, POINTS)?;
+        let cells = refiner.keyframe_cells();
+        let checkpoint = Checkpoint::open(&checkpoint::path(out), WINDOW, config.keyframes, cells)?;
+        let journal = Journal::open(&journal::path(out))?;
+        let (mut poses, ended) = journal.last(1)?;
+        let last = poses.pop();
+        let slam = &configuration.slam;
+        let poses = last.map_or(0, |last| last.item.seq + 1);
+        let keyframes = slam
+            .is_on()
+            .then(|| Keyframes::open(out, &slam.places, poses, ended));
+        Ok(Self {
+            refiner,
+            checkpoint,
+            journal,
+            keyframes: keyframes.transpose()?,
+            last,
+            ended,
+        })
+    }
+
+    fn play(&mut self) -> Result<(), Failure> {
+        if self.ended {
+            return Ok(());
+        }
+        let first = self.last.map_or(0, |last| last.item.seq + 1);
+        if let Some(before) = first.checked_sub(1) {
+            self.checkpoint.restore(before, &mut self.refiner)?;
+        }
+        for seq in first..SCANS {
+            let motion = MotionHeader {
+                item: item(seq),
+                motion: self.refined(seq),
+            };
+            self.checkpoint
+                .write(seq, checkpoint::checksum(&motion.motion), &self.refiner)?;
+            let pose = compose(self.last.as_ref(), &motion);
+            if let Some(keyframes) = &mut self.keyframes {
+                keyframes.add(&pose, &scan(seq))?;
+            }
+            self.journal.append(&pose)?;
+            self.last = Some(pose);
+        }
+        if let Some(keyframes) = &mut self.keyframes {
+            keyframes.end()?;
+        }
+        let end = PoseHeader {
+            item: Item {
+                flags: flag::END,
+                ..item(SCANS)
+            },
+            ..PoseHeader::default()
+        };
+        Ok(self.journal.append(&end)?)
+    }
+
+    fn refined(&mut self, seq: u64) -> MotionEstimate {
+        let Some(before) = seq.checked_sub(1) else {
+            return MotionEstimate::default();
+        };
+        // Where nothing matches, a new map begins, with a scan that may be in the old one too.
+        let (later, earlier) = (scan(seq), scan(before));
+        let searched = Isometry2::new(Vector2::new(STEP_M, 0.0), 0.0);
+        let interval_s = INTERVAL_NS as f64 * 1e-9;
+        let refined = self
+            .refiner
+            .refine(seq, &later, &earlier, &searched, interval_s);
+        let found = MotionEstimate {
+            x_m: STEP_M,
+            interval_ns: INTERVAL_NS,
+            ..MotionEstimate::default()
+        };
+        found.refined(&refined)
+    }
+}
+
+fn item(seq: u64) -> Item {
+    Item {
+        seq,
+        scan: seq,
+        published: seq,
+        previous_scan: seq.saturating_sub(1),
+        stamp_ns: 1_700_000_000_000_000_000 + seq as i64 * INTERVAL_NS,
+        flags: if seq == 0 { flag::BREAK } else { 0 },
+        ..Item::default()
+    }
+}
+
+/// The scan of posts along a road; from scan 26 on of others, to which nothing before matches.
+fn scan(seq: u64) -> Vec<SparsePoint> {
+    let world = seq / 26;
+    let metres = seq as f64 * STEP_M;
+    let mixed = |k: u64, salt: u64| {
+        let word = (k + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15 ^ salt ^ world << 40);
+        (word ^ word >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 40
+    };
+    let share = |k: u64, salt: u64| mixed(k, salt) as f64 / f64::from(1 << 24);
+    let place = |k: u64| {
+        [
+            300.0 * share(k, 1) - 100.0 - metres,
+            50.0 * share(k, 7) - 25.0,
+        ]
+    };
+    (0..900)
+        .map(place)
+        .filter(|[x, y]| x.hypot(*y) < 28.0)
+        .map(|[x, y]| [x as f32, y as f32, 0.0, 0.7, 0.0].into())
+        .take(POINTS)
+        .collect()
+}

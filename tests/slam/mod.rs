@@ -1,0 +1,7 @@
+//! SLAM: keyframes, loops, maps, and localisation in them.
+
+mod extended_maps;
+mod followers;
+mod keyframes;
+mod localise;
+mod loops;
