@@ -189,54 +189,59 @@ mod tests {
         ScanAssembly::new(radar, Constants::default()).unwrap()
     }
 
-    /// Adds an azimuth with this time; returns the missing azimuths of the scan that it completes.
-    fn add(
-        scans: &mut ScanAssembly,
-        turns: &mut TurnCounter,
-        row: u16,
-        stamp_ns: i64,
-    ) -> Option<usize> {
-        let (mut header, mut bytes) = (ScanHeader::default(), vec![0; 400 * 16]);
-        let (seconds, split_seconds) = ClockFormat::default().fields(stamp_ns);
-        let azimuth = Azimuth {
-            sweep_counter: row,
-            encoder: row * 14,
-            seconds,
-            split_seconds,
-            powers: Powers::Eight(&[7; 16]),
-        };
-        let scan = scans.add(azimuth, stamp_ns, turns, &mut header, &mut bytes);
-        scan.map(|scan| scan.missing)
+    /// The assembly of scans in the memory of one scan.
+    struct Source {
+        scans: ScanAssembly,
+        turns: TurnCounter,
+        header: ScanHeader,
+        bytes: Vec<u8>,
     }
 
-    /// Adds a turn, in whose middle the clock is set by `step_ns`.
-    fn turn(
-        scans: &mut ScanAssembly,
-        turns: &mut TurnCounter,
-        start_ns: i64,
-        step_ns: i64,
-    ) -> Option<usize> {
-        let mut complete = None;
-        for row in 0..AZIMUTHS {
-            let set_ns = if row < AZIMUTHS / 2 { 0 } else { step_ns };
-            let stamp_ns = start_ns + i64::from(row) * 625_000 + set_ns;
-            complete = add(scans, turns, row, stamp_ns).or(complete);
+    impl Source {
+        fn new() -> Self {
+            let mut turns = TurnCounter::resume(None, 0);
+            turns.configure(250_000_000);
+            Self {
+                scans: scans(),
+                turns,
+                header: ScanHeader::default(),
+                bytes: vec![0; 400 * 16],
+            }
         }
-        complete
-    }
 
-    fn turns() -> TurnCounter {
-        let mut turns = TurnCounter::resume(None, 0);
-        turns.configure(250_000_000);
-        turns
+        /// Adds an azimuth with this time; returns the missing ones of the scan that it completes.
+        fn add(&mut self, row: u16, stamp_ns: i64) -> Option<usize> {
+            let (seconds, split_seconds) = ClockFormat::default().fields(stamp_ns);
+            let azimuth = Azimuth {
+                sweep_counter: row,
+                encoder: row * 14,
+                seconds,
+                split_seconds,
+                powers: Powers::Eight(&[7; 16]),
+            };
+            let (header, bytes) = (&mut self.header, &mut self.bytes);
+            let scan = (self.scans).add(azimuth, stamp_ns, &mut self.turns, header, bytes);
+            scan.map(|scan| scan.missing)
+        }
+
+        /// Adds a turn, in whose middle the clock is set by `step_ns`.
+        fn turn(&mut self, start_ns: i64, step_ns: i64) -> Option<usize> {
+            let mut complete = None;
+            for row in 0..AZIMUTHS {
+                let set_ns = if row < AZIMUTHS / 2 { 0 } else { step_ns };
+                let stamp_ns = start_ns + i64::from(row) * 625_000 + set_ns;
+                complete = self.add(row, stamp_ns).or(complete);
+            }
+            complete
+        }
     }
 
     #[test]
     fn a_scan_in_which_the_clock_is_set_back_is_left_out_and_counted() {
-        let (mut scans, mut turns) = (scans(), turns());
+        let mut source = Source::new();
         let mut turn = |start_ns, step_ns| {
-            let missing = turn(&mut scans, &mut turns, start_ns, step_ns);
-            (missing, turns.left_out(scans.is_open()))
+            let missing = source.turn(start_ns, step_ns);
+            (missing, source.turns.left_out(source.scans.is_open()))
         };
         assert_eq!(turn(START_NS, 0), (Some(0), 0));
         assert_eq!(turn(START_NS + 250_000_000, -20_000_000), (None, 1));
@@ -245,14 +250,14 @@ mod tests {
 
     #[test]
     fn the_source_sleeps_at_most_half_of_the_time_to_the_end_of_a_scan() {
-        let (mut scans, mut turns) = (scans(), turns());
-        assert_eq!(turn(&mut scans, &mut turns, START_NS, 0), Some(0));
+        let mut source = Source::new();
+        assert_eq!(source.turn(START_NS, 0), Some(0));
         let mut pauses = 0;
         for row in 0..AZIMUTHS {
             let stamp_ns = START_NS + 250_000_000 + i64::from(row) * 625_000;
-            add(&mut scans, &mut turns, row, stamp_ns);
+            source.add(row, stamp_ns);
             let left = Duration::from_micros(625) * u32::from(AZIMUTHS - row);
-            if let Some(pause) = scans.pause() {
+            if let Some(pause) = source.scans.pause() {
                 assert!(2 * pause <= left && pause <= Duration::from_micros(6250));
                 pauses += 1;
             }
