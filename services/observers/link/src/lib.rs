@@ -10,7 +10,7 @@
 //! no state of a receiver. The messages that are still there depend on the topic: see
 //! `replay_buffer`.
 //!
-//! Reading order: [`config`], `network` and `session` (endpoints and certificates), `replay_buffer`
+//! Reading order: `config`, `network` and `session` (endpoints and certificates), `replay_buffer`
 //! (the messages that can be sent), `serve` and `fetch` (the two ends of a topic), `handshake` with
 //! `robot` and `base`, then `send` and `receive`.
 

@@ -2,11 +2,11 @@
 //! Navtech radar from its driver.
 //!
 //! Reading order:
-//! 1. [`Domain`]: domain and network; `node`: a node there, and its topics.
-//! 2. [`Bridge`]: an observer of a run, which publishes it. `following` are its threads,
+//! 1. `Domain`: domain and network; `node`: a node there, and its topics.
+//! 2. `Bridge`: an observer of a run, which publishes it. `following` are its threads,
 //!    `run_state` is their shared state.
-//! 3. `clock`, [`Mounting`], `health`, `live_map`: stamps, frames, diagnostics, the map.
-//! 4. [`source`]: the topics of Navtech's driver as the source of a run.
+//! 3. `clock`, `Mounting`, `health`, `live_map`: stamps, frames, diagnostics, the map.
+//! 4. `source`: the topics of Navtech's driver as the source of a run.
 
 #![cfg(feature = "dds")]
 
