@@ -1,6 +1,6 @@
 //! One scenario after the other.
 
-use std::{thread, time::Duration};
+use std::{sync::Arc, thread, time::Duration};
 
 use gyre_messages::StageId;
 use gyre_stage::run::{free_shared_memory, sweep};
@@ -10,7 +10,7 @@ use crate::{
     budget::Check,
     copying,
     fault::{self, FaultKind},
-    pipeline::{Gate, Measured, Setup, measure},
+    pipeline::{Measured, Setup, measure},
     report::{Figures, ScenarioOutcome, Step, Verdict},
     scenario::{RADAR_HZ, Scenario},
     search::{Found, Steps, largest, step_duration},
@@ -113,7 +113,7 @@ impl Campaign<'_> {
                 least_s: fault::LEAST.as_secs(),
             });
         }
-        let mut measured = measure(self.tested, &setup, &Gate::of(1))?;
+        let mut measured = measure(self.tested, &setup, Arc::new(()))?;
         let (problem, omitted) = (problem(&measured), measured.omitted.take());
         let figures = measured.figures;
         Ok(ScenarioOutcome {
@@ -242,7 +242,6 @@ impl Campaign<'_> {
 
     /// Measures so many pipelines at once at a rate: a step of this level.
     fn step(&self, level: f64, rate_hz: f64, pipelines: u32) -> Result<Step, StressError> {
-        let gate = Gate::of(pipelines as usize);
         let duration = step_duration(self.options.duration, rate_hz);
         let setups: Vec<_> = (0..pipelines)
             .map(|number| Setup {
@@ -251,11 +250,13 @@ impl Campaign<'_> {
             })
             .collect();
         let measured: Vec<_> = thread::scope(|scope| {
-            let gate = &gate;
-            let running = setups
-                .iter()
-                .map(|setup| scope.spawn(move || measure(self.tested, setup, gate)));
-            let running: Vec<_> = running.collect();
+            let ticket = Arc::new(());
+            let start = |setup| {
+                let ticket = Arc::clone(&ticket);
+                scope.spawn(move || measure(self.tested, setup, ticket))
+            };
+            let running: Vec<_> = setups.iter().map(start).collect();
+            drop(ticket);
             running.into_iter().map(|it| it.join()).collect()
         });
         let mut all = Vec::new();

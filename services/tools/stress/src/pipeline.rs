@@ -1,11 +1,11 @@
 //! One run from its start to its end, with its load and faults, as an observer of `pose` sees it.
 
-mod gate;
 mod running;
 
 use std::{
     collections::BTreeMap,
     path::Path,
+    sync::{Arc, Weak},
     thread,
     time::{Duration, Instant},
 };
@@ -29,7 +29,6 @@ use crate::{
     work::Work,
 };
 
-pub use gate::Gate;
 use running::Running;
 
 /// Time after the measurement in which late poses still count.
@@ -113,23 +112,24 @@ pub struct Counters {
     pub wakes_caught_late: u64,
 }
 
-/// Starts a run, measures it, and ends it.
+/// Starts a run, measures it, and ends it. Pipelines that are measured together have one ticket: the
+/// measurement begins when each has given up its share of it, after the warm-up or by a failure.
 ///
 /// # Errors
 /// A run that makes no first poses; a helper that fails.
 pub fn measure(
     tested: &TestedPipeline,
     setup: &Setup,
-    gate: &Gate,
+    ticket: Arc<()>,
 ) -> Result<Measured, StressError> {
-    let mut ticket = gate.ticket();
+    let held = Arc::downgrade(&ticket);
     let mut run = Running::start(tested, setup)?;
     let observed = run.attach()?;
     let mut poses = observed.observe::<Pose>()?;
     let mut newest = run.warm_up(&mut poses)?;
     let (mut loads, taken) = run.load(tested)?;
-    ticket.arrive();
-    await_others(gate, &mut poses, &mut newest)?;
+    drop(ticket);
+    await_others(&held, &mut poses, &mut newest)?;
     let mut session = Session::begin(setup, run.pid(), run.out(), &newest);
     let has_ended = session.measure(&mut poses, || run.has_ended())?;
     let ended_load = loads.iter_mut().find_map(Helper::has_died);
@@ -168,7 +168,7 @@ pub fn measure(
 
 /// Waits for the other pipelines. The poses that come meanwhile are of the warm-up.
 fn await_others(
-    gate: &Gate,
+    held: &Weak<()>,
     poses: &mut Observer<'_, Pose>,
     newest: &mut PoseHeader,
 ) -> Result<(), StressError> {
@@ -177,7 +177,7 @@ fn await_others(
             // It returns at once when the run has ended.
             thread::sleep(TICK);
         }
-        if gate.is_open() {
+        if held.strong_count() == 0 {
             return Ok(());
         }
     }

@@ -90,8 +90,8 @@ impl<'a> Running<'a> {
         !matches!(self.process.try_wait(), Ok(None))
     }
 
-    /// Returns the reason why it has ended, in its own words, which are complete when its process has
-    /// ended too.
+    /// Returns the reason why it has ended, in its own words, which are complete when its process
+    /// has ended too.
     pub fn last_words(&mut self) -> String {
         self.await_end(Instant::now() + END_LIMIT);
         match self.process.try_wait() {
@@ -157,7 +157,8 @@ impl<'a> Running<'a> {
         }
     }
 
-    /// Waits for the first poses, and returns the newest of them; where hardly a scan comes, for one.
+    /// Waits for the first poses, and returns the newest of them; where hardly a scan comes, for
+    /// one.
     pub fn warm_up(&mut self, poses: &mut Observer<'_, Pose>) -> Result<PoseHeader, StressError> {
         let enough = match self.setup.scenario {
             Scenario::Idle => 1,

@@ -316,3 +316,47 @@ fn ms(ms: Option<f64>) -> String {
         Some(ms) => format!("{ms:.3}"),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+    use crate::{fault::Fault, record::RunLatency};
+
+    #[test]
+    fn a_page_has_the_tables_of_what_was_measured_and_no_empty_ones() {
+        let kill = Fault {
+            kind: FaultKind::Kill,
+            stage: "masking",
+            at_s: 1.5,
+            recovery_ms: Some(40.0),
+        };
+        let counts = Counts {
+            due: 240,
+            posed: 238,
+            dropped: 2,
+            ..Counts::default()
+        };
+        let mut outcome = ScenarioOutcome::new(Scenario::Kills, Duration::from_secs(60));
+        outcome.figures = Some(Figures {
+            latency: RunLatency {
+                counts,
+                ..RunLatency::default()
+            },
+            faults: vec![kill],
+            ..Figures::default()
+        });
+        let page = page(&Report::of(vec![outcome]));
+        for part in [
+            " | max | closed loop p50 | p99 | max |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|\n\
+             | kills | 4 | 240 | 2 | - | - | - | - | - | - | - | - | - |\n",
+            "\n## kills\n\nStages that are killed (SIGKILL), at 4 scans/s. 60 s.\n\n240 scans were due: ",
+            "\n\n| at, s | fault | stage | recovered after, ms |\n|---|---|---|---|\n\
+             | 1.50 | killed | masking | 40.0 |\n\nRecovered: ",
+        ] {
+            assert!(page.contains(part), "{part}\nis not in\n{page}");
+        }
+        assert!(!page.contains("| process |") && !page.contains("| limit |"));
+    }
+}
