@@ -1,4 +1,5 @@
-//! Times the rendering of scans: `cargo run --release -p gyre-simulator --example render -- [CONFIG [SCANS]]`.
+//! Times the rendering of scans:
+//! `cargo run --release -p gyre-simulator --example render -- [CONFIG [SCANS]]`.
 //!
 //! CONFIG has the keys of the section `[simulation]` at its top level.
 

@@ -22,8 +22,8 @@ pub enum Aspect {
 }
 
 impl Aspect {
-    /// Share of the power that is reflected towards `direction`, a unit vector from the scatterer to the
-    /// sensor: 0 to 1.
+    /// Share of the power that is reflected towards `direction`, a unit vector from the scatterer
+    /// to the sensor: 0 to 1.
     pub fn gain(&self, direction: Vector2<f64>) -> f64 {
         match *self {
             Self::AllRound => 1.0,
@@ -31,8 +31,8 @@ impl Aspect {
         }
     }
 
-    /// The mean of [`Aspect::gain`] over all directions: that of a power of the cosine over a circle is
-    /// about `1 / sqrt(2 pi (sharpness + 0.64))`.
+    /// The mean of [`Aspect::gain`] over all directions: that of a power of the cosine over a
+    /// circle is about `1 / sqrt(2 pi (sharpness + 0.64))`.
     pub fn mean_gain(&self) -> f64 {
         match *self {
             Self::AllRound => 1.0,
@@ -140,7 +140,8 @@ impl Moving<'_> {
 
 /// The moving bodies around the sensor.
 pub trait Movers: Send + Sync {
-    /// Visits all bodies within `reach_m` of `centre` at a time of the drive, always in the same order.
+    /// Visits all bodies within `reach_m` of `centre` at a time of the drive, always in the same
+    /// order.
     fn visit<'a>(
         &'a self,
         time_s: f64,

@@ -18,13 +18,13 @@ pub(crate) const MAX_SCANS: usize = 100_000;
 
 /// A simulation. Every key has a default, and unknown keys are rejected.
 ///
-/// One configuration gives one dataset, byte for byte (with one build on one kind of machine: sines and
-/// logarithms are the system's).
+/// One configuration gives one dataset, byte for byte (with one build on one kind of machine: sines
+/// and logarithms are the system's).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SimulationConfig {
-    /// Scans to generate. A drive round a block is repeated as long as they last; of any other drive there
-    /// are no more than it lasts. Default: all of the drive; 64 round a block.
+    /// Scans to generate. A drive round a block is repeated as long as they last; of any other
+    /// drive there are no more than it lasts. Default: all of the drive; 64 round a block.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scans: Option<usize>,
     /// The seed of all randomness that has no seed of its own: `town.seed`, `town.changes_seed`,

@@ -40,8 +40,8 @@ pub struct DriveConfig {
     pub block_width_m: f64,
     /// `block` and `town`: speed on straights, metres a second; in a town on its fastest streets.
     pub speed_mps: f64,
-    /// `block` and `town`: lateral acceleration in bends, metres a second squared, which limits the speed
-    /// there. Default: 5 round a block, 2.2 in a town.
+    /// `block` and `town`: lateral acceleration in bends, metres a second squared, which limits the
+    /// speed there. Default: 5 round a block, 2.2 in a town.
     pub lateral_acceleration_mps2: Option<f64>,
     /// `town`: length of the drive, metres.
     pub length_m: f64,
@@ -124,12 +124,12 @@ impl DriveConfig {
         Ok(())
     }
 
-    /// Builds the path; all its randomness comes from `seed`. The poses of a file are those in the frame
-    /// `world` of the file; without one in that of the first pose that is driven.
+    /// Builds the path; all its randomness comes from `seed`. The poses of a file are those in the
+    /// frame `world` of the file; without one in that of the first pose that is driven.
     ///
     /// # Errors
-    /// [`SimulatorError::Trajectory`] if the file cannot be read, [`SimulatorError::Drive`] if no vehicle
-    /// can drive along its poses.
+    /// [`SimulatorError::Trajectory`] if the file cannot be read, [`SimulatorError::Drive`] if no
+    /// vehicle can drive along its poses.
     pub fn path(&self, seed: u64, world: Option<Pose>) -> Result<Box<dyn Path>, SimulatorError> {
         let lateral_acceleration_mps2 = |default| self.lateral_acceleration_mps2.unwrap_or(default);
         Ok(match (self.kind, &self.file) {

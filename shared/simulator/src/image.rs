@@ -7,9 +7,9 @@ use gyre_storage::Draft;
 
 use crate::error::SimulatorError;
 
-/// Encodes an 8-bit grey PNG to `into`, whose content is replaced. Fast rather than small: the difference
-/// to the neighbour in range compresses better than PNG's other filters and needs no trial for each row (4
-/// ms for an Oxford scan, which halves in size).
+/// Encodes an 8-bit grey PNG to `into`, whose content is replaced. Fast rather than small: the
+/// difference to the neighbour in range compresses better than PNG's other filters and needs no
+/// trial for each row (4 ms for an Oxford scan, which halves in size).
 pub(crate) fn encode(
     size: ImageSize,
     pixels: &[u8],
@@ -31,7 +31,8 @@ pub(crate) fn encode(
     writer.finish()
 }
 
-/// Writes an image as a whole or not at all, whatever ends the process or the machine; `buffer` is working memory.
+/// Writes an image as a whole or not at all, whatever ends the process or the machine; `buffer` is
+/// working memory.
 ///
 /// # Errors
 /// [`SimulatorError::Encode`] or [`SimulatorError::Storage`].

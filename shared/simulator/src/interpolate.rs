@@ -1,7 +1,7 @@
 //! Interpolation in tables of measured values.
 
-/// The value of a table at a place: linear between its entries, constant before the first and after the
-/// last. `None` for an empty table.
+/// The value of a table at a place: linear between its entries, constant before the first and after
+/// the last. `None` for an empty table.
 pub(crate) fn interpolate(table: &[(f64, f64)], at: f64) -> Option<f64> {
     let next = table.partition_point(|entry| entry.0 <= at);
     let (Some(before), Some(after)) = (table.get(next.saturating_sub(1)), table.get(next)) else {

@@ -1,14 +1,16 @@
-//! Simulated drives: towns, traffic, weather, and spinning FMCW radars that are fitted to real ones.
+//! Simulated drives: towns, traffic, weather, and spinning FMCW radars that are fitted to real
+//! ones.
 //!
-//! A vehicle with a spinning radar drives through a procedural town. The result is a dataset in Oxford's,
-//! Boreas' or RADIATE's format with exact ground truth, written to a disk or streamed into a pipeline. In
-//! the order of the data:
+//! A vehicle with a spinning radar drives through a procedural town. The result is a dataset in
+//! Oxford's, Boreas' or RADIATE's format with exact ground truth, written to a disk or streamed
+//! into a pipeline. In the order of the data:
 //!
 //! - [`config`]: the configuration,
 //! - [`drive`], [`path`]: the path of the sensor, a pose for every instant,
 //! - [`lanes`], [`streets`]: the network of streets,
 //! - [`town`], [`traffic`]: what stands along them and what moves on them,
-//! - [`body`], [`world`], [`occlusion`]: scatterers and walls, and which walls lie between two points,
+//! - [`body`], [`world`], [`occlusion`]: scatterers and walls, and which walls lie between two
+//!   points,
 //! - [`profile`]: the radars; [`weather`]: rain, fog and snow,
 //! - [`sensor`]: the measurement of one sweep,
 //! - [`simulator`]: single scans with their exact poses,

@@ -4,10 +4,11 @@ use nalgebra::{Point2, Vector2};
 
 use crate::body::{NO_BODY, Wall};
 
-/// Side of a cell, metres: a few walls in each, some ten cells between the sensor and most scatterers.
+/// Side of a cell, metres: a few walls in each, some ten cells between the sensor and most
+/// scatterers.
 const CELL_M: f64 = 5.0;
-/// Margin before the first wall, metres. Not a round number, since a wall along the edge of a cell is not
-/// found from the cell beside it.
+/// Margin before the first wall, metres. Not a round number, since a wall along the edge of a cell
+/// is not found from the cell beside it.
 const MARGIN_M: f64 = 1.618_034;
 
 /// Walls indexed by the cells that they touch.
@@ -70,7 +71,8 @@ impl WallGrid {
         inside.then(|| row as usize * self.columns + column as usize)
     }
 
-    /// Two-line share of the power that passes between two points; see [`crate::World::transmission`].
+    /// Two-line share of the power that passes between two points; see
+    /// [`crate::World::transmission`].
     pub fn transmission(
         &self,
         from: Point2<f64>,

@@ -13,7 +13,8 @@ pub struct OutputConfig {
     /// Format of the files. Default: in a run that of `dataset.format`, else Oxford's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub format: Option<OutputFormat>,
-    /// The times at which the host receives scans, which RADIATE logs instead of the sensor's times.
+    /// The times at which the host receives scans, which RADIATE logs instead of the sensor's
+    /// times.
     pub host_stamps: HostStamps,
     /// True if `gyre run` writes the dataset to its results and plays it from there. Default: it is played
     /// without touching the disk.
@@ -31,8 +32,8 @@ pub enum OutputFormat {
     Oxford,
     /// Boreas, and Boreas Road Trip where the chirps alternate. Fits every radar.
     Boreas,
-    /// RADIATE: transposed images without metadata. Fits radars that turn four times a second and whose
-    /// first azimuth is straight ahead.
+    /// RADIATE: transposed images without metadata. Fits radars that turn four times a second and
+    /// whose first azimuth is straight ahead.
     Radiate,
 }
 

@@ -46,7 +46,8 @@ pub struct Sampling {
     pub bins: usize,
     /// Range resolution, metres a bin.
     pub range_resolution_m: f64,
-    /// Metres to add to a bin's range: bin `b` is at `(b + 0.5) * range_resolution_m + range_offset_m`.
+    /// Metres to add to a bin's range: bin `b` is at
+    /// `(b + 0.5) * range_resolution_m + range_offset_m`.
     pub range_offset_m: f64,
     /// Time of one turn, microseconds.
     pub period_us: i64,
@@ -76,11 +77,11 @@ pub struct Receiver {
     /// Power received from 1 m² is this over the fourth power of the range, at long range, in the
     /// receiver's units.
     pub constant: f64,
-    /// Range below which power falls with the square only, metres: an FMCW receiver filters low beat
-    /// frequencies.
+    /// Range below which power falls with the square only, metres: an FMCW receiver filters low
+    /// beat frequencies.
     pub filter_m: f64,
-    /// Range below which power rises with the square, metres: near objects lie below the beam of the
-    /// antenna on the roof.
+    /// Range below which power rises with the square, metres: near objects lie below the beam of
+    /// the antenna on the roof.
     pub near_m: f64,
     /// Power at which the receiver saturates, in its units.
     pub full_scale: f32,
@@ -190,9 +191,9 @@ impl Profile {
                 doppler_s: 0.0505,
                 ..oxford
             },
-            // Checchin et al. 2010, Table 1; 3600 counts are its angular precision of 0.1 degrees. The
-            // Doppler shift depends on the duration of the chirp, which is not published: 0 unless
-            // `sensor.doppler_s` is set.
+            // Checchin et al. 2010, Table 1; 3600 counts are its angular precision of 0.1 degrees.
+            // The Doppler shift depends on the duration of the chirp, which is not published: 0
+            // unless `sensor.doppler_s` is set.
             Self::K2pi => Sampling {
                 azimuths: 120,
                 bins: 162,
@@ -234,7 +235,8 @@ impl Profile {
                 ringing_db: &RADIATE_RINGING,
                 ..oxford
             },
-            // No recording was available: Oxford's values, with the longer cell of its smaller bandwidth.
+            // No recording was available: Oxford's values, with the longer cell of its smaller
+            // bandwidth.
             Self::Cir204h => Receiver {
                 cell_m: 0.33,
                 constant: 1.6e11,
@@ -247,10 +249,11 @@ impl Profile {
                 ringing_db: &RAS6_RINGING,
                 ..oxford
             },
-            // Checchin et al. 2010, Table 1: 24 GHz, an angular resolution of 3 degrees, 250 MHz, which is
-            // 0.6 m. A gain of 20 dB with such a narrow beam implies a fan beam, assumed 20 degrees high
-            // one way. Assumptions are the sensitivity, by which 1 m² at 100 m, the maximum range, is 16 dB
-            // above the floor, the filter and the floor. The first bin is at 3 m, so no ringing is visible.
+            // Checchin et al. 2010, Table 1: 24 GHz, an angular resolution of 3 degrees, 250 MHz,
+            // which is 0.6 m. A gain of 20 dB with such a narrow beam implies a fan beam, assumed
+            // 20 degrees high one way. Assumptions are the sensitivity, by which 1 m² at 100 m, the
+            // maximum range, is 16 dB above the floor, the filter and the floor. The first bin is
+            // at 3 m, so no ringing is visible.
             Self::K2pi => Receiver {
                 carrier_ghz: 24.0,
                 beam_rad: 3.0f64.to_radians(),

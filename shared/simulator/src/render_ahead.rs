@@ -1,7 +1,8 @@
 //! Images of a simulated drive, rendered before they are needed.
 //!
-//! One thread per processor renders the next image that no other has begun, up to [`AHEAD`] images ahead of the reader. So
-//! memory is bounded; and since an image depends on its number alone, threads and their timing change nothing.
+//! One thread per processor renders the next image that no other has begun, up to [`AHEAD`] images
+//! ahead of the reader. So memory is bounded; and since an image depends on its number alone,
+//! threads and their timing change nothing.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -26,7 +27,8 @@ struct RenderAhead {
 }
 
 impl SimulatedDrive {
-    /// Opens the drive as a dataset that lies on no disk, its images rendered ahead on all processors.
+    /// Opens the drive as a dataset that lies on no disk, its images rendered ahead on all
+    /// processors.
     ///
     /// # Errors
     /// Options that do not fit the drive's format.
@@ -141,7 +143,8 @@ impl Queue {
 }
 
 impl Shared {
-    /// The queue is consistent even after a panic: nothing that can fail is done while it is locked.
+    /// The queue is consistent even after a panic: nothing that can fail is done while it is
+    /// locked.
     fn lock(&self) -> MutexGuard<'_, Queue> {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }

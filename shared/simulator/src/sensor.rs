@@ -2,20 +2,22 @@
 //!
 //! In the order of a measurement:
 //!
-//! - `sweep_poses`: the sensor's pose at each azimuth, and the times at which its beam passes a place,
+//! - `sweep_poses`: the sensor's pose at each azimuth, and the times at which its beam passes a
+//!   place,
 //! - `line_of_sight`: rays in all directions, and the walls along each,
-//! - `echoes`, `highlights`, `ghosts`: direct echoes, specular reflections of walls, and mirror images,
-//!   with their amplitudes; `atmosphere`: attenuation by the weather,
+//! - `echoes`, `highlights`, `ghosts`: direct echoes, specular reflections of walls, and mirror
+//!   images, with their amplitudes; `atmosphere`: attenuation by the weather,
 //! - `scintillation`: fluctuation of echoes with the direction,
 //! - `elevation`, `antenna`: the beam's pattern in elevation and azimuth,
 //! - `spectrum`: range processing and quantisation,
 //! - `ground`: backscatter of road and fields,
-//! - `fixed_echoes`: ringing and the vehicle's own parts; `noise`: all power that is no single echo,
+//! - `fixed_echoes`: ringing and the vehicle's own parts; `noise`: all power that is no single
+//!   echo,
 //! - `effects`: switches for all of these.
 //!
 //! Echoes are summed as complex amplitudes with the phase of their true path, so scatterers in one
-//! resolution cell interfere (speckle), differently from each pose. Not modelled: terrain, true heights of
-//! objects, and paths with a single bounce.
+//! resolution cell interfere (speckle), differently from each pose. Not modelled: terrain, true
+//! heights of objects, and paths with a single bounce.
 
 mod antenna;
 mod atmosphere;
@@ -133,8 +135,8 @@ impl Sensor {
         &self.sampling
     }
 
-    /// Measures one sweep into `slot` and returns its geometry: rows of [`METADATA_BYTES`], then powers, as
-    /// in an Oxford image.
+    /// Measures one sweep into `slot` and returns its geometry: rows of [`METADATA_BYTES`], then
+    /// powers, as in an Oxford image.
     ///
     /// All randomness comes from the radar's seed and `index`, the number of the scan.
     pub fn sweep(
@@ -208,8 +210,8 @@ impl Sensor {
         if self.effects.multipath {
             view.ghosts(scene.world, &mut self.echoes);
         }
-        // The number of drawn values does not depend on the effects, so that none changes another's.
-        // Interference, which needs a varying number, comes last.
+        // The number of drawn values does not depend on the effects, so that none changes
+        // another's. Interference, which needs a varying number, comes last.
         let jitter_rad = if self.effects.encoder_wobble {
             ENCODER_JITTER_RAD
         } else {

@@ -1,5 +1,5 @@
-//! A simulated drive in a dataset format: images with their names, side files and ground truth. It can be
-//! written to a disk or streamed into a pipeline.
+//! A simulated drive in a dataset format: images with their names, side files and ground truth. It
+//! can be written to a disk or streamed into a pipeline.
 
 use std::path::PathBuf;
 

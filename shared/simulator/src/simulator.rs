@@ -19,16 +19,17 @@ use crate::traffic::Traffic;
 use crate::weather::WeatherConfig;
 use crate::world::World;
 
-/// Stamp of the first azimuth of the first scan, microseconds since 1970 (2019-01-10 15:00 UTC). Readers
-/// check that the year is plausible, and it is fixed so that a configuration always gives the same files.
+/// Stamp of the first azimuth of the first scan, microseconds since 1970 (2019-01-10 15:00 UTC).
+/// Readers check that the year is plausible, and it is fixed so that a configuration always gives
+/// the same files.
 const EPOCH_US: i64 = 1_547_132_400_000_000;
 
 /// Time between the places of a drive that are checked to lie on the town's streets, seconds.
 const CHECK_S: f64 = 0.5;
 /// Number of scans of an endless drive, if none is given.
 const ENDLESS_SCANS: usize = 64;
-/// Duration of an endless drive along which streets are laid, seconds; its traffic is made for multiples of
-/// this.
+/// Duration of an endless drive along which streets are laid, seconds; its traffic is made for
+/// multiples of this.
 const ENDLESS_S: f64 = 600.0;
 
 /// A drive through a town, ready to be rendered. Cheap to clone and shared between threads.
@@ -207,8 +208,8 @@ fn scans(wanted: Option<usize>, duration_s: f64, period_s: f64) -> Result<usize,
     }
 }
 
-/// Lays the streets of `town.streets` in the frame `world` of their files, and checks that the drive, a path
-/// and how many seconds of it, stays on them.
+/// Lays the streets of `town.streets` in the frame `world` of their files, and checks that the
+/// drive, a path and how many seconds of it, stays on them.
 fn shared_streets(
     config: &SimulationConfig,
     world: Pose,

@@ -1,4 +1,5 @@
-//! Independent streams of random numbers from one seed, so that no random quantity depends on another.
+//! Independent streams of random numbers from one seed, so that no random quantity depends on
+//! another.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

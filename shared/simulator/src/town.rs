@@ -1,12 +1,12 @@
 //! A procedural town along any network of streets.
 //!
-//! Each side of a street is divided into stretches, and each stretch into lots by the uses of its district
-//! ([`TownConfig::character`]): terraced houses, detached houses, halls, lawns, car parks, fields. A second
-//! row fills what is visible through gaps. No two lots overlap, and none reaches into a street. Posts,
-//! signs, trees and parked cars stand between lots and carriageway.
+//! Each side of a street is divided into stretches, and each stretch into lots by the uses of its
+//! district ([`TownConfig::character`]): terraced houses, detached houses, halls, lawns, car parks,
+//! fields. A second row fills what is visible through gaps. No two lots overlap, and none reaches
+//! into a street. Posts, signs, trees and parked cars stand between lots and carriageway.
 //!
-//! The content of a place depends on the seed, the place and the streets near by alone, so a longer drive
-//! or a later pass sees the same town.
+//! The content of a place depends on the seed, the place and the streets near by alone, so a longer
+//! drive or a later pass sees the same town.
 
 mod boundary;
 mod building;
@@ -107,8 +107,8 @@ impl<'a> Planner<'a> {
             register: Register::default(),
             built: Built::default(),
         };
-        // First rows before second ones and driven streets before others, since the most visible lots have
-        // priority.
+        // First rows before second ones and driven streets before others, since the most visible
+        // lots have priority.
         for row in [Row::First, Row::Second] {
             for driven in [true, false] {
                 planner.line(&lines, row, driven);

@@ -1,8 +1,8 @@
 //! The other road users.
 //!
-//! The place of each is a function of time alone, so any time can be asked for in any order. Vehicles in
-//! the ego vehicle's lane follow its progress at no less than the distance of a queue; the others keep
-//! clear of it.
+//! The place of each is a function of time alone, so any time can be asked for in any order.
+//! Vehicles in the ego vehicle's lane follow its progress at no less than the distance of a queue;
+//! the others keep clear of it.
 
 mod actor;
 mod actors;

@@ -1,11 +1,11 @@
-//! Exact ground truth beside a dataset of any format: `ground_truth.tum`, the pose at the time of each
-//! scan, and `azimuth_poses.npy`, the pose at the time of each azimuth.
+//! Exact ground truth beside a dataset of any format: `ground_truth.tum`, the pose at the time of
+//! each scan, and `azimuth_poses.npy`, the pose at the time of each azimuth.
 //!
-//! The latter is a NumPy array (format 1.0, `<f8`) of shape (scans, azimuths, 4): seconds since the first
-//! azimuth of the first scan; x and y in the world, metres; yaw, radians counter-clockwise. It takes 12.8
-//! MB for 1,000 scans of 400 azimuths, and `numpy.load(path, mmap_mode="r")` opens it. The header is
-//! written here since `ndarray-npy` and `npyz` would add a Python parser (pest) and a C build for these ten
-//! lines.
+//! The latter is a NumPy array (format 1.0, `<f8`) of shape (scans, azimuths, 4): seconds since the
+//! first azimuth of the first scan; x and y in the world, metres; yaw, radians counter-clockwise.
+//! It takes 12.8 MB for 1,000 scans of 400 azimuths, and `numpy.load(path, mmap_mode="r")` opens
+//! it. The header is written here since `ndarray-npy` and `npyz` would add a Python parser (pest)
+//! and a C build for these ten lines.
 
 use gyre_geometry::Pose;
 use gyre_radar::Trajectory;
@@ -59,7 +59,8 @@ pub(crate) fn azimuth_poses_npy(simulator: &Simulator) -> Vec<u8> {
     bytes
 }
 
-/// Magic, version 1.0, the header's length, and a Python dictionary padded to a multiple of 64 bytes.
+/// Magic, version 1.0, the header's length, and a Python dictionary padded to a multiple of 64
+/// bytes.
 fn npy_header(scans: usize, azimuths: usize) -> Vec<u8> {
     let dictionary =
         format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({scans}, {azimuths}, 4), }}");

@@ -1,9 +1,9 @@
 //! Rain, fog and snow: attenuation and backscatter.
 //!
-//! Specific attenuation follows ITU-R P.838-3 (rain: k R^alpha) and P.840 (fog, by liquid water). The
-//! reflectivity of rain is Currie, Dyer and Hayes' (1975) fit A R^B at 70 GHz, and for 24 GHz one between
-//! their 9.4 and 35 GHz. For snow and wet radomes, whose figures vary widely in the literature, middle
-//! values are used.
+//! Specific attenuation follows ITU-R P.838-3 (rain: k R^alpha) and P.840 (fog, by liquid water).
+//! The reflectivity of rain is Currie, Dyer and Hayes' (1975) fit A R^B at 70 GHz, and for 24 GHz
+//! one between their 9.4 and 35 GHz. For snow and wet radomes, whose figures vary widely in the
+//! literature, middle values are used.
 
 use serde::{Deserialize, Serialize};
 
@@ -47,7 +47,8 @@ impl WeatherConfig {
 
     /// Attenuation one way, decibels a metre, at a carrier frequency.
     pub fn attenuation_db_m(&self, carrier_ghz: f64) -> f64 {
-        // P.838-3, horizontal polarisation, at 24 GHz and 77 GHz; no radar between the two is simulated.
+        // P.838-3, horizontal polarisation, at 24 GHz and 77 GHz; no radar between the two is
+        // simulated.
         let (k, alpha, fog_db_km, snow) = if carrier_ghz > 50.0 {
             (1.13, 0.717, 4.6, 0.6)
         } else {

@@ -85,8 +85,8 @@ impl World {
         self.walls.walls()
     }
 
-    /// Two-way share of the power that passes between two points; walls of `body` are ignored. Stops as
-    /// soon as the share is below `negligible`.
+    /// Two-way share of the power that passes between two points; walls of `body` are ignored.
+    /// Stops as soon as the share is below `negligible`.
     pub fn transmission(
         &self,
         from: Point2<f64>,
@@ -97,8 +97,8 @@ impl World {
         self.walls.transmission(from, to, body, negligible)
     }
 
-    /// Visits the walls between two points, each once: its number in [`World::walls`], and the share of the
-    /// line at which it is crossed.
+    /// Visits the walls between two points, each once: its number in [`World::walls`], and the
+    /// share of the line at which it is crossed.
     pub fn walls_between(
         &self,
         from: Point2<f64>,

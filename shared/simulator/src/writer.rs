@@ -28,8 +28,8 @@ pub struct Summary {
     pub scans: usize,
     /// Scans that existed already.
     pub kept: usize,
-    /// Length of the path from the first scan to the last, metres (sum of the straight lines between
-    /// scans).
+    /// Length of the path from the first scan to the last, metres (sum of the straight lines
+    /// between scans).
     pub path_m: f64,
     /// Time from the first scan to the last, seconds.
     pub duration_s: f64,
@@ -52,16 +52,16 @@ pub fn write_dataset(
     )
 }
 
-/// Writes the dataset of `config` to the folder `out` on `threads` threads, and calls `progress(done,
-/// total)` for each image.
+/// Writes the dataset of `config` to the folder `out` on `threads` threads, and calls
+/// `progress(done, total)` for each image.
 ///
-/// The files are the same, byte for byte, for the same configuration and any number of threads. Images of
-/// an earlier call with the same configuration are kept, if it was interrupted or had fewer scans; the
-/// first and the last of them are compared with newly rendered ones.
+/// The files are the same, byte for byte, for the same configuration and any number of threads.
+/// Images of an earlier call with the same configuration are kept, if it was interrupted or had
+/// fewer scans; the first and the last of them are compared with newly rendered ones.
 ///
 /// # Errors
-/// [`SimulatorError`] if `config` cannot be simulated, if `out` holds another dataset or images of unknown
-/// origin, if another process writes to it, or if it cannot be written.
+/// [`SimulatorError`] if `config` cannot be simulated, if `out` holds another dataset or images of
+/// unknown origin, if another process writes to it, or if it cannot be written.
 pub fn write_dataset_on(
     threads: NonZeroUsize,
     config: &SimulationConfig,

@@ -21,7 +21,8 @@ fn real_files() -> Vec<PathBuf> {
     .to_vec()
 }
 
-/// Sorted magnitudes of the n-th derivative of a quantity along the drive, by differences over 50 ms.
+/// Sorted magnitudes of the n-th derivative of a quantity along the drive, by differences over 50
+/// ms.
 fn derivative(drive: &dyn Path, order: usize, of: &dyn Fn(f64) -> [f64; 2]) -> Vec<f64> {
     let step = 0.05;
     let mut values: Vec<[f64; 2]> = (0..(drive.duration_s() / step) as usize)

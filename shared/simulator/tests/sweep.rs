@@ -109,7 +109,8 @@ fn brightest(scan: &OwnedScan) -> (usize, f64, u8) {
     )
 }
 
-/// The azimuth whose beam is closest to a world point when it is measured, and the range from there.
+/// The azimuth whose beam is closest to a world point when it is measured, and the range from
+/// there.
 fn expected(path: &dyn Path, target: Point2<f64>) -> (usize, f64) {
     let seen = |azimuth: usize| {
         let time_s = (250_000 * azimuth as i64 / AZIMUTHS as i64) as f64 * 1e-6;

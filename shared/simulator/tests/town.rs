@@ -13,8 +13,8 @@ fn place(drive: &dyn Path, time_s: f64) -> Point2<f64> {
     Point2::from(drive.pose(time_s).translation.vector)
 }
 
-/// Builds the town along a drive and checks that nothing stands on a street or between two places of the
-/// drive.
+/// Builds the town along a drive and checks that nothing stands on a street or between two places
+/// of the drive.
 fn free_town(drive: &dyn Path, duration_s: f64, seed: u64) -> World {
     let streets = Streets::along(drive, duration_s, DrivingSide::Left, seed);
     let world = World::new(town::build(&TownConfig::default(), &streets, seed));

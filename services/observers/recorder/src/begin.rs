@@ -1,4 +1,5 @@
-//! Where a recording begins: a new one, or the next part of one that an earlier recorder of the run has begun.
+//! Where a recording begins: a new one, or the next part of one that an earlier recorder of the run
+//! has begun.
 
 use std::{
     collections::BTreeMap,
@@ -19,20 +20,20 @@ use crate::{
 pub(crate) struct Begun {
     /// The file to write.
     pub path: PathBuf,
-    /// What stands at its begin.
+    /// The head of the file.
     pub head: Head,
-    /// What a recorder of this run that was there before has written.
-    pub earlier: Option<Earlier>,
+    /// The parts of an earlier recorder of this run.
+    pub earlier: Option<EarlierParts>,
 }
 
 /// The parts that earlier recorders have written.
-pub(crate) struct Earlier {
+pub(crate) struct EarlierParts {
     id: String,
     /// The number after that of the newest message of each topic.
     next: BTreeMap<String, u64>,
 }
 
-impl Earlier {
+impl EarlierParts {
     fn read(first: &Path, topics: &[String]) -> Result<Self, RecordingError> {
         let id = Recording::open(&[first.to_owned()])?.head().id.clone();
         let mut next = BTreeMap::new();
@@ -51,7 +52,8 @@ impl Earlier {
         Ok(Self { id, next })
     }
 
-    /// Returns the first message of a topic that they lack. Recording begins with the first scan, which waits for the recorder.
+    /// Returns the first message of a topic that they lack. Recording begins with the first scan,
+    /// which waits for the recorder.
     pub fn next_of(&self, topic: &str) -> u64 {
         self.next.get(topic).copied().unwrap_or_default()
     }
@@ -67,7 +69,7 @@ pub(crate) fn begin(
     if part > 1 && !options.continues {
         return Err(RecorderError::Exists(options.to.clone()));
     }
-    let earlier = (part > 1).then(|| Earlier::read(&options.to, topics));
+    let earlier = (part > 1).then(|| EarlierParts::read(&options.to, topics));
     let earlier = earlier.transpose()?;
     let id = match &earlier {
         None => format!("{}-{}", manifest.prefix.trim_matches('_'), now_ns()),

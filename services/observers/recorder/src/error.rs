@@ -1,4 +1,4 @@
-//! Why there is no recording, or no complete one.
+//! Errors of a recording.
 
 use std::path::PathBuf;
 
@@ -6,7 +6,7 @@ use gyre_recording::RecordingError;
 use gyre_stage::StageError;
 use thiserror::Error;
 
-/// Why there is no recording, or no complete one.
+/// An error because of which there is no recording, or no complete one.
 #[derive(Debug, Error)]
 pub enum RecorderError {
     /// The run cannot be observed.

@@ -1,4 +1,5 @@
-//! The health of the run, as its supervisor tells it: for recordings, in which one sees later when a process died.
+//! The health of the run, as its supervisor reports it: for recordings, in which one sees later
+//! when a process died.
 
 use std::{
     path::PathBuf,
@@ -16,16 +17,16 @@ use serde::Serialize;
 /// Time between two questions.
 const PERIOD: Duration = Duration::from_secs(1);
 
-/// What `gyre ps --json` says of a run.
+/// The health of a run, as `gyre ps --json` prints it.
 #[derive(Serialize)]
 struct Health {
     status: Status,
-    /// What the processes use, in the order of the status.
+    /// The resources of the processes, in the order of the status.
     usage: Vec<Option<Usage>>,
 }
 
-/// Asks the supervisor of a run once a second, in a thread of its own, which ends when nobody takes what it says. A supervisor that is
-/// busy answers late, and recording does not wait for it.
+/// Asks the supervisor of a run once a second, in a thread of its own, which ends when nobody takes
+/// what it says. A supervisor that is busy answers late, and recording does not wait for it.
 pub(crate) fn health(out: PathBuf) -> Receiver<String> {
     let (sender, receiver) = mpsc::sync_channel(1);
     thread::spawn(move || {

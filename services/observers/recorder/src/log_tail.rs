@@ -30,7 +30,8 @@ impl LogTail {
         }
     }
 
-    /// Returns the lines that were appended since the last call. A log that cannot be read has none.
+    /// Returns the lines that were appended since the last call. A log that cannot be read has
+    /// none.
     pub fn lines(&mut self, now_ns: i64) -> Vec<LogLine> {
         let Some(appended) = self.appended() else {
             return Vec::new();

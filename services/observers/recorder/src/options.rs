@@ -1,4 +1,4 @@
-//! What to record.
+//! The options of a recording.
 
 use std::path::PathBuf;
 
@@ -9,7 +9,7 @@ pub(crate) const LOG: &str = "log";
 /// That of the run's health, no more.
 pub(crate) const HEALTH: &str = "health";
 
-/// What to record.
+/// The options of a recording.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// The folder of the run's results.
@@ -20,6 +20,7 @@ pub struct Options {
     pub topics: Vec<String>,
     /// When a file is ended and the next part begun.
     pub split: Split,
-    /// Whether a recording that is there is one of this run, which another recorder has begun: it goes on in its next part.
+    /// True if an existing recording is one of this run, which another recorder has begun: it
+    /// goes on in its next part.
     pub continues: bool,
 }

@@ -11,10 +11,11 @@ use std::{
 
 use gyre_recording::{Incoming, LogLine};
 
-/// The largest number of bytes that wait: twenty seconds of the largest radar's scans at four in a second, should the disk stand still.
+/// The largest number of bytes that wait: twenty seconds of the largest radar's scans at four in a
+/// second, should the disk stand still.
 pub(crate) const LIMIT_BYTES: usize = 128 << 20;
 
-/// What is written.
+/// An entry of the recording.
 #[derive(Debug)]
 pub(crate) enum Entry {
     Message(Incoming),

@@ -129,7 +129,7 @@ pub fn record(options: &Options) -> Result<Recorded, RecorderError> {
         health,
         queue: sender,
         is_of_run: options.continues,
-        told: 0,
+        reported: 0,
         due: Instant::now(),
     };
     let ended = recorder.run_until_end(&writing);
@@ -171,11 +171,11 @@ struct Recorder<'run> {
     log: Option<LogTail>,
     health: Option<Receiver<String>>,
     queue: Sender,
-    /// Whether the supervisor has started it.
+    /// True if the supervisor has started it.
     is_of_run: bool,
-    /// Missed messages that the log tells of.
-    told: u64,
-    /// When the next sentence about them is due.
+    /// Missed messages that the log has reported.
+    reported: u64,
+    /// The time at which the next sentence about them is due.
     due: Instant,
 }
 
@@ -183,7 +183,7 @@ impl Recorder<'_> {
     /// Receives until the run ends, a signal requests a stop, or the other thread has failed.
     fn run_until_end<T>(&mut self, writing: &JoinHandle<T>) -> Result<(), StageError> {
         loop {
-            // Before the look: what was published before the end is still in the queues.
+            // Before the queues are emptied: the messages before the end are still there.
             let has_ended = self.run.has_ended();
             self.take_all()?;
             let have_ended = self.taps.iter().all(|tap| tap.has_ended());
@@ -201,7 +201,7 @@ impl Recorder<'_> {
         for tap in &mut self.taps {
             tap.drain(&self.queue)?;
         }
-        self.say_what_is_missed()?;
+        self.report_missed()?;
         for line in self.log.iter_mut().flat_map(|log| log.lines(now_ns())) {
             self.queue.put(Entry::Log(line));
         }
@@ -211,9 +211,9 @@ impl Recorder<'_> {
         Ok(())
     }
 
-    fn say_what_is_missed(&mut self) -> Result<(), StageError> {
+    fn report_missed(&mut self) -> Result<(), StageError> {
         let missed = self.taps.iter().map(|tap| tap.counts().missed).sum();
-        if missed > self.told && Instant::now() >= self.due {
+        if missed > self.reported && Instant::now() >= self.due {
             let counts = self
                 .taps
                 .iter()
@@ -226,7 +226,7 @@ impl Recorder<'_> {
                 "missed {} so far: the recorder was too slow, or was not there",
                 counts.join(", ")
             );
-            (self.told, self.due) = (missed, Instant::now() + SENTENCE_PERIOD);
+            (self.reported, self.due) = (missed, Instant::now() + SENTENCE_PERIOD);
             if self.is_of_run {
                 self.run.tell_missed(missed)?;
             }

@@ -35,8 +35,8 @@ pub(crate) struct Tap<'run> {
 }
 
 impl<'run> Tap<'run> {
-    /// Observes a topic by its name; `None` if there is no such topic. Messages from number `expected`
-    /// on are to be recorded, if it is known: those before are in earlier parts.
+    /// Observes a topic by its name; `None` if there is no such topic. Messages from number
+    /// `expected` on are to be recorded, if it is known: those before are in earlier parts.
     pub(crate) fn on(
         run: &'run ObservedRun,
         topic: &str,
@@ -57,7 +57,8 @@ impl<'run> Tap<'run> {
     }
 
     fn missed(&self) -> u64 {
-        // The numbers of corrections count their keyframes, and each correction replaces those before.
+        // The numbers of corrections count their keyframes, and each correction replaces those
+        // before.
         let overwritten = match self.observer.topic() {
             Correction::TOPIC => 0,
             _ => self.observer.missed(),
@@ -71,7 +72,8 @@ impl<'run> Tap<'run> {
             match self.observer.take() {
                 Ok(Some(message)) => self.put(message, queue),
                 Ok(None) => break,
-                // The stages judge the messages of another program. The next message reports the gap.
+                // The stages judge the messages of another program. The next message reports the
+                // gap.
                 Err(error @ StageError::Malformed { .. }) => {
                     tracing::warn!("not recorded: {error}");
                 }

@@ -6,8 +6,8 @@ use gyre_recording::{RecordingError, SplitWriter};
 
 use crate::queue::{Entry, Receiver, Taken};
 
-/// Time between two looks at whether a chunk is due while nothing is received.
-const LOOK: Duration = Duration::from_millis(100);
+/// Time between two checks for a due chunk while nothing is received.
+const POLL_PERIOD: Duration = Duration::from_millis(100);
 
 /// Writes what comes until the queue ends; returns the number of messages missed by topic.
 ///
@@ -18,7 +18,7 @@ pub(crate) fn write(
     queue: &Receiver,
 ) -> Result<BTreeMap<String, u64>, RecordingError> {
     loop {
-        match queue.take(LOOK) {
+        match queue.take(POLL_PERIOD) {
             Taken::Entry(Entry::Message(message)) => recording.add(&message)?,
             Taken::Entry(Entry::Missed(topic, missed)) => recording.missed(topic, missed),
             Taken::Entry(Entry::Log(line)) => recording.add_log(line)?,

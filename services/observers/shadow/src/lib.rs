@@ -1,10 +1,10 @@
-//! Shadow mode: a second program for a stage of a running run. It gets the same inputs as the stage,
-//! its results are compared with the stage's and timed, and nobody uses them.
+//! Shadow mode: a second program for a stage of a running run. It gets the same inputs as the
+//! stage, its results are compared with the stage's and timed, and nobody uses them.
 //!
-//! To the run this process is an observer ([`gyre_stage::observer`]): the run neither waits for it nor
-//! fails with it. The program runs in a run of its own, alone ([`gyre_harness`]), where this process
-//! sends it the observed items, one at a time. It takes nothing from the observed run but processor
-//! time.
+//! To the run this process is an observer ([`gyre_stage::observer`]): the run neither waits for it
+//! nor fails with it. The program runs in a run of its own, alone ([`gyre_harness`]), where this
+//! process sends it the observed items, one at a time. It takes nothing from the observed run but
+//! processor time.
 //!
 //! Reading order: [`shadow`], `shadowing` (the loop), `observation` (the items of the run),
 //! `renumbering` (the items as the shadow gets them), `life` (the process), `record`, [`Report`].
@@ -90,12 +90,12 @@ impl ShadowError {
     }
 }
 
-/// Runs a program as the shadow of a stage until the run ends, a limit is reached, or a signal requests
-/// a stop. `observe` receives lines about the progress.
+/// Runs a program as the shadow of a stage until the run ends, a limit is reached, or a signal
+/// requests a stop. `observe` receives lines about the progress.
 ///
 /// # Errors
-/// The run cannot be observed, the program cannot be started, or the report cannot be written. A fault
-/// of the program is no error: the report says so.
+/// The run cannot be observed, the program cannot be started, or the report cannot be written. A
+/// fault of the program is no error: the report says so.
 pub fn shadow(
     run: &ObservedRun,
     options: &Options,
@@ -128,8 +128,8 @@ pub fn shadow(
     Ok(report)
 }
 
-/// Returns the program, in a run like the observed one but lossless: the scans that the run's masking
-/// has dropped are not sent at all.
+/// Returns the program, in a run like the observed one but lossless: the scans that the run's
+/// masking has dropped are not sent at all.
 fn candidate(run: &ObservedRun, options: &Options) -> Result<Candidate, ShadowError> {
     let manifest = run.manifest();
     let configuration = manifest.root.join("config.toml");

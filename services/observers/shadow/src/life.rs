@@ -140,8 +140,8 @@ impl ShadowProgram {
         appended.map_err(ShadowError::file(path))
     }
 
-    /// Copies the state of the run's refinement, from which a restarted one or one that is swapped in
-    /// starts too.
+    /// Copies the state of the run's refinement, from which a restarted one or one that is swapped
+    /// in starts too.
     fn copy_state(&self, out: &Path) -> Result<(), ShadowError> {
         let from = checkpoint::path(&self.candidate.manifest.out);
         let to = checkpoint::path(out);

@@ -9,8 +9,8 @@ use gyre_stage::{
     observer::{ObservedRun, TopicObserver},
 };
 
-/// Bytes of messages of items that are not complete. Beyond them the oldest is given up: in live mode
-/// most scans never become an item.
+/// Bytes of messages of items that are not complete. Beyond them the oldest is given up: in live
+/// mode most scans never become an item.
 const MAX_INCOMPLETE_BYTES: usize = 64 << 20;
 
 /// An item of the stage, with all messages that it is about.
@@ -65,7 +65,8 @@ pub(crate) struct Observation<'run> {
     /// masking numbers anew.
     incomplete: BTreeMap<u64, Vec<Option<Recorded>>>,
     incomplete_bytes: usize,
-    /// The last items without a gap: those that the lag reaches from an item and from the one before.
+    /// The last items without a gap: those that the lag reaches from an item and from the one
+    /// before.
     recent: VecDeque<Feedback>,
     last: Option<u64>,
     /// Items of the stage that were not seen whole.

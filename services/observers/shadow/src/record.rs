@@ -26,7 +26,8 @@ pub struct Counts {
     pub compared: u64,
     /// Compared items with the same bytes.
     pub identical: u64,
-    /// Items that only opened the stream for the shadow: at its start, after a gap and after skipped items.
+    /// Items that only opened the stream for the shadow: at its start, after a gap and after
+    /// skipped items.
     pub opening: u64,
     /// Items that were left out because the shadow was behind.
     pub skipped: u64,
@@ -185,7 +186,8 @@ impl Record {
         })
     }
 
-    /// Adds the differences of a pair; returns those of masks, of translation (m) and of rotation (deg).
+    /// Adds the differences of a pair; returns those of masks, of translation (m) and of rotation
+    /// (deg).
     fn differ(&mut self, pair: &Pair<'_>) -> Result<[Option<f64>; 3], StageError> {
         let all = &mut self.differences;
         Ok(match difference(self.topic, pair.real, pair.shadow)? {
@@ -210,7 +212,8 @@ impl Record {
         })
     }
 
-    /// Returns the time from the publication of an item's last input to that of the item, in the run.
+    /// Returns the time from the publication of an item's last input to that of the item, in the
+    /// run.
     fn answer_ns(&self, item: &Item) -> Option<i64> {
         let stage = self.stage as usize;
         let before = item.hops[..stage].iter().map(|hop| hop.published_ns).max();

@@ -1,10 +1,11 @@
 //! Renumbers an observed item, and sends it to the shadow.
 //!
-//! The shadow's numbers are consecutive, as the contract says, also where the observed ones are not:
-//! after a gap, or skipped items. Such an item *opens* the stream anew, and its result is not compared:
+//! The shadow's numbers are consecutive, as the contract says, also where the observed ones are
+//! not: after a gap, or skipped items. Such an item *opens* the stream anew, and its result is not
+//! compared:
 //!
-//! - to a search it is the start of a chain (BREAK), so that the next item is matched against it and
-//!   not against an older one;
+//! - to a search it is the start of a chain (BREAK), so that the next item is matched against it
+//!   and not against an older one;
 //! - masking looks up motions by number: it gets each motion with that number, directly before the
 //!   scan;
 //! - refinement needs the state before its first item, with which each life begins: it is started

@@ -96,7 +96,8 @@ impl Report {
         }
     }
 
-    /// Returns whether items were compared, and the program has neither died nor hung nor broken the contract. Its results may differ.
+    /// Returns whether items were compared, and the program has neither died nor hung nor broken
+    /// the contract. Its results may differ.
     pub fn is_sound(&self) -> bool {
         let Counts {
             deaths,

@@ -1,5 +1,5 @@
-//! The loop: takes the items of the run, starts the shadow, sends it item after item, and compares its
-//! answers.
+//! The loop: takes the items of the run, starts the shadow, sends it item after item, and compares
+//! its answers.
 
 mod answers;
 
@@ -134,7 +134,8 @@ impl<'a> Shadowing<'a> {
         self.options.scans.is_some_and(|scans| compared >= scans)
     }
 
-    /// Returns whether nothing more can come: the run has ended and all is answered, or the shadow is given up.
+    /// Returns whether nothing more can come: the run has ended and all is answered, or the shadow
+    /// is given up.
     fn is_done(&self, has_ended: bool) -> bool {
         let has_answered = self.backlog.is_empty() && self.under_way.is_none();
         let is_given_up = self.failures >= MAX_FAILURES;

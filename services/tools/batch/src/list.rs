@@ -22,10 +22,10 @@ const COLUMNS: [&str; 4] = [DRIVE, "name", "configuration", "set"];
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Drive {
-    /// Its name, which no other drive of the batch has: the folder of its results.
+    /// The name, which no other drive of the batch has: the folder of its results.
     pub name: String,
-    /// Path of a recording's folder, of a recorded run (`.mcap`) or of a configuration (`.toml`), as the
-    /// list has it.
+    /// Path of a recording's folder, of a recorded run (`.mcap`) or of a configuration (`.toml`),
+    /// as the list has it.
     pub path: String,
     /// Path of the configuration, as the list has it; `None`: that of the batch.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -35,8 +35,8 @@ pub struct Drive {
     pub set: Vec<String>,
 }
 
-/// The part of a batch that one of many tasks computes: each `tasks`-th drive, so that long drives that
-/// lie side by side are divided.
+/// The part of a batch that one of many tasks computes: each `tasks`-th drive, so that long drives
+/// that lie side by side are divided.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Slice {
     /// The task, from 0.
@@ -57,7 +57,8 @@ impl List {
     /// Reads a list. Relative paths in it are relative to its folder.
     ///
     /// # Errors
-    /// A list that cannot be read, is empty, or has a line that is no drive; two drives of one name.
+    /// A list that cannot be read, is empty, or has a line that is no drive; two drives of one
+    /// name.
     pub fn read(path: &Path) -> Result<Self, BatchError> {
         let unread = |source| BatchError::List {
             path: path.to_owned(),

@@ -43,9 +43,9 @@ outcomes! {
     Corrupt: "corrupt",
     /// There is nothing at its path.
     Missing: "missing",
-    /// What is at its path is no recording, has too few scans, or a first one that cannot be read.
+    /// The path leads to no recording, or to one with too few scans or an unreadable first one.
     NotADataset: "not-a-dataset",
-    /// Its configuration was refused.
+    /// The configuration was refused.
     Configuration: "configuration",
     /// The computer lacks something: shared memory, open files.
     Machine: "machine",
@@ -83,8 +83,8 @@ impl DriveOutcome {
         CODES + self as u8 + if earlier { EARLIER } else { 0 }
     }
 
-    /// Returns the outcome of an exit code, and whether it had ended so before. Any other code is that of
-    /// a process which has failed.
+    /// Returns the outcome of an exit code, and whether it had ended so before. Any other code is
+    /// that of a process which has failed.
     pub(crate) fn of_exit_code(code: i32) -> (Self, bool) {
         let has_code = |earlier| {
             let mut all = Self::ALL.into_iter();

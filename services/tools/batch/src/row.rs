@@ -17,8 +17,8 @@ const VERSION: u32 = 1;
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Settings {
-    /// The configuration of the drives that name none and are none, an absolute path; `None`: by their
-    /// formats and scans.
+    /// The configuration of the drives that name none and are none, an absolute path; `None`: by
+    /// their formats and scans.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub configuration: Option<PathBuf>,
     /// Overrides of each configuration, `section.key=value`. Those of a drive hold over them.
@@ -35,12 +35,12 @@ pub struct DriveRow {
     pub drive: Drive,
     /// The settings that it was computed with.
     pub settings: Settings,
-    /// Its outcome.
+    /// The outcome.
     pub outcome: DriveOutcome,
     /// The reason why it is not complete, in a sentence; else empty.
     pub sentence: String,
-    /// The columns of `results.csv` that follow from its scans and its configuration; empty unless all
-    /// scans were played.
+    /// The columns of `results.csv` that follow from its scans and its configuration; empty unless
+    /// all scans were played.
     pub figures: Values,
     /// The columns of `times.csv`: times, restarts, the computer.
     pub times: Values,
@@ -127,8 +127,8 @@ impl DriveRow {
         }
     }
 
-    /// Reads that of a drive with these settings whose results are there; `None`: there are none, or they
-    /// are being computed anew.
+    /// Reads that of a drive with these settings whose results are there; `None`: there are none,
+    /// or they are being computed anew.
     ///
     /// # Errors
     /// A file that cannot be read.

@@ -28,7 +28,7 @@ pub(crate) struct Examination<'a> {
     context: Context<'a>,
     observe: &'a mut dyn FnMut(&str),
     findings: Findings,
-    /// Its messages in the first scenario.
+    /// The messages of the first scenario.
     outputs: Vec<Recorded>,
     /// Their result bytes, by item.
     first_results: BTreeMap<u64, Vec<u8>>,
@@ -49,7 +49,8 @@ impl<'a> Examination<'a> {
         self.context.test.candidate.stage
     }
 
-    /// Runs all scenarios. If the program does not get through the first, the others could say nothing.
+    /// Runs all scenarios. If the program does not get through the first, the others could say
+    /// nothing.
     pub(crate) fn run(mut self) -> Result<Report, ConformanceError> {
         self.note_inapplicable_rules();
         (self.observe)("a start without topics");

@@ -1,8 +1,8 @@
 //! Checks whether a program keeps the contract of a stage, which is in `docs/replace-a-stage.md`.
 //!
-//! The program runs alone, in runs of its own, as the supervisor would start it. This process stands
-//! for the rest of such a run ([`gyre_harness`]): it feeds the program the results of Gyre's own
-//! stages for some scans, and examines what it sends.
+//! The program runs alone, in runs of its own, as the supervisor would start it. This process
+//! stands for the rest of such a run ([`gyre_harness`]): it feeds the program the results of Gyre's
+//! own stages for some scans, and examines what it sends.
 //!
 //! Reading order: [`Rule`] (what is checked), [`check`], `checks` (the scenarios), `session` (one
 //! process under test), `reference` (the inputs), `malformed` (inputs that must be refused).

@@ -4,7 +4,7 @@ use gyre_harness::{Recorded, result::floats};
 use gyre_messages::{Masked, Message, Motion, Pose, Rotation, Scan};
 use gyre_stage::StageError;
 
-/// A message that no stage may send, and what is wrong with it.
+/// A message that no stage may send, after the name of its fault.
 pub(crate) type Malformed = (&'static str, Recorded);
 
 /// Returns messages of a topic that differ from a valid one by one field that breaks its rule.
@@ -46,7 +46,7 @@ pub(crate) fn malformed(topic: &str, valid: &Recorded) -> Result<Vec<Malformed>,
     Ok(all)
 }
 
-/// What is wrong with a header, and how to make it so.
+/// A fault of a header, and a function that makes it.
 type Change<'a, M> = (&'static str, &'a dyn Fn(&mut <M as Message>::Header));
 
 fn changes<M: Message<Header: Copy>>(

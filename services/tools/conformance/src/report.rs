@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::rule::{Rule, Verdict};
 
-/// What was found out about a program.
+/// The result of the test of a program.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     /// The stage that it replaces.
@@ -20,11 +20,12 @@ pub struct Report {
     pub rules: Vec<Judged>,
     /// The time of its work on an item by its own stamps, with the window full.
     pub work: Option<Work>,
-    /// The time from sending it an item to reading its answer, one item at a time; `None` unless there is a budget.
+    /// The time from sending it an item to reading its answer, one item at a time; `None` unless
+    /// there is a budget.
     pub answers: Option<Work>,
     /// That of Gyre's own stage on the same inputs, directly after.
     pub own_work: Option<Work>,
-    /// How far its results are from those of Gyre's own stage.
+    /// The distance of its results from those of Gyre's own stage.
     pub deviation: Option<String>,
 }
 
@@ -35,7 +36,7 @@ pub struct Judged {
     pub rule: Rule,
     /// The section of the contract.
     pub section: &'static str,
-    /// What a program that keeps it does.
+    /// The conduct of a program that keeps it.
     pub says: &'static str,
     /// The verdict.
     #[serde(flatten)]
@@ -74,7 +75,8 @@ impl Work {
         })
     }
 
-    /// Returns the figure that a budget is for, ms, and its name: the 99th percentile, of few items the maximum.
+    /// Returns the figure that a budget is for, ms, and its name: the 99th percentile, of few items
+    /// the maximum.
     pub(crate) fn judged(&self) -> (f64, &'static str) {
         match self.p99_ms {
             Some(p99_ms) => (p99_ms, "99th percentile"),

@@ -49,7 +49,7 @@ pub(crate) struct Session<'a> {
     newest: Option<u64>,
     /// The last item of this life of the process.
     last: Option<u64>,
-    /// Its outputs, in order, over all its lives.
+    /// The outputs, in order, over all its lives.
     pub outputs: Vec<Recorded>,
     /// The topics whose publishers it has notified.
     notified: BTreeSet<&'static str>,
@@ -153,8 +153,8 @@ impl<'a> Session<'a> {
         self.wait(limit, |session| session.newest >= Some(seq))
     }
 
-    /// Waits until `done`, while the run goes on around the process; `limit` is counted from the last
-    /// item that it sent.
+    /// Waits until `done`, while the run goes on around the process; `limit` is counted from the
+    /// last item that it sent.
     pub(crate) fn wait(
         &mut self,
         limit: Duration,

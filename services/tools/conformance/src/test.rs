@@ -37,8 +37,8 @@ pub struct Demands {
     pub quiet: Duration,
     /// True if its results are to be those of Gyre's own stage, to the bit.
     pub same_as_own: bool,
-    /// The 99th percentile of its work on an item that is allowed; of fewer than a hundred items the
-    /// maximum.
+    /// The 99th percentile of its work on an item that is allowed; of fewer than a hundred items
+    /// the maximum.
     pub budget: Option<Duration>,
 }
 

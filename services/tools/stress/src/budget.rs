@@ -40,8 +40,8 @@ macro_rules! limits {
 }
 
 limits! {
-    /// Median of the time from sensor to pose, ms. A scan that was dropped counts until the pose of the
-    /// next one that was not.
+    /// Median of the time from sensor to pose, ms. A scan that was dropped counts until the pose of
+    /// the next one that was not.
     p50_ms,
     /// 90th percentile of it, ms.
     p90_ms,
@@ -55,8 +55,8 @@ limits! {
     drops,
     /// The same, % of those that were due.
     drops_percent,
-    /// Time from a fault (the kill, or the end of the stop) to the first pose that the stage has worked
-    /// on since, ms.
+    /// Time from a fault (the kill, or the end of the stop) to the first pose that the stage has
+    /// worked on since, ms.
     recovery_ms,
     /// Processor time of all processes of the run, % of one processor.
     cpu_percent,

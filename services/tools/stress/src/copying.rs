@@ -1,10 +1,10 @@
-//! The transport beside copies: the same messages from one process to 1, 4 and 8 others, once through
-//! shared memory as stages do it, and once through Unix stream sockets, where each reader gets the
-//! bytes.
+//! The transport beside copies: the same messages from one process to 1, 4 and 8 others, once
+//! through shared memory as stages do it, and once through Unix stream sockets, where each reader
+//! gets the bytes.
 //!
 //! Both sides are alike in all else: one process for the sender and one for each reader; the sender
-//! writes the message anew, then sends it; a reader sleeps in `ppoll`, and has a message when it has
-//! read a byte of each of its cache lines.
+//! writes the message anew, then sends it; a reader sleeps in `ppoll`, and has a message when it
+//! has read a byte of each of its cache lines.
 
 mod reader;
 mod sender;
@@ -30,7 +30,8 @@ pub(crate) use sender::send;
 const RATE_HZ: f64 = 50.0;
 /// Messages before those that are measured.
 const WARM_UP: u64 = 10;
-/// Messages that are measured in a row, whatever the duration: ten of them are beyond the 99th percentile.
+/// Messages that are measured in a row, whatever the duration: ten of them are beyond the 99th
+/// percentile.
 const LEAST: f64 = 1000.0;
 /// The same for the 99.9th percentile: more say nothing new.
 const MOST: f64 = 10_000.0;
@@ -109,7 +110,8 @@ struct Sent {
 /// The result of a reader.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct Readings {
-    /// For each measured message its number, and the time from its sending until this reader had it, ns.
+    /// For each measured message its number, and the time from its sending until this reader had
+    /// it, ns.
     after_ns: Vec<(u64, i64)>,
     /// Processor time for the measured messages, ns.
     cpu_ns: u64,

@@ -47,8 +47,8 @@ pub struct Fault {
     pub stage: &'static str,
     /// The time at which it began, s since the measurement began.
     pub at_s: f64,
-    /// Time from the kill, or from the end of the stop, to the first pose that the stage has worked on
-    /// since, ms; `None`: there was none.
+    /// Time from the kill, or from the end of the stop, to the first pose that the stage has worked
+    /// on since, ms; `None`: there was none.
     pub recovery_ms: Option<f64>,
 }
 

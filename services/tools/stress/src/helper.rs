@@ -153,7 +153,8 @@ pub(crate) fn say_result(result: &impl Serialize) -> Result<(), StressError> {
     Ok(())
 }
 
-/// Prints a line for the process that has started this one. That it has ended is noticed by its death.
+/// Prints a line for the process that has started this one. That it has ended is noticed by its
+/// death.
 fn say(line: &str) {
     let mut output = std::io::stdout();
     let _ = writeln!(output, "{line}").and_then(|()| output.flush());

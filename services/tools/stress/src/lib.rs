@@ -1,17 +1,17 @@
 //! Stress tests: does a run meet its deadline under load?
 //!
 //! Each [`Scenario`] starts real runs, loads or damages them, and watches as an observer of `pose`,
-//! whose messages carry the time stamps of every hop. Arrivals do not wait for the pipeline: a scan is
-//! due by the source's clock, and latency counts from there.
+//! whose messages carry the time stamps of every hop. Arrivals do not wait for the pipeline: a scan
+//! is due by the source's clock, and latency counts from there.
 //!
 //! Reading order:
 //!
 //! 1. [`scenario`]: the scenarios; [`budget`]: their limits.
-//! 2. [`stress`] (in `campaign.rs`): one scenario after the other; [`pipeline`]: one run from its start
-//!    to its end.
+//! 2. [`stress`] (in `campaign.rs`): one scenario after the other; [`pipeline`]: one run from its
+//!    start to its end.
 //! 3. [`record`]: poses in, distributions out; drops are samples too.
-//! 4. [`fault`]: stops and kills of stages; [`helper`], `work`, `load`: the child processes that load
-//!    the machine.
+//! 4. [`fault`]: stops and kills of stages; [`helper`], `work`, `load`: the child processes that
+//!    load the machine.
 //! 5. [`processes`]: the resources of each process.
 //! 6. [`copying`]: the transport beside copies through sockets.
 //! 7. [`report`]: `report.json`, `report.md` and the plots, all of one [`Report`].

@@ -24,7 +24,8 @@ use crate::{
 /// Bytes that are taken at once.
 const PIECE: usize = 32 << 20;
 const PAGE: usize = 4096;
-/// Time in which memory is taken before the measurement. On a large machine all of it would take minutes.
+/// Time in which memory is taken before the measurement. On a large machine all of it would take
+/// minutes.
 const TAKING: Duration = Duration::from_secs(20);
 /// Time between two polls for memory when there is no more to take.
 const PAUSE: Duration = Duration::from_millis(20);
@@ -43,7 +44,8 @@ pub(super) fn spin() -> ! {
     }
 }
 
-/// Takes memory until this share of what is available is taken, then gives back and takes pieces of it without end.
+/// Takes memory until this share of what is available is taken, then gives back and takes pieces of
+/// it without end.
 pub(super) fn churn(share: f64) -> Result<(), StressError> {
     // If memory runs out all the same, this process is the one to end.
     let _ = fs::write("/proc/self/oom_score_adj", "1000");

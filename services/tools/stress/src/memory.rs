@@ -1,5 +1,5 @@
-//! Memory that programs can still get, by the machine and by the control groups of this process; and
-//! the part that a load has taken.
+//! Memory that programs can still get, by the machine and by the control groups of this process;
+//! and the part that a load has taken.
 
 use std::{
     fs,
@@ -81,7 +81,8 @@ struct Group {
     used: u64,
 }
 
-/// Returns the limits of the control groups in `/proc/self/cgroup` (version 1 or 2) and of those above them.
+/// Returns the limits of the control groups in `/proc/self/cgroup` (version 1 or 2) and of those
+/// above them.
 fn limits(root: &Path, groups: &str) -> Vec<Group> {
     let hierarchies = groups.lines().filter_map(|line| {
         let mut fields = line.splitn(3, ':').skip(1);

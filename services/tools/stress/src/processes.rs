@@ -143,7 +143,8 @@ fn cost(name: &str, seen: &[&Seen], own_bytes: u64, elapsed: Duration) -> Cost {
     }
 }
 
-/// The place of a name in a table: supervisor, the stages in the order of the stream, followers, others.
+/// The place of a name in a table: supervisor, the stages in the order of the stream, followers,
+/// others.
 fn rank(name: &str) -> usize {
     let stages = StageId::ALL.iter().map(|stage| stage.name());
     let names = ["supervisor"].into_iter().chain(stages);

@@ -1,8 +1,8 @@
 //! Poses in, distributions out.
 //!
-//! Every scan that was due is a sample. One that was dropped counts until the pose of the next one that
-//! was not: the vehicle had no newer pose before that. So neither a drop nor a source that stands still
-//! makes the distribution look better (coordinated omission).
+//! Every scan that was due is a sample. One that was dropped counts until the pose of the next one
+//! that was not: the vehicle had no newer pose before that. So neither a drop nor a source that
+//! stands still makes the distribution look better (coordinated omission).
 
 mod distribution;
 
@@ -26,7 +26,8 @@ pub struct Counts {
     pub posed: u64,
     /// Scans without a pose, those of `never` among them.
     pub dropped: u64,
-    /// Scans that no later pose has replaced when the measurement ended. They count as long as that took.
+    /// Scans that no later pose has replaced when the measurement ended. They count as long as that
+    /// took.
     pub never: u64,
     /// Poses that this observer has missed: they are neither posed nor dropped.
     pub unseen: u64,
@@ -73,8 +74,8 @@ pub struct Hop {
 pub struct RunLatency {
     /// Counts of scans.
     pub counts: Counts,
-    /// From the time at which a scan was due to its pose; a scan that was dropped counts until the pose
-    /// that replaced it.
+    /// From the time at which a scan was due to its pose; a scan that was dropped counts until the
+    /// pose that replaced it.
     pub sensor_to_pose: Distribution,
     /// The same of the scans that have a pose alone.
     pub posed: Distribution,
@@ -104,7 +105,8 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Records the scans that are due within `window`, `CLOCK_MONOTONIC`, ns. `burst` scans become due at once.
+    /// Records the scans that are due within `window`, `CLOCK_MONOTONIC`, ns. `burst` scans become
+    /// due at once.
     pub fn new(window: Range<i64>, burst: u64) -> Self {
         Self {
             window,
@@ -141,8 +143,8 @@ impl Recorder {
         self.closed_loop.add(posed_ns - published_ns);
     }
 
-    /// Adds the scans between two poses: a pose was missed for each number that `seq` lacks, and the rest
-    /// was dropped.
+    /// Adds the scans between two poses: a pose was missed for each number that `seq` lacks, and
+    /// the rest was dropped.
     fn add_between(&mut self, before: &Item, item: &Item, posed_ns: i64) {
         let unseen = item.seq - before.seq - 1;
         let between = item.published.saturating_sub(before.published + 1);
@@ -178,14 +180,15 @@ impl Recorder {
         });
     }
 
-    /// Returns whether a scan that was due in the time, one each `period_ns`, may still get its pose.
+    /// Returns whether a scan that was due in the time, one each `period_ns`, may still get its
+    /// pose.
     pub fn owes(&self, period_ns: i64) -> bool {
         let newest = self.before.map(|item| item.due_ns);
         newest.is_some_and(|due_ns| due_ns.saturating_add(period_ns) < self.window.end)
     }
 
-    /// Ends the recording at `now_ns`. Scans that were due, one each `period_ns`, and that no pose has
-    /// replaced count until now.
+    /// Ends the recording at `now_ns`. Scans that were due, one each `period_ns`, and that no pose
+    /// has replaced count until now.
     pub fn finish(mut self, period_ns: i64, now_ns: i64) -> RunLatency {
         let period_ns = period_ns.max(1);
         let after = self
@@ -223,8 +226,8 @@ mod tests {
 
     const MS: i64 = 1_000_000;
 
-    /// A pose of a scan that was due at `due_ms`, published `late_ms` after that, and has its pose 10 ms
-    /// later.
+    /// A pose of a scan that was due at `due_ms`, published `late_ms` after that, and has its pose
+    /// 10 ms later.
     fn pose(seq: u64, published: u64, due_ms: i64, late_ms: i64) -> PoseHeader {
         let item = Item {
             seq,

@@ -17,7 +17,8 @@ use crate::{
 pub use outcome::{Figures, ScenarioOutcome, Verdict};
 pub use step::Step;
 
-/// The version of `report.json`. A key that changes its meaning or goes raises it; one that is added does not.
+/// The version of `report.json`. A key that changes its meaning or goes raises it; one that is
+/// added does not.
 const VERSION: u32 = 1;
 
 /// The origin of a report: computer, program, recording.

@@ -7,7 +7,8 @@ use crate::{StressError, report::Step};
 /// Share of a scenario's time that a step of a search takes.
 const STEP: u32 = 6;
 const SHORTEST_STEP: Duration = Duration::from_secs(5);
-/// Scans of a step, whatever its rate: enough for a p99 in each, so that slow and fast steps are judged by the same figure.
+/// Scans of a step, whatever its rate: enough for a p99 in each, so that slow and fast steps are
+/// judged by the same figure.
 const STEP_SCANS: f64 = 110.0;
 /// Times that a level of a search may be tried. One hiccup of the machine does not decide.
 const TRIES: usize = 2;
@@ -21,7 +22,8 @@ pub struct Found {
     pub failed: Option<u32>,
 }
 
-/// Returns the largest level from `first` on that passes, up to `most`. `grow` says which level to try after one that has passed.
+/// Returns the largest level from `first` on that passes, up to `most`. `grow` says which level to
+/// try after one that has passed.
 ///
 /// # Errors
 /// An error of `passes`.

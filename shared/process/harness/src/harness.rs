@@ -28,7 +28,7 @@ pub enum Sent {
     Message(Recorded),
     /// One that every reader refuses.
     Malformed {
-        /// Its sequence number.
+        /// The sequence number.
         seq: u64,
         /// The rule that it breaks, in a sentence.
         sentence: String,
@@ -155,7 +155,8 @@ impl<'a> Harness<'a> {
         }
     }
 
-    /// Sleeps until the process has sent something or `limit` has passed; true on a request to stop.
+    /// Sleeps until the process has sent something or `limit` has passed; true on a request to
+    /// stop.
     ///
     /// # Errors
     /// The system refuses to wait.

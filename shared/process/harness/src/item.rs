@@ -20,9 +20,9 @@ pub fn not_copied(stage: StageId, input: &Item, output: &Item) -> Vec<&'static s
     missing.map(|(field, _)| field).collect()
 }
 
-/// Returns what is wrong with the time stamps of a stage's own hop; `None` if they are in order, and
-/// between the times at which its input was sent (if that is known) and its output was read, both
-/// CLOCK_MONOTONIC, ns.
+/// Returns what is wrong with the time stamps of a stage's own hop; `None` if they are in order,
+/// and between the times at which its input was sent (if that is known) and its output was read,
+/// both CLOCK_MONOTONIC, ns.
 pub fn wrong_stamps(
     stage: StageId,
     output: &Item,

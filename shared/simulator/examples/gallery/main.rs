@@ -1,8 +1,8 @@
 //! Draws the pictures of `gallery/README.md`, which describes each effect of the sensor:
 //! `cargo run --release -p gyre-simulator --example gallery`.
 //!
-//! The same pictures whenever it runs on one kind of machine, so that a change of the sensor shows in
-//! version control.
+//! The same pictures whenever it runs on one kind of machine, so that a change of the sensor shows
+//! in version control.
 
 mod exhibit;
 mod picture;

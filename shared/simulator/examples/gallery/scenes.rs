@@ -1,4 +1,5 @@
-//! Synthetic scenes, each suited to one effect. The sensor is at the origin, x ahead and y to the left.
+//! Synthetic scenes, each suited to one effect. The sensor is at the origin, x ahead and y to the
+//! left.
 
 use std::f64::consts::TAU;
 use std::ops::Range;

@@ -114,7 +114,8 @@ impl Shot {
             bytes: azimuths * sampling.stride(),
             azimuths,
         });
-        // The path's time zero is the middle of the first sweep, so the sensor is at the origin of a synthetic scene.
+        // The path's time zero is the middle of the first sweep, so the sensor is at the origin of
+        // a synthetic scene.
         let start_us = EPOCH_US + period_us * self.index as i64 - period_us / 2;
         let time = SweepTime {
             start_us,

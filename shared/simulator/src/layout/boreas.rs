@@ -1,5 +1,6 @@
-//! Boreas and Boreas Road Trip: `radar/<us>.png` with Oxford's columns, named by the time of azimuth `n / 2 - 1`, which is the scan's;
-//! and `applanix/radar_poses.csv`: the radar in east-north-up at those times, its own frame x forward, **y right, z down**.
+//! Boreas and Boreas Road Trip: `radar/<us>.png` with Oxford's columns, named by the time of
+//! azimuth `n / 2 - 1`, which is the scan's; and `applanix/radar_poses.csv`: the radar in
+//! east-north-up at those times, its own frame x forward, **y right, z down**.
 
 use std::f64::consts::PI;
 
@@ -36,8 +37,8 @@ fn radar_poses_csv(simulator: &Simulator) -> String {
         .collect()
 }
 
-/// With the sensor's z axis down (a roll of pi) the heading is the course, counter-clockwise from east, while a left turn is
-/// negative about z.
+/// With the sensor's z axis down (a roll of pi) the heading is the course, counter-clockwise from
+/// east, while a left turn is negative about z.
 fn row(simulator: &Simulator, index: usize) -> String {
     let (stamp_us, path) = (stamp_us(simulator, index), simulator.path());
     let time_s = simulator.time(index).drive_time_s(stamp_us);

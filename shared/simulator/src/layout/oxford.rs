@@ -1,6 +1,6 @@
-//! Oxford Radar RobotCar: `radar/<us>.png`, one for each sweep, named by the time of its first azimuth;
-//! `radar.timestamps`; and `gt/radar_odometry.csv`: the pose of each scan but the first in the frame of the
-//! one before, at the middle of the sweeps, x forward, **y right, yaw clockwise**.
+//! Oxford Radar RobotCar: `radar/<us>.png`, one for each sweep, named by the time of its first
+//! azimuth; `radar.timestamps`; and `gt/radar_odometry.csv`: the pose of each scan but the first in
+//! the frame of the one before, at the middle of the sweeps, x forward, **y right, yaw clockwise**.
 
 use super::side_file::SideFile;
 use crate::simulator::Simulator;
@@ -31,8 +31,8 @@ fn timestamps(simulator: &Simulator) -> String {
         .collect()
 }
 
-/// `gt/radar_odometry.csv`: source is the newer scan, destination the older. With nine decimals instead of
-/// Oxford's six, since the ground truth is exact and should stay so when it is chained.
+/// `gt/radar_odometry.csv`: source is the newer scan, destination the older. With nine decimals
+/// instead of Oxford's six, since the ground truth is exact and should stay so when it is chained.
 fn radar_odometry_csv(simulator: &Simulator) -> String {
     let header = "source_timestamp,destination_timestamp,x,y,z,roll,pitch,yaw,\
                   source_radar_timestamp,destination_radar_timestamp\n";

@@ -1,6 +1,6 @@
-//! RADIATE: `Navtech_Polar/000001.png`, range downwards and azimuth to the right, without metadata; and
-//! `Navtech_Polar.txt` with the times at which the host received the scans. RADIATE has no exact ground
-//! truth, so it is written as `ground_truth.tum`.
+//! RADIATE: `Navtech_Polar/000001.png`, range downwards and azimuth to the right, without metadata;
+//! and `Navtech_Polar.txt` with the times at which the host received the scans. RADIATE has no
+//! exact ground truth, so it is written as `ground_truth.tum`.
 
 use std::fmt::Write as _;
 
@@ -45,8 +45,8 @@ pub(crate) fn file_name(index: usize) -> String {
     format!("{:06}.png", index + 1)
 }
 
-/// The scan's time, nanoseconds since 1970: the mean over its columns, whose times are evenly spaced over a
-/// turn.
+/// The scan's time, nanoseconds since 1970: the mean over its columns, whose times are evenly
+/// spaced over a turn.
 pub(crate) fn stamp_ns(simulator: &Simulator, index: usize) -> i64 {
     let (time, azimuths) = (simulator.time(index), simulator.sampling().azimuths as i64);
     time.start_us * 1000 + time.period_us * 1000 * (azimuths - 1) / (2 * azimuths)

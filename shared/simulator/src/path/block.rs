@@ -8,7 +8,8 @@ use super::continuous::Path;
 
 /// Length of a bend by 90 degrees along the path, metres.
 const BEND_M: f64 = 20.0;
-/// Share of a bend over which the curvature rises, and over which it falls again: steering takes time.
+/// Share of a bend over which the curvature rises, and over which it falls again: steering takes
+/// time.
 const RAMP: f64 = 0.25;
 /// Braking and acceleration along the path, metres a second squared.
 const LONGITUDINAL_MPS2: f64 = 2.5;
@@ -23,10 +24,11 @@ struct Node {
     heading_rad: f64,
 }
 
-/// Laps around a rectangular block, counter-clockwise, with rounded corners that are taken more slowly.
+/// Laps around a rectangular block, counter-clockwise, with rounded corners that are taken more
+/// slowly.
 ///
-/// The world's origin is the block's centre; the path starts in the middle of the side at negative y,
-/// towards positive x.
+/// The world's origin is the block's centre; the path starts in the middle of the side at negative
+/// y, towards positive x.
 #[derive(Clone, Debug)]
 pub struct BlockLoop {
     nodes: Vec<Node>,
@@ -35,7 +37,8 @@ pub struct BlockLoop {
 }
 
 impl BlockLoop {
-    /// A loop along the centre lines of four streets: `length_m` along x by `width_m` along y, each at least 30 m.
+    /// A loop along the centre lines of four streets: `length_m` along x by `width_m` along y, each
+    /// at least 30 m.
     pub fn new(
         length_m: f64,
         width_m: f64,
@@ -89,7 +92,8 @@ impl Path for BlockLoop {
     }
 }
 
-/// Heading gained after `share` of a bend: the integral of a trapezoidal curvature, from 0 to 90 degrees.
+/// Heading gained after `share` of a bend: the integral of a trapezoidal curvature, from 0 to 90
+/// degrees.
 fn bend_heading(share: f64) -> f64 {
     let rising = |u: f64| u * u / (2.0 * RAMP);
     let area = 1.0 - RAMP;
@@ -112,7 +116,8 @@ fn bend_footprint() -> f64 {
         .sum()
 }
 
-/// Heading after `distance_m` of a lap: half a straight, bend, straight, bend, ..., half a straight.
+/// Heading after `distance_m` of a lap: half a straight, bend, straight, bend, ..., half a
+/// straight.
 fn heading_at(distance_m: f64, straights_m: &[f64; 2]) -> f64 {
     let mut left = distance_m - straights_m[0] / 2.0;
     for corner in 0..4 {

@@ -35,20 +35,21 @@ impl Default for Excerpt {
     }
 }
 
-/// Reads a trajectory of any format that [`gyre_radar::read_trajectory`] knows and returns a path along it,
-/// in the frame of the excerpt's first pose.
+/// Reads a trajectory of any format that [`gyre_radar::read_trajectory`] knows and returns a path
+/// along it, in the frame of the excerpt's first pose.
 ///
-/// The path passes within 5 cm of 95 % of a real drive's poses and within 10 cm of 99 %; the rest is noise
-/// of the poses.
+/// The path passes within 5 cm of 95 % of a real drive's poses and within 10 cm of 99 %; the rest
+/// is noise of the poses.
 ///
 /// # Errors
-/// [`SimulatorError::Trajectory`] if the file cannot be read; [`SimulatorError::Drive`] if the excerpt has
-/// fewer than two poses, jumps, pauses for hours, or does not move forward.
+/// [`SimulatorError::Trajectory`] if the file cannot be read; [`SimulatorError::Drive`] if the
+/// excerpt has fewer than two poses, jumps, pauses for hours, or does not move forward.
 pub fn read(path: &Path, excerpt: Excerpt) -> Result<SplinePath, SimulatorError> {
     read_in(path, excerpt, None)
 }
 
-/// As [`read`], in the frame `world` of the file's poses; without one in that of the excerpt's first pose.
+/// As [`read`], in the frame `world` of the file's poses; without one in that of the excerpt's
+/// first pose.
 ///
 /// # Errors
 /// As [`read`].
@@ -93,7 +94,8 @@ pub fn read_in(
 /// The first pose of a file.
 ///
 /// # Errors
-/// [`SimulatorError::Trajectory`] if the file cannot be read, [`SimulatorError::Drive`] if it is empty.
+/// [`SimulatorError::Trajectory`] if the file cannot be read, [`SimulatorError::Drive`] if it is
+/// empty.
 pub fn first_pose(path: &Path) -> Result<Pose, SimulatorError> {
     let read = read_trajectory(path)?;
     read.poses
@@ -144,7 +146,8 @@ fn timed(path: &Path, rate_hz: f64) -> Result<Vec<(f64, Pose)>, SimulatorError> 
     Ok(poses)
 }
 
-/// Share of the distance that is driven along x of the body, within 45 degrees; 1 if it hardly moves.
+/// Share of the distance that is driven along x of the body, within 45 degrees; 1 if it hardly
+/// moves.
 fn share_forward(poses: &[(f64, Pose)]) -> f64 {
     let (mut forward_m, mut all_m) = (0.0, 0.0);
     let mut from = poses[0].1;

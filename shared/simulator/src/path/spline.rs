@@ -6,7 +6,8 @@ use std::f64::consts::TAU;
 const SUPPORT: usize = 6;
 /// Entries of a row of the normal equations, from the diagonal on.
 const BAND: usize = SUPPORT;
-/// Penalty on first differences, relative to a sample's weight: determines coefficients without samples.
+/// Penalty on first differences, relative to a sample's weight: determines coefficients without
+/// samples.
 const TINY: f64 = 1e-9;
 
 /// A sample of a curve in `D` coordinates.
@@ -20,8 +21,8 @@ pub struct Sample<const D: usize> {
     pub weight: f64,
 }
 
-/// A curve in `D` coordinates whose derivatives are continuous up to the fourth. Evaluation takes constant
-/// time.
+/// A curve in `D` coordinates whose derivatives are continuous up to the fourth. Evaluation takes
+/// constant time.
 #[derive(Clone, Debug)]
 pub struct UniformSpline<const D: usize> {
     start: f64,
@@ -30,9 +31,9 @@ pub struct UniformSpline<const D: usize> {
 }
 
 impl<const D: usize> UniformSpline<D> {
-    /// Fits a curve with knots `step` apart to the samples, with a penalty on its third derivative (Eilers
-    /// and Marx, "Flexible smoothing with B-splines and penalties", 1996): a low-pass filter with the
-    /// frequency `cutoff`, periods a unit.
+    /// Fits a curve with knots `step` apart to the samples, with a penalty on its third derivative
+    /// (Eilers and Marx, "Flexible smoothing with B-splines and penalties", 1996): a low-pass
+    /// filter with the frequency `cutoff`, periods a unit.
     ///
     /// The samples are in ascending order; without any the curve is zero.
     pub fn fit(samples: &[Sample<D>], step: f64, cutoff: f64) -> Self {
@@ -144,8 +145,8 @@ fn penalise(normal: &mut [[f64; BAND]], difference: &[f64], weight: f64) {
     }
 }
 
-/// Replaces a positive definite band matrix by its factors L D L': D on the diagonal, the columns of L
-/// beside it.
+/// Replaces a positive definite band matrix by its factors L D L': D on the diagonal, the columns
+/// of L beside it.
 fn factorise(band: &mut [[f64; BAND]]) {
     for column in 0..band.len() {
         let row = band[column];

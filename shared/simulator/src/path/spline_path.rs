@@ -28,13 +28,14 @@ pub struct SplinePath {
 }
 
 impl SplinePath {
-    /// A path close to `poses`, whose times ascend from zero (seconds), low-pass filtered with `cutoff_hz`.
+    /// A path close to `poses`, whose times ascend from zero (seconds), low-pass filtered with
+    /// `cutoff_hz`.
     pub fn new(poses: &[(f64, Pose)], cutoff_hz: f64) -> Self {
         Self::smooth(&unwrapped(poses), cutoff_hz)
     }
 
-    /// A path close to measured poses, which have errors of some centimetres. The vehicle stands where they
-    /// hardly change for a while.
+    /// A path close to measured poses, which have errors of some centimetres. The vehicle stands
+    /// where they hardly change for a while.
     pub fn measured(poses: &[(f64, Pose)]) -> Self {
         let mut samples = unwrapped(poses);
         hold_stands(&mut samples);

@@ -34,9 +34,9 @@ pub struct TownDrive {
 impl TownDrive {
     /// Builds the path, the same for the same seed.
     ///
-    /// It returns to its first streets and drives them again, drives some streets in both directions, and
-    /// ends standing. Streets cross at junctions only; parallel ones are at least 50 m apart. It starts at
-    /// the origin.
+    /// It returns to its first streets and drives them again, drives some streets in both
+    /// directions, and ends standing. Streets cross at junctions only; parallel ones are at least
+    /// 50 m apart. It starts at the origin.
     pub fn path(&self, seed: u64) -> SplinePath {
         let mut rng = Stream::Drive.generator(seed);
         let town = plan::Plan::new(self.length_m, &mut rng);

@@ -14,8 +14,8 @@ pub(super) struct Atmosphere {
     reflectivity_m2_m3: f64,
 }
 
-/// Half-power height of the beam, radians: Navtech state 1.8 degrees for the antenna's upper part, widened
-/// downwards.
+/// Half-power height of the beam, radians: Navtech state 1.8 degrees for the antenna's upper part,
+/// widened downwards.
 const BEAM_HEIGHT_RAD: f64 = 0.07;
 
 impl Atmosphere {

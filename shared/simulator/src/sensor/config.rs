@@ -10,8 +10,8 @@ use crate::profile::{Profile, Sampling};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SensorConfig {
-    /// The seed of noise, speckle, the drops of rain, the vehicle's pitch and roll, and the echoes that are
-    /// fixed to the radar. Default: the seed of the simulation.
+    /// The seed of noise, speckle, the drops of rain, the vehicle's pitch and roll, and the echoes
+    /// that are fixed to the radar. Default: the seed of the simulation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub seed: Option<u64>,
     /// The radar. Default: `cts350x-oxford`.
@@ -22,8 +22,8 @@ pub struct SensorConfig {
     /// Metres to add to a bin's range. Default: the profile's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub range_offset_m: Option<f64>,
-    /// Doppler shift: metres of range for each m/s of closing speed; 0 for a radar without the effect.
-    /// Default: the profile's.
+    /// Doppler shift: metres of range for each m/s of closing speed; 0 for a radar without the
+    /// effect. Default: the profile's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub doppler_s: Option<f64>,
     /// Eccentricity of the encoder's disc, radians: the beam points to `azimuth + eccentricity *

@@ -1,36 +1,42 @@
-//! The effects that make real scans difficult, each with a switch: the section `[simulation.effects]`.
+//! The effects that make real scans difficult, each with a switch: the section
+//! `[simulation.effects]`.
 
 use serde::{Deserialize, Serialize};
 
-/// Switches for the simulated effects of real radars. All are on by default. `gallery/README.md` in the
-/// crate's folder shows each off and on, with its source.
+/// Switches for the simulated effects of real radars. All are on by default. `gallery/README.md` in
+/// the crate's folder shows each off and on, with its source.
 ///
 /// Each has its own random numbers, so switching one does not change the others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Effects {
-    /// Each azimuth is measured at its own time from its own pose; off: all at the middle of the sweep.
+    /// Each azimuth is measured at its own time from its own pose; off: all at the middle of the
+    /// sweep.
     pub sweep_motion: bool,
     /// Side lobes of the antenna: strong echoes appear in neighbouring azimuths.
     pub side_lobes: bool,
-    /// Echoes in one resolution cell interfere, differently from every pose; off: their powers are added.
+    /// Echoes in one resolution cell interfere, differently from every pose; off: their powers are
+    /// added.
     pub speckle: bool,
-    /// Smooth and tilted surfaces reflect in some directions only; off: all reflect in all directions.
+    /// Smooth and tilted surfaces reflect in some directions only; off: all reflect in all
+    /// directions.
     pub aspect: bool,
     /// Specular reflections of smooth walls at normal incidence, which move along with the sensor.
     pub highlights: bool,
     /// Scatterers have lobes, so their echoes fluctuate as the sensor passes.
     pub scintillation: bool,
-    /// The beam has a height of a few degrees and the vehicle pitches and rolls, so returns come and go.
+    /// The beam has a height of a few degrees and the vehicle pitches and rolls, so returns come
+    /// and go.
     pub elevation: bool,
     /// Walls hide what is behind them.
     pub occlusion: bool,
     /// Metal and glass fronts mirror strong reflectors: ghost targets.
     pub multipath: bool,
-    /// Strong echoes raise the noise in all bins of their azimuth (phase noise), mostly next to them:
-    /// streaks.
+    /// Strong echoes raise the noise in all bins of their azimuth (phase noise), mostly next to
+    /// them: streaks.
     pub phase_noise: bool,
-    /// Multiple reflections between houses: a noise-like tail behind strong echoes, longest along a street.
+    /// Multiple reflections between houses: a noise-like tail behind strong echoes, longest along a
+    /// street.
     pub reverberation: bool,
     /// The transmitter rings in the first bins.
     pub ringing: bool,

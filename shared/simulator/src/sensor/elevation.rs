@@ -1,8 +1,9 @@
-//! Elevation in a planar world: the beam has a height of a few degrees, and the vehicle pitches and rolls.
+//! Elevation in a planar world: the beam has a height of a few degrees, and the vehicle pitches and
+//! rolls.
 //!
-//! Each scatterer stands for a column of a facade, a trunk or a car, of which the beam illuminates one
-//! height. At short range it illuminates a small part of the column, and another one as the vehicle
-//! pitches, so returns come and go from scan to scan.
+//! Each scatterer stands for a column of a facade, a trunk or a car, of which the beam illuminates
+//! one height. At short range it illuminates a small part of the column, and another one as the
+//! vehicle pitches, so returns come and go from scan to scan.
 
 use std::f64::consts::{LN_2, TAU};
 
@@ -66,8 +67,9 @@ impl PitchRoll {
     }
 }
 
-/// Share of the beam's power that illuminates a scatterer, for a beam with the elevation `elevation_rad`.
-/// Strong scatterers are vertical lines (posts, corners), which are always illuminated at some height.
+/// Share of the beam's power that illuminates a scatterer, for a beam with the elevation
+/// `elevation_rad`. Strong scatterers are vertical lines (posts, corners), which are always
+/// illuminated at some height.
 pub(super) fn elevation_gain(
     place: Point2<f64>,
     cross_section_m2: f64,

@@ -1,5 +1,5 @@
-//! Echoes that are fixed to the radar: its own ringing, and the roof below it. They are the same in every
-//! scan, including their phase.
+//! Echoes that are fixed to the radar: its own ringing, and the roof below it. They are the same in
+//! every scan, including their phase.
 
 use std::f64::consts::TAU;
 
@@ -14,8 +14,8 @@ use crate::interpolate::interpolate;
 use crate::profile::{Chirp, Receiver, Sampling};
 use crate::stream::Stream;
 
-/// Variation of the ringing over the azimuths: standard deviation, dB, and the number of azimuths over
-/// which it is smoothed.
+/// Variation of the ringing over the azimuths: standard deviation, dB, and the number of azimuths
+/// over which it is smoothed.
 const RINGING_SPREAD_DB: f64 = 3.0;
 const SMOOTH_AZIMUTHS: usize = 12;
 /// Correlation of the ringing's complex amplitude between neighbouring azimuths.
@@ -141,8 +141,8 @@ fn fixed(bin: f64, amplitude: f64, rng: &mut ChaCha8Rng) -> FixedEcho {
     }
 }
 
-/// Complex Gaussian numbers on a circle, with a mean power of 1 and correlated neighbours: a periodic
-/// autoregressive process.
+/// Complex Gaussian numbers on a circle, with a mean power of 1 and correlated neighbours: a
+/// periodic autoregressive process.
 fn correlated_amplitudes(count: usize, rng: &mut ChaCha8Rng) -> Vec<Vector2<f64>> {
     let deviation = ((1.0 - RINGING_CORRELATION * RINGING_CORRELATION) / 2.0).sqrt();
     let fresh: Vec<Vector2<f64>> = (0..count)

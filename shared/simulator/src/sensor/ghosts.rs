@@ -1,7 +1,9 @@
-//! Ghost targets: mirror images by a double bounce off a smooth front (sensor, wall, object, wall, sensor).
+//! Ghost targets: mirror images by a double bounce off a smooth front (sensor, wall, object, wall,
+//! sensor).
 //!
-//! A mirror image behaves like an object behind the wall, visible where the line of sight to it crosses the
-//! wall. Single-bounce paths return from another direction than they left in, outside a narrow beam.
+//! A mirror image behaves like an object behind the wall, visible where the line of sight to it
+//! crosses the wall. Single-bounce paths return from another direction than they left in, outside a
+//! narrow beam.
 
 use std::collections::BTreeMap;
 

@@ -5,8 +5,8 @@ use nalgebra::Point2;
 use super::place_noise::smooth_noise;
 use crate::profile::Receiver;
 
-/// Backscatter of a square metre of ground at a grazing angle, median, dB: dry asphalt at 77 GHz; rough
-/// grass is 20 dB above it.
+/// Backscatter of a square metre of ground at a grazing angle, median, dB: dry asphalt at 77 GHz;
+/// rough grass is 20 dB above it.
 const REFLECTIVITY_DB: f64 = -50.0;
 /// Variation between patches, standard deviation, dB, and their size, metres.
 const PATCHES_DB: f64 = 11.0;

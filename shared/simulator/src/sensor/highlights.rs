@@ -1,9 +1,10 @@
-//! Specular highlights: the reflection of a smooth wall at normal incidence, which moves along the wall
-//! with the sensor.
+//! Specular highlights: the reflection of a smooth wall at normal incidence, which moves along the
+//! wall with the sensor.
 //!
-//! A flat plate larger than the first Fresnel zone reflects like its own mirror image: its cross-section is
-//! pi R^2 times the mirrored share (Knott, Shaeffer and Tuley, Radar Cross Section), less the part that
-//! roughness scatters. For odometry a highlight looks like an object at rest relative to the vehicle.
+//! A flat plate larger than the first Fresnel zone reflects like its own mirror image: its
+//! cross-section is pi R^2 times the mirrored share (Knott, Shaeffer and Tuley, Radar Cross
+//! Section), less the part that roughness scatters. For odometry a highlight looks like an object
+//! at rest relative to the vehicle.
 
 use std::collections::BTreeSet;
 use std::f64::consts::PI;

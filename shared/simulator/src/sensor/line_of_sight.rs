@@ -9,7 +9,8 @@ use crate::world::World;
 
 /// Rays for each azimuth of 0.9 degrees.
 const RAYS: usize = 4;
-/// Minimum distance of a wall from the objects behind it that it hides, metres: objects lean against walls.
+/// Minimum distance of a wall from the objects behind it that it hides, metres: objects lean
+/// against walls.
 const CLEARANCE_M: f32 = 0.1;
 
 /// Maximum distance of a moving body's parts from its origin, metres: half a long bus.
@@ -97,8 +98,8 @@ impl LineOfSight {
         }
     }
 
-    /// Two-way share of the power that passes to a scatterer of `body` at `range_m` and an azimuth with
-    /// fractions.
+    /// Two-way share of the power that passes to a scatterer of `body` at `range_m` and an azimuth
+    /// with fractions.
     pub fn transmission(&self, azimuth: f64, range_m: f64, body: u32) -> f32 {
         let nearer = range_m as f32 - CLEARANCE_M;
         self.ray(azimuth)

@@ -1,5 +1,5 @@
-//! All power that is no single echo: thermal noise, ground, weather, phase noise, reverberation, spurious
-//! lines, interference.
+//! All power that is no single echo: thermal noise, ground, weather, phase noise, reverberation,
+//! spurious lines, interference.
 
 use std::f64::consts::TAU;
 
@@ -15,21 +15,21 @@ use crate::profile::{Receiver, Sampling};
 
 /// Length of a cell of the coarse power profile for phase noise and reverberation, metres.
 const COARSE_M: f64 = 2.0;
-/// Phase noise far from an echo: power in each bin as a share of the echo's, measured in Oxford's and
-/// RADIATE's scans (the lower fifth of an azimuth's powers rises with their sum).
+/// Phase noise far from an echo: power in each bin as a share of the echo's, measured in Oxford's
+/// and RADIATE's scans (the lower fifth of an azimuth's powers rises with their sum).
 const SKIRT: f64 = 1.0e-6;
-/// Factor of the phase noise at the echo itself, and the distance at which it has fallen to one half,
-/// metres.
+/// Factor of the phase noise at the echo itself, and the distance at which it has fallen to one
+/// half, metres.
 const SKIRT_PEAK: f64 = 100.0;
 const SKIRT_WIDTH_M: f64 = 1.5;
-/// Reverberation: share of an echo's power, and exponential decay length, metres. First what lies behind a
-/// front (rooms, eaves, near objects), then a whole street, which a beam also receives from neighbouring
-/// azimuths.
+/// Reverberation: share of an echo's power, and exponential decay length, metres. First what lies
+/// behind a front (rooms, eaves, near objects), then a whole street, which a beam also receives
+/// from neighbouring azimuths.
 const TAIL: [(f64, f64); 2] = [(2.0e-3, 1.5), (2.0e-5, 10.0)];
 const STREET: (f64, f64) = (2.5e-6, 50.0);
 const STREET_AZIMUTHS: usize = 4;
-/// Variation of reverberation between directions, standard deviation, dB: the part that belongs to the
-/// place, and the part that is new in each sweep.
+/// Variation of reverberation between directions, standard deviation, dB: the part that belongs to
+/// the place, and the part that is new in each sweep.
 const LIVELINESS_DB: f64 = 8.0;
 const STIRRED_DB: f64 = 7.0;
 /// Number of directions, and the distance over which each changes, metres.
@@ -69,12 +69,12 @@ pub(super) struct Noise {
     /// Power of echoes in each coarse cell of the current azimuth, and the noise that results.
     echoes: Vec<f64>,
     raised: Vec<f64>,
-    /// Power of echoes in each coarse cell of all azimuths, azimuth by azimuth; and its mean over the
-    /// azimuths from which a street reverberates.
+    /// Power of echoes in each coarse cell of all azimuths, azimuth by azimuth; and its mean over
+    /// the azimuths from which a street reverberates.
     around: Vec<f64>,
     street: Vec<f64>,
-    /// Phase noise by the distance from an echo, in coarse cells, and reverberation by the distance behind
-    /// it, at the front and along the street, as shares of the echo's power.
+    /// Phase noise by the distance from an echo, in coarse cells, and reverberation by the distance
+    /// behind it, at the front and along the street, as shares of the echo's power.
     skirt: Vec<f64>,
     tail: Vec<f64>,
     street_tail: Vec<f64>,
@@ -141,7 +141,8 @@ impl Noise {
         }
     }
 
-    /// Prepares a sweep. `clutter` gives the power from a resolution cell of the atmosphere at a range.
+    /// Prepares a sweep. `clutter` gives the power from a resolution cell of the atmosphere at a
+    /// range.
     pub fn begin_sweep(
         &mut self,
         sampling: &Sampling,
@@ -169,8 +170,8 @@ impl Noise {
         }
     }
 
-    /// Draws the reverberation of each direction: log-normal, by place and direction. A part is new in each
-    /// sweep, as from moving leaves and opened doors.
+    /// Draws the reverberation of each direction: log-normal, by place and direction. A part is new
+    /// in each sweep, as from moving leaves and opened doors.
     pub fn draw_reverberation(&mut self, sweep_poses: &SweepPoses, rng: &mut impl Rng) {
         let stirred: Vec<f64> = (0..REVERBERATION_SECTORS)
             .map(|_| STIRRED_DB * rng.sample::<f64, _>(StandardNormal))
@@ -220,7 +221,8 @@ impl Noise {
         }
     }
 
-    /// Prepares an azimuth. `ground` gives the power from a resolution cell of the ground at a range.
+    /// Prepares an azimuth. `ground` gives the power from a resolution cell of the ground at a
+    /// range.
     pub fn begin_azimuth(&mut self, ground: impl Fn(f64) -> f64) {
         self.echoes.fill(0.0);
         for (cell, power) in self.ground.iter_mut().enumerate() {
@@ -258,7 +260,8 @@ impl Noise {
         }
         if self.snow {
             for (cell, clutter) in self.clutter.iter().enumerate() {
-                // Snow is clumped: exponentially distributed power about an exponentially distributed mean.
+                // Snow is clumped: exponentially distributed power about an exponentially
+                // distributed mean.
                 let clump = -(1.0 - rng.random::<f64>()).ln();
                 add_gaussian(spectrum, cell as f64 * spacing, clump * clutter, rng);
             }

@@ -13,8 +13,8 @@ pub(super) fn place_hash(place: Point2<f64>, index: u64) -> f64 {
     ((bits ^ (bits >> 31)) >> 11) as f64 / (1u64 << 53) as f64
 }
 
-/// A random field over the world, smooth on the scale `size_m`, with a mean of 0, a standard deviation of
-/// about 1 and a maximum of 2.7. Each `index` gives another one.
+/// A random field over the world, smooth on the scale `size_m`, with a mean of 0, a standard
+/// deviation of about 1 and a maximum of 2.7. Each `index` gives another one.
 pub(super) fn smooth_noise(place: Point2<f64>, size_m: f64, index: u64) -> f64 {
     let at = place / size_m;
     let corner = Point2::new(at.x.floor(), at.y.floor());
@@ -22,8 +22,8 @@ pub(super) fn smooth_noise(place: Point2<f64>, size_m: f64, index: u64) -> f64 {
     let share = (at - corner).map(|share| share * share * (3.0 - 2.0 * share));
     let value = |x: f64, y: f64| 2.0 * place_hash(corner + Vector2::new(x, y), index) - 1.0;
     let along = |y: f64| value(0.0, y) * (1.0 - share.x) + value(1.0, y) * share.x;
-    // The mean of four numbers with a standard deviation of one over the square root of three has 0.42 on
-    // average.
+    // The mean of four numbers with a standard deviation of one over the square root of three has
+    // 0.42 on average.
     (along(0.0) * (1.0 - share.y) + along(1.0) * share.y) / 0.42
 }
 

@@ -1,5 +1,5 @@
-//! Scintillation: real objects are some wavelengths large and have lobes, so their echoes fluctuate with
-//! the direction.
+//! Scintillation: real objects are some wavelengths large and have lobes, so their echoes fluctuate
+//! with the direction.
 
 use std::f64::consts::TAU;
 
@@ -7,8 +7,8 @@ use nalgebra::{Point2, Vector2};
 
 use super::place_noise::place_hash;
 
-/// Angular scale of a scatterer's lobes, radians: half a wavelength over its size, here some fifteen
-/// centimetres.
+/// Angular scale of a scatterer's lobes, radians: half a wavelength over its size, here some
+/// fifteen centimetres.
 const LOBE_RAD: f64 = 0.012;
 
 /// Factor on the cross-section of a scatterer at `place`, seen from `direction` (a unit vector):

@@ -6,8 +6,8 @@ use crate::profile::Receiver;
 const CELLS_KEPT: f64 = 4.0;
 /// Tabulated positions within a bin.
 const SUB_BINS: usize = 16;
-/// Energy of the point response in cells: mean power in every bin of independent noise with power 1 in each
-/// cell.
+/// Energy of the point response in cells: mean power in every bin of independent noise with power 1
+/// in each cell.
 pub const NOISE_OVERLAP: f32 = 1.5;
 
 /// The complex amplitudes of one azimuth over range.
@@ -65,8 +65,8 @@ impl RangeSpectrum {
         )
     }
 
-    /// Adds an echo at `bin` (with fractions) with a complex amplitude; its peak power is the amplitude's
-    /// square.
+    /// Adds an echo at `bin` (with fractions) with a complex amplitude; its peak power is the
+    /// amplitude's square.
     pub fn add(&mut self, bin: f64, real: f32, imaginary: f32) {
         let Some((response, first)) = self.place(bin) else {
             return;
@@ -140,8 +140,8 @@ fn hann_response(cells: f64) -> f64 {
 
 /// Converts power to counts of half a decibel, with compression above `full_scale`.
 ///
-/// The CTS350-X and the RAS6 send integer powers: scans hold 0, 6, 9, 12, 14, 15, 17, ... (powers 1, 2, 3,
-/// ...) and nothing between.
+/// The CTS350-X and the RAS6 send integer powers: scans hold 0, 6, 9, 12, 14, 15, 17, ... (powers
+/// 1, 2, 3, ...) and nothing between.
 pub fn counts(power: f32, full_scale: f32, whole_powers: bool) -> u8 {
     let compressed = power / (1.0 + power / full_scale);
     let power = if whole_powers {
@@ -152,11 +152,12 @@ pub fn counts(power: f32, full_scale: f32, whole_powers: bool) -> u8 {
     (6.020_6 * log2(power.max(1.0)) - 0.1 + NO_FRACTIONS).to_bits() as u8
 }
 
-/// The sum with this constant is rounded to an integer, which is in its last byte. This vectorises, unlike
-/// casts and calls.
+/// The sum with this constant is rounded to an integer, which is in its last byte. This vectorises,
+/// unlike casts and calls.
 const NO_FRACTIONS: f32 = 8_388_608.0;
 
-/// Logarithm of a number of at least 1, accurate to 1e-4; arithmetic alone, so that all machines agree.
+/// Logarithm of a number of at least 1, accurate to 1e-4; arithmetic alone, so that all machines
+/// agree.
 fn log2(value: f32) -> f32 {
     let bits = value.to_bits();
     let exponent = (bits >> 23) as i32 - 127;

@@ -36,8 +36,9 @@ pub(super) struct SweepPoses {
 }
 
 impl SweepPoses {
-    /// Samples the path during a sweep. `error_rad` is the deviation of the beam to the right of a reported
-    /// azimuth, `elevation_rad` its elevation at a time of the drive, seconds, and an azimuth.
+    /// Samples the path during a sweep. `error_rad` is the deviation of the beam to the right of a
+    /// reported azimuth, `elevation_rad` its elevation at a time of the drive, seconds, and an
+    /// azimuth.
     pub fn sample(
         &mut self,
         path: &dyn Path,
@@ -104,9 +105,9 @@ impl SweepPoses {
         self.step_rad
     }
 
-    /// Visits the azimuths, with fractions, at which the beam passes an object at `place(azimuth_pose)`:
-    /// usually once, twice or never near the sweep's seam if the vehicle turns, and up to [`MARGIN`]
-    /// azimuths outside the sweep.
+    /// Visits the azimuths, with fractions, at which the beam passes an object at
+    /// `place(azimuth_pose)`: usually once, twice or never near the sweep's seam if the vehicle
+    /// turns, and up to [`MARGIN`] azimuths outside the sweep.
     pub fn beam_passes(
         &self,
         place: impl Fn(&AzimuthPose) -> Point2<f64>,

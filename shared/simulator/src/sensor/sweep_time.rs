@@ -19,7 +19,8 @@ impl SweepTime {
         self.start_us + self.period_us * azimuth as i64 / self.azimuths as i64
     }
 
-    /// Middle of the sweep: half-way between the first and the last azimuth, microseconds since 1970.
+    /// Middle of the sweep: half-way between the first and the last azimuth, microseconds since
+    /// 1970.
     pub fn middle_us(&self) -> i64 {
         self.start_us + (self.stamp_us(self.azimuths - 1) - self.start_us) / 2
     }

@@ -22,17 +22,17 @@ const TOLERANCE_M: f64 = 0.1;
 const SIDE_WIDTH_M: std::ops::Range<f64> = 5.0..8.0;
 
 impl Streets {
-    /// Lays streets along the first `duration_s` of a drive, and side streets that branch off, the same for
-    /// the same seed.
+    /// Lays streets along the first `duration_s` of a drive, and side streets that branch off, the
+    /// same for the same seed.
     ///
-    /// The ego vehicle drives in its lane. What it drives twice, in either direction and with some metres
-    /// of offset, is one street. Everywhere its centre is at least 1.3 m from the kerb.
+    /// The ego vehicle drives in its lane. What it drives twice, in either direction and with some
+    /// metres of offset, is one street. Everywhere its centre is at least 1.3 m from the kerb.
     pub fn along(path: &dyn Path, duration_s: f64, driving_side: DrivingSide, seed: u64) -> Self {
         Self::along_all(&[(path, duration_s)], driving_side, seed)
     }
 
-    /// As [`Streets::along`], along several drives, each with the duration of which streets are laid,
-    /// seconds.
+    /// As [`Streets::along`], along several drives, each with the duration of which streets are
+    /// laid, seconds.
     pub fn along_all(drives: &[(&dyn Path, f64)], driving_side: DrivingSide, seed: u64) -> Self {
         let mut rng = Stream::Streets.generator(seed);
         let drives = drives

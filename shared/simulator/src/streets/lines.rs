@@ -73,8 +73,8 @@ impl LineGrid {
         }
     }
 
-    /// The segments within `reach_m` of a place, by cell and in the order in which they were added; some
-    /// more than once.
+    /// The segments within `reach_m` of a place, by cell and in the order in which they were added;
+    /// some more than once.
     pub fn near(&self, place: Point2<f64>, reach_m: f64) -> impl Iterator<Item = &Segment> {
         let reach = Vector2::repeat(reach_m);
         let (low, high) = (cell(place - reach), cell(place + reach));
@@ -98,7 +98,8 @@ pub fn length_m(line: &[Point2<f64>]) -> f64 {
     line.windows(2).map(|ends| (ends[1] - ends[0]).norm()).sum()
 }
 
-/// The line without points within `tolerance_m` of the line through the others (Douglas and Peucker, 1973).
+/// The line without points within `tolerance_m` of the line through the others (Douglas and
+/// Peucker, 1973).
 pub fn simplified(line: &[Point2<f64>], tolerance_m: f64) -> Line {
     let mut keep = vec![false; line.len()];
     let mut open = vec![(0, line.len().saturating_sub(1))];

@@ -15,10 +15,11 @@ const JOIN_M: f64 = 8.0;
 const LEAVE_M: f64 = 11.0;
 /// Minimum cosine of the angle between parallel directions.
 const PARALLEL: f64 = 0.85;
-/// Distance to either side over which the shift of a street to the middle of its passes is averaged,
-/// metres.
+/// Distance to either side over which the shift of a street to the middle of its passes is
+/// averaged, metres.
 const SHIFT_M: f64 = 20.0;
-/// A path that turns by more than the angle (radians) within the distance (metres) takes another street.
+/// A path that turns by more than the angle (radians) within the distance (metres) takes another
+/// street.
 const TURN: (f64, f64) = (0.9, 24.0);
 
 /// A point of the driven path.
@@ -56,7 +57,8 @@ pub fn waypoints(path: &dyn Path, duration_s: f64, driving_side: DrivingSide) ->
     (0..poses.len()).map(point).collect()
 }
 
-/// Poses with their times, some metres apart; at least two, the last of which lies ahead of the path's end.
+/// Poses with their times, some metres apart; at least two, the last of which lies ahead of the
+/// path's end.
 fn steps(path: &dyn Path, duration_s: f64) -> Vec<(f64, Pose)> {
     let mut poses = vec![(0.0, path.pose(0.0))];
     let apart = |a: &Pose, b: &Pose| (a.translation.vector - b.translation.vector).norm();
@@ -72,8 +74,8 @@ fn steps(path: &dyn Path, duration_s: f64) -> Vec<(f64, Pose)> {
     poses
 }
 
-/// The direction of the path; the vehicle's own where the path is not along it, as when it turns on the
-/// spot.
+/// The direction of the path; the vehicle's own where the path is not along it, as when it turns on
+/// the spot.
 fn direction(poses: &[(f64, Pose)], index: usize) -> Vector2<f64> {
     let (before, after) = (
         poses[index.saturating_sub(1)].1,

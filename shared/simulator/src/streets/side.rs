@@ -111,8 +111,8 @@ impl<R: Rng> SideStreets<'_, R> {
         }
     }
 
-    /// Draws a street from `start` as long as there is room, or up to a street that it meets at a steep
-    /// angle.
+    /// Draws a street from `start` as long as there is room, or up to a street that it meets at a
+    /// steep angle.
     fn build(&mut self, start: Point2<f64>, direction: Vector2<f64>) {
         let wanted_m = self.rng.random_range(LENGTH_M);
         let bend = Rotation2::new(

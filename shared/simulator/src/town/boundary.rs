@@ -28,8 +28,8 @@ pub(super) enum Boundary {
     Barrier,
 }
 
-/// The properties of a boundary. All are lower than a radar on a roof, which sees higher objects behind
-/// them. Hedges: Weissberger's attenuation of 1.55 dB a metre of foliage at 77 GHz, two-way.
+/// The properties of a boundary. All are lower than a radar on a roof, which sees higher objects
+/// behind them. Hedges: Weissberger's attenuation of 1.55 dB a metre of foliage at 77 GHz, two-way.
 struct Make {
     screen: Screen,
     /// Distance between posts, metres; 0 without posts.

@@ -43,8 +43,8 @@ pub(super) struct Building {
 const BEHIND: f64 = 0.4;
 
 impl Room {
-    /// The corners of a ground plan in this space, counter-clockwise from the front's left. `share` says
-    /// where it is divided.
+    /// The corners of a ground plan in this space, counter-clockwise from the front's left. `share`
+    /// says where it is divided.
     fn outline(&self, form: Form, share: f64) -> Vec<Point2<f64>> {
         let (w, d) = (self.width_m, self.depth_m);
         let (cut, step) = (w * share, (0.25 * d).min(3.0));

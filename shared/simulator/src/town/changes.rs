@@ -33,7 +33,8 @@ impl Changes {
         }
     }
 
-    /// The generator of what stands at a place and changes; `None` where all is as the town's seed has it.
+    /// The generator of what stands at a place and changes; `None` where all is as the town's seed
+    /// has it.
     pub(super) fn generator(&self, place: Point2<f64>) -> Option<ChaCha8Rng> {
         Some(at(&[self.seed?, REST], place))
     }

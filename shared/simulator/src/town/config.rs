@@ -11,17 +11,20 @@ use crate::limits::require_within;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TownConfig {
-    /// The seed of the town: its streets and all that stands along them. Drives with the same seed, the same
-    /// streets and otherwise the same section are in the same town. Default: the seed of the simulation.
+    /// The seed of the town: its streets and all that stands along them. Drives with the same seed,
+    /// the same streets and otherwise the same section are in the same town. Default: the seed of
+    /// the simulation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub seed: Option<u64>,
-    /// The trajectories of all drives through the town, in any format that [`gyre_radar::read_trajectory`]
-    /// knows: streets are laid along all of them, whichever is driven. The world's frame is that of the
-    /// first file's first pose. Default: streets along the drive alone.
+    /// The trajectories of all drives through the town, in any format that
+    /// [`gyre_radar::read_trajectory`] knows: streets are laid along all of them, whichever is
+    /// driven. The world's frame is that of the first file's first pose. Default: streets along the
+    /// drive alone.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub streets: Vec<PathBuf>,
-    /// The seed of what changes from one drive to another while the town stays: which parking places are
-    /// taken and by which cars, the leaves, the building sites. Default: as the seed of the town has them.
+    /// The seed of what changes from one drive to another while the town stays: which parking
+    /// places are taken and by which cars, the leaves, the building sites. Default: as the seed of
+    /// the town has them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub changes_seed: Option<u64>,
     /// The type of development.

@@ -1,11 +1,12 @@
 //! Facades: the scatterers of a wall.
 //!
-//! In real scans a row of houses appears as short bright pieces and dots with gaps between. So a facade
-//! consists of regular bays, each with its own strength: rough wall (many weak scatterers, whose echoes
-//! interfere), relief between the bays, which appears as a row of dots along a street, and in some of them
-//! windows (reveals that face along the street, a pane that flashes at normal incidence, a room that
-//! extends the echo in range), doors (a recess: two walls and the ground, bright over a wide angle) and
-//! drain pipes. Cross-sections are fitted to the histogram of powers in real scans.
+//! In real scans a row of houses appears as short bright pieces and dots with gaps between. So a
+//! facade consists of regular bays, each with its own strength: rough wall (many weak scatterers,
+//! whose echoes interfere), relief between the bays, which appears as a row of dots along a street,
+//! and in some of them windows (reveals that face along the street, a pane that flashes at normal
+//! incidence, a room that extends the echo in range), doors (a recess: two walls and the ground,
+//! bright over a wide angle) and drain pipes. Cross-sections are fitted to the histogram of powers
+//! in real scans.
 
 use nalgebra::{Point2, Rotation2, Vector2};
 use rand::Rng;
@@ -15,10 +16,10 @@ use super::site::{Screen, Site};
 
 /// The material of a wall.
 ///
-/// The mirrored share follows from the relative permittivities of ITU-R P.2040 at normal incidence (brick
-/// 3.9: 0.11, concrete 5.2: 0.15, glass 6.3: 0.19 for each surface, wood 2.0: 0.03), reduced by roughness
-/// and increased by coatings. The transmitted share is larger than that of the material alone, since
-/// windows transmit more and a radar in the plane cannot see over anything.
+/// The mirrored share follows from the relative permittivities of ITU-R P.2040 at normal incidence
+/// (brick 3.9: 0.11, concrete 5.2: 0.15, glass 6.3: 0.19 for each surface, wood 2.0: 0.03), reduced
+/// by roughness and increased by coatings. The transmitted share is larger than that of the
+/// material alone, since windows transmit more and a radar in the plane cannot see over anything.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Material {
     Brick,
@@ -60,8 +61,8 @@ impl Material {
 
 /// One wall, seen from outside.
 pub(super) struct Facade {
-    /// The wall's ends in the site's frame; outside is on the right when going from the first to the
-    /// second.
+    /// The wall's ends in the site's frame; outside is on the right when going from the first to
+    /// the second.
     pub from: Point2<f64>,
     pub to: Point2<f64>,
     pub material: Material,
@@ -134,8 +135,8 @@ impl Site<'_> {
         if self.chance(door) {
             self.door(bay, facade.body);
         }
-        // Pilasters, gutters and panel joints at the side of every bay, visible along the street from far
-        // away.
+        // Pilasters, gutters and panel joints at the side of every bay, visible along the street
+        // from far away.
         let relief_m2 = if self.chance(pipe) { 5.0 } else { 1.6 };
         self.facing(
             bay.at(0.0, 0.1),

@@ -11,8 +11,8 @@ use crate::streets::{Street, Streets};
 const NODE_M: f64 = 2.0;
 /// Distance to either side over which the direction is averaged, metres, since driven lines waver.
 const TANGENT_M: f64 = 5.0;
-/// Maximum distance along the street between a place's own station and its nearest point of a street,
-/// metres.
+/// Maximum distance along the street between a place's own station and its nearest point of a
+/// street, metres.
 const OWN_M: f64 = 8.0;
 
 /// The centre line of a street, by distance along it.
@@ -20,7 +20,8 @@ pub(super) struct Line {
     /// Places, [`NODE_M`] apart along the street.
     nodes: Vec<Point2<f64>>,
     length_m: f64,
-    /// The seed of the street: where it begins. Its index and its end change when the network grows.
+    /// The seed of the street: where it begins. Its index and its end change when the network
+    /// grows.
     key: u64,
 }
 
@@ -140,8 +141,8 @@ impl<'a> Frontage<'a> {
         self.streets.clearance_m(place, metres) >= metres
     }
 
-    /// The largest rectangle with its front along the kerb between two stations, `out_m` metres beyond it;
-    /// none where the street bends too sharply. It may overlap other streets.
+    /// The largest rectangle with its front along the kerb between two stations, `out_m` metres
+    /// beyond it; none where the street bends too sharply. It may overlap other streets.
     pub(super) fn lot(&self, along_m: f64, width_m: f64, out_m: f64, depth_m: f64) -> Option<Lot> {
         let [front, back] = [out_m, out_m + depth_m].map(|out| {
             let (from, to) = (self.place(along_m, out), self.place(along_m + width_m, out));

@@ -1,9 +1,9 @@
 //! Objects between a street and its lots: posts, signs, trees, parked cars, barriers.
 //!
 //! A post is a metal cylinder, 2π r h² / λ at normal incidence (Knott, Shaeffer, Tuley: Radar Cross
-//! Section), of which only the first Fresnel zone contributes: r = 0.08 m and h = 0.2 m at 20 m give 5 m².
-//! A sign is a flat plate, 4π A² / λ², some thousand square metres in the same zone, but hardly any sign is
-//! vertical enough to show half of it.
+//! Section), of which only the first Fresnel zone contributes: r = 0.08 m and h = 0.2 m at 20 m
+//! give 5 m². A sign is a flat plate, 4π A² / λ², some thousand square metres in the same zone, but
+//! hardly any sign is vertical enough to show half of it.
 
 use nalgebra::{Point2, Rotation2, Vector2};
 use rand::Rng;
@@ -21,7 +21,8 @@ use crate::body::NO_BODY;
 
 /// Distance from the kerb to posts and signs, metres.
 const POSTS_OUT_M: f64 = 0.5;
-/// Distance from the kerb to the centre of parked cars, metres: they stand in bays beside the carriageway.
+/// Distance from the kerb to the centre of parked cars, metres: they stand in bays beside the
+/// carriageway.
 const CARS_OUT_M: f64 = 1.25;
 /// Width of the parking bays, metres.
 pub(super) const BAYS_M: f64 = 2.4;
@@ -276,7 +277,8 @@ impl Site<'_> {
         }
     }
 
-    /// Adds a pole with a plate facing the traffic, whose bends and brackets reflect in all directions.
+    /// Adds a pole with a plate facing the traffic, whose bends and brackets reflect in all
+    /// directions.
     fn sign(&mut self) {
         let body = self.body();
         let turn = Rotation2::new(0.08 * normal(&mut self.rng));

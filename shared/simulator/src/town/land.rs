@@ -11,8 +11,8 @@ use crate::streets::Streets;
 const CELL_M: f64 = 24.0;
 /// Permitted overlap of neighbours, metres, for rounding.
 const TOLERANCE_M: f64 = 0.02;
-/// Distance between the places of a lot that are checked against the streets, metres: less than the width
-/// of any street.
+/// Distance between the places of a lot that are checked against the streets, metres: less than the
+/// width of any street.
 const SAMPLE_M: f64 = 3.0;
 
 /// A rectangle of land beside a street.

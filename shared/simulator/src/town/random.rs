@@ -1,7 +1,7 @@
 //! Random quantities of the town.
 //!
-//! Each object has its own generator, seeded by what and where it is, so a place looks the same whatever
-//! else is built.
+//! Each object has its own generator, seeded by what and where it is, so a place looks the same
+//! whatever else is built.
 
 use std::f64::consts::TAU;
 
@@ -9,7 +9,8 @@ use nalgebra::Point2;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Mixes keys to a pseudo-random number (the finalizer of SplitMix64, Steele et al. 2014, for each key).
+/// Mixes keys to a pseudo-random number (the finalizer of SplitMix64, Steele et al. 2014, for each
+/// key).
 pub fn hash(keys: &[u64]) -> u64 {
     keys.iter().fold(0x9e37_79b9_7f4a_7c15, |state, key| {
         let mut mixed = (state ^ key).wrapping_add(0x9e37_79b9_7f4a_7c15);

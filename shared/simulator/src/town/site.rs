@@ -51,8 +51,9 @@ impl Site<'_> {
         self.built.last_body
     }
 
-    /// Builds what changes between drives, at a place. It is built as the town's seed has it, and where the
-    /// town has changed since it is replaced, so that the town's random numbers stay the same.
+    /// Builds what changes between drives, at a place. It is built as the town's seed has it, and
+    /// where the town has changed since it is replaced, so that the town's random numbers stay the
+    /// same.
     pub(super) fn changing(&mut self, place: Point2<f64>, build: impl Fn(&mut Site<'_>)) {
         let before = self.built.len();
         build(self);
@@ -79,7 +80,8 @@ impl Site<'_> {
         }
     }
 
-    /// Adds a scatterer that reflects in all directions, of `median_m2` with a spread of `deviation_db`.
+    /// Adds a scatterer that reflects in all directions, of `median_m2` with a spread of
+    /// `deviation_db`.
     pub(super) fn point(
         &mut self,
         place: Point2<f64>,
@@ -141,8 +143,8 @@ impl Site<'_> {
         });
     }
 
-    /// Adds scatterers without a body around a place: normally distributed, at most `reach_m` away in x and
-    /// y.
+    /// Adds scatterers without a body around a place: normally distributed, at most `reach_m` away
+    /// in x and y.
     pub(super) fn cloud(
         &mut self,
         place: Point2<f64>,

@@ -27,7 +27,8 @@ fn street(
     }
 }
 
-/// A driven street with bends in both directions, and others that branch off at various angles or cross it.
+/// A driven street with bends in both directions, and others that branch off at various angles or
+/// cross it.
 fn network() -> Streets {
     let mut bends = street((0.0, 0.0), 0.0, 200.0, 0.0, true);
     let last = bends.centre[bends.centre.len() - 1];
@@ -125,8 +126,8 @@ fn buildings_do_not_overlap() {
             .collect();
         assert!(solid.len() > 20, "{character:?}: {}", solid.len());
         for (index, wall) in solid.iter().enumerate() {
-            // Neighbours may share a wall or a corner, but a building shrunk by some centimetres must not
-            // touch the other.
+            // Neighbours may share a wall or a corner, but a building shrunk by some centimetres
+            // must not touch the other.
             let inset = (wall.to - wall.from).normalize() * 0.05;
             for other in solid[index + 1..]
                 .iter()

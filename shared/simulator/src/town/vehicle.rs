@@ -10,12 +10,12 @@ use crate::body::{Aspect, Body, Scatterer, Wall};
 
 /// Half of a car's length and width, metres.
 pub(super) const CAR_HALF_M: (f64, f64) = (2.15, 0.9);
-/// Two-way share of the power that passes a car: through its windows, below it, and above it to what is
-/// higher.
+/// Two-way share of the power that passes a car: through its windows, below it, and above it to
+/// what is higher.
 const CAR_TRANSMISSION: f64 = 0.8;
 
-/// A car around its own origin, x ahead: bright corners, wheels and plates, and sides that hide what is
-/// behind.
+/// A car around its own origin, x ahead: bright corners, wheels and plates, and sides that hide
+/// what is behind.
 ///
 /// The sum is about 10 m² on each side, the order reported for passenger cars at 77 GHz.
 pub(crate) fn car(body: u32, rng: &mut impl Rng) -> Body {

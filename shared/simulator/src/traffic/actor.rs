@@ -25,7 +25,8 @@ impl Actor {
         (self.visible_s[0]..=self.visible_s[1]).contains(&time_s)
     }
 
-    /// Velocity in the world, metres a second, by a difference quotient over 2 ms; accurate to 0.1 mm/s.
+    /// Velocity in the world, metres a second, by a difference quotient over 2 ms; accurate to 0.1
+    /// mm/s.
     pub fn velocity(&self, route: &EgoRoute, time_s: f64, pose: &Pose) -> Vector2<f64> {
         let half_s = 1e-3;
         let [before, after] =

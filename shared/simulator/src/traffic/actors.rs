@@ -194,7 +194,8 @@ impl Actors {
         }
     }
 
-    /// Adds a road user that is visible while the ego vehicle is within reach of their meeting place.
+    /// Adds a road user that is visible while the ego vehicle is within reach of their meeting
+    /// place.
     fn along(&mut self, kind: Kind, alongside: Alongside, route: &EgoRoute, rng: &mut ChaCha8Rng) {
         let reach_m = route.reach_m() / (1.0 - alongside.share).abs();
         let visible_s =
@@ -219,7 +220,8 @@ fn places(route: &EgoRoute, mean_m: f64, rng: &mut ChaCha8Rng) -> Vec<f64> {
     all
 }
 
-/// The times between which an oncoming vehicle is within reach; the distance to it always decreases.
+/// The times between which an oncoming vehicle is within reach; the distance to it always
+/// decreases.
 fn meeting(track: &Track, route: &EgoRoute) -> [f64; 2] {
     let apart_m = |time_s: f64| track.along_m(route, time_s) - route.progress_m(time_s);
     [route.reach_m(), -route.reach_m()].map(|wanted_m| {

@@ -18,7 +18,8 @@ use crate::streets::{Street, Streets};
 const SEEN_M: f64 = 170.0;
 /// They wait while it is nearer than this, metres.
 const KEEP_OFF_M: f64 = 40.0;
-/// Distance from the kerb to the front of the first waiting vehicle, and between waiting vehicles, metres.
+/// Distance from the kerb to the front of the first waiting vehicle, and between waiting vehicles,
+/// metres.
 const STOP_M: f64 = 1.5;
 const BETWEEN_M: f64 = 2.5;
 /// Maximum length of a queue.
@@ -27,8 +28,8 @@ const LONGEST: usize = 3;
 const PATH_M: f64 = 120.0;
 /// Minimum length of a side street with vehicles, metres.
 const SHORTEST_M: f64 = 30.0;
-/// Others must not be nearer to the junction's centre than this, metres, during this time, seconds, for a
-/// vehicle to cross.
+/// Others must not be nearer to the junction's centre than this, metres, during this time, seconds,
+/// for a vehicle to cross.
 const CLEAR_M: f64 = 9.0;
 const CLEAR_S: f64 = 5.0;
 
@@ -104,8 +105,8 @@ fn direction(street: &Street) -> Vector2<f64> {
     street.at(10.0).rotation * Vector2::x()
 }
 
-/// A pass of the ego vehicle: the times during which it is within [`SEEN_M`] and within [`KEEP_OFF_M`],
-/// seconds.
+/// A pass of the ego vehicle: the times during which it is within [`SEEN_M`] and within
+/// [`KEEP_OFF_M`], seconds.
 #[derive(Clone, Copy)]
 struct Pass {
     seen_s: [f64; 2],
@@ -203,8 +204,8 @@ fn gap(actors: &Actors, place: Point2<f64>, route: &EgoRoute, from_s: f64, until
     }
 }
 
-/// The path from a side street, in its lane, into the opposite one; its length; and the place of the first
-/// vehicle's front.
+/// The path from a side street, in its lane, into the opposite one; its length; and the place of
+/// the first vehicle's front.
 fn path(junction: &Junction<'_>, driving_side: DrivingSide) -> (UniformSpline<2>, f64, f64) {
     let side = if driving_side == DrivingSide::Left {
         1.0

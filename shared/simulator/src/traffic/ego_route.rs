@@ -32,11 +32,11 @@ pub struct EgoRoute {
     places: UniformSpline<2>,
     /// Distance along the route by time.
     progress: UniformSpline<1>,
-    /// Distance to the kerbs on the ego vehicle's side and on the other, metres, by distance along the
-    /// route.
+    /// Distance to the kerbs on the ego vehicle's side and on the other, metres, by distance along
+    /// the route.
     kerbs: UniformSpline<2>,
-    /// Travel time of the others from the start of the route, seconds, by distance along it, and the
-    /// inverse.
+    /// Travel time of the others from the start of the route, seconds, by distance along it, and
+    /// the inverse.
     clock: UniformSpline<1>,
     place_of_clock: UniformSpline<1>,
     /// The ego side is on the left (1) or right (-1).
@@ -122,8 +122,8 @@ impl EgoRoute {
         self.place_of_clock.value(clock_s)[0]
     }
 
-    /// A pose on the route, `inwards_m` beside the ego vehicle's track (towards the centre of the street),
-    /// x along it.
+    /// A pose on the route, `inwards_m` beside the ego vehicle's track (towards the centre of the
+    /// street), x along it.
     pub fn pose(&self, along_m: f64, inwards_m: f64) -> Pose {
         let ([x, y], [dx, dy]) = (self.places.value(along_m), self.places.slope(along_m));
         let along = Vector2::new(dx, dy)
@@ -151,8 +151,8 @@ impl EgoRoute {
         self.duration_s
     }
 
-    /// Maximum distance along the route at which traffic is visible, metres: less than half of the shortest
-    /// loop, so that nothing is in two places.
+    /// Maximum distance along the route at which traffic is visible, metres: less than half of the
+    /// shortest loop, so that nothing is in two places.
     pub fn reach_m(&self) -> f64 {
         self.reach_m
     }

@@ -1,12 +1,12 @@
 //! The bodies of cars, vans, lorries, buses, cyclists and pedestrians at 77 GHz.
 //!
-//! Cross-sections are of the published order: 1 to 100 m² for a car by its aspect, 100 m² and more for the
-//! flat sides of lorries (Skolnik, *Introduction to Radar Systems*, gives 100 m² for a car, 200 m² for a
-//! pickup, 2 m² for a bicycle, 1 m² for a person at microwaves); about -8 dBm² for a pedestrian at 76 GHz
-//! (Yamada et al., EuMC 2005; measured from all sides by Fortuny-Guasch and Chareau, JRC report EUR 25762,
-//! 2013); some decibels more for a cyclist (Belgiovane and Chen, IEEE T-ITS 2017). Transmission is assumed
-//! from the height of the sensor: from a roof it sees over cars, but not over buses. Micro-Doppler of limbs
-//! and wheels is neglected.
+//! Cross-sections are of the published order: 1 to 100 m² for a car by its aspect, 100 m² and more
+//! for the flat sides of lorries (Skolnik, *Introduction to Radar Systems*, gives 100 m² for a car,
+//! 200 m² for a pickup, 2 m² for a bicycle, 1 m² for a person at microwaves); about -8 dBm² for a
+//! pedestrian at 76 GHz (Yamada et al., EuMC 2005; measured from all sides by Fortuny-Guasch and
+//! Chareau, JRC report EUR 25762, 2013); some decibels more for a cyclist (Belgiovane and Chen,
+//! IEEE T-ITS 2017). Transmission is assumed from the height of the sensor: from a roof it sees
+//! over cars, but not over buses. Micro-Doppler of limbs and wheels is neglected.
 
 use nalgebra::{Point2, Rotation2, Vector2};
 use rand::Rng;
@@ -29,7 +29,8 @@ pub enum Kind {
 /// A box on wheels.
 struct Shape {
     half_m: (f64, f64),
-    /// Median cross-section of an edge, seen from all sides, and of a panel, seen at normal incidence, m².
+    /// Median cross-section of an edge, seen from all sides, and of a panel, seen at normal
+    /// incidence, m².
     edge_m2: f64,
     panel_m2: f64,
     /// Two-route share of the power that passes.
@@ -126,7 +127,8 @@ impl Shape {
         body
     }
 
-    /// Adds about one panel for each metre: flat, hence bright at normal incidence, but slightly tilted.
+    /// Adds about one panel for each metre: flat, hence bright at normal incidence, but slightly
+    /// tilted.
     fn panels(
         &self,
         body: &mut Body,

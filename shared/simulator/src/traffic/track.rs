@@ -8,8 +8,8 @@ use super::ego_route::EgoRoute;
 use crate::lanes::LANE_M;
 use crate::path::spline::UniformSpline;
 
-/// Delay of a vehicle's motion behind that of the one ahead, seconds (Newell, "A simplified car-following
-/// theory", 2002).
+/// Delay of a vehicle's motion behind that of the one ahead, seconds (Newell, "A simplified
+/// car-following theory", 2002).
 pub const REACTION_S: f64 = 1.2;
 
 /// The place of a road user at any time.
@@ -70,7 +70,8 @@ pub struct Alongside {
 pub enum Lane {
     /// Distance from the ego vehicle's track towards the centre of the street, metres.
     Inwards(f64),
-    /// Distance beyond the kerb on the ego vehicle's side, metres; at least [`PASSING_M`] from its track.
+    /// Distance beyond the kerb on the ego vehicle's side, metres; at least [`PASSING_M`] from its
+    /// track.
     EgoKerb(f64),
     /// Distance beyond the other kerb, metres.
     OtherKerb(f64),
@@ -141,8 +142,8 @@ impl Track {
     }
 }
 
-/// Distance from the ego vehicle's track to the oncoming lane, metres: in the middle of the other half of
-/// the carriageway.
+/// Distance from the ego vehicle's track to the oncoming lane, metres: in the middle of the other
+/// half of the carriageway.
 fn other_lane_m([ego_m, other_m]: [f64; 2]) -> f64 {
     (0.75 * other_m - 0.25 * ego_m).max(LANE_M)
 }

@@ -43,8 +43,8 @@ fn to_toml(value: &impl serde::Serialize) -> Result<String, SimulatorError> {
 /// Returns the scans that `out` lacks.
 ///
 /// # Errors
-/// [`SimulatorError`] if `out` holds images of another dataset, or images that differ from what is rendered
-/// now.
+/// [`SimulatorError`] if `out` holds images of another dataset, or images that differ from what is
+/// rendered now.
 pub(super) fn missing(
     drive: &SimulatedDrive,
     config: &SimulationConfig,
@@ -132,8 +132,8 @@ fn same_scans(config: &SimulationConfig) -> SimulationConfig {
     config
 }
 
-/// Checks an image against a newly rendered one: another build may render differently, and the file may
-/// have been changed.
+/// Checks an image against a newly rendered one: another build may render differently, and the file
+/// may have been changed.
 fn require_same(drive: &SimulatedDrive, index: usize, path: &Path) -> Result<(), SimulatorError> {
     let size = drive.image_size();
     let (mut pixels, mut encoded) = (vec![0; size.bytes()], Vec::new());

@@ -29,7 +29,8 @@ fn noise_has_the_profiles_floor_and_exponential_power() {
             .count() as f64
             / counts.len() as f64
     };
-    // For an exponential distribution 1 - 1/e lies below the mean, 1 - exp(-0.2) below a fifth of it.
+    // For an exponential distribution 1 - 1/e lies below the mean, 1 - exp(-0.2) below a fifth of
+    // it.
     assert!((below(0.0) - 0.632).abs() < 0.03, "{}", below(0.0));
     assert!((below(-7.0) - 0.181).abs() < 0.03, "{}", below(-7.0));
 }
@@ -75,8 +76,8 @@ fn phase_noise_is_60_db_below_the_echo_in_far_bins_of_its_azimuth() {
     };
     let [there, beside, elsewhere] = measured(true);
     assert!((there - 60.0).abs() < 5.0, "{there} dB");
-    // Off the beam's axis it falls as the echo does: 3 dB at half the beam's width, with the square of the
-    // angle.
+    // Off the beam's axis it falls as the echo does: 3 dB at half the beam's width, with the square
+    // of the angle.
     let sensor = Setup::default();
     let fall_db = 12.04 * (sensor.sampling().step_rad() / sensor.receiver().beam_rad).powi(2);
     assert!(
@@ -100,8 +101,8 @@ fn reverberation_follows_strong_echoes_and_never_precedes_them() {
     for row in scans.iter().flat_map(|scan| powers(scan)) {
         assert!(row[on.bins(5.0..27.0)].iter().all(|count| *count == 0));
     }
-    // Power below the echo by the distance behind it: in the directions with the most, the median and the
-    // least reverberation of ten.
+    // Power below the echo by the distance behind it: in the directions with the most, the median
+    // and the least reverberation of ten.
     let below_db = |behind_m: f64| {
         let rows = scans
             .iter()

@@ -52,8 +52,8 @@ fn power_is_exponentially_distributed_over_directions_about_the_constant_one() {
         .collect();
     let mean = factors.iter().sum::<f64>() / factors.len() as f64;
     assert!((0.75..1.3).contains(&mean), "{mean}");
-    // For an exponential distribution 1 - exp(-0.2) = 18% lies below a fifth of the mean, exp(-2) = 14%
-    // above twice it.
+    // For an exponential distribution 1 - exp(-0.2) = 18% lies below a fifth of the mean, exp(-2) =
+    // 14% above twice it.
     let share = |chosen: &dyn Fn(f64) -> bool| {
         factors.iter().filter(|f| chosen(**f)).count() as f64 / SCANS as f64
     };

@@ -45,8 +45,8 @@ fn loss_db(weather: WeatherConfig, effects: Effects) -> f64 {
 
 #[test]
 fn rain_attenuates_as_in_p_838() {
-    // ITU-R P.838-3, horizontal polarisation, 76.5 GHz: between k 1.0315, alpha 0.7345 (70 GHz) and 1.1704,
-    // 0.7115 (80 GHz).
+    // ITU-R P.838-3, horizontal polarisation, 76.5 GHz: between k 1.0315, alpha 0.7345 (70 GHz) and
+    // 1.1704, 0.7115 (80 GHz).
     let db_km = 1.122 * 100f64.powf(0.7195);
     let loss = loss_db(RAIN, ON);
     assert!(
@@ -83,8 +83,8 @@ fn rain_fills_the_beam_whose_area_grows_with_the_square_of_range() {
         (far - near - db(16.0)).abs() < 0.4,
         "{far} dB and {near} dB"
     );
-    // So it falls with the square of range, not with the fourth power like a point's echo; here less, since
-    // the receiver's gain rises.
+    // So it falls with the square of range, not with the fourth power like a point's echo; here
+    // less, since the receiver's gain rises.
     let setup = Setup {
         weather: RAIN,
         effects: Effects::NONE,

@@ -19,14 +19,15 @@ impl Examination<'_> {
         self.motions_of_poses()
     }
 
-    /// Returns whether any of its rasters is motion-compensated. One that compensates nothing need not
-    /// wait.
+    /// Returns whether any of its rasters is motion-compensated. One that compensates nothing need
+    /// not wait.
     fn compensates(&self) -> bool {
         let mut headers = self.outputs.iter().map(|it| it.header::<Masked>());
         headers.any(|header| header.is_ok_and(|header| header.compensated == 1))
     }
 
-    /// A window of scans before the first pose: all motions come from the search, one after the other.
+    /// A window of scans before the first pose: all motions come from the search, one after the
+    /// other.
     fn motions_of_the_search(&mut self) -> Result<(), ConformanceError> {
         let compensates = self.compensates();
         let mut session = Session::open(self.context, "motions", &mut self.findings)?;
@@ -59,7 +60,8 @@ impl Examination<'_> {
         session.compare(&self.first_results, all, Rule::WaitsForMotion, when)
     }
 
-    /// A start in the middle of the stream: the motions up to the newest pose come with the poses alone.
+    /// A start in the middle of the stream: the motions up to the newest pose come with the poses
+    /// alone.
     fn motions_of_poses(&mut self) -> Result<(), ConformanceError> {
         let reference = self.context.reference;
         let mut session = Session::open(self.context, "poses", &mut self.findings)?;

@@ -1,4 +1,5 @@
-//! A whole stream with a full window, from a history that is there before the program, to the end and SIGTERM.
+//! A whole stream with a full window, from a history that is there before the program, to the end
+//! and SIGTERM.
 
 use std::time::Instant;
 

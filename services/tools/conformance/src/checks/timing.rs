@@ -1,5 +1,5 @@
-//! The time of its answers by the clock of this process: one item at a time, from when it is sent to
-//! when its answer is read. The stamps in the answers are the program's own.
+//! The time of its answers by the clock of this process: one item at a time, from when it is sent
+//! to when its answer is read. The stamps in the answers are the program's own.
 
 use super::{Examination, stream::starts};
 use crate::{
@@ -10,7 +10,8 @@ use crate::{
 };
 
 impl Examination<'_> {
-    /// Measures the answers to all items. A source answers none: it is asked for the next by a pose.
+    /// Measures the answers to all items. A source answers none: it is asked for the next by a
+    /// pose.
     pub(super) fn timing(&mut self) -> Result<Option<Work>, ConformanceError> {
         let mut session = Session::open(self.context, "timing", &mut self.findings)?;
         if session.harness.topics().copied().is_none() {

@@ -57,8 +57,9 @@ impl Session<'_> {
         Ok(())
     }
 
-    /// Publishes the inputs anew as after a restart of all stages: of the items so far no more than a
-    /// restarted stage may need, and the last poses. Those after them follow as they are admitted.
+    /// Publishes the inputs anew as after a restart of all stages: of the items so far no more than
+    /// a restarted stage may need, and the last poses. Those after them follow as they are
+    /// admitted.
     pub(crate) fn restart_inputs(&mut self, newest_pose: u64) -> Result<(), ConformanceError> {
         self.harness.open_feeds()?;
         self.republish_poses(newest_pose)?;

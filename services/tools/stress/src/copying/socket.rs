@@ -18,7 +18,8 @@ use crate::StressError;
 
 const HEAD: usize = 16;
 
-/// The sender: one socket for each reader. It writes to whichever has room, so that no reader waits for another.
+/// The sender: one socket for each reader. It writes to whichever has room, so that no reader waits
+/// for another.
 pub(super) struct Sender {
     listener: UnixListener,
     readers: usize,

@@ -1,7 +1,7 @@
 //! The processes of a run, and the stages that they belong to.
 //!
-//! The supervisor knows its stages whatever their programs are called. Each leads a process group, with
-//! the processes that it starts, as those behind a shell.
+//! The supervisor knows its stages whatever their programs are called. Each leads a process group,
+//! with the processes that it starts, as those behind a shell.
 
 use std::{
     collections::BTreeMap,
@@ -132,7 +132,8 @@ mod tests {
         let rows = [
             row(1, 0, 1),
             row(SUPERVISOR, 1, 1),
-            // A shell, its child, a grandchild whose parent has ended, and one that nobody knows yet.
+            // A shell, its child, a grandchild whose parent has ended, and one that nobody knows
+            // yet.
             row(20, SUPERVISOR, 20),
             row(21, 20, 20),
             row(22, 1, 20),

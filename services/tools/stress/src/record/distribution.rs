@@ -37,7 +37,8 @@ impl Distribution {
         // Rounded: 1 - 0.99 is not 0.01.
         let is_supported = |share: f64| samples >= (1.0 / (1.0 - share)).round() as u64;
         let supported = |share| at(share).filter(|_| is_supported(share));
-        // The last of n samples stands for the shares from 1 - 1 / n on: it is drawn in their middle.
+        // The last of n samples stands for the shares from 1 - 1 / n on: it is drawn in their
+        // middle.
         let nines = (2.0 * samples.max(1) as f64).log10();
         let steps = (nines * 40.0).ceil() as usize;
         let curve = (0..=steps).filter_map(|step| {
@@ -56,8 +57,8 @@ impl Distribution {
         }
     }
 
-    /// Returns ` of N` for the percentile of a share with fewer than ten of the N samples beyond it: it
-    /// depends on chance.
+    /// Returns ` of N` for the percentile of a share with fewer than ten of the N samples beyond
+    /// it: it depends on chance.
     pub fn mark(&self, percentile: Option<f64>, share: f64) -> String {
         let beyond = (self.samples as f64 * (1.0 - share)).round();
         match percentile.is_some() && beyond < FIRM {

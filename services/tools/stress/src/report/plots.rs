@@ -23,7 +23,8 @@ const LEGEND: u32 = 220;
 const TICKS_MS: [f64; 13] = [
     1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1e3, 2e3, 5e3, 1e4,
 ];
-/// Okabe and Ito's colours, which people with any kind of colour vision tell apart, then dashed for the rest.
+/// Okabe and Ito's colours, which people with any kind of colour vision tell apart, then dashed for
+/// the rest.
 const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(230, 159, 0),
@@ -224,7 +225,8 @@ fn grid(chart: &mut Chart<'_, '_>, ends: [(f64, f64); 2]) -> Result<(), PlotErro
     drawn.map(drop).map_err(drawing)
 }
 
-/// Writes into `area`, which holds the diagram, beside a point of the diagram, `(right, down)` px from it.
+/// Writes into `area`, which holds the diagram, beside a point of the diagram, `(right, down)` px
+/// from it.
 fn label(
     area: &Area<'_>,
     chart: &Chart<'_, '_>,

@@ -87,7 +87,8 @@ impl Lane {
     ) {
         let chord_m = (to.0 - from.0).norm();
         let turn = from.1.angle(&to.1);
-        // The handles of a circular arc are 4/3 tan(turn/4) radii long, its chord 2 sin(turn/2) radii.
+        // The handles of a circular arc are 4/3 tan(turn/4) radii long, its chord 2 sin(turn/2)
+        // radii.
         let handle_m = if turn < 0.05 {
             chord_m / 3.0
         } else {

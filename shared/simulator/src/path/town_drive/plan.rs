@@ -70,8 +70,8 @@ impl Plan {
         }
     }
 
-    /// Removes streets between junctions that keep three others, so that no junction becomes a dead end or
-    /// a bend.
+    /// Removes streets between junctions that keep three others, so that no junction becomes a dead
+    /// end or a bend.
     fn remove_some(&mut self, rng: &mut impl Rng) {
         for from in 0..self.junctions.len() {
             for to in self.neighbours[from].clone() {
@@ -85,7 +85,8 @@ impl Plan {
         }
     }
 
-    /// Place and direction on the centre line between two junctions; `share` is 0 at `from`, 1 at `to`.
+    /// Place and direction on the centre line between two junctions; `share` is 0 at `from`, 1 at
+    /// `to`.
     pub fn street(&self, from: usize, to: usize, share: f64) -> (Point2<f64>, Vector2<f64>) {
         let (low, high) = (from.min(to), from.max(to));
         let swerve_m = self.swerves_m[low][usize::from(high - low == 1)];

@@ -9,13 +9,13 @@ use super::plan::Plan;
 
 /// Share of the length after which the drive first returns to its start.
 const FIRST_TOUR: f64 = 0.4;
-/// Number of streets that are repeated after each return, and number of streets that are driven in the
-/// opposite direction.
+/// Number of streets that are repeated after each return, and number of streets that are driven in
+/// the opposite direction.
 const REPEATED: usize = 2;
 
-/// Draws the junctions of a drive of at least `length_m`, without U-turns. The drive returns to its start
-/// at 40 % of its length, repeats its first streets, drives some streets in the opposite direction, and
-/// ends at its start.
+/// Draws the junctions of a drive of at least `length_m`, without U-turns. The drive returns to its
+/// start at 40 % of its length, repeats its first streets, drives some streets in the opposite
+/// direction, and ends at its start.
 pub fn route(plan: &Plan, length_m: f64, rng: &mut impl Rng) -> Vec<usize> {
     let start = plan.junctions.len() / 2;
     let first = plan.neighbours[start][rng.random_range(0..plan.neighbours[start].len())];
@@ -88,7 +88,8 @@ impl Drive<'_> {
         }
     }
 
-    /// The shortest route to the start from which the first street can be repeated without a U-turn.
+    /// The shortest route to the start from which the first street can be repeated without a
+    /// U-turn.
     fn route_home(&self) -> Vec<usize> {
         self.shortest((self.last(1), self.last(0)), |before, here| {
             here == self.passed[0] && before != self.passed[1]
@@ -125,8 +126,8 @@ impl Drive<'_> {
             .sum()
     }
 
-    /// The route with the fewest streets that continues from the two junctions `from` to where `arrived`
-    /// (given the last two junctions), without U-turns; empty if there is none.
+    /// The route with the fewest streets that continues from the two junctions `from` to where
+    /// `arrived` (given the last two junctions), without U-turns; empty if there is none.
     fn shortest(&self, from: (usize, usize), arrived: impl Fn(usize, usize) -> bool) -> Vec<usize> {
         let mut came_from = BTreeMap::from([(from, None)]);
         let mut open = VecDeque::from([from]);

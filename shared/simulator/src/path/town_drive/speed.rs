@@ -102,7 +102,8 @@ fn timed(speeds: &[f64], waits_s: &[f64]) -> Vec<f64> {
         let at_m = node as f64 * STEP_M;
         fill(at_m, until_s, at_m, until_s + waits_s[node]);
         until_s += waits_s[node];
-        // Between two nodes at standstill, as where a wait meets the end of the drive, the vehicle creeps.
+        // Between two nodes at standstill, as where a wait meets the end of the drive, the vehicle
+        // creeps.
         let takes_s = 2.0 * STEP_M / (pair[0] + pair[1]).max(CREEP_MPS);
         fill(at_m, until_s, at_m + STEP_M, until_s + takes_s);
         until_s += takes_s;
