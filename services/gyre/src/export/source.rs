@@ -1,4 +1,4 @@
-//! What is exported: a run, a recording of one, or a dataset.
+//! The source of an export: a run, a recording of one, or a dataset.
 
 use std::{iter, path::Path, path::PathBuf};
 
@@ -9,12 +9,15 @@ use gyre_mapping::grid;
 use gyre_messages::{Correction, CorrectionHeader, Message, Pose as PoseTopic, PoseHeader};
 use gyre_radar::{Dataset, DatasetOptions, Trajectory, ground_truth::read_trajectory};
 use gyre_recording::Recording;
-use gyre_ros2_messages::{Mounting, frames::Frames, nav_msgs::OccupancyGrid};
+use gyre_ros2_messages::{
+    Mounting,
+    frames::{Frames, occupancy_grid},
+};
 
 use super::places::Place;
 use crate::{Failure, configuration::Configuration, map, preflight, print};
 
-/// What is exported.
+/// The source of an export.
 pub struct Source {
     path: PathBuf,
     kind: Kind,
@@ -38,7 +41,7 @@ pub struct Scans {
     pub played: std::ops::Range<usize>,
     /// The eccentricity of the encoder, rad.
     pub eccentricity_rad: f32,
-    /// Whether the angles are corrected by it.
+    /// True if the angles are corrected by it.
     pub is_corrected: bool,
     /// Encoder counts per turn, if they are known.
     pub encoder_counts: Option<u16>,
@@ -97,7 +100,8 @@ impl Source {
             Kind::Run(configuration) if configuration.is_radar() => Ok(None),
             Kind::Run(configuration) => {
                 let mut configuration = configuration.clone();
-                // The angles of an encoder are written as it counts them: who reads them corrects its eccentricity.
+                // The angles of an encoder are written as it counts them: who reads them corrects
+                // its eccentricity.
                 let eccentricity = configuration.dataset.azimuth_eccentricity_rad;
                 configuration.dataset.azimuth_eccentricity_rad = Some(0.0);
                 let dataset = preflight::open(&configuration)?.dataset;
@@ -155,7 +159,16 @@ impl Source {
                 return Ok(());
             }
         };
-        let grid: OccupancyGrid = grid(&mut evidence, stamp_ns, &frames.map)?;
+        let grid = grid(&mut evidence)?;
+        let size = [grid.columns, grid.rows];
+        let grid = occupancy_grid(
+            stamp_ns,
+            &frames.map,
+            grid.cell_m,
+            size,
+            grid.corner_m,
+            grid.values,
+        );
         let topic = bag.topic("/map", Kept::ForLater)?;
         bag.write(&topic, stamp_ns, &grid)?;
         Ok(())

@@ -29,7 +29,7 @@ pub struct Domain {
 /// A domain that cannot be joined.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum DomainError {
-    /// The variable is no number of a domain.
+    /// The variable is not the number of a domain.
     #[error("ROS_DOMAIN_ID is `{0}`, but must be a number from 0 to {MAX_DOMAIN}")]
     Variable(String),
     /// The number is too high.

@@ -7,7 +7,7 @@ use std::{
 
 use gyre_geometry::Pose;
 use gyre_mapping::{Evidence, MapError, grid};
-use gyre_ros2_messages::nav_msgs::OccupancyGrid;
+use gyre_ros2_messages::{frames::occupancy_grid, nav_msgs::OccupancyGrid};
 use gyre_slam::{Keyframe, Query, RecordReader, TrajectoryEstimator, TrajectoryOptions};
 use gyre_stage::{clock, observer::ObservedRun};
 use gyre_storage::LogError;
@@ -90,11 +90,15 @@ fn follow(
         let begun = Instant::now();
         if map.update(&shared.out)? {
             let before = maps.sent();
-            maps.send(grid(
-                &mut map.evidence,
+            let grid = grid(&mut map.evidence)?;
+            maps.send(occupancy_grid(
                 clock::since_1970_ns(),
                 &shared.frames.map,
-            )?);
+                grid.cell_m,
+                [grid.columns, grid.rows],
+                grid.corner_m,
+                grid.values,
+            ));
             state.lock().maps += maps.sent() - before;
         }
         due = Instant::now() + INTERVAL.max(begun.elapsed() * PAUSE_FACTOR);

@@ -16,11 +16,11 @@ use gyre_messages::{Item, StageId, flag};
 
 use crate::{
     ConformanceError,
+    context::Context,
     deviation::deviation,
     report::{Judged, Report, Work},
     rule::{Findings, Rule},
     session::Session,
-    test::Context,
 };
 
 /// The test of one program.

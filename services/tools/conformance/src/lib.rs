@@ -8,6 +8,7 @@
 //! process under test), `reference` (the inputs), `malformed` (inputs that must be refused).
 
 mod checks;
+mod context;
 mod deviation;
 mod malformed;
 mod reference;
@@ -26,8 +27,8 @@ pub use rule::{Rule, Verdict};
 pub use test::{Demands, InputScans, Prepare, Test};
 
 use checks::Examination;
+use context::Context;
 use reference::Reference;
-use test::Context;
 
 /// Why a program could not be tested.
 #[derive(Debug, Error)]

@@ -18,9 +18,10 @@ use gyre_messages::{Message, Pose, StageId, flag};
 
 use crate::{
     ConformanceError,
+    context::Context,
     reference::{POLL_PERIOD, Reference},
     rule::{Findings, Rule},
-    test::{Context, Demands, Test},
+    test::{Demands, Test},
 };
 
 /// The number of items under way at most.

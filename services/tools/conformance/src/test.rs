@@ -7,7 +7,7 @@ use gyre_messages::StageId;
 use gyre_radar::Dataset;
 use gyre_stage::{StageError, wake::Signals};
 
-use crate::{ConformanceError, reference::Reference};
+use crate::ConformanceError;
 
 /// Writes files into the root of a run.
 pub type Prepare = Box<dyn Fn(&Path) -> io::Result<()>>;
@@ -61,14 +61,6 @@ pub struct InputScans {
     pub dataset: Box<dyn Dataset>,
     /// The scans to play.
     pub played: Range<usize>,
-}
-
-/// The test with its inputs.
-#[derive(Clone, Copy)]
-pub(crate) struct Context<'a> {
-    pub test: &'a Test,
-    pub reference: &'a Reference,
-    pub signals: &'a Signals,
 }
 
 impl Test {

@@ -6,11 +6,13 @@
 //! writes the message anew, then sends it; a reader sleeps in `ppoll`, and has a message when it
 //! has read a byte of each of its cache lines.
 
+pub(crate) mod plan;
 mod reader;
 mod sender;
+mod sending;
 mod socket;
 
-use std::{fs, path::PathBuf};
+use std::fs;
 
 use gyre_latency::Durations;
 use serde::{Deserialize, Serialize};
@@ -23,6 +25,7 @@ use crate::{
     work::Work,
 };
 
+pub use plan::{HandOver, Medium};
 pub(crate) use reader::read;
 pub(crate) use sender::send;
 
@@ -38,28 +41,6 @@ const MOST: f64 = 10_000.0;
 /// The duration of a scenario that [`LEAST`] messages are for, s.
 const LEAST_S: f64 = 60.0;
 const READERS: [usize; 3] = [1, 4, 8];
-
-/// The medium of messages.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Medium {
-    /// Shared memory, without copying.
-    SharedMemory,
-    /// Unix stream sockets, by copying.
-    Sockets,
-}
-
-impl Medium {
-    const ALL: [Self; 2] = [Self::SharedMemory, Self::Sockets];
-
-    /// Returns its name.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::SharedMemory => "shared memory",
-            Self::Sockets => "sockets",
-        }
-    }
-}
 
 /// The cost of the hand-over of one kind of message to some readers.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -85,17 +66,6 @@ pub struct HandOverCost {
     pub shared_mb: f64,
     /// Messages that a reader has missed.
     pub missed: u64,
-}
-
-/// One hand-over, as its processes know it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct HandOver {
-    medium: Medium,
-    /// The folder that names the topic, or the socket.
-    place: PathBuf,
-    bytes: usize,
-    messages: u64,
-    readers: usize,
 }
 
 /// The result of the sender.
@@ -197,12 +167,6 @@ fn cost(kind: &MessageKind, plan: &HandOver, sent: &Sent, readings: &[Readings])
     }
 }
 
-impl HandOver {
-    fn socket(&self) -> PathBuf {
-        self.place.join("socket")
-    }
-}
-
 /// Own memory of this process, bytes.
 fn own_bytes() -> u64 {
     gyre_stage::usage::Usage::of(std::process::id()).map_or(0, |usage| usage.own_bytes)
@@ -216,6 +180,8 @@ fn cpu_ns() -> u64 {
 
 #[cfg(test)]
 mod tests {
+    use std::path::PathBuf;
+
     use super::*;
 
     const KIND: MessageKind = MessageKind {

@@ -112,8 +112,9 @@ pub struct Counters {
     pub wakes_caught_late: u64,
 }
 
-/// Starts a run, measures it, and ends it. Pipelines that are measured together have one ticket: the
-/// measurement begins when each has given up its share of it, after the warm-up or by a failure.
+/// Starts a run, measures it, and ends it. Pipelines that are measured together have one ticket:
+/// the measurement begins when each has given up its share of it, after the warm-up or by a
+/// failure.
 ///
 /// # Errors
 /// A run that makes no first poses; a helper that fails.

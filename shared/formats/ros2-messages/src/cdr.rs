@@ -54,8 +54,8 @@ pub fn encode<T: Ros2Message>(message: &T) -> Result<Vec<u8>, BadMessage> {
     Ok(bytes)
 }
 
-/// Returns the message in these bytes. What follows it is padding. It allocates no more than the bytes hold, whatever lengths they
-/// give.
+/// Returns the message in these bytes. What follows it is padding. It allocates no more than the
+/// bytes hold, whatever lengths they give.
 ///
 /// # Errors
 /// Bytes that are not CDR, or not of this type.

@@ -1,19 +1,22 @@
-//! Poses and motions in the plane as odometry and transforms.
+//! Poses, motions and maps in the plane as odometry, transforms and grids.
 //!
-//! Frames follow REP-105: `map` -> `odom` -> `base_link` -> `radar`. `odom` is the vehicle's frame at the first scan, and `map` is where
-//! loops have corrected it to be. All follow REP-103, as Gyre's own frames do, so that no axis is turned.
+//! Frames follow REP-105: `map` -> `odom` -> `base_link` -> `radar`. `odom` is the vehicle's frame
+//! at the first scan, and `map` is where loops have corrected it to be. All follow REP-103, as
+//! Gyre's own frames do, so that no axis is turned.
 
-use gyre_geometry::{Pose, Twist, UncertainMotion, xy_yaw};
-use nalgebra::{Matrix3, Rotation2};
+use gyre_geometry::{Pose, Twist, UncertainMotion, pose as planar, xy_yaw};
+use nalgebra::{Matrix3, Rotation2, Vector2};
 
 use crate::{
+    builtin_interfaces::Time,
     geometry_msgs::{self, Covariance, Point, Quaternion, Transform, TransformStamped, Vector3},
-    nav_msgs::Odometry,
+    nav_msgs::{MapMetaData, OccupancyGrid, Odometry},
     std_msgs::Header,
 };
 
-/// Variance of what a planar odometry does not measure: z, roll and pitch, and their velocities. So large that no filter uses it; zero
-/// would mean that they are known exactly. The value is that of ROS 2's `diff_drive_controller`.
+/// Variance of what a planar odometry does not measure: z, roll and pitch, and their velocities. So
+/// large that no filter uses it; zero would mean that they are known exactly. The value is that of
+/// ROS 2's `diff_drive_controller`.
 pub const UNKNOWN: f64 = 1e6;
 
 /// Where x, y and yaw are among x, y, z, roll, pitch and yaw.
@@ -47,7 +50,8 @@ impl Default for Frames {
 /// The motion that led to a pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
-    /// The motion from the previous scan, with the covariance of its (x, y, yaw) along the axes of the earlier frame.
+    /// The motion from the previous scan, with the covariance of its (x, y, yaw) along the axes of
+    /// the earlier frame.
     pub motion: UncertainMotion,
     /// The duration, ns.
     pub duration_ns: i64,
@@ -57,9 +61,10 @@ pub struct Interval {
 
 /// Returns a pose in the odometry frame, and the velocity with which it was reached, as odometry.
 ///
-/// The covariance of the pose is along the axes of `odom`, as `robot_localization` expects it. The velocity is that of
-/// constant motion since the previous scan, in the frame of the vehicle, with the covariance that follows from that of the motion. That
-/// of a predicted motion has the variance [`UNKNOWN`], since it is no measurement. Without a motion (at the first scan) the velocity is
+/// The covariance of the pose is along the axes of `odom`, as `robot_localization` expects it. The
+/// velocity is that of constant motion since the previous scan, in the frame of the vehicle, with
+/// the covariance that follows from that of the motion. That of a predicted motion has the variance
+/// [`UNKNOWN`], since it is no measurement. Without a motion (at the first scan) the velocity is
 /// zero, with the same variance.
 pub fn odometry(
     stamp_ns: i64,
@@ -86,7 +91,8 @@ pub fn odometry(
     odometry
 }
 
-/// Returns the covariance of (x, y, yaw) among those of ROS. [`UNKNOWN`] is the variance of all others; of all six without one.
+/// Returns the covariance of (x, y, yaw) among those of ROS. [`UNKNOWN`] is the variance of all
+/// others; of all six without one.
 pub fn covariance(planar: Option<&Matrix3<f64>>) -> Covariance {
     let mut covariance = Covariance::default();
     for value in 0..geometry_msgs::VALUES {
@@ -165,9 +171,31 @@ pub fn pose(pose: &Pose) -> geometry_msgs::Pose {
     }
 }
 
+/// Returns a map as a grid of `[columns, rows]` cells of `cell_m` metres, whose lowest x and y is
+/// `corner_m` and whose axes are those of `frame`.
+pub fn occupancy_grid(
+    stamp_ns: i64,
+    frame: &str,
+    cell_m: f64,
+    [columns, rows]: [usize; 2],
+    corner_m: Vector2<f64>,
+    data: Vec<u8>,
+) -> OccupancyGrid {
+    OccupancyGrid {
+        header: Header::new(stamp_ns, frame),
+        info: MapMetaData {
+            map_load_time: Time::from_ns(stamp_ns),
+            resolution: cell_m as f32,
+            width: columns as u32,
+            height: rows as u32,
+            origin: pose(&planar(corner_m.x, corner_m.y, 0.0)),
+        },
+        data,
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use gyre_geometry::pose as planar;
     use std::f64::consts::FRAC_PI_2;
 
     use super::*;
@@ -257,5 +285,17 @@ mod tests {
         assert_eq!(odometry.twist.twist, geometry_msgs::Twist::default());
         assert_eq!(odometry.twist.covariance, covariance(None));
         assert_eq!(odometry.pose.covariance.at(0, 0), 0.0);
+    }
+
+    #[test]
+    fn a_grid_lies_along_the_axes_of_its_frame() {
+        let corner_m = Vector2::new(-128.0, 0.0);
+        let grid = occupancy_grid(5_000_000_000, "map", 0.5, [2, 1], corner_m, vec![100, 255]);
+        assert_eq!((grid.info.width, grid.info.height), (2, 1));
+        assert_eq!(grid.info.resolution, 0.5);
+        let origin = grid.info.origin;
+        assert_eq!((origin.position.x, origin.position.y), (-128.0, 0.0));
+        assert_eq!((origin.orientation.z, origin.orientation.w), (0.0, 1.0));
+        assert_eq!((grid.header.stamp.sec, &*grid.header.frame_id), (5, "map"));
     }
 }

@@ -1,4 +1,5 @@
-//! `geometry_msgs`: poses, twists and transforms. Frames follow REP-103, lengths are in m, angles in rad.
+//! `geometry_msgs`: poses, twists and transforms. Frames follow REP-103, lengths are in m, angles
+//! in rad.
 
 use serde::{Deserialize, Serialize};
 

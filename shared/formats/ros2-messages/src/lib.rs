@@ -2,10 +2,12 @@
 //!
 //! Reading order:
 //! - [`Definition`]: names and fields of a type, and the text of its schema;
-//! - a module for each ROS package: [`nav_msgs`], [`tf2_msgs`], [`navtech_msgs`] and those that they consist of;
+//! - a module for each ROS package: [`nav_msgs`], [`tf2_msgs`], [`navtech_msgs`] and those that
+//!   they consist of;
 //! - [`encode`], [`decode`]: messages as CDR;
 //! - [`frames`]: poses and motions of Gyre as odometry and transforms;
-//! - [`radar`]: Navtech's messages as azimuths of [`gyre_colossus`], and scans as Navtech's messages.
+//! - [`radar`]: Navtech's messages as azimuths of [`gyre_colossus`], and scans as Navtech's
+//!   messages.
 
 pub mod builtin_interfaces;
 mod cdr;

@@ -1,4 +1,5 @@
-//! `messages`: the package of Navtech's driver until 2024, in which numbers are arrays of their bytes, most significant first.
+//! `messages`: the package of Navtech's driver until 2024, in which numbers are arrays of their
+//! bytes, most significant first.
 
 use serde::{Deserialize, Serialize};
 
@@ -39,7 +40,8 @@ message!(
     [Header]
 );
 
-/// The radar's description of itself; see [`RadarConfigurationMsg`](crate::navtech_msgs::RadarConfigurationMsg).
+/// The radar's description of itself; see
+/// [`RadarConfigurationMsg`](crate::navtech_msgs::RadarConfigurationMsg).
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RadarConfigurationMessage {
     /// The time at which the driver received it.

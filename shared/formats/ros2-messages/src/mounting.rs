@@ -6,7 +6,8 @@ use gyre_geometry::{Pose, UncertainMotion, pose};
 use nalgebra::{Matrix3, Vector2};
 use thiserror::Error;
 
-/// The pose of the radar in the frame of the vehicle. Written as `X,Y,YAW`: m forward, m to the left, degrees counter-clockwise.
+/// The pose of the radar in the frame of the vehicle. Written as `X,Y,YAW`: m forward, m to the
+/// left, degrees counter-clockwise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mounting(Pose);
 
@@ -44,13 +45,14 @@ impl Mounting {
         &self.0
     }
 
-    /// Returns the motion of the vehicle, in its own earlier frame, from that of the radar: `B M B^-1` with the radar's pose `B`.
+    /// Returns the motion of the vehicle, in its own earlier frame, from that of the radar:
+    /// `B M B^-1` with the radar's pose `B`.
     pub fn of_vehicle(&self, of_radar: &Pose) -> Pose {
         self.0 * of_radar * self.0.inverse()
     }
 
-    /// Returns the motion of the vehicle with its covariance: the displacement is turned by the mounting, and an error in yaw moves the
-    /// vehicle as far as the radar is from its origin.
+    /// Returns the motion of the vehicle with its covariance: the displacement is turned by the
+    /// mounting, and an error in yaw moves the vehicle as far as the radar is from its origin.
     pub fn of_vehicle_uncertain(&self, of_radar: &UncertainMotion) -> UncertainMotion {
         let motion = self.of_vehicle(&of_radar.motion);
         let at = self.0.translation.vector;

@@ -1,6 +1,7 @@
 //! `navtech_msgs`: what Navtech's driver publishes of a radar.
 //!
-//! Sources: `navtech_msgs` and the publishers `colossus_publisher` and `b_scan_extended_publisher` of Navtech's driver.
+//! Sources: `navtech_msgs` and the publishers `colossus_publisher` and `b_scan_extended_publisher`
+//! of Navtech's driver.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,13 +12,15 @@ use crate::{definition::message, sensor_msgs::Image, std_msgs::Header};
 pub struct RadarFftDataMsg {
     /// The time at which the driver received it.
     pub header: Header,
-    /// Not to be used: the driver divides by the number of azimuths, where it should divide by the encoder's counts.
+    /// Not to be used: the driver divides by the number of azimuths, where it should divide by the
+    /// encoder's counts.
     pub angle: f64,
     /// Encoder count of the antenna, clockwise from straight ahead.
     pub azimuth: u16,
     /// Number of the azimuth, incremented with each one; wraps.
     pub sweep_counter: u16,
-    /// Seconds of the radar's clock, as the radar sends them, whose byte order the driver does not change; 0 without a clock.
+    /// Seconds of the radar's clock, as the radar sends them, whose byte order the driver does not
+    /// change; 0 without a clock.
     pub ntp_seconds: u32,
     /// Nanoseconds or microseconds of the second, likewise.
     pub ntp_split_seconds: u32,
@@ -67,15 +70,17 @@ message!(
 
 /// The powers of one turn: the topic `radar_data/b_scan_msg`.
 ///
-/// The driver puts an azimuth into the row of its encoder count divided by the whole number of counts per azimuth, and leaves the rows
-/// that it does not reach at zero: encoder value, time and powers.
+/// The driver puts an azimuth into the row of its encoder count divided by the whole number of
+/// counts per azimuth, and leaves the rows that it does not reach at zero: encoder value, time and
+/// powers.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RadarBScanMsg {
     /// The powers, `8UC1`, a row for an azimuth; stamped with the time of row 199.
     pub b_scan_img: Image,
     /// Encoder count of each row.
     pub encoder_values: Vec<u16>,
-    /// Time of each row, ns of the radar's clock; the driver computes it in floating point, to 256 ns.
+    /// Time of each row, ns of the radar's clock; the driver computes it in floating point, to 256
+    /// ns.
     pub timestamps: Vec<u64>,
 }
 message!(

@@ -69,7 +69,8 @@ fn messages_come_back() {
     });
 }
 
-/// The bytes of a message with an empty frame, counted by hand: CDR aligns numbers to their size, from behind the first four bytes.
+/// The bytes of a message with an empty frame, counted by hand: CDR aligns numbers to their size,
+/// from behind the first four bytes.
 #[test]
 fn numbers_are_aligned_from_behind_the_encapsulation() {
     let message = RadarFftDataMsg {

@@ -21,14 +21,17 @@ use crate::{
 const IN_MEMORY: usize = 256;
 /// A keyframe is drawn anew when it moves a place that it sees by more than this share of a cell.
 const MOVED_CELLS: f64 = 0.3;
-/// Looks from nearby by which evidence is held back: what was looked at once or twice is not yet certain.
+/// Looks from nearby by which evidence is held back: what was looked at once or twice is not yet
+/// certain.
 const PRIOR: f64 = 1.0;
 /// Looks from nearby of a cell that is well known.
 const WELL_KNOWN: f64 = 8.0;
 
-/// The evidence of keyframes at their poses about the cells of a map: how often each returned power of how often it was looked at.
+/// The evidence of keyframes at their poses about the cells of a map: how often each returned power
+/// of how often it was looked at.
 ///
-/// It is the same whatever the order in which keyframes were drawn, and wherever they were drawn before.
+/// It is the same whatever the order in which keyframes were drawn, and wherever they were drawn
+/// before.
 ///
 /// Memory: 70 MB of tiles, and a pose a keyframe; more tiles lie in a file without a name.
 pub struct Evidence {
@@ -50,7 +53,8 @@ enum Change {
 }
 
 impl Change {
-    /// Sums do not overflow for fewer looks at one cell than 200,000; an erased keyframe takes away what it has added.
+    /// Sums do not overflow for fewer looks at one cell than 200,000; an erased keyframe takes away
+    /// what it has added.
     fn apply(self, sum: &mut u32, amount: u32) {
         *sum = match self {
             Self::Draw => sum.wrapping_add(amount),
@@ -60,8 +64,8 @@ impl Change {
 }
 
 impl Evidence {
-    /// Starts without any. Tiles that do not fit into memory lie in a file in `folder`, which has no name and does not outlive the
-    /// process.
+    /// Starts without any. Tiles that do not fit into memory lie in a file in `folder`, which has
+    /// no name and does not outlive the process.
     ///
     /// # Errors
     /// An option that is out of bounds.
@@ -92,13 +96,14 @@ impl Evidence {
         self.store.tiles().collect()
     }
 
-    /// Returns the tiles that have changed since the last call, also those that are no more, in rising order.
+    /// Returns the tiles that have changed since the last call, also those that are no more, in
+    /// rising order.
     pub fn take_changed(&mut self) -> BTreeSet<TileIndex> {
         std::mem::take(&mut self.changed)
     }
 
-    /// Returns whether a keyframe that is at `pose` (in the map frame) ought to be drawn: it is not yet, or at a pose by which
-    /// something that it sees is off by more than 0.3 cells.
+    /// Returns whether a keyframe that is at `pose` (in the map frame) ought to be drawn: it is not
+    /// yet, or at a pose by which something that it sees is off by more than 0.3 cells.
     pub fn has_moved(&self, seq: u64, pose: &Pose) -> bool {
         let limit_m = MOVED_CELLS * self.options.cell_m;
         self.drawn.get(&seq).is_none_or(|drawn| {
@@ -108,7 +113,8 @@ impl Evidence {
         })
     }
 
-    /// Draws a keyframe at `pose` in the map frame. If it is drawn already, it is taken out there first.
+    /// Draws a keyframe at `pose` in the map frame. If it is drawn already, it is taken out there
+    /// first.
     ///
     /// # Errors
     /// The file of the tiles cannot be read or written.

@@ -6,6 +6,6 @@ mod pgm;
 mod web;
 
 pub use geotiff::write_geotiff;
-pub use grid::grid;
+pub use grid::{Grid, grid};
 pub use pgm::write_pgm;
 pub use web::write_web_tiles;

@@ -49,8 +49,9 @@ pub struct Map {
     tiles: BTreeSet<TileIndex>,
 }
 
-/// Writes a map into `folder`: `tiles/X_Y.png` (grey: evidence, opacity: how often it was looked at; see [`Cell`]), then `map.toml`, without
-/// which the folder is not a map. A map that is there is replaced. It survives a power failure when this returns.
+/// Writes a map into `folder`: `tiles/X_Y.png` (grey: evidence, opacity: how often it was looked
+/// at; see [`Cell`]), then `map.toml`, without which the folder is not a map. A map that is there
+/// is replaced. It survives a power failure when this returns.
 ///
 /// # Errors
 /// A folder that cannot be written, or has other content than a map.

@@ -2,7 +2,8 @@
 
 use crate::Cell;
 
-/// A cell is known if it was looked at half a time from nearby, and occupied if it returned a sixteenth of the power it might have.
+/// A cell is known if it was looked at half a time from nearby, and occupied if it returned a
+/// sixteenth of the power it might have.
 const KNOWN_LOOKED: u8 = 16;
 const OCCUPIED_EVIDENCE: u8 = 64;
 

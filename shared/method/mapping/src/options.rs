@@ -15,7 +15,8 @@ pub struct MapOptions {
     pub reach_m: f64,
     /// Range at which a view weighs half as much as one from nearby, m.
     pub half_weight_m: f64,
-    /// Standard deviation of the bearing of a return, degrees: a return is spread along its arc by so much.
+    /// Standard deviation of the bearing of a return, degrees: a return is spread along its arc by
+    /// so much.
     pub bearing_deg: f64,
 }
 

@@ -16,7 +16,8 @@ const LOOPS: Colour = [236, 40, 132];
 const START: Colour = [120, 230, 130];
 const TEXT: Colour = [220, 224, 232];
 
-/// Loops have a pale rim wider than the trajectory, under which many lie: they join places of one lane.
+/// Loops have a pale rim wider than the trajectory, under which many lie: they join places of one
+/// lane.
 const LOOPS_RIM: Pen = Pen {
     colour: LOOPS,
     width: 5.0,
@@ -24,7 +25,8 @@ const LOOPS_RIM: Pen = Pen {
 };
 /// Side of a picture that is legible at once, px.
 const LEGIBLE_SIDE: f64 = 2048.0;
-/// Side of the largest cells that are chosen for a picture, m: larger pixels are made of several cells.
+/// Side of the largest cells that are chosen for a picture, m: larger pixels are made of several
+/// cells.
 const MAX_CELL_M: f64 = 3.2;
 
 /// The overlay drawn over a map, all in the map frame.
@@ -38,8 +40,8 @@ pub struct Overlay<'a> {
     pub loops: &'a [[Point2<f64>; 2]],
 }
 
-/// Returns options with the smallest cells, doubled from the default ones, of which a picture of the map around `poses` has at most 2,048 a
-/// side; none are larger than 3.2 m.
+/// Returns options with the smallest cells, doubled from the default ones, of which a picture of
+/// the map around `poses` has at most 2,048 a side; none are larger than 3.2 m.
 pub fn legible(options: MapOptions, poses: &[Pose]) -> MapOptions {
     let finite = || {
         let places = poses.iter().map(|pose| pose.translation.vector);
@@ -55,8 +57,9 @@ pub fn legible(options: MapOptions, poses: &[Pose]) -> MapOptions {
     MapOptions { cell_m, ..options }
 }
 
-/// Returns the picture of a map as a PNG file: at most 4,096 pixels a side and a footer, x to the right, with the start and its heading, a
-/// scale bar with the metres of a pixel, and a legend. Memory: 250 MB at most.
+/// Returns the picture of a map as a PNG file: at most 4,096 pixels a side and a footer, x to the
+/// right, with the start and its heading, a scale bar with the metres of a pixel, and a legend.
+/// Memory: 250 MB at most.
 ///
 /// # Errors
 /// A tile that cannot be read, and a map that is empty or wider than a million cells.

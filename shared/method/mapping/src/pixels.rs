@@ -23,7 +23,8 @@ pub fn encode(width: usize, color: ColorType, pixels: &[u8]) -> Result<Vec<u8>, 
     Ok(bytes)
 }
 
-/// Unites a block of cells: evidence half way between the mean and the highest, so that thin walls stay visible, and the mean look.
+/// Unites a block of cells: evidence half way between the mean and the highest, so that thin walls
+/// stay visible, and the mean look.
 pub fn unite(cells: impl Iterator<Item = Cell> + Clone) -> Cell {
     let count = cells.clone().count().max(1) as u32;
     let sum = |value: fn(Cell) -> u8| {
@@ -49,7 +50,8 @@ const STRONG: [f32; 3] = [255.0, 236.0, 190.0];
 const WEAK_EVIDENCE: f32 = 45.0;
 const STRONG_EVIDENCE: f32 = 100.0;
 
-/// Steps of evidence and of looks that the eye does not tell apart: a picture without them is half as large.
+/// Steps of evidence and of looks that the eye does not tell apart: a picture without them is half
+/// as large.
 const EVIDENCE_STEP: u8 = 4;
 const LOOKED_STEP: u8 = 15;
 

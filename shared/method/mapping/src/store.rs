@@ -11,7 +11,8 @@ use gyre_storage::StorageError;
 
 use crate::tile::{CELLS, TILE_CELLS, TileIndex};
 
-/// Cells per side of a block: how often it was looked at varies slowly, and is kept for a block rather than a cell.
+/// Cells per side of a block: how often it was looked at varies slowly, and is kept for a block
+/// rather than a cell.
 pub const BLOCK: usize = 4;
 /// Blocks per side of a tile.
 pub const BLOCKS: usize = TILE_CELLS / BLOCK;
@@ -20,7 +21,8 @@ pub const ONE: u32 = 1 << 14;
 
 /// The evidence about the cells of a tile, in units of [`ONE`].
 ///
-/// Integers, so that a keyframe is taken out again without a trace, and sums do not depend on their order.
+/// Integers, so that a keyframe is taken out again without a trace, and sums do not depend on their
+/// order.
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Tile {
@@ -43,7 +45,8 @@ struct Entry {
     slot: Option<u64>,
 }
 
-/// The tiles that keyframes look at. Those not used for longest lie in a file without a name, which no kill leaves behind.
+/// The tiles that keyframes look at. Those not used for longest lie in a file without a name, which
+/// no kill leaves behind.
 pub struct TileStore {
     entries: BTreeMap<TileIndex, Entry>,
     folder: PathBuf,

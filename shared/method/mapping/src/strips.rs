@@ -22,7 +22,8 @@ pub fn extent(source: &impl TileSource, form: &'static str) -> Result<TileExtent
     }
 }
 
-/// Calls `take` with the cells of each row of tiles, that of the highest y first, as rows of the whole width.
+/// Calls `take` with the cells of each row of tiles, that of the highest y first, as rows of the
+/// whole width.
 ///
 /// # Errors
 /// A tile that cannot be read, and those of `take`.

@@ -10,7 +10,8 @@ pub const TILE_CELLS: usize = 256;
 /// The number of cells of a tile.
 pub(crate) const CELLS: usize = TILE_CELLS * TILE_CELLS;
 
-/// A tile's place: tile (0, 0) has its corner of lowest x and y at the origin of the map frame. It is written as `X_Y`.
+/// A tile's place: tile (0, 0) has its corner of lowest x and y at the origin of the map frame. It
+/// is written as `X_Y`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct TileIndex {
     /// Number of the tile along x, from 0 at the origin.
@@ -31,7 +32,8 @@ impl TileIndex {
         [self.x, self.y].map(|index| i64::from(index) * TILE_CELLS as i64)
     }
 
-    /// Returns the tiles of the square that reaches `reach_m` to each side of `centre`, in rising order.
+    /// Returns the tiles of the square that reaches `reach_m` to each side of `centre`, in rising
+    /// order.
     pub(crate) fn around(
         centre: &Point2<f64>,
         reach_m: f64,
@@ -52,7 +54,8 @@ fn span(at_m: f64, reach_m: f64, cell_m: f64) -> RangeInclusive<i32> {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Cell {
-    /// The share of looks at which the cell returned power: the square root of that share, from 0 (never) to 255.
+    /// The share of looks at which the cell returned power: the square root of that share, from 0
+    /// (never) to 255.
     pub evidence: u8,
     /// Number of looks, from 0 (never) to 255 (8 times from nearby, or oftener).
     pub looked: u8,

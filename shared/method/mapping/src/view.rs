@@ -10,18 +10,20 @@ use crate::MapOptions;
 
 /// Sectors of one degree.
 const SECTORS: usize = 360;
-/// Sectors to either side that a return speaks for: a return hides weaker ones at its range within the beam, so that not every
-/// azimuth has points of a wall that all of them see.
+/// Sectors to either side that a return speaks for: a return hides weaker ones at its range within
+/// the beam, so that not every azimuth has points of a wall that all of them see.
 const BEAM_SECTORS: usize = 3;
-/// A wall returns as much in a cell of this side as it can. Of what it returns, a cell has a share in proportion to its side, m.
+/// A wall returns as much in a cell of this side as it can. Of what it returns, a cell has a share
+/// in proportion to its side, m.
 const FULL_CELL_M: f64 = 0.2;
 /// A return is spread along its arc over so many standard deviations to either side.
 const SPREAD_SIGMAS: f64 = 2.0;
 
 /// The free space and the returns of a keyframe, in its own frame.
 ///
-/// A radar sees past and over things, and where nothing returns power it may have looked at open ground, or at nothing for a hill
-/// or a truck. So a sector was looked at as far as its farthest return.
+/// A radar sees past and over things, and where nothing returns power it may have looked at open
+/// ground, or at nothing for a hill or a truck. So a sector was looked at as far as its farthest
+/// return.
 pub struct View {
     options: MapOptions,
     points: Submap,

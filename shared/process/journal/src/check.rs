@@ -15,9 +15,10 @@ const LAST: usize = 8 * GroupSync::LIMIT as usize;
 pub struct Content {
     /// Number of poses.
     pub poses: u64,
-    /// Whether the end of the stream follows them.
+    /// True if the end of the stream follows them.
     pub ended: bool,
-    /// Records at the end that are not whole, or not known to be in order: to be cut off by [`cut`].
+    /// Records at the end that are not whole, or not known to be in order: to be cut off by
+    /// [`cut`].
     pub torn: u64,
     /// The last poses, oldest first; not all of them in a long journal.
     pub last: VecDeque<PoseHeader>,
@@ -25,9 +26,10 @@ pub struct Content {
 
 /// Reads a whole journal, in bounded memory, and finds out what of it is valid.
 ///
-/// A record that is not valid is one of two things. If no later record knows that it was on the disk, and there are no more of them than
-/// can have been in danger, it is what a death or a power failure leaves, and it is cut off with all that follows: those poses are
-/// computed anew. Else the file was damaged after it had been written.
+/// A record that is not valid is one of two things. If no later record knows that it was on the
+/// disk, and there are no more of them than can have been in danger, it is what a death or a power
+/// failure leaves, and it is cut off with all that follows: those poses are computed anew. Else the
+/// file was damaged after it had been written.
 ///
 /// # Errors
 /// [`JournalError::Damaged`], a file that cannot be read or is not a journal.

@@ -1,13 +1,15 @@
 //! The checkpoint: a file with the state of the refinement, from which a restarted process resumes.
 //!
-//! A local map has no finite look-back, since the keyframes of a stationary vehicle can be arbitrarily old. So the state after
-//! each item is written before its motion is published, and a restart restores the state before its first item. The file
-//! consists of two rings of fixed-size slots, one of states and one of keyframes, long enough for any restart; it does not grow.
+//! A local map has no finite look-back, since the keyframes of a stationary vehicle can be
+//! arbitrarily old. So the state after each item is written before its motion is published, and a
+//! restart restores the state before its first item. The file consists of two rings of fixed-size
+//! slots, one of states and one of keyframes, long enough for any restart; it does not grow.
 //! Checksums detect slots that were cut short by a death; their items had not been published.
 //!
-//! A thread synchronises the file about once a second. After a power failure any part of what was written since may be there or
-//! not. So a state names its keyframes by their content, and the motion that it led to: [`Checkpoint::newest_known`] finds the last pose of a
-//! journal whose state is whole, and the run goes on from there.
+//! A thread synchronises the file about once a second. After a power failure any part of what was
+//! written since may be there or not. So a state names its keyframes by their content, and the
+//! motion that it led to: [`Checkpoint::newest_known`] finds the last pose of a journal whose state
+//! is whole, and the run goes on from there.
 
 mod codec;
 #[cfg(test)]
@@ -30,15 +32,17 @@ use codec::{
 
 /// The start of the file, with the version of the slots.
 const MAGIC: [u8; 16] = *b"gyre map v3     ";
-/// The largest window. The layout of the file is the same for all windows, so a run can be continued with another one.
+/// The largest window. The layout of the file is the same for all windows, so a run can be
+/// continued with another one.
 const MAX_WINDOW: usize = 66;
 /// Number of states in the ring.
 const STATES: usize = look_back(MAX_WINDOW);
-/// Bytes of the file's header: the start, the numbers of slots of both rings, the sizes of a state's and a keyframe's slot.
+/// Bytes of the file's header: the start, the numbers of slots of both rings, the sizes of a
+/// state's and a keyframe's slot.
 const HEADER_BYTES: usize = 16 + 4 * 8;
 
-/// Number of items that a restart can go back, from the newest state: by two windows after a death, and by what was not yet
-/// synchronised after a power failure.
+/// Number of items that a restart can go back, from the newest state: by two windows after a death,
+/// and by what was not yet synchronised after a power failure.
 const fn look_back(window: usize) -> usize {
     const HEADROOM: usize = 8;
     2 * window + GroupSync::LIMIT as usize + HEADROOM
@@ -74,7 +78,8 @@ pub struct Checkpoint {
     kept: usize,
     /// The keyframe in each slot; `None` for an empty slot.
     keyframes: Vec<Option<Name>>,
-    /// The keyframes of the last state that was written or restored, oldest first, and those of the state before it.
+    /// The keyframes of the last state that was written or restored, oldest first, and those of the
+    /// state before it.
     map: Vec<Name>,
     earlier_map: Vec<Name>,
     buffers: Buffers,
@@ -154,7 +159,8 @@ impl Layout {
 }
 
 impl Checkpoint {
-    /// Opens or creates a checkpoint for runs with this window and maps of at most `max_keyframes` keyframes of `cells` cells.
+    /// Opens or creates a checkpoint for runs with this window and maps of at most `max_keyframes`
+    /// keyframes of `cells` cells.
     ///
     /// # Errors
     /// A file that cannot be read or written, or to which another process writes.
@@ -198,9 +204,10 @@ impl Checkpoint {
         Ok(())
     }
 
-    /// Writes the state after `item`, which led to a motion with this checksum: first the new keyframes, then the state that names
-    /// them. If the file has this state already, the process repeats items after a restart, and it is left: later states may still
-    /// be needed. If it has another state, all later ones are obsolete.
+    /// Writes the state after `item`, which led to a motion with this checksum: first the new
+    /// keyframes, then the state that names them. If the file has this state already, the process
+    /// repeats items after a restart, and it is left: later states may still be needed. If it has
+    /// another state, all later ones are obsolete.
     ///
     /// # Errors
     /// A file that cannot be written or synchronised.
@@ -291,7 +298,8 @@ impl Checkpoint {
         empty.or_else(oldest).unwrap_or(0)
     }
 
-    /// Reads the state after `item` and the names of its keyframes; `None` if the file does not have it whole.
+    /// Reads the state after `item` and the names of its keyframes; `None` if the file does not
+    /// have it whole.
     fn read_state(
         &mut self,
         item: u64,
@@ -345,7 +353,8 @@ impl Checkpoint {
         Ok(led_to_it && self.map.iter().all(|name| self.place_of(*name).is_some()))
     }
 
-    /// Returns the newest of these poses, given newest first, from which a run can go on: the one whose whole state is in the file.
+    /// Returns the newest of these poses, given newest first, from which a run can go on: the one
+    /// whose whole state is in the file.
     ///
     /// # Errors
     /// A file that cannot be read.

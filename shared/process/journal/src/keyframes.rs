@@ -43,8 +43,9 @@ pub struct Keyframes {
 }
 
 impl Keyframes {
-    /// Opens or creates the log of the run that writes to `out`, whose journal has `poses` poses, and perhaps the end of the stream.
-    /// Keyframes beyond them are cut off, and the motion since the last one is recovered from the journal.
+    /// Opens or creates the log of the run that writes to `out`, whose journal has `poses` poses,
+    /// and perhaps the end of the stream. Keyframes beyond them are cut off, and the motion since
+    /// the last one is recovered from the journal.
     ///
     /// # Errors
     /// A file that cannot be used, or a pose without its keyframe.
@@ -79,8 +80,8 @@ impl Keyframes {
         self.log.reserve(Keyframe::encoded_len(points));
     }
 
-    /// Takes the next pose, before it is journalled. If it becomes a keyframe, that is appended with the scan's points. Returns whether
-    /// it does.
+    /// Takes the next pose, before it is journalled. If it becomes a keyframe, that is appended
+    /// with the scan's points. Returns whether it does.
     ///
     /// # Errors
     /// A file that cannot be written or synchronised.
@@ -101,7 +102,8 @@ impl Keyframes {
         Ok(true)
     }
 
-    /// Says that the stream has ended, before that is journalled. All keyframes survive a power failure when this returns.
+    /// Says that the stream has ended, before that is journalled. All keyframes survive a power
+    /// failure when this returns.
     ///
     /// # Errors
     /// A file that cannot be written or synchronised.
@@ -110,8 +112,8 @@ impl Keyframes {
     }
 }
 
-/// Returns how many of the first `poses` poses of the journal have all their keyframes. After a death all of them have; a power
-/// failure can take the last keyframes. Changes nothing.
+/// Returns how many of the first `poses` poses of the journal have all their keyframes. After a
+/// death all of them have; a power failure can take the last keyframes. Changes nothing.
 ///
 /// # Errors
 /// A file that cannot be read or is damaged.
@@ -154,7 +156,8 @@ fn find(
     })
 }
 
-/// Takes the poses of the journal since the last keyframe again. Returns the first one that lacks its keyframe, if there is one.
+/// Takes the poses of the journal since the last keyframe again. Returns the first one that lacks
+/// its keyframe, if there is one.
 fn recover(
     out: &Path,
     options: &PlaceOptions,

@@ -1,10 +1,11 @@
-//! The files that a run goes on from after a death or a power failure: the journal of its poses; with SLAM its [`keyframes`]; and the
-//! [`checkpoint`] of its refinement.
+//! The files that a run goes on from after a death or a power failure: the journal of its poses;
+//! with SLAM its [`keyframes`]; and the [`checkpoint`] of its refinement.
 //!
-//! The journal is a file of poses, each with its motion and a checksum, from which all results of a run are made.
-//! Each record is one `write`, before its pose is published. A record that is cut short by a death is found by its checksum; its
-//! pose had not been published. A thread synchronises the file about once a second, so a power failure takes the poses of
-//! the last second: what is left of them is found by [`check`] and cut off, and they are computed anew.
+//! The journal is a file of poses, each with its motion and a checksum, from which all results of a
+//! run are made. Each record is one `write`, before its pose is published. A record that is cut
+//! short by a death is found by its checksum; its pose had not been published. A thread
+//! synchronises the file about once a second, so a power failure takes the poses of the last
+//! second: what is left of them is found by [`check`] and cut off, and they are computed anew.
 
 mod check;
 pub mod checkpoint;
@@ -74,7 +75,8 @@ const RECORDS: Slots = Slots {
 };
 
 impl Journal {
-    /// Opens or creates a journal and cuts off an incomplete record at its end. Only the end is read, however long it is.
+    /// Opens or creates a journal and cuts off an incomplete record at its end. Only the end is
+    /// read, however long it is.
     ///
     /// # Errors
     /// A file that cannot be read or written, is not a journal, or to which another process writes.
@@ -104,7 +106,8 @@ impl Journal {
         })
     }
 
-    /// Returns the last poses, at most `count`, oldest first, and whether the end of the stream follows them.
+    /// Returns the last poses, at most `count`, oldest first, and whether the end of the stream
+    /// follows them.
     ///
     /// # Errors
     /// A file that cannot be read, or a damaged record.

@@ -4,7 +4,8 @@ use gyre_messages::PoseHeader;
 use gyre_storage::Checksum;
 
 const POSE: usize = size_of::<PoseHeader>();
-/// Bytes of a record: the pose, the number of records before it that were in danger, and a checksum of both.
+/// Bytes of a record: the pose, the number of records before it that were in danger, and a checksum
+/// of both.
 pub(crate) const RECORD: usize = POSE + 8;
 const CHECK: usize = POSE + 4;
 
@@ -12,7 +13,8 @@ const CHECK: usize = POSE + 4;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Record {
     pub pose: PoseHeader,
-    /// Number of records before it that were not known to be on the disk when it was written. All earlier ones were.
+    /// Number of records before it that were not known to be on the disk when it was written. All
+    /// earlier ones were.
     pub in_danger: u32,
 }
 
@@ -23,7 +25,8 @@ impl Record {
         Checksum::Last.seal(bytes);
     }
 
-    /// Decodes the record number `index`. Records are numbered as their items are, so that one in a wrong place is not valid.
+    /// Decodes the record number `index`. Records are numbered as their items are, so that one in a
+    /// wrong place is not valid.
     pub fn decode(bytes: &[u8], index: u64) -> Option<Self> {
         let record = Self {
             pose: bytemuck::pod_read_unaligned(bytes.get(..POSE)?),

@@ -31,7 +31,7 @@ pub(crate) struct Places {
     bytes: Box<[u8; RECORD]>,
     /// Number of the next place.
     pub next: u64,
-    /// Whether the header is whole.
+    /// True if the header is whole.
     pub has_header: bool,
 }
 
@@ -112,7 +112,8 @@ impl Places {
         }
     }
 
-    /// Reads the next place: its record, or `None` if it is not valid. Ends at the last complete place.
+    /// Reads the next place: its record, or `None` if it is not valid. Ends at the last complete
+    /// place.
     pub fn read(&mut self) -> Option<Result<Option<Record>, JournalError>> {
         match self.reader.read_exact(&mut self.bytes[..]) {
             Ok(()) => {

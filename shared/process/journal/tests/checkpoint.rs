@@ -1,4 +1,5 @@
-//! A run resumes from its published items bit for bit after the death of the process or damage to the newest slots.
+//! A run resumes from its published items bit for bit after the death of the process or damage to
+//! the newest slots.
 #![allow(clippy::unwrap_used)]
 
 use std::{fs, path::Path};
@@ -127,7 +128,8 @@ fn state_bits(refinement: &Refiner) -> Vec<u64> {
     words
 }
 
-/// The states after the items 0, 1, ... of one process; the state is empty after item 0, where the chain starts.
+/// The states after the items 0, 1, ... of one process; the state is empty after item 0, where the
+/// chain starts.
 fn history(world: u64, items: u64) -> Vec<Vec<u64>> {
     let mut refinement = refinement();
     let mut history = vec![state_bits(&refinement)];
@@ -424,8 +426,8 @@ fn a_state_that_lacks_a_keyframe_is_not_known_and_is_completed_when_its_item_is_
     assert_eq!(restored(&path, 29).unwrap(), history[29]);
 }
 
-/// A map can start anew with a scan that is a keyframe of the map before. Killed after the first of its two writes, a process
-/// must find the earlier map whole.
+/// A map can start anew with a scan that is a keyframe of the map before. Killed after the first of
+/// its two writes, a process must find the earlier map whole.
 #[test]
 fn a_keyframe_does_not_replace_another_one_of_the_same_scan() {
     let (_folder, path) = checkpoint_of(30);

@@ -30,7 +30,8 @@ impl Durations {
         self.0.as_ref().map_or(0, Histogram::len)
     }
 
-    /// Returns the duration, ns, that this share (0 to 1) of all does not exceed; `None` if there is no duration.
+    /// Returns the duration, ns, that this share (0 to 1) of all does not exceed; `None` if there
+    /// is no duration.
     pub fn at(&self, share: f64) -> Option<u64> {
         let histogram = self.0.as_ref()?;
         Some(histogram.value_at_quantile(share))

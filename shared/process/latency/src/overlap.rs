@@ -4,8 +4,8 @@ use std::{cmp::Reverse, collections::BinaryHeap};
 
 use gyre_messages::{Hop, Hops};
 
-/// Starts (+1) and ends (-1) of work in the order of time. What is earlier than the first work on the newest scan is final, so
-/// only the scans in flight are kept.
+/// Starts (+1) and ends (-1) of work in the order of time. What is earlier than the first work on
+/// the newest scan is final, so only the scans in flight are kept.
 #[derive(Debug, Default)]
 pub struct Overlap {
     edges: BinaryHeap<Reverse<(i64, i32)>>,

@@ -1,6 +1,8 @@
-//! Payload elements: blocks of 64 bytes, so that every payload starts on a cache line and is aligned for any vector unit.
+//! Payload elements: blocks of 64 bytes, so that every payload starts on a cache line and is
+//! aligned for any vector unit.
 //!
-//! The element type carries the alignment, because the transport multiplies the memory of an aligned slice of bytes by the alignment.
+//! The element type carries the alignment, because the transport multiplies the memory of an
+//! aligned slice of bytes by the alignment.
 
 use bytemuck::{Pod, Zeroable};
 

@@ -89,8 +89,8 @@ mod tests {
     /// The start of the sentence that refuses a header, and how to make it such.
     type Change<'a, H> = (&'a str, &'a dyn Fn(&mut H));
 
-    /// Asserts that a header is accepted, that each of the changes makes it refused for its field, and that the end of the stream
-    /// needs no content.
+    /// Asserts that a header is accepted, that each of the changes makes it refused for its field,
+    /// and that the end of the stream needs no content.
     fn each_is_refused<M: Message>(
         header: M::Header,
         payload: &[M::Element],

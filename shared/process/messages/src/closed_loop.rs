@@ -38,7 +38,8 @@ header!(LoopHeader, "gyre_loop_header_v1");
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct LoopHeader {
-    /// `seq` counts the loops, from 0. `scan` is the later keyframe's and `previous_scan` the earlier one's.
+    /// `seq` counts the loops, from 0. `scan` is the later keyframe's and `previous_scan` the
+    /// earlier one's.
     pub item: Item,
     /// Number of the later keyframe's scan in the run.
     pub later_seq: u64,

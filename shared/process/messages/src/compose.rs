@@ -4,8 +4,9 @@ use gyre_geometry::{covariance, xy_yaw};
 
 use crate::{MotionHeader, PoseHeader};
 
-/// Composes the previous pose (the origin without one) and a motion (zero at the start of a chain) to the next pose. The covariance
-/// is propagated to first order (Checchin et al., Eqs. 1 and 2), but the noise of a scan's registration does not accumulate: see
+/// Composes the previous pose (the origin without one) and a motion (zero at the start of a chain)
+/// to the next pose. The covariance is propagated to first order (Checchin et al., Eqs. 1 and 2),
+/// but the noise of a scan's registration does not accumulate: see
 /// [`ComposedMotion`](gyre_geometry::ComposedMotion).
 pub fn compose(previous: Option<&PoseHeader>, motion: &MotionHeader) -> PoseHeader {
     let start = PoseHeader::default();
@@ -53,7 +54,7 @@ mod tests {
         assert!(near(end.covariance[0], 5.0) && near(end.covariance[3], 5.0));
     }
 
-    /// What `Odometry` does in one process, to the bit.
+    /// Compares with `Odometry` in one process, to the bit.
     #[test]
     fn poses_are_those_of_motions_composed_without_messages() {
         let mut header: Option<PoseHeader> = None;

@@ -13,8 +13,8 @@ use crate::{
     pose::MAX_DISTANCE_M,
 };
 
-/// The transform that corrects poses of the odometry. Odometry is continuous and drifts; the correction jumps when a loop is closed
-/// (REP-105: the transform from `map` to `odom`).
+/// The transform that corrects poses of the odometry. Odometry is continuous and drifts; the
+/// correction jumps when a loop is closed (REP-105: the transform from `map` to `odom`).
 #[derive(Debug)]
 pub enum Correction {}
 
@@ -40,7 +40,8 @@ header!(CorrectionHeader, "gyre_correction_header_v1");
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct CorrectionHeader {
-    /// `seq` counts what was read of the logs so far, from 0; their ends count as one. `scan` and the times are the newest keyframe's.
+    /// `seq` counts what was read of the logs so far, from 0; their ends count as one. `scan` and
+    /// the times are the newest keyframe's.
     pub item: Item,
     /// Number of the newest keyframe's scan in the run.
     pub keyframe_seq: u64,
@@ -54,7 +55,8 @@ pub struct CorrectionHeader {
     pub y_m: f64,
     /// Counter-clockwise, rad, in (-pi, pi].
     pub yaw_rad: f64,
-    /// Covariance of (x, y, yaw) of the newest keyframe's pose in the map frame, not scaled by residuals: see [`covariance::Packed`].
+    /// Covariance of (x, y, yaw) of the newest keyframe's pose in the map frame, not scaled by
+    /// residuals: see [`covariance::Packed`].
     pub keyframe_covariance: covariance::Packed,
 }
 
@@ -70,8 +72,8 @@ impl CorrectionHeader {
         require(self.keyframes > 0, "keyframes", self.keyframes, "1 or more")
     }
 
-    /// Returns the transform from the odometry frame to the map frame: applied to a pose of the odometry, it gives the pose in the
-    /// map.
+    /// Returns the transform from the odometry frame to the map frame: applied to a pose of the
+    /// odometry, it gives the pose in the map.
     pub fn map_from_odometry(&self) -> PlanarPose {
         pose(self.x_m, self.y_m, self.yaw_rad)
     }

@@ -55,7 +55,7 @@ pub struct FixHeader {
     pub item: Item,
     /// Number of the keyframe's scan in the run.
     pub keyframe_seq: u64,
-    /// What is known: see [`fix_status`].
+    /// The state of the localisation: see [`fix_status`].
     pub status: u64,
     /// The sensor's number of the map's nearest keyframe.
     pub place: u64,

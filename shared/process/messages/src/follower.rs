@@ -2,8 +2,8 @@
 
 use crate::limits::Window;
 
-/// The followers of a run with SLAM. They read durable logs at their own pace and are not in the stream of scans, so they have no
-/// [`Hop`](crate::Hop) and give no credit.
+/// The followers of a run with SLAM. They read durable logs at their own pace and are not in the
+/// stream of scans, so they have no [`Hop`](crate::Hop) and give no credit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum FollowerId {
     /// Finds loops between keyframes.

@@ -10,8 +10,8 @@ pub mod flag {
     pub const END: u32 = 1;
     /// The chain of motions starts here: there is no previous scan to match against.
     pub const BREAK: u32 = 2;
-    /// On `pose`: the newest pose of the trajectory. After a restart the last poses are published again, and only the
-    /// newest of them has this flag.
+    /// On `pose`: the newest pose of the trajectory. After a restart the last poses are published
+    /// again, and only the newest of them has this flag.
     pub const SYNC: u32 = 4;
     /// On `pose`: the trajectory is empty, and the stream begins with the first scan.
     pub const BASE: u32 = 8;
@@ -20,8 +20,9 @@ pub mod flag {
     pub(crate) const ALL: u32 = END | BREAK | SYNC | BASE;
 }
 
-/// The stages of a pipeline in the order of the stream; a stage's value is the index of its [`Hop`]. A run has either the two
-/// decoupled searches or the joint one, and may lack refinement; the hops of missing stages stay zero.
+/// The stages of a pipeline in the order of the stream; a stage's value is the index of its
+/// [`Hop`]. A run has either the two decoupled searches or the joint one, and may lack refinement;
+/// the hops of missing stages stay zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(usize)]
 pub enum StageId {
@@ -112,12 +113,13 @@ pub struct Item {
     pub scan: u64,
     /// The scan that this one is matched against (itself where the chain starts).
     pub previous_scan: u64,
-    /// Sequence number at the source: a gap between consecutive items counts the scans dropped in live mode.
+    /// Sequence number at the source: a gap between consecutive items counts the scans dropped in
+    /// live mode.
     pub published: u64,
     /// Time of the middle of the sweep on the sensor's clock, ns since 1970.
     pub stamp_ns: i64,
-    /// Time at which the sweep was complete, or would have been at the sensor: `CLOCK_MONOTONIC`, ns. Latency is measured
-    /// from here.
+    /// Time at which the sweep was complete, or would have been at the sensor: `CLOCK_MONOTONIC`,
+    /// ns. Latency is measured from here.
     pub due_ns: i64,
     /// Process id of the publisher; it changes when a stage is restarted.
     pub pid: u32,
@@ -153,7 +155,8 @@ impl Item {
         self.flags & flags == flags
     }
 
-    /// Returns the number of scans that were published before this item and are not in its chain: what live mode dropped.
+    /// Returns the number of scans that were published before this item and are not in its chain:
+    /// what live mode dropped.
     pub fn dropped(&self) -> u64 {
         self.published.saturating_sub(self.seq)
     }

@@ -14,12 +14,13 @@
 //! | `correction` | [`CorrectionHeader`] | empty |
 //! | `fix` | [`FixHeader`] | empty |
 //!
-//! The last three exist only in runs with SLAM: [`FollowerId`]. All headers start with an [`Item`], which identifies the scan and carries the
-//! time stamps of each stage. Type names carry a
-//! version, so that two builds of different versions reject each other's messages instead of misreading them.
+//! The last three exist only in runs with SLAM: [`FollowerId`]. All headers start with an [`Item`],
+//! which identifies the scan and carries the time stamps of each stage. Type names carry a version,
+//! so that two builds of different versions reject each other's messages instead of misreading
+//! them.
 //!
-//! Reading order: `item`, `limits`, `message` (the contract of a message type), `check` (its enforcement), one file per message,
-//! `topics`.
+//! Reading order: `item`, `limits`, `message` (the contract of a message type), `check` (its
+//! enforcement), one file per message, `topics`.
 
 mod block;
 mod check;

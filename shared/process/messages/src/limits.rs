@@ -1,13 +1,16 @@
-//! The window of scans in flight, and the queue sizes that follow from it: memory is bounded and known before the first scan.
+//! The window of scans in flight, and the queue sizes that follow from it: memory is bounded and
+//! known before the first scan.
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// Processes of the run that may have a topic open at once. A dead process counts until its resources are removed.
+/// Processes of the run that may have a topic open at once. A dead process counts until its
+/// resources are removed.
 const NODES: usize = 16;
 /// The largest number of observers of a topic.
 const MAX_OBSERVERS: usize = 64;
-/// Samples that a reader may hold: the previous one, the current one, and one that is being received.
+/// Samples that a reader may hold: the previous one, the current one, and one that is being
+/// received.
 const BORROWED: usize = 3;
 /// Samples that a publisher may fill at once.
 const LOANED: usize = 1;
@@ -19,7 +22,8 @@ const LATEST: usize = 16;
 pub struct Window {
     /// Maximum number of scans in flight, between admission and pose (W).
     pub scans: usize,
-    /// Lag of motion compensation (L): scan k uses the motion of scan k - L. 0 without motion compensation.
+    /// Lag of motion compensation (L): scan k uses the motion of scan k - L. 0 without motion
+    /// compensation.
     pub lag: usize,
     /// Number of previous scans that processing one scan needs, along the longest path (LB).
     pub look_back: usize,
@@ -27,7 +31,8 @@ pub struct Window {
     pub live_depth: usize,
     /// Number of observers that each topic has room for: see [`TopicSizes::observers`].
     pub observers: usize,
-    /// True in a run with SLAM: pose-integration keeps keyframes, and the topics of loops and corrections exist.
+    /// True in a run with SLAM: pose-integration keeps keyframes, and the topics of loops and
+    /// corrections exist.
     pub slam: bool,
     /// True in a run with SLAM that names the map of an earlier drive: the topic of fixes exists.
     pub localises: bool,
@@ -76,8 +81,9 @@ pub struct TopicSizes {
 }
 
 impl TopicSizes {
-    /// Samples in the publisher's segment. History and queues hold the same newest samples, so only the longest of them counts;
-    /// each sample that a reader or an observer holds may be an older one.
+    /// Samples in the publisher's segment. History and queues hold the same newest samples, so only
+    /// the longest of them counts; each sample that a reader or an observer holds may be an older
+    /// one.
     pub fn samples(&self) -> usize {
         self.history.max(self.buffer) + self.readers * self.borrowed + self.observers + self.loaned
     }
@@ -117,13 +123,15 @@ impl Window {
         newest_pose.map_or(seq < scans, |newest| seq <= newest.saturating_add(scans))
     }
 
-    /// Returns whether the mask takes two scans. Masking then looks back at one scan more than the stages after it.
+    /// Returns whether the mask takes two scans. Masking then looks back at one scan more than the
+    /// stages after it.
     pub fn masks_pairs(&self) -> bool {
         self.look_back > 1
     }
 
-    /// Returns the sizes of a topic's queues. A restarted reader first receives the history. Items that are already further
-    /// down the stream can finish meanwhile and admit `scans` new ones, so a queue is longer than the history by the window.
+    /// Returns the sizes of a topic's queues. A restarted reader first receives the history. Items
+    /// that are already further down the stream can finish meanwhile and admit `scans` new ones, so
+    /// a queue is longer than the history by the window.
     pub(crate) fn queues(&self, history: History, readers: usize) -> TopicSizes {
         let stream = self.scans + self.look_back;
         let (history, more) = match history {

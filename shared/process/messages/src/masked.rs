@@ -12,8 +12,9 @@ use crate::{
     message::{Message, Sender, header},
 };
 
-/// The payload is one raster if the mask takes one scan, or two (this scan and the previous one, both masked for this pair) if
-/// it takes both; then the scan's points. Each part starts at a whole block.
+/// The payload is one raster if the mask takes one scan, or two (this scan and the previous one,
+/// both masked for this pair) if it takes both; then the scan's points. Each part starts at a whole
+/// block.
 #[derive(Debug)]
 pub enum Masked {}
 
@@ -77,7 +78,8 @@ pub struct MaskedHeader {
     pub cell_m: f32,
     /// The mask: see [`mask_kind`].
     pub mask: u32,
-    /// The velocity used for motion compensation: x, y (m/s), yaw rate (rad/s); zero without compensation.
+    /// The velocity used for motion compensation: x, y (m/s), yaw rate (rad/s); zero without
+    /// compensation.
     pub twist: [f32; 3],
     /// 1 if the scan is motion-compensated.
     pub compensated: u32,
@@ -105,12 +107,14 @@ pub struct Pair<'a> {
     pub later: ArrayView2<'a, f32>,
     /// The raster of the previous scan; `None` where the chain of motions starts.
     pub earlier: Option<ArrayView2<'a, f32>>,
-    /// True if the mask took both scans: the earlier raster then differs from the later one of the previous pair.
+    /// True if the mask took both scans: the earlier raster then differs from the later one of the
+    /// previous pair.
     pub earlier_changed: bool,
 }
 
 impl MaskedHeader {
-    /// Checks the sizes, the length of the payload, and that the points are finite. The rasters are not looked at.
+    /// Checks the sizes, the length of the payload, and that the points are finite. The rasters are
+    /// not looked at.
     fn check(&self, values: &[f32], limits: &Limits) -> Result<(), Violation> {
         let (n, rasters, points) = (self.n as usize, self.rasters as usize, self.points as usize);
         require(n == limits.side(), "n", n, limits.side())?;
@@ -159,7 +163,8 @@ impl MaskedHeader {
         Some(FloatBlock::count(cells) * FloatBlock::LEN)
     }
 
-    /// Splits a payload into its parts, with `rasters` (1 or 2) of n x n cells. `None` if it is too short.
+    /// Splits a payload into its parts, with `rasters` (1 or 2) of n x n cells. `None` if it is too
+    /// short.
     pub fn split(values: &mut [f32], n: usize, rasters: usize) -> Option<MaskedParts<'_>> {
         let raster = Self::raster_values(n)?;
         let (later, rest) = values.split_at_mut_checked(raster)?;
@@ -183,7 +188,8 @@ impl MaskedHeader {
         })
     }
 
-    /// Returns raster `index` of a payload, n x n; `None` if the payload is shorter than the header says.
+    /// Returns raster `index` of a payload, n x n; `None` if the payload is shorter than the header
+    /// says.
     fn raster<'a>(&self, values: &'a [f32], index: usize) -> Option<ArrayView2<'a, f32>> {
         let n = self.n as usize;
         let first = index.checked_mul(Self::raster_values(n)?)?;
@@ -204,8 +210,8 @@ impl MaskedHeader {
         Some(bytemuck::cast_slice(values.get(first..)?.get(..count)?))
     }
 
-    /// Returns where points of this scan lie in its frame (x, y in m), motion-compensated as its raster is, and the weight of each. Those
-    /// without weight are left out.
+    /// Returns where points of this scan lie in its frame (x, y in m), motion-compensated as its
+    /// raster is, and the weight of each. Those without weight are left out.
     pub fn deskewed<'a>(
         &self,
         points: &'a [SparsePoint],
@@ -220,8 +226,9 @@ impl MaskedHeader {
         seen.map(move |point| (point.deskewed(&twist).into(), point.weight))
     }
 
-    /// Returns the rasters to match. The earlier one is the second raster of this payload if the mask took both scans, else the
-    /// first raster of the previous message. `None` if a payload is shorter than its header says.
+    /// Returns the rasters to match. The earlier one is the second raster of this payload if the
+    /// mask took both scans, else the first raster of the previous message. `None` if a payload is
+    /// shorter than its header says.
     pub fn pair<'a>(
         &self,
         values: &'a [f32],

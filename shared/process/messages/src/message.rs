@@ -1,4 +1,5 @@
-//! The contract of a message type: its topic, its header, the elements of its payload and the sizes of its queues.
+//! The contract of a message type: its topic, its header, the elements of its payload and the sizes
+//! of its queues.
 
 use std::fmt::Debug;
 
@@ -11,7 +12,8 @@ use crate::{
     limits::{History, Limits, TopicSizes, Window},
 };
 
-/// A fixed header that starts with an [`Item`]. It is plain data, so processes may share its memory.
+/// A fixed header that starts with an [`Item`]. It is plain data, so processes may share its
+/// memory.
 pub trait Header: Pod + Default + Debug {
     /// The name of the type with its version, as the transport compares it.
     const TYPE_NAME: &'static str;
@@ -37,7 +39,8 @@ pub enum Sender {
 }
 
 impl Sender {
-    /// Returns the name of the process that has sent an item: the one of the stages that has stamped it, or the follower.
+    /// Returns the name of the process that has sent an item: the one of the stages that has
+    /// stamped it, or the follower.
     pub fn of(&self, item: &Item) -> &'static str {
         let stages = match self {
             Self::Stage(stages) => *stages,
@@ -69,8 +72,8 @@ pub trait Message: 'static {
         1
     }
 
-    /// Checks that a message keeps its contract, whatever program sent it. A receiver that has checked a message may rely on its
-    /// numbers and on the length of its payload.
+    /// Checks that a message keeps its contract, whatever program sent it. A receiver that has
+    /// checked a message may rely on its numbers and on the length of its payload.
     ///
     /// # Errors
     /// The first violation.
@@ -97,8 +100,8 @@ pub trait Message: 'static {
         limits: &Limits,
     ) -> Result<(), Violation>;
 
-    /// Returns the bytes of the payload that the header describes; what follows them in memory has no meaning. `None`: more than a
-    /// payload can have.
+    /// Returns the bytes of the payload that the header describes; what follows them in memory has
+    /// no meaning. `None`: more than a payload can have.
     fn content_bytes(_header: &Self::Header) -> Option<usize> {
         Some(0)
     }

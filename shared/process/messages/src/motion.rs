@@ -62,13 +62,15 @@ pub struct MotionEstimate {
     pub runner_up_score: f64,
     /// The rotation that the translation was searched with.
     pub rotation: RotationEstimate,
-    /// The searched motion: x, y (m), yaw (rad). It is the same on every topic, because motion compensation uses it.
+    /// The searched motion: x, y (m), yaw (rad). It is the same on every topic, because motion
+    /// compensation uses it.
     pub searched: [f64; 3],
     /// The result of the refinement.
     pub refinement: RefinementRecord,
 }
 
-/// The searched motion. It is the same whether masking reads it from `motion` or from `pose` after refinement.
+/// The searched motion. It is the same whether masking reads it from `motion` or from `pose` after
+/// refinement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SearchedMotion {
     /// The motion.
@@ -84,7 +86,8 @@ impl SearchedMotion {
     }
 }
 
-/// Longest motion in widths of a raster. The search stays within one; a prediction over a gap may be longer.
+/// Longest motion in widths of a raster. The search stays within one; a prediction over a gap may
+/// be longer.
 const MAX_EXTENTS: f64 = 10.0;
 
 impl MotionEstimate {

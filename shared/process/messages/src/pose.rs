@@ -51,10 +51,11 @@ pub struct PoseHeader {
     pub yaw_rad: f64,
     /// Covariance of (x, y, yaw) in the frame of the first scan: see [`covariance::Packed`].
     pub covariance: covariance::Packed,
-    /// The part of it that later poses have too, equal to it where the errors of motions are independent: see
-    /// [`ComposedMotion::accumulated`].
+    /// The part of it that later poses have too, equal to it where the errors of motions are
+    /// independent: see [`ComposedMotion::accumulated`].
     pub accumulated_covariance: covariance::Packed,
-    /// Number of corrections of the whole trajectory (loop closures); always 0 while poses are only composed motions.
+    /// Number of corrections of the whole trajectory (loop closures); always 0 while poses are only
+    /// composed motions.
     pub trajectory_version: u64,
 }
 

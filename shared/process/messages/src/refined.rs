@@ -9,7 +9,8 @@ use crate::{
     motion::MotionHeader,
 };
 
-/// As [`Motion`](crate::Motion), in runs with refinement. The searched motion stays beside the refined one.
+/// As [`Motion`](crate::Motion), in runs with refinement. The searched motion stays beside the
+/// refined one.
 #[derive(Debug)]
 pub enum Refined {}
 

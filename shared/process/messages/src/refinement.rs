@@ -37,7 +37,8 @@ pub struct RefinementRecord {
     pub outcome: u32,
     /// The initial guess of the accepted motion: see [`initial_guess`].
     pub initial_guess: u32,
-    /// Mean value of the map at the scan's points, from 0 to 1; 1 if every keyframe has returns at all of them.
+    /// Mean value of the map at the scan's points, from 0 to 1; 1 if every keyframe has returns at
+    /// all of them.
     pub overlap: f64,
     /// Weight of the scan's points relative to the running mean.
     pub support: f64,

@@ -11,7 +11,8 @@ use crate::{
     message::{Message, Sender, header},
 };
 
-/// A polar scan: the power of azimuth `a` at range bin `b` is byte `first_byte + a * stride + b` of the payload.
+/// A polar scan: the power of azimuth `a` at range bin `b` is byte `first_byte + a * stride + b` of
+/// the payload.
 #[derive(Debug)]
 pub enum Scan {}
 
@@ -73,11 +74,13 @@ pub struct ScanHeader {
     pub first_byte: u32,
     /// Size of a range bin, m.
     pub range_resolution_m: f32,
-    /// Offset of ranges, m: the centre of bin `b` is at `(b + 0.5) * range_resolution_m + range_offset_m`.
+    /// Offset of ranges, m: the centre of bin `b` is at
+    /// `(b + 0.5) * range_resolution_m + range_offset_m`.
     pub range_offset_m: f32,
     /// 1 if azimuths grow clockwise seen from above, else 0.
     pub clockwise: u32,
-    /// Metres to add to a range for each m/s of approach; 0 if unknown: see [`SweepGeometry::doppler_s`].
+    /// Metres to add to a range for each m/s of approach; 0 if unknown: see
+    /// [`SweepGeometry::doppler_s`].
     pub doppler_s: f32,
     /// Time of each row, ns since 1970.
     pub azimuth_stamp_ns: [i64; MAX_AZIMUTHS],
@@ -94,7 +97,8 @@ impl Default for ScanHeader {
 }
 
 impl ScanHeader {
-    /// Returns a view of the scan in this header and its payload; `None` if the payload is shorter than the header says.
+    /// Returns a view of the scan in this header and its payload; `None` if the payload is shorter
+    /// than the header says.
     pub fn view<'a>(&'a self, bytes: &'a [u8]) -> Option<PolarScan<'a>> {
         let geometry = self.geometry();
         let fits = geometry.azimuths <= MAX_AZIMUTHS && self.end()? <= bytes.len();
@@ -107,7 +111,8 @@ impl ScanHeader {
         })
     }
 
-    /// Returns the position behind the last bin of the last row; `None` without rows, or beyond all memory.
+    /// Returns the position behind the last bin of the last row; `None` without rows, or beyond all
+    /// memory.
     fn end(&self) -> Option<usize> {
         let geometry = self.geometry();
         let rows = geometry
@@ -117,7 +122,8 @@ impl ScanHeader {
         last_row.checked_add(geometry.bins)
     }
 
-    /// Checks the geometry, the angles and the times, and that the payload is as long as the geometry says.
+    /// Checks the geometry, the angles and the times, and that the payload is as long as the
+    /// geometry says.
     fn check(&self, bytes: &[u8]) -> Result<(), Violation> {
         let azimuths = self.azimuths as usize;
         let range = format_args!("1 to {MAX_AZIMUTHS}");
@@ -140,7 +146,8 @@ impl ScanHeader {
         checked.map_err(|error| Violation(error.to_string()))
     }
 
-    /// Returns the buffers that a dataset reader fills: the tables of this header and the bytes of the payload.
+    /// Returns the buffers that a dataset reader fills: the tables of this header and the bytes of
+    /// the payload.
     pub fn slot<'a>(&'a mut self, bytes: &'a mut [u8]) -> ScanSlot<'a> {
         ScanSlot {
             bytes,
@@ -163,7 +170,8 @@ impl ScanHeader {
         self.item.stamp_ns = geometry.stamp_ns;
     }
 
-    /// Adds to the time of the scan and of its rows, ns: a recording that is played again goes on in time.
+    /// Adds to the time of the scan and of its rows, ns: a recording that is played again goes on
+    /// in time.
     pub fn shift_times(&mut self, shift_ns: i64) {
         if shift_ns == 0 {
             return;

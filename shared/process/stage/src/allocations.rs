@@ -9,8 +9,8 @@ thread_local! {
     static COUNT: Cell<u64> = const { Cell::new(0) };
 }
 
-/// The system allocator with a count of the allocations of each thread. A program that makes it its global allocator has the
-/// allocations of its stages counted:
+/// The system allocator with a count of the allocations of each thread. A program that makes it its
+/// global allocator has the allocations of its stages counted:
 ///
 /// ```
 /// #[global_allocator]
@@ -25,7 +25,8 @@ fn count() {
     let _ = COUNT.try_with(|count| count.set(count.get() + 1));
 }
 
-// SAFETY: every call is forwarded to the system allocator unchanged; counting neither allocates nor panics.
+// SAFETY: every call is forwarded to the system allocator unchanged; counting neither allocates nor
+// panics.
 unsafe impl GlobalAlloc for CountingAllocator {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         count();

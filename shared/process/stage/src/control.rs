@@ -1,7 +1,7 @@
 //! The control of a running run, from other processes: its status, and requests to its supervisor.
 //!
-//! The supervisor answers at a socket in the run's root, which is the user's alone: one request on one line of JSON, one answer on
-//! another, and the connection is closed.
+//! The supervisor answers at a socket in the run's root, which is the user's alone: one request on
+//! one line of JSON, one answer on another, and the connection is closed.
 
 use std::{
     fs,
@@ -60,7 +60,8 @@ pub enum Answer {
     Done,
     /// It was not done, and why.
     Refused(String),
-    /// To [`Request::Swap`]: the program has taken over, and nothing has shown yet that it works; a sentence.
+    /// To [`Request::Swap`]: the program has taken over, and nothing has shown yet that it works; a
+    /// sentence.
     Untried(String),
 }
 
@@ -123,23 +124,24 @@ pub struct ProcessStatus {
     pub command: Vec<String>,
     /// True if the program is another one than the run was begun with.
     pub is_swapped: bool,
-    /// What it does.
+    /// The activity.
     pub activity: Activity,
     /// For how long it has done that, s; `None` if it does not tell.
     pub activity_s: Option<f64>,
     /// Time since its start, s.
     pub uptime_s: f64,
-    /// Its restarts, for whatever reason.
+    /// The restarts, for whatever reason.
     pub restarts: usize,
     /// The cause of its last death.
     pub last_death: Option<String>,
-    /// Messages that it should have recorded and has missed since its start; `None` if it is no recorder.
+    /// Messages that it should have recorded and has missed since its start; `None` if it is no
+    /// recorder.
     pub missed: Option<u64>,
-    /// What a live radar has delivered, and what is missing; `None` if it is no source of one.
+    /// The counts of a live radar's data; `None` if it is no source of one.
     pub received: Option<Received>,
 }
 
-/// What a process does.
+/// The activity of a process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Activity {
@@ -244,11 +246,12 @@ impl Control {
         self.order(&Request::Restart { process }, Some(ANSWER))
     }
 
-    /// Goes on with another program in the place of a stage. Returns when that has worked on a first pose; or, with a sentence, when it
-    /// has taken over and no scan came for it to work on.
+    /// Goes on with another program in the place of a stage. Returns when that has worked on a
+    /// first pose; or, with a sentence, when it has taken over and no scan came for it to work on.
     ///
     /// # Errors
-    /// The program did not come to take over, or has failed, and the one before goes on; or the run has ended.
+    /// The program did not come to take over, or has failed, and the one before goes on; or the run
+    /// has ended.
     pub fn swap(&self, swap: Swap) -> Result<Option<String>, StageError> {
         // The supervisor has the limits: `run.start_timeout_s`, and that of the trial.
         match self.ask(&Request::Swap(swap), None)? {
@@ -257,7 +260,8 @@ impl Control {
         }
     }
 
-    /// Returns whether the run is still there: its supervisor lives, and has not written all results.
+    /// Returns whether the run is still there: its supervisor lives, and has not written all
+    /// results.
     #[must_use]
     pub fn is_there(&self) -> bool {
         id_of(&self.root) == Some(self.id) && run::is_alive(&self.root)

@@ -1,5 +1,5 @@
-//! What a run has handed over to stages on another machine. While those owe something, nobody here does: the supervisor reads it before
-//! it looks for a stall.
+//! The progress of stages on another machine. While those owe something, nobody here does: the
+//! supervisor reads it before it looks for a stall.
 
 use std::{
     fs::{File, OpenOptions},
@@ -9,8 +9,8 @@ use std::{
 
 use crate::{Manifest, StageError};
 
-/// The name of the file in the run's root: one more than `Item::published` of the newest item that was handed over, eight bytes,
-/// little-endian.
+/// The name of the file in the run's root: one more than `Item::published` of the newest item that
+/// was handed over, eight bytes, little-endian.
 const FILE: &str = "elsewhere";
 /// Written until the other machine has said where it goes on.
 const UNKNOWN: u64 = u64::MAX;
@@ -54,7 +54,8 @@ impl ElsewhereWriter {
     }
 }
 
-/// Returns whether stages on another machine owe the pose of an item that was handed over to them, after so many poses.
+/// Returns whether stages on another machine owe the pose of an item that was handed over to them,
+/// after so many poses.
 pub fn owes(manifest: &Manifest, poses: u64) -> bool {
     let mut bytes = [0; 8];
     let read =

@@ -96,7 +96,8 @@ pub enum StageError {
         /// The violation.
         reason: String,
     },
-    /// There is too little shared memory. A dead process may have left some that is about to be freed.
+    /// There is too little shared memory. A dead process may have left some that is about to be
+    /// freed.
     #[error(
         "shared memory at /dev/shm has no room for the {megabytes:.1} MB of topic `{topic}` ({source}): free some, enlarge it \
          (containers: --shm-size), or lower run.window or raster.n"
@@ -151,8 +152,9 @@ impl StageError {
 }
 
 impl From<LogError> for StageError {
-    /// For a process that follows a log. Another attempt helps where a process that was killed is not gone yet, or where the one that
-    /// appends has been cutting off a record that was being read.
+    /// For a process that follows a log. Another attempt helps where a process that was killed is
+    /// not gone yet, or where the one that appends has been cutting off a record that was being
+    /// read.
     fn from(error: LogError) -> Self {
         match error {
             LogError::Foreign { .. } | LogError::Malformed { .. } => Self::Input(error.to_string()),

@@ -1,7 +1,9 @@
-//! The loop of a follower: a process that reads durable logs at its own pace, and publishes for observers.
+//! The loop of a follower: a process that reads durable logs at its own pace, and publishes for
+//! observers.
 //!
-//! A follower is not in the stream: no stage waits for it, and it gives no credit. It can be late by any time, since all that it needs
-//! is in the logs. An event wakes it when a log has grown; as events can be lost, it looks every 200 ms.
+//! A follower is not in the stream: no stage waits for it, and it gives no credit. It can be late
+//! by any time, since all that it needs is in the logs. An event wakes it when a log has grown; as
+//! events can be lost, it looks every 200 ms.
 
 mod growth;
 mod progress;
@@ -28,7 +30,8 @@ pub trait Follower {
     /// The logs whose growth wakes it.
     const LOGS: &'static [LogId];
 
-    /// Works on the next records of the logs. A step should be short: requests to stop are looked for between two steps.
+    /// Works on the next records of the logs. A step should be short: requests to stop are looked
+    /// for between two steps.
     ///
     /// # Errors
     /// An error that ends the process.

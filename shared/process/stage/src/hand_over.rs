@@ -1,6 +1,8 @@
-//! One topic without a run around it, to measure what the hand-over of a message costs, whatever its size.
+//! One topic without a run around it, to measure what the hand-over of a message costs, whatever
+//! its size.
 //!
-//! The messages take the way of those of a run: [`Writer`] in the sender, [`Observer`](crate::observer::Observer) in each reader.
+//! The messages take the way of those of a run: [`Writer`] in the sender,
+//! [`Observer`](crate::observer::Observer) in each reader.
 
 use std::path::Path;
 
@@ -44,7 +46,8 @@ impl Parcel {
     pub const HOP: StageId = StageId::RadarReplay;
 }
 
-/// The sender of parcels. Readers attach with [`ObservedRun::writing_to`](crate::observer::ObservedRun::writing_to).
+/// The sender of parcels. Readers attach with
+/// [`ObservedRun::writing_to`](crate::observer::ObservedRun::writing_to).
 pub struct HandOver {
     writer: Writer<Parcel>,
     sizes: TopicSizes,
@@ -57,7 +60,8 @@ pub struct HandOver {
 }
 
 impl HandOver {
-    /// Creates the topic for parcels of so many bytes and so many readers, under the name of the folder `out`.
+    /// Creates the topic for parcels of so many bytes and so many readers, under the name of the
+    /// folder `out`.
     ///
     /// # Errors
     /// Shared memory cannot be used, or a failure of the transport.

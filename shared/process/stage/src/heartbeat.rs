@@ -1,8 +1,10 @@
-//! The heartbeat of a process: whether it waits or works, and since when. It distinguishes a process that hangs from one that waits.
+//! The heartbeat of a process: whether it waits or works, and since when. It distinguishes a
+//! process that hangs from one that waits.
 //!
-//! Each process of a run writes it to a file in the run's root whenever it begins and ends a wait, which is every 200 ms or more
-//! often, and a stage also before each item. So a process that works has a beat as old as its work, and one that is stopped, or
-//! that the system does not run, has an old beat that says that it waits.
+//! Each process of a run writes it to a file in the run's root whenever it begins and ends a wait,
+//! which is every 200 ms or more often, and a stage also before each item. So a process that works
+//! has a beat as old as its work, and one that is stopped, or that the system does not run, has an
+//! old beat that says that it waits.
 
 use std::{
     fs::{File, OpenOptions},
@@ -17,11 +19,14 @@ use memmap2::{MmapOptions, MmapRaw};
 
 use crate::{Manifest, StageError, clock};
 
-/// The longest wait of a process, so the longest time between two beats of one that works on nothing.
+/// The longest wait of a process, so the longest time between two beats of one that works on
+/// nothing.
 pub const MAX_WAIT: Duration = Duration::from_millis(200);
-/// Size of the file: the time of the beat (i64), the process (u32) and the activity (u32), little-endian.
+/// Size of the file: the time of the beat (i64), the process (u32) and the activity (u32),
+/// little-endian.
 const BYTES: usize = 16;
-/// A waiting process beats at least every [`MAX_WAIT`]. Beyond this time it is stopped, or not run by the system.
+/// A waiting process beats at least every [`MAX_WAIT`]. Beyond this time it is stopped, or not run
+/// by the system.
 const SILENT: Duration = MAX_WAIT.saturating_mul(5);
 
 /// The activity of a process.
@@ -40,7 +45,7 @@ pub struct Heartbeat {
     pub since_ns: i64,
     /// The process.
     pub pid: u32,
-    /// What it does since then.
+    /// The activity since then.
     pub activity: Activity,
 }
 
@@ -63,7 +68,8 @@ impl Heartbeat {
         self.activity == Activity::Waits && self.age() > SILENT
     }
 
-    /// Returns whether the process has not come to its next wait, or out of the last one, within `limit`.
+    /// Returns whether the process has not come to its next wait, or out of the last one, within
+    /// `limit`.
     pub fn hangs(&self, limit: Duration) -> bool {
         self.age() > limit.max(SILENT)
     }
@@ -96,8 +102,8 @@ impl Heartbeat {
     }
 }
 
-/// Writes the beats of this process, through a mapping of the file: the beat at the end of a wait is part of the latency, and a system
-/// call would take longer.
+/// Writes the beats of this process, through a mapping of the file: the beat at the end of a wait
+/// is part of the latency, and a system call would take longer.
 #[derive(Debug)]
 pub(crate) struct HeartbeatWriter {
     mapped: MmapRaw,
@@ -134,10 +140,11 @@ impl HeartbeatWriter {
         let (words, _) = bytes.as_chunks();
         let first: *mut AtomicU64 = self.mapped.as_mut_ptr().cast();
         for (at, word) in words.iter().enumerate() {
-            // SAFETY: the mapping begins at a page, is as long as the words, and lives as long as this; other processes only read the
-            // file.
+            // SAFETY: the mapping begins at a page, is as long as the words, and lives as long as
+            // this; other processes only read the file.
             let mapped = unsafe { &*first.add(at) };
-            // One that reads in between has the time of this beat with the activity before, for less than a microsecond.
+            // One that reads in between has the time of this beat with the activity before, for
+            // less than a microsecond.
             mapped.store(u64::from_ne_bytes(*word), Ordering::Relaxed);
         }
     }

@@ -1,4 +1,5 @@
-//! The inputs of a stage: pairs of consecutive items of one topic, alone or joined with another topic.
+//! The inputs of a stage: pairs of consecutive items of one topic, alone or joined with another
+//! topic.
 
 use gyre_messages::{Item, Masked, Message, Pair, flag};
 
@@ -15,7 +16,8 @@ pub enum Action {
     Wait,
     /// Keep the current item only as the previous one of the next: advance and publish nothing.
     Keep,
-    /// Process this item, the last input of which was received at the given time (`CLOCK_MONOTONIC`, ns).
+    /// Process this item, the last input of which was received at the given time
+    /// (`CLOCK_MONOTONIC`, ns).
     Process(Item, i64),
     /// Pass on the end of the stream.
     End(Item),
@@ -42,8 +44,9 @@ pub trait Inputs: Sized {
     fn view(&self) -> Option<Self::View<'_>>;
     /// Advances to the next item.
     fn advance(&mut self);
-    /// Returns the listeners to wait for after [`Action::Wait`]. Where two inputs are missing one of them is enough, best the one
-    /// that comes last: each wake-up less leaves a processor to the stages before.
+    /// Returns the listeners to wait for after [`Action::Wait`]. Where two inputs are missing one
+    /// of them is enough, best the one that comes last: each wake-up less leaves a processor to the
+    /// stages before.
     fn listeners(&self) -> Vec<&Listener>;
     /// Returns the number of items that were skipped because they had been received before.
     fn duplicates(&self) -> u64;
@@ -176,7 +179,8 @@ impl<A: Message, B: Message> Inputs for Joined<A, B> {
                     received_ns,
                 ));
             }
-            // After a restart the history of the other topic may reach further back; its items are of no use alone.
+            // After a restart the history of the other topic may reach further back; its items are
+            // of no use alone.
             self.other.release();
         }
     }

@@ -28,7 +28,8 @@ use crate::{
     wake::{self, Signals},
 };
 
-/// What is logged unless `GYRE_LOG` says otherwise. The network layers of a link and of DDS report each attempt to connect, each peer.
+/// The filter of the log unless `GYRE_LOG` has another. The network layers of a link and of DDS
+/// report each attempt to connect, each peer.
 const FILTER: &str = "info,zenoh=error,rustdds=error,ros2_client=error";
 
 /// The environment of a stage: its run, its configuration, and its node in the transport.
@@ -83,10 +84,12 @@ impl Launch {
         })
     }
 
-    /// Takes this process's place in the run, when it has loaded what it needs, and before it opens its topics or files that it writes.
-    /// A process that stands by waits here until the one before it has ended (see [`run::STANDBY`]). False on a request to stop.
+    /// Takes this process's place in the run, when it has loaded what it needs, and before it opens
+    /// its topics or files that it writes. A process that stands by waits here until the one before
+    /// it has ended (see [`run::STANDBY`]). False on a request to stop.
     ///
-    /// The loops of this crate call it. A stage with files of its own calls it before it opens them; once is enough.
+    /// The loops of this crate call it. A stage with files of its own calls it before it opens
+    /// them; once is enough.
     ///
     /// # Errors
     /// A file of the run that cannot be written, or memory that cannot be locked.
@@ -175,7 +178,8 @@ impl Launch {
         })
     }
 
-    /// Returns the delay that the configuration adds to the work on each item, to test behaviour under load.
+    /// Returns the delay that the configuration adds to the work on each item, to test behaviour
+    /// under load.
     pub(crate) fn delay(&self) -> Duration {
         let stages = self.configuration.get("stages");
         let own = stages.and_then(|stages| stages.get(&self.name)?.get("delay_ms")?.as_integer());
@@ -198,7 +202,8 @@ fn stands_by() -> bool {
     std::env::var_os(run::STANDBY).is_some()
 }
 
-/// Runs a stage as the `main` of its process: joins the run, works until its end, and prints an error as one sentence.
+/// Runs a stage as the `main` of its process: joins the run, works until its end, and prints an
+/// error as one sentence.
 pub fn main(
     name: &str,
     work: impl FnOnce(&Launch) -> Result<StageCounters, StageError>,
@@ -221,7 +226,8 @@ pub fn main(
     }
 }
 
-/// Returns the name of the file in the run's root in which a stage says why it ended, or a process that was started to stand by.
+/// Returns the name of the file in the run's root in which a stage says why it ended, or a process
+/// that was started to stand by.
 pub fn last_words(stage: &str, stands_by: bool) -> String {
     match stands_by {
         true => format!("{stage}.standby.error"),
@@ -237,8 +243,8 @@ fn leave_last_words(stage: &str, sentence: &str) {
     }
 }
 
-/// Starts logging to `log.jsonl`, to which all processes append one line per event. While the returned span lives, each line
-/// carries the name of the stage.
+/// Starts logging to `log.jsonl`, to which all processes append one line per event. While the
+/// returned span lives, each line carries the name of the stage.
 ///
 /// # Errors
 /// The log cannot be opened.

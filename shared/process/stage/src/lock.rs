@@ -78,7 +78,8 @@ fn holder(file: impl AsFd) -> Option<String> {
     Some(format!("process {pid} ({})", name.trim_end()))
 }
 
-/// Returns the process that is listed with the lock of a file; `id` is the device's numbers and the inode.
+/// Returns the process that is listed with the lock of a file; `id` is the device's numbers and the
+/// inode.
 fn listed(id: &str) -> Option<String> {
     let locks = fs::read_to_string("/proc/locks").ok()?;
     locks.lines().find_map(|line| {

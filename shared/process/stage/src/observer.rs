@@ -1,9 +1,12 @@
 //! Observers: subscribers that the run does not depend on, in processes of their own.
 //!
-//! An observer may attach at any time, be slow, be stopped or be killed. No publisher waits for it: a full queue loses its oldest
-//! message, and the observer counts what it has missed. It looks at its queue at most every 10 ms, whatever the rate. It holds one message at a time, which the publishers' memory is sized for
-//! (see [`TopicSizes::samples`](gyre_messages::TopicSizes::samples)). It notifies the publisher once, when it attaches, so that the
-//! publisher connects to it while it waits, and not while it sends. The supervisor frees the places of killed observers.
+//! An observer may attach at any time, be slow, be stopped or be killed. No publisher waits for it:
+//! a full queue loses its oldest message, and the observer counts what it has missed. It looks at
+//! its queue at most every 10 ms, whatever the rate. It holds one message at a time, which the
+//! publishers' memory is sized for (see
+//! [`TopicSizes::samples`](gyre_messages::TopicSizes::samples)). It notifies the publisher once,
+//! when it attaches, so that the publisher connects to it while it waits, and not while it sends.
+//! The supervisor frees the places of killed observers.
 
 mod topic;
 
@@ -31,8 +34,9 @@ pub use topic::TopicObserver;
 pub const NAME: &str = "observer";
 /// Time to wait for a place. The supervisor frees those of killed observers within a second or two.
 const MAX_WAIT_FOR_PLACE: Duration = Duration::from_secs(5);
-/// The shortest time between two looks at a queue that was empty. On a machine whose processors are all busy each wake-up takes time from the
-/// stages; at hundreds of messages in a second that is more than what most observers do with them. The queue holds 9 meanwhile.
+/// The shortest time between two looks at a queue that was empty. On a machine whose processors are
+/// all busy each wake-up takes time from the stages; at hundreds of messages in a second that is
+/// more than what most observers do with them. The queue holds 9 meanwhile.
 const REST: Duration = Duration::from_millis(10);
 /// Time between two attempts to get a place.
 const RETRY: Duration = Duration::from_millis(100);
@@ -106,8 +110,8 @@ impl ObservedRun {
         &self.manifest
     }
 
-    /// Tells the supervisor, which has started this process as its recorder under this name, that all topics are observed, and
-    /// reports the waits for `signals` from here on.
+    /// Tells the supervisor, which has started this process as its recorder under this name, that
+    /// all topics are observed, and reports the waits for `signals` from here on.
     ///
     /// # Errors
     /// A file of the run cannot be written.
@@ -133,7 +137,8 @@ impl ObservedRun {
     /// Subscribes to a topic. The first messages are those of the publisher's history.
     ///
     /// # Errors
-    /// The run has no such topic, all places of the topic are taken, the run has ended, or the transport fails.
+    /// The run has no such topic, all places of the topic are taken, the run has ended, or the
+    /// transport fails.
     pub fn observe<M: Message>(&self) -> Result<Observer<'_, M>, StageError> {
         let (subscriber, data) = self.attach(&Topic::of::<M>())?;
         Ok(Observer {
@@ -183,7 +188,8 @@ impl ObservedRun {
             return Err(no_place());
         }
         let subscriber = Subscriber::observe(&service, NAME)?;
-        // Another one may have come at the same time. The places of the stages must stay free for their restarts.
+        // Another one may have come at the same time. The places of the stages must stay free for
+        // their restarts.
         if service.subscribers_named(NAME) > places {
             return Err(no_place());
         }
@@ -198,12 +204,14 @@ pub fn ready_file(root: &Path) -> PathBuf {
     root.join("recorder.ready")
 }
 
-/// Returns the file in the run's root to which the recorder writes its process and the messages that it has missed.
+/// Returns the file in the run's root to which the recorder writes its process and the messages
+/// that it has missed.
 fn missed_file(root: &Path) -> PathBuf {
     root.join("recorder.missed")
 }
 
-/// Returns the number of messages that the recorder, this process, has missed as it says itself; none unless it has told of some.
+/// Returns the number of messages that the recorder, this process, has missed as it says itself;
+/// none unless it has told of some.
 pub fn read_missed(root: &Path, recorder: u32) -> u64 {
     let told = fs::read_to_string(missed_file(root)).unwrap_or_default();
     // The recorder before has left its own.
@@ -212,8 +220,8 @@ pub fn read_missed(root: &Path, recorder: u32) -> u64 {
 }
 
 impl<M: Message> Observer<'_, M> {
-    /// Returns the next message in the publisher's memory, and waits for it at most `limit`. The message before it is released,
-    /// and the next call releases this one.
+    /// Returns the next message in the publisher's memory, and waits for it at most `limit`. The
+    /// message before it is released, and the next call releases this one.
     ///
     /// # Errors
     /// A failure of the transport.
@@ -242,13 +250,14 @@ impl<M: Message> Observer<'_, M> {
         &self.data
     }
 
-    /// Counts as missed what is between `next` and the first item that is received: all before it is known already, as from an
-    /// observer that was there earlier.
+    /// Counts as missed what is between `next` and the first item that is received: all before it
+    /// is known already, as from an observer that was there earlier.
     pub fn expect(&mut self, next: u64) {
         self.sequence.expected = Some(next);
     }
 
-    /// Returns the number of items missed since the observer attached, or since the item that it was told to expect.
+    /// Returns the number of items missed since the observer attached, or since the item that it
+    /// was told to expect.
     pub fn missed(&self) -> u64 {
         self.sequence.missed
     }
@@ -271,8 +280,8 @@ impl<M: Message> Observer<'_, M> {
     }
 }
 
-/// Sleeps until one of several observers may have a message, a signal requests a stop (then true), or `limit` has passed, and on
-/// for as long as an observer rests between two looks.
+/// Sleeps until one of several observers may have a message, a signal requests a stop (then true),
+/// or `limit` has passed, and on for as long as an observer rests between two looks.
 ///
 /// # Errors
 /// The system refuses to wait.
@@ -299,8 +308,8 @@ struct Sequence {
 }
 
 impl Sequence {
-    /// Returns the number of items missed directly before this one; `None` for an item without a scan, or one that was received
-    /// before: a restarted publisher sends its last items again.
+    /// Returns the number of items missed directly before this one; `None` for an item without a
+    /// scan, or one that was received before: a restarted publisher sends its last items again.
     fn advance(&mut self, item: &Item) -> Option<u64> {
         if item.is(flag::BASE) || self.next.is_some_and(|next| item.seq < next) {
             return None;

@@ -1,4 +1,5 @@
-//! The publisher of a topic whose messages come as bytes: from a recording, or from another machine.
+//! The publisher of a topic whose messages come as bytes: from a recording, or from another
+//! machine.
 
 use gyre_messages::{Item, Message, Pose, Sender, StageId, flag};
 

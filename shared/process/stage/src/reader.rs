@@ -52,7 +52,8 @@ impl<M: Message> Received<M> {
         bytemuck::cast_slice(self.sample.payload())
     }
 
-    /// Returns a copy of the message outside of shared memory: its header, and what that describes of its payload.
+    /// Returns a copy of the message outside of shared memory: its header, and what that describes
+    /// of its payload.
     pub fn to_bytes(&self) -> RecordedMessage {
         let bytes = self.values::<u8>();
         let content = M::content_bytes(self.header()).unwrap_or(bytes.len());
@@ -147,7 +148,8 @@ pub struct Reader<M: Message> {
 }
 
 impl<M: Message> Reader<M> {
-    /// Subscribes to the topic. `next` is the first item wanted; `None` takes whichever arrives first.
+    /// Subscribes to the topic. `next` is the first item wanted; `None` takes whichever arrives
+    /// first.
     ///
     /// # Errors
     /// A failure of the transport.
@@ -172,7 +174,8 @@ impl<M: Message> Reader<M> {
     /// Returns the current item and receives it first if necessary. Duplicates are skipped.
     ///
     /// # Errors
-    /// A failure of the transport; a sequence gap, since queues are sized so that no item can be lost.
+    /// A failure of the transport; a sequence gap, since queues are sized so that no item can be
+    /// lost.
     pub fn head(&mut self) -> Result<Option<&Received<M>>, StageError> {
         while self.head.is_none() {
             let Some(received) = self.port.receive()? else {

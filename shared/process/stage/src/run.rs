@@ -1,7 +1,8 @@
 //! A run: its name, its files, and the manifest that each of its processes reads.
 //!
-//! The root of a run is on tmpfs (`/dev/shm/gyre-<uid>/<name>`), where the transport's bookkeeping makes recovery four times faster
-//! than on a disk. It holds the manifest, the resolved configuration and the transport's sockets, and is removed at the end.
+//! The root of a run is on tmpfs (`/dev/shm/gyre-<uid>/<name>`), where the transport's bookkeeping
+//! makes recovery four times faster than on a disk. It holds the manifest, the resolved
+//! configuration and the transport's sockets, and is removed at the end.
 
 mod root;
 
@@ -36,8 +37,9 @@ pub const BEGUN_WITH: &str = "journal/run.toml";
 /// The file there that a run leaves when it has all its results. The next run begins anew.
 pub const COMPLETE: &str = "journal/complete";
 
-/// The environment variable of a process that stands by for another one. When it has loaded what it needs it creates the file
-/// `NAME.ready` in the run's root, and it opens its topics when its standard input ends.
+/// The environment variable of a process that stands by for another one. When it has loaded what it
+/// needs it creates the file `NAME.ready` in the run's root, and it opens its topics when its
+/// standard input ends.
 pub const STANDBY: &str = "GYRE_STANDBY";
 
 /// Returns the path of the file by which a process says that it stands by.
@@ -58,11 +60,13 @@ pub struct Manifest {
     pub window: Window,
     /// Sizes of the largest messages.
     pub limits: Limits,
-    /// True in live mode, which drops old scans; false in lossless mode, which processes every scan.
+    /// True in live mode, which drops old scans; false in lossless mode, which processes every
+    /// scan.
     pub live: bool,
     /// True if the run has a refinement: poses are then composed of `refined`, else of `motion`.
     pub refines: bool,
-    /// Speed of playback relative to the sensor's clock; `None`: as fast as the window admits scans.
+    /// Speed of playback relative to the sensor's clock; `None`: as fast as the window admits
+    /// scans.
     pub rate: Option<f64>,
     /// SHA-256 of the supervisor's program, which all stages of its own must be.
     pub build: String,
@@ -92,7 +96,8 @@ impl Manifest {
         root.join("manifest.json")
     }
 
-    /// Writes the manifest, the resolved configuration and the configuration of the transport into the run's root.
+    /// Writes the manifest, the resolved configuration and the configuration of the transport into
+    /// the run's root.
     ///
     /// # Errors
     /// A file that cannot be written.
@@ -139,12 +144,14 @@ pub(crate) fn write(path: PathBuf, text: &str) -> Result<(), StageError> {
         .map_err(|source| StageError::File { path, source })
 }
 
-/// Makes all files that this process and its children create the owner's alone, whatever the umask of the shell.
+/// Makes all files that this process and its children create the owner's alone, whatever the umask
+/// of the shell.
 pub fn keep_files_private() {
     umask(Mode::RWXG | Mode::RWXO);
 }
 
-/// Lets this process get a signal when the process that has started it, `parent`, ends, even if that is killed. False: it has ended already.
+/// Lets this process get a signal when the process that has started it, `parent`, ends, even if
+/// that is killed. False: it has ended already.
 ///
 /// # Errors
 /// The system refuses.

@@ -1,6 +1,7 @@
-//! The schedule of the source: how many scans it has published, and when the next one is due. The supervisor reads it, since only
-//! the source can tell a gap in the recording from a source that hangs. And the origin of its pace, for the source after it: scans of
-//! a live run become due whether a source is there or not.
+//! The schedule of the source: how many scans it has published, and when the next one is due. The
+//! supervisor reads it, since only the source can tell a gap in the recording from a source that
+//! hangs. And the origin of its pace, for the source after it: scans of a live run become due
+//! whether a source is there or not.
 
 use std::{
     fs::{File, OpenOptions},
@@ -10,8 +11,8 @@ use std::{
 
 use crate::{Manifest, StageError, clock};
 
-/// The name of the file in the run's root: [`Schedule::published`], then [`Schedule::due_ns`], then the origin of the pace, if there
-/// is one: each number as eight bytes, little-endian.
+/// The name of the file in the run's root: [`Schedule::published`], then [`Schedule::due_ns`], then
+/// the origin of the pace, if there is one: each number as eight bytes, little-endian.
 const FILE: &str = "source.schedule";
 
 /// The state of the source.
@@ -77,8 +78,8 @@ impl ScheduleWriter {
         Self::begin(manifest, 0)
     }
 
-    /// Goes on after the source before, which has died. What it published is numbered, but no pose of it is owed: its scans may be
-    /// lost.
+    /// Goes on after the source before, which has died. What it published is numbered, but no pose
+    /// of it is owed: its scans may be lost.
     pub fn resume(manifest: &Manifest) -> Result<Self, StageError> {
         Self::begin(
             manifest,

@@ -1,5 +1,5 @@
-//! The services of the transport: the supervisor creates them once with the sizes of the window, and stages only open them.
-//! So no restart finds a service missing or of another size.
+//! The services of the transport: the supervisor creates them once with the sizes of the window,
+//! and stages only open them. So no restart finds a service missing or of another size.
 
 use gyre_messages::{FollowerId, Message, Pose, Sender, StageId, Topic, TopicSizes, Window};
 
@@ -42,8 +42,8 @@ impl Services {
         })
     }
 
-    /// Returns whether a stage has opened the topic that it publishes, which stages do last. A dead stage counts until its
-    /// resources are removed.
+    /// Returns whether a stage has opened the topic that it publishes, which stages do last. A dead
+    /// stage counts until its resources are removed.
     pub fn has_publisher(&self, stage: StageId) -> bool {
         let is_sent = |topic: &Topic| match topic.sender {
             Sender::Stage(stages) => stages.contains(&stage),

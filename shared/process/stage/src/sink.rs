@@ -19,7 +19,8 @@ pub trait Sink {
     fn takes_scans(&self) -> bool {
         false
     }
-    /// Returns the last poses of the journal, at most `count`, oldest first, and whether the stream had ended.
+    /// Returns the last poses of the journal, at most `count`, oldest first, and whether the stream
+    /// had ended.
     ///
     /// # Errors
     /// A journal that cannot be read.
@@ -88,7 +89,8 @@ pub fn run<M: Message<Header = MotionHeader>, S: Sink>(
     }
 }
 
-/// Publishes the last poses again. The source resumes at the newest one, and masking needs the motions of all of them.
+/// Publishes the last poses again. The source resumes at the newest one, and masking needs the
+/// motions of all of them.
 pub(crate) fn republish(
     poses: &Writer<Pose>,
     restored: &[PoseHeader],
@@ -110,8 +112,8 @@ pub(crate) fn republish(
     publish(poses, newest(*last), hop)
 }
 
-/// Marks a pose as the newest. Older ones that are published again are not marked: a source that resumed at one of them would
-/// send more scans than its readers have room for.
+/// Marks a pose as the newest. Older ones that are published again are not marked: a source that
+/// resumed at one of them would send more scans than its readers have room for.
 pub(crate) fn newest(pose: PoseHeader) -> PoseHeader {
     PoseHeader {
         item: Item {
@@ -181,7 +183,8 @@ impl<M: Message<Header = MotionHeader>> Motions<M> {
         }
     }
 
-    /// Returns the listener of the input that is missing, as [`Inputs::listeners`](crate::inputs::Inputs::listeners).
+    /// Returns the listener of the input that is missing, as
+    /// [`Inputs::listeners`](crate::inputs::Inputs::listeners).
     fn listener(&self) -> &Listener {
         match (&self.scans, self.motions.current()) {
             (Some(scans), Some(_)) => scans.listener(),

@@ -1,4 +1,5 @@
-//! The loop of the first stage: publishes a scan when the window admits it and, at a given rate, when it is due.
+//! The loop of the first stage: publishes a scan when the window admits it and, at a given rate,
+//! when it is due.
 
 mod attempts;
 mod credit;
@@ -38,8 +39,9 @@ pub trait Source {
     /// The scans to play, by their index in the recording.
     fn scans(&self) -> Range<usize>;
 
-    /// Time at which scan `index` is complete on the sensor's clock, ns since 1970, if it is known without reading the scan.
-    /// Without it a restarted source in live mode cannot tell which scans it has missed, and plays them late.
+    /// Time at which scan `index` is complete on the sensor's clock, ns since 1970, if it is known
+    /// without reading the scan. Without it a restarted source in live mode cannot tell which scans
+    /// it has missed, and plays them late.
     fn complete_ns(&self, index: usize) -> Option<i64>;
 
     /// Time between two scans, ns.
@@ -50,7 +52,8 @@ pub trait Source {
         NonZeroUsize::MIN
     }
 
-    /// Returns whether live mode drops the scans that become due while this process is busy or down, as with a real sensor.
+    /// Returns whether live mode drops the scans that become due while this process is busy or
+    /// down, as with a real sensor.
     fn drops_missed_scans(&self) -> bool;
 
     /// Reads scan `index` into shared memory.

@@ -11,7 +11,8 @@ use crate::{
     writer::{Draft, Writer},
 };
 
-/// A stage: a function of its inputs. This crate does the waiting, joining, publishing and restarting.
+/// A stage: a function of its inputs. This crate does the waiting, joining, publishing and
+/// restarting.
 pub trait Stage {
     /// The inputs.
     type Inputs: Inputs;
@@ -20,8 +21,8 @@ pub trait Stage {
     /// The stage that it is, or replaces.
     const HOP: gyre_messages::StageId;
 
-    /// Processes one item: reads borrowed shared memory and writes header and payload of a loaned sample. The item of the header
-    /// is filled in afterwards.
+    /// Processes one item: reads borrowed shared memory and writes header and payload of a loaned
+    /// sample. The item of the header is filled in afterwards.
     ///
     /// # Errors
     /// An error that ends the process.
@@ -142,7 +143,8 @@ impl<S: Stage> Flow<'_, S> {
         Ok(())
     }
 
-    /// Requires consecutive output: a gap in its history would stop every reader that restarts on it.
+    /// Requires consecutive output: a gap in its history would stop every reader that restarts on
+    /// it.
     fn require_next(&self, item: &Item) -> Result<(), StageError> {
         match self.last_sent.map(|last| last.saturating_add(1)) {
             Some(expected) if item.seq != expected => Err(StageError::SequenceGap {

@@ -1,9 +1,10 @@
 //! The transport, iceoryx2, behind a boundary without its types.
 //!
-//! Its ports are generic in the message. Here each is instantiated once, for messages of any type: header and payload are bytes,
-//! and a topic is opened with the names, sizes and alignments of [`gyre_messages::Topic`], as by the transport's bindings for other
-//! languages. So no other crate compiles its code again; [`writer`](crate::writer) and [`reader`](crate::reader) give the bytes their
-//! types.
+//! The ports are generic in the message. Here each is instantiated once, for messages of any type:
+//! header and payload are bytes, and a topic is opened with the names, sizes and alignments of
+//! [`gyre_messages::Topic`], as by the transport's bindings for other languages. So no other crate
+//! compiles its code again; [`writer`](crate::writer) and [`reader`](crate::reader) give the bytes
+//! their types.
 
 mod event;
 mod publisher;
@@ -49,7 +50,8 @@ pub fn silence() {
 }
 
 impl Transport {
-    /// The transport of a run. Names and paths are unique to the run, and only the supervisor cleans up.
+    /// The transport of a run. Names and paths are unique to the run, and only the supervisor
+    /// cleans up.
     pub(crate) fn of(manifest: &Manifest) -> Result<Self, StageError> {
         let mut config = Config::default();
         config.global.prefix = FileName::new(manifest.prefix.as_bytes())
@@ -64,7 +66,8 @@ impl Transport {
         Ok(Self(config))
     }
 
-    /// Makes the configuration in a file the global one, which the transport uses to clean up incomplete nodes.
+    /// Makes the configuration in a file the global one, which the transport uses to clean up
+    /// incomplete nodes.
     ///
     /// # Errors
     /// A failure of the transport.

@@ -1,4 +1,4 @@
-//! What a process uses of the machine, as the kernel counts it.
+//! The machine's resources that a process uses, as the kernel counts it.
 
 use std::time::Duration;
 
@@ -8,12 +8,13 @@ use procfs::{
 };
 use serde::{Deserialize, Serialize};
 
-/// What a process has used since its start, and the memory that it has now.
+/// The resources that a process has used since its start, and the memory that it has now.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Usage {
     /// Processor time of all threads, s.
     pub cpu_s: f64,
-    /// Memory that is the process's own, bytes: neither files nor memory that it shares with others.
+    /// Memory that is the process's own, bytes: neither files nor memory that it shares with
+    /// others.
     pub own_bytes: u64,
     /// Memory that is mapped into the process and present, bytes, with what it shares.
     pub resident_bytes: u64,

@@ -1,7 +1,8 @@
 //! Sleep until a publisher notifies, a signal arrives, or the longest wait has passed.
 //!
-//! The transport can lose a wake-up, rarely (a race between its datagram and its flag). So every wait has a limit after which
-//! the queues are read anyway, and each wake-up that was caught so is counted.
+//! The transport can lose a wake-up, rarely (a race between its datagram and its flag). So every
+//! wait has a limit after which the queues are read anyway, and each wake-up that was caught so is
+//! counted.
 
 use std::{
     cell::{Cell, OnceCell},
@@ -28,8 +29,8 @@ use crate::{
 
 pub use crate::heartbeat::MAX_WAIT;
 
-/// Lets a write beyond the limit of file sizes (`ulimit -f`) fail with an error, which a sentence can report. Without this, a
-/// signal ends the process.
+/// Lets a write beyond the limit of file sizes (`ulimit -f`) fail with an error, which a sentence
+/// can report. Without this, a signal ends the process.
 ///
 /// # Errors
 /// The handler cannot be installed.
@@ -71,7 +72,8 @@ impl Woken {
 }
 
 impl Signals {
-    /// Installs handlers: from here on SIGTERM, SIGINT, SIGHUP and SIGCHLD wake the process instead of ending it.
+    /// Installs handlers: from here on SIGTERM, SIGINT, SIGHUP and SIGCHLD wake the process instead
+    /// of ending it.
     ///
     /// # Errors
     /// The system refuses a socket or a handler.
@@ -108,7 +110,8 @@ impl Signals {
         Ok(self.wait(&[], None, limit)?.stop)
     }
 
-    /// Sleeps until one of these listeners is notified, a signal arrives or `limit` has passed; true on a request to stop.
+    /// Sleeps until one of these listeners is notified, a signal arrives or `limit` has passed;
+    /// true on a request to stop.
     ///
     /// # Errors
     /// The system refuses to wait.
@@ -120,9 +123,10 @@ impl Signals {
         Ok(self.wait(listeners, None, limit)?.stop)
     }
 
-    /// Sleeps until a listener is notified, a signal arrives or `limit` has passed, whichever is first.
-    /// Consumes the notifications of `data`: read all queues afterwards. A notification of `handshake` is left for
-    /// [`Writer::accept_readers`](crate::writer::Writer::accept_readers), to be called if [`Woken::may_have_new_readers`].
+    /// Sleeps until a listener is notified, a signal arrives or `limit` has passed, whichever is
+    /// first. Consumes the notifications of `data`: read all queues afterwards. A notification of
+    /// `handshake` is left for [`Writer::accept_readers`](crate::writer::Writer::accept_readers),
+    /// to be called if [`Woken::may_have_new_readers`].
     ///
     /// # Errors
     /// The system refuses to wait, or a notification cannot be read.
@@ -135,7 +139,8 @@ impl Signals {
         self.wait_or_readable(data, handshake.as_slice(), None, limit)
     }
 
-    /// As [`wait`](Self::wait) with any number of topics that are published, or until a connection has something to read, which it leaves there.
+    /// As [`wait`](Self::wait) with any number of topics that are published, or until a connection
+    /// has something to read, which it leaves there.
     ///
     /// # Errors
     /// The system refuses to wait, or a notification cannot be read.

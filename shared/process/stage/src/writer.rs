@@ -9,7 +9,8 @@ use crate::{
     transport::{Listener, Loan, Node, Notifier, Publisher, Service},
 };
 
-/// Publishes the messages of a topic and keeps a history for late readers: see [`Writer::accept_readers`].
+/// Publishes the messages of a topic and keeps a history for late readers: see
+/// [`Writer::accept_readers`].
 pub struct Writer<M: Message> {
     untyped: UntypedWriter,
     message: PhantomData<M>,
@@ -75,8 +76,8 @@ impl<M: Message> Writer<M> {
 
     /// Sends the history to readers that have subscribed since the last call, and wakes them.
     ///
-    /// Readers are woken only after a handshake: woken readers answer the handshakes of their own topics, so unconditional
-    /// wake-ups would circulate for ever.
+    /// Readers are woken only after a handshake: woken readers answer the handshakes of their own
+    /// topics, so unconditional wake-ups would circulate for ever.
     ///
     /// # Errors
     /// A failure of the transport.
@@ -143,7 +144,8 @@ impl UntypedWriter {
 
     pub(crate) fn accept_readers(&self) -> Result<(), StageError> {
         let new_reader = self.has_new_reader()?;
-        // Unconditionally: after a lost handshake the reader finds the history at the end of its own wait.
+        // Unconditionally: after a lost handshake the reader finds the history at the end of its
+        // own wait.
         self.publisher.connect()?;
         if new_reader { self.notify() } else { Ok(()) }
     }

@@ -25,7 +25,8 @@ use crate::{
     start::{Place, Starter},
 };
 
-/// Time for a killed process to end. The kernel holds one that waits for a device, as for a network folder.
+/// Time for a killed process to end. The kernel holds one that waits for a device, as for a network
+/// folder.
 const KILL_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// The death of a process.
@@ -145,7 +146,8 @@ impl Child {
         self.is_on_trial = true;
     }
 
-    /// Returns whether its program has taken the place of another one and has not worked on a pose yet.
+    /// Returns whether its program has taken the place of another one and has not worked on a pose
+    /// yet.
     pub(crate) fn is_on_trial(&self) -> bool {
         self.is_on_trial
     }
@@ -155,8 +157,8 @@ impl Child {
         self.is_on_trial = false;
     }
 
-    /// Goes back to the program before a swap, from the next start on, or to `begun`, that of the run's begin, if a file of the former
-    /// has changed since. False if there is none.
+    /// Goes back to the program before a swap, from the next start on, or to `begun`, that of the
+    /// run's begin, if a file of the former has changed since. False if there is none.
     pub(crate) fn go_back(&mut self, begun: &StagePlan) -> bool {
         let is_another = self.plan.command != begun.command;
         let plans = self.before.take().into_iter();
@@ -344,7 +346,8 @@ impl Child {
     }
 }
 
-/// Returns the file in which a process says why it ended. One that stands by has its own: the other is in use.
+/// Returns the file in which a process says why it ended. One that stands by has its own: the other
+/// is in use.
 fn last_words(manifest: &Manifest, name: &str, place: Place) -> PathBuf {
     let stands_by = place == Place::Taken;
     manifest.root.join(launch::last_words(name, stands_by))

@@ -1,8 +1,9 @@
 //! Removes the transport's resources of dead processes.
 //!
-//! The transport's own cleanup does this, except in two cases, which are handled first. A process that is killed while it creates
-//! a port can leave an empty shared-memory file, and every process that opens it waits for ever; or an empty tag, and every
-//! cleanup fails. A time limit covers unknown cases.
+//! The transport's own cleanup does this, except in two cases, which are handled first. A process
+//! that is killed while it creates a port can leave an empty shared-memory file, and every process
+//! that opens it waits for ever; or an empty tag, and every cleanup fails. A time limit covers
+//! unknown cases.
 
 use std::{
     collections::HashSet,
@@ -24,13 +25,14 @@ use crate::SuperviseError;
 
 /// Time limit of a cleanup, which normally takes milliseconds.
 const LIMIT: Duration = Duration::from_secs(3);
-/// Time after which a file that is still empty is not being created any more, which takes microseconds.
+/// Time after which a file that is still empty is not being created any more, which takes
+/// microseconds.
 const UNFINISHED: Duration = Duration::from_millis(200);
 /// File mode of an incomplete tag. A complete one is read-only.
 const INCOMPLETE: u32 = 0o600;
 
-/// Removes all resources of dead processes. This must precede a restart: a topic has room for exactly one publisher, and old and
-/// new samples must not mix.
+/// Removes all resources of dead processes. This must precede a restart: a topic has room for
+/// exactly one publisher, and old and new samples must not mix.
 pub(crate) fn remove_dead(
     manifest: &Manifest,
     transport: &Transport,
@@ -40,7 +42,8 @@ pub(crate) fn remove_dead(
     within_limit(move || clean(&manifest, &transport, all_dead))
 }
 
-/// Removes all resources of dead observers, and the files that would make a stage wait for a stopped one.
+/// Removes all resources of dead observers, and the files that would make a stage wait for a
+/// stopped one.
 pub(crate) fn remove_dead_observers(
     manifest: &Manifest,
     transport: &Transport,
@@ -87,7 +90,8 @@ fn clean(manifest: &Manifest, transport: &Transport, all_dead: bool) -> bool {
     transport.remove_dead_nodes()
 }
 
-/// Removes empty files of living observers that stay empty: an observer was stopped while it created them.
+/// Removes empty files of living observers that stay empty: an observer was stopped while it
+/// created them.
 fn unlink_unfinished_files(manifest: &Manifest, transport: &Transport) {
     let ports = ports_of(manifest, &transport.living_nodes(observer::NAME));
     let unfinished = || {
@@ -102,7 +106,8 @@ fn unlink_unfinished_files(manifest: &Manifest, transport: &Transport) {
     }
 }
 
-/// Returns the ids of the ports of dead processes: each has a tag `<prefix><port id>.port_tag` in the directory of its node.
+/// Returns the ids of the ports of dead processes: each has a tag `<prefix><port id>.port_tag` in
+/// the directory of its node.
 fn ports_of(manifest: &Manifest, dead: &[String]) -> HashSet<String> {
     let names = |node: &String| {
         fs::read_dir(manifest.root.join("nodes").join(node))

@@ -11,7 +11,8 @@ use rustix::{
     process::{Pid, PidfdFlags, pidfd_open},
 };
 
-/// Waits until a child process has exited, at most for `limit`; returns whether it has. Its status is left to be read.
+/// Waits until a child process has exited, at most for `limit`; returns whether it has. Its status
+/// is left to be read.
 pub(crate) fn ends_within(process: &Child, limit: Duration) -> bool {
     let pid = Pid::from_child(process);
     let Ok(descriptor) = pidfd_open(pid, PidfdFlags::empty()) else {

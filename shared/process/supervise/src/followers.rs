@@ -1,5 +1,5 @@
-//! The supervision of followers: they are restarted alone, and waited for at the end of the stream. Odometry goes on without one that
-//! dies again and again.
+//! The supervision of followers: they are restarted alone, and waited for at the end of the stream.
+//! Odometry goes on without one that dies again and again.
 
 use std::time::{Duration, Instant};
 
@@ -20,7 +20,7 @@ struct Clock {
     at: Option<(usize, Progress, Instant)>,
     /// The farthest that this follower has been.
     farthest: u64,
-    /// Its stalls without going farther.
+    /// The stalls without going farther.
     stalls_in_a_row: usize,
 }
 
@@ -53,12 +53,13 @@ pub(crate) struct Followers<'a> {
     given_up: Vec<(usize, SuperviseError)>,
 }
 
-/// What is to be done about a follower that the run waits for.
+/// The decision about a follower that the run waits for.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum Patience {
     /// It goes on.
     Wait,
-    /// It has stayed where it is for too long: it is ended, and then started again as after a death.
+    /// It has stayed where it is for too long: it is ended, and then started again as after a
+    /// death.
     End(Stall),
     /// That has not helped.
     GiveUp(Stall),
@@ -98,7 +99,8 @@ impl<'a> Followers<'a> {
         self.roles.follows(process) && !has_given_up && !follower::is_done(self.manifest, name)
     }
 
-    /// Returns the followers to wait for. None reads what one writes that is not restarted any more, or one behind it.
+    /// Returns the followers to wait for. None reads what one writes that is not restarted any
+    /// more, or one behind it.
     pub fn behind(&self) -> Vec<usize> {
         let given_up = self.given_up.iter().map(|(follower, _)| *follower).min();
         let followers = self.roles.followers();

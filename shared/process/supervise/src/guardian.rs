@@ -1,7 +1,8 @@
 //! A process that outlives a killed supervisor, to end what the stages have started.
 //!
-//! The system ends a stage together with its supervisor, but not the stage's own children, as a shell has them. Each stage leads a
-//! process group, and the guardian knows them all: it reads them from a pipe, and the end of the pipe is the end of the supervisor.
+//! The system ends a stage together with its supervisor, but not the stage's own children, as a
+//! shell has them. Each stage leads a process group, and the guardian knows them all: it reads them
+//! from a pipe, and the end of the pipe is the end of the supervisor.
 
 use std::{
     collections::BTreeMap,
@@ -74,7 +75,8 @@ impl Guardian {
         self.send(group as RawPid);
     }
 
-    /// Takes a group from the care of the guardian: its processes are dead, and its number may be given anew.
+    /// Takes a group from the care of the guardian: its processes are dead, and its number may be
+    /// given anew.
     pub fn forget(&self, group: u32) {
         self.send(-(group as RawPid));
     }
@@ -97,10 +99,11 @@ impl Drop for Guardian {
     }
 }
 
-/// Puts the group that this process leads into the care of the guardian. Called between fork and exec, so that there is no moment
-/// in which a stage has children that nobody knows of.
+/// Puts the group that this process leads into the care of the guardian. Called between fork and
+/// exec, so that there is no moment in which a stage has children that nobody knows of.
 pub(crate) fn join(pipe: RawFd) {
-    // SAFETY: the supervisor keeps the pipe open while it starts a process, and the new process has a copy of it.
+    // SAFETY: the supervisor keeps the pipe open while it starts a process, and the new process has
+    // a copy of it.
     let pipe = unsafe { BorrowedFd::borrow_raw(pipe) };
     let _ = rustix::io::write(pipe, &getpid().as_raw_nonzero().get().to_ne_bytes());
 }
@@ -121,7 +124,8 @@ pub fn guard(mut messages: impl Read) {
         };
     }
     for (group, since) in groups {
-        // A number can be given anew. While a group has processes left, no other process gets its number.
+        // A number can be given anew. While a group has processes left, no other process gets its
+        // number.
         let is_another = started(group).is_some_and(|now| Some(now) != since);
         if let Some(group) = Pid::from_raw(group).filter(|_| !is_another) {
             let _ = kill_process_group(group, Signal::KILL);

@@ -17,7 +17,7 @@ const MAX: u64 = 8 << 20;
 /// Time between two looks at the sizes.
 const PERIOD: Duration = Duration::from_secs(1);
 
-/// What a supervisor prints that runs in the background, by its name in the folder of the logs.
+/// The log of a supervisor that runs in the background, by its name in the folder of the logs.
 const BACKGROUND: &str = "gyre";
 
 /// The longest last line that is looked for, bytes.
@@ -105,7 +105,8 @@ pub(crate) fn path_of(manifest: &Manifest, stage: &str) -> PathBuf {
     manifest.out.join("log").join(format!("{stage}.txt"))
 }
 
-/// Moves the end of a log that is too long to its `.old`, and empties it. The processes that append to it do not notice.
+/// Moves the end of a log that is too long to its `.old`, and empties it. The processes that append
+/// to it do not notice.
 pub(crate) fn bound(path: &Path) {
     let too_long = fs::symlink_metadata(path).is_ok_and(|log| log.is_file() && log.len() > MAX);
     if !too_long {

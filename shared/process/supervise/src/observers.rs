@@ -11,7 +11,8 @@ use crate::run::Run;
 
 /// Time between two looks.
 const PERIOD: Duration = Duration::from_secs(1);
-/// The same after a cleanup that failed or did not end. No stage needs it: every restart of a stage cleans up by itself.
+/// The same after a cleanup that failed or did not end. No stage needs it: every restart of a stage
+/// cleans up by itself.
 const PERIOD_AFTER_FAILURE: Duration = Duration::from_secs(30);
 
 /// Looks for killed observers at a low rate, since nothing tells the supervisor of their death.
@@ -26,7 +27,8 @@ impl Sweep {
         }
     }
 
-    /// Removes what killed observers left, if it is time to look. `processes` is the number of the run's own processes.
+    /// Removes what killed observers left, if it is time to look. `processes` is the number of the
+    /// run's own processes.
     pub(crate) fn run_if_due(&mut self, run: &Run<'_>, processes: usize) {
         let now = Instant::now();
         if now < self.due {

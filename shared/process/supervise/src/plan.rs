@@ -22,13 +22,16 @@ pub struct Plan {
     pub stages: Vec<StagePlan>,
     /// The process that records the run, if any: nothing depends on it.
     pub recorder: Option<StagePlan>,
-    /// Program and arguments of a process that calls [`guard`](crate::guard) with its standard input.
+    /// Program and arguments of a process that calls [`guard`](crate::guard) with its standard
+    /// input.
     pub guardian: Vec<String>,
-    /// Time for which a published scan may lack its pose, or the source a scan that is due; `None`: no limit.
+    /// Time for which a published scan may lack its pose, or the source a scan that is due; `None`:
+    /// no limit.
     pub stall_timeout: Option<Duration>,
     /// Time for a stage to open its topics; `None`: no limit.
     pub start_timeout: Option<Duration>,
-    /// Longest time that a processor of the machine may take to wake while the run lives, us; `None`: as the system has it.
+    /// Longest time that a processor of the machine may take to wake while the run lives, us;
+    /// `None`: as the system has it.
     pub cpu_wake_us: Option<u32>,
 }
 
@@ -39,17 +42,20 @@ pub struct StagePlan {
     pub name: String,
     /// Program and arguments, executed without a shell.
     pub command: Vec<String>,
-    /// The files that the command executes. After a change of one of them the stage is not started again.
+    /// The files that the command executes. After a change of one of them the stage is not started
+    /// again.
     pub programs: Vec<Program>,
     /// The directory in which it is started; `None`: the supervisor's.
     pub directory: Option<PathBuf>,
-    /// How the system runs it.
+    /// The scheduling of the process.
     pub scheduling: Scheduling,
     /// The restart policy.
     pub restart: RestartPolicy,
-    /// True if it keeps running when the others are restarted: a live source, since a radar does not wait.
+    /// True if it keeps running when the others are restarted: a live source, since a radar does
+    /// not wait.
     pub outlives_restarts: bool,
-    /// True if its death restarts the others too: it has state that its own restart does not recover.
+    /// True if its death restarts the others too: it has state that its own restart does not
+    /// recover.
     pub restarts_all: bool,
 }
 
@@ -69,7 +75,8 @@ pub struct RestartPolicy {
     pub limit: usize,
     /// Length of the time window of `limit`, s.
     pub window_s: f64,
-    /// Delay before the restart of a stage that ended by itself, ms. A killed one is restarted at once.
+    /// Delay before the restart of a stage that ended by itself, ms. A killed one is restarted at
+    /// once.
     pub backoff_ms: u64,
 }
 
@@ -104,24 +111,26 @@ pub enum Event<'a> {
     },
     /// Processes were started again.
     Restarted {
-        /// The only one, by its name; `None` if they are several: all stages, or all but a live source.
+        /// The only one, by its name; `None` if they are several: all stages, or all but a live
+        /// source.
         only: Option<&'a str>,
     },
     /// The stream has ended, and a follower has not come to the end of its logs.
     Following {
         /// The name of the follower.
         follower: &'a str,
-        /// Its position.
+        /// The position.
         progress: Progress,
     },
-    /// A follower is not restarted any more. Odometry goes on, and then the run ends with this error.
+    /// A follower is not restarted any more. Odometry goes on, and then the run ends with this
+    /// error.
     GaveUp {
         /// The name of the follower.
         follower: &'a str,
         /// Why.
         error: &'a SuperviseError,
     },
-    /// What became of the recording.
+    /// The end of the recording.
     Recorder {
         /// A sentence.
         sentence: &'a str,
@@ -141,7 +150,8 @@ pub enum Event<'a> {
         /// The program and its arguments.
         command: &'a [String],
     },
-    /// The program that had taken the place of a stage has failed: the one before it is started again.
+    /// The program that had taken the place of a stage has failed: the one before it is started
+    /// again.
     WentBack {
         /// The name of the stage.
         stage: &'a str,

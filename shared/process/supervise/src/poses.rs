@@ -80,7 +80,8 @@ impl Poses {
     }
 }
 
-/// Returns whether a pose is one that has not been seen. A restarted process sends its last ones again.
+/// Returns whether a pose is one that has not been seen. A restarted process sends its last ones
+/// again.
 fn is_new(newest: Option<&Item>, item: &Item) -> bool {
     !item.is(flag::BASE) && newest.is_none_or(|newest| item.seq > newest.seq)
 }

@@ -87,8 +87,8 @@ impl Processes {
         opening.min_by_key(|child| child.started())
     }
 
-    /// Returns whether a process has not come to its next wait for longer than `since`. A stage that has not opened its topics is
-    /// starting, and has a limit of its own.
+    /// Returns whether a process has not come to its next wait for longer than `since`. A stage
+    /// that has not opened its topics is starting, and has a limit of its own.
     pub fn hangs(&self, process: usize, since: Duration, run: &Run<'_>) -> bool {
         let child = &self[process];
         let beat = child.heartbeat(run.manifest());
@@ -97,7 +97,8 @@ impl Processes {
             && beat.is_some_and(|beat| beat.hangs(since))
     }
 
-    /// Returns why one of these processes could not be started again, as far as that is known. Then it must not be ended.
+    /// Returns why one of these processes could not be started again, as far as that is known. Then
+    /// it must not be ended.
     pub fn why_not_again(&self, mut processes: impl Iterator<Item = usize>) -> Option<String> {
         processes.find_map(|i| {
             let (name, path) = (self[i].name(), self[i].changed_file()?.display());
@@ -122,7 +123,8 @@ impl Processes {
         self.restarts
     }
 
-    /// Lets programs pass their trials that have worked on a pose since they took the place of others.
+    /// Lets programs pass their trials that have worked on a pose since they took the place of
+    /// others.
     pub fn pass_trials(&mut self, pose: &PoseHeader, recovery: &Recovery) {
         let on_trial = self.children.iter_mut().filter(|child| child.is_on_trial());
         for child in on_trial {

@@ -13,7 +13,7 @@ pub struct Program {
     state: State,
 }
 
-/// What changes with a file's content, without reading it.
+/// The metadata that changes with a file's content.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct State {
     device: u64,
@@ -46,14 +46,15 @@ impl Program {
         })
     }
 
-    /// Returns the files of a command as they are now; it is to be started in `directory`, or in that of this process. A file that is
-    /// missing is reported when the command is started.
+    /// Returns the files of a command as they are now; it is to be started in `directory`, or in
+    /// that of this process. A file that is missing is reported when the command is started.
     pub fn all_of(command: &[String], directory: Option<&Path>) -> Vec<Self> {
         let files = files_of(command, directory.unwrap_or(Path::new(""))).into_iter();
         files.filter_map(|path| Self::at(&path).ok()).collect()
     }
 
-    /// Returns the place of a program as a shell finds it: itself if it is a path, else in the folders of PATH.
+    /// Returns the place of a program as a shell finds it: itself if it is a path, else in the
+    /// folders of PATH.
     #[must_use]
     pub fn place_of(program: &str) -> PathBuf {
         let folders = env::var_os("PATH").unwrap_or_default();

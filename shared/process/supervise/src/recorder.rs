@@ -1,5 +1,5 @@
-//! The recorder of a run: a process beside the stages that nothing depends on. It is restarted alone, and the run goes on without one that
-//! dies too often.
+//! The recorder of a run: a process beside the stages that nothing depends on. It is restarted
+//! alone, and the run goes on without one that dies too often.
 
 use std::time::{Duration, Instant};
 
@@ -12,7 +12,7 @@ use gyre_stage::{
 use crate::{
     Ending, Event, SuperviseError,
     child::{Child, Death},
-    requests::{activity, of_child},
+    process_status::{activity, of_child},
     run::Run,
     start::Place,
 };
@@ -36,8 +36,8 @@ pub(crate) struct Recorder {
 }
 
 impl Recorder {
-    /// Starts the recorder of the plan before any stage, and waits until it observes all topics, so that it misses nothing of the
-    /// beginning.
+    /// Starts the recorder of the plan before any stage, and waits until it observes all topics, so
+    /// that it misses nothing of the beginning.
     pub fn start(run: &mut Run<'_>) -> Result<Option<Self>, SuperviseError> {
         let Some(plan) = &run.plan.recorder else {
             return Ok(None);
@@ -144,7 +144,8 @@ impl Recorder {
         self.end(run, limit)
     }
 
-    /// Ends the recorder and starts it again, also one that has ended for good: its disk may have room again.
+    /// Ends the recorder and starts it again, also one that has ended for good: its disk may have
+    /// room again.
     pub fn restart(
         &mut self,
         run: &mut Run<'_>,

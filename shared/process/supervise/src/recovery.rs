@@ -44,7 +44,8 @@ impl Recovery {
         started.is_none_or(|stage| stage.has_worked(pose))
     }
 
-    /// Ends the recovery of stages at the first pose that their new processes worked on; items in flight do not count.
+    /// Ends the recovery of stages at the first pose that their new processes worked on; items in
+    /// flight do not count.
     pub fn see(&mut self, pose: &PoseHeader) {
         let recovered = self
             .recovering
@@ -61,8 +62,8 @@ impl Recovery {
     }
 }
 
-/// Returns the processes to restart after these have died, or are to be replaced: all stages if a restart of one alone does not recover
-/// its state, or has not helped before.
+/// Returns the processes to restart after these have died, or are to be replaced: all stages if a
+/// restart of one alone does not recover its state, or has not helped before.
 pub(crate) fn restarted_after(
     dead: &[usize],
     roles: Roles<'_>,

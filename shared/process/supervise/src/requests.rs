@@ -2,20 +2,15 @@
 
 use std::process;
 
-use gyre_messages::StageId;
 use gyre_stage::{
     clock,
     control::{Activity, Answer, Phase, ProcessStatus, Request, Status, Swap},
-    heartbeat::{self, Heartbeat},
     schedule,
-    source::received_of,
 };
 
 use crate::{
     Event, StagePlan, SuperviseError,
-    child::Child,
-    processes::Processes,
-    run::Run,
+    process_status::status_of,
     socket::Client,
     supervisor::Supervisor,
     swaps::{Standby, Step, plan_of},
@@ -53,7 +48,8 @@ impl Supervisor<'_> {
         )));
     }
 
-    /// Ends a process and starts it again, which counts as a restart and not as a death. One that could not be started again goes on.
+    /// Ends a process and starts it again, which counts as a restart and not as a death. One that
+    /// could not be started again goes on.
     fn restart_on_request(&mut self, name: &str, client: Client) -> Result<(), SuperviseError> {
         let Some(process) = self.run.roles().named(name) else {
             let newest = self.poses.newest_seq();
@@ -83,8 +79,8 @@ impl Supervisor<'_> {
         self.restart(stages, clock::now_ns())
     }
 
-    /// Starts a program that is to take the place of another one. The client has its answer when that has done so, and has worked on a
-    /// first pose.
+    /// Starts a program that is to take the place of another one. The client has its answer when
+    /// that has done so, and has worked on a first pose.
     fn begin_swap(&mut self, swap: &Swap, client: Client) -> Result<(), SuperviseError> {
         let Some(process) = self.run.roles().named(&swap.process) else {
             self.refuse_unknown(&swap.process, client);
@@ -101,7 +97,8 @@ impl Supervisor<'_> {
         }
     }
 
-    /// Ends a process, and starts another program in its place. If that cannot be started, the one before is started again.
+    /// Ends a process, and starts another program in its place. If that cannot be started, the one
+    /// before is started again.
     fn swap_cold(
         &mut self,
         process: usize,
@@ -170,15 +167,16 @@ impl Supervisor<'_> {
         Ok(())
     }
 
-    /// Ends a process; returns whether it has left no scan without a pose. Then the one after it numbers scans as it would have, and no
-    /// other process need be restarted with it.
+    /// Ends a process; returns whether it has left no scan without a pose. Then the one after it
+    /// numbers scans as it would have, and no other process need be restarted with it.
     fn ends_between_scans(&mut self, process: usize) -> Result<bool, SuperviseError> {
         self.processes[process].kill();
         self.processes[process].await_end()?;
         Ok(!self.poses.are_owed(self.run.manifest()))
     }
 
-    /// Says that a program has taken the place of another one, and lets the client wait until it proves itself.
+    /// Says that a program has taken the place of another one, and lets the client wait until it
+    /// proves itself.
     fn has_swapped(&mut self, process: usize, client: Client) {
         let child = &self.processes[process];
         self.swaps.has_swapped(child.plan(), self.poses.count());
@@ -217,55 +215,5 @@ impl Supervisor<'_> {
             last_pose_s: self.poses.age_s(),
             processes,
         }
-    }
-}
-
-fn status_of(process: usize, processes: &Processes, run: &Run<'_>) -> ProcessStatus {
-    let child = &processes[process];
-    let beat = child.heartbeat(run.manifest());
-    let activity = match beat {
-        _ if child.is_known_to_have_exited() => Activity::Ended,
-        _ if run.is_starting(child) => Activity::Starting,
-        None => Activity::Running,
-        Some(beat) => activity(beat),
-    };
-    ProcessStatus {
-        is_swapped: child.plan().command != run.plan.stages[process].command,
-        restarts: processes.restarts_of(process),
-        received: match child.stage() {
-            Some(StageId::RadarReplay) => received_of(run.manifest()),
-            _ => None,
-        },
-        ..of_child(child, beat, activity)
-    }
-}
-
-/// Returns what a living process does.
-pub(crate) fn activity(beat: Heartbeat) -> Activity {
-    match beat.activity {
-        _ if beat.is_silent() => Activity::Silent,
-        heartbeat::Activity::Works => Activity::Working,
-        heartbeat::Activity::Waits => Activity::Waiting,
-    }
-}
-
-/// Returns the state of a process that has never been restarted.
-pub(crate) fn of_child(
-    child: &Child,
-    beat: Option<Heartbeat>,
-    activity: Activity,
-) -> ProcessStatus {
-    ProcessStatus {
-        name: child.name().to_owned(),
-        pid: child.pid(),
-        command: child.plan().command.clone(),
-        is_swapped: false,
-        activity,
-        activity_s: beat.map(|beat| beat.age().as_secs_f64()),
-        uptime_s: child.started().elapsed().as_secs_f64(),
-        restarts: 0,
-        last_death: child.last_death().map(str::to_owned),
-        missed: None,
-        received: None,
     }
 }

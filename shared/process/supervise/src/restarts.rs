@@ -26,7 +26,8 @@ impl Supervisor<'_> {
         self.restart(&restarted, died_ns)
     }
 
-    /// Goes back to the programs before those that are on trial while another stage fails: what they sent may be the cause. Returns them.
+    /// Goes back to the programs before those that are on trial while another stage fails: what
+    /// they sent may be the cause. Returns them.
     fn blame_trial(&mut self, dead: &[usize], failure: &str) -> Vec<usize> {
         let is_blamed = |i: &usize| self.processes[*i].is_on_trial() && !dead.contains(i);
         let mut blamed: Vec<usize> = self.run.roles().stages().filter(is_blamed).collect();
@@ -34,8 +35,8 @@ impl Supervisor<'_> {
         blamed
     }
 
-    /// Counts deaths against the restart policies, and waits for the longest backoff. Returns a sentence about one that was a failure of a
-    /// program which is not on trial.
+    /// Counts deaths against the restart policies, and waits for the longest backoff. Returns a
+    /// sentence about one that was a failure of a program which is not on trial.
     fn may_restart(&mut self, dead: &[usize]) -> Result<Option<String>, SuperviseError> {
         let (mut backoff, mut failure) = (Duration::ZERO, None);
         for i in dead {
@@ -58,7 +59,8 @@ impl Supervisor<'_> {
         Ok(failure)
     }
 
-    /// Checks whether a dead process may be started again, by its policy. One that has taken the place of another gives way to it first.
+    /// Checks whether a dead process may be started again, by its policy. One that has taken the
+    /// place of another gives way to it first.
     fn require_restart(&mut self, process: usize, death: &Death) -> Result<(), SuperviseError> {
         if self.processes[process].is_on_trial() && self.go_back(process, &death.to_string()) {
             return Ok(());
@@ -101,7 +103,8 @@ impl Supervisor<'_> {
         self.run.say(Event::Restarted { only });
     }
 
-    /// Ends processes and starts others in their places; in one of them a process that stood by goes on.
+    /// Ends processes and starts others in their places; in one of them a process that stood by
+    /// goes on.
     pub(crate) fn replace(
         &mut self,
         processes: &[usize],
@@ -126,7 +129,8 @@ impl Supervisor<'_> {
         Ok(())
     }
 
-    /// Starts a process again. If its program cannot be started, and has taken the place of another one, that one is.
+    /// Starts a process again. If its program cannot be started, and has taken the place of another
+    /// one, that one is.
     fn respawn(&mut self, process: usize) -> Result<(), SuperviseError> {
         let newest = self.poses.newest_seq();
         loop {
@@ -177,7 +181,8 @@ impl Supervisor<'_> {
         self.restart(&processes, clock::now_ns())
     }
 
-    /// Restarts dead followers that are not at their end. The stages do not notice, and one that cannot be restarted does not end them.
+    /// Restarts dead followers that are not at their end. The stages do not notice, and one that
+    /// cannot be restarted does not end them.
     pub(crate) fn recover_followers(&mut self, dead: &[usize]) -> Result<(), SuperviseError> {
         let mut dead = dead.to_vec();
         dead.retain(|i| self.followers.is_behind(*i));
@@ -204,7 +209,8 @@ impl Supervisor<'_> {
         Ok(())
     }
 
-    /// Says how far a follower is, and ends one that has stayed there for too long: it is then started again as after a death.
+    /// Says how far a follower is, and ends one that has stayed there for too long: it is then
+    /// started again as after a death.
     pub(crate) fn end_stuck_follower(&mut self, follower: usize) -> Result<(), SuperviseError> {
         let child = &mut self.processes[follower];
         let progress = self.followers.progress_of(follower);

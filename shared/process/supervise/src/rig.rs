@@ -1,8 +1,9 @@
-//! A run of one process alone, to test whether it keeps the contract of a stage: the services of a run as the supervisor creates
-//! them, publishers for the inputs of the stage, and readers of its output.
+//! A run of one process alone, to test whether it keeps the contract of a stage: the services of a
+//! run as the supervisor creates them, publishers for the inputs of the stage, and readers of its
+//! output.
 //!
-//! Messages are values here ([`Recorded`]), since the tester is to send also what no stage may send. Readers check what they receive
-//! as the readers of a run do.
+//! Messages are values here ([`Recorded`]), since the tester is to send also what no stage may
+//! send. Readers check what they receive as the readers of a run do.
 
 mod recorded;
 
@@ -45,7 +46,8 @@ pub struct Rig<'a> {
     _root: RunRoot,
 }
 
-/// A process that is started in a [`Rig`] as the supervisor starts it. It is killed when this value is dropped.
+/// A process that is started in a [`Rig`] as the supervisor starts it. It is killed when this value
+/// is dropped.
 pub struct Process {
     child: Child,
     death: Option<Death>,
@@ -59,8 +61,8 @@ pub trait Feed {
     /// A failure of the transport.
     fn send(&self, message: &Recorded) -> Result<(), StageError>;
 
-    /// Sends the history to readers that have notified since the last call; returns whether there were any. A reader that does not
-    /// notify is not connected to.
+    /// Sends the history to readers that have notified since the last call; returns whether there
+    /// were any. A reader that does not notify is not connected to.
     ///
     /// # Errors
     /// A failure of the transport.
@@ -92,11 +94,12 @@ pub trait Tap {
 }
 
 impl<'a> Rig<'a> {
-    /// Creates the root of a run with this manifest, the prefix and the root of which are set, and this configuration, and the services
-    /// of the run. `guardian` is as in [`Plan`](crate::Plan).
+    /// Creates the root of a run with this manifest, the prefix and the root of which are set, and
+    /// this configuration, and the services of the run. `guardian` is as in [`Plan`](crate::Plan).
     ///
     /// # Errors
-    /// Shared memory that cannot be used, a guardian that cannot be started, or a failure of the transport.
+    /// Shared memory that cannot be used, a guardian that cannot be started, or a failure of the
+    /// transport.
     pub fn new(
         manifest: Manifest,
         configuration: &str,
@@ -140,7 +143,8 @@ impl<'a> Rig<'a> {
         &self.manifest
     }
 
-    /// Starts a process with the environment and the process group that a stage of this name has. Its output is appended to its log.
+    /// Starts a process with the environment and the process group that a stage of this name has.
+    /// Its output is appended to its log.
     ///
     /// # Errors
     /// A command that cannot be started, or not with this priority.
@@ -222,8 +226,8 @@ impl<'a> Rig<'a> {
         }
     }
 
-    /// Sleeps until one of these topics has a new reader, a connection has something to read, or `limit` has passed; true on a request
-    /// to stop.
+    /// Sleeps until one of these topics has a new reader, a connection has something to read, or
+    /// `limit` has passed; true on a request to stop.
     ///
     /// # Errors
     /// The system refuses to wait.
@@ -240,7 +244,8 @@ impl<'a> Rig<'a> {
         Ok(woken.stop)
     }
 
-    /// Sleeps until one of these readers is notified or `limit` has passed; true on a request to stop.
+    /// Sleeps until one of these readers is notified or `limit` has passed; true on a request to
+    /// stop.
     ///
     /// # Errors
     /// The system refuses to wait.
@@ -250,7 +255,7 @@ impl<'a> Rig<'a> {
     }
 }
 
-/// How a reader joins.
+/// The way in which a reader joins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Joining {
     /// It notifies the publisher, and so receives its history.

@@ -1,4 +1,5 @@
-//! The roles of a run's processes, by the plan: which of them a restart concerns. Processes are indices into the plan's stages.
+//! The roles of a run's processes, by the plan: which of them a restart concerns. Processes are
+//! indices into the plan's stages.
 
 use gyre_messages::{FollowerId, StageId};
 
@@ -60,7 +61,8 @@ impl<'a> Roles<'a> {
         self.0[process].restarts_all
     }
 
-    /// Returns the processes to restart with one of them: itself, or all stages if its restart alone does not recover its state.
+    /// Returns the processes to restart with one of them: itself, or all stages if its restart
+    /// alone does not recover its state.
     pub fn restarted_with(self, process: usize) -> Vec<usize> {
         match self.restarts_all(process) {
             true => self.all_but_survivors(&[process]),

@@ -15,7 +15,8 @@ use crate::{
     start::Starter, wake_limit::WakeLimit,
 };
 
-/// The plan of a run, and what its processes need to be started, to be seen and to be cleaned up after.
+/// The plan of a run, and what its processes need to be started, to be seen and to be cleaned up
+/// after.
 pub(crate) struct Run<'a> {
     pub plan: &'a Plan,
     observe: &'a mut dyn FnMut(Event<'_>),
@@ -107,7 +108,8 @@ impl<'a> Run<'a> {
         clean::remove_dead_observers(self.manifest(), &self.transport)
     }
 
-    /// Replaces a guardian that somebody has killed. If there is no room for a process it is tried again at the next wake-up.
+    /// Replaces a guardian that somebody has killed. If there is no room for a process it is tried
+    /// again at the next wake-up.
     pub fn keep_guardian(&mut self, groups: impl Iterator<Item = u32>) {
         if self.guardian.has_ended()
             && let Ok(guardian) = Guardian::start(&self.plan.guardian, &self.plan.manifest)

@@ -1,4 +1,5 @@
-//! The supervisor's end of the control socket: takes requests, one for each connection, without waiting for a slow client.
+//! The supervisor's end of the control socket: takes requests, one for each connection, without
+//! waiting for a slow client.
 
 use std::{
     io::{self, Read, Write},
@@ -15,8 +16,8 @@ use gyre_stage::{
 };
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
-/// Time for a client to send its request, and to take the answer. The supervisor does nothing else meanwhile, and clients of this
-/// user send it at once.
+/// Time for a client to send its request, and to take the answer. The supervisor does nothing else
+/// meanwhile, and clients of this user send it at once.
 const LIMIT: Duration = Duration::from_millis(100);
 /// Size of the longest request, bytes.
 const MAX: usize = 64 << 10;
@@ -42,7 +43,8 @@ impl ControlSocket {
         self.0.as_fd()
     }
 
-    /// Returns the next request, and where its answer goes. One that cannot be read is refused here.
+    /// Returns the next request, and where its answer goes. One that cannot be read is refused
+    /// here.
     pub fn next(&self) -> Option<(Request, Client)> {
         loop {
             let (stream, _) = self.0.accept().ok()?;

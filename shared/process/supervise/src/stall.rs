@@ -55,8 +55,8 @@ impl<'a> Stalls<'a> {
         self.watchdog.restarted();
     }
 
-    /// Looks for stalls. `hangs` says whether a process has not come to its next wait for longer than a time, and `starting` is the stage
-    /// that has been opening its topics for longest.
+    /// Looks for stalls. `hangs` says whether a process has not come to its next wait for longer
+    /// than a time, and `starting` is the stage that has been opening its topics for longest.
     pub fn look(
         &mut self,
         now: Instant,
@@ -110,8 +110,9 @@ impl<'a> Stalls<'a> {
         }
     }
 
-    /// Returns the processes to restart, which may be stuck: one that hangs alone; else first the source if it is late, and all but a live
-    /// source otherwise. When that does not help, all stages; `None` when that does not help either.
+    /// Returns the processes to restart, which may be stuck: one that hangs alone; else first the
+    /// source if it is late, and all but a live source otherwise. When that does not help, all
+    /// stages; `None` when that does not help either.
     pub fn remedy(&mut self, stall: &Stall) -> Option<Vec<usize>> {
         let roles = self.roles;
         Some(match (self.watchdog.count(), stall) {
@@ -145,8 +146,8 @@ impl Looks {
         }
     }
 
-    /// Returns whether this process itself was not run until a moment ago, as in a container that was frozen. Then all heartbeats
-    /// are old.
+    /// Returns whether this process itself was not run until a moment ago, as in a container that
+    /// was frozen. Then all heartbeats are old.
     fn are_resuming(&mut self, now: Instant) -> bool {
         if now.duration_since(self.last) > RESUMED {
             self.resumes_until = Some(now + RESUMED);

@@ -17,7 +17,8 @@ use crate::{
     scheduling::Key,
 };
 
-/// Pauses after a failure to start a process for want of processes or memory; the sum is the time for which it is tried.
+/// Pauses after a failure to start a process for want of processes or memory; the sum is the time
+/// for which it is tried.
 const PAUSES_MS: [u64; 8] = [20, 50, 100, 200, 500, 1000, 2000, 4000];
 
 /// The place of a process that is started.
@@ -25,7 +26,8 @@ const PAUSES_MS: [u64; 8] = [20, 50, 100, 200, 500, 1000, 2000, 4000];
 pub(crate) enum Place {
     /// Nobody else has it.
     Free,
-    /// Another process has it: the new one stands by until its standard input ends (see [`run::STANDBY`]).
+    /// Another process has it: the new one stands by until its standard input ends (see
+    /// [`run::STANDBY`]).
     Taken,
 }
 
@@ -82,7 +84,8 @@ impl<'a> Starter<'a> {
         }
     }
 
-    /// Returns the command of a process, which writes to `refusals` which key of its scheduling the system refuses.
+    /// Returns the command of a process, which writes to `refusals` which key of its scheduling the
+    /// system refuses.
     fn command(
         &self,
         plan: &StagePlan,
@@ -101,7 +104,8 @@ impl<'a> Starter<'a> {
             .stdin(Stdio::null())
             .stdout(log.try_clone()?)
             .stderr(log.try_clone()?)
-            // A process group of its own: an interrupt from the terminal reaches only the supervisor, which then stops each stage.
+            // A process group of its own: an interrupt from the terminal reaches only the
+            // supervisor, which then stops each stage.
             .process_group(0);
         let (supervisor, guardian) = (getpid(), self.guardian.pipe());
         let scheduling = plan.scheduling.prepare();
@@ -117,13 +121,15 @@ impl<'a> Starter<'a> {
                 false => Err(io::Error::other("the supervisor has died")),
             }
         };
-        // SAFETY: between fork and exec there are only system calls; nothing is allocated unless the supervisor is dead.
+        // SAFETY: between fork and exec there are only system calls; nothing is allocated unless
+        // the supervisor is dead.
         unsafe { command.pre_exec(prepare) };
         Ok(command)
     }
 }
 
-/// Starts a process, and tries again while the system has no room for one. A request to stop ends the attempts.
+/// Starts a process, and tries again while the system has no room for one. A request to stop ends
+/// the attempts.
 fn with_patience<T>(
     mut start: impl FnMut() -> io::Result<T>,
     mut pause: impl FnMut(Duration) -> Result<bool, StageError>,
@@ -153,7 +159,8 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    /// Starts with these results one after the other; returns the last one and the number of attempts.
+    /// Starts with these results one after the other; returns the last one and the number of
+    /// attempts.
     fn started(stop: bool, results: &[io::Result<()>]) -> (Option<io::ErrorKind>, usize) {
         let mut attempts = 0;
         let start = || {

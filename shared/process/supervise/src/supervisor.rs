@@ -1,5 +1,5 @@
-//! The loop of the supervisor. Its parts look at what has happened and decide; what they have decided is done in `restarts` and
-//! `requests`.
+//! The loop of the supervisor. Its parts look at what has happened and decide; what they have
+//! decided is done in `restarts` and `requests`.
 
 use std::collections::BTreeMap;
 
@@ -24,9 +24,11 @@ use crate::{
     swaps::Swaps,
 };
 
-/// Runs all stages of `plan` until the stream ends, a signal requests a stop, or restarts do not help.
+/// Runs all stages of `plan` until the stream ends, a signal requests a stop, or restarts do not
+/// help.
 ///
-/// Install the signals before acquiring the run's root. A signal in between would otherwise end the process without cleanup.
+/// Install the signals before acquiring the run's root. A signal in between would otherwise end the
+/// process without cleanup.
 ///
 /// # Errors
 /// A stage that cannot be started or fails too often, a stall, or a failure of the transport.
@@ -112,8 +114,9 @@ impl<'a> Supervisor<'a> {
         }
     }
 
-    /// Waits until the followers have read the logs to their end, or until they have that do not read what one writes that dies again
-    /// and again. The stream has ended, so the death of a stage changes nothing.
+    /// Waits until the followers have read the logs to their end, or until they have that do not
+    /// read what one writes that dies again and again. The stream has ended, so the death of a
+    /// stage changes nothing.
     fn await_followers(&mut self) -> Result<Ending, SuperviseError> {
         self.followers.begin_to_be_awaited();
         // The last pose may have been the first of a program on trial.

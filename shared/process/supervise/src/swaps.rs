@@ -1,9 +1,10 @@
 //! Swaps: another program takes the place of a stage while the run goes on.
 //!
-//! The new program first stands by: it loads what it needs while the one before works. It takes over when no scan is in flight, if
-//! there is such a moment, and a restart of the stage is all that the others see. (Masking in live mode alone knows which scans it has
-//! admitted: if there are some without a pose, the others are restarted with it.) A program that fails before its first pose, or too
-//! often later, is given up, and the one before is started again.
+//! The new program first stands by: it loads what it needs while the one before works. It takes
+//! over when no scan is in flight, if there is such a moment, and a restart of the stage is all
+//! that the others see. (Masking in live mode alone knows which scans it has admitted: if there are
+//! some without a pose, the others are restarted with it.) A program that fails before its first
+//! pose, or too often later, is given up, and the one before is started again.
 
 mod trial;
 
@@ -24,7 +25,8 @@ use crate::{
 };
 use trial::Trial;
 
-/// Time for which a moment without a scan in flight is waited for. At the highest rate there is none.
+/// Time for which a moment without a scan in flight is waited for. At the highest rate there is
+/// none.
 const PATIENCE: Duration = Duration::from_secs(1);
 
 const ENDED: &str = "the stream has ended";
@@ -49,7 +51,7 @@ pub(crate) struct Standby {
     ready: Option<Instant>,
 }
 
-/// What is to be done about the program that stands by.
+/// The decision about the program that stands by.
 pub(crate) enum Step {
     Wait,
     TakeOver(Standby),
@@ -69,8 +71,8 @@ impl Swaps {
         }
     }
 
-    /// Starts a program that is to take the place of a process. The client has its answer when that has done so, and has worked on a
-    /// first pose.
+    /// Starts a program that is to take the place of a process. The client has its answer when that
+    /// has done so, and has worked on a first pose.
     pub fn begin(
         &mut self,
         process: usize,
@@ -147,7 +149,8 @@ impl Swaps {
         });
     }
 
-    /// Goes back to the program before a swap, or to `begun`, that of the run's begin, from the next start on; false if there is none.
+    /// Goes back to the program before a swap, or to `begun`, that of the run's begin, from the
+    /// next start on; false if there is none.
     pub fn go_back(
         &mut self,
         process: usize,
@@ -191,7 +194,8 @@ impl Standby {
         (self.child, self.client)
     }
 
-    /// Tells the client why it cannot take over, and ends the program. Returns the process that it was.
+    /// Tells the client why it cannot take over, and ends the program. Returns the process that it
+    /// was.
     pub fn give_up(self, reason: &str) -> u32 {
         let name = self.child.name();
         let command = self.child.plan().command.join(" ");

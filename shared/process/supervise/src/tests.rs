@@ -1,4 +1,4 @@
-//! What the tests of several parts need: a plan that is never started.
+//! Shared by the tests of several parts: a plan that is never started.
 
 use std::{
     path::{Path, PathBuf},

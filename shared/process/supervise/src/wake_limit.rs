@@ -1,13 +1,15 @@
 //! Processors that wake in time: a limit on how long they take to leave an idle state.
 //!
-//! A processor that has nothing to do sleeps, the deeper the longer. Each hop of a scan wakes one up, which can take longer than
-//! the hop's message needs. The limit holds for the whole machine, while the supervisor lives.
+//! A processor that has nothing to do sleeps, the deeper the longer. Each hop of a scan wakes one
+//! up, which can take longer than the hop's message needs. The limit holds for the whole machine,
+//! while the supervisor lives.
 
 use std::{fs::File, io::Write};
 
 use crate::SuperviseError;
 
-/// The system keeps to what a process has written here until that process closes it (Linux, "PM QoS").
+/// The system keeps to what a process has written here until that process closes it (Linux, "PM
+/// QoS").
 const FILE: &str = "/dev/cpu_dma_latency";
 
 /// A limit that is in effect until it is dropped.
@@ -16,7 +18,8 @@ pub(crate) struct WakeLimit {
 }
 
 impl WakeLimit {
-    /// Lets no processor sleep so deeply that it takes longer than `us` microseconds to wake; with 0 none sleeps.
+    /// Lets no processor sleep so deeply that it takes longer than `us` microseconds to wake; with
+    /// 0 none sleeps.
     ///
     /// # Errors
     /// The system refuses it.

@@ -1,8 +1,9 @@
 //! Finds a run that makes no progress although no process has died.
 //!
-//! The clock runs only while something is owed: a pose, of an item that the source has published, or an item that the source
-//! should have published by its own schedule. So neither slow playback nor a gap in a recording is a stall. A stage that has not
-//! opened its topics is starting: it may load a model, and has a limit of its own. What stages on another machine owe is watched there.
+//! The clock runs only while something is owed: a pose, of an item that the source has published,
+//! or an item that the source should have published by its own schedule. So neither slow playback
+//! nor a gap in a recording is a stall. A stage that has not opened its topics is starting: it may
+//! load a model, and has a limit of its own. What stages on another machine owe is watched there.
 
 use std::time::{Duration, Instant};
 
@@ -20,7 +21,7 @@ pub(crate) struct Watchdog {
     start_timeout: Option<Duration>,
     /// `Item::published` of the newest pose.
     newest: Option<u64>,
-    /// What is owed, and since when without any progress.
+    /// The owed item, and since when without any progress.
     owed: Option<(Stall, Instant)>,
     stalls_in_a_row: usize,
 }
@@ -81,7 +82,8 @@ impl Watchdog {
         self.stalls_in_a_row
     }
 
-    /// Returns what is owed now. A source without a schedule always owes a scan, and so the run a pose.
+    /// Returns what is owed now. A source without a schedule always owes a scan, and so the run a
+    /// pose.
     fn owed_by(&self, source: Option<Schedule>, limit: Duration) -> Option<Stall> {
         let Some(source) = source else {
             return Some(Stall::Pose { limit });

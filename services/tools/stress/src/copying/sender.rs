@@ -5,26 +5,11 @@ use std::thread;
 use gyre_stage::{clock, hand_over};
 use rustix::time::{ClockId, clock_gettime};
 
-use super::{HandOver, Medium, RATE_HZ, Sent, WARM_UP, own_bytes, socket};
+use super::{HandOver, Medium, RATE_HZ, Sent, WARM_UP, own_bytes, sending::Send, socket};
 use crate::{
     StressError,
     helper::{say_ready, say_result},
 };
-
-/// A medium as its sender uses it.
-pub(super) trait Send {
-    /// Waits until all readers are there, after they have said so.
-    fn begin(&mut self) -> Result<(), StressError>;
-
-    /// Writes a message anew.
-    fn write(&mut self, number: u64) -> Result<(), StressError>;
-
-    /// Sends it.
-    fn send(&mut self) -> Result<(), StressError>;
-
-    /// Returns the bytes of shared memory.
-    fn shared_bytes(&self) -> u64;
-}
 
 /// Sends the messages of a hand-over.
 pub(crate) fn send(plan: &HandOver) -> Result<(), StressError> {

@@ -13,7 +13,7 @@ use std::{
 use gyre_stage::clock;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
-use super::{HandOver, sender::Send};
+use super::{HandOver, sending::Send};
 use crate::StressError;
 
 const HEAD: usize = 16;

@@ -7,7 +7,8 @@ use crate::{
 };
 
 impl RadarFftDataMsg {
-    /// Returns the azimuth as the radar sent it. Its angle is that of the encoder: [`RadarFftDataMsg::angle`] is wrong.
+    /// Returns the azimuth as the radar sent it. Its angle is that of the encoder:
+    /// [`RadarFftDataMsg::angle`] is wrong.
     pub fn azimuth(&self) -> Azimuth<'_> {
         Azimuth {
             sweep_counter: self.sweep_counter,

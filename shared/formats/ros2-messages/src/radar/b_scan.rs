@@ -52,8 +52,9 @@ pub struct Row<'a> {
 }
 
 impl RadarBScanMsg {
-    /// Returns the azimuths in order. Rows that the driver has not written (its index overruns the image where the encoder's counts are
-    /// no multiple of the azimuths, and leaves other rows out) are none.
+    /// Returns the azimuths in order. Rows that the driver has not written (its index overruns the
+    /// image where the encoder's counts are no multiple of the azimuths, and leaves other rows out)
+    /// are none.
     ///
     /// `arrived_ns` is the host's time at which the message was received.
     ///
@@ -101,8 +102,8 @@ impl RadarBScanMsg {
 }
 
 impl Image {
-    /// Returns the azimuths of a `b_scan_image`, which has neither encoder values nor times: they are evenly spaced, and a turn ends
-    /// when the image is received.
+    /// Returns the azimuths of a `b_scan_image`, which has neither encoder values nor times: they
+    /// are evenly spaced, and a turn ends when the image is received.
     ///
     /// # Errors
     /// An image that is not of powers.

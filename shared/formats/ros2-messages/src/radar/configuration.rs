@@ -10,7 +10,8 @@ use crate::{
 
 /// Bins per metre of `bin_size`.
 const BIN_SIZES: f64 = 1e4;
-/// The largest rate that is in turns per second: no radar turns as slowly as this in turns per 1000 s, or as quickly.
+/// The largest rate that is in turns per second: no radar turns as slowly as this in turns per 1000
+/// s, or as quickly.
 const MAX_TURNS_PER_S: u16 = 50;
 
 impl RadarConfigurationMsg {
@@ -30,7 +31,8 @@ impl RadarConfigurationMsg {
         }
     }
 
-    /// Returns the message of a configuration. The depth of a bin is exact if a number of 32 bits divided by 10,000 can be.
+    /// Returns the message of a configuration. The depth of a bin is exact if a number of 32 bits
+    /// divided by 10,000 can be.
     pub fn of(configuration: &Configuration, header: Header) -> Self {
         Self {
             header,

@@ -11,7 +11,8 @@ use crate::{
     std_msgs::Header,
 };
 
-/// Angles nearer to a count than this are that count, rad: several roundings of an angle in 32 bits.
+/// Angles nearer to a count than this are that count, rad: several roundings of an angle in 32
+/// bits.
 const ROUNDING_RAD: f64 = 2e-6;
 
 /// The counts of an encoder.
@@ -24,8 +25,9 @@ pub struct Encoder {
 }
 
 impl Encoder {
-    /// Returns the encoder of which the angles of a scan are: `known`, or the one that is found; the finest possible for angles that are of
-    /// none. One of which all angles are counts to the bit goes before others.
+    /// Returns the encoder of which the angles of a scan are: `known`, or the one that is found;
+    /// the finest possible for angles that are of none. One of which all angles are counts to the
+    /// bit goes before others.
     pub fn of(azimuth_rad: &[f32], known: Option<u16>) -> Self {
         let rows = u16::try_from(azimuth_rad.len()).unwrap_or(u16::MAX);
         let even = [Some(rows), rows.checked_mul(2), rows.checked_mul(4)];
@@ -120,8 +122,9 @@ impl ScanMessages {
         }
     }
 
-    /// Returns the message of a whole turn, stamped with the time of the scan. Rows that were not measured have powers, but no encoder value
-    /// and no time, as the driver leaves those that it has not received.
+    /// Returns the message of a whole turn, stamped with the time of the scan. Rows that were not
+    /// measured have powers, but no encoder value and no time, as the driver leaves those that it
+    /// has not received.
     pub fn b_scan(&self, scan: PolarScan<'_>) -> RadarBScanMsg {
         let (azimuths, bins) = (scan.geometry.azimuths, scan.geometry.bins);
         let mut message = RadarBScanMsg {

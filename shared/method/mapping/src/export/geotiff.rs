@@ -28,11 +28,13 @@ const BANDS: &str = "<GDALMetadata>\
     <Item name=\"DESCRIPTION\" sample=\"1\" role=\"description\">looked</Item>\
     </GDALMetadata>";
 
-/// Writes the map as one GeoTIFF of two bands: evidence, and how often a cell was looked at as opacity (see [`Cell`](crate::Cell)). With
-/// an origin it is in the UTM zone of that, turned by the heading; without, in metres of the map frame.
+/// Writes the map as one GeoTIFF of two bands: evidence, and how often a cell was looked at as
+/// opacity (see [`Cell`](crate::Cell)). With an origin it is in the UTM zone of that, turned by the
+/// heading; without, in metres of the map frame.
 ///
 /// # Errors
-/// A file that cannot be written, an origin that is not on the earth, and a map that is empty or too large.
+/// A file that cannot be written, an origin that is not on the earth, and a map that is empty or
+/// too large.
 pub fn write_geotiff(
     path: &Path,
     source: &mut impl TileSource,
@@ -93,7 +95,8 @@ fn transformation(
     ]
 }
 
-/// The directory of keys: version, revision, their number; then each with the place, the count and the value.
+/// The directory of keys: version, revision, their number; then each with the place, the count and
+/// the value.
 fn keys(georeference: &Georeference) -> Vec<u16> {
     let mut keys = vec![1, 1, 1, 4];
     let system = match georeference.epsg {

@@ -1,13 +1,7 @@
-//! A map as an occupancy grid of ROS 2.
+//! A map as an occupancy grid, with the values of ROS.
 
 use crate::{Cell, MapError, Occupancy, TILE_CELLS, TileExtent, TileImage, TileSource};
-use gyre_geometry::pose;
-use gyre_ros2_messages::{
-    builtin_interfaces::Time,
-    frames,
-    nav_msgs::{MapMetaData, OccupancyGrid},
-    std_msgs::Header,
-};
+use nalgebra::Vector2;
 
 /// The most cells of a grid. What sends it is slow with larger messages.
 const MAX_CELLS: usize = 1 << 20;
@@ -16,17 +10,28 @@ const FREE: u8 = 0;
 const OCCUPIED: u8 = 100;
 const UNKNOWN: u8 = u8::MAX;
 
-/// Returns a map as a grid in the frame `map`, which is that of its tiles: the origin of the grid has no rotation, since Nav2 ignores it. Blocks
-/// of 2 x 2, 4 x 4 and so on become one cell where it would have more than a million: occupied if one of them is, free if one is and none
-/// is occupied.
+/// An occupancy grid in the frame of the map's tiles.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grid {
+    /// The side of a cell, m.
+    pub cell_m: f64,
+    /// Cells along x.
+    pub columns: usize,
+    /// Cells along y.
+    pub rows: usize,
+    /// The lowest x and y, m.
+    pub corner_m: Vector2<f64>,
+    /// The cells by rows, from the corner on: 0 to 100 % occupied, 255 unknown.
+    pub values: Vec<u8>,
+}
+
+/// Returns a map as a grid in the frame of its tiles: the grid has no rotation, since Nav2 ignores
+/// it. Blocks of 2 x 2, 4 x 4 and so on become one cell where it would have more than a million:
+/// occupied if one of them is, free if one is and none is occupied.
 ///
 /// # Errors
 /// A tile that cannot be read, and a map without a keyframe.
-pub fn grid(
-    source: &mut impl TileSource,
-    stamp_ns: i64,
-    map: &str,
-) -> Result<OccupancyGrid, MapError> {
+pub fn grid(source: &mut impl TileSource) -> Result<Grid, MapError> {
     let extent = TileExtent::of(&source.tiles()).ok_or(MapError::Empty)?;
     let block = block(extent);
     let [width, height] = extent.cells().map(|cells| cells / block);
@@ -45,17 +50,12 @@ pub fn grid(
         }
     }
     let cell_m = source.cell_m();
-    let corner = extent.corner_m(cell_m);
-    Ok(OccupancyGrid {
-        header: Header::new(stamp_ns, map),
-        info: MapMetaData {
-            map_load_time: Time::from_ns(stamp_ns),
-            resolution: (cell_m * block as f64) as f32,
-            width: width as u32,
-            height: height as u32,
-            origin: frames::pose(&pose(corner.x, corner.y, 0.0)),
-        },
-        data,
+    Ok(Grid {
+        cell_m: cell_m * block as f64,
+        columns: width,
+        rows: height,
+        corner_m: extent.corner_m(cell_m),
+        values: data,
     })
 }
 
@@ -119,29 +119,22 @@ mod tests {
 
     #[test]
     fn the_first_cell_is_that_of_lowest_x_and_y() {
-        let mut walls = Walls(vec![tile(-1, 0), tile(0, 2)]);
-        let grid = grid(&mut walls, 5_000_000_000, "map").unwrap();
-        assert_eq!((grid.info.width, grid.info.height), (512, 768));
-        assert_eq!(grid.info.resolution, 0.5);
-        let origin = grid.info.origin.position;
-        assert_eq!((origin.x, origin.y), (-128.0, 0.0));
-        assert_eq!(grid.data[..3], [OCCUPIED, FREE, UNKNOWN]);
+        let grid = grid(&mut Walls(vec![tile(-1, 0), tile(0, 2)])).unwrap();
+        assert_eq!((grid.columns, grid.rows), (512, 768));
+        assert_eq!(grid.cell_m, 0.5);
+        assert_eq!(grid.corner_m, Vector2::new(-128.0, 0.0));
+        assert_eq!(grid.values[..3], [OCCUPIED, FREE, UNKNOWN]);
         let second = 2 * 256 * 512 + 256;
-        assert_eq!(grid.data[second..second + 3], [OCCUPIED, FREE, UNKNOWN]);
-        let known = grid.data.iter().filter(|cell| **cell != UNKNOWN);
+        assert_eq!(grid.values[second..second + 3], [OCCUPIED, FREE, UNKNOWN]);
+        let known = grid.values.iter().filter(|cell| **cell != UNKNOWN);
         assert_eq!(known.count(), 4);
-        assert_eq!(
-            (grid.header.stamp.sec, grid.header.frame_id.as_str()),
-            (5, "map")
-        );
     }
 
     #[test]
     fn a_large_map_has_larger_cells() {
-        let mut walls = Walls(vec![tile(0, 0), tile(9, 9)]);
-        let grid = grid(&mut walls, 0, "map").unwrap();
-        assert_eq!((grid.info.width, grid.info.height), (640, 640));
-        assert_eq!(grid.info.resolution, 2.0);
-        assert_eq!(grid.data[..2], [OCCUPIED, UNKNOWN]);
+        let grid = grid(&mut Walls(vec![tile(0, 0), tile(9, 9)])).unwrap();
+        assert_eq!((grid.columns, grid.rows), (640, 640));
+        assert_eq!(grid.cell_m, 2.0);
+        assert_eq!(grid.values[..2], [OCCUPIED, UNKNOWN]);
     }
 }

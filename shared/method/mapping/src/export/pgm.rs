@@ -6,7 +6,8 @@ use gyre_storage::Draft;
 
 use crate::{Cell, MapError, Occupancy, TileSource, strips};
 
-/// The values of `map_server`'s form: with the thresholds below a cell is occupied, free or unknown.
+/// The values of `map_server`'s form: with the thresholds below a cell is occupied, free or
+/// unknown.
 const OCCUPIED: u8 = 0;
 const FREE: u8 = 254;
 const UNKNOWN: u8 = 205;
@@ -26,7 +27,8 @@ pub fn write_pgm(folder: &Path, source: &mut impl TileSource) -> Result<(), MapE
         Ok(picture.append(pixels)?)
     })?;
     let mut yaml = Draft::create(&folder.join("map.yaml"))?;
-    // The origin is the lower left corner of the picture. 205 is 0.196 of the way to occupied, and not below the free threshold.
+    // The origin is the lower left corner of the picture. 205 is 0.196 of the way to occupied, and
+    // not below the free threshold.
     yaml.append(format!(
         "image: map.pgm\nmode: trinary\nresolution: {cell_m}\norigin: [{:.3}, {:.3}, 0.0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n",
         corner.x, corner.y

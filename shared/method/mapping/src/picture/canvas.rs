@@ -185,7 +185,8 @@ impl Canvas {
         self.fill(triangle.finish(), colour);
     }
 
-    /// Draws a bar of a round length at the left of the footer; returns where the next entry begins.
+    /// Draws a bar of a round length at the left of the footer; returns where the next entry
+    /// begins.
     pub fn scale_bar(&mut self, colour: Colour) -> f32 {
         let longest_m = LONGEST_BAR * f64::from(self.unit) * self.view.pixel_m;
         let length_m = round_length_m(longest_m);
@@ -248,7 +249,8 @@ fn add_line(builder: &mut PathBuilder, points: &[(f32, f32)]) {
             (last, end) = ((x, y), None);
         }
     }
-    // The last one is drawn wherever it is, so that a line has its end, and one of two equal points is a dot.
+    // The last one is drawn wherever it is, so that a line has its end, and one of two equal points
+    // is a dot.
     if let Some((x, y)) = end {
         builder.line_to(x, y);
     }

@@ -1,4 +1,5 @@
-//! The cells of a picture: a map at a size that can be looked at, without what was never seen around it.
+//! The cells of a picture: a map at a size that can be looked at, without what was never seen
+//! around it.
 
 use crate::{Cell, MapError, TILE_CELLS, TileExtent, TileImage, TileIndex, TileSource, pixels};
 use nalgebra::Vector2;

@@ -233,7 +233,8 @@ fn a_geotiff_has_the_cells_and_their_place_on_the_earth() {
         let north = matrix[4] * column + matrix[5] * row + matrix[7];
         match origin {
             None => assert!((east - 0.1).abs() < 1e-9 && (north - 20.1).abs() < 1e-9),
-            // East is ahead, so that 20 m to the left are 20 m north, but for the convergence of 1.4 degrees there.
+            // East is ahead, so that 20 m to the left are 20 m north, but for the convergence of
+            // 1.4 degrees there.
             Some(_) => {
                 let (northing, easting, _) = utm::to_utm_wgs84(51.75, -1.25, 30);
                 assert!((east - easting).abs() < 0.7, "{}", east - easting);

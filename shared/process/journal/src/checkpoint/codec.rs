@@ -1,12 +1,13 @@
-//! The binary layout of the slots of a checkpoint: little-endian words of 8 bytes, the first one a checksum of the rest.
+//! The binary layout of the slots of a checkpoint: little-endian words of 8 bytes, the first one a
+//! checksum of the rest.
 
 use gyre_geometry::Twist;
 use gyre_scan_matching::{Anchor, Keyframe, Standstill, TrackerState};
 use gyre_storage::Checksum;
 use nalgebra::{Complex, Isometry2, Translation2, UnitComplex};
 
-/// Words of a state's slot before the names of its keyframes: the checksum; the item, the checksum of its motion, the number of
-/// keyframes; the tracker state.
+/// Words of a state's slot before the names of its keyframes: the checksum; the item, the checksum
+/// of its motion, the number of keyframes; the tracker state.
 const STATE_WORDS: usize = 1 + 3 + TRACKER_WORDS;
 const NAME_WORDS: usize = 2;
 const TRACKER_WORDS: usize = STANDSTILL + STANDSTILL_WORDS;
@@ -172,7 +173,8 @@ pub(super) fn encode_state(
     Checksum::First.seal(slot);
 }
 
-/// Decodes a state; `None` if its checksum is wrong. Its keyframes are put into `keyframes`, oldest first.
+/// Decodes a state; `None` if its checksum is wrong. Its keyframes are put into `keyframes`, oldest
+/// first.
 pub(super) fn decode_state(
     slot: &[u8],
     keyframes: &mut Vec<Name>,

@@ -58,7 +58,8 @@ impl Process {
         }
     }
 
-    /// Processes these items of a drive at `speed` metres per scan; returns the bits of the motions.
+    /// Processes these items of a drive at `speed` metres per scan; returns the bits of the
+    /// motions.
     fn items(&mut self, items: impl IntoIterator<Item = u64>, speed: f64) -> Vec<[u64; 3]> {
         items
             .into_iter()
@@ -97,7 +98,8 @@ impl Process {
     }
 }
 
-/// A restarted process may repeat any number of items before the next restart, which can begin at any of them.
+/// A restarted process may repeat any number of items before the next restart, which can begin at
+/// any of them.
 #[test]
 fn a_process_resumes_from_any_item_of_earlier_processes() {
     let folder = tempfile::tempdir().unwrap();

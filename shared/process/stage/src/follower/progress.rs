@@ -1,5 +1,6 @@
-//! The progress of a follower, a file in the run's root. The supervisor reads it to know whether the follower has come to its end,
-//! which no exit code tells: a follower that somebody asks to end exits as well.
+//! The progress of a follower, a file in the run's root. The supervisor reads it to know whether
+//! the follower has come to its end, which no exit code tells: a follower that somebody asks to end
+//! exits as well.
 
 use std::{
     fs::{File, OpenOptions},
@@ -18,7 +19,8 @@ pub struct Progress {
     pub total: u64,
 }
 
-/// The length of the file: [`Progress::done`], [`Progress::total`] and 1 at the end of the logs, each as eight bytes, little-endian.
+/// The length of the file: [`Progress::done`], [`Progress::total`] and 1 at the end of the logs,
+/// each as eight bytes, little-endian.
 const LENGTH: usize = 24;
 
 /// Writes the progress.
@@ -61,7 +63,8 @@ impl ProgressWriter {
     }
 }
 
-/// Returns the progress of a follower and whether it has come to its end; `None` before its first step.
+/// Returns the progress of a follower and whether it has come to its end; `None` before its first
+/// step.
 pub fn read(manifest: &Manifest, follower: &str) -> Option<(Progress, bool)> {
     let mut bytes = [0; LENGTH];
     let file = File::open(path(manifest, follower)).ok()?;

@@ -14,11 +14,12 @@ use crate::{
     writer::Writer,
 };
 
-/// Publishes messages of the first stages, which are on another machine, in the place of the source.
+/// Publishes messages of the first stages, which are on another machine, in the place of the
+/// source.
 pub struct FirstStages<'a> {
     launch: &'a Launch,
     credit: Credit,
-    /// What goes back to the first stages besides poses.
+    /// The motions that go back to the first stages beside the poses.
     motions: Option<Reader<Motion>>,
     outlets: Vec<Outlet>,
     schedule: ScheduleWriter,
@@ -63,7 +64,8 @@ impl<'a> FirstStages<'a> {
         self.credit.update()
     }
 
-    /// Returns the newest pose of the trajectory at the last start of the last stage; `None` before it has told.
+    /// Returns the newest pose of the trajectory at the last start of the last stage; `None` before
+    /// it has told.
     pub fn resume_at(&self) -> Option<&Item> {
         self.credit.resume_at.as_ref()
     }
@@ -91,8 +93,9 @@ impl<'a> FirstStages<'a> {
         self.launch.manifest.window.admits(seq, self.credit.newest)
     }
 
-    /// Publishes the messages about item `seq`, one for each topic in the order of [`open`](Self::open), but for those that have none. Its
-    /// times on the other machine are on another clock: here the item begins with its arrival.
+    /// Publishes the messages about item `seq`, one for each topic in the order of
+    /// [`open`](Self::open), but for those that have none. Its times on the other machine are on
+    /// another clock: here the item begins with its arrival.
     ///
     /// # Errors
     /// A message of another item, or of another size than this run's; a failure of the transport.
@@ -131,8 +134,9 @@ impl<'a> FirstStages<'a> {
         self.schedule.has_published(item.published)
     }
 
-    /// Sleeps until there is a pose or a motion, or the connection has something to read, and answers the handshakes of new readers; true
-    /// on a request to stop. It is never late: the other machine may be out of reach.
+    /// Sleeps until there is a pose or a motion, or the connection has something to read, and
+    /// answers the handshakes of new readers; true on a request to stop. It is never late: the
+    /// other machine may be out of reach.
     ///
     /// # Errors
     /// A failure of the transport.

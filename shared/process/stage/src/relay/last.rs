@@ -12,7 +12,8 @@ use crate::{
     reader::Reader, sink, transport::Listener, wake, writer::Writer,
 };
 
-/// Reads what the last stages read, which are on another machine, and publishes the poses that come back from them.
+/// Reads what the last stages read, which are on another machine, and publishes the poses that come
+/// back from them.
 pub struct LastStages<'a> {
     launch: &'a Launch,
     poses: Writer<Pose>,
@@ -41,7 +42,8 @@ impl<'a> LastStages<'a> {
         })
     }
 
-    /// Publishes the last poses again, of which the newest says where the source goes on; without any, that it begins.
+    /// Publishes the last poses again, of which the newest says where the source goes on; without
+    /// any, that it begins.
     ///
     /// # Errors
     /// A failure of the transport.
@@ -64,7 +66,8 @@ impl<'a> LastStages<'a> {
         Ok(())
     }
 
-    /// Returns the next message of one of these topics, by its place among them; `None` if there is none yet.
+    /// Returns the next message of one of these topics, by its place among them; `None` if there is
+    /// none yet.
     ///
     /// # Errors
     /// A message that breaks its contract, a sequence gap, a failure of the transport.
@@ -120,8 +123,8 @@ impl<'a> LastStages<'a> {
         motions.publish(draft)
     }
 
-    /// Sleeps until a topic has a message or the connection has something to read, and answers the handshakes of new readers; true on
-    /// a request to stop.
+    /// Sleeps until a topic has a message or the connection has something to read, and answers the
+    /// handshakes of new readers; true on a request to stop.
     ///
     /// # Errors
     /// A failure of the transport.

@@ -1,8 +1,9 @@
 //! The place of a run in shared memory: its root, its lock, and the removal of both.
 //!
-//! All runs of a user lie in `/dev/shm/gyre-<uid>`, which is the user's alone. Beside the root of each run lies its lock, and as
-//! long as the run lives its supervisor holds it. So a lock that is free belongs to a dead run, and whoever holds it may remove
-//! that run. No lock is shared between runs, and none is waited for.
+//! All runs of a user lie in `/dev/shm/gyre-<uid>`, which is the user's alone. Beside the root of
+//! each run lies its lock, and as long as the run lives its supervisor holds it. So a lock that is
+//! free belongs to a dead run, and whoever holds it may remove that run. No lock is shared between
+//! runs, and none is waited for.
 
 use std::{
     collections::BTreeSet,
@@ -31,11 +32,13 @@ pub const SHARED_MEMORY: &str = "/dev/shm";
 const OWNER_ONLY: u32 = 0o700;
 /// Hexadecimal digits in the name of a run.
 const DIGITS: usize = 10;
-/// Time for which a lock is tried. Another supervisor holds the lock of a dead run for some milliseconds, while it removes it.
+/// Time for which a lock is tried. Another supervisor holds the lock of a dead run for some
+/// milliseconds, while it removes it.
 const LIMIT: Duration = Duration::from_secs(1);
 const PAUSE: Duration = Duration::from_millis(20);
 
-/// The root of a run in shared memory, locked by its supervisor. Dropping it removes all files of the run.
+/// The root of a run in shared memory, locked by its supervisor. Dropping it removes all files of
+/// the run.
 #[derive(Debug)]
 pub struct RunRoot {
     prefix: String,
@@ -69,9 +72,9 @@ pub enum RootError {
     Unsafe {
         /// The directory.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The problem.
         state: String,
-        /// What to do.
+        /// The remedy.
         remedy: String,
     },
     /// A signal requested a stop.
@@ -83,7 +86,8 @@ pub enum RootError {
 }
 
 impl RunRoot {
-    /// Creates and locks the root of the run that writes to `out`, after removing the files of the user's dead runs.
+    /// Creates and locks the root of the run that writes to `out`, after removing the files of the
+    /// user's dead runs.
     ///
     /// # Errors
     /// Another run writes to `out`, shared memory cannot be used, or a signal requested a stop.
@@ -103,8 +107,8 @@ impl RunRoot {
                     remove_files(&path);
                     make_directory(&path).map_err(unusable)?;
                     return Ok(Self {
-                        // Of this start alone: a process that still has files of an earlier run open, as an observer may,
-                        // must not remove files of this one.
+                        // Of this start alone: a process that still has files of an earlier run
+                        // open, as an observer may, must not remove files of this one.
                         prefix: format!("{name}_{:08x}_", clock::now_ns() as u32),
                         path,
                         _lock: lock,
@@ -144,12 +148,14 @@ impl Drop for RunRoot {
     }
 }
 
-/// Returns the root of this user's run that writes to `out`, an absolute path, whether there is one or not.
+/// Returns the root of this user's run that writes to `out`, an absolute path, whether there is one
+/// or not.
 pub fn root_of(out: &Path) -> PathBuf {
     path_of(geteuid()).join(name(out, geteuid()))
 }
 
-/// Returns the name of the run that writes to `out`. It differs between users, since names in `/dev/shm` are common to all.
+/// Returns the name of the run that writes to `out`. It differs between users, since names in
+/// `/dev/shm` are common to all.
 fn name(out: &Path, user: Uid) -> String {
     let user = user.as_raw().to_le_bytes();
     let hash = hash(out.as_os_str().as_encoded_bytes().iter().chain(&user));
@@ -171,8 +177,9 @@ fn lock_of(root: &Path) -> PathBuf {
     root.with_extension("lock")
 }
 
-/// Returns the directory of the user's runs, which is created if there is none. `/dev/shm` is open to all users, so what is there
-/// is used only if it is a directory of this user that no other can enter.
+/// Returns the directory of the user's runs, which is created if there is none. `/dev/shm` is open
+/// to all users, so what is there is used only if it is a directory of this user that no other can
+/// enter.
 fn user_directory() -> Result<PathBuf, RootError> {
     let path = path_of(geteuid());
     let unusable = |source| RootError::Unusable {
@@ -269,7 +276,8 @@ fn roots_in(runs: &Path) -> impl Iterator<Item = PathBuf> {
 /// Removes runs whose supervisor was killed: their locks are free.
 fn remove_dead_runs(runs: &Path) {
     for root in roots_in(runs) {
-        // A run that has just ended has removed its lock last. Created again, that would stay if this process were killed here.
+        // A run that has just ended has removed its lock last. Created again, that would stay if
+        // this process were killed here.
         let lock = match try_lock_existing(&lock_of(&root)) {
             Err(error) if error.kind() == io::ErrorKind::NotFound && root.exists() => {
                 try_lock(&lock_of(&root))
@@ -324,7 +332,8 @@ pub(crate) fn shared_memory_is_full() -> bool {
     free_shared_memory().is_ok_and(|free| free == Some(0))
 }
 
-/// Closes the files of a run to other users. The transport opens one of them, the counter of its nodes, to all.
+/// Closes the files of a run to other users. The transport opens one of them, the counter of its
+/// nodes, to all.
 ///
 /// # Errors
 /// A file whose mode cannot be changed.

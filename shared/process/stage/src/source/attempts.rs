@@ -10,7 +10,7 @@ pub(super) const PAUSE: Duration = Duration::from_millis(100);
 /// Why a scan cannot be read: one sentence each.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Unreadable {
-    /// Its content is invalid: it is skipped and counted.
+    /// The content is invalid: it is skipped and counted.
     Damaged(String),
     /// The file or device fails, whatever its content: it is tried again, and nothing is skipped.
     Io(String),
@@ -25,7 +25,8 @@ pub struct Tolerance {
     pub max_unreadable: usize,
 }
 
-/// Opens the input of a source, and tries again while that fails with a sentence. `None` on a request to stop.
+/// Opens the input of a source, and tries again while that fails with a sentence. `None` on a
+/// request to stop.
 ///
 /// # Errors
 /// Input that fails for longer than `tolerance` allows; a failure of the transport.

@@ -1,4 +1,4 @@
-//! How far the run has come, by which a source is admitted.
+//! The progress of the run, by which a source is admitted.
 
 use gyre_messages::{Item, Pose, flag};
 
@@ -13,7 +13,7 @@ pub(crate) struct Credit {
     pub published: Option<u64>,
     /// The newest pose of the trajectory at the last start of the sink.
     pub resume_at: Option<Item>,
-    /// Whether the sink has journalled the end of the stream.
+    /// True if the sink has journalled the end of the stream.
     pub has_ended: bool,
 }
 

@@ -49,14 +49,16 @@ impl<S: Source> Playback<'_, S> {
     /// Waits until the sink has reported the newest pose; `None` on a request to stop.
     pub fn wait_for_start(&mut self) -> Result<Option<Position>, StageError> {
         loop {
-            // Sleep first. The sink republishes its last poses one by one and notifies after all of them. Reading earlier
-            // could take an older pose for the newest, and more scans would be sent than the readers have room for.
+            // Sleep first. The sink republishes its last poses one by one and notifies after all of
+            // them. Reading earlier could take an older pose for the newest, and more scans would
+            // be sent than the readers have room for.
             if self.sleep(wake::MAX_WAIT)? {
                 return Ok(None);
             }
             self.credit.update()?;
             if let Some(newest_pose) = self.credit.resume_at {
-                // In live mode the numbers do not tell how far back the previous scan is; masking does without it.
+                // In live mode the numbers do not tell how far back the previous scan is; masking
+                // does without it.
                 let manifest = &self.launch.manifest;
                 let masks_pairs = manifest.window.masks_pairs() && !manifest.live;
                 let first = self.source.scans().start;
@@ -102,7 +104,8 @@ impl<S: Source> Playback<'_, S> {
         Ok(())
     }
 
-    /// Returns when a scan is due; `None` at the highest rate. `gap` has the times of the scan before a break.
+    /// Returns when a scan is due; `None` at the highest rate. `gap` has the times of the scan
+    /// before a break.
     fn due_ns(
         &mut self,
         pace: &mut Option<Pace>,
@@ -251,8 +254,8 @@ impl<S: Source> Playback<'_, S> {
         }
     }
 
-    /// Returns when a scan is expected to be due before it is read; `None` if its time is unknown or breaks with that of the scan
-    /// before.
+    /// Returns when a scan is expected to be due before it is read; `None` if its time is unknown
+    /// or breaks with that of the scan before.
     fn expected_ns(&self, index: usize, published: u64, pace: Pace) -> Option<i64> {
         let before_ns = self.source.complete_ns(index.checked_sub(1)?)?;
         let complete_ns = self.source.complete_ns(index)?;
@@ -260,7 +263,8 @@ impl<S: Source> Playback<'_, S> {
         continues(before_ns, complete_ns).then(due_ns)
     }
 
-    /// Drops the scans that a sensor would have measured while this process was down: those before the burst that is due.
+    /// Drops the scans that a sensor would have measured while this process was down: those before
+    /// the burst that is due.
     fn drop_missed(&mut self, position: &mut Position, pace: Pace) {
         let (now_ns, end) = (clock::now_ns(), self.source.scans().end);
         let is_missed = |position: &Position| {
@@ -277,8 +281,9 @@ impl<S: Source> Playback<'_, S> {
         }
     }
 
-    /// Leaves the processors to the scan in flight, since a real sensor would not use them to read a recording. Returns at that
-    /// scan's pose, or half-way to the next scan; false on a request to stop.
+    /// Leaves the processors to the scan in flight, since a real sensor would not use them to read
+    /// a recording. Returns at that scan's pose, or half-way to the next scan; false on a request
+    /// to stop.
     fn yield_processors(&mut self, position: &Position, pace: Pace) -> Result<bool, StageError> {
         let Some(due_ns) = self.expected_ns(position.index, position.published, pace) else {
             return Ok(true);
@@ -305,8 +310,8 @@ impl<S: Source> Playback<'_, S> {
         self.schedule.has_published(position.published)
     }
 
-    /// Answers the handshakes of new readers, and sleeps; true on a request to stop. In this order, since the scan that has become
-    /// due when the sleep ends goes first.
+    /// Answers the handshakes of new readers, and sleeps; true on a request to stop. In this order,
+    /// since the scan that has become due when the sleep ends goes first.
     fn sleep(&mut self, limit: Duration) -> Result<bool, StageError> {
         if mem::take(&mut self.may_have_new_readers) {
             self.scans.accept_readers()?;

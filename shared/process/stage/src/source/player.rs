@@ -1,5 +1,6 @@
-//! The loop of a source that takes the place of the first stages as well: publishes recorded messages of the topics that the others
-//! read, when the window admits their scan and, at a given rate, when it is due.
+//! The loop of a source that takes the place of the first stages as well: publishes recorded
+//! messages of the topics that the others read, when the window admits their scan and, at a given
+//! rate, when it is due.
 
 use std::{ops::Range, time::Duration};
 
@@ -116,8 +117,8 @@ impl<R: Recorded> Player<'_, R> {
         Ok(())
     }
 
-    /// Waits until the sink has reported the newest pose, and returns the first message to send: that of this pose, which the others
-    /// need as the previous one. `None` on a request to stop.
+    /// Waits until the sink has reported the newest pose, and returns the first message to send:
+    /// that of this pose, which the others need as the previous one. `None` on a request to stop.
     fn wait_for_start(&mut self) -> Result<Option<u64>, StageError> {
         loop {
             // Sleep first, as the source of scans does.

@@ -7,11 +7,12 @@ use gyre_messages::{Item, flag};
 pub(super) struct Position {
     /// Index of the scan in the recording.
     pub index: usize,
-    /// Sequence number among the published scans. In live mode masking numbers the chain of motions itself.
+    /// Sequence number among the published scans. In live mode masking numbers the chain of motions
+    /// itself.
     pub published: u64,
     /// The scan published before it; `None` at the start, and where it is not known.
     previous: Option<u64>,
-    /// Whether the chain of motions starts with it.
+    /// True if the chain of motions starts with it.
     starts_chain: bool,
 }
 
@@ -26,8 +27,8 @@ impl Position {
         }
     }
 
-    /// Resumes at the scan of the newest pose, or at the previous one if the mask takes two scans: the other stages need it as
-    /// their previous scan. Without a pose it starts with scan `first`.
+    /// Resumes at the scan of the newest pose, or at the previous one if the mask takes two scans:
+    /// the other stages need it as their previous scan. Without a pose it starts with scan `first`.
     pub fn resume(newest_pose: &Item, first: usize, masks_pairs: bool) -> Self {
         let newest = newest_pose;
         let in_chain = !newest.is(flag::BREAK);
@@ -50,7 +51,8 @@ impl Position {
         }
     }
 
-    /// Goes on after the newest pose, and after all that has been published: a sensor measures nothing twice.
+    /// Goes on after the newest pose, and after all that has been published: a sensor measures
+    /// nothing twice.
     pub fn after(newest_pose: &Item, published: u64) -> Self {
         let next = match newest_pose.is(flag::BASE) {
             true => 0,

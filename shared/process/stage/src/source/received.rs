@@ -1,5 +1,5 @@
-//! What a sensor has delivered and what it has not, in a file of the run's root: a source that follows one that has died goes on
-//! counting, and who looks on sees it while the run works.
+//! Counts of what a sensor has delivered and what is missing, in a file of the run's root: a source
+//! that follows one that has died goes on counting, and who looks on sees it while the run works.
 
 use std::{
     fs::{File, OpenOptions},
@@ -11,12 +11,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Manifest, StageCounters, StageError};
 
-/// The name of the file: the numbers of [`Received`] in their order, each as eight bytes, little-endian.
+/// The name of the file: the numbers of [`Received`] in their order, each as eight bytes,
+/// little-endian.
 const FILE: &str = "source.received";
 const NUMBERS: usize = 9;
 const BYTES: usize = 8 * NUMBERS;
 
-/// What a live sensor has delivered since the start of the run, and what is missing.
+/// Counts of what a live sensor has delivered since the start of the run, and of what is missing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Received {
     /// Azimuths that are missing from the scans that were published.
@@ -25,7 +26,8 @@ pub struct Received {
     pub scans_left_out: u64,
     /// Messages that could not be read.
     pub damaged_messages: u64,
-    /// Datagrams of others, and descriptions of scans that do not fit into the run. They were passed over.
+    /// Datagrams of others, and descriptions of scans that do not fit into the run. They were
+    /// passed over.
     pub foreign_messages: u64,
     /// Connections so far.
     pub connections: u64,

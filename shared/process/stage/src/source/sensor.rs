@@ -1,4 +1,5 @@
-//! The loop of a source that a sensor drives: a scan is published when it is complete, and nothing is ever asked for again.
+//! The loop of a source that a sensor drives: a scan is published when it is complete, and nothing
+//! is ever asked for again.
 
 use std::{os::fd::BorrowedFd, time::Duration};
 
@@ -14,10 +15,11 @@ use crate::{
     writer::Writer,
 };
 
-/// Time for which the supervisor need not intervene: this loop says again and again that it is not late, since a radar that is
-/// switched off is no reason to restart it.
+/// Time for which the supervisor need not intervene: this loop says again and again that it is not
+/// late, since a radar that is switched off is no reason to restart it.
 pub(crate) const ALIVE_NS: i64 = 5_000_000_000;
-/// Time between two such words, ns: it wakes many times for each scan, and a word is a write to a file.
+/// Time between two such words, ns: it wakes many times for each scan, and a word is a write to a
+/// file.
 const SAID_EVERY_NS: i64 = 1_000_000_000;
 
 /// A sensor that delivers scans by itself.
@@ -28,15 +30,16 @@ pub trait Sensor {
     /// The connection to wait for, while there is one.
     fn connection(&self) -> Option<BorrowedFd<'_>>;
 
-    /// Takes what has arrived and writes it into shared memory, without waiting. After [`Arrival::Scan`] it is called again at once,
-    /// with memory for the next scan.
+    /// Takes what has arrived and writes it into shared memory, without waiting. After
+    /// [`Arrival::Scan`] it is called again at once, with memory for the next scan.
     ///
     /// # Errors
     /// Input that this run can do nothing with.
     fn take(&mut self, header: &mut ScanHeader, bytes: &mut [u8]) -> Result<Arrival, StageError>;
 
-    /// Returns when the scan that was returned last was complete by the sensor's clock, `CLOCK_MONOTONIC`, ns, however late it was read;
-    /// `None` if that is not known: then its latency counts from when it was read.
+    /// Returns when the scan that was returned last was complete by the sensor's clock,
+    /// `CLOCK_MONOTONIC`, ns, however late it was read; `None` if that is not known: then its
+    /// latency counts from when it was read.
     fn due_ns(&self) -> Option<i64>;
 
     /// Goes on counting after a source that has died.
@@ -46,14 +49,16 @@ pub trait Sensor {
     fn received(&self) -> Received;
 }
 
-/// What has arrived.
+/// The event of a sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Arrival {
     /// A scan is complete.
     Scan,
-    /// No scan is complete yet. Without a connection [`Sensor::take`] is to be called again after this time.
+    /// No scan is complete yet. Without a connection [`Sensor::take`] is to be called again after
+    /// this time.
     Nothing(Duration),
-    /// No scan can be complete before this time has passed: the connection need not wake until then.
+    /// No scan can be complete before this time has passed: the connection need not wake until
+    /// then.
     Later(Duration),
 }
 
@@ -157,7 +162,8 @@ impl Stream<'_> {
             };
             let due_ns = sensor.due_ns().unwrap_or(started_ns);
             header.item.due_ns = due_ns.min(started_ns);
-            // In this order a death in between leaves a number without a scan, which counts as dropped, and no scan without a number.
+            // In this order a death in between leaves a number without a scan, which counts as
+            // dropped, and no scan without a number.
             self.schedule.has_published(position.published)?;
             self.received.write(sensor.received())?;
             self.scans.send(draft, S::HOP)?;
@@ -175,7 +181,8 @@ impl Stream<'_> {
         Ok(())
     }
 
-    /// Sleeps until the connection has something to read, and answers the handshakes of new readers; true on a request to stop.
+    /// Sleeps until the connection has something to read, and answers the handshakes of new
+    /// readers; true on a request to stop.
     fn sleep(
         &mut self,
         connection: Option<BorrowedFd<'_>>,

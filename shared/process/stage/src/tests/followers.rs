@@ -1,4 +1,4 @@
-//! What followers publish, and what wakes them.
+//! Tests of what followers publish, and of what wakes them.
 
 use std::time::Duration;
 

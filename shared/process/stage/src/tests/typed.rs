@@ -1,4 +1,5 @@
-//! Programs whose ports are typed, as those of other languages are: they find the types that Gyre has for its bytes.
+//! Programs whose ports are typed, as those of other languages are: they find the types that Gyre
+//! has for its bytes.
 
 use std::fmt;
 

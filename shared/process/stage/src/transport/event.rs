@@ -14,7 +14,8 @@ use iceoryx2::{
 use super::{Ipc, Node, Sealed, service_name};
 use crate::StageError;
 
-/// Spare ports of an event: a listener that is killed during its creation can occupy one until the run ends.
+/// Spare ports of an event: a listener that is killed during its creation can occupy one until the
+/// run ends.
 const HEADROOM: usize = 6;
 
 /// Numbers of ports that an event has room for, without the spare ones.
@@ -68,7 +69,8 @@ impl Listener {
             .map_err(|e| StageError::transport(format!("listen to {event}"), e))
     }
 
-    /// Takes the notifications that have arrived, and returns their number. `action` is named in an error.
+    /// Takes the notifications that have arrived, and returns their number. `action` is named in an
+    /// error.
     pub(crate) fn take(&self, action: Arguments<'_>) -> Result<usize, StageError> {
         let mut notifications = 0;
         let taken = self.0.try_wait(|_| notifications += 1);

@@ -59,7 +59,8 @@ impl Publisher {
         self.port.id().value()
     }
 
-    /// Loans a message of the longest payload. The header is zero; the payload is whatever is in memory.
+    /// Loans a message of the longest payload. The header is zero; the payload is whatever is in
+    /// memory.
     pub(crate) fn loan(&self) -> Result<Loan, StageError> {
         // SAFETY: the topic's payload is a slice, so that any number of elements may be loaned.
         let sample = unsafe { self.port.loan_custom_payload(self.elements) }
@@ -94,8 +95,9 @@ impl Loan {
         let header = std::ptr::from_mut(self.sample.user_header_mut()).cast::<u8>();
         let payload = self.sample.payload_mut();
         let (elements, bytes) = (payload.as_mut_ptr().cast::<u8>(), payload.len());
-        // SAFETY: the topic was opened with this size of headers, so that the sample has as many bytes there. `loan` has written
-        // them. An element of `AnyPayload` is one byte. Header and payload are disjoint parts of a sample that this loan owns.
+        // SAFETY: the topic was opened with this size of headers, so that the sample has as many
+        // bytes there. `loan` has written them. An element of `AnyPayload` is one byte. Header and
+        // payload are disjoint parts of a sample that this loan owns.
         unsafe {
             (
                 slice::from_raw_parts_mut(header, self.header_bytes),

@@ -5,8 +5,8 @@ use std::{
     ops::{Deref, DerefMut},
 };
 
-/// A value of the transport. Its drop is long generic code, which each crate that drops such a value would compile again. So it
-/// is reached through a pointer that is taken in this crate.
+/// A value of the transport. Its drop is long generic code, which each crate that drops such a
+/// value would compile again. So it is reached through a pointer that is taken in this crate.
 pub(super) struct Sealed<T> {
     value: ManuallyDrop<T>,
     drop: unsafe fn(&mut ManuallyDrop<T>),

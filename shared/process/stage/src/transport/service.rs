@@ -90,7 +90,8 @@ fn builder(node: &Node, topic: &Topic) -> Result<Builder<AnyPayload, AnyHeader, 
         .service_builder(&service_name(topic.name)?)
         .publish_subscribe::<AnyPayload>()
         .user_header::<AnyHeader>();
-    // SAFETY: these are the sizes and alignments of the types whose values are read and written as bytes here.
+    // SAFETY: these are the sizes and alignments of the types whose values are read and written as
+    // bytes here.
     Ok(unsafe {
         builder
             .__internal_set_user_header_type_details(&header)

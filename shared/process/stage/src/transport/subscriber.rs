@@ -63,9 +63,11 @@ impl Subscriber {
                 sample: Sealed::new(sample),
                 header_bytes: self.header_bytes,
             })),
-            // Samples of a dead publisher are still borrowed. The next call succeeds once they are released.
+            // Samples of a dead publisher are still borrowed. The next call succeeds once they are
+            // released.
             Err(ReceiveError::ExceedsMaxBorrows) if !self.is_observer => Ok(None),
-            // The publisher has just died or is being restarted. Its next message is found at the next wake-up.
+            // The publisher has just died or is being restarted. Its next message is found at the
+            // next wake-up.
             Err(ReceiveError::ConnectionFailure(_)) if self.is_observer => Ok(None),
             Err(e) => Err(StageError::transport(format!("receive {}", self.topic), e)),
         }
@@ -76,8 +78,8 @@ impl Sample {
     /// Returns the bytes of the header.
     pub(crate) fn header(&self) -> &[u8] {
         let header = std::ptr::from_ref(self.sample.user_header()).cast::<u8>();
-        // SAFETY: the topic was opened with this size of headers, so that the sample has as many bytes there, which its publisher
-        // does not write any more.
+        // SAFETY: the topic was opened with this size of headers, so that the sample has as many
+        // bytes there, which its publisher does not write any more.
         unsafe { slice::from_raw_parts(header, self.header_bytes) }
     }
 

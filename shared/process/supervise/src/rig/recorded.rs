@@ -23,7 +23,8 @@ impl Recorded {
         received_ns: i64,
     ) -> Self {
         let start = std::ptr::from_ref(header).cast::<u8>();
-        // SAFETY: a header is plain numbers, `repr(C)` and without padding, so all of its bytes are initialised.
+        // SAFETY: a header is plain numbers, `repr(C)` and without padding, so all of its bytes are
+        // initialised.
         let bytes = unsafe { std::slice::from_raw_parts(start, size_of::<M::Header>()) };
         Self {
             header: bytes.to_vec(),
@@ -47,7 +48,8 @@ impl Recorded {
     /// It is of another topic, whose headers have another size.
     pub fn header<M: Message<Header: Copy>>(&self) -> Result<M::Header, StageError> {
         match self.header.len() == size_of::<M::Header>() {
-            // SAFETY: the bytes are those of a header of this size, which is plain numbers: any bytes are a value of it.
+            // SAFETY: the bytes are those of a header of this size, which is plain numbers: any
+            // bytes are a value of it.
             true => Ok(unsafe { self.header.as_ptr().cast::<M::Header>().read_unaligned() }),
             false => Err(StageError::Input(format!(
                 "a header of {} bytes is none of topic `{}`",

@@ -1,5 +1,5 @@
-//! The trial of a program that has taken the place of another one: it lasts until the first pose that the program has worked on, and
-//! who has asked for the swap waits for its result.
+//! The trial of a program that has taken the place of another one: it lasts until the first pose
+//! that the program has worked on, and who has asked for the swap waits for its result.
 
 use std::time::{Duration, Instant};
 
@@ -8,7 +8,8 @@ use gyre_stage::control::Answer;
 use super::Swaps;
 use crate::{child::Child, processes::Processes, run::Run, socket::Client};
 
-/// Time for which a client waits for the first pose, from when the program has opened its topics. A radar may be switched off.
+/// Time for which a client waits for the first pose, from when the program has opened its topics. A
+/// radar may be switched off.
 const LIMIT: Duration = Duration::from_secs(10);
 
 /// A client that waits for the result.
@@ -21,7 +22,8 @@ pub(super) struct Trial {
 }
 
 impl Swaps {
-    /// Lets the client of a swap wait. Of a follower no pose says what it does: so its swap is done when it is started.
+    /// Lets the client of a swap wait. Of a follower no pose says what it does: so its swap is done
+    /// when it is started.
     pub fn await_trial(&mut self, process: usize, child: &Child, client: Client) {
         if child.follows() {
             client.answer(&Answer::Done);

@@ -10,11 +10,11 @@ use std::{
 
 use crate::{File, StorageError};
 
-/// Synchronises a file on a thread of its own, for many changes at once: a synchronisation takes milliseconds, too long for each of
-/// a hundred changes in a second.
+/// Synchronises a file on a thread of its own, for many changes at once: a synchronisation takes
+/// milliseconds, too long for each of a hundred changes in a second.
 ///
-/// At most [`GroupSync::LIMIT`] changes are in danger of a power failure, and none for much longer than
-/// [`GroupSync::INTERVAL`].
+/// At most [`GroupSync::LIMIT`] changes are in danger of a power failure, and none for much longer
+/// than [`GroupSync::INTERVAL`].
 pub struct GroupSync {
     path: PathBuf,
     shared: Arc<Shared>,
@@ -53,7 +53,8 @@ impl Shared {
             .unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Waits until it is time for a synchronisation; returns the number of changes that it covers, or `None` at the end.
+    /// Waits until it is time for a synchronisation; returns the number of changes that it covers,
+    /// or `None` at the end.
     fn next(&self, last: Option<Instant>) -> Option<u64> {
         let mut progress = self.lock();
         loop {
@@ -146,7 +147,8 @@ impl GroupSync {
         }
     }
 
-    /// Returns the number of changes that are safe; `None` until the first synchronisation has ended.
+    /// Returns the number of changes that are safe; `None` until the first synchronisation has
+    /// ended.
     pub fn safe(&self) -> Option<u64> {
         self.shared.lock().safe.checked_sub(1)
     }

@@ -18,7 +18,8 @@ const ALIGNMENT: usize = 4;
 pub(super) const MARGIN: usize = HEADER + ALIGNMENT;
 /// Bytes that are read at once in search of a header.
 const CHUNK: usize = 1 << 16;
-/// Number of records at the end that a death or a power failure can have damaged: those in danger, and the one being written.
+/// Number of records at the end that a death or a power failure can have damaged: those in danger,
+/// and the one being written.
 const IN_DANGER: usize = GroupSync::LIMIT as usize + 1;
 
 /// The most bytes that a death or a power failure can leave behind the complete records.
@@ -177,7 +178,8 @@ impl Records {
         }
     }
 
-    /// Opens the file, unless it is open, and checks its magic. Returns its length; `None` if it does not exist.
+    /// Opens the file, unless it is open, and checks its magic. Returns its length; `None` if it
+    /// does not exist.
     fn open(&mut self) -> Result<Option<u64>, LogError> {
         let failed = StorageError::at("read", &self.path);
         let file = match self.file.take().map_or_else(|| File::open(&self.path), Ok) {
@@ -203,8 +205,8 @@ impl Records {
         Ok(Some(length))
     }
 
-    /// Returns whether the last known record is still in the file of this length. The process that appends may have cut it off
-    /// and appended another one.
+    /// Returns whether the last known record is still in the file of this length. The process that
+    /// appends may have cut it off and appended another one.
     fn is_last_unchanged(&self, length: u64) -> Result<bool, StorageError> {
         let (Some(last), Some(place)) = (self.len().checked_sub(1), self.places.last()) else {
             return Ok(true);
@@ -217,7 +219,8 @@ impl Records {
         Ok(place.end <= length && self.header_at(self.start(last))? == Some(known))
     }
 
-    /// Drops the first damaged one of the last records, and those behind it. Those that were known before were whole.
+    /// Drops the first damaged one of the last records, and those behind it. Those that were known
+    /// before were whole.
     fn drop_incomplete(&mut self) -> Result<(), LogError> {
         let mut bytes = Vec::new();
         let first = self.len().saturating_sub(IN_DANGER);
@@ -233,8 +236,8 @@ impl Records {
         Ok(())
     }
 
-    /// Checks that the record after the end was in danger when the last one in the file was written: that it is not one that was
-    /// damaged later.
+    /// Checks that the record after the end was in danger when the last one in the file was
+    /// written: that it is not one that was damaged later.
     fn require_no_safe_record_after_end(&self, length: u64) -> Result<(), LogError> {
         if length - self.end() > LONGEST_END {
             return Err(self.damaged(self.len()));

@@ -23,8 +23,9 @@ impl LogReader {
         Ok(reader)
     }
 
-    /// Looks for records that were appended or cut off meanwhile; returns the number of complete ones now. Only the headers of the new
-    /// ones are read, and the bytes of those that may be damaged.
+    /// Looks for records that were appended or cut off meanwhile; returns the number of complete
+    /// ones now. Only the headers of the new ones are read, and the bytes of those that may be
+    /// damaged.
     ///
     /// # Errors
     /// A file that cannot be read, is not such a log, or is damaged.
@@ -38,8 +39,9 @@ impl LogReader {
         self.records.len()
     }
 
-    /// Returns how many of the first records were known before the last [`refresh`](Self::refresh), and are the same. Fewer than were
-    /// known if the process that appends was restarted and has cut some off; it may have appended others since.
+    /// Returns how many of the first records were known before the last [`refresh`](Self::refresh),
+    /// and are the same. Fewer than were known if the process that appends was restarted and has
+    /// cut some off; it may have appended others since.
     pub fn unchanged(&self) -> usize {
         self.records.unchanged()
     }
@@ -65,8 +67,8 @@ impl LogReader {
         self.records.malformed(index)
     }
 
-    /// Reads at most `length` bytes of the start of a record, which replace the content of `bytes`. They are not checked: the checksum
-    /// is that of the whole record.
+    /// Reads at most `length` bytes of the start of a record, which replace the content of `bytes`.
+    /// They are not checked: the checksum is that of the whole record.
     ///
     /// # Errors
     /// [`LogError::Damaged`] if the header of the record is, or a file that cannot be read.

@@ -17,8 +17,8 @@ const BEHIND: &str = ".tmp";
 /// Bytes that are collected before they are written.
 const BUFFER: usize = 1 << 18;
 
-/// The next content of a file, written aside as `.NAME.tmp`. It takes the place of the file when it is committed; dropped before
-/// that, it is removed.
+/// The next content of a file, written aside as `.NAME.tmp`. It takes the place of the file when it
+/// is committed; dropped before that, it is removed.
 #[derive(Debug)]
 pub struct Draft {
     path: PathBuf,
@@ -83,8 +83,9 @@ impl Draft {
             .map_err(StorageError::at("write", &self.path))
     }
 
-    /// Makes the draft the content of the file: after a kill or a power failure the file has the whole of the old or of the new
-    /// content. The new one is sure to survive once the folder is synchronised too ([`sync_folder`]).
+    /// Makes the draft the content of the file: after a kill or a power failure the file has the
+    /// whole of the old or of the new content. The new one is sure to survive once the folder is
+    /// synchronised too ([`sync_folder`]).
     ///
     /// # Errors
     /// The rest cannot be written, or the file cannot be replaced.

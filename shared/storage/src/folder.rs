@@ -6,8 +6,8 @@ use crate::StorageError;
 #[cfg(feature = "record")]
 use crate::record::{self, Operation};
 
-/// Makes the names in a folder survive a power failure: those of its new, renamed and removed files. An empty path, as above a bare name,
-/// is the current folder.
+/// Makes the names in a folder survive a power failure: those of its new, renamed and removed
+/// files. An empty path, as above a bare name, is the current folder.
 ///
 /// # Errors
 /// The folder cannot be synchronised.

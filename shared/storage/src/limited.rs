@@ -1,4 +1,5 @@
-//! Files of limited size. A file from elsewhere may be made to exhaust the memory, or be a link to a device that never ends.
+//! Files of limited size. A file from elsewhere may be made to exhaust the memory, or be a link to
+//! a device that never ends.
 
 use std::{
     fs::File,

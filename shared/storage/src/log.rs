@@ -1,12 +1,15 @@
 //! A log: a file of records of any length, each with a checksum, that grows at its end.
 //!
-//! One process appends, others read what is complete meanwhile. Each record is one `write`. A record that is cut short by a death is
-//! the last one; a thread synchronises the file, so that a power failure takes or damages at most the last
-//! [`GroupSync::LIMIT`](crate::GroupSync::LIMIT) records. Those are cut off when the log is opened. Any other damaged record was whole once, and is
-//! refused with its number: when the log is opened if its header is damaged, else when it is read.
+//! One process appends, others read what is complete meanwhile. Each record is one `write`. A
+//! record that is cut short by a death is the last one; a thread synchronises the file, so that a
+//! power failure takes or damages at most the last [`GroupSync::LIMIT`](crate::GroupSync::LIMIT)
+//! records. Those are cut off when the log is opened. Any other damaged record was whole once, and
+//! is refused with its number: when the log is opened if its header is damaged, else when it is
+//! read.
 //!
-//! Layout, little-endian: 16 bytes of magic; then for each record its number (u64), its length in bytes (u32), the CRC-32 of its bytes
-//! (u32), the CRC-32 of these three (u32), its bytes, and zeros up to a multiple of four. So the same records are the same file.
+//! Layout, little-endian: 16 bytes of magic; then for each record its number (u64), its length in
+//! bytes (u32), the CRC-32 of its bytes (u32), the CRC-32 of these three (u32), its bytes, and
+//! zeros up to a multiple of four. So the same records are the same file.
 
 mod reader;
 mod records;
@@ -76,11 +79,13 @@ pub struct Log {
 }
 
 impl Log {
-    /// Opens or creates a log, and cuts off what a death or a power failure has left of the last records. Of the others only the
-    /// headers are read. What is in the log then survives a power failure.
+    /// Opens or creates a log, and cuts off what a death or a power failure has left of the last
+    /// records. Of the others only the headers are read. What is in the log then survives a power
+    /// failure.
     ///
     /// # Errors
-    /// A file that cannot be read or written, is not such a log, is damaged, or to which another process writes.
+    /// A file that cannot be read or written, is not such a log, is damaged, or to which another
+    /// process writes.
     pub fn open(path: &Path, magic: LogMagic) -> Result<Self, LogError> {
         let mut records = Records::new(path, magic);
         let file = DurableFile::open(path, |file| {
@@ -111,7 +116,8 @@ impl Log {
         self.len() == 0
     }
 
-    /// Takes the memory for appending many records of up to so many bytes: none is allocated for each.
+    /// Takes the memory for appending many records of up to so many bytes: none is allocated for
+    /// each.
     pub fn reserve(&mut self, bytes: usize) {
         self.buffer.reserve(bytes + records::MARGIN);
         self.records.reserve(MANY);
@@ -134,8 +140,9 @@ impl Log {
         self.count()
     }
 
-    /// Counts a change of another file that is of use only with the records that were appended. At most [`GroupSync::LIMIT`](crate::GroupSync::LIMIT) of
-    /// them are made before the records survive a power failure.
+    /// Counts a change of another file that is of use only with the records that were appended. At
+    /// most [`GroupSync::LIMIT`](crate::GroupSync::LIMIT) of them are made before the records
+    /// survive a power failure.
     ///
     /// # Errors
     /// A file that cannot be synchronised.
@@ -175,7 +182,8 @@ impl Log {
         self.records.malformed(index)
     }
 
-    /// Keeps the first `records` records and cuts off those behind them. The cut survives a power failure.
+    /// Keeps the first `records` records and cuts off those behind them. The cut survives a power
+    /// failure.
     ///
     /// # Errors
     /// A file that cannot be written.

@@ -1,15 +1,18 @@
 //! Files that are whole after a kill and after a power failure.
 //!
-//! - [`write()`] and [`Draft`] replace a file as a whole: it is written aside, synchronised and renamed.
-//! - [`File`] is changed in place; what has not been synchronised when the power fails may be there in part.
+//! - [`write()`] and [`Draft`] replace a file as a whole: it is written aside, synchronised and
+//!   renamed.
+//! - [`File`] is changed in place; what has not been synchronised when the power fails may be there
+//!   in part.
 //! - [`GroupSync`] synchronises such a file in the background.
-//! - [`DurableFile`] is such a file of one process, synchronised so; its records are in [`Slots`], each with a [`Checksum`].
+//! - [`DurableFile`] is such a file of one process, synchronised so; its records are in [`Slots`],
+//!   each with a [`Checksum`].
 //! - [`Log`] is a file of records that grows at its end; [`LogReader`] reads it meanwhile.
 //! - [`read_text`] and [`read_bytes`] read files that may come from elsewhere, up to a size.
 //!
-//! A file and its name are two things: the name of a new or renamed file is safe once its folder is synchronised.
-//! Everything that must survive is written through this crate, so that a test can record each change (feature `record`) and
-//! replay what a power failure would have left of them.
+//! A file and its name are two things: the name of a new or renamed file is safe once its folder is
+//! synchronised. Everything that must survive is written through this crate, so that a test can
+//! record each change (feature `record`) and replay what a power failure would have left of them.
 
 mod draft;
 mod durable;

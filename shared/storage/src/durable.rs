@@ -1,4 +1,5 @@
-//! A file that one process at a time changes in place: the common part of logs, of the journal and of checkpoints.
+//! A file that one process at a time changes in place: the common part of logs, of the journal and
+//! of checkpoints.
 
 use std::path::{Path, PathBuf};
 
@@ -22,11 +23,12 @@ pub struct DurableFile {
 }
 
 impl DurableFile {
-    /// Opens or creates a file and its folder, and locks it for this process. `prepare` makes of what it finds there what the process
-    /// goes on from, before the thread starts.
+    /// Opens or creates a file and its folder, and locks it for this process. `prepare` makes of
+    /// what it finds there what the process goes on from, before the thread starts.
     ///
     /// # Errors
-    /// A file that cannot be read or written, or that another process changes; an error of `prepare`.
+    /// A file that cannot be read or written, or that another process changes; an error of
+    /// `prepare`.
     pub fn open<E: From<StorageError> + From<Busy>>(
         path: &Path,
         prepare: impl FnOnce(&File) -> Result<(), E>,
@@ -49,7 +51,8 @@ impl DurableFile {
         &self.file
     }
 
-    /// Fills `bytes` with the content of a slot; false if the file ends before. [`Checksum::is_right`] says whether it is whole.
+    /// Fills `bytes` with the content of a slot; false if the file ends before.
+    /// [`Checksum::is_right`] says whether it is whole.
     ///
     /// # Errors
     /// The file cannot be read.
@@ -73,7 +76,8 @@ impl DurableFile {
         self.sync.changed()
     }
 
-    /// Returns the number of changes that survive a power failure; `None` until the first synchronisation has ended.
+    /// Returns the number of changes that survive a power failure; `None` until the first
+    /// synchronisation has ended.
     pub fn safe(&self) -> Option<u64> {
         self.sync.safe()
     }
@@ -95,7 +99,8 @@ impl Slots {
     }
 }
 
-/// The place of a CRC-32 by which the content of a slot is known to be whole. Numbers are little-endian.
+/// The place of a CRC-32 by which the content of a slot is known to be whole. Numbers are
+/// little-endian.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Checksum {
     /// The first eight bytes, with one more bit set: it is never zero, as in an empty slot.

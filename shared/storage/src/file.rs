@@ -25,7 +25,8 @@ pub struct File {
 }
 
 impl File {
-    /// Opens a file to read and change it, or creates it. The name of a new one survives a power failure.
+    /// Opens a file to read and change it, or creates it. The name of a new one survives a power
+    /// failure.
     ///
     /// # Errors
     /// A file that cannot be opened or created.
@@ -90,8 +91,9 @@ impl File {
         })
     }
 
-    /// Locks the file for this process, and waits up to a second for one that was killed and is not gone yet: it keeps its lock
-    /// until the system has closed its files. False if another process keeps the lock.
+    /// Locks the file for this process, and waits up to a second for one that was killed and is not
+    /// gone yet: it keeps its lock until the system has closed its files. False if another process
+    /// keeps the lock.
     ///
     /// # Errors
     /// A file system without locks.
@@ -135,7 +137,8 @@ impl File {
         }
     }
 
-    /// Writes `bytes` at `offset`. A process that is killed meanwhile has written a first part of them.
+    /// Writes `bytes` at `offset`. A process that is killed meanwhile has written a first part of
+    /// them.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -182,7 +185,8 @@ impl File {
     /// Makes all that was written before survive a power failure.
     ///
     /// # Errors
-    /// The system could not write all of it. What is lost is unknown, and a second attempt does not tell.
+    /// The system could not write all of it. What is lost is unknown, and a second attempt does not
+    /// tell.
     pub fn sync(&self) -> Result<(), StorageError> {
         #[cfg(feature = "record")]
         let id = record::sync_begins(&self.path);
