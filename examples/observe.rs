@@ -6,10 +6,11 @@
 //! cargo run --release --example observe -- out/demo
 //! ```
 //!
-//! `gyre up` returns when there is something to observe; a run that was just started by `gyre run &` may not be there yet.
+//! `gyre up` returns when there is something to observe; a run that was just started by
+//! `gyre run &` may not be there yet.
 //!
-//! Any number of programs up to `run.observers` may do so at once. Kill this one, or stop it for a while with Ctrl-Z: the run does
-//! not notice.
+//! Any number of programs up to `run.observers` may do so at once. Kill this one, or stop it for a
+//! while with Ctrl-Z: the run does not notice.
 
 use std::{error::Error, path::PathBuf, time::Duration};
 
@@ -22,7 +23,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         .ok_or("usage: observe OUT, the folder of a run's results")?
         .into();
     let run = ObservedRun::writing_to(&out)?;
-    // One observer a topic. Each has a queue of its own, which loses its oldest message when it is full.
+    // One observer a topic. Each has a queue of its own, which loses its oldest message when it is
+    // full.
     let mut scans = run.observe::<Scan>()?;
     let mut poses = run.observe::<Pose>()?;
     loop {
@@ -38,8 +40,8 @@ fn main() -> Result<(), Box<dyn Error>> {
             Next::Idle => println!("no pose for a second"),
             Next::Ended => break,
         }
-        // All scans that are there, without waiting. A message is read in the publisher's memory: nothing is copied. It is
-        // released at the next call of `next`.
+        // All scans that are there, without waiting. A message is read in the publisher's memory:
+        // nothing is copied. It is released at the next call of `next`.
         while let Next::Message(scan, _) = scans.next(Duration::ZERO)? {
             let bytes: &[u8] = scan.values();
             let strongest = bytes.iter().max().copied().unwrap_or_default();

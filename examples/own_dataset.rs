@@ -1,5 +1,5 @@
-//! A dataset format of your own. Here it is a folder of files `STAMP.u8`: each is a sweep, 400 azimuths x 576 range bins without
-//! a header, named by the time of its middle, ns.
+//! A dataset format of your own. Here it is a folder of files `STAMP.u8`: each is a sweep, 400
+//! azimuths x 576 range bins without a header, named by the time of its middle, ns.
 //!
 //! ```sh
 //! cargo run --release -p gyre-odometry --example own_dataset -- FOLDER > trajectory.tum

@@ -4,7 +4,8 @@
 //! cargo run --release -p gyre-odometry --example own_sensor
 //! ```
 //!
-//! Here the sweeps are computed, of a sensor that drives 2 m ahead in each. Yours come from a driver: all but `sweep` stays.
+//! Here the sweeps are computed, of a sensor that drives 2 m ahead in each. Yours come from a
+//! driver: all but `sweep` stays.
 
 use std::{error::Error, f32::consts::TAU};
 

@@ -1,4 +1,5 @@
-//! Gyre as a whole, with real processes. One program, so that all of it is linked once; each run has a folder of its own.
+//! Gyre as a whole, with real processes. One program, so that all of it is linked once; each run
+//! has a folder of its own.
 
 #![allow(clippy::unwrap_used)]
 

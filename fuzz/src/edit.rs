@@ -51,7 +51,7 @@ pub const FLOATS: [f64; 12] = [
 ];
 
 impl Number {
-    /// Its bits.
+    /// Returns its bits.
     pub fn bits(self) -> u64 {
         match self {
             Self::Any(bits) => bits,

@@ -1,5 +1,5 @@
-//! Fuzzing of everything that Gyre reads. A test in `tests/` is a target; each generates edits of small valid inputs and asserts of
-//! every input that
+//! Fuzzing of everything that Gyre reads. A test in `tests/` is a target; each generates edits of
+//! small valid inputs and asserts of every input that
 //!
 //! - nothing panics,
 //! - memory stays within the target's limit,
@@ -11,7 +11,8 @@
 //! BOLERO_RANDOM_TEST_TIME_MS=600000 cargo test --release -p gyre-fuzz -- --nocapture pixels
 //! ```
 //!
-//! A failure prints the edits, shrunk, and the seed that repeats it. It becomes a test of the crate that was at fault.
+//! A failure prints the edits, shrunk, and the seed that repeats it. It becomes a test of the crate
+//! that was at fault.
 //!
 //! - [`edit`]: edits of bytes and texts;
 //! - [`recording`]: small recordings of all formats;
@@ -46,7 +47,7 @@ pub struct Target {
     _alone: MutexGuard<'static, ()>,
 }
 
-/// What became of the inputs.
+/// The outcomes of the inputs.
 #[derive(Default)]
 struct Counts {
     executed: u64,
@@ -105,7 +106,8 @@ impl Drop for Target {
 /// Any error.
 pub type Failure = Box<dyn Error + Send + Sync>;
 
-/// Asserts that an error is one sentence for a person: one line that is not too long, without the marks of a debugging format.
+/// Asserts that an error is one sentence for a person: one line that is not too long, without the
+/// marks of a debugging format.
 pub fn assert_sentence(error: &impl Display) {
     let text = error.to_string();
     assert!(!text.trim().is_empty(), "an empty error");

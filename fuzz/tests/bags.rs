@@ -132,7 +132,8 @@ fn write(path: &Path, messages: &[Message], chunks: bool) {
     mcap.finish().unwrap();
 }
 
-/// Opens a bag and reads all its scans, from the last to the first. What it accepts must be consistent.
+/// Opens a bag and reads all its scans, from the last to the first. What it accepts must be
+/// consistent.
 fn use_bag(path: &Path) -> Result<(), Failure> {
     let mut dataset = gyre_bags::open(path, &DatasetOptions::default())?;
     let mut refused = None;

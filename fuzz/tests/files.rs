@@ -1,4 +1,5 @@
-//! Gyre's own files, which another version, a bad disk or another program may have changed: the journal and the refinement's map.
+//! Gyre's own files, which another version, a bad disk or another program may have changed: the
+//! journal and the refinement's map.
 
 use std::{collections::BTreeSet, fs, path::Path};
 
@@ -165,8 +166,8 @@ fn refinement_maps() {
     });
 }
 
-/// The slots that hold something. The file's header has, after 16 bytes, the numbers of slots of states and of keyframes, and the
-/// bytes of each.
+/// The slots that hold something. The file's header has, after 16 bytes, the numbers of slots of
+/// states and of keyframes, and the bytes of each.
 fn slots(file: &[u8]) -> Vec<std::ops::Range<usize>> {
     let number =
         |k: usize| u64::from_le_bytes(file[MAGIC + 8 * k..][..8].try_into().unwrap()) as usize;

@@ -14,7 +14,8 @@ use crate::recordings::folder;
 
 const KEYFRAMES: usize = 4;
 const MAGIC: usize = 16;
-/// The header of a record: its number, its length, and the checksums of its bytes and of the header.
+/// The header of a record: its number, its length, and the checksums of its bytes and of the
+/// header.
 const HEADER: usize = 20;
 
 /// An edit of a log.

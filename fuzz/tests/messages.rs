@@ -1,4 +1,5 @@
-//! Messages that a stage of somebody else's may send: any header and any payload, against what the next stages do with them.
+//! Messages that a stage of somebody else's may send: any header and any payload, against what the
+//! next stages do with them.
 
 use bolero::{TypeGenerator, check};
 use gyre_fuzz::{Failure, Target, edit::Number};

@@ -1,4 +1,5 @@
-//! What a radar sends: a stream of Colossus, or datagrams of CAT-240, against what a client does with it.
+//! The stream of a radar: a stream of Colossus, or datagrams of CAT-240, against what a client does
+//! with it.
 
 use bolero::{TypeGenerator, check};
 use gyre_colossus::{
@@ -75,7 +76,8 @@ fn edit_radar(configuration: &mut Configuration, rows: &mut [Row], edits: &[Edit
     }
 }
 
-/// A radar's health: a temperature of 36.5 that is healthy, transmitting, three errors of the encoder.
+/// A radar's health: a temperature of 36.5 that is healthy, transmitting, three errors of the
+/// encoder.
 const HEALTH: [u8; 13] = [0x0a, 7, 0x1d, 0, 0, 0x12, 0x42, 0x28, 3, 0x40, 1, 0x60, 3];
 /// Two peaks of an azimuth.
 const NAVIGATION: [u8; 22] = [

@@ -1,5 +1,5 @@
-//! `gyre-lab ablation`: measures the contribution of each step from the paper's form to a sequence's own configuration, or the effect of
-//! single changes of that configuration.
+//! `gyre-lab ablation`: measures the contribution of each step from the paper's form to a
+//! sequence's own configuration, or the effect of single changes of that configuration.
 
 use std::{path::Path, process::ExitCode, slice};
 

@@ -21,13 +21,16 @@ pub struct Lab {
 
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Print Fast-MbyM's Table III for this machine: the times of the searches, and the accuracy that they reach.
+    /// Print Fast-MbyM's Table III for this machine: the times of the searches, and the accuracy
+    /// that they reach.
     Tables(TablesArguments),
-    /// Measure what each step from the paper's form to a configuration gives, or what single changes of it do.
+    /// Measure what each step from the paper's form to a configuration gives, or what single
+    /// changes of it do.
     Ablation(AblationArguments),
     /// Measure how close simulated scans are to real ones.
     Realism(RealismArguments),
-    /// Write a copy of a recording in which some scans are corrupted, to see what an odometry makes of them.
+    /// Write a copy of a recording in which some scans are corrupted, to see what an odometry makes
+    /// of them.
     Corrupt(CorruptArguments),
     /// Write rasters with their true poses into one memory-mappable file, to train masks on.
     ExportPairs(ExportPairsArguments),
@@ -35,7 +38,8 @@ pub enum Command {
     Places(PlacesArguments),
     /// Close the loops of a run, correct its trajectory, and compare both with the ground truth.
     Slam(SlamArguments),
-    /// Measure localisation in a map: the first fix by each scan alone, whole and half hidden, and tracking.
+    /// Measure localisation in a map: the first fix by each scan alone, whole and half hidden, and
+    /// tracking.
     Localisation(LocalisationArguments),
     /// A command of `gyre`.
     #[command(flatten)]
@@ -75,8 +79,8 @@ pub struct AblationArguments {
     /// The folder of ablation.md, ablation.json and all runs.
     #[arg(long, default_value = "out/ablation")]
     pub out: PathBuf,
-    /// Run each of these changes alone instead of the steps, as in masking.threshold=50,70: shows whether a choice holds among its
-    /// neighbours; may be repeated.
+    /// Run each of these changes alone instead of the steps, as in masking.threshold=50,70: shows
+    /// whether a choice holds among its neighbours; may be repeated.
     #[arg(long, value_name = "KEY=VALUE,...")]
     pub vary: Vec<String>,
 }
@@ -87,10 +91,12 @@ pub struct RealismArguments {
     pub sim: PathBuf,
     /// The real recording's folder.
     pub real: PathBuf,
-    /// Another real recording: says of each statistic whether SIM is closer to REAL than this one is.
+    /// Another real recording: says of each statistic whether SIM is closer to REAL than this one
+    /// is.
     #[arg(long, value_name = "OTHER")]
     pub between: Option<PathBuf>,
-    /// The folder of the configurations, `oxford.toml` and so on: each recording is read by the one of its format.
+    /// The folder of the configurations, `oxford.toml` and so on: each recording is read by the one
+    /// of its format.
     #[arg(long, default_value = "configs")]
     pub configs: PathBuf,
     /// SIM's configuration instead.
@@ -105,7 +111,8 @@ pub struct RealismArguments {
     /// The folder of realism.md, realism.json and the runs of the searches.
     #[arg(long, default_value = "out/realism")]
     pub out: PathBuf,
-    /// Scans whose statistics are taken, at most: runs of consecutive ones, evenly spread over the recording.
+    /// Scans whose statistics are taken, at most: runs of consecutive ones, evenly spread over the
+    /// recording.
     #[arg(long, default_value = "64")]
     pub scans: NonZeroUsize,
     /// Scans that the odometries are run on, at most, from the first on; 0: run none.
@@ -117,7 +124,8 @@ pub struct RealismArguments {
 pub struct ExportPairsArguments {
     /// The configuration, a TOML file: its raster, masking, rotation and translation.
     pub configuration: PathBuf,
-    /// A recording's folder; may be repeated. Default: the configuration's simulation, or its source.data.
+    /// A recording's folder; may be repeated. Default: the configuration's simulation, or its
+    /// source.data.
     #[arg(long)]
     pub data: Vec<PathBuf>,
     /// The file to write, NAME.npy; NAME.toml beside it says what it was made of.

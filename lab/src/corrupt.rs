@@ -1,8 +1,8 @@
-//! `gyre-lab corrupt`: a copy of a recording, real or simulated, in which some scans are corrupted in a known way. An odometry should
-//! get over each of them, and report that it had to.
+//! `gyre-lab corrupt`: a copy of a recording, real or simulated, in which some scans are corrupted
+//! in a known way. An odometry should get over each of them, and report that it had to.
 //!
-//! The copy has links to all that is untouched, so it takes little room and goes with the recording. Noise depends on the seed
-//! alone: the same arguments give the same pixels.
+//! The copy has links to all that is untouched, so it takes little room and goes with the
+//! recording. Noise depends on the seed alone: the same arguments give the same pixels.
 
 #[cfg(test)]
 mod tests;
@@ -81,7 +81,8 @@ pub fn corrupt(arguments: &CorruptArguments) -> Result<ExitCode, Failure> {
 }
 
 impl CorruptArguments {
-    /// Writes the corrupted copy. Returns the numbers of the scans that were hit, by their place in the recording.
+    /// Writes the corrupted copy. Returns the numbers of the scans that were hit, by their place in
+    /// the recording.
     fn write(&self) -> Result<Vec<usize>, Failure> {
         let (resolved, out) = (self.path.canonicalize(), &self.out);
         let source = resolved.unwrap_or_else(|_| self.path.clone());
@@ -94,7 +95,8 @@ impl CorruptArguments {
             let (out, other) = (out.display(), other.display());
             return Err(format!("{out} holds `{other}`: give an empty folder").into());
         }
-        // All is linked, folders as a whole, but for the folders that lead to the images, and in there but for the corrupted ones.
+        // All is linked, folders as a whole, but for the folders that lead to the images, and in
+        // there but for the corrupted ones.
         let folder = dataset.file(0).parent().unwrap_or(&source);
         let (mut here, mut there) = (source.clone(), out.clone());
         for next in folder.strip_prefix(&source).unwrap_or(Path::new("")) {

@@ -34,8 +34,8 @@ pub struct Drive {
 }
 
 impl Drive {
-    /// Selects the keyframes of the run in the folder `run`, and extracts their points from its recording. A learned mask is not
-    /// applied.
+    /// Selects the keyframes of the run in the folder `run`, and extracts their points from its
+    /// recording. A learned mask is not applied.
     ///
     /// # Errors
     /// Results or a recording that cannot be read, or have no ground truth.

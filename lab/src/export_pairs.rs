@@ -11,10 +11,11 @@
 //! | `twist` | f4 (3,) | m/s ahead and to the left, rad/s: the velocity of the motion compensation; zero without |
 //! | `sequence` | u4 | number of the sequence |
 //!
-//! A sequence is an unbroken row of one recording's scans. Where a scan is left out, because it cannot be read or the truth does not
-//! say where it was, the next one begins a sequence as the first one did: nothing is searched, and its sweep is not compensated,
-//! nor those of the next `masking.lag`. At run time an unreadable scan breaks no chain; here it does, so that any two neighbours of
-//! one number are consecutive scans.
+//! A sequence is an unbroken row of one recording's scans. Where a scan is left out, because it
+//! cannot be read or the truth does not say where it was, the next one begins a sequence as the
+//! first one did: nothing is searched, and its sweep is not compensated, nor those of the next
+//! `masking.lag`. At run time an unreadable scan breaks no chain; here it does, so that any two
+//! neighbours of one number are consecutive scans.
 //!
 //! - [`preparation`]: from scans to records;
 //! - [`npy`]: how they are written;
@@ -75,7 +76,8 @@ pub fn export_pairs(arguments: &ExportPairsArguments) -> Result<ExitCode, Failur
     Ok(ExitCode::SUCCESS)
 }
 
-/// Returns the configuration of each recording that was named on the command line, or of what the configuration itself plays.
+/// Returns the configuration of each recording that was named on the command line, or of what the
+/// configuration itself plays.
 fn configurations(arguments: &ExportPairsArguments) -> Result<Vec<Configuration>, Failure> {
     let mut common = Configuration::read(&arguments.configuration, &arguments.set)?;
     let named = arguments.ground_truth.as_ref();
@@ -120,7 +122,8 @@ struct Export {
 }
 
 impl Export {
-    /// Appends a recording's scans. One that gives none is refused: it, or its truth, is not what was meant.
+    /// Appends a recording's scans. One that gives none is refused: it, or its truth, is not what
+    /// was meant.
     fn recording(&mut self, recording: &mut Recording, truth: &Track) -> Result<(), Failure> {
         let (sequences, without_truth) = (self.sequences.len(), self.without_truth);
         let mut scan = OwnedScan::with_limits(recording.dataset.limits());
@@ -176,7 +179,7 @@ impl Export {
         Ok(())
     }
 
-    /// What was written, in words.
+    /// Returns what was written, in words.
     fn counts(&self) -> String {
         let scans: usize = self.sequences.iter().map(|(_, scans)| scans).sum();
         let sequences = match self.sequences.len() {

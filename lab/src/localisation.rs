@@ -1,4 +1,5 @@
-//! `gyre-lab localisation`: the first fix by each scan alone, and tracking, against the ground truth.
+//! `gyre-lab localisation`: the first fix by each scan alone, and tracking, against the ground
+//! truth.
 
 mod figures;
 

@@ -1,4 +1,5 @@
-//! `gyre-lab`: tables of the papers, ablations, realism of simulated scans, corrupted recordings, training pairs.
+//! `gyre-lab`: tables of the papers, ablations, realism of simulated scans, corrupted recordings,
+//! training pairs.
 
 mod ablation;
 mod cli;

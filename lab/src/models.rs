@@ -15,8 +15,9 @@ pub struct Model {
 }
 
 impl Model {
-    /// Finds the first of `names` that `folder` has, for rasters of `n` cells a side ({n} in a name), and of `cell_m` metres a cell
-    /// where that is settled; `None` without names. The network has been loaded once.
+    /// Finds the first of `names` that `folder` has, for rasters of `n` cells a side ({n} in a
+    /// name), and of `cell_m` metres a cell where that is settled; `None` without names. The
+    /// network has been loaded once.
     ///
     /// # Errors
     /// A sentence that says what is missing or does not fit.

@@ -26,15 +26,18 @@ const WRONG_DEG: f64 = 5.0;
 
 #[derive(Debug, Args)]
 pub struct PlacesArguments {
-    /// The results of a run: a folder with config.toml and trajectory.tum. The recording needs a ground truth.
+    /// The results of a run: a folder with config.toml and trajectory.tum. The recording needs a
+    /// ground truth.
     pub run: PathBuf,
-    /// Least length of the path between a keyframe and the earlier ones that it is compared with, m.
+    /// Least length of the path between a keyframe and the earlier ones that it is compared with,
+    /// m.
     #[arg(long, default_value = "100")]
     pub gap_m: f64,
     /// A loop is wrong if it is farther from the ground truth, m.
     #[arg(long, default_value = "2")]
     pub wrong_m: f64,
-    /// The folder of places.md, places.json and loops.csv: every verified candidate with its verdict and its error.
+    /// The folder of places.md, places.json and loops.csv: every verified candidate with its
+    /// verdict and its error.
     #[arg(long, default_value = "out/places")]
     pub out: PathBuf,
 }
@@ -45,7 +48,8 @@ struct Checked {
     query: usize,
     place: usize,
     verification: Verification,
-    /// x, y (m) and yaw (rad) of the motion less the true one, along the axes of the found keyframe.
+    /// x, y (m) and yaw (rad) of the motion less the true one, along the axes of the found
+    /// keyframe.
     error: Vector3<f64>,
     is_wrong: bool,
     /// The true distance, m, and yaw, rad.

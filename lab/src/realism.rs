@@ -1,11 +1,13 @@
-//! `gyre-lab realism`: compares simulated scans with real ones: statistics of each recording, and a distance for each statistic.
+//! `gyre-lab realism`: compares simulated scans with real ones: statistics of each recording, and a
+//! distance for each statistic.
 //!
-//! Sensors differ in resolution and range, so all that is compared is measured on one [`RangeGrid`], the coarsest and shortest of
-//! the recordings'. Reading order:
+//! Sensors differ in resolution and range, so all that is compared is measured on one
+//! [`RangeGrid`], the coarsest and shortest of the recordings'. Reading order:
 //!
-//! - [`subject`]: a recording that was named, its scans and how they moved, what the searches reach on it;
-//! - [`statistics`]: measures a recording, scan by scan: [`grid`], [`histogram`], [`correlation`] and [`change`] (from a scan to the
-//!   next) have a statistic each;
+//! - [`subject`]: a recording that was named, its scans and how they moved, what the searches reach
+//!   on it;
+//! - [`statistics`]: measures a recording, scan by scan: [`grid`], [`histogram`], [`correlation`]
+//!   and [`change`] (from a scan to the next) have a statistic each;
 //! - [`comparison`]: the distances, and which of two recordings is closer.
 
 mod change;

@@ -82,7 +82,8 @@ impl Track {
         Ok(Self { path, trajectory })
     }
 
-    /// The truth about a simulation: what `gyre simulate` writes, so that it does not matter whether that was done.
+    /// The truth about a simulation: what `gyre simulate` writes, so that it does not matter
+    /// whether that was done.
     fn simulated(tum: &[u8]) -> Result<Self, Failure> {
         let path = PathBuf::from(results::SIMULATED_TRUTH);
         let trajectory = parse_trajectory(&String::from_utf8_lossy(tum), &path)?;
@@ -98,7 +99,8 @@ impl Track {
         }
     }
 
-    /// Returns the pose at a time, in the trajectory's own frame; `None` before the first, after the last, and in gaps.
+    /// Returns the pose at a time, in the trajectory's own frame; `None` before the first, after
+    /// the last, and in gaps.
     pub fn pose(&self, stamp_ns: i64) -> Option<Pose> {
         let gap_ns = self.trajectory.gap_ns(stamp_ns);
         let pose = self.trajectory.near(stamp_ns, Trajectory::ROUNDING_NS);
@@ -106,7 +108,8 @@ impl Track {
     }
 }
 
-/// Returns the last name of a path; `recordings/.` and the like have one only once they are resolved.
+/// Returns the last name of a path; `recordings/.` and the like have one only once they are
+/// resolved.
 pub fn folder_name(path: &Path) -> String {
     let resolved = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let name = resolved.file_name().unwrap_or_default();

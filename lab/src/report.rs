@@ -1,4 +1,5 @@
-//! The form of all reports: where, when and how something was measured, and tables of records, in Markdown and in JSON.
+//! The form of all reports: where, when and how something was measured, and tables of records, in
+//! Markdown and in JSON.
 
 use std::{collections::BTreeMap, env, fs, io, path::Path};
 
@@ -43,8 +44,8 @@ pub fn record(object: Value) -> Record {
     }
 }
 
-/// Writes tables that this process has measured, and where, when and how it did, to `NAME.json` and `NAME.md` in `out`. Prints the
-/// latter.
+/// Writes tables that this process has measured, and where, when and how it did, to `NAME.json` and
+/// `NAME.md` in `out`. Prints the latter.
 pub fn publish(name: &str, tables: &[Table], out: &Path) -> Result<(), Failure> {
     let arguments = env::args_os().skip(1);
     let arguments = arguments.map(|argument| argument.to_string_lossy().into_owned());

@@ -27,7 +27,8 @@ pub struct SequenceArguments {
     /// A sequence's folder; may be repeated.
     #[arg(long, required = true)]
     pub data: Vec<PathBuf>,
-    /// The folder of the learned masks. A row whose network is missing is left out, and named under the table.
+    /// The folder of the learned masks. A row whose network is missing is left out, and named under
+    /// the table.
     #[arg(long, default_value = "models")]
     pub models: PathBuf,
 }
@@ -42,7 +43,8 @@ pub struct Sequence {
     pub data: PathBuf,
 }
 
-/// The columns of runs: up to `forward` the place in the evaluation of `summary.json`, then what is made of other parts of it.
+/// The columns of runs: up to `forward` the place in the evaluation of `summary.json`, then what is
+/// made of other parts of it.
 const COLUMNS: [Column; 16] = [
     ("row", "row", 0),
     ("path_m", "path m", 0),
@@ -123,8 +125,8 @@ impl Sequence {
         Ok(Model::find(models, names, raster.n, Some(raster.cell_m)))
     }
 
-    /// Runs it with a row's overrides, masked by this network if there is one, as a person would, by `gyre run`, into a folder below
-    /// `out`. Returns the folder, and what `summary.json` says.
+    /// Runs it with a row's overrides, masked by this network if there is one, as a person would,
+    /// by `gyre run`, into a folder below `out`. Returns the folder, and what `summary.json` says.
     pub fn run(
         &self,
         row: &str,

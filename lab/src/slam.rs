@@ -1,4 +1,5 @@
-//! `gyre-lab slam`: closes the loops of a run, corrects its trajectory, and compares both with the ground truth.
+//! `gyre-lab slam`: closes the loops of a run, corrects its trajectory, and compares both with the
+//! ground truth.
 
 mod figures;
 mod wrong;
@@ -20,7 +21,8 @@ use figures::{Figures, loops_table};
 
 #[derive(Debug, Args)]
 pub struct SlamArguments {
-    /// The results of a run: a folder with config.toml, odometry.csv and trajectory.tum. The recording needs a ground truth.
+    /// The results of a run: a folder with config.toml, odometry.csv and trajectory.tum. The
+    /// recording needs a ground truth.
     pub run: PathBuf,
     /// A loop is wrong if it is farther from the ground truth, m.
     #[arg(long, default_value = "2")]

@@ -1,4 +1,5 @@
-//! `gyre-lab tables`: Fast-MbyM's Table III for this machine, the paper's figures and a baseline's beside ours.
+//! `gyre-lab tables`: Fast-MbyM's Table III for this machine, the paper's figures and a baseline's
+//! beside ours.
 //!
 //! - [`rows`]: what is compared, and what each row overrides in a configuration;
 //! - [`times`]: Table IIIa by the [`timer`], and [`baseline`] in it; Table IIIb is made of runs.
@@ -34,7 +35,8 @@ pub fn tables(arguments: &TablesArguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Runs every row of Table IIIb on `sequence`. Where the network of one is missing there is only what the paper says, if it does.
+/// Runs every row of Table IIIb on `sequence`. Where the network of one is missing there is only
+/// what the paper says, if it does.
 fn accuracy(rows: &Rows, sequence: &Sequence, models: &Path, out: &Path) -> Result<Table, Failure> {
     let (mut records, mut left_out) = (Vec::new(), Notes::new());
     for row in rows.run() {

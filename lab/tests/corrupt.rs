@@ -1,4 +1,5 @@
-//! Recordings that were corrupted on purpose: no fault leads the odometry far astray, and none goes by unnoticed.
+//! Recordings that were corrupted on purpose: no fault leads the odometry far astray, and none goes
+//! by unnoticed.
 
 use std::path::{Path, PathBuf};
 

@@ -1,4 +1,5 @@
-//! `gyre-lab export-pairs` as a whole: what a training reads of a simulated drive, and what is refused.
+//! `gyre-lab export-pairs` as a whole: what a training reads of a simulated drive, and what is
+//! refused.
 
 use std::{
     fs,

@@ -7,7 +7,8 @@ use gyre_simulator::{SimulationConfig, write_dataset};
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// A folder with `other`, a drive through another town, and the configuration that simulated recordings are read with.
+/// A folder with `other`, a drive through another town, and the configuration that simulated
+/// recordings are read with.
 fn folder() -> TempDir {
     let folder = crate::common::folder();
     let config = SimulationConfig {

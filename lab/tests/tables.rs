@@ -1,4 +1,5 @@
-//! `gyre-lab tables` and `gyre-lab ablation` as a whole: a small simulated drive, real runs, and a baseline that only pretends.
+//! `gyre-lab tables` and `gyre-lab ablation` as a whole: a small simulated drive, real runs, and a
+//! baseline that only pretends.
 
 use std::{fs, path::Path, process::Command};
 
@@ -17,7 +18,8 @@ const ROWS: [&str; 7] = [
     "Gyre",
 ];
 
-/// Writes what a baseline writes, to the file that follows `--json`: 80 ms for each search, whatever its arguments.
+/// Writes what a baseline writes, to the file that follows `--json`: 80 ms for each search,
+/// whatever its arguments.
 const BASELINE: &str = r#"
 echo "$@" > "$(dirname "$0")/arguments.txt"
 while [ "$1" != --json ]; do shift; done
@@ -282,7 +284,8 @@ fn single_changes_are_run_alone() {
     assert_ne!(ate(&lines[1]), ate(&lines[2]));
 }
 
-/// Asserts that the command of a line, in another folder for its results, gives what it gave in the table.
+/// Asserts that the command of a line, in another folder for its results, gives what it gave in the
+/// table.
 fn repeats(folder: &Path, line: &Value) {
     let words: Vec<&str> = line["command"].as_str().unwrap().split(' ').collect();
     let out = words[1 + words.iter().position(|word| *word == "--out").unwrap()];

@@ -12,11 +12,13 @@ use toml::Table;
 
 use crate::{errors, values};
 
-/// The settings of the method and the constants of a radar: the sections `dataset`, `raster`, `points`, `masking`, `search`, `rotation`,
-/// `translation`, `exhaustive`, `refinement` and `slam` of a configuration of `gyre run`, with the same keys and defaults.
+/// The settings of the method and the constants of a radar: the sections `dataset`, `raster`,
+/// `points`, `masking`, `search`, `rotation`, `translation`, `exhaustive`, `refinement` and `slam`
+/// of a configuration of `gyre run`, with the same keys and defaults.
 ///
-/// `Config()` has the defaults, and `Config({"masking": {"threshold": 70}})` differs from them in one key. Unknown keys and values out
-/// of their bounds raise ConfigError. A key that is None has its default. A configuration never changes, and can be pickled.
+/// `Config()` has the defaults, and `Config({"masking": {"threshold": 70}})` differs from them in
+/// one key. Unknown keys and values out of their bounds raise ConfigError. A key that is None has
+/// its default. A configuration never changes, and can be pickled.
 #[pyclass(module = "gyre", frozen, eq)]
 pub struct Config {
     method: MethodConfig,
@@ -57,8 +59,9 @@ impl Config {
         Self::from_table(table.unwrap_or_default(), None)
     }
 
-    /// Reads a TOML file, as `gyre run` does. Its sections `run`, `source`, `simulation`, `budget`, `record` and `stages`, which are for
-    /// a run of processes, are ignored. `overrides` replaces keys: `{"masking.kind": "none"}`.
+    /// Reads a TOML file, as `gyre run` does. Its sections `run`, `source`, `simulation`, `budget`,
+    /// `record` and `stages`, which are for a run of processes, are ignored. `overrides` replaces
+    /// keys: `{"masking.kind": "none"}`.
     #[staticmethod]
     #[pyo3(signature = (path, overrides=None))]
     fn read(path: PathBuf, overrides: Option<&Bound<'_, PyMapping>>) -> PyResult<Self> {
@@ -68,9 +71,10 @@ impl Config {
         Self::from_table(table, None)
     }
 
-    /// Finds the settings of a recording, as `gyre run --data` does without a configuration: the radar's constants are those of its
-    /// format or its `dataset.toml`, and eight of its scans give the threshold and the sizes of cells and beams. `note` says what was
-    /// found. `overrides` replaces keys.
+    /// Finds the settings of a recording, as `gyre run --data` does without a configuration: the
+    /// radar's constants are those of its format or its `dataset.toml`, and eight of its scans give
+    /// the threshold and the sizes of cells and beams. `note` says what was found. `overrides`
+    /// replaces keys.
     #[staticmethod]
     #[pyo3(signature = (data, overrides=None))]
     fn of(
@@ -87,7 +91,8 @@ impl Config {
         Self::from_table(found.table, Some(found.sentence))
     }
 
-    /// What `Config.of` found in the recording, in a sentence; None for other configurations.
+    /// The settings that `Config.of` found in the recording, in a sentence; None for other
+    /// configurations.
     #[getter]
     fn note(&self) -> Option<&str> {
         self.note.as_deref()

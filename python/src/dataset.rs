@@ -18,10 +18,12 @@ use crate::{config::Config, errors, lock::Guarded, scan::Scan};
 /// Damaged scans in a row that are skipped: the default of `source.max_unreadable` of a run.
 const MAX_UNREADABLE: usize = 10;
 
-/// Opens a recording: a folder of a format that Gyre knows, an MCAP file of `gyre record`, or a bag of ROS 2.
+/// Opens a recording: a folder of a format that Gyre knows, an MCAP file of `gyre record`, or a bag
+/// of ROS 2.
 ///
-/// The constants of the radar are those of the section `dataset` of `config`. Without one they are those of the format, or of the
-/// recording's `dataset.toml`, as `Config.of` takes them. Raises ReadError.
+/// The constants of the radar are those of the section `dataset` of `config`. Without one they are
+/// those of the format, or of the recording's `dataset.toml`, as `Config.of` takes them. Raises
+/// ReadError.
 #[pyfunction]
 #[pyo3(signature = (data, config=None))]
 pub fn open(
@@ -57,9 +59,9 @@ pub fn find_ground_truth(data: PathBuf) -> Option<PathBuf> {
 
 /// The scans of a recording, ordered by time.
 ///
-/// `dataset[i]` decodes scan i, and raises ReadError if it cannot be read. Iteration plays the scans as `gyre run` does: it begins at
-/// `first`, skips damaged scans with a SkippedScanWarning, and raises ReadError after ten of them in a row, or where a file cannot be
-/// read.
+/// `dataset[i]` decodes scan i, and raises ReadError if it cannot be read. Iteration plays the
+/// scans as `gyre run` does: it begins at `first`, skips damaged scans with a SkippedScanWarning,
+/// and raises ReadError after ten of them in a row, or where a file cannot be read.
 ///
 /// A pickled dataset is opened anew where it is unpickled, as in a process of `multiprocessing`.
 #[pyclass(module = "gyre", frozen)]
@@ -80,13 +82,15 @@ impl Dataset {
         self.format
     }
 
-    /// The index of the first scan that can be read; not 0 in a recording of a run that was resumed.
+    /// The index of the first scan that can be read; not 0 in a recording of a run that was
+    /// resumed.
     #[getter]
     fn first(&self) -> usize {
         self.first
     }
 
-    /// The files of the scans, in order; of an MCAP recording its parts, of a bag of ROS 2 its files.
+    /// The files of the scans, in order; of an MCAP recording its parts, of a bag of ROS 2 its
+    /// files.
     #[getter]
     fn files(&self, py: Python<'_>) -> PyResult<Vec<PathBuf>> {
         self.dataset.with(py, |dataset| {
@@ -96,7 +100,8 @@ impl Dataset {
         })
     }
 
-    /// The time of each scan as far as it is known without decoding it, int64 (scans,), ns; -1 where it is not.
+    /// The time of each scan as far as it is known without decoding it, int64 (scans,), ns; -1
+    /// where it is not.
     #[getter]
     fn stamp_ns<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<i64>>> {
         let stamps = self.dataset.with(py, |dataset| {
@@ -138,8 +143,8 @@ impl Dataset {
         self.scans(None, None)
     }
 
-    /// Iterates over `count` scans from number `first` on, as iteration over the dataset does over all: by default it begins at the
-    /// first scan that can be read, and ends with the last one.
+    /// Iterates over `count` scans from number `first` on, as iteration over the dataset does over
+    /// all: by default it begins at the first scan that can be read, and ends with the last one.
     #[pyo3(signature = (first=None, count=None))]
     fn scans(&self, first: Option<usize>, count: Option<usize>) -> Scans {
         let first = first.unwrap_or(self.first);

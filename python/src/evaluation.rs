@@ -10,10 +10,11 @@ use pyo3::{exceptions::PyValueError, prelude::*};
 
 use crate::{errors, trajectory::Trajectory, values};
 
-/// Compares an estimated trajectory with the ground truth: by time, or pose by pose where one of them has no times.
+/// Compares an estimated trajectory with the ground truth: by time, or pose by pose where one of
+/// them has no times.
 ///
-/// `step` is the number of poses from the start of a segment of KITTI and seg to the start of the next; published figures use 10 or 4.
-/// Raises TrajectoryError if they cannot be compared.
+/// `step` is the number of poses from the start of a segment of KITTI and seg to the start of the
+/// next; published figures use 10 or 4. Raises TrajectoryError if they cannot be compared.
 #[pyfunction]
 #[pyo3(signature = (estimate, truth, step=10))]
 pub fn evaluate(
@@ -42,7 +43,8 @@ fn timed(trajectory: &gyre_radar::Trajectory) -> TimedPoses<'_> {
     TimedPoses::new(stamps, &trajectory.poses)
 }
 
-/// The errors of a trajectory against ground truth. `str(evaluation)` is a table, and `to_dict()` has every figure.
+/// The errors of a trajectory against ground truth. `str(evaluation)` is a table, and `to_dict()`
+/// has every figure.
 #[pyclass(module = "gyre", frozen)]
 pub struct Evaluation(gyre_evaluation::Evaluation);
 
@@ -60,7 +62,8 @@ impl Evaluation {
         self.0.ate.rmse_m
     }
 
-    /// The translation error of KITTI, %; None for a path up to 100 m or a ground truth without heading.
+    /// The translation error of KITTI, %; None for a path up to 100 m or a ground truth without
+    /// heading.
     #[getter]
     fn translation_percent(&self) -> Option<f64> {
         self.0.kitti.as_ref().map(|kitti| kitti.translation_percent)
@@ -73,7 +76,8 @@ impl Evaluation {
         kitti.map(|kitti| kitti.rotation_deg_per_100m)
     }
 
-    /// The error of segments that are aligned by themselves, % of their length; None for a path up to 100 m.
+    /// The error of segments that are aligned by themselves, % of their length; None for a path up
+    /// to 100 m.
     #[getter]
     fn seg_percent(&self) -> Option<f64> {
         self.0.seg.as_ref().map(|seg| seg.percent)
@@ -89,8 +93,8 @@ impl Evaluation {
         gyre_storage::write(&path, self._repr_svg_()?).map_err(errors::write)
     }
 
-    /// Draws the errors over the length of segments into an SVG file; over the distance travelled where the path is too short for
-    /// KITTI.
+    /// Draws the errors over the length of segments into an SVG file; over the distance travelled
+    /// where the path is too short for KITTI.
     fn plot_errors(&self, path: PathBuf) -> PyResult<()> {
         let svg = errors_svg(&self.0).map_err(errors::trajectory)?;
         gyre_storage::write(&path, svg).map_err(errors::write)

@@ -1,4 +1,4 @@
-//! What a recording is.
+//! The description of a recording.
 
 use std::path::PathBuf;
 
@@ -6,8 +6,9 @@ use pyo3::prelude::*;
 
 use crate::{config::Config, errors, trajectory::Trajectory, values};
 
-/// Examines a recording: what it contains, and what looks wrong with it. With a trajectory of it the clock of its ground truth is
-/// compared. The section `dataset` of `config` says how the recording is opened; without one its format alone does. Raises ReadError.
+/// Examines a recording: what it contains, and what looks wrong with it. With a trajectory of it
+/// the clock of its ground truth is compared. The section `dataset` of `config` says how the
+/// recording is opened; without one its format alone does. Raises ReadError.
 #[pyfunction]
 #[pyo3(signature = (data, trajectory=None, config=None))]
 pub fn inspect(
@@ -29,13 +30,13 @@ pub fn inspect(
     report.map(Report).map_err(errors::open)
 }
 
-/// What a recording contains. `str(report)` is a text, and `to_dict()` has every figure.
+/// The content of a recording. `str(report)` is a text, and `to_dict()` has every figure.
 #[pyclass(module = "gyre", frozen)]
 pub struct Report(gyre_radar::Report);
 
 #[pymethods]
 impl Report {
-    /// What looks wrong: whole sentences.
+    /// The problems that were found: whole sentences.
     #[getter]
     fn findings(&self) -> Vec<String> {
         self.0.findings.clone()

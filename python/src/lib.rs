@@ -1,10 +1,13 @@
-//! The extension module of the Python package `gyre`: the libraries of `shared/`, with scans, rasters and points as numpy arrays.
+//! The extension module of the Python package `gyre`: the libraries of `shared/`, with scans,
+//! rasters and points as numpy arrays.
 //!
-//! Reading order: `config`, `dataset`, `scan` (whose memory is numpy's), `odometry` and `registered`, `masker`, `slam`, `trajectory`,
-//! `evaluation`; `errors` and `values` say how errors and values cross the border. What is written in Python is in `package/`.
+//! Reading order: `config`, `dataset`, `scan` (whose memory is numpy's), `odometry` and
+//! `registered`, `masker`, `slam`, `trajectory`, `evaluation`; `errors` and `values` say how errors
+//! and values cross the border. What is written in Python is in `package/`.
 //!
-//! The GIL is released while scans are decoded and computed. Each object of Rust that changes is behind a lock, which is taken without
-//! the GIL: two threads that share one wait for each other, and never block the interpreter.
+//! The GIL is released while scans are decoded and computed. Each object of Rust that changes is
+//! behind a lock, which is taken without the GIL: two threads that share one wait for each other,
+//! and never block the interpreter.
 
 mod config;
 mod dataset;

@@ -11,8 +11,9 @@ use crate::errors;
 
 /// A value behind a lock, for the threads of one process.
 ///
-/// A forked process has a copy of the lock, which a thread of its parent may have held, of the threads of ONNX Runtime nothing, and the
-/// positions in open files in common with its parent. So it is told to make the value anew.
+/// A forked process has a copy of the lock, which a thread of its parent may have held, of the
+/// threads of ONNX Runtime nothing, and the positions in open files in common with its parent. So
+/// it is told to make the value anew.
 pub struct Guarded<T> {
     name: &'static str,
     process: u32,
@@ -29,7 +30,8 @@ impl<T: Send> Guarded<T> {
         }
     }
 
-    /// Computes on the value. The GIL is released first, so that a thread that waits blocks no other.
+    /// Computes on the value. The GIL is released first, so that a thread that waits blocks no
+    /// other.
     ///
     /// # Errors
     /// Error: the value was made before this process was forked.
@@ -44,7 +46,8 @@ impl<T: Send> Guarded<T> {
                 self.name
             )));
         }
-        // A computation that panicked has raised PanicException in its thread; what it left is checked as any other input.
+        // A computation that panicked has raised PanicException in its thread; what it left is
+        // checked as any other input.
         Ok(py.detach(|| compute(&mut self.value.lock().unwrap_or_else(PoisonError::into_inner))))
     }
 }

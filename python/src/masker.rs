@@ -37,13 +37,15 @@ struct State {
 /// A masked scan: what `Masker.mask` returns.
 #[pyclass(module = "gyre", frozen, get_all)]
 pub struct Masked {
-    /// The raster of powers, motion-compensated and masked: float32 (n, n), row 0 far ahead, column 0 far to the left. A cell is
-    /// `raster.cell_m` wide, and the sensor is in the middle.
+    /// The raster of powers, motion-compensated and masked: float32 (n, n), row 0 far ahead, column
+    /// 0 far to the left. A cell is `raster.cell_m` wide, and the sensor is in the middle.
     raster: Py<PyArray2<f32>>,
-    /// The raster of the previous scan, masked for this pair, float32 (n, n), if the mask takes two scans; else None.
+    /// The raster of the previous scan, masked for this pair, float32 (n, n), if the mask takes two
+    /// scans; else None.
     previous: Option<Py<PyArray2<f32>>>,
-    /// The strongest returns as measured, a structured array with the float32 fields `x_m` and `y_m` in the sensor's frame at the time
-    /// of the azimuth, `time_s` relative to the scan's stamp, `weight` from 0 to 1, and `doppler_s`.
+    /// The strongest returns as measured, a structured array with the float32 fields `x_m` and
+    /// `y_m` in the sensor's frame at the time of the azimuth, `time_s` relative to the scan's
+    /// stamp, `weight` from 0 to 1, and `doppler_s`.
     points: Py<PyAny>,
     /// The factors of a learned mask, float32 (n, n) from 0 to 1; None without a network.
     factors: Option<Py<PyArray2<f32>>>,
@@ -86,7 +88,8 @@ pub fn fields_of<'py>(points: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArray1<'
 }
 
 impl State {
-    /// Masks a scan into the rasters, writes its points, and returns their number and the factors of a network.
+    /// Masks a scan into the rasters, writes its points, and returns their number and the factors
+    /// of a network.
     fn mask(
         &mut self,
         scan: &PolarScan<'_>,
@@ -134,11 +137,12 @@ impl Masker {
         })
     }
 
-    /// Masks a scan. `velocity` is that of the sensor for motion compensation: x forward and y left in m/s, and the yaw rate
-    /// counter-clockwise in rad/s; without it nothing is compensated.
+    /// Masks a scan. `velocity` is that of the sensor for motion compensation: x forward and y left
+    /// in m/s, and the yaw rate counter-clockwise in rad/s; without it nothing is compensated.
     ///
-    /// If the mask takes two scans, the previous one is that of the call before; a scan that is not later than that, or by more than
-    /// 10 s, is its own previous scan. A scan that cannot be used raises ScanError, and a network that fails Error.
+    /// If the mask takes two scans, the previous one is that of the call before; a scan that is not
+    /// later than that, or by more than 10 s, is its own previous scan. A scan that cannot be used
+    /// raises ScanError, and a network that fails Error.
     #[pyo3(signature = (scan, velocity=None))]
     fn mask(
         &self,

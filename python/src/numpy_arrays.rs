@@ -35,7 +35,8 @@ pub fn given<'py, T: Element, D: Dimension>(
     })
 }
 
-/// Borrows an object as an array that Rust reads. Type and shape are looked at each time: numpy can change both in place.
+/// Borrows an object as an array that Rust reads. Type and shape are looked at each time: numpy can
+/// change both in place.
 ///
 /// # Errors
 /// TypeError: it is no such array. RuntimeError: it is being written.
@@ -47,8 +48,8 @@ pub fn readable<'py, T: Element, D: Dimension>(
     Ok(given(array, name, expected)?.try_readonly()?)
 }
 
-/// Converts an object to an array of elements `T` that a slice of Rust can have: C-contiguous and aligned. One that is so is not
-/// copied; a view of packed records is.
+/// Converts an object to an array of elements `T` that a slice of Rust can have: C-contiguous and
+/// aligned. One that is so is not copied; a view of packed records is.
 ///
 /// # Errors
 /// TypeError or ValueError of numpy: it cannot be converted.
@@ -60,7 +61,8 @@ pub fn sliceable<'py, T: Element>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'
     numpy.call_method("require", (value, T::get_dtype(py)), Some(&keywords))
 }
 
-/// Converts what numpy can convert without loss of kind, as a list of int or an array of float64, to an array of one dimension.
+/// Converts what numpy can convert without loss of kind, as a list of int or an array of float64,
+/// to an array of one dimension.
 ///
 /// # Errors
 /// TypeError or ValueError of numpy: it cannot be converted.

@@ -10,7 +10,8 @@ use crate::{
 
 /// Radar odometry: registers scan after scan against the previous ones.
 ///
-/// `Odometry(config)` takes the settings of `gyre run`, and finds its motions to the last bit. Two threads can each have their own.
+/// `Odometry(config)` takes the settings of `gyre run`, and finds its motions to the last bit. Two
+/// threads can each have their own.
 #[pyclass(module = "gyre", frozen)]
 pub struct Odometry(Guarded<State>);
 
@@ -51,8 +52,9 @@ impl Odometry {
 
     /// Registers the next scan: estimates its motion from the previous scan, and its pose.
     ///
-    /// A scan that is not later than the previous one, or by more than 10 s, starts a new chain of motions. A scan that cannot be used
-    /// raises ScanError and is left out: the next one is registered against the scan before it. A network that fails raises Error.
+    /// A scan that is not later than the previous one, or by more than 10 s, starts a new chain of
+    /// motions. A scan that cannot be used raises ScanError and is left out: the next one is
+    /// registered against the scan before it. A network that fails raises Error.
     fn register(&self, py: Python<'_>, scan: &Bound<'_, Scan>) -> PyResult<Registered> {
         let borrowed = scan.get().borrowed(py)?;
         let scan = borrowed.view()?;

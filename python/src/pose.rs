@@ -8,7 +8,8 @@ use pyo3::prelude::*;
 
 use crate::numpy_arrays;
 
-/// The pose of a frame in another frame, with its covariance: x forward and y left in m, yaw counter-clockwise in rad.
+/// The pose of a frame in another frame, with its covariance: x forward and y left in m, yaw
+/// counter-clockwise in rad.
 ///
 /// A motion is the pose of the later scan in the frame of the earlier one.
 #[pyclass(module = "gyre", frozen)]
@@ -34,13 +35,15 @@ impl Pose {
         xy_yaw(&self.0.motion)[2]
     }
 
-    /// The covariance of (x, y, yaw) along the axes of the reference frame, float64 (3, 3): m^2, m rad and rad^2.
+    /// The covariance of (x, y, yaw) along the axes of the reference frame, float64 (3, 3): m^2, m
+    /// rad and rad^2.
     #[getter]
     fn covariance<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         numpy_arrays::matrix(py, &self.0.covariance)
     }
 
-    /// The homogeneous matrix, float64 (3, 3): it maps points (x, y, 1), m, into the reference frame.
+    /// The homogeneous matrix, float64 (3, 3): it maps points (x, y, 1), m, into the reference
+    /// frame.
     #[getter]
     fn matrix<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         numpy_arrays::matrix(py, &self.0.motion.to_homogeneous())

@@ -27,8 +27,8 @@ impl Registered {
         self.stamp_ns
     }
 
-    /// The origin of the motion: `start` (none: the chain starts here), `searched`, `refined`, `weak` (refined with little support) or
-    /// `predicted` (nothing matched).
+    /// The origin of the motion: `start` (none: the chain starts here), `searched`, `refined`,
+    /// `weak` (refined with little support) or `predicted` (nothing matched).
     #[getter]
     fn outcome(&self) -> &'static str {
         match self.registered.outcome {
@@ -68,7 +68,7 @@ impl Registered {
         self.registered.interval_ns
     }
 
-    /// Whether the vehicle stands. While it does, motions are zero.
+    /// Returns whether the vehicle stands. While it does, motions are zero.
     #[getter]
     fn stationary(&self) -> bool {
         let refined = self.registered.refined.as_ref();

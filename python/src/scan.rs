@@ -22,22 +22,22 @@ const ANGLES: &str = "one float32 for each azimuth, rad";
 const STAMPS: &str = "one int64 for each azimuth, ns";
 const FLAGS: &str = "one uint8 for each azimuth";
 
-/// One sweep of a radar: the powers of `azimuths` x `range bins`, with the angle and the time of each azimuth.
+/// One sweep of a radar: the powers of `azimuths` x `range bins`, with the angle and the time of
+/// each azimuth.
 ///
-/// `Dataset` reads scans of recordings. This constructor makes one of arrays of your own, without copying `power`:
+/// `Dataset` reads scans of recordings. This constructor makes one of arrays of your own, without
+/// copying `power`:
 ///
-/// power: uint8 (azimuths, range bins), C-contiguous; nearest bin first.
-/// stamp_ns: the time of the scan, ns: the middle of the sweep.
-/// range_resolution_m: the depth of a range bin, m.
-/// clockwise: whether azimuths increase clockwise, seen from above.
-/// azimuth_stamp_ns: int64 (azimuths,), the time of each azimuth, ns; or else
-/// sweep_s: the duration of the sweep, s, whose azimuths are measured evenly in time.
-/// azimuth_rad: float32 (azimuths,), the angles from straight ahead in the sense of rotation, rad; without them the first is straight ahead,
-///     and all are spaced evenly over a turn.
-/// azimuth_flags: uint8 (azimuths,), what is known of each azimuth: 1 measured, 2 rising chirp, 4 the chirp is known; without them all
-///     are measured.
-/// range_offset_m: m; the centre of bin b is at (b + 0.5) * range_resolution_m + range_offset_m.
-/// doppler_s: metres to add to a range for each m/s of closing speed; 0: unknown.
+/// power: uint8 (azimuths, range bins), C-contiguous; nearest bin first. stamp_ns: the time of the
+/// scan, ns: the middle of the sweep. range_resolution_m: the depth of a range bin, m. clockwise:
+/// whether azimuths increase clockwise, seen from above. azimuth_stamp_ns: int64 (azimuths,), the
+/// time of each azimuth, ns; or else sweep_s: the duration of the sweep, s, whose azimuths are
+/// measured evenly in time. azimuth_rad: float32 (azimuths,), the angles from straight ahead in the
+/// sense of rotation, rad; without them the first is straight ahead, and all are spaced evenly over
+/// a turn. azimuth_flags: uint8 (azimuths,), what is known of each azimuth: 1 measured, 2 rising
+/// chirp, 4 the chirp is known; without them all are measured. range_offset_m: m; the centre of bin
+/// b is at (b + 0.5) * range_resolution_m + range_offset_m. doppler_s: metres to add to a range for
+/// each m/s of closing speed; 0: unknown.
 ///
 /// Arrays that are written to while a scan is registered by another thread give undefined motions.
 #[pyclass(module = "gyre", frozen)]
@@ -261,14 +261,15 @@ impl Scan {
         Ok(scan)
     }
 
-    /// The powers, uint8 (azimuths, range bins), nearest bin first: a view without the metadata that a file has before each row. What is
-    /// written to it is registered.
+    /// The powers, uint8 (azimuths, range bins), nearest bin first: a view without the metadata
+    /// that a file has before each row. What is written to it is registered.
     #[getter]
     fn power(&self, py: Python<'_>) -> Py<PyAny> {
         self.power.clone_ref(py)
     }
 
-    /// The angle of each azimuth from straight ahead, float32 (azimuths,), rad, in the sense of rotation.
+    /// The angle of each azimuth from straight ahead, float32 (azimuths,), rad, in the sense of
+    /// rotation.
     #[getter]
     fn azimuth_rad(&self, py: Python<'_>) -> Py<PyAny> {
         self.azimuth_rad.clone_ref(py)
@@ -280,7 +281,7 @@ impl Scan {
         self.azimuth_stamp_ns.clone_ref(py)
     }
 
-    /// What is known of each azimuth, uint8 (azimuths,): 1 measured, 2 rising chirp, 4 the chirp is known.
+    /// Flags of each azimuth, uint8 (azimuths,): 1 measured, 2 rising chirp, 4 the chirp is known.
     #[getter]
     fn azimuth_flags(&self, py: Python<'_>) -> Py<PyAny> {
         self.azimuth_flags.clone_ref(py)
@@ -298,7 +299,8 @@ impl Scan {
         self.geometry.range_resolution_m
     }
 
-    /// The offset of the ranges, m: the centre of bin b is at (b + 0.5) * range_resolution_m + range_offset_m.
+    /// The offset of the ranges, m: the centre of bin b is at (b + 0.5) * range_resolution_m +
+    /// range_offset_m.
     #[getter]
     fn range_offset_m(&self) -> f32 {
         self.geometry.range_offset_m
@@ -310,7 +312,7 @@ impl Scan {
         self.geometry.doppler_s
     }
 
-    /// Whether azimuths increase clockwise, seen from above.
+    /// Returns whether azimuths increase clockwise, seen from above.
     #[getter]
     fn clockwise(&self) -> bool {
         self.geometry.sense == Sense::Clockwise

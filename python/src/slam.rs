@@ -21,8 +21,9 @@ const MAX_RANGE_M: f32 = 1e4;
 
 /// Finds the places that a drive comes back to, and corrects its trajectory by them.
 ///
-/// `config` has `slam.kind` `graph` or `filter`. Give each registered scan to `add`, and call `finish` after the last one. Odometry does
-/// not depend on it. The points of keyframes are kept in memory, 20 bytes each.
+/// `config` has `slam.kind` `graph` or `filter`. Give each registered scan to `add`, and call
+/// `finish` after the last one. Odometry does not depend on it. The points of keyframes are kept in
+/// memory, 20 bytes each.
 #[pyclass(module = "gyre", frozen)]
 pub struct Slam {
     state: Guarded<State>,
@@ -190,8 +191,8 @@ impl Slam {
         })
     }
 
-    /// Takes the next scan with its points, those of `Odometry.points`, and closes the loops that it completes. Returns whether the scan
-    /// is a keyframe.
+    /// Takes the next scan with its points, those of `Odometry.points`, and closes the loops that
+    /// it completes. Returns whether the scan is a keyframe.
     fn add(
         &self,
         py: Python<'_>,

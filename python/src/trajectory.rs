@@ -17,8 +17,8 @@ use crate::{
 
 /// Poses of the sensor over time.
 ///
-/// stamp_ns: int64 (poses,), ns, not decreasing; None for poses without times.
-/// poses: float64 (poses, 3), x forward and y left in m, yaw counter-clockwise in rad; or a sequence of Pose.
+/// stamp_ns: int64 (poses,), ns, not decreasing; None for poses without times. poses: float64
+/// (poses, 3), x forward and y left in m, yaw counter-clockwise in rad; or a sequence of Pose.
 #[pyclass(module = "gyre", frozen)]
 pub struct Trajectory(pub gyre_radar::Trajectory);
 
@@ -81,7 +81,8 @@ impl Trajectory {
         Ok(Self(gyre_radar::Trajectory { stamp_ns, poses }))
     }
 
-    /// Reads a file of TUM, KITTI, Oxford, Boreas or MulRan, and converts it to x forward, y left. Raises ReadError.
+    /// Reads a file of TUM, KITTI, Oxford, Boreas or MulRan, and converts it to x forward, y left.
+    /// Raises ReadError.
     #[staticmethod]
     fn read(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         let read = py.detach(|| read_trajectory(&path));

@@ -39,7 +39,8 @@ impl Browser {
             return None;
         };
         let profile = tempfile::tempdir().unwrap();
-        // The browser reads its requests at descriptor 3, and answers at 4. Its sandbox does not work as root, and it opens our page alone.
+        // The browser reads its requests at descriptor 3, and answers at 4. Its sandbox does not
+        // work as root, and it opens our page alone.
         let mut child = Command::new("sh")
             .args([
                 "-c",

@@ -7,9 +7,9 @@ use std::process::{Command, ExitStatus};
 pub struct Ended {
     /// The exit status.
     pub status: ExitStatus,
-    /// Its standard output.
+    /// The standard output.
     pub stdout: String,
-    /// Its standard error.
+    /// The standard error.
     pub stderr: String,
 }
 
@@ -25,7 +25,7 @@ impl Ended {
         }
     }
 
-    /// Its exit code; `None` when a signal ended it.
+    /// Returns its exit code; `None` when a signal ended it.
     pub fn code(&self) -> Option<i32> {
         self.status.code()
     }
@@ -66,7 +66,8 @@ impl Ended {
     }
 
     fn assert_calm(&self) {
-        // A process without memory is aborted by Rust, and its last words, which are repeated, are of a backtrace.
+        // A process without memory is aborted by Rust, and its last words, which are repeated, are
+        // of a backtrace.
         let is_abort = |line: &&str| line.contains("died by signal 6 (");
         for text in [&self.stdout, &self.stderr] {
             let mut lines = text.lines().filter(|line| !is_abort(line));

@@ -15,7 +15,8 @@ pub fn root(out: &Path) -> PathBuf {
     root_of(&out.canonicalize().unwrap_or_else(|_| out.to_owned()))
 }
 
-/// Asserts that no process, shared-memory file or temporary file of the run that wrote to `out` is there.
+/// Asserts that no process, shared-memory file or temporary file of the run that wrote to `out` is
+/// there.
 pub fn assert_nothing_left(out: &Path) {
     assert_nothing_left_of(&root(out));
 }

@@ -1,5 +1,6 @@
-//! Shared by the whole-pipeline tests: a [`Run`] is a `gyre run` command with results of its own, [`Running`] is one that is
-//! running, [`Ended`] its output. Every run that ends is checked to have left nothing behind.
+//! Shared by the whole-pipeline tests: a [`Run`] is a `gyre run` command with results of its own,
+//! [`Running`] is one that is running, [`Ended`] its output. Every run that ends is checked to have
+//! left nothing behind.
 
 // Each test binary uses its own part of this.
 #![allow(dead_code, unused_imports, clippy::unwrap_used)]
@@ -72,8 +73,9 @@ pub fn gyre() -> Command {
 
 /// Makes a program of this content.
 ///
-/// A process of its own writes it. If this one had it open for writing, a process that another test starts at that moment would inherit
-/// that, and the program could not be executed ("text file busy").
+/// A process of its own writes it. If this one had it open for writing, a process that another test
+/// starts at that moment would inherit that, and the program could not be executed ("text file
+/// busy").
 pub fn install(program: &Path, content: impl AsRef<[u8]>) {
     let mut writer = Command::new("sh")
         .args(["-c", "cat > \"$0\" && chmod 755 \"$0\""])
@@ -122,7 +124,8 @@ pub fn runtime_is_installed() -> bool {
     found
 }
 
-/// A `gyre run` command: start it as often as you like, it has the same results directory each time.
+/// A `gyre run` command: start it as often as you like, it has the same results directory each
+/// time.
 #[derive(Clone, Debug)]
 pub struct Run {
     /// Holds the configuration, the results and what the run says.
@@ -220,7 +223,8 @@ impl Run {
         self
     }
 
-    /// The same with an executable shell script for a stage; `{gyre}` in it stands for the program under test.
+    /// The same with an executable shell script for a stage; `{gyre}` in it stands for the program
+    /// under test.
     pub fn stage_script(self, stage: &str, script: &str) -> Self {
         use std::os::unix::fs::PermissionsExt;
         let path = self.folder.path().join(format!("{stage}.sh"));
@@ -253,7 +257,8 @@ impl Run {
         command
     }
 
-    /// The command line with a file system of its own at `place`; `None` where the system does not permit that.
+    /// The command line with a file system of its own at `place`; `None` where the system does not
+    /// permit that.
     pub fn with_tmpfs(&self, place: &Path, options: &str) -> Option<Command> {
         let unshare = |script: &str| {
             let mut command = Command::new("unshare");
@@ -300,12 +305,12 @@ impl Run {
         self.odometry()
     }
 
-    /// Its `odometry.csv`.
+    /// Returns its `odometry.csv`.
     pub fn odometry(&self) -> String {
         self.result("odometry.csv")
     }
 
-    /// Its `summary.json`.
+    /// Returns its `summary.json`.
     pub fn summary(&self) -> Value {
         serde_json::from_str(&self.result("summary.json")).unwrap()
     }

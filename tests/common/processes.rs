@@ -25,7 +25,8 @@ pub fn send(pid: Pid, signal: Signal) {
 /// The time that a process has spent computing.
 pub fn cpu_time(pid: Pid) -> Duration {
     let stat = fs::read_to_string(format!("/proc/{pid}/stat")).unwrap();
-    // After the name in brackets: state, ppid, ...; utime and stime are the 14th and 15th of all, in hundredths of a second.
+    // After the name in brackets: state, ppid, ...; utime and stime are the 14th and 15th of all,
+    // in hundredths of a second.
     let fields: Vec<&str> = stat.rsplit_once(") ").unwrap().1.split(' ').collect();
     let ticks: u64 = fields[11].parse::<u64>().unwrap() + fields[12].parse::<u64>().unwrap();
     Duration::from_millis(ticks * 10)

@@ -1,4 +1,5 @@
-//! The recording that the runs play: simulated once for each build of the tests, and shared by all of them.
+//! The recording that the runs play: simulated once for each build of the tests, and shared by all
+//! of them.
 
 use std::{
     env, fs,
@@ -61,7 +62,8 @@ fn of_a_block(scans: usize) -> PathBuf {
     simulated(&scans.to_string(), &config)
 }
 
-/// A copy of the small recording's first `scans` scans, to be corrupted. Its images are links: replace them instead of writing into them.
+/// A copy of the small recording's first `scans` scans, to be corrupted. Its images are links:
+/// replace them instead of writing into them.
 pub fn copy(scans: usize) -> TempDir {
     let copy = linked(small(), |scan| scan < scans);
     // As in a real recording, the truth is in `gt` alone.
@@ -146,8 +148,8 @@ fn encoded(width: u32, height: u32, pixels: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// Replaces an image by itself with other times of its rows, us since 1970: `stamp_us` returns that of a row, from 0, given the
-/// one that it has.
+/// Replaces an image by itself with other times of its rows, us since 1970: `stamp_us` returns that
+/// of a row, from 0, given the one that it has.
 pub fn restamp(image: &Path, stamp_us: impl Fn(usize, i64) -> i64) {
     const STAMP: usize = 8;
     rewrite(image, |row, pixels| {
@@ -192,8 +194,8 @@ fn replace(image: &Path, bytes: &[u8]) {
     fs::write(image, bytes).unwrap();
 }
 
-/// Simulates where the build keeps its temporary files, unless this build of the tests has done so already. Test processes that
-/// start at the same time wait for the first.
+/// Simulates where the build keeps its temporary files, unless this build of the tests has done so
+/// already. Test processes that start at the same time wait for the first.
 fn simulated(name: &str, config: &SimulationConfig) -> PathBuf {
     let test = env::current_exe().unwrap();
     let name = format!("{}-{name}", test.file_stem().unwrap().to_string_lossy());

@@ -47,7 +47,7 @@ impl Server {
         fs::read_to_string(&self.said).unwrap()
     }
 
-    /// Its process.
+    /// Returns its process.
     pub fn pid(&self) -> Pid {
         self.child.id()
     }
@@ -77,7 +77,8 @@ impl Server {
         self.address.split_once("?token=").map(|(_, token)| token)
     }
 
-    /// Asks for a path as a browser on this machine does, with other headers, and returns the whole answer.
+    /// Asks for a path as a browser on this machine does, with other headers, and returns the whole
+    /// answer.
     pub fn get(&self, path: &str, headers: &[&str]) -> String {
         let port = self
             .address

@@ -22,7 +22,7 @@ pub struct Watch {
     topic: &'static str,
 }
 
-/// What an observer has printed.
+/// The output of an observer.
 #[derive(Debug)]
 pub struct Watched {
     /// The sequence numbers of the messages.
@@ -118,8 +118,8 @@ impl Drop for Watch {
 }
 
 impl Watched {
-    /// Asserts that each message came once and in order, and that all that is missing is counted. `items` is the number of items
-    /// of a run whose end it has seen.
+    /// Asserts that each message came once and in order, and that all that is missing is counted.
+    /// `items` is the number of items of a run whose end it has seen.
     pub fn assert_consistent(&self, items: u64) -> &Self {
         let first = self.seqs.first().copied().unwrap_or(items);
         let last = self.seqs.last().copied().unwrap_or(items);

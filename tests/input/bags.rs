@@ -1,4 +1,5 @@
-//! Bags of ROS 2: what a run has found, written and read by a reader that is not Gyre's own, and its scans taken back to the same motions.
+//! Bags of ROS 2: what a run has found, written and read by a reader that is not Gyre's own, and
+//! its scans taken back to the same motions.
 
 use std::{
     fs,
@@ -20,7 +21,8 @@ fn export(source: &Path, bag: &Path, arguments: &[&str]) -> Ended {
     Ended::of(command)
 }
 
-/// A run of a bag, with the resolved configuration of another run and the constants of the radar, which a bag does not have.
+/// A run of a bag, with the resolved configuration of another run and the constants of the radar,
+/// which a bag does not have.
 fn replayed(of: &Run, bag: &Path) -> Run {
     let run = Run::of_file(&of.out().join("config.toml")).data(bag);
     with_constants(run).set("record.file=''")
@@ -34,8 +36,8 @@ fn bag(run: &Run, name: &str) -> PathBuf {
     run.folder().join(name)
 }
 
-/// Returns what the independent reader says of the bag of a run, and of one with a radar that looks to the left; `None` where it is not
-/// installed.
+/// Returns what the independent reader says of the bag of a run, and of one with a radar that looks
+/// to the left; `None` where it is not installed.
 fn checked(bag: &Path, out: &Path, turned: Option<&Path>) -> Option<Value> {
     let can = Command::new(python())
         .args(["-c", "import rosbags, numpy"])

@@ -1,4 +1,5 @@
-//! Times that are wrong, and recordings with gaps: a run waits for no year, and says where the chain of motions breaks.
+//! Times that are wrong, and recordings with gaps: a run waits for no year, and says where the
+//! chain of motions breaks.
 
 use std::{
     fs,

@@ -1,4 +1,5 @@
-//! Files made to exhaust the memory: each is refused in a sentence by a process that may not have much.
+//! Files made to exhaust the memory: each is refused in a sentence by a process that may not have
+//! much.
 
 use std::{
     fs::{self, File},

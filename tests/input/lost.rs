@@ -1,4 +1,5 @@
-//! Input that cannot be reached for a while, and recordings with many damaged scans: nothing is lost silently.
+//! Input that cannot be reached for a while, and recordings with many damaged scans: nothing is
+//! lost silently.
 
 use std::{fs, path::Path, thread, time::Duration};
 

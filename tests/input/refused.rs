@@ -1,4 +1,5 @@
-//! Bad input: one clear sentence and a failure before anything starts, or a scan that is skipped, counted, and no more.
+//! Bad input: one clear sentence and a failure before anything starts, or a scan that is skipped,
+//! counted, and no more.
 
 use std::{fs, path::Path};
 

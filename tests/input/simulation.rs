@@ -1,4 +1,5 @@
-//! Simulated drives with real processes: written by `gyre simulate`, and played by `gyre run` without touching the disk.
+//! Simulated drives with real processes: written by `gyre simulate`, and played by `gyre run`
+//! without touching the disk.
 
 use std::{
     collections::BTreeMap,

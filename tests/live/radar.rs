@@ -1,4 +1,5 @@
-//! A radar on the network: `gyre radar-server` plays a recording as one, and a run receives it live.
+//! A radar on the network: `gyre radar-server` plays a recording as one, and a run receives it
+//! live.
 
 use std::{
     io::{BufRead, BufReader, Read},
@@ -28,7 +29,8 @@ impl Radar {
         Self::to(&["--listen", "127.0.0.1:0"], recording, arguments)
     }
 
-    /// One that sends to a group by UDP, and describes only itself for as long as a run takes to begin.
+    /// One that sends to a group by UDP, and describes only itself for as long as a run takes to
+    /// begin.
     pub fn sending(group: &str, recording: &Path, arguments: &[&str]) -> Self {
         Self::to(&["--udp", group, "--wait-s", "4"], recording, arguments)
     }
@@ -81,7 +83,7 @@ impl Radar {
     }
 }
 
-/// What a radar says of a playback.
+/// The report of a playback.
 #[derive(Debug)]
 pub(crate) struct Played {
     pub scans: u64,
@@ -89,7 +91,8 @@ pub(crate) struct Played {
     pub resets: u64,
 }
 
-/// A run without end of a radar at an address, with the constants that the recording has in its `dataset.toml`.
+/// A run without end of a radar at an address, with the constants that the recording has in its
+/// `dataset.toml`.
 pub(crate) fn run_at(address: &str) -> Run {
     let settings = std::fs::read_to_string(recording::small().join("dataset.toml")).unwrap();
     let settings: toml::Table = settings.parse().unwrap();
@@ -187,7 +190,8 @@ fn lost_doubled_and_swapped_datagrams_are_lost_azimuths_at_most() {
     let summary = run.summary();
     let source = &summary["stages"]["radar-replay"];
     let count = |key: &str| source[key].as_u64().unwrap();
-    // A two-hundredth of the parts of 20 x 400 azimuths, and those parts that came after the next azimuth.
+    // A two-hundredth of the parts of 20 x 400 azimuths, and those parts that came after the next
+    // azimuth.
     assert!((20..1000).contains(&count("missing_azimuths")), "{source}");
     assert!((2..10).contains(&count("damaged_messages")), "{source}");
     assert_eq!(count("reconnections"), 0, "{source}");

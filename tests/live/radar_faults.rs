@@ -1,4 +1,5 @@
-//! What a live run does when a radar or its network fails: every scan is published or counted, and the radar is found again.
+//! Tests of a live run whose radar or its network fails: every scan is published or counted, and
+//! the radar is found again.
 
 use std::{
     io::{self, Read, Write},
@@ -36,8 +37,8 @@ fn count(summary: &Value, key: &str) -> u64 {
     summary["stages"]["radar-replay"][key].as_u64().unwrap()
 }
 
-/// Every scan that was played is published or counted, and no more azimuths are missing than were lost, but for those that were on their
-/// way when a connection ended.
+/// Every scan that was played is published or counted, and no more azimuths are missing than were
+/// lost, but for those that were on their way when a connection ended.
 fn assert_all_counted(summary: &Value, played: &Played) {
     let published = summary["published"].as_u64().unwrap();
     let left_out = count(summary, "scans_left_out");
@@ -100,7 +101,8 @@ fn a_source_that_stands_still_does_not_hide_its_delay() {
     assert!(longest_us.unwrap() > 1e6, "{}", summary["latency"]);
 }
 
-/// Passes on what a group receives to another, but for those datagrams that come within a time of the first azimuth.
+/// Passes on what a group receives to another, but for those datagrams that come within a time of
+/// the first azimuth.
 fn relay_with_outage(from: &str, to: String, outage: Range<Duration>) {
     let group = from.parse::<SocketAddrV4>().unwrap();
     let receiver = UdpSocket::bind(group).unwrap();
@@ -147,7 +149,7 @@ fn scans_of_which_no_datagram_arrives_are_counted() {
     assert_eq!(published + left_out, played.scans, "{left_out} left out");
 }
 
-/// What a relay does with a connection.
+/// The fate of a connection in a relay.
 #[derive(Clone, Copy)]
 enum Connection {
     /// Passes on what radar and client send.

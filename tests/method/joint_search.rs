@@ -1,4 +1,5 @@
-//! The exhaustive search by five processes, joint-search in place of the two halves: the same result every time.
+//! The exhaustive search by five processes, joint-search in place of the two halves: the same
+//! result every time.
 
 use std::collections::BTreeSet;
 

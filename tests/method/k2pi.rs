@@ -1,5 +1,6 @@
-//! A radar that takes a second for a turn (Checchin et al. 2010), simulated, with real processes: the shipped configuration and the
-//! paper's algorithm on the first minute of the same drive, bends included.
+//! A radar that takes a second for a turn (Checchin et al. 2010), simulated, with real processes:
+//! the shipped configuration and the paper's algorithm on the first minute of the same drive, bends
+//! included.
 
 use std::path::Path;
 
@@ -10,7 +11,8 @@ use serde_json::Value;
 use crate::common::{Run, odometry};
 
 const SCANS: usize = 60;
-/// Measured over some 200 m each: 0.7, 0.7 and 0.5 m off by the shipped configuration, 12.4, 10.3 and 2.9 m by the paper's.
+/// Measured over some 200 m each: 0.7, 0.7 and 0.5 m off by the shipped configuration, 12.4, 10.3
+/// and 2.9 m by the paper's.
 const SEEDS: [u32; 3] = [1, 2, 3];
 
 /// The evaluation of a configuration on a drive.

@@ -1,4 +1,5 @@
-//! Learned masks in a whole run: restarts change nothing, and what does not fit is refused before anything starts.
+//! Learned masks in a whole run: restarts change nothing, and what does not fit is refused before
+//! anything starts.
 
 use std::{
     fs,

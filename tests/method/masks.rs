@@ -1,4 +1,5 @@
-//! `gyre masks` as a whole: pictures of what each kind of mask keeps of a small simulated drive, and what is refused.
+//! `gyre masks` as a whole: pictures of what each kind of mask keeps of a small simulated drive,
+//! and what is refused.
 
 use std::{
     collections::BTreeSet,
@@ -214,7 +215,8 @@ fn sweeps_are_undone_by_the_motions_that_a_run_undoes_them_by() {
         );
     }
 
-    // Where the scans are far apart those between them are not all looked at: the motions differ by their noise.
+    // Where the scans are far apart those between them are not all looked at: the motions differ by
+    // their noise.
     let far_apart = figures(masks(folder.path(), &["--scans", "0,23"]).succeeded());
     let all = &printed[23];
     let near = |figure: usize, most: f64| (far_apart[1][figure] - all[figure]).abs() < most;

@@ -1,4 +1,5 @@
-//! The method by the processes of a run: the same bits every time, and the accuracy that is to be kept.
+//! The method by the processes of a run: the same bits every time, and the accuracy that is to be
+//! kept.
 
 pub mod in_process;
 mod joint_search;

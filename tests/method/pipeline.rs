@@ -206,7 +206,8 @@ fn stopped_by(signal: Signal) {
     assert_resumes(&run, processed);
 }
 
-/// The command of a run that was cut short after `poses` poses or more resumes from there and gives the undisturbed result.
+/// The command of a run that was cut short after `poses` poses or more resumes from there and gives
+/// the undisturbed result.
 fn assert_resumes(run: &Run, poses: u64) {
     assert_eq!(run.complete(), undisturbed());
     let resumed_after = run.summary()["resumed_after"].as_u64().unwrap();

@@ -1,5 +1,5 @@
-//! Refinement, the process between the search and the poses: what it changes, what it leaves alone, and its death while it
-//! writes its map.
+//! Refinement, the process between the search and the poses: what it changes, what it leaves alone,
+//! and its death while it writes its map.
 
 use std::{collections::BTreeSet, fs, thread, time::Duration};
 
@@ -91,7 +91,8 @@ fn a_run_that_does_not_refine_has_neither_the_process_nor_its_map_nor_its_counts
     );
 }
 
-/// Masking compensates with searched motions, so the search sees the same rasters whether its motions are refined or not.
+/// Masking compensates with searched motions, so the search sees the same rasters whether its
+/// motions are refined or not.
 #[test]
 fn refining_changes_nothing_for_the_search() {
     let alone = without().complete();
@@ -133,7 +134,8 @@ fn joint_search_is_refined_as_well() {
 
 // Its death.
 
-/// The run is disturbed once it is in its middle: the result is that of one that was not, to the byte.
+/// The run is disturbed once it is in its middle: the result is that of one that was not, to the
+/// byte.
 fn survives(run: &Run, undisturbed: &str, disturb: impl FnOnce(&mut Running)) {
     let run = run.clone().rate(MODERATE);
     let mut running = run.start();
@@ -159,7 +161,8 @@ fn refinement_and_a_neighbour_killed_at_once_go_on() {
     }
 }
 
-/// The recording's vehicle makes nearly every scan a keyframe, so deaths this dense meet keyframes and states half written.
+/// The recording's vehicle makes nearly every scan a keyframe, so deaths this dense meet keyframes
+/// and states half written.
 #[test]
 fn refinement_killed_at_any_moment_of_many_lives_goes_on() {
     for run in [Run::of_recording(), with_small_map()] {
@@ -231,7 +234,7 @@ fn an_unfinished_run_is_not_continued_with_another_refinement() {
     }
 }
 
-/// What damage can leave of a map.
+/// Returns what damage can leave of a map.
 fn damages(whole: &[u8]) -> [Vec<u8>; 4] {
     let flip = |(k, byte): (usize, &u8)| if k > 100 { !byte } else { *byte };
     let flipped = whole.iter().enumerate().map(flip).collect();

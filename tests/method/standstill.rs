@@ -1,4 +1,5 @@
-//! A vehicle that stops, stands and drives off: the run says so, and a death meanwhile changes nothing.
+//! A vehicle that stops, stands and drives off: the run says so, and a death meanwhile changes
+//! nothing.
 
 use std::fmt::Write;
 

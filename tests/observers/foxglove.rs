@@ -1,4 +1,5 @@
-//! `gyre watch --foxglove`: what a viewer that is not Gyre's own receives, who may connect, and one that never reads.
+//! `gyre watch --foxglove`: what a viewer that is not Gyre's own receives, who may connect, and one
+//! that never reads.
 
 use std::{
     collections::BTreeMap,
@@ -16,8 +17,9 @@ use crate::common::{Ended, Run, Running, Server, odometry, python, recording};
 /// Bytes before the powers in each row of an image: the azimuth, its time and its flag.
 const ROW_HEADER: usize = 11;
 
-/// Subscribes to all channels by the Python package `websockets`, decodes what comes by the schemas that are sent, and prints it once it has
-/// so many poses and a message of each channel that a run has.
+/// Subscribes to all channels by the Python package `websockets`, decodes what comes by the schemas
+/// that are sent, and prints it once it has so many poses and a message of each channel that a run
+/// has.
 const VIEW: &str = "
 import base64, hashlib, json, struct, sys
 from mcap.records import Schema

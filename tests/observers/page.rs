@@ -192,7 +192,8 @@ fn the_page_shows_poses_a_killed_stage_and_the_end_of_each_run() {
     browser.until("document.getElementById('state').textContent === 'Connection lost'");
 }
 
-/// Asserts that nothing is wider than a phone, and that nothing has moved since the page was opened.
+/// Asserts that nothing is wider than a phone, and that nothing has moved since the page was
+/// opened.
 fn fits_a_phone(browser: &mut Browser) {
     let moved = "new Promise((done) => {
         let moved = 0;

@@ -1,4 +1,5 @@
-//! Recordings of runs: they change nothing, survive kills and full disks, say what is missing, and replay to the same bytes.
+//! Recordings of runs: they change nothing, survive kills and full disks, say what is missing, and
+//! replay to the same bytes.
 
 use std::{
     fs,
@@ -20,7 +21,8 @@ use crate::{
 const SCANS: usize = 24;
 /// Every topic that a replay can begin with.
 const ALL: &str = "record.topics=['scan','masked','rotation','motion','refined','pose','log']";
-/// With so large a window the queues hold all scans of these tests: nothing is missed, however slow the machine is.
+/// With so large a window the queues hold all scans of these tests: nothing is missed, however slow
+/// the machine is.
 const WINDOW: &str = "run.window=32";
 
 /// A drive that makes a loop, through small rasters.
@@ -165,7 +167,8 @@ fn a_recorder_that_is_stopped_for_long_says_exactly_what_it_missed() {
     assert_eq!(run.odometry(), simulated().set("run.window=1").complete());
     let missed = counted_as_missed(&run, &ended);
     let recording = open_recording(&file(&run)).unwrap();
-    // The scans that are there are played, and those that are not are named; what needs every message is refused.
+    // The scans that are there are played, and those that are not are named; what needs every
+    // message is refused.
     let again = Run::configured("")
         .data(&file(&run))
         .set("source.max_unreadable=100");
@@ -181,7 +184,8 @@ fn a_recorder_that_is_stopped_for_long_says_exactly_what_it_missed() {
     from.finish().refused_with(&[&lacks]);
 }
 
-/// Returns the number of scans that are not there, four or more, which the recorder has said and written.
+/// Returns the number of scans that are not there, four or more, which the recorder has said and
+/// written.
 fn counted_as_missed(run: &Run, ended: &Ended) -> usize {
     let recording = open_recording(&file(run)).unwrap();
     let there = seqs(&recording, "scan");
@@ -202,7 +206,8 @@ fn what_a_killed_recorder_had_not_written_and_the_next_one_did_not_find_is_count
     let mut running = run.start();
     running.await_poses(SCANS / 4);
     let killed = await_recorder(&mut running, None);
-    // It writes nothing from here on, so that the gap is longer than the history of the topics, however fast the machine is.
+    // It writes nothing from here on, so that the gap is longer than the history of the topics,
+    // however fast the machine is.
     send(killed, Signal::STOP);
     running.await_poses(SCANS - 8);
     send(killed, Signal::KILL);

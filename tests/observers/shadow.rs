@@ -1,4 +1,5 @@
-//! `gyre shadow`: a second program beside a stage of a running run. Whatever it does, the run is the same; what it answers is compared.
+//! `gyre shadow`: a second program beside a stage of a running run. Whatever it does, the run is
+//! the same; what it answers is compared.
 
 use std::{
     fs::{self, File},

@@ -1,4 +1,5 @@
-//! `gyre watch --otlp`: a collector receives a trace of each pose, and one that is away costs nothing.
+//! `gyre watch --otlp`: a collector receives a trace of each pose, and one that is away costs
+//! nothing.
 
 use std::{
     collections::{BTreeMap, BTreeSet},

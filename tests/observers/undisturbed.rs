@@ -1,4 +1,5 @@
-//! Observers of a run: whatever happens to them, the result is the same, nothing is left, and each knows what it has missed.
+//! Observers of a run: whatever happens to them, the result is the same, nothing is left, and each
+//! knows what it has missed.
 
 use std::{path::Path, thread, time::Duration};
 
@@ -15,7 +16,8 @@ fn simulated() -> Run {
     Run::configured(&format!("{scans}[raster]\nn = 127\ncell_m = 0.8\n"))
 }
 
-/// Runs with eight observers: two look on, two are stopped, two are killed, and two places are for ones that come and go.
+/// Runs with eight observers: two look on, two are stopped, two are killed, and two places are for
+/// ones that come and go.
 fn observers_change_nothing(run: &Run, undisturbed: &str) {
     let scans = odometry::rows(undisturbed).len() as u64 + 1;
     let mut running = run.start();

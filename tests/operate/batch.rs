@@ -1,4 +1,5 @@
-//! `gyre batch`: whatever is killed, the same command completes the table, and failures are told apart.
+//! `gyre batch`: whatever is killed, the same command completes the table, and failures are told
+//! apart.
 
 use std::{
     fs,
@@ -168,7 +169,8 @@ struct Started<'a> {
 }
 
 impl Started<'_> {
-    /// Waits until there are so many rows and one more drive is being computed, and returns its supervisor.
+    /// Waits until there are so many rows and one more drive is being computed, and returns its
+    /// supervisor.
     fn await_run_after(&mut self, rows: usize) -> u32 {
         let since = Instant::now();
         loop {

@@ -1,4 +1,5 @@
-//! Running runs from the command line: up, ps, logs, top, restart, down; what systemd is notified of.
+//! Running runs from the command line: up, ps, logs, top, restart, down; what systemd is notified
+//! of.
 
 use std::{
     fs,

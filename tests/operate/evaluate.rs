@@ -1,4 +1,5 @@
-//! `gyre evaluate` on the results of a run: the figures of a trajectory and of its covariances, as a table, as JSON and drawn.
+//! `gyre evaluate` on the results of a run: the figures of a trajectory and of its covariances, as
+//! a table, as JSON and drawn.
 
 use std::{
     ffi::OsStr,

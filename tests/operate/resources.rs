@@ -10,7 +10,8 @@ use rustix::process::Signal;
 
 #[test]
 fn after_its_first_messages_a_stage_allocates_nothing_for_a_scan() {
-    // So slow that the followers have come before the sixth scan: the transport allocates when a listener comes.
+    // So slow that the followers have come before the sixth scan: the transport allocates when a
+    // listener comes.
     let with_slam = Run::of_recording()
         .rate("6")
         .set("slam.kind=graph")

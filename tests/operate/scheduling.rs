@@ -1,4 +1,4 @@
-//! How the system runs a run: the priorities and processors of its stages, and how soon processors wake.
+//! Tests of scheduling: the priorities and processors of its stages, and how soon processors wake.
 
 use std::{fs, io::Read, path::Path};
 

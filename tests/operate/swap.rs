@@ -128,7 +128,8 @@ fn a_program_that_was_edited_is_taken_by_a_swap_alone_and_gives_way_when_it_fail
     script(&run, "own.sh", FAILS);
     ask(&run, &["restart", "masking"]).refused_with(&["own.sh has changed", "gyre swap masking"]);
     assert_eq!(process(&status(&run).unwrap(), "masking")["pid"], before);
-    // The one before is of a file that is another one by now: so it is the one that the run was begun with.
+    // The one before is of a file that is another one by now: so it is the one that the run was
+    // begun with.
     swap(&run, "masking", &[], &[&own]).refused_with(&["own.sh` has failed", "no such mask"]);
     assert_eq!(
         process(&status(&run).unwrap(), "masking")["is_swapped"],

@@ -42,7 +42,7 @@ fn conforms(stage: &str, more: &[&str]) {
     assert_eq!(judged(&report, "stands-by")["verdict"], "kept");
 }
 
-/// What a report says of a rule.
+/// Returns the verdict of a report on a rule.
 fn judged<'a>(report: &'a Value, rule: &str) -> &'a Value {
     let rules = report["rules"].as_array().unwrap();
     rules.iter().find(|judged| judged["rule"] == rule).unwrap()
@@ -69,7 +69,8 @@ fn why(report: &Value, rule: &str) -> String {
     judged(report, rule)["why"].to_string()
 }
 
-/// Asserts that a broken rotation search is found out by these rules, in sentences with these words.
+/// Asserts that a broken rotation search is found out by these rules, in sentences with these
+/// words.
 fn breaks(breach: &str, named: &[(&str, &str)]) {
     let report = broken("rotation-search", breach, &["--patience-s", "2"]);
     for (rule, words) in named {

@@ -1,5 +1,5 @@
-//! Replaced stages that send what no stage may send: the stage that receives it refuses it by the sender's name, and the poses
-//! before it are kept.
+//! Replaced stages that send what no stage may send: the stage that receives it refuses it by the
+//! sender's name, and the poses before it are kept.
 
 mod stages;
 
@@ -30,7 +30,8 @@ fn run_with(stage: &str, fault: &str, once: bool) -> Run {
     .set(&format!("stages.{stage}.restart.backoff_ms=10"))
 }
 
-/// Asserts that the run ends because of this fault, in a sentence that names the stage and the field, and keeps good poses only.
+/// Asserts that the run ends because of this fault, in a sentence that names the stage and the
+/// field, and keeps good poses only.
 fn refuses(stage: &str, fault: &str, field: &str) {
     let run = run_with(stage, fault, false);
     let ended = run.finish();
@@ -98,7 +99,8 @@ fn a_fault_that_does_not_come_again_costs_a_restart() {
 /// Numbers that break most contracts, and some that keep them.
 const NUMBERS: [&str; 6] = ["NaN", "-inf", "-1", "1e300", "0", "0.5"];
 
-/// Runs in which a stage writes a number anywhere into a header: refused by its name, or no harm is done.
+/// Runs in which a stage writes a number anywhere into a header: refused by its name, or no harm is
+/// done.
 fn any_word_is_refused_or_harmless(runs: u64) {
     let stages = [
         ("masking", "masked"),

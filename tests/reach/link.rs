@@ -1,4 +1,5 @@
-//! A run that is split between two machines gives the same results, whatever happens to the link; and one can look on from another machine.
+//! A run that is split between two machines gives the same results, whatever happens to the link;
+//! and one can look on from another machine.
 
 use std::{
     net::TcpListener,

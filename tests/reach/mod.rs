@@ -1,4 +1,5 @@
-//! Programs that are not of this build or not on this machine: stages of others, ROS 2, Python, links.
+//! Programs that are not of this build or not on this machine: stages of others, ROS 2, Python,
+//! links.
 
 #[cfg(not(feature = "full"))]
 mod absent_features;

@@ -1,4 +1,5 @@
-//! The Debian package and the container: what their recipes name is there, and gyre has the commands that they start.
+//! The Debian package and the container: what their recipes name is there, and gyre has the
+//! commands that they start.
 
 use std::{
     fs,

@@ -1,6 +1,8 @@
-//! The masking stage in Python, `examples/python-masking`: it keeps the contract, and runs in a pipeline.
+//! The masking stage in Python, `examples/python-masking`: it keeps the contract, and runs in a
+//! pipeline.
 //!
-//! The tests that start it need its requirements in the Python that `GYRE_PYTHON` names, else in `python3`.
+//! The tests that start it need its requirements in the Python that `GYRE_PYTHON` names, else in
+//! `python3`.
 
 use std::{
     collections::BTreeMap,

@@ -1,5 +1,6 @@
-//! ROS 2 without ROS 2: what a peer that is not Gyre's own (Cyclone DDS) receives of a run. All on the loopback, each test in a domain of its own,
-//! with those of [`ros2_driver`](super::ros2_driver).
+//! ROS 2 without ROS 2: what a peer that is not Gyre's own (Cyclone DDS) receives of a run. All on
+//! the loopback, each test in a domain of its own, with those of
+//! [`ros2_driver`](super::ros2_driver).
 
 use std::{
     collections::BTreeMap,
@@ -35,7 +36,8 @@ pub(crate) fn can_speak() -> bool {
     can
 }
 
-/// A domain that only this test of this process uses. Those above 101 share their ports with other programs.
+/// A domain that only this test of this process uses. Those above 101 share their ports with other
+/// programs.
 pub(crate) fn domain(test: u32) -> String {
     (1 + (process::id() % 11) * 9 + test).to_string()
 }
@@ -67,7 +69,8 @@ impl Program {
         )
     }
 
-    /// A bridge that waits for the run. What it says to the person at the terminal is taken for its lines.
+    /// A bridge that waits for the run. What it says to the person at the terminal is taken for its
+    /// lines.
     pub(crate) fn bridge(run: &Run, domain: &str, options: &[&str]) -> Self {
         let mut command = Command::new("sh");
         command.args(["-c", "exec \"$@\" 2>&1", "sh"]);
@@ -128,11 +131,12 @@ struct Expected {
     pose: UncertainMotion,
     /// The velocity, 0 at the first scan.
     velocity: [f64; 3],
-    /// Its covariance, if it was measured.
+    /// The covariance, if it was measured.
     covariance: Option<Matrix3<f64>>,
 }
 
-/// What `odometry.csv` says of each pose: the motions composed with their covariances, after the first scan's pose.
+/// Returns each pose by `odometry.csv`: the motions composed with their covariances, after the
+/// first scan's pose.
 fn expected(run: &Run) -> Vec<Expected> {
     let names = [
         "stamp_ns",
@@ -366,7 +370,8 @@ fn a_node_of_ros_receives_each_pose_with_its_stamp_frames_and_covariance() {
     assert!(is_well("gyre") && is_well("gyre: masking"), "{parts:?}");
 }
 
-/// As `robot_localization` needs it, which publishes the transform of odometry itself and predicts where nothing was measured.
+/// As `robot_localization` needs it, which publishes the transform of odometry itself and predicts
+/// where nothing was measured.
 #[test]
 fn a_filter_can_have_its_own_transforms_and_is_told_which_velocities_are_predicted() {
     if !can_speak() {

@@ -1,4 +1,5 @@
-//! A run that receives a radar from its driver in ROS 2, which a peer plays that is not Gyre's own (Cyclone DDS).
+//! A run that receives a radar from its driver in ROS 2, which a peer plays that is not Gyre's own
+//! (Cyclone DDS).
 
 use std::{
     io::{BufRead, BufReader},

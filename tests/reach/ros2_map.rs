@@ -1,4 +1,4 @@
-//! What a peer in ROS 2 receives of a run with SLAM: a frame of the map, and the map.
+//! Tests of what a peer in ROS 2 receives of a run with SLAM: a frame of the map, and the map.
 
 use serde_json::Value;
 
@@ -38,7 +38,8 @@ fn a_run_with_slam_has_a_map_frame_and_a_map() {
     assert!(
         frames.iter().any(|it| it == "world -> odo") && frames.iter().any(|it| it == "odo -> car")
     );
-    // The radar looks to the left of the car, which so drives to the right of the radar's first scan.
+    // The radar looks to the left of the car, which so drives to the right of the radar's first
+    // scan.
     let (_, mounted, values) = &transforms(&topics["/tf_static"])[0];
     assert_eq!(mounted, "car -> top");
     assert!(

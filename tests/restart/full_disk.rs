@@ -1,4 +1,5 @@
-//! A full disk: the exit code and, where it can be written, a sentence tell what happened; nothing panics.
+//! A full disk: the exit code and, where it can be written, a sentence tell what happened; nothing
+//! panics.
 
 use std::{fs::File, path::Path, process::Command};
 

@@ -1,4 +1,5 @@
-//! A run goes on only with what it was begun with: the program, the configuration and the recording.
+//! A run goes on only with what it was begun with: the program, the configuration and the
+//! recording.
 
 use std::{
     fs,

@@ -1,4 +1,5 @@
-//! `kill -9` of stages: each is started again, and the result is the undisturbed run's, byte for byte.
+//! `kill -9` of stages: each is started again, and the result is the undisturbed run's, byte for
+//! byte.
 
 use std::fs;
 
@@ -10,7 +11,8 @@ use serde_json::Value;
 const MODERATE: &str = "6";
 const MIDDLE: usize = recording::SCANS / 3;
 
-/// Disturbs a run once it is in its middle, and asserts that this changes nothing but the count of restarts of `stages`.
+/// Disturbs a run once it is in its middle, and asserts that this changes nothing but the count of
+/// restarts of `stages`.
 fn survives(stages: &[&str], disturb: impl FnOnce(&mut Running)) {
     let run = Run::of_recording().rate(MODERATE);
     let mut running = run.start();

@@ -1,8 +1,11 @@
-//! A journal of a month: restarting, checking and writing results take time and memory that do not grow with what was done before.
+//! A journal of a month: restarting, checking and writing results take time and memory that do not
+//! grow with what was done before.
 //!
-//! The journal is short by default. A month of it, in release: `GYRE_POSES=26000000 cargo test --release -p gyre --test long_journal NAME
-//! -- --nocapture`, each test in a process of its own, because the peak of memory is the process's; 550 bytes to 1 kB of disk a pose. Run
-//! under `eatmydata`, the journal is made in minutes: the tests do not need the synchronisation of its records.
+//! The journal is short by default. A month of it, in release: `GYRE_POSES=26000000 cargo test
+//! --release -p gyre --test long_journal NAME -- --nocapture`, each test in a process of its own,
+//! because the peak of memory is the process's; 550 bytes to 1 kB of disk a pose. Run under
+//! `eatmydata`, the journal is made in minutes: the tests do not need the synchronisation of its
+//! records.
 
 #![allow(clippy::unwrap_used)]
 
@@ -21,7 +24,7 @@ use tempfile::TempDir;
 
 /// Poses that a restart asks for with a usual window.
 const LAST: usize = 16;
-/// What may be resident, however long the journal is, MB.
+/// The limit of resident memory, however long the journal is, MB.
 const MAX_PEAK_MB: f64 = 64.0;
 
 fn poses() -> u64 {

@@ -1,4 +1,5 @@
-//! Restarts and results: whatever is killed, full or taken away, the results are the undisturbed ones.
+//! Restarts and results: whatever is killed, full or taken away, the results are the undisturbed
+//! ones.
 
 mod faults;
 mod full_disk;

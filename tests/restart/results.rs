@@ -1,4 +1,5 @@
-//! The folder of the results: whole files, one run at a time, nothing lost and nothing of others removed.
+//! The folder of the results: whole files, one run at a time, nothing lost and nothing of others
+//! removed.
 
 use std::{fs, path::Path, process::Command};
 
@@ -25,7 +26,8 @@ fn names(folder: &Path) -> Vec<String> {
         .collect()
 }
 
-/// The results could not be written at the first attempt: an earlier summary does not make the run complete.
+/// The results could not be written at the first attempt: an earlier summary does not make the run
+/// complete.
 #[test]
 fn results_that_could_not_be_written_are_written_by_the_next_run_from_the_journal() {
     let run = interrupted();
@@ -157,7 +159,8 @@ fn a_journal_that_was_damaged_on_the_disk_is_refused_and_kept() {
     assert_eq!(fs::read(kept).unwrap(), bytes);
 }
 
-/// The command with a `/dev/shm` of its own, as a container has it; `None` where the system does not permit that.
+/// The command with a `/dev/shm` of its own, as a container has it; `None` where the system does
+/// not permit that.
 fn in_container(run: &Run) -> Option<Command> {
     let permitted = Command::new("unshare").args(["--mount", "true"]).output();
     if !permitted.is_ok_and(|output| output.status.success()) {

@@ -1,4 +1,5 @@
-//! Shared memory is common to all users and programs of a machine: a run depends on none of them, and leaves their files alone.
+//! Shared memory is common to all users and programs of a machine: a run depends on none of them,
+//! and leaves their files alone.
 
 use std::{
     fs,

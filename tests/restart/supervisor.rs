@@ -1,4 +1,5 @@
-//! What the supervisor owes to the machine: no process outlives a run, no log grows for ever, and it waits for room.
+//! Tests of what the supervisor owes to the machine: no process outlives a run, no log grows for
+//! ever, and it waits for room.
 
 use std::{fs, thread, time::Duration};
 

@@ -1,4 +1,5 @@
-//! The followers of a run with SLAM: whatever happens to them, odometry does not notice, and what they write is the same to the byte.
+//! The followers of a run with SLAM: whatever happens to them, odometry does not notice, and what
+//! they write is the same to the byte.
 
 use std::{fs, sync::OnceLock, thread, time::Duration};
 
@@ -23,7 +24,7 @@ fn run() -> Run {
     without_slam().set("slam.kind=graph")
 }
 
-/// What a run leaves that must be the same.
+/// The results of a run that must be the same.
 #[derive(PartialEq)]
 struct Left {
     odometry: String,

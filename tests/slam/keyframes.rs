@@ -1,4 +1,5 @@
-//! The log of keyframes of a run with SLAM: odometry is the same with it, and it is the same bytes whatever is killed.
+//! The log of keyframes of a run with SLAM: odometry is the same with it, and it is the same bytes
+//! whatever is killed.
 
 use std::{fs, sync::OnceLock, thread, time::Duration};
 

@@ -1,5 +1,5 @@
-//! Results of a run with SLAM: a drive that comes back to its start is corrected by loops, and the files are the same bytes whatever
-//! happens to the run.
+//! Results of a run with SLAM: a drive that comes back to its start is corrected by loops, and the
+//! files are the same bytes whatever happens to the run.
 
 use std::fs;
 

@@ -1,8 +1,9 @@
-//! NumPy's `.npy`, format 1.0, written record by record: `numpy.load(path, mmap_mode="r")` opens it without reading it.
+//! NumPy's `.npy`, format 1.0, written record by record: `numpy.load(path, mmap_mode="r")` opens it
+//! without reading it.
 //!
-//! The number of records is known at the end, so the header leaves room for any number and is written again then. Until the file is
-//! complete it has another name. (The crates for `.npy` write no records with an array of a size known at run time,
-//! or a header of another length.)
+//! The number of records is known at the end, so the header leaves room for any number and is
+//! written again then. Until the file is complete it has another name. (The crates for `.npy` write
+//! no records with an array of a size known at run time, or a header of another length.)
 
 use std::{
     fs::{self, File},
@@ -19,7 +20,8 @@ const PREFIX_BYTES: usize = 10;
 /// NumPy wants the data to begin at a multiple of this.
 const ALIGNMENT: usize = 64;
 
-/// A one-dimensional array that grows on the disk. What is dropped before [`NpyWriter::finish`] is removed.
+/// A one-dimensional array that grows on the disk. What is dropped before [`NpyWriter::finish`] is
+/// removed.
 pub struct NpyWriter {
     file: BufWriter<File>,
     path: PathBuf,
@@ -29,7 +31,8 @@ pub struct NpyWriter {
 }
 
 impl NpyWriter {
-    /// Begins the array that is to be at `path`, of records that `dtype`, a Python literal, describes.
+    /// Begins the array that is to be at `path`, of records that `dtype`, a Python literal,
+    /// describes.
     pub fn create(path: &Path, dtype: String) -> Result<Self, Failure> {
         let partial = path.with_added_extension("part");
         let file = File::create(&partial).map_err(cannot_write(&partial))?;

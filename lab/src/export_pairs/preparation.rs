@@ -1,4 +1,5 @@
-//! From scans with true poses to records: the odometry's own rasters and searches, its motion compensation by the truth.
+//! From scans with true poses to records: the odometry's own rasters and searches, its motion
+//! compensation by the truth.
 
 use std::collections::VecDeque;
 
@@ -49,7 +50,8 @@ impl Preparation {
         })
     }
 
-    /// Returns NumPy's description of a record, packed and little-endian, as in the table in [`super`].
+    /// Returns NumPy's description of a record, packed and little-endian, as in the table in
+    /// [`super`].
     pub fn dtype(&self) -> String {
         let n = self.odometry.raster().nrows();
         format!(
@@ -69,7 +71,8 @@ impl Preparation {
         self.odometry.restart();
     }
 
-    /// Returns the next scan's record. `pose` is the truth at the scan's time. After an error the chain is as it was.
+    /// Returns the next scan's record. `pose` is the truth at the scan's time. After an error the
+    /// chain is as it was.
     pub fn next(
         &mut self,
         scan: &PolarScan<'_>,

@@ -24,10 +24,12 @@ const SECTIONS: [&str; 6] = [
     "simulation",
 ];
 
-/// Scans that follow each other, none left out: those with one number in `sequence`. What is said of them, and how many they are.
+/// Scans that follow each other, none left out: those with one number in `sequence`. What is said
+/// of them, and how many they are.
 pub type Sequence = (Record, usize);
 
-/// Refuses a name that is no `.npy` file's, or beside which another file is in the way: a configuration, say.
+/// Refuses a name that is no `.npy` file's, or beside which another file is in the way: a
+/// configuration, say.
 pub fn check_place(pairs: &Path) -> Result<(), Failure> {
     let (named, beside) = (pairs.display(), pairs.with_extension("toml"));
     if pairs.extension().is_none_or(|extension| extension != "npy") {

@@ -1,4 +1,4 @@
-//! What is counted over all queries.
+//! The counts over all queries.
 
 use std::{collections::BTreeSet, time::Duration};
 
@@ -21,19 +21,21 @@ pub struct Times {
     count: u32,
 }
 
-/// What is counted over all queries.
+/// The counts over all queries.
 pub struct Counts {
     describe: Duration,
     pub query: Times,
     pub verification: Times,
-    /// Keyframes with an earlier one within each distance, and those that found one first or among the best five.
+    /// Keyframes with an earlier one within each distance, and those that found one first or among
+    /// the best five.
     revisits: [usize; 2],
     found: [[usize; 2]; 2],
     /// Keyframes with an earlier one within 5 m, and those with a right loop.
     near: BTreeSet<usize>,
     closed: BTreeSet<usize>,
     wrong: Vec<String>,
-    /// Highest correlation of a wrong candidate that was aligned; lowest one of a right one within 5 m.
+    /// Highest correlation of a wrong candidate that was aligned; lowest one of a right one within
+    /// 5 m.
     correlations: [f64; 2],
     opposite: Errors,
     other: Errors,

@@ -16,16 +16,18 @@ pub struct Change {
     pub pairs: usize,
     /// Correlation coefficient of the powers above the threshold, the mean over the pairs.
     pub correlation: f64,
-    /// Share of the cells with a return that have none within one cell in the other scan, both ways.
+    /// Share of the cells with a return that have none within one cell in the other scan, both
+    /// ways.
     pub unmatched_share: f64,
 }
 
-/// Compares each scan with the one before it where the motion between them is known, in rasters that reach to `range_m`. What is not
-/// above `threshold` is no return. `None` where nothing could be compared.
+/// Compares each scan with the one before it where the motion between them is known, in rasters
+/// that reach to `range_m`. What is not above `threshold` is no return. `None` where nothing could
+/// be compared.
 ///
-/// Both are drawn as seen from where the sensor was half-way between, by one motion at constant velocity through both sweeps: so both
-/// sweeps are motion-compensated and aligned in one step, and blurred alike. A motion that no sensor makes is a wrong one: those scans
-/// are not compared.
+/// Both are drawn as seen from where the sensor was half-way between, by one motion at constant
+/// velocity through both sweeps: so both sweeps are motion-compensated and aligned in one step, and
+/// blurred alike. A motion that no sensor makes is a wrong one: those scans are not compared.
 ///
 /// # Errors
 /// A raster that cannot be made.
@@ -92,7 +94,8 @@ fn draw(
     Ok(())
 }
 
-/// Pearson's coefficient over the cells in the raster's circle; `None` where one of them is the same everywhere.
+/// Pearson's coefficient over the cells in the raster's circle; `None` where one of them is the
+/// same everywhere.
 fn correlation(a: &Array2<f32>, b: &Array2<f32>) -> Option<f64> {
     let half = (a.nrows() / 2) as i64;
     let in_circle = |(row, column): (usize, usize)| {

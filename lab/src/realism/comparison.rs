@@ -1,7 +1,7 @@
 //! Distances between two recordings, statistic by statistic.
 //!
-//! Lengths, shares and errors are compared by the magnitude of the natural logarithm of their ratio: 0.1 is a tenth more or less,
-//! 0.69 twice or half.
+//! Lengths, shares and errors are compared by the magnitude of the natural logarithm of their
+//! ratio: 0.1 is a tenth more or less, 0.69 twice or half.
 
 use gyre::Failure;
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,5 @@
-//! Autocorrelation of powers in range and in azimuth, after subtracting the mean at their range: 1 at lag 0.
+//! Autocorrelation of powers in range and in azimuth, after subtracting the mean at their range: 1
+//! at lag 0.
 //!
 //! Sums of powers and of their products are whole numbers: nothing is lost, whatever the order.
 
@@ -20,7 +21,8 @@ pub fn mean_power(samples: &[Sample], grid: RangeGrid) -> Vec<f64> {
     sums.into_iter().map(|sum| sum as f64 / count).collect()
 }
 
-/// Returns the autocorrelation in range by lags in cells; nothing where all powers at a range are the same.
+/// Returns the autocorrelation in range by lags in cells; nothing where all powers at a range are
+/// the same.
 pub fn in_range(samples: &[Sample], means: &[f64], grid: RangeGrid) -> Vec<f64> {
     let lags = (RANGE_LAG_M / grid.resolution_m) as usize + 1;
     let covariance = |lag: usize| {
@@ -35,7 +37,8 @@ pub fn in_range(samples: &[Sample], means: &[f64], grid: RangeGrid) -> Vec<f64> 
     normalised((0..lags.min(grid.cells)).map(covariance).collect())
 }
 
-/// Returns the autocorrelation in azimuth, round the whole turn, by lags in azimuths; nothing where all powers at a range are the same.
+/// Returns the autocorrelation in azimuth, round the whole turn, by lags in azimuths; nothing where
+/// all powers at a range are the same.
 pub fn in_azimuth(samples: &[Sample], means: &[f64]) -> Vec<f64> {
     let azimuths = samples
         .first()
@@ -53,11 +56,11 @@ pub fn in_azimuth(samples: &[Sample], means: &[f64]) -> Vec<f64> {
     normalised((0..azimuths.div_ceil(TURN_PART)).map(covariance).collect())
 }
 
-/// Returns the lag at which an autocorrelation first falls to a half, on the straight line between its values; `None` where it never
-/// does.
+/// Returns the lag at which an autocorrelation first falls to a half, on the straight line between
+/// its values; `None` where it never does.
 ///
-/// A half rather than 1/e: streets and streaks give the curve a long flat tail, and there 1/e lies. In range it is crossed
-/// at 2.5 to 4.4 m on real drives that have 1.2 to 1.4 m at a half.
+/// A half rather than 1/e: streets and streaks give the curve a long flat tail, and there 1/e lies.
+/// In range it is crossed at 2.5 to 4.4 m on real drives that have 1.2 to 1.4 m at a half.
 pub fn lag_at_half(values: &[f64]) -> Option<f64> {
     let level = 0.5;
     let after = values.iter().position(|value| *value <= level)?;

@@ -2,8 +2,9 @@
 
 use gyre_radar::{OwnedScan, PolarScan, ScanError, SweepGeometry};
 
-/// Equal cells of range, from the first bin's near edge on: ranges as the sensor counts them, without any offset, so that what the
-/// sensor itself puts into a scan (ringing, noise) falls into the same cells whatever offset a configuration names.
+/// Equal cells of range, from the first bin's near edge on: ranges as the sensor counts them,
+/// without any offset, so that what the sensor itself puts into a scan (ringing, noise) falls into
+/// the same cells whatever offset a configuration names.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RangeGrid {
     /// Metres a cell.
@@ -13,8 +14,8 @@ pub struct RangeGrid {
 }
 
 impl RangeGrid {
-    /// The grid that scans of all these kinds can be averaged to: the coarsest resolution over the shortest range. `None` where there
-    /// is no scan, or one without bins.
+    /// The grid that scans of all these kinds can be averaged to: the coarsest resolution over the
+    /// shortest range. `None` where there is no scan, or one without bins.
     pub fn common(geometries: &[SweepGeometry]) -> Option<Self> {
         let resolutions_m = geometries.iter().map(|g| g.range_resolution_m);
         let resolution_m = resolutions_m.reduce(f32::max)?;
@@ -40,8 +41,9 @@ impl RangeGrid {
     }
 }
 
-/// Averages the powers of a scan over each cell of a grid, a bin that two cells share by its parts, and rounds to whole counts.
-/// Azimuths, times and flags stay as they are. Where the scan has no more bins there is nothing: power 0.
+/// Averages the powers of a scan over each cell of a grid, a bin that two cells share by its parts,
+/// and rounds to whole counts. Azimuths, times and flags stay as they are. Where the scan has no
+/// more bins there is nothing: power 0.
 pub fn resample(scan: &PolarScan<'_>, grid: RangeGrid) -> Result<OwnedScan, ScanError> {
     scan.check()?;
     let azimuths = scan.geometry.azimuths;

@@ -52,8 +52,8 @@ impl Histogram {
         above as f64 / self.total() as f64
     }
 
-    /// Returns the first Wasserstein distance, counts: how far the powers of one must be moved, on average, to become those of the
-    /// other.
+    /// Returns the first Wasserstein distance, counts: how far the powers of one must be moved, on
+    /// average, to become those of the other.
     pub fn wasserstein(&self, other: &Self) -> f64 {
         let (total, other_total) = (self.total() as f64, other.total() as f64);
         let (mut below, mut other_below) = (0, 0);

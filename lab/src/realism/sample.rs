@@ -1,4 +1,4 @@
-//! What is measured of a recording.
+//! The measures of a recording.
 
 use gyre_geometry::Pose;
 use gyre_radar::OwnedScan;
@@ -7,6 +7,7 @@ use gyre_radar::OwnedScan;
 pub struct Sample {
     /// The scan on the common grid.
     pub scan: OwnedScan,
-    /// Its pose in the frame of the sample before it, if that is the scan before it in the recording and the motion is known.
+    /// The pose in the frame of the sample before it, if that is the scan before it in the
+    /// recording and the motion is known.
     pub motion: Option<Pose>,
 }

@@ -13,8 +13,9 @@ use super::{
 };
 use crate::report::{Record, record};
 
-/// A bin counts as saturated if its power is less than so many counts below the highest that the recording has. A receiver at its
-/// limit piles powers up there; where the limit lies is the sensor's own, and no recording known reaches 255.
+/// A bin counts as saturated if its power is less than so many counts below the highest that the
+/// recording has. A receiver at its limit piles powers up there; where the limit lies is the
+/// sensor's own, and no recording known reaches 255.
 const SATURATED_LEVELS: u8 = 4;
 /// Half of the range over which the power at a range is averaged, m: single cells are noisy.
 const AROUND_M: f64 = 0.5;

@@ -1,4 +1,5 @@
-//! A recording that was named on the command line: its scans, how they moved, and what the searches reach on it.
+//! A recording that was named on the command line: its scans, how they moved, and what the searches
+//! reach on it.
 
 use std::{ops::Range, path::Path};
 
@@ -29,8 +30,8 @@ const TURNING_DEG: f64 = 2.0;
 /// A recording with fewer scans is not halved.
 const MIN_HALVED: usize = 6;
 
-/// The statistics of a recording, and of its halves: how far apart these are is what a distance owes to chance and to the streets
-/// driven.
+/// The statistics of a recording, and of its halves: how far apart these are is what a distance
+/// owes to chance and to the streets driven.
 pub struct Measured {
     /// Of the whole recording, with the figures of the searches.
     pub whole: Statistics,
@@ -102,8 +103,8 @@ impl Subject {
         first.first().map(|scan| scan.geometry).ok_or_else(none)
     }
 
-    /// Runs the search in the paper's form, and the shipped configuration without refinement and with it, on the first `scans` scans, if
-    /// there are two.
+    /// Runs the search in the paper's form, and the shipped configuration without refinement and
+    /// with it, on the first `scans` scans, if there are two.
     pub fn search(&mut self, scans: usize, out: &Path) -> Result<(), Failure> {
         let scans = self.recording.played.len().min(scans);
         if scans < 2 {
@@ -146,7 +147,8 @@ impl Subject {
         Ok(Measured { whole, halves })
     }
 
-    /// Measures at most `most` of these scans, each with its motion since the one before it where that is known.
+    /// Measures at most `most` of these scans, each with its motion since the one before it where
+    /// that is known.
     fn measure_part(
         &mut self,
         scans: Range<usize>,

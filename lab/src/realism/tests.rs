@@ -71,7 +71,8 @@ pub fn noise(seed: u64, most: u8) -> Vec<u8> {
         .collect()
 }
 
-/// A scan of posts, each a few bins deep and three azimuths wide, by a sensor that is at `pose(seconds since its stamp)`.
+/// A scan of posts, each a few bins deep and three azimuths wide, by a sensor that is at
+/// `pose(seconds since its stamp)`.
 pub fn posts(posts: &[Point2<f64>], index: i64, pose: impl Fn(f64) -> Isometry2<f64>) -> OwnedScan {
     let mut drawn = scan(AZIMUTHS, BINS, index, |_, _| 0);
     for azimuth in 0..AZIMUTHS {

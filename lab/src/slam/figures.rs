@@ -1,4 +1,4 @@
-//! What is measured of loops and of a corrected trajectory.
+//! The measures of loops and of a corrected trajectory.
 
 use std::{collections::BTreeMap, time::Duration};
 
@@ -170,7 +170,7 @@ impl LoopCounts {
     }
 }
 
-/// Whether a loop contradicts the truth; `None` where that is unknown.
+/// Returns whether a loop contradicts the truth; `None` where that is unknown.
 fn is_wrong(drive: &Drive, later: usize, found: &LoopCandidate, wrong_m: f64) -> Option<bool> {
     let (later, earlier) = (drive.truths[later]?, drive.truths[found.place]?);
     let error = found.motion.error(&earlier.inv_mul(&later));

@@ -13,8 +13,9 @@ use crate::drive::Drive;
 /// Standard deviations of a loop: m, m, rad.
 const SIGMA: [f64; 3] = [0.05, 0.05, 0.001];
 
-/// Returns `count` loops between keyframes that are not of the same place, in runs of `length` that agree with each other: as if a
-/// stretch of the path lay, within 5 m and at any heading, where another one is. They are in the order of the later keyframes.
+/// Returns `count` loops between keyframes that are not of the same place, in runs of `length` that
+/// agree with each other: as if a stretch of the path lay, within 5 m and at any heading, where
+/// another one is. They are in the order of the later keyframes.
 pub fn loops(drive: &Drive, count: usize, length: usize) -> Vec<Constraint> {
     let mut random = ChaCha8Rng::seed_from_u64(5);
     let keyframes = drive.keyframes.len();

@@ -22,8 +22,9 @@ struct BaselineRow {
     median_ms: f64,
 }
 
-/// Times all rows of the baseline that is named, if one is, for rasters of `n` cells a side on one thread; its exhaustive search tries
-/// as many angles as the sequence's. The report stays in the folder of the tables.
+/// Times all rows of the baseline that is named, if one is, for rasters of `n` cells a side on one
+/// thread; its exhaustive search tries as many angles as the sequence's. The report stays in the
+/// folder of the tables.
 ///
 /// # Errors
 /// A program that cannot be started, fails, or writes something else.

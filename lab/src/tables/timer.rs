@@ -30,8 +30,8 @@ pub struct Timer {
 }
 
 impl Timer {
-    /// Prepares a row with rasters of `n` cells a side. They cover the same area at every size: that of the row's own
-    /// configuration, or that of its network.
+    /// Prepares a row with rasters of `n` cells a side. They cover the same area at every size:
+    /// that of the row's own configuration, or that of its network.
     pub fn new(
         mut configuration: Configuration,
         model: Option<Model>,

@@ -1,5 +1,5 @@
-//! Table IIIa: how long mask, search and refinement take for a pair of scans, as far as a row has them, on one thread of this
-//! process.
+//! Table IIIa: how long mask, search and refinement take for a pair of scans, as far as a row has
+//! them, on one thread of this process.
 
 use gyre::Failure;
 use gyre_radar::OwnedScan;
@@ -36,7 +36,8 @@ const COLUMNS: [Column; 10] = [
 /// A row at one size; `None` without the network for it.
 type Timed<'a> = (&'a Row, Option<Timer>);
 
-/// Times all rows at all sizes on scans of `sequence`: half the passes, then the baseline, then the other half.
+/// Times all rows at all sizes on scans of `sequence`: half the passes, then the baseline, then the
+/// other half.
 ///
 /// # Errors
 /// A row that cannot be timed at a size, or what the baseline says.
@@ -80,7 +81,8 @@ fn time(timers: &mut [Timed<'_>], arguments: &TablesArguments) -> Result<(), Fai
     timers.try_for_each(|timer| timer.time(arguments.passes.get()))
 }
 
-/// The rows at one size. Where the network of one is missing there is only what the paper and the baseline say, if they do.
+/// The rows at one size. Where the network of one is missing there is only what the paper and the
+/// baseline say, if they do.
 fn timers<'a>(
     rows: &'a Rows,
     sequence: &Sequence,

@@ -35,7 +35,7 @@ const PICTURE: &str = "calibration.svg";
 /// Time between two lines of progress.
 const EVERY: Duration = Duration::from_secs(5);
 
-/// What is known of the drive before it is calibrated.
+/// The configuration of the drive before it is calibrated.
 pub(crate) struct Configured {
     /// The constants by which the scans were read.
     pub geometry: SweepGeometry,
@@ -48,7 +48,8 @@ pub(crate) struct Configured {
 /// Finds the constants, prints them, and writes `calibration.toml` and `calibration.svg`.
 ///
 /// # Errors
-/// A recording or a configuration that cannot be used, a drive that does not determine the constants, a file that cannot be written.
+/// A recording or a configuration that cannot be used, a drive that does not determine the
+/// constants, a file that cannot be written.
 pub fn calibrate(arguments: &CalibrateArguments) -> Result<ExitCode, Failure> {
     let configuration = match (&arguments.config, &arguments.data) {
         (Some(path), _) => Configuration::read(path, &arguments.set)?,

@@ -52,7 +52,8 @@ pub struct Gyre {
 pub enum Command {
     /// Run the whole pipeline on a recording or a live radar, and write a trajectory.
     Run(RunArguments),
-    /// Run the pipeline on many drives, and write a table of their results. The same command goes on after an interruption.
+    /// Run the pipeline on many drives, and write a table of their results. The same command goes
+    /// on after an interruption.
     Batch(BatchArguments),
     /// Compute a drive of a batch (what `gyre batch` starts).
     #[command(hide = true, name = gyre_batch::COMMAND)]
@@ -71,20 +72,25 @@ pub enum Command {
     Restart(RestartArguments),
     /// Go on with another program in the place of a stage of a running run, without losing a scan.
     Swap(SwapArguments),
-    /// Run a second program beside a stage of a running run, and compare what both make of the same inputs. Its results are never used.
+    /// Run a second program beside a stage of a running run, and compare what both make of the same
+    /// inputs. Its results are never used.
     Shadow(ShadowArguments),
     /// Run one process of a run (what `gyre run` starts).
     Stage {
-        /// radar-replay, masking, rotation-search, translation-search, joint-search, refinement or pose-integration.
+        /// radar-replay, masking, rotation-search, translation-search, joint-search, refinement or
+        /// pose-integration.
         name: String,
     },
     /// Print the messages of a running run. It changes neither a result nor a latency.
     Echo(EchoArguments),
-    /// Watch a running run in a browser, and by Prometheus. It changes neither a result nor a latency.
+    /// Watch a running run in a browser, and by Prometheus. It changes neither a result nor a
+    /// latency.
     Watch(WatchArguments),
-    /// Publish a running run to ROS 2, by DDS: odometry, transforms, diagnostics and the map. It changes neither a result nor a latency.
+    /// Publish a running run to ROS 2, by DDS: odometry, transforms, diagnostics and the map. It
+    /// changes neither a result nor a latency.
     Ros2(Ros2Arguments),
-    /// Measure whether the pipeline meets its deadline on this computer, undisturbed and under load.
+    /// Measure whether the pipeline meets its deadline on this computer, undisturbed and under
+    /// load.
     Stress(StressArguments),
     /// Load the machine or take part in a measurement (what `gyre stress` starts).
     #[command(hide = true, name = gyre_stress::helper::COMMAND)]
@@ -93,9 +99,11 @@ pub enum Command {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         words: Vec<String>,
     },
-    /// Record a running run as MCAP, for viewers and to replay it. It changes neither a result nor a latency.
+    /// Record a running run as MCAP, for viewers and to replay it. It changes neither a result nor
+    /// a latency.
     Record(RecordArguments),
-    /// Take the topics of a running run to another machine. To split a run between two machines, see the section `[link]`.
+    /// Take the topics of a running run to another machine. To split a run between two machines,
+    /// see the section `[link]`.
     Link(LinkArguments),
     /// Report what this machine lacks for a run.
     Doctor(DoctorArguments),
@@ -134,19 +142,23 @@ pub struct RunArguments {
     /// The dataset's folder, a recording of a run, NAME.mcap, or a bag of ROS 2 (source.data).
     #[arg(long)]
     pub data: Option<PathBuf>,
-    /// Play a recording from this topic on, without the stages before it: masked, rotation, motion or refined (source.from).
+    /// Play a recording from this topic on, without the stages before it: masked, rotation, motion
+    /// or refined (source.from).
     #[arg(long, value_name = "TOPIC", requires = "data")]
     pub from: Option<String>,
     /// The radar's address, as in 192.168.0.1: run live (source.kind, source.address, run.mode).
     #[arg(long, value_name = "ADDRESS", conflicts_with = "data")]
     pub radar: Option<String>,
-    /// The topic of ROS 2 on which Navtech's driver publishes azimuths, as in /radar_data/fft_data: run live (source.kind, source.topic, run.mode).
+    /// The topic of ROS 2 on which Navtech's driver publishes azimuths, as in /radar_data/fft_data:
+    /// run live (source.kind, source.topic, run.mode).
     #[arg(long, value_name = "TOPIC", conflicts_with_all = ["data", "radar"])]
     pub ros2: Option<String>,
-    /// The folder of the results. Default: `out/NAME`, NAME being the configuration's, or without one the dataset's.
+    /// The folder of the results. Default: `out/NAME`, NAME being the configuration's, or without
+    /// one the dataset's.
     #[arg(long)]
     pub out: Option<PathBuf>,
-    /// The constants of the radar, of `gyre calibrate`: its section `[dataset]` over that of the configuration.
+    /// The constants of the radar, of `gyre calibrate`: its section `[dataset]` over that of the
+    /// configuration.
     #[arg(long, value_name = "FILE")]
     pub calibration: Option<PathBuf>,
     /// Pace of the source: realtime, max, or a factor (run.rate).
@@ -244,13 +256,15 @@ pub struct LocaliseArguments {
 pub struct CalibrateArguments {
     /// The recording's folder. Default: the configuration's simulation, or its source.data.
     pub data: Option<PathBuf>,
-    /// The configuration, a TOML file: its constants are those that are checked. Default: those of the format.
+    /// The configuration, a TOML file: its constants are those that are checked. Default: those of
+    /// the format.
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
     /// The folder of calibration.toml and calibration.svg.
     #[arg(long, default_value = "out/calibrate")]
     pub out: PathBuf,
-    /// Length of the path by an odometer or GNSS, m: without it the range resolution cannot be told.
+    /// Length of the path by an odometer or GNSS, m: without it the range resolution cannot be
+    /// told.
     #[arg(long, value_parser = length)]
     pub distance_m: Option<f64>,
     /// Maximum number of scans. Their points are kept in memory.
@@ -296,7 +310,8 @@ pub struct SchemaArguments {
 pub struct SimulateArguments {
     /// The configuration, whose section `[simulation]` is used; its defaults without one.
     pub configuration: Option<PathBuf>,
-    /// The folder of the recording. What an earlier call with the same configuration left there is kept and completed.
+    /// The folder of the recording. What an earlier call with the same configuration left there is
+    /// kept and completed.
     #[arg(long)]
     pub out: PathBuf,
     /// Number of scans (simulation.scans).

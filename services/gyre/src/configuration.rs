@@ -1,4 +1,5 @@
-//! The configuration of a run: read strictly, overridden key by key, written back as it was resolved.
+//! The configuration of a run: read strictly, overridden key by key, written back as it was
+//! resolved.
 
 pub mod difference;
 mod rate;
@@ -52,9 +53,10 @@ pub struct Configuration {
     pub odometry: OdometryConfig,
     /// The correction of the trajectory at places that are seen again.
     pub slam: SlamConfig,
-    /// What `gyre stress` asks of a run: limits for all scenarios, and in `[budget.NAME]` for one of them.
-    /// A scenario whose purpose is a fault (`slow-stage`, `stopped`, `kills`) is judged by `recovery_ms` and by
-    /// its own limits alone, and `bursts` by drops only if it names them. A run itself does not depend on it.
+    /// The limits that `gyre stress` checks: limits for all scenarios, and in `[budget.NAME]` for
+    /// one of them. A scenario whose purpose is a fault (`slow-stage`, `stopped`, `kills`) is
+    /// judged by `recovery_ms` and by its own limits alone, and `bursts` by drops only if it names
+    /// them. A run itself does not depend on it.
     pub budget: Budget,
     /// The recording of the run as MCAP. Results do not depend on it.
     pub record: RecordConfig,
@@ -89,10 +91,12 @@ impl Configuration {
         Self::resolve(toml::Table::new(), overrides)
     }
 
-    /// Creates the configuration of a recording from its format, its `dataset.toml` and its scans, and prints it.
+    /// Creates the configuration of a recording from its format, its `dataset.toml` and its scans,
+    /// and prints it.
     ///
     /// # Errors
-    /// A recording that cannot be opened or of which no scan can be read, an unknown key, a value out of its bounds.
+    /// A recording that cannot be opened or of which no scan can be read, an unknown key, a value
+    /// out of its bounds.
     pub fn of_recording(data: &Path, overrides: &[String]) -> Result<Self, Failure> {
         let wished = Self::of_overrides(overrides)?.dataset;
         let found = automatic(data, &wished)?;
@@ -141,8 +145,8 @@ impl Configuration {
         }
     }
 
-    /// Returns the limits on scans in flight, with masks that look at `scans_a_mask` scans. In live mode the source keeps what
-    /// arrives within a second, the time of a restart.
+    /// Returns the limits on scans in flight, with masks that look at `scans_a_mask` scans. In live
+    /// mode the source keeps what arrives within a second, the time of a restart.
     pub fn window(&self, period: Option<Duration>, scans_a_mask: usize) -> Window {
         let pace = match self.is_radar() {
             true => Some(1.0),
@@ -176,7 +180,8 @@ impl Configuration {
         self.link.side == Some(side)
     }
 
-    /// Leaves to the other side what it has: the robot has no SLAM, and the base has no scans of its own.
+    /// Leaves to the other side what it has: the robot has no SLAM, and the base has no scans of
+    /// its own.
     pub fn leave_other_side(&mut self) {
         match self.link.side {
             Some(Side::Robot) => {
@@ -216,8 +221,8 @@ impl Configuration {
             .filter(|simulation| simulation.output.store)
     }
 
-    /// Plays this recording instead, or streams the simulation even if a run would store it: for commands that read the scans
-    /// without a run. Streamed and stored scans are byte-identical.
+    /// Plays this recording instead, or streams the simulation even if a run would store it: for
+    /// commands that read the scans without a run. Streamed and stored scans are byte-identical.
     #[must_use]
     pub fn streaming(mut self, data: Option<&Path>) -> Self {
         if let Some(data) = data {
@@ -260,7 +265,8 @@ impl Configuration {
         }
     }
 
-    /// Returns whether the run starts this stage: it has it, and neither a recording nor the other side of a link takes its place.
+    /// Returns whether the run starts this stage: it has it, and neither a recording nor the other
+    /// side of a link takes its place.
     pub fn starts(&self, stage: StageId) -> bool {
         let computes = match stage {
             StageId::RadarReplay | StageId::PoseIntegration => None,
@@ -310,7 +316,8 @@ impl Configuration {
                 outlives_restarts: live
                     && name == StageId::RadarReplay.name()
                     && !self.is_link(name),
-                // Live masking alone knows which scans it admitted, and on a base the link which of them have come.
+                // Live masking alone knows which scans it admitted, and on a base the link which of
+                // them have come.
                 restarts_all: live
                     && (name == StageId::Masking.name()
                         || (self.is_side(Side::Base) && self.is_link(name))),
@@ -337,8 +344,8 @@ impl Configuration {
         toml::to_string_pretty(self)
     }
 
-    /// Returns the first key in which this configuration differs from `begun`, of those that the result depends on. `None`: a run
-    /// that was begun with it can be resumed with this.
+    /// Returns the first key in which this configuration differs from `begun`, of those that the
+    /// result depends on. `None`: a run that was begun with it can be resumed with this.
     ///
     /// # Errors
     /// A value that TOML cannot hold.

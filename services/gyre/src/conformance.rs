@@ -18,7 +18,8 @@ use crate::{
     run::{self, INTERRUPTED},
 };
 
-/// The configuration of a test without `--config` and `--data`: the shape of the program's messages matters, not the accuracy.
+/// The configuration of a test without `--config` and `--data`: the shape of the program's messages
+/// matters, not the accuracy.
 const SMALL: [&str; 2] = ["simulation.seed=1", "raster.n=127"];
 /// Places for readers beside those of a run; the test takes some.
 const OBSERVERS: usize = 4;
@@ -26,8 +27,8 @@ const OBSERVERS: usize = 4;
 /// The exit code where not all could be tested, which says nothing against the program.
 const NOT_TESTED: u8 = 2;
 
-/// Tests a program, and prints what it breaks. The exit code is 0 if it keeps the contract, 1 if it breaks a rule, and 2 if not all could be
-/// tested.
+/// Tests a program, and prints what it breaks. The exit code is 0 if it keeps the contract, 1 if it
+/// breaks a rule, and 2 if not all could be tested.
 ///
 /// # Errors
 /// Standard output cannot be written.
@@ -124,7 +125,8 @@ fn demands(arguments: &ConformanceArguments) -> Result<Demands, Failure> {
     })
 }
 
-/// The configuration of the runs that the program is tested in: lossless, with the stage, of some scans.
+/// The configuration of the runs that the program is tested in: lossless, with the stage, of some
+/// scans.
 fn configuration(
     arguments: &ConformanceArguments,
     stage: StageId,

@@ -15,9 +15,9 @@ use crate::{
 struct Finding {
     subject: &'static str,
     state: State,
-    /// What was found.
+    /// The finding.
     found: String,
-    /// What to do about it; empty if there is nothing to do.
+    /// The remedy; empty if there is nothing to do.
     remedy: String,
 }
 

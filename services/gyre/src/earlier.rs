@@ -1,4 +1,5 @@
-//! What an earlier run left in the folder of the results: nothing, a journal to resume, or one whose results are to be written.
+//! The state of an earlier run in the folder of the results: nothing, a journal to resume, or one
+//! whose results are to be written.
 
 use std::{
     fs, io,
@@ -27,7 +28,7 @@ use crate::{
 const CONFIGURATION: &str = "config.toml";
 const LOGS: [&str; 2] = ["log.jsonl", "log.jsonl.old"];
 
-/// What an earlier run left.
+/// The state of an earlier run.
 #[derive(Debug)]
 pub enum Earlier {
     /// Nothing to go on from.
@@ -45,7 +46,7 @@ pub struct Begun {
     pub poses: u64,
     /// Records behind them, which a power failure has left in part: they are to be cut off.
     pub lost: u64,
-    /// What it was begun with.
+    /// The identity that it was begun with.
     pub identity: Identity,
 }
 
@@ -126,9 +127,9 @@ fn kept(error: JournalError, path: &Path) -> Failure {
     .into()
 }
 
-/// Returns the number of poses of an unfinished journal up to the newest one from which the run can go on: all poses up to it have
-/// their keyframes, and the map of the refinement knows it. After a power failure that may be an earlier one than the last; after a
-/// death it is the last.
+/// Returns the number of poses of an unfinished journal up to the newest one from which the run can
+/// go on: all poses up to it have their keyframes, and the map of the refinement knows it. After a
+/// power failure that may be an earlier one than the last; after a death it is the last.
 fn known_poses(
     out: &Out,
     configuration: &Configuration,
@@ -188,8 +189,8 @@ fn damaged(error: KeyframesError) -> Failure {
     }
 }
 
-/// Removes the results and the state of an earlier run, and says what the new one begins with. The journal goes first: without
-/// it nothing else is taken for part of a run.
+/// Removes the results and the state of an earlier run, and says what the new one begins with. The
+/// journal goes first: without it nothing else is taken for part of a run.
 ///
 /// # Errors
 /// A file that cannot be removed or written.
@@ -229,8 +230,8 @@ pub fn mark_complete(out: &Out, poses: usize) -> Result<(), Failure> {
     )?)
 }
 
-/// Makes the folder ready for the run to go on: cuts off what a power failure has left of the last poses, and writes `config.toml`
-/// again if it is not what the run was begun with.
+/// Makes the folder ready for the run to go on: cuts off what a power failure has left of the last
+/// poses, and writes `config.toml` again if it is not what the run was begun with.
 ///
 /// # Errors
 /// A file that cannot be written.

@@ -54,7 +54,8 @@ fn nees_options(arguments: &EvaluateArguments) -> NeesOptions {
     }
 }
 
-/// Returns the motions of the odometry that was named, or of the one beside the estimate if it fits.
+/// Returns the motions of the odometry that was named, or of the one beside the estimate if it
+/// fits.
 fn judged_motions(
     arguments: &EvaluateArguments,
     estimate: &Trajectory,

@@ -90,7 +90,7 @@ struct Trajectory {
     odometry: Topic<Odometry>,
     transforms: Topic<TFMessage>,
     fixed: Topic<TFMessage>,
-    /// Whether the mounting has been written.
+    /// True if the mounting has been written.
     is_mounted: bool,
 }
 

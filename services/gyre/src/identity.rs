@@ -21,7 +21,7 @@ use crate::{
 
 const HEAD: &str = "# What the run was begun with, which the same command compares before it resumes the run.\n# CRC-32 of the rest: ";
 
-/// What a run was begun with.
+/// The identity that a run was begun with.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Identity {
@@ -84,7 +84,8 @@ impl Programs {
 }
 
 impl Identity {
-    /// The identity of a run that begins now. Its configuration has the options of `dataset.toml` in `dataset`.
+    /// The identity of a run that begins now. Its configuration has the options of `dataset.toml`
+    /// in `dataset`.
     ///
     /// # Errors
     /// A recording that cannot be read, or a configuration that TOML cannot hold.
@@ -119,8 +120,8 @@ impl Identity {
     /// Reads that of the run whose journal holds `poses` poses.
     ///
     /// # Errors
-    /// One sentence that says what is wrong with the file. It is written as a whole before the first pose, so the run did not
-    /// leave it like that.
+    /// One sentence that says what is wrong with the file. It is written as a whole before the
+    /// first pose, so the run did not leave it like that.
     pub fn read(out: &Out, poses: u64) -> Result<Self, Failure> {
         let path = out.join(BEGUN_WITH);
         Self::read_file(&path).map_err(|state| {
@@ -173,7 +174,8 @@ impl Identity {
         }
     }
 
-    /// Checks that the recording is the one that the run was begun with, and is read in the same way.
+    /// Checks that the recording is the one that the run was begun with, and is read in the same
+    /// way.
     ///
     /// # Errors
     /// One sentence that says what differs.
@@ -192,8 +194,8 @@ impl Identity {
         })
     }
 
-    /// Returns whether a run of this configuration that begins now would compute the same and judge it by the same truth. Gyre's own build
-    /// may be another one.
+    /// Returns whether a run of this configuration that begins now would compute the same and judge
+    /// it by the same truth. Gyre's own build may be another one.
     ///
     /// # Errors
     /// A recording or a program that cannot be read.

@@ -1,5 +1,5 @@
-//! The evaluation of a trajectory against ground truth, as `gyre run` and `gyre evaluate` both report it: its errors, and the
-//! consistency of its covariances.
+//! The evaluation of a trajectory against ground truth, as `gyre run` and `gyre evaluate` both
+//! report it: its errors, and the consistency of its covariances.
 
 use std::fmt;
 
@@ -13,7 +13,8 @@ use serde::Serialize;
 
 use crate::Failure;
 
-/// The evaluation with the NEES of its covariances. `Display` is a table, the alternate form a longer one.
+/// The evaluation with the NEES of its covariances. `Display` is a table, the alternate form a
+/// longer one.
 #[derive(Debug, Serialize)]
 pub struct Judgement {
     #[serde(flatten)]
@@ -21,7 +22,8 @@ pub struct Judgement {
     /// `None`: there are no covariances, or the truth cannot judge them.
     #[serde(skip_serializing_if = "Option::is_none")]
     nees: Option<Nees>,
-    /// Share of the poses whose error in x, y, yaw is within three standard deviations of what their covariance says, %.
+    /// Share of the poses whose error in x, y, yaw is within three standard deviations of what
+    /// their covariance says, %.
     #[serde(skip_serializing_if = "Option::is_none")]
     within_3_sigma_percent: Option<[f64; 3]>,
     #[serde(skip)]
@@ -46,7 +48,8 @@ impl Judgement {
         }
     }
 
-    /// Draws the trajectory, errors where the truth has heading, and bands where there are covariances: names and SVG documents.
+    /// Draws the trajectory, errors where the truth has heading, and bands where there are
+    /// covariances: names and SVG documents.
     ///
     /// # Errors
     /// A plot that cannot be drawn.

@@ -1,6 +1,8 @@
-//! Gyre's command line as a library: `gyre` is this crate's binary, and the laboratory builds on the same parts.
+//! Gyre's command line as a library: `gyre` is this crate's binary, and the laboratory builds on
+//! the same parts.
 //!
-//! Reading order: [`cli`], then [`run`] (what `gyre run` does, on a page), [`earlier`], [`configuration`], [`results`].
+//! Reading order: [`cli`], then [`run`] (what `gyre run` does, on a page), [`earlier`],
+//! [`configuration`], [`results`].
 
 pub mod batch;
 pub mod calibrate;
@@ -104,7 +106,8 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
     }
 }
 
-/// Returns whether the files of a command are its user's alone: those of a run and of its observers.
+/// Returns whether the files of a command are its user's alone: those of a run and of its
+/// observers.
 fn is_private(command: &Command) -> bool {
     matches!(
         command,
@@ -122,7 +125,8 @@ fn is_private(command: &Command) -> bool {
     )
 }
 
-/// Parses the command line. Help is printed to standard output, a wrong argument to standard error, and the exit code is returned.
+/// Parses the command line. Help is printed to standard output, a wrong argument to standard error,
+/// and the exit code is returned.
 ///
 /// # Errors
 /// Help that was asked for, or a wrong argument.

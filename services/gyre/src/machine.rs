@@ -51,7 +51,8 @@ pub fn today() -> String {
     date(since.as_secs() / 86_400)
 }
 
-/// The Gregorian date of a day counted from 1970-01-01: years begin in March here, so that a leap day is a year's last.
+/// The Gregorian date of a day counted from 1970-01-01: years begin in March here, so that a leap
+/// day is a year's last.
 fn date(day: u64) -> String {
     const DAYS_TO_1970: u64 = 719_468; // from March 1 of the year 0
     const CYCLE: u64 = 146_097; // days of 400 years

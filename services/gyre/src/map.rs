@@ -31,7 +31,8 @@ const CORRECTED: &str = "trajectory_slam.tum";
 const ODOMETRY: &str = "trajectory.tum";
 const LOOPS: &str = "loops.csv";
 
-/// Draws the keyframes of a run along its trajectory, and writes the map in the forms that were asked for.
+/// Draws the keyframes of a run along its trajectory, and writes the map in the forms that were
+/// asked for.
 ///
 /// # Errors
 /// A run without keyframes or without a trajectory, a folder that cannot be written.
@@ -81,8 +82,9 @@ fn draw_run(arguments: &MapArguments) -> Result<Drawing, Failure> {
     Ok(drawing)
 }
 
-/// Draws the keyframes of a run along its trajectory, in the frame in which the frame of the trajectory has the pose `placed`. What does not fit
-/// into memory lies in a file in `folder`, which has no name.
+/// Draws the keyframes of a run along its trajectory, in the frame in which the frame of the
+/// trajectory has the pose `placed`. What does not fit into memory lies in a file in `folder`,
+/// which has no name.
 ///
 /// # Errors
 /// A run without keyframes or without a trajectory.
@@ -124,7 +126,7 @@ fn open(run: &Path) -> Result<RecordReader<Keyframe>, Failure> {
     }
 }
 
-/// What is drawn over the keyframes, in the frame of the trajectory.
+/// The lines drawn over the keyframes, in the frame of the trajectory.
 #[derive(Default)]
 struct Lines {
     trajectory: Vec<Pose>,

@@ -1,4 +1,5 @@
-//! Notifications of a run to systemd, where it has started it (`Type=notify`): readiness, a watchdog's keep-alive, and a line of status.
+//! Notifications of a run to systemd, where it has started it (`Type=notify`): readiness, a
+//! watchdog's keep-alive, and a line of status.
 
 use std::{
     io,
@@ -40,8 +41,9 @@ impl Notifier {
         }
     }
 
-    /// Tells what systemd wants to know of an event. The keep-alive says that the supervisor looks after its processes, which it
-    /// restarts by itself; systemd restarts a supervisor that does not.
+    /// Tells what systemd wants to know of an event. The keep-alive says that the supervisor looks
+    /// after its processes, which it restarts by itself; systemd restarts a supervisor that does
+    /// not.
     pub fn report(&mut self, event: &Event<'_>) {
         match event {
             Event::Ready => {

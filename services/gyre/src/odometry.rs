@@ -15,8 +15,8 @@ pub const HEADER: &str = "seq,scan,previous_scan,stamp_ns,interval_ns,x_m,y_m,ya
     rotation_rad,rotation_variance_rad2,rotation_score,rotation_runner_up_rad,rotation_runner_up_score,\
     searched_x_m,searched_y_m,searched_yaw_rad,outcome,hypothesis,overlap,support,stationary,drift_share,scale_sigma\n";
 
-/// Writes the row of a motion to `text`, in fixed decimals, so that equal motions give equal bytes. The start of the chain has no
-/// row.
+/// Writes the row of a motion to `text`, in fixed decimals, so that equal motions give equal bytes.
+/// The start of the chain has no row.
 pub fn write_row(pose: &PoseHeader, text: &mut String) {
     if pose.item.is(flag::BREAK) {
         return;

@@ -1,7 +1,8 @@
-//! The commands that operate running runs: `gyre up`, `down`, `ps`, `logs`, `top`, `restart` and `swap`.
+//! The commands that operate running runs: `gyre up`, `down`, `ps`, `logs`, `top`, `restart` and
+//! `swap`.
 //!
-//! Each asks the supervisor of a run at its control socket ([`gyre_stage::control`]); nothing of a run is looked up elsewhere, but its
-//! logs.
+//! Each asks the supervisor of a run at its control socket ([`gyre_stage::control`]); nothing of a
+//! run is looked up elsewhere, but its logs.
 
 mod background;
 mod events;
@@ -42,7 +43,8 @@ const UNTRIED: u8 = 2;
 /// Goes on with another program in the place of a stage.
 ///
 /// # Errors
-/// There is no such run or process, or the program does not come to take over, or fails at its first scan: the one before goes on.
+/// There is no such run or process, or the program does not come to take over, or fails at its
+/// first scan: the one before goes on.
 pub fn swap(arguments: &SwapArguments) -> Result<ExitCode, Failure> {
     let run = chosen(&arguments.run)?;
     let command = arguments.command.as_deref().map(program::words);

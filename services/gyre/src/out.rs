@@ -9,8 +9,8 @@ use std::{
 use gyre_stage::lock::{Attempt, try_lock};
 use thiserror::Error;
 
-/// The lock of the folder. It lies beside the results and not in shared memory, which two runs need not have in common:
-/// containers have their own.
+/// The lock of the folder. It lies beside the results and not in shared memory, which two runs need
+/// not have in common: containers have their own.
 const LOCK: &str = ".lock";
 
 /// Why a folder cannot be that of the results.

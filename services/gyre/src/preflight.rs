@@ -33,7 +33,7 @@ pub enum PreflightError {
     NoRecording {
         /// The topic.
         from: &'static str,
-        /// What was named.
+        /// The source that was named.
         data: String,
     },
     /// A recording is needed.
@@ -47,7 +47,7 @@ pub enum PreflightError {
     TooFew {
         /// The dataset.
         path: String,
-        /// Its scans.
+        /// The scans.
         scans: usize,
     },
     /// The segments would not fit.
@@ -69,7 +69,7 @@ pub enum PreflightError {
         /// The limit.
         limit: u64,
     },
-    /// Its size cannot be read.
+    /// The size cannot be read.
     #[error("cannot use shared memory at /dev/shm: {0}")]
     NoSharedMemory(rustix::io::Errno),
 }
@@ -92,9 +92,9 @@ pub struct Preflight {
 
 /// A recording on the disk.
 pub struct Recording {
-    /// What tells it from another one.
+    /// The identity of the recording.
     pub fingerprint: Fingerprint,
-    /// Its files.
+    /// The files.
     pub listing: Listing,
 }
 
@@ -153,7 +153,7 @@ pub fn fingerprint(configuration: &Configuration) -> Result<Option<Fingerprint>,
     Ok(Some(Fingerprint::of(played.dataset.as_ref())?))
 }
 
-/// What the source says of its scans before the run.
+/// The properties of the scans that the source knows before the run.
 pub(crate) struct Scans {
     /// `None`: without end.
     pub count: Option<usize>,
@@ -214,7 +214,7 @@ impl Scans {
         })
     }
 
-    /// What a base knows of the robot's scans before the run.
+    /// Returns the properties of the robot's scans, which a base asks for before the run.
     fn of_base(configuration: &Configuration) -> Result<Self, crate::Failure> {
         Ok(Self {
             count: None,
@@ -243,7 +243,8 @@ impl Scans {
     }
 }
 
-/// Checks that a process may open as many files as it needs. The transport's own errors would not say what is missing.
+/// Checks that a process may open as many files as it needs. The transport's own errors would not
+/// say what is missing.
 ///
 /// # Errors
 /// It may not.
@@ -254,8 +255,8 @@ pub fn check_open_files() -> Result<(), PreflightError> {
     }
 }
 
-/// Says which library computes learned masks, and warns where a configuration differs from the one that its network was trained
-/// for.
+/// Says which library computes learned masks, and warns where a configuration differs from the one
+/// that its network was trained for.
 ///
 /// # Errors
 /// A model card that cannot be read, or ONNX Runtime missing where it is required.
@@ -295,7 +296,7 @@ pub fn describe_masks(configuration: &Configuration) -> Result<(), crate::Failur
 
 /// An open recording or simulation.
 pub struct Played {
-    /// Its scans.
+    /// The scans.
     pub dataset: Box<dyn Dataset>,
     /// `ground_truth.tum` of a simulation that is played without being stored.
     pub truth: Option<Vec<u8>>,
@@ -330,8 +331,8 @@ pub fn open(configuration: &Configuration) -> Result<Played, crate::Failure> {
     }
 }
 
-/// Checks that the run fits into shared memory. Runs that were killed may take some of it: acquire the run's root first, which
-/// removes them.
+/// Checks that the run fits into shared memory. Runs that were killed may take some of it: acquire
+/// the run's root first, which removes them.
 ///
 /// # Errors
 /// Too little shared memory.

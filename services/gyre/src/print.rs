@@ -28,12 +28,14 @@ pub fn printed(written: io::Result<()>) -> Result<(), Failure> {
     }
 }
 
-/// Prints a line to standard error. Failures are ignored: a run does not end because its terminal is closed.
+/// Prints a line to standard error. Failures are ignored: a run does not end because its terminal
+/// is closed.
 pub fn note(text: impl Display) {
     let _ = writeln!(io::stderr(), "{}", printable(&text.to_string()));
 }
 
-/// Replaces what a terminal would take as a command: names and words of files are quoted as they are.
+/// Replaces what a terminal would take as a command: names and words of files are quoted as they
+/// are.
 fn printable(text: &str) -> String {
     let plain = |c: char| {
         if c.is_control() && c != '\n' {

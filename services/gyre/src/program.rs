@@ -1,7 +1,8 @@
 //! The programs of a run: this build of Gyre, and what replaces its stages.
 //!
-//! A stage that is started again must be the program that it was. Gyre's own stages are started from the file that the
-//! supervisor executes, which stays while it runs, even if another build takes its name.
+//! A stage that is started again must be the program that it was. Gyre's own stages are started
+//! from the file that the supervisor executes, which stays while it runs, even if another build
+//! takes its name.
 
 use std::{
     collections::BTreeMap,
@@ -15,7 +16,8 @@ use sha2::{Digest, Sha256};
 
 use crate::Failure;
 
-/// Returns a path that leads to the program that this process executes, for this process and its children.
+/// Returns a path that leads to the program that this process executes, for this process and its
+/// children.
 pub fn own() -> PathBuf {
     PathBuf::from(format!("/proc/{}/exe", std::process::id()))
 }
@@ -41,7 +43,8 @@ pub fn sha256(path: &Path) -> io::Result<String> {
     Ok(format!("{:x}", digest.finalize()))
 }
 
-/// Returns the SHA-256 of the words of each replaced stage's command and of the files that it names.
+/// Returns the SHA-256 of the words of each replaced stage's command and of the files that it
+/// names.
 ///
 /// # Errors
 /// A file that cannot be read.

@@ -125,7 +125,8 @@ impl Progress {
         }
     }
 
-    /// Counts by the numbers of this pose alone: when poses come fast, not all of them are seen here.
+    /// Counts by the numbers of this pose alone: when poses come fast, not all of them are seen
+    /// here.
     fn message(&mut self, pose: &Item) -> String {
         self.done = pose.seq.saturating_add(1);
         let (since, first) = *self.since.get_or_insert((Instant::now(), self.done));

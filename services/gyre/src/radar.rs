@@ -6,10 +6,12 @@ use gyre_live_radar::{Address, BadAddress, Settings};
 use gyre_radar::DatasetOptions;
 use gyre_radar_replay::SourceConfig;
 
-/// Encoder counts per turn of a radar that does not tell them, unless `dataset.encoder_counts` says otherwise.
+/// Encoder counts per turn of a radar that does not tell them, unless `dataset.encoder_counts` says
+/// otherwise.
 const ENCODER_COUNTS: u16 = 5600;
 
-/// Returns the connection to the radar of the section `[source]`, with the constants of the section `[dataset]`.
+/// Returns the connection to the radar of the section `[source]`, with the constants of the section
+/// `[dataset]`.
 ///
 /// # Errors
 /// The address is none.

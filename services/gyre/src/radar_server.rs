@@ -35,7 +35,8 @@ pub fn serve(arguments: &RadarServerArguments) -> Result<ExitCode, Failure> {
         None => Configuration::of_overrides(&arguments.set)?,
     };
     let mut configuration = configuration.streaming(arguments.data.as_deref());
-    // The angles of an encoder are sent as it counts them: who receives them corrects its eccentricity.
+    // The angles of an encoder are sent as it counts them: who receives them corrects its
+    // eccentricity.
     configuration.dataset.azimuth_eccentricity_rad = Some(0.0);
     let Played { mut dataset, .. } = preflight::open(&configuration)?;
     let mut scans = configuration.source.played(dataset.as_ref());
@@ -108,7 +109,8 @@ fn announced(what: &str, arguments: &RadarServerArguments) -> Result<Audience, F
     Ok(audience)
 }
 
-/// Returns to whom is played, the address at which the radar is received, and whether others than this machine reach it.
+/// Returns to whom is played, the address at which the radar is received, and whether others than
+/// this machine reach it.
 fn audience(arguments: &RadarServerArguments) -> Result<(Audience, String, bool), Failure> {
     if let Some(to) = arguments.udp {
         if arguments.rate.factor().is_none() {

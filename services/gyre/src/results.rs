@@ -1,7 +1,8 @@
-//! Results of a run in `--out`, all made from the journal: an interrupted run leaves the same files.
+//! Results of a run in `--out`, all made from the journal: an interrupted run leaves the same
+//! files.
 //!
-//! The journal is read once, from its start to its end, and nothing is kept of it but what a result needs: a month takes no more
-//! memory than a minute. Only an evaluation needs all poses.
+//! The journal is read once, from its start to its end, and nothing is kept of it but what a result
+//! needs: a month takes no more memory than a minute. Only an evaluation needs all poses.
 
 mod estimate;
 mod files;
@@ -56,19 +57,20 @@ pub const FILES: [&str; 13] = [
     SIMULATED_TRUTH,
 ];
 
-/// What was written.
+/// The files that were written.
 #[derive(Debug)]
 pub struct Results {
     /// Poses in the journal.
     pub poses: usize,
-    /// Whether the journal has its end.
+    /// True if the journal has its end.
     pub ended: bool,
     /// The summary to print.
     pub summary: Summary,
 }
 
-/// Writes all files from the journal. Each is written aside first, and none takes its place before all are complete; a result of an
-/// earlier session that cannot be made any more is removed. They survive a power failure when this returns.
+/// Writes all files from the journal. Each is written aside first, and none takes its place before
+/// all are complete; a result of an earlier session that cannot be made any more is removed. They
+/// survive a power failure when this returns.
 ///
 /// # Errors
 /// A journal that cannot be read, a file that cannot be written.

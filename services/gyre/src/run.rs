@@ -42,8 +42,8 @@ pub(crate) const INTERRUPTED: u8 = 130;
 /// The folder of a simulated recording that is stored.
 const RECORDING: &str = "recording";
 
-/// Runs the pipeline and writes its results, however it ended. What an earlier run has begun is resumed; if it only lacks
-/// results, they are written.
+/// Runs the pipeline and writes its results, however it ended. What an earlier run has begun is
+/// resumed; if it only lacks results, they are written.
 ///
 /// # Errors
 /// A run that cannot start, fails, or finds fewer than two readable scans.
@@ -66,7 +66,8 @@ pub(crate) fn compute(
     out: Out,
     fresh: bool,
 ) -> Result<ExitCode, Failure> {
-    // An earlier run may have been killed, and this one may be refused before it takes shared memory itself.
+    // An earlier run may have been killed, and this one may be refused before it takes shared
+    // memory itself.
     sweep();
     place_recording(&mut configuration, &out);
     let programs = Programs::now(&configuration)?;
@@ -108,7 +109,7 @@ pub fn results_folder(arguments: &RunArguments) -> PathBuf {
         .unwrap_or_else(|| Path::new("out").join(name))
 }
 
-/// What a run needs that its configuration does not say.
+/// The inputs of a run that its configuration does not have.
 struct Ready {
     /// The configuration with the options of `dataset.toml`.
     resolved: Configuration,
@@ -209,7 +210,8 @@ fn play(
         ending: report.as_ref().ok().map(|report| report.ending),
         report: report.as_ref().ok(),
     };
-    // The run keeps its locks until its results are written, so that no other run writes them meanwhile.
+    // The run keeps its locks until its results are written, so that no other run writes them
+    // meanwhile.
     let written = finish(configuration, &out, &session);
     match report {
         Ok(_) => conclude(&session, &written?),
@@ -298,7 +300,8 @@ fn write_missing_results(
     conclude(&session, &written)
 }
 
-/// Writes the results. Only when all of them are in place, the run counts as complete, and the next one starts anew.
+/// Writes the results. Only when all of them are in place, the run counts as complete, and the next
+/// one starts anew.
 fn finish(
     configuration: &Configuration,
     out: &Out,
@@ -346,13 +349,14 @@ fn conclude(session: &Session<'_>, written: &Results) -> Result<ExitCode, Failur
 /// The environment variable of a run that has started over: the poses that it resumed after before.
 const STARTED_OVER: &str = "GYRE_STARTED_OVER";
 
-/// Returns whether the run has started over since it resumed after so many poses: once more would not help.
+/// Returns whether the run has started over since it resumed after so many poses: once more would
+/// not help.
 fn has_started_over_at(poses: usize) -> bool {
     env::var(STARTED_OVER).is_ok_and(|before| before == poses.to_string())
 }
 
-/// Executes the same command again: the transport hung on what a dead process left, which is removed now, and the run resumes from
-/// the journal.
+/// Executes the same command again: the transport hung on what a dead process left, which is
+/// removed now, and the run resumes from the journal.
 fn start_over(resumed: usize) -> Result<ExitCode, Failure> {
     print::note(
         "gyre: the transport did not finish cleaning up after a dead process; starting over from the journal",

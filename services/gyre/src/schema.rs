@@ -1,6 +1,8 @@
-//! `gyre schema`: the schema of configurations for editors, and the reference in Markdown that is made from it.
+//! `gyre schema`: the schema of configurations for editors, and the reference in Markdown that is
+//! made from it.
 //!
-//! Keys, types, defaults and descriptions come from the configuration structures and their doc comments.
+//! Keys, types, defaults and descriptions come from the configuration structures and their doc
+//! comments.
 
 mod markdown;
 mod transform;
@@ -27,7 +29,8 @@ fn json() -> String {
     format!("{:#}", generate().as_value())
 }
 
-/// The schema, with each section where it belongs: editors and the reference need not follow references.
+/// The schema, with each section where it belongs: editors and the reference need not follow
+/// references.
 fn generate() -> Schema {
     let settings = SchemaSettings::draft07().with(|settings| settings.inline_subschemas = true);
     let mut schema = settings

@@ -1,4 +1,5 @@
-//! `gyre shadow`: runs a second program beside a stage of a running run, and compares their results.
+//! `gyre shadow`: runs a second program beside a stage of a running run, and compares their
+//! results.
 
 use std::{process::ExitCode, time::Duration};
 
@@ -9,8 +10,8 @@ use gyre_supervise::Scheduling;
 
 use crate::{Failure, cli::ShadowArguments, operate, preflight, print, program};
 
-/// Compares until the run ends or as long as the arguments say, and prints the report. The exit code is 1 if nothing was compared, or the
-/// program died, hung or broke the contract.
+/// Compares until the run ends or as long as the arguments say, and prints the report. The exit
+/// code is 1 if nothing was compared, or the program died, hung or broke the contract.
 ///
 /// # Errors
 /// There is no such run or stage, the stage cannot have a shadow, or the program cannot be started.

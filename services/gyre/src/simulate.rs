@@ -79,7 +79,8 @@ fn overrides(arguments: &SimulateArguments) -> Vec<String> {
         .collect()
 }
 
-/// Writes the recording of a run to `out`, or completes it. If `replace`, it takes the place of that of an earlier run.
+/// Writes the recording of a run to `out`, or completes it. If `replace`, it takes the place of
+/// that of an earlier run.
 ///
 /// # Errors
 /// As [`simulate`]; a folder that holds files which Gyre did not write.

@@ -90,7 +90,8 @@ fn integrate(launch: &Launch) -> Result<StageCounters, StageError> {
     }
 }
 
-/// Receives from a radar or from the other side of a link, or plays a recording, or a simulation as it is rendered.
+/// Receives from a radar or from the other side of a link, or plays a recording, or a simulation as
+/// it is rendered.
 fn play(launch: &Launch) -> Result<StageCounters, StageError> {
     let input = |error: &dyn std::error::Error| StageError::Input(error.to_string());
     if launch.section::<LinkConfig>("link")?.side == Some(Side::Base) {

@@ -19,15 +19,17 @@ use crate::{
     simulate,
 };
 
-/// The exit code of a stress test that could not be carried out, which says nothing of the pipeline.
+/// The exit code of a stress test that could not be carried out, which says nothing of the
+/// pipeline.
 const NOT_CARRIED_OUT: u8 = 2;
 /// Duration of a scenario with `--quick`, s.
 const QUICK_S: f64 = 10.0;
-/// The longest part of a simulated drive that is rendered, scans: a minute of a 4 Hz radar. It is played again and again.
+/// The longest part of a simulated drive that is rendered, scans: a minute of a 4 Hz radar. It is
+/// played again and again.
 const RENDERED: usize = 240;
 
-/// Carries out the scenarios and writes the report. The exit code is 0 if all limits of the budget are kept, 1 if not, and 2 if the test could
-/// not be carried out.
+/// Carries out the scenarios and writes the report. The exit code is 0 if all limits of the budget
+/// are kept, 1 if not, and 2 if the test could not be carried out.
 ///
 /// # Errors
 /// Standard output cannot be written.
@@ -114,7 +116,8 @@ fn carry_out(arguments: &StressArguments) -> Result<Report, Failure> {
     Ok(report)
 }
 
-/// Stores a simulation, so that rendering does not bound the pipeline. What is stored already and is the same is kept.
+/// Stores a simulation, so that rendering does not bound the pipeline. What is stored already and
+/// is the same is kept.
 fn render(configuration: &mut Configuration, out: &Out) -> Result<(), Failure> {
     let Some(mut simulation) = configuration.simulation.take() else {
         return Ok(());
@@ -129,7 +132,8 @@ fn render(configuration: &mut Configuration, out: &Out) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The messages whose hand-over is compared with copies: the largest ones, and one without a payload.
+/// The messages whose hand-over is compared with copies: the largest ones, and one without a
+/// payload.
 fn kinds(checked: &Preflight) -> Vec<MessageKind> {
     let kind = |name| {
         let mut topics = topics(&checked.window);

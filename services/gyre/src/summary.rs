@@ -32,7 +32,7 @@ pub struct Session<'a> {
     pub wall: Duration,
     /// Shared memory; `None` if no process was started, because only results were missing.
     pub footprint: Option<&'a Footprint>,
-    /// Its end; `None`: it failed.
+    /// The end; `None`: it failed.
     pub ending: Option<Ending>,
     /// The supervisor's report; `None` if it failed or no process was started.
     pub report: Option<&'a Report>,

@@ -1,7 +1,7 @@
 //! The configuration of a recording that is played without a configuration file.
 //!
-//! Its format gives the constants of the radar, which scans do not show: those of `configs/NAME.toml`. Its scans give the
-//! threshold and the sizes of cells and beams.
+//! The format gives the constants of the radar, which scans do not show: those of
+//! `configs/NAME.toml`. Its scans give the threshold and the sizes of cells and beams.
 
 use std::path::Path;
 
@@ -13,13 +13,15 @@ use crate::{ConfigurationError, MethodConfig, strict};
 
 /// Scans that are measured, evenly spread over the recording.
 const SCANS: usize = 8;
-/// The threshold above the noise floor, steps of half a decibel. Chosen on RADIATE and Oxford, whose floors are 17 steps apart.
+/// The threshold above the noise floor, steps of half a decibel. Chosen on RADIATE and Oxford,
+/// whose floors are 17 steps apart.
 const ABOVE_NOISE: u8 = 36;
 /// Cells on a side of the rasters.
 const CELLS: f32 = 255.0;
 /// The largest cell, m: with it the rasters reach 102 m.
 const MAX_CELL_M: f32 = 0.8;
-/// From this time between scans on, the motion of the scan two before is too old for compensation, s.
+/// From this time between scans on, the motion of the scan two before is too old for compensation,
+/// s.
 const LONG_PERIOD_S: f64 = 0.5;
 /// Angle that a vehicle turns by in such a time, degrees.
 const LONG_REACH_DEG: f64 = 45.0;
@@ -29,7 +31,7 @@ const LONG_REACH_DEG: f64 = 45.0;
 pub struct Automatic {
     /// The configuration.
     pub table: Table,
-    /// What they are and why, in a sentence.
+    /// The settings and their reasons, in a sentence.
     pub sentence: String,
 }
 
@@ -53,8 +55,8 @@ pub enum AutomaticError {
     Recorded(String),
 }
 
-/// Returns the settings of a recording from its format, its `dataset.toml` and its scans; of a recorded run, those of the run. The
-/// options in `wished` go before those of the format.
+/// Returns the settings of a recording from its format, its `dataset.toml` and its scans; of a
+/// recorded run, those of the run. The options in `wished` go before those of the format.
 ///
 /// # Errors
 /// A recording that cannot be opened, or of which no scan can be read.
@@ -84,8 +86,8 @@ pub fn automatic(data: &Path, wished: &DatasetOptions) -> Result<Automatic, Auto
     })
 }
 
-/// Returns the format of a recording and the constants of its radar: those of its `dataset.toml`, then those of its format. A recorded
-/// run has its own.
+/// Returns the format of a recording and the constants of its radar: those of its `dataset.toml`,
+/// then those of its format. A recorded run has its own.
 ///
 /// # Errors
 /// A recording that cannot be opened.

@@ -11,8 +11,8 @@ use crate::{
     strict::{section, within},
 };
 
-/// The sections of a configuration that say what is computed of which radar's scans: its file may have others, which are for a run of
-/// processes.
+/// The sections of a configuration that say what is computed of which radar's scans: its file may
+/// have others, which are for a run of processes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct MethodConfig {
     /// The format of the recording, and the constants of its radar.

@@ -13,8 +13,8 @@ const ALIKE: f64 = 0.75;
 /// Reads a file.
 ///
 /// # Errors
-/// A file that cannot be read, or is not TOML: the error names the place of the mistake, and shows nothing of the file, which may hold
-/// anything.
+/// A file that cannot be read, or is not TOML: the error names the place of the mistake, and shows
+/// nothing of the file, which may hold anything.
 pub fn read_table(path: &Path) -> Result<Table, ConfigurationError> {
     let unreadable = |source| ConfigurationError::Unreadable {
         path: path.to_owned(),
@@ -68,7 +68,8 @@ pub fn section<T: DeserializeOwned>(
     read(name, value)
 }
 
-/// Takes a section of sections out of the table, each of which must have one of the names in `known`.
+/// Takes a section of sections out of the table, each of which must have one of the names in
+/// `known`.
 ///
 /// # Errors
 /// Another name, an unknown key, or a value that does not fit.

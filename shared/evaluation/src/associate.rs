@@ -33,7 +33,8 @@ impl<'a> TimedPoses<'a> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(tag = "by", rename_all = "snake_case")]
 pub enum Association {
-    /// The ground truth is interpolated at the stamps of the estimate: positions linearly, yaw the shorter way round.
+    /// The ground truth is interpolated at the stamps of the estimate: positions linearly, yaw the
+    /// shorter way round.
     Time {
         /// The widest gap between two stamps of the ground truth that is interpolated across, ns.
         max_gap_ns: i64,
@@ -100,11 +101,12 @@ impl Coverage {
     }
 }
 
-/// Returns the estimated poses that have a ground-truth pose, with it, and counts those that have none.
+/// Returns the estimated poses that have a ground-truth pose, with it, and counts those that have
+/// none.
 ///
 /// # Errors
-/// [`EvaluationError`] if a pose is invalid (not finite, no rotation), if stamps are missing or out of order (by time
-/// only), or if fewer than two poses are associated.
+/// [`EvaluationError`] if a pose is invalid (not finite, no rotation), if stamps are missing or out
+/// of order (by time only), or if fewer than two poses are associated.
 pub fn associate(
     estimate: TimedPoses<'_>,
     truth: TimedPoses<'_>,
@@ -186,7 +188,8 @@ fn by_time(
     Ok((MatchedPoses::new(kept, true_poses)?, coverage))
 }
 
-/// Returns the first and last stamp, `None` of an empty trajectory; refuses a wrong count and decreasing stamps.
+/// Returns the first and last stamp, `None` of an empty trajectory; refuses a wrong count and
+/// decreasing stamps.
 pub(crate) fn require_stamps(
     side: Side,
     trajectory: &TimedPoses<'_>,
@@ -217,10 +220,12 @@ pub(crate) enum At {
     Gap,
 }
 
-/// Files have stamps in microseconds: a stamp that lies this close to an end of the ground truth lies on it.
+/// Files have stamps in microseconds: a stamp that lies this close to an end of the ground truth
+/// lies on it.
 const ROUNDING_NS: u64 = 1_000;
 
-/// Returns the ground truth at `stamp_ns`. A stamp that the ground truth has itself is never in a gap.
+/// Returns the ground truth at `stamp_ns`. A stamp that the ground truth has itself is never in a
+/// gap.
 pub(crate) fn truth_at(truth: TimedPoses<'_>, stamp_ns: i64, max_gap_ns: i64) -> At {
     let ends = truth
         .stamps_ns

@@ -1,7 +1,8 @@
-//! Absolute trajectory error (ATE): distances of positions from the ground truth after SE(2) alignment.
+//! Absolute trajectory error (ATE): distances of positions from the ground truth after SE(2)
+//! alignment.
 //!
-//! Sturm et al., "A benchmark for the evaluation of RGB-D SLAM systems", IROS 2012, in the plane; the alignment has no
-//! scale.
+//! Sturm et al., "A benchmark for the evaluation of RGB-D SLAM systems", IROS 2012, in the plane;
+//! the alignment has no scale.
 
 use gyre_geometry::Pose;
 use serde::{Serialize, Serializer};
@@ -39,21 +40,23 @@ pub fn ate(matched: &MatchedPoses) -> Ate {
     }
 }
 
-/// Returns the rigid motion that aligns the positions of the estimate with those of the ground truth by least squares.
-/// Headings are not used. If the positions do not define the rotation (all in one place), it is 0.
+/// Returns the rigid motion that aligns the positions of the estimate with those of the ground
+/// truth by least squares. Headings are not used. If the positions do not define the rotation (all
+/// in one place), it is 0.
 pub fn align(matched: &MatchedPoses) -> Pose {
     align_positions(matched.estimate(), matched.truth())
 }
 
-/// Returns the RMSE (m) of the positions after their alignment; both slices have the same length, at least 1.
+/// Returns the RMSE (m) of the positions after their alignment; both slices have the same length,
+/// at least 1.
 pub(crate) fn aligned_rmse_m(estimate: &[Pose], truth: &[Pose]) -> f64 {
     let truth_from_estimate = align_positions(estimate, truth);
     let square = |(e, t)| distance_m(&truth_from_estimate, e, t).powi(2);
     (estimate.iter().zip(truth).map(square).sum::<f64>() / truth.len() as f64).sqrt()
 }
 
-/// Returns the least-squares alignment in closed form: the angle that maximises sum(t . R e) over centred positions is
-/// atan2(sum of cross products, sum of dot products).
+/// Returns the least-squares alignment in closed form: the angle that maximises sum(t . R e) over
+/// centred positions is atan2(sum of cross products, sum of dot products).
 fn align_positions(estimate: &[Pose], truth: &[Pose]) -> Pose {
     let (e0, t0) = (centroid(estimate), centroid(truth));
     let (mut cross, mut dot) = (0.0, 0.0);

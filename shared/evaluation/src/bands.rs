@@ -4,7 +4,8 @@ use nalgebra::Vector3;
 
 use crate::{MatchedMotions, TruthSigma, motions::Chain};
 
-/// Errors and standard deviations along each unbroken chain of motions that has ground truth (Checchin et al., Fig. 3).
+/// Errors and standard deviations along each unbroken chain of motions that has ground truth
+/// (Checchin et al., Fig. 3).
 ///
 /// A chain is aligned with the ground truth at its first pose that has any: there both are zero.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,13 +21,15 @@ pub struct Bands {
 pub struct BandSample {
     /// Time since the first motion began, s.
     pub time_s: f64,
-    /// (x, y, yaw) of the estimate less those of the ground truth, along the axes of the aligned pose; m, rad in (-pi, pi].
+    /// (x, y, yaw) of the estimate less those of the ground truth, along the axes of the aligned
+    /// pose; m, rad in (-pi, pi].
     pub error: Vector3<f64>,
     /// Standard deviations of (x, y, yaw), those of the ground truth included; m, rad.
     pub sigma: Vector3<f64>,
 }
 
-/// Composes the motions of each chain and compares every pose with its ground truth, where there is one.
+/// Composes the motions of each chain and compares every pose with its ground truth, where there is
+/// one.
 pub fn bands(matched: &MatchedMotions, truth_sigma: TruthSigma) -> Bands {
     let start_ns = matched.span_ns().0;
     let chains = matched
@@ -66,8 +69,8 @@ fn samples(chain: &Chain, start_ns: i64, truth_sigma: TruthSigma) -> Vec<BandSam
 }
 
 impl Bands {
-    /// Returns the share of the poses whose error in x, y, yaw is within `sigmas` standard deviations, %. The aligned
-    /// poses do not count.
+    /// Returns the share of the poses whose error in x, y, yaw is within `sigmas` standard
+    /// deviations, %. The aligned poses do not count.
     pub fn inside_percent(&self, sigmas: f64) -> [f64; 3] {
         let later = || self.chains.iter().flat_map(|chain| chain.iter().skip(1));
         let inside = |part: usize| {

@@ -170,7 +170,8 @@ impl fmt::Display for Rpe {
 }
 
 impl fmt::Display for Nees {
-    /// Writes a table of all segments; the alternate form has lines for each half of the drive, too.
+    /// Writes a table of all segments; the alternate form has lines for each half of the drive,
+    /// too.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
@@ -202,7 +203,8 @@ impl fmt::Display for Nees {
 }
 
 impl fmt::Display for NeesLength {
-    /// Writes lines that begin with a line break: all segments, and in the alternate form each half.
+    /// Writes lines that begin with a line break: all segments, and in the alternate form each
+    /// half.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "\n{:8}{:>10}{}", self.motions, "all", self.all)?;
         let halves = [("first", &self.first_half), ("second", &self.second_half)];

@@ -4,8 +4,8 @@ use serde::Serialize;
 
 use crate::MatchedPoses;
 
-/// The error of the last pose once the first poses are aligned in position and heading (Checchin et al., Fig. 3, its last
-/// sample).
+/// The error of the last pose once the first poses are aligned in position and heading (Checchin et
+/// al., Fig. 3, its last sample).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct EndError {
     /// Distance between the last positions, m.

@@ -1,8 +1,8 @@
 //! Handedness: frames with y to the right and clockwise yaw, detected and converted.
 //!
-//! Radar datasets and odometries disagree on handedness. A frame with y to the right has a clockwise yaw, so both
-//! change sign together; some files have only one of the two wrong. The estimate is compared with the ground truth with
-//! each sign, and converted to the signs that fit.
+//! Radar datasets and odometries disagree on handedness. A frame with y to the right has a
+//! clockwise yaw, so both change sign together; some files have only one of the two wrong. The
+//! estimate is compared with the ground truth with each sign, and converted to the signs that fit.
 
 use std::fmt;
 
@@ -18,9 +18,11 @@ pub struct Axes {
     pub y_negated: bool,
     /// yaw was negated.
     pub heading_negated: bool,
-    /// Set if only one of the two was negated: then heading and path of one of the trajectories contradict each other.
+    /// Set if only one of the two was negated: then heading and path of one of the trajectories
+    /// contradict each other.
     pub heading_fault: Option<HeadingFault>,
-    /// The heading of the ground truth is constant although the estimate turns: it has positions only.
+    /// The heading of the ground truth is constant although the estimate turns: it has positions
+    /// only.
     pub truth_lacks_heading: bool,
 }
 
@@ -57,14 +59,16 @@ const MIN_MISFIT_RAD: f64 = 1e-3;
 const CONSTANT_RAD: f64 = 1e-6;
 /// The least turn of the estimate that shows that the ground truth has no heading, rad.
 const MIN_TURN_RAD: f64 = 0.1;
-/// The steps over which the turns of a path are measured, m: long compared with the noise of positions.
+/// The steps over which the turns of a path are measured, m: long compared with the noise of
+/// positions.
 const COURSE_STEP_M: f64 = 5.0;
 
-/// Returns the poses with the estimate converted to the signs that fit the ground truth, and those signs.
+/// Returns the poses with the estimate converted to the signs that fit the ground truth, and those
+/// signs.
 ///
-/// Positions and headings vote: if one of them is clear and the other is not, the clear one decides for both. So a
-/// left-handed sensor frame is always found, and a poor estimate is not mirrored because its mirror image happens to be
-/// a little nearer.
+/// Positions and headings vote: if one of them is clear and the other is not, the clear one decides
+/// for both. So a left-handed sensor frame is always found, and a poor estimate is not mirrored
+/// because its mirror image happens to be a little nearer.
 pub fn resolve_axes(matched: MatchedPoses) -> (MatchedPoses, Axes) {
     let (estimate_yaw, truth_yaw) = (
         unwrapped_yaw(matched.estimate()),
@@ -172,7 +176,8 @@ fn heading_fault(matched: &MatchedPoses) -> HeadingFault {
     }
 }
 
-/// Returns the sum of heading change times course change: negative if the heading has the opposite sense of the path.
+/// Returns the sum of heading change times course change: negative if the heading has the opposite
+/// sense of the path.
 fn turns_with_path(poses: &[Pose]) -> f64 {
     let mut kept: Vec<&Pose> = Vec::new();
     for pose in poses {

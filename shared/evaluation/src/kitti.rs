@@ -1,7 +1,7 @@
 //! KITTI odometry errors: drift of translation and rotation over segments of 100 to 800 m.
 //!
-//! Geiger et al., "Are we ready for autonomous driving?", CVPR 2012, as the odometry development kit computes them. They
-//! need no alignment: only motions within a segment are compared.
+//! Geiger et al., "Are we ready for autonomous driving?", CVPR 2012, as the odometry development
+//! kit computes them. They need no alignment: only motions within a segment are compared.
 
 use std::num::NonZeroUsize;
 
@@ -44,10 +44,11 @@ pub struct KittiLength {
     pub segments: usize,
 }
 
-/// Returns the mean errors of the segments that start at every `step`-th pose, `None` if the path is not longer than
-/// 100 m.
+/// Returns the mean errors of the segments that start at every `step`-th pose, `None` if the path
+/// is not longer than 100 m.
 ///
-/// `step` is 10 in the development kit (1 s of its lidar at 10 Hz); radar papers use 10 or 4 (1 s at 4 Hz).
+/// `step` is 10 in the development kit (1 s of its lidar at 10 Hz); radar papers use 10 or 4 (1 s
+/// at 4 Hz).
 pub fn kitti(matched: &MatchedPoses, step: NonZeroUsize) -> Option<Kitti> {
     let mut errors = PerLength::new();
     for segment in segments(&matched.distance_m(), step) {
@@ -77,9 +78,9 @@ fn segment_error(matched: &MatchedPoses, segment: Segment) -> [f64; 2] {
 
 /// A planar rigid motion in complex numbers: x -> rotation x + translation.
 ///
-/// The inverse is a true division, not a conjugation, and the angle an arc cosine, because the development kit inverts
-/// matrices and takes their trace. This matters only in the fifth decimal of published figures: rotations in files have
-/// six decimals.
+/// The inverse is a true division, not a conjugation, and the angle an arc cosine, because the
+/// development kit inverts matrices and takes their trace. This matters only in the fifth decimal
+/// of published figures: rotations in files have six decimals.
 struct Motion {
     rotation: Complex<f64>,
     translation: Complex<f64>,

@@ -1,14 +1,17 @@
-//! Metrics of planar odometry against ground truth: KITTI drift, ATE, RPE, segment error and NEES, with plots.
+//! Metrics of planar odometry against ground truth: KITTI drift, ATE, RPE, segment error and NEES,
+//! with plots.
 //!
-//! The crate computes on slices of poses and stamps; files are read elsewhere. A [`Pose`](gyre_geometry::Pose) is that
-//! of the sensor in a fixed frame (REP-103: x forward, y left, yaw counter-clockwise); stamps are in ns. Estimate and
-//! ground truth may have different fixed frames.
+//! The crate computes on slices of poses and stamps; files are read elsewhere. A
+//! [`Pose`](gyre_geometry::Pose) is that of the sensor in a fixed frame (REP-103: x forward, y
+//! left, yaw counter-clockwise); stamps are in ns. Estimate and ground truth may have different
+//! fixed frames.
 //!
 //! Reading order:
 //! - [`report`]: [`evaluate`] is the whole method, one line a step;
 //! - [`mod@associate`]: association of estimated poses with ground-truth poses;
 //! - [`handedness`]: frames with y to the right or clockwise yaw, detected and converted;
-//! - [`mod@kitti`], [`mod@seg`], [`mod@ate`], [`mod@end`], [`mod@rpe`]: one metric each, on [`MatchedPoses`];
+//! - [`mod@kitti`], [`mod@seg`], [`mod@ate`], [`mod@end`], [`mod@rpe`]: one metric each, on
+//!   [`MatchedPoses`];
 //! - [`motions`]: reported motions with covariances, associated with the ground truth;
 //! - [`mod@nees`], [`mod@bands`]: consistency of these covariances, as figures and over time;
 //! - [`plot`]: trajectory, errors and error bands as SVG.

@@ -4,7 +4,8 @@ use gyre_geometry::Pose;
 
 use crate::{EvaluationError, Side, error::LARGEST_COORDINATE_M};
 
-/// Estimated and ground-truth poses, associated by index: valid, at least two, equally many. The fixed frames may differ.
+/// Estimated and ground-truth poses, associated by index: valid, at least two, equally many. The
+/// fixed frames may differ.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MatchedPoses {
     estimate: Vec<Pose>,

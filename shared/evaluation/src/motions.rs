@@ -19,7 +19,8 @@ pub struct TimedMotion {
     pub estimate: OdometryMotion,
 }
 
-/// A part of a drive, by shares of its duration. Covariances are calibrated on one part and tested on another.
+/// A part of a drive, by shares of its duration. Covariances are calibrated on one part and tested
+/// on another.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Part {
     from: f64,
@@ -35,8 +36,8 @@ impl Part {
         (0.0 <= from && from < to && to <= 1.0).then_some(Self { from, to })
     }
 
-    /// Returns the motions that start within this part; `motions` are in order of time. Adjoining parts share no motion
-    /// and leave none out.
+    /// Returns the motions that start within this part; `motions` are in order of time. Adjoining
+    /// parts share no motion and leave none out.
     pub fn of<'m>(&self, motions: &'m [TimedMotion]) -> &'m [TimedMotion] {
         let (Some(first), Some(last)) = (motions.first(), motions.last()) else {
             return motions;
@@ -75,12 +76,13 @@ pub(crate) struct Chain {
 }
 
 impl MatchedMotions {
-    /// Associates both ends of each motion with the ground truth, interpolated across gaps of up to `max_gap_ns`.
+    /// Associates both ends of each motion with the ground truth, interpolated across gaps of up to
+    /// `max_gap_ns`.
     ///
     /// # Errors
-    /// [`EvaluationError::BadMotion`] and [`EvaluationError::MotionOutOfOrder`] for invalid motions, the errors of
-    /// [`associate()`](crate::associate()) that concern the ground truth, and [`EvaluationError::NoMatchedMotion`] if no
-    /// motion has both ground truth and covariance.
+    /// [`EvaluationError::BadMotion`] and [`EvaluationError::MotionOutOfOrder`] for invalid
+    /// motions, the errors of [`associate()`](crate::associate()) that concern the ground truth,
+    /// and [`EvaluationError::NoMatchedMotion`] if no motion has both ground truth and covariance.
     pub fn new(
         motions: &[TimedMotion],
         truth: TimedPoses<'_>,

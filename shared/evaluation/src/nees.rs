@@ -1,9 +1,11 @@
-//! Normalised estimation error squared (NEES): the consistency of covariances with the errors of motions.
+//! Normalised estimation error squared (NEES): the consistency of covariances with the errors of
+//! motions.
 //!
-//! Bar-Shalom, Li and Kirubarajan, "Estimation with applications to tracking and navigation", 2001, Sec. 5.4. The error of
-//! a segment of consecutive motions is e = (x, y, yaw) of the estimate less those of the ground truth, along the axes of its
-//! first frame; P is the covariance composed over the segment, plus that of the ground truth. The NEES e' inv(P) e of a
-//! consistent covariance has a chi-square distribution, whose expectation is its degrees of freedom: 3, or 2 for the
+//! Bar-Shalom, Li and Kirubarajan, "Estimation with applications to tracking and navigation", 2001,
+//! Sec. 5.4. The error of a segment of consecutive motions is e = (x, y, yaw) of the estimate less
+//! those of the ground truth, along the axes of its first frame; P is the covariance composed over
+//! the segment, plus that of the ground truth. The NEES e' inv(P) e of a consistent covariance has
+//! a chi-square distribution, whose expectation is its degrees of freedom: 3, or 2 for the
 //! translation alone, or 1 for the yaw. Segments of one length share no motion.
 
 use std::num::NonZeroUsize;
@@ -37,7 +39,8 @@ impl Default for NeesOptions {
     }
 }
 
-/// The NEES of the motions for each segment length. `Display` is a table; `{:#}` adds both halves of the drive.
+/// The NEES of the motions for each segment length. `Display` is a table; `{:#}` adds both halves
+/// of the drive.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Nees {
     /// Motions given.
@@ -81,9 +84,11 @@ pub struct NeesFigures {
 /// The mean NEES relative to its expectation.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct NeesFigure {
-    /// The mean NEES divided by its degrees of freedom. Above 1 the covariances are overconfident, below 1 conservative.
+    /// The mean NEES divided by its degrees of freedom. Above 1 the covariances are overconfident,
+    /// below 1 conservative.
     pub ratio: f64,
-    /// The interval with 95 % of the ratios of consistent covariances, if errors are Gaussian and independent.
+    /// The interval with 95 % of the ratios of consistent covariances, if errors are Gaussian and
+    /// independent.
     pub acceptance_interval: [f64; 2],
     /// Share of the segments whose error lies outside the 95 % region of their covariance, %.
     pub outside_percent: f64,
@@ -97,7 +102,8 @@ const FREEDOMS: [usize; 3] = [3, 2, 1];
 
 /// Returns the NEES of the motions.
 ///
-/// The noise of the ground truth dominates short segments unless `truth_sigma` accounts for it; long segments are few.
+/// The noise of the ground truth dominates short segments unless `truth_sigma` accounts for it;
+/// long segments are few.
 pub fn nees(matched: &MatchedMotions, options: &NeesOptions) -> Nees {
     let (from_ns, to_ns) = matched.span_ns();
     let middle_ns = from_ns.midpoint(to_ns);

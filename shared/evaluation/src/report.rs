@@ -12,7 +12,8 @@ use crate::{
 /// The options of an evaluation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Options {
-    /// Poses from the start of a segment of KITTI and seg to the start of the next; published figures use 10 or 4.
+    /// Poses from the start of a segment of KITTI and seg to the start of the next; published
+    /// figures use 10 or 4.
     pub step: NonZeroUsize,
     /// The rule by which poses are associated.
     pub association: Association,
@@ -28,7 +29,8 @@ impl Default for Options {
     }
 }
 
-/// All metrics of one estimate. `Display` is a short table; `{:#}` adds a line for each segment length.
+/// All metrics of one estimate. `Display` is a short table; `{:#}` adds a line for each segment
+/// length.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Evaluation {
     /// The numbers of poses that were compared.
@@ -49,7 +51,8 @@ pub struct Evaluation {
     pub end: Option<EndError>,
     /// Relative pose error; `None` for a ground truth without heading.
     pub rpe: Option<Rpe>,
-    /// The poses that were compared, the estimate in the handedness of the ground truth but not aligned; not serialised.
+    /// The poses that were compared, the estimate in the handedness of the ground truth but not
+    /// aligned; not serialised.
     #[serde(skip)]
     pub matched: MatchedPoses,
 }

@@ -17,8 +17,8 @@ pub struct Rpe {
     pub rotation_rmse_deg: f64,
     /// Mean magnitude of the rotation error of a pair, degrees.
     pub rotation_mean_deg: f64,
-    /// Estimated over true forward translation, both summed over the pairs; `None` if the ground truth moves forward
-    /// by less than 1 m. It shows a wrong range resolution.
+    /// Estimated over true forward translation, both summed over the pairs; `None` if the ground
+    /// truth moves forward by less than 1 m. It shows a wrong range resolution.
     pub forward_ratio: Option<f64>,
     /// All pairs in order; not serialised.
     #[serde(skip)]

@@ -12,7 +12,8 @@ use crate::{
 
 /// The RMSE of the positions of a segment after its own SE(2) alignment, in % of its length.
 ///
-/// Unlike the KITTI errors it uses no heading, so it is valid where the ground truth has a poor heading or none.
+/// Unlike the KITTI errors it uses no heading, so it is valid where the ground truth has a poor
+/// heading or none.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Seg {
     /// Mean over all segments of all lengths, % of the segment length.
@@ -36,8 +37,8 @@ pub struct SegLength {
     pub segments: usize,
 }
 
-/// Returns the mean error of the segments of [`kitti`](crate::kitti::kitti), each aligned by itself; `None` if the path
-/// is not longer than 100 m.
+/// Returns the mean error of the segments of [`kitti`](crate::kitti::kitti), each aligned by
+/// itself; `None` if the path is not longer than 100 m.
 pub fn seg(matched: &MatchedPoses, step: NonZeroUsize) -> Option<Seg> {
     let mut errors = PerLength::new();
     for segment in segments(&matched.distance_m(), step) {

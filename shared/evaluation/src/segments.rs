@@ -1,4 +1,5 @@
-//! The segments (KITTI: subsequences) of 100 to 800 m over which the KITTI errors and seg are means.
+//! The segments (KITTI: subsequences) of 100 to 800 m over which the KITTI errors and seg are
+//! means.
 
 use std::num::NonZeroUsize;
 
@@ -15,13 +16,15 @@ pub(crate) struct Segment {
 }
 
 impl Segment {
-    /// The length, m. As in the development kit errors are divided by it, not by the distance travelled.
+    /// The length, m. As in the development kit errors are divided by it, not by the distance
+    /// travelled.
     pub fn length_m(self) -> f64 {
         SEGMENT_LENGTHS_M[self.length]
     }
 }
 
-/// Returns all segments that start at every `step`-th pose and end at the first pose *beyond* the length.
+/// Returns all segments that start at every `step`-th pose and end at the first pose *beyond* the
+/// length.
 ///
 /// `distance_m` does not decrease. A length that the rest of the path does not exceed is skipped.
 pub(crate) fn segments(
@@ -64,7 +67,8 @@ impl<const N: usize> PerLength<N> {
         }
     }
 
-    /// Returns the mean over all segments of all lengths, and their count; `None` without a segment.
+    /// Returns the mean over all segments of all lengths, and their count; `None` without a
+    /// segment.
     pub fn mean(&self) -> Option<([f64; N], usize)> {
         let count: usize = self.counts.iter().sum();
         let total = |value: usize| self.sums.iter().map(|s| s[value]).sum::<f64>();

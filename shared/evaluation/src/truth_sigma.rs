@@ -14,8 +14,8 @@ pub struct TruthSigma {
 }
 
 impl TruthSigma {
-    /// The covariance of a true motion: both ends are uncertain, and the error of the first heading grows into a
-    /// lateral error of the second end.
+    /// The covariance of a true motion: both ends are uncertain, and the error of the first heading
+    /// grows into a lateral error of the second end.
     pub fn of_motion(&self, truth: &Pose) -> Matrix3<f64> {
         let variance_m2 = self.position_m * self.position_m;
         let pose = Matrix3::from_diagonal(&Vector3::new(

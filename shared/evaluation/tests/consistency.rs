@@ -39,7 +39,8 @@ fn disturbed(truth: &Pose, error: Vector3<f64>) -> Pose {
     )
 }
 
-/// A winding drive and its motions with errors drawn from `covariance()`; their stated covariance is `scale` times that.
+/// A winding drive and its motions with errors drawn from `covariance()`; their stated covariance
+/// is `scale` times that.
 struct Drive {
     stamps_ns: Vec<i64>,
     truth: Vec<Pose>,
@@ -159,7 +160,8 @@ fn twice_the_covariance_halves_the_ratio() {
     }
 }
 
-/// The poses drift, and each has noise of its own besides, as those of scans that are registered with a map.
+/// The poses drift, and each has noise of its own besides, as those of scans that are registered
+/// with a map.
 #[test]
 fn motions_that_share_the_noise_of_their_poses_are_consistent_over_all_lengths() {
     const DRIFT_SHARE: f64 = 0.05;
@@ -227,7 +229,8 @@ fn the_noise_of_the_ground_truth_is_accounted_for() {
         },
     );
     for length in &with_sigma.by_length {
-        // Adjoining segments share a ground-truth pose, so the ratio varies a little more than the interval.
+        // Adjoining segments share a ground-truth pose, so the ratio varies a little more than the
+        // interval.
         assert!((length.all.pose.ratio - 1.0).abs() < 0.15, "{with_sigma}");
     }
 }

@@ -16,8 +16,8 @@ fn data() -> Option<PathBuf> {
     root
 }
 
-/// Reads KITTI poses: a 3 x 4 matrix by rows, twelve numbers a line. Cosine and sine are not normalised, because the fifth
-/// decimal of the published figures depends on their rounding.
+/// Reads KITTI poses: a 3 x 4 matrix by rows, twelve numbers a line. Cosine and sine are not
+/// normalised, because the fifth decimal of the published figures depends on their rounding.
 fn kitti_poses(path: PathBuf) -> Vec<Pose> {
     let parse = |line: &str| {
         let m: Vec<f64> = line
@@ -36,7 +36,8 @@ fn kitti_poses(path: PathBuf) -> Vec<Pose> {
         .collect()
 }
 
-/// Reads Oxford's motions and chains them from the identity, in their own frame: y right, yaw clockwise.
+/// Reads Oxford's motions and chains them from the identity, in their own frame: y right, yaw
+/// clockwise.
 fn chained_csv(path: PathBuf) -> Vec<Pose> {
     let mut motions = Vec::new();
     for line in fs::read_to_string(path).unwrap().lines().skip(1) {

@@ -30,8 +30,8 @@ fn rechained(poses: &[Pose], change: impl Fn(usize, Pose) -> Pose) -> Vec<Pose> 
     chain(poses[0], motions.collect::<Vec<_>>())
 }
 
-/// The KITTI errors by their definition: a linear search for each end, and 3 x 3 matrices. Returns translation (%),
-/// rotation (deg/100 m) and the number of segments.
+/// The KITTI errors by their definition: a linear search for each end, and 3 x 3 matrices. Returns
+/// translation (%), rotation (deg/100 m) and the number of segments.
 fn kitti_by_definition(estimate: &[Pose], truth: &[Pose], step: usize) -> (f64, f64, usize) {
     let (mut translation, mut rotation, mut n) = (0.0, 0.0, 0);
     for first in (0..truth.len()).step_by(step) {

@@ -1,5 +1,5 @@
-//! A dataset in Oxford's format: reproducible, in its conventions, and readable by the reader for real
-//! data.
+//! A dataset in Oxford's format: reproducible, in its conventions, and readable by the reader for
+//! real data.
 
 use std::fs;
 use std::path::Path;

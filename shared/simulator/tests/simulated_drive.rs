@@ -1,5 +1,5 @@
-//! Datasets of each format: written, read by the readers for real data, interrupted, resumed, and streamed
-//! without a disk.
+//! Datasets of each format: written, read by the readers for real data, interrupted, resumed, and
+//! streamed without a disk.
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -1,4 +1,5 @@
-//! Stages that keep the contract but for one clause of it. Their results are constant: only the contract matters here.
+//! Stages that keep the contract but for one clause of it. Their results are constant: only the
+//! contract matters here.
 
 use std::{env, fs, thread, time::Duration};
 
@@ -8,7 +9,7 @@ use gyre_messages::{
 use gyre_stage::{Launch, StageCounters, StageError, clock, run::STANDBY};
 use gyre_supervise::rig::{Feed, Joining, Ports, Recorded, Tap};
 
-/// What a stage does wrong.
+/// The environment variable with the fault of a stage.
 pub const BREACH: &str = "GYRE_TEST_BREACH";
 
 /// The item with which something goes wrong.
@@ -156,7 +157,8 @@ impl Broken<'_> {
         }
     }
 
-    /// Masking that is too patient waits for the motion of the item before, and one that is not waits for none.
+    /// Masking that is too patient waits for the motion of the item before, and one that is not
+    /// waits for none.
     fn has_motion(&self, seq: u64) -> bool {
         let Some(before) = seq
             .checked_sub(1)

@@ -21,7 +21,7 @@ use gyre_stage::{
 
 /// The item that is sent wrong.
 pub const FAULTY: u64 = 7;
-/// What a foreign stage does wrong: a topic, a field of it and a value, see [`Fault`].
+/// The fault of a foreign stage: a topic, a field of it and a value, see [`Fault`].
 pub const FAULT: &str = "GYRE_TEST_FAULT";
 /// A file that exists once the fault has been sent, if it is to be sent only once.
 pub const ONCE: &str = "GYRE_TEST_ONCE";

@@ -1,4 +1,4 @@
-//! What is played while the faults happen.
+//! The drive that is played while the faults happen.
 
 use std::{
     fs,
@@ -25,7 +25,7 @@ pub struct Results([String; 4]);
 
 /// A run that nothing disturbs.
 pub struct Undisturbed {
-    /// Its results.
+    /// The results.
     pub results: Results,
     /// The size of its folder of results.
     pub bytes: u64,

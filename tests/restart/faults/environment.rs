@@ -14,7 +14,8 @@ use super::{
 };
 use crate::common::wrapped;
 
-/// The clock of the day is set, up to years ahead or back. Nothing but the stamps of logs depends on it.
+/// The clock of the day is set, up to years ahead or back. Nothing but the stamps of logs depends
+/// on it.
 pub fn clock_step(scene: &mut Scene) -> Option<Outcome> {
     let run = scene.run();
     let clock = run.folder().join("clock");

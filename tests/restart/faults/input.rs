@@ -9,7 +9,8 @@ use super::{
     scene::{Outcome, PERIOD_S, Scene},
 };
 
-/// Scans are missing, one long gap among them, during which the watchdog must not lose patience. A stage is killed besides.
+/// Scans are missing, one long gap among them, during which the watchdog must not lose patience. A
+/// stage is killed besides.
 pub fn gaps(scene: &mut Scene) -> Option<Outcome> {
     let scans = scene.drive.scans;
     let gap = scene.rng.random_range(scans / 6..scans / 3);

@@ -66,7 +66,8 @@ pub fn at_the_start(scene: &mut Scene) -> Option<Outcome> {
     Some(scene.finished(&run, &running.finish()))
 }
 
-/// A process at a write of a file from which its successor continues: refinement has two of them for each of its keyframes.
+/// A process at a write of a file from which its successor continues: refinement has two of them
+/// for each of its keyframes.
 pub fn at_a_write(scene: &mut Scene) -> Option<Outcome> {
     let run = scene.run();
     let mut running = run.start();
@@ -87,7 +88,8 @@ pub fn at_a_write(scene: &mut Scene) -> Option<Outcome> {
     Some(scene.finished(&run, &running.finish()))
 }
 
-/// Most of all processes together, again and again, and now and then the supervisor with them: the same command goes on.
+/// Most of all processes together, again and again, and now and then the supervisor with them: the
+/// same command goes on.
 pub fn storms(scene: &mut Scene) -> Option<Outcome> {
     let run = scene.run();
     let mut running = run.start();

@@ -38,8 +38,8 @@ pub fn memory(scene: &mut Scene) -> Option<Outcome> {
     Some(out_of_memory(scene, &run, &ended))
 }
 
-/// A process without memory may be ended by a signal, by Rust (SIGABRT) or because its stack cannot grow (SIGSEGV). For the
-/// supervisor that is as good as a kill.
+/// A process without memory may be ended by a signal, by Rust (SIGABRT) or because its stack cannot
+/// grow (SIGSEGV). For the supervisor that is as good as a kill.
 fn out_of_memory(scene: &Scene, run: &Run, ended: &Ended) -> Outcome {
     if ended.code().is_none() {
         return scene.resumed(run);

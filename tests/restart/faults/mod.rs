@@ -1,17 +1,20 @@
-//! Faults into real processes: each kind disturbs a `gyre run` in one way, and says how the run may end. A run finishes with the
-//! results of the undisturbed one, or ends with a sentence and the same command resumes to them, or is refused with a sentence.
+//! Faults into real processes: each kind disturbs a `gyre run` in one way, and says how the run may
+//! end. A run finishes with the results of the undisturbed one, or ends with a sentence and the
+//! same command resumes to them, or is refused with a sentence.
 //!
-//! One fault of each kind, on a small simulated recording, belongs to the tests of every change. All of them, on a real drive with
-//! refinement and learned masks:
+//! One fault of each kind, on a small simulated recording, belongs to the tests of every change.
+//! All of them, on a real drive with refinement and learned masks:
 //!
 //! ```sh
 //! cargo test --release -p gyre --test pipeline on_a_real_drive -- --ignored --nocapture
 //! ```
 //!
-//! All runs are with SLAM, so a stage is a follower too, and what must be the same are the corrected trajectory and its loops as well.
+//! All runs are with SLAM, so a stage is a follower too, and what must be the same are the
+//! corrected trajectory and its loops as well.
 //!
-//! `GYRE_FAULTS_KIND` selects one kind by its name, `GYRE_FAULTS_SEED` the first seed, `GYRE_FAULTS_EVENTS` the number of faults of
-//! each kind. So a fault is repeated by its kind, its seed and 1. The small recording takes the first two as well.
+//! `GYRE_FAULTS_KIND` selects one kind by its name, `GYRE_FAULTS_SEED` the first seed,
+//! `GYRE_FAULTS_EVENTS` the number of faults of each kind. So a fault is repeated by its kind, its
+//! seed and 1. The small recording takes the first two as well.
 
 mod drive;
 mod environment;
@@ -46,7 +49,7 @@ const ATTEMPTS: usize = 20;
 /// A kind of faults.
 struct Kind {
     name: &'static str,
-    /// What the machine must have or allow.
+    /// The requirements on the machine.
     needs: &'static [Need],
     /// Runs a drive, disturbs it, and judges how it ended; `None` if it ended before the fault.
     strike: fn(&mut Scene) -> Option<Outcome>,

@@ -10,7 +10,8 @@ use super::{
 };
 use crate::common::{Ended, Run, copy_program, install, wrapped};
 
-/// The program's file is removed or replaced, by another build or by something else; then a stage is killed.
+/// The program's file is removed or replaced, by another build or by something else; then a stage
+/// is killed.
 pub fn replaced(scene: &mut Scene) -> Option<Outcome> {
     let run = scene.run();
     let program = run.folder().join("gyre");

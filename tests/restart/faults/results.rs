@@ -17,7 +17,7 @@ use crate::common::{Run, Running, assert_nothing_left_of, wrapped};
 
 /// More than any results have.
 const PLENTY: u64 = 256 << 20;
-/// What fills a disk.
+/// The file that fills a disk.
 const FILLER: &str = "filler";
 
 /// Leaves at most `leave` bytes of the file system at `place`.
@@ -53,7 +53,8 @@ pub fn disk_full(scene: &mut Scene) -> Option<Outcome> {
     Some(scene.survived(&run, &ended))
 }
 
-/// Calls of the system fail at random with an I/O error or a full disk. libfiu draws random numbers of its own.
+/// Calls of the system fail at random with an I/O error or a full disk. libfiu draws random numbers
+/// of its own.
 pub fn io_errors(scene: &mut Scene) -> Option<Outcome> {
     let call = *[
         "rw/write",
@@ -77,7 +78,8 @@ pub fn io_errors(scene: &mut Scene) -> Option<Outcome> {
     Some(scene.survived(&run, &ended))
 }
 
-/// No file may become longer: of the whole run, or of a process in the middle. A signal says so, unless it is ignored.
+/// No file may become longer: of the whole run, or of a process in the middle. A signal says so,
+/// unless it is ignored.
 pub fn file_size_limit(scene: &mut Scene) -> Option<Outcome> {
     let run = scene.run();
     let signal = if scene.one_in(2) {

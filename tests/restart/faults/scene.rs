@@ -1,4 +1,5 @@
-//! One fault: its random numbers, the moment when it happens, and the judgement of how the run ended.
+//! One fault: its random numbers, the moment when it happens, and the judgement of how the run
+//! ended.
 
 use std::{thread, time::Duration};
 
@@ -14,7 +15,7 @@ use crate::common::{Ended, Pid, Run, Running, send};
 /// The interval of the scans of both drives, s.
 pub const PERIOD_S: f64 = 0.25;
 
-/// How a run ended.
+/// The end of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
     /// It went on and is complete.
@@ -28,7 +29,7 @@ pub enum End {
 /// The end of a run with a fault that is as it must be.
 #[derive(Debug)]
 pub struct Outcome {
-    /// How it ended.
+    /// The end.
     pub end: End,
     /// The times from a death to the first pose that the new process worked on.
     pub recovery_ms: Vec<f64>,
@@ -55,7 +56,7 @@ impl Outcome {
 
 /// A fault on its way.
 pub struct Scene<'a> {
-    /// What is played.
+    /// The drive that is played.
     pub drive: &'a Drive,
     /// The source of all that is random.
     pub rng: ChaCha8Rng,
@@ -88,7 +89,8 @@ impl<'a> Scene<'a> {
         thread::sleep(Duration::from_millis(self.rng.random_range(0..=limit_ms)));
     }
 
-    /// Waits for a random moment: while the processes start, or in the middle. `None` if the run is over.
+    /// Waits for a random moment: while the processes start, or in the middle. `None` if the run is
+    /// over.
     pub fn moment(&mut self, running: &mut Running) -> Option<()> {
         if self.one_in(6) {
             self.pause(200);
@@ -165,7 +167,8 @@ fn assert_complete(run: &Run, expected: &Results) {
     assert_eq!(run.summary()["ending"], "complete");
 }
 
-/// Its last words are the only sentence of the program; what comes before is the progress of the run.
+/// Returns its last words are the only sentence of the program; what comes before is the progress
+/// of the run.
 pub fn assert_one_sentence(ended: &Ended) {
     ended.failed_with(&[]);
     let notice = |line: &&str| line.ends_with("starting over from the journal");

@@ -4,14 +4,14 @@ use std::{collections::BTreeMap, fmt};
 
 use super::scene::{End, Outcome};
 
-/// What came of the faults, by kind.
+/// The outcomes of the faults, by kind.
 #[derive(Default)]
 pub struct Table {
     kinds: BTreeMap<&'static str, Vec<Result<Outcome, u64>>>,
     skipped: BTreeMap<&'static str, &'static str>,
 }
 
-/// What came of a fault; an error is its seed.
+/// Returns the outcome of a fault in a word; an error is its seed.
 pub fn word(outcome: &Result<Outcome, u64>) -> String {
     match outcome {
         Ok(Outcome { end, .. }) => format!("{end:?}").to_lowercase(),

@@ -13,7 +13,7 @@ use crate::common::{Pid, Run};
 /// A user and group without rights: nobody.
 const NOBODY: u32 = 65534;
 
-/// What a kind of faults requires of the machine.
+/// A requirement of a kind of faults on the machine.
 #[derive(Clone, Copy)]
 pub enum Need {
     /// Mounting, also in a namespace of its own.
@@ -99,7 +99,8 @@ pub fn execute<T: AsRef<OsStr>>(program: &str, arguments: impl IntoIterator<Item
     );
 }
 
-/// Limits a resource of a process of this user, or of nobody. That the process is gone already is no error.
+/// Limits a resource of a process of this user, or of nobody. That the process is gone already is
+/// no error.
 pub fn limit(pid: Pid, resource: &str, value: u64) {
     let (pid_option, limit) = (format!("--pid={pid}"), format!("--{resource}={value}:"));
     let prlimit = ["prlimit", &pid_option, &limit];

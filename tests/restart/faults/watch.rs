@@ -25,8 +25,8 @@ impl Watch {
         Some(Self(watch))
     }
 
-    /// Waits until `writes` writes pass `counts`, which has the name of the file in a watched folder. `None` if there is none for
-    /// as long as `limit`.
+    /// Waits until `writes` writes pass `counts`, which has the name of the file in a watched
+    /// folder. `None` if there is none for as long as `limit`.
     pub fn wait(
         &self,
         mut writes: usize,

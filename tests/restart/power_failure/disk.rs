@@ -32,7 +32,7 @@ struct Naming {
     names: Vec<(PathBuf, Option<usize>)>,
 }
 
-/// What survives of the changes in danger.
+/// The part of the changes in danger that survives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Survives {
     Nothing,
@@ -53,7 +53,7 @@ pub struct Disk {
     time: usize,
 }
 
-/// What a disk holds after a power failure: folders, and files with their bytes.
+/// The content of a disk after a power failure: folders, and files with their bytes.
 #[derive(PartialEq, Eq, Hash)]
 pub struct State {
     folders: BTreeSet<PathBuf>,

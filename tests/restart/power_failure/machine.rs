@@ -49,7 +49,8 @@ pub struct Machine {
 impl Machine {
     /// A machine whose runs have SLAM or not.
     pub fn new(slam: SlamKind) -> Self {
-        // A small map, whose slots are used again within the drive; and a small picture, because each of thousands of runs draws one.
+        // A small map, whose slots are used again within the drive; and a small picture, because
+        // each of thousands of runs draws one.
         let overrides = [
             "points.max_range_m=10.0",
             "refinement.keyframes=3",
@@ -112,7 +113,8 @@ impl Machine {
         earlier::mark_complete(&out, written.poses)
     }
 
-    /// Returns whether the run in this folder is complete. A new run removes the journal first: without it the mark says nothing.
+    /// Returns whether the run in this folder is complete. A new run removes the journal first:
+    /// without it the mark says nothing.
     pub fn is_complete(&self, folder: &Path) -> bool {
         folder.join("journal/complete").exists() && journal::path(folder).exists()
     }
@@ -170,7 +172,8 @@ struct Stages {
     journal: Journal,
     keyframes: Option<Keyframes>,
     last: Option<PoseHeader>,
-    /// The journal has its end: a run that goes on waits for its followers alone, which this machine does not have.
+    /// The journal has its end: a run that goes on waits for its followers alone, which this
+    /// machine does not have.
     ended: bool,
 }
 

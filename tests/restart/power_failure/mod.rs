@@ -1,8 +1,10 @@
-//! Power failures: every change that a run makes to its folder is recorded, and after any of them the power fails. Whatever the
-//! synchronisations allow to survive, the next run gives the bytes of the undisturbed one or refuses in a sentence.
+//! Power failures: every change that a run makes to its folder is recorded, and after any of them
+//! the power fails. Whatever the synchronisations allow to survive, the next run gives the bytes of
+//! the undisturbed one or refuses in a sentence.
 //!
-//! The next run depends on the state of the disk alone, so each state is tried once, however many power failures lead to it. Half of them
-//! lead to one that was tried: a synchronisation makes no new state, and a change that does not survive makes none either.
+//! The next run depends on the state of the disk alone, so each state is tried once, however many
+//! power failures lead to it. Half of them lead to one that was tried: a synchronisation makes no
+//! new state, and a change that does not survive makes none either.
 //!
 //! `GYRE_POWER_FAILURES=N` tries N random outcomes at each change instead of one.
 

@@ -115,7 +115,7 @@ fn town(seed: u64) -> Vec<Point2<f64>> {
         .collect()
 }
 
-/// What is found between two scans, the later one 0.25 s after the earlier.
+/// Returns the changes between two scans, the later one 0.25 s after the earlier.
 fn between(earlier: &OwnedScan, later: &OwnedScan, motion: &Isometry2<f64>) -> Change {
     let samples = [sample(earlier, None), sample(later, Some(*motion))];
     change(&samples, GRID.range_m(), 60).unwrap().unwrap()

@@ -1,7 +1,8 @@
 //! Localisation of a run in the map of an earlier drive, while it drives.
 //!
-//! It follows `journal/keyframes.log`, localises keyframe after keyframe, and publishes each place as a `fix`. It writes no file: what it
-//! publishes follows from the keyframes and the map, whenever the keyframes come.
+//! It follows `journal/keyframes.log`, localises keyframe after keyframe, and publishes each place
+//! as a `fix`. It writes no file: what it publishes follows from the keyframes and the map,
+//! whenever the keyframes come.
 
 use std::path::PathBuf;
 
@@ -19,7 +20,8 @@ use gyre_stage::{
 /// Runs the follower to the end of the keyframes, or until SIGTERM.
 ///
 /// # Errors
-/// A map or keyframes that cannot be used, an invalid configuration, or an error of [`follower::run`].
+/// A map or keyframes that cannot be used, an invalid configuration, or an error of
+/// [`follower::run`].
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let slam: SlamConfig = launch.section("slam")?;
     let refinement: RefinementConfig = launch.section("refinement")?;

@@ -1,7 +1,9 @@
-//! Loop closing: finds the places that the vehicle has come back to, among the keyframes of the run.
+//! Loop closing: finds the places that the vehicle has come back to, among the keyframes of the
+//! run.
 //!
-//! It follows `journal/keyframes.log`. The places of keyframes are kept in `journal/places.log` and the verdicts on all candidates in
-//! `journal/loops.log`, from which a restarted process continues. Both follow from the keyframes, whenever those come.
+//! It follows `journal/keyframes.log`. The places of keyframes are kept in `journal/places.log` and
+//! the verdicts on all candidates in `journal/loops.log`, from which a restarted process continues.
+//! Both follow from the keyframes, whenever those come.
 
 mod logged;
 
@@ -111,9 +113,9 @@ struct State {
     loops: u64,
     /// Loops that are to be published.
     pending: VecDeque<LoopHeader>,
-    /// Whether the closer knows that no keyframes follow.
+    /// True if the closer knows that no keyframes follow.
     has_finished: bool,
-    /// Whether the queries have grown.
+    /// True if the queries have grown.
     has_appended: bool,
 }
 
@@ -132,8 +134,9 @@ impl State {
         })
     }
 
-    /// Gives the places and queries that are there to a new closer, and cuts off those that keyframes which are no longer there have led
-    /// to. `unchanged` is the number of keyframes that are as they were; `None`: none was cut off.
+    /// Gives the places and queries that are there to a new closer, and cuts off those that
+    /// keyframes which are no longer there have led to. `unchanged` is the number of keyframes that
+    /// are as they were; `None`: none was cut off.
     fn restore(&mut self, unchanged: Option<usize>) -> Result<(), StageError> {
         let places = self.known_places(unchanged)?;
         if places < self.places.len() {
@@ -189,7 +192,8 @@ impl State {
         Ok((first..places).find(is_incomplete).unwrap_or(places))
     }
 
-    /// Looks for new keyframes. Returns the number of those that are as they were, if some have been cut off.
+    /// Looks for new keyframes. Returns the number of those that are as they were, if some have
+    /// been cut off.
     fn look(&mut self) -> Result<Option<usize>, StageError> {
         let known = self.keyframes.len();
         self.keyframes.refresh()?;

@@ -1,4 +1,5 @@
-//! The loops in the logs of a run, as they are published: for programs that must have all of them, whenever they come.
+//! The loops in the logs of a run, as they are published: for programs that must have all of them,
+//! whenever they come.
 
 use std::path::Path;
 

@@ -1,8 +1,10 @@
-//! The trajectory that agrees with the loops: fuses the motions between keyframes and the loops among them.
+//! The trajectory that agrees with the loops: fuses the motions between keyframes and the loops
+//! among them.
 //!
-//! It follows `journal/keyframes.log` and `journal/loops.log` and has no file of its own. While the run goes on, new loops are taken into
-//! the standing estimate, which may depend a little on when they came. When both logs have ended the poses are solved anew: the last
-//! correction is a function of the logs, and that of the results, which the supervisor makes from the same logs.
+//! It follows `journal/keyframes.log` and `journal/loops.log` and has no file of its own. While the
+//! run goes on, new loops are taken into the standing estimate, which may depend a little on when
+//! they came. When both logs have ended the poses are solved anew: the last correction is a
+//! function of the logs, and that of the results, which the supervisor makes from the same logs.
 
 use std::path::PathBuf;
 
@@ -44,11 +46,12 @@ struct Trajectory {
     newest: Option<Keyframe>,
     /// Keyframes and queries that were read.
     read: [usize; 2],
-    /// The pose of the newest keyframe as corrected; `None` if loops were read since that have corrected no pose yet.
+    /// The pose of the newest keyframe as corrected; `None` if loops were read since that have
+    /// corrected no pose yet.
     corrected: Option<UncertainMotion>,
-    /// Whether the poses are those of the results.
+    /// True if the poses are those of the results.
     is_final: bool,
-    /// Whether something was read since the last correction.
+    /// True if something was read since the last correction.
     has_changed: bool,
 }
 

@@ -1,4 +1,5 @@
-//! The process of a drive: a run that knows whether it has been computed, and by whose exit code failures are told apart.
+//! The process of a drive: a run that knows whether it has been computed, and by whose exit code
+//! failures are told apart.
 
 use std::{
     path::Path,
@@ -44,12 +45,13 @@ enum DriveError {
         "the configuration is of {0}, which has no end: a batch is of recordings and simulations"
     )]
     Endless(String),
-    /// Its settings, in the words of who read them.
+    /// The settings, in the words of who read them.
     #[error("{0}")]
     Configuration(Failure),
 }
 
-/// Computes a drive, unless it has been computed with the same configuration from the same scans. The exit code tells the outcome.
+/// Computes a drive, unless it has been computed with the same configuration from the same scans.
+/// The exit code tells the outcome.
 ///
 /// # Errors
 /// The system does not let the process end with the batch.
@@ -122,8 +124,9 @@ fn finished(out: &Out) -> Result<DriveOutcome, Failure> {
     })
 }
 
-/// Returns whether an unfinished run in the folder, if there is one, goes on with this configuration. One of another configuration or build is
-/// discarded: nobody has seen results of it.
+/// Returns whether an unfinished run in the folder, if there is one, goes on with this
+/// configuration. One of another configuration or build is discarded: nobody has seen results of
+/// it.
 fn continues(out: &Out, configuration: &Configuration) -> Result<bool, Failure> {
     let Ok(begun) = Identity::read(out, 0) else {
         return Ok(true);
@@ -196,7 +199,8 @@ fn outcome_of_preflight(error: &PreflightError) -> DriveOutcome {
     }
 }
 
-/// Returns whether a disk or a quota is full. The last words of a stage are a text, as the system's errors are written in Rust.
+/// Returns whether a disk or a quota is full. The last words of a stage are a text, as the system's
+/// errors are written in Rust.
 fn is_of_full_disk(failure: &Failure) -> bool {
     let text = failure.to_string();
     let full = [Errno::NOSPC, Errno::DQUOT].map(|it| format!("(os error {})", it.raw_os_error()));

@@ -1,4 +1,4 @@
-//! What was found, beside what is configured, and what each value rests on.
+//! The constants that were found, beside the configured ones, and the evidence for each.
 
 use std::fmt;
 
@@ -12,9 +12,11 @@ use crate::Failure;
 
 /// A configured value that is off by so many standard deviations is wrong.
 const WRONG_SIGMAS: f64 = 3.0;
-/// The given length of the path over that by the scans: beyond, it is of another drive, or scans are missing.
+/// The given length of the path over that by the scans: beyond, it is of another drive, or scans
+/// are missing.
 const PLAUSIBLE_RATIO: std::ops::RangeInclusive<f64> = 0.8..=1.25;
-/// Share of the path by which that in both directions of time differs, at least: the error of its length.
+/// Share of the path by which that in both directions of time differs, at least: the error of its
+/// length.
 const PATH_ERROR: f64 = 1e-3;
 
 /// A constant that the configuration has a key for.

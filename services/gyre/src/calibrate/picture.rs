@@ -56,7 +56,8 @@ pub fn svg(drive: &Drive, calibration: &Calibration) -> String {
     text
 }
 
-/// The revisit with the longest way between, or the two scans of the drive 20 scans apart in its middle.
+/// The revisit with the longest way between, or the two scans of the drive 20 scans apart in its
+/// middle.
 fn scans(calibration: &Calibration) -> (usize, usize) {
     let longest = calibration
         .revisits

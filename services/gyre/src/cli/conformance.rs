@@ -11,8 +11,8 @@ pub struct ConformanceArguments {
     /// The stage that the program replaces.
     #[arg(value_parser = PossibleValuesParser::new(StageId::ALL.map(StageId::name)))]
     pub stage: String,
-    /// The program and its arguments, as in 'python3 stage.py --fast'; no shell is involved. Default: the command of the stage in the
-    /// configuration, else Gyre's own stage.
+    /// The program and its arguments, as in 'python3 stage.py --fast'; no shell is involved.
+    /// Default: the command of the stage in the configuration, else Gyre's own stage.
     #[arg(long, value_name = "COMMAND")]
     pub command: Option<String>,
     /// The configuration, a TOML file. Default: a simulated drive on small rasters.
@@ -30,7 +30,8 @@ pub struct ConformanceArguments {
     /// The results must be those of Gyre's own stage, to the bit.
     #[arg(long)]
     pub same_as_own: bool,
-    /// The 99th percentile of the work on an item must be at most this, ms; of fewer than a hundred items the maximum. The first four do not count.
+    /// The 99th percentile of the work on an item must be at most this, ms; of fewer than a hundred
+    /// items the maximum. The first four do not count.
     #[arg(long, value_name = "MS")]
     pub budget_ms: Option<f64>,
     /// Time for the program to open its topics, s.

@@ -11,7 +11,8 @@ pub struct EvaluateArguments {
     /// The trajectory to evaluate: TUM, KITTI, or a dataset's own format.
     #[arg(long)]
     pub estimate: PathBuf,
-    /// The ground truth: TUM, KITTI, Oxford radar_odometry.csv, Boreas radar_poses.csv, MulRan global_pose.csv.
+    /// The ground truth: TUM, KITTI, Oxford radar_odometry.csv, Boreas radar_poses.csv, MulRan
+    /// global_pose.csv.
     #[arg(long)]
     pub ground_truth: PathBuf,
     /// Poses between the starts of the segments that are measured.
@@ -23,17 +24,19 @@ pub struct EvaluateArguments {
     /// Write trajectory.svg, errors.svg and, where there are covariances, bands.svg here.
     #[arg(long)]
     pub plots: Option<PathBuf>,
-    /// The motions whose covariances are evaluated. Default: the odometry.csv beside the estimate, if it has the same stamps.
+    /// The motions whose covariances are evaluated. Default: the odometry.csv beside the estimate,
+    /// if it has the same stamps.
     #[arg(long)]
     pub odometry: Option<PathBuf>,
     /// Lengths, in motions, of the segments over which covariances are evaluated.
     #[arg(long, value_delimiter = ',', default_value = "1,4,16,64")]
     pub nees_lengths: Vec<NonZeroUsize>,
-    /// The part of the drive whose covariances are evaluated: all, or from A to B percent of its time as in 0..50. Scales that are
-    /// tuned on one part can be validated on another.
+    /// The part of the drive whose covariances are evaluated: all, or from A to B percent of its
+    /// time as in 0..50. Scales that are tuned on one part can be validated on another.
     #[arg(long, value_name = "A..B", default_value = "all", value_parser = part)]
     pub nees_part: Part,
-    /// Standard deviation of the ground truth's x and y, m: added to the covariances that are evaluated.
+    /// Standard deviation of the ground truth's x and y, m: added to the covariances that are
+    /// evaluated.
     #[arg(long, default_value = "0", value_parser = sigma)]
     pub truth_sigma_m: f64,
     /// Standard deviation of the ground truth's heading, degrees.

@@ -9,12 +9,13 @@ use super::Names;
 /// The arguments of `gyre export`.
 #[derive(Debug, Args)]
 pub struct ExportArguments {
-    /// What is exported: the folder of a run's results, a recording of a run, NAME.mcap, or a dataset.
+    /// The source: the folder of a run's results, a recording of a run, NAME.mcap, or a dataset.
     pub source: PathBuf,
     /// The bag to write: a folder, or one file if its name ends in .mcap.
     #[arg(long, value_name = "BAG")]
     pub mcap: PathBuf,
-    /// How scans are written: as whole turns, azimuth by azimuth as the radar sends them, both, or not.
+    /// The form of the scans: as whole turns, azimuth by azimuth as the radar sends them, both, or
+    /// not.
     #[arg(long, value_enum, value_delimiter = ',', default_value = "b-scan")]
     pub scans: Vec<ScanForm>,
     /// Names of the frames: of the map, of odometry, of the vehicle and of the radar.
@@ -30,7 +31,7 @@ pub struct ExportArguments {
     pub mounting: String,
 }
 
-/// How scans are written.
+/// The form in which scans are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum ScanForm {
     /// A message a turn: navtech_msgs/msg/RadarBScanMsg.

@@ -17,7 +17,8 @@ pub struct LinkArguments {
 pub enum LinkEnd {
     /// Let other machines look on at a running run. It changes neither a result nor a latency.
     Send(SendArguments),
-    /// Look on at a run of another machine: what comes is a run here, for `gyre watch`, `echo` and `record`.
+    /// Look on at a run of another machine: what comes is a run here, for `gyre watch`, `echo` and
+    /// `record`.
     Receive(ReceiveArguments),
 }
 
@@ -26,8 +27,8 @@ pub enum LinkEnd {
 pub struct SendArguments {
     /// The folder of the run's results, its --out.
     pub out: PathBuf,
-    /// What is sent: scan, masked, rotation, motion, refined, pose, loop, correction, fix. Default: what the run has of these but scan, masked
-    /// and rotation.
+    /// The topics that are sent: scan, masked, rotation, motion, refined, pose, loop, correction,
+    /// fix. Default: what the run has of these but scan, masked and rotation.
     #[arg(long, value_delimiter = ',')]
     pub topics: Vec<String>,
     /// Time to wait, after the end of the run, for receivers that have not everything yet, s.
@@ -43,7 +44,7 @@ pub struct SendArguments {
 pub struct ReceiveArguments {
     /// The folder of the run that is made of it.
     pub out: PathBuf,
-    /// What is received of what is sent. Default: all.
+    /// The topics that are received of those that are sent. Default: all.
     #[arg(long, value_delimiter = ',')]
     pub topics: Vec<String>,
     /// The other machine.
@@ -51,7 +52,7 @@ pub struct ReceiveArguments {
     pub network: NetworkArguments,
 }
 
-/// How the other machine is reached.
+/// The endpoints and certificates of the other machine.
 #[derive(Debug, Args)]
 pub struct NetworkArguments {
     /// Wait for the other end here, as in tls/0.0.0.0:7447; tcp/ is for loopback addresses.

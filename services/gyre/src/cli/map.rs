@@ -13,19 +13,23 @@ pub struct MapArguments {
     /// The folder of the map.
     #[arg(long)]
     pub out: PathBuf,
-    /// What is written: the map's own folder, map.png, map.tif, map.pgm with map.yaml for map_server, or web tiles.
+    /// The forms that are written: the map's own folder, map.png, map.tif, map.pgm with map.yaml
+    /// for map_server, or web tiles.
     #[arg(long, value_enum, value_delimiter = ',', default_value = "folder,png")]
     pub format: Vec<MapFormat>,
-    /// Draw along this trajectory (TUM). Default: the run's trajectory_slam.tum, or its trajectory.tum.
+    /// Draw along this trajectory (TUM). Default: the run's trajectory_slam.tum, or its
+    /// trajectory.tum.
     #[arg(long, value_name = "FILE")]
     pub trajectory: Option<PathBuf>,
-    /// Place the run in this map of earlier drives, and write a map of all. Its cells and its place on the earth stay.
+    /// Place the run in this map of earlier drives, and write a map of all. Its cells and its place
+    /// on the earth stay.
     #[arg(long, value_name = "MAP", conflicts_with_all = ["trajectory", "cell_m", "origin"])]
     pub extend: Option<PathBuf>,
     /// Side of a cell, m.
     #[arg(long, default_value = "0.2")]
     pub cell_m: f64,
-    /// Place of the first keyframe on the earth and its heading, degrees: latitude, longitude (WGS 84), clockwise from true north.
+    /// Place of the first keyframe on the earth and its heading, degrees: latitude, longitude (WGS
+    /// 84), clockwise from true north.
     #[arg(long, value_name = "LAT,LON,HEADING", value_parser = origin, allow_hyphen_values = true)]
     pub origin: Option<Origin>,
 }

@@ -21,7 +21,8 @@ pub struct PsArguments {
     /// Print JSON.
     #[arg(long)]
     pub json: bool,
-    /// Fail unless a run is running, and of each run all processes do what they should: for health checks.
+    /// Fail unless a run is running, and of each run all processes do what they should: for health
+    /// checks.
     #[arg(long)]
     pub check: bool,
 }
@@ -60,11 +61,12 @@ pub struct SwapArguments {
     /// The run.
     #[command(flatten)]
     pub run: RunChoice,
-    /// The program that takes over and its arguments, as in 'python3 stage.py --fast'; no shell is involved. Default: the one that the
-    /// run was begun with.
+    /// The program that takes over and its arguments, as in 'python3 stage.py --fast'; no shell is
+    /// involved. Default: the one that the run was begun with.
     #[arg(long, value_name = "COMMAND")]
     pub command: Option<String>,
-    /// End the program before first. For a program that cannot stand by; scans wait for it meanwhile, or are dropped in live mode.
+    /// End the program before first. For a program that cannot stand by; scans wait for it
+    /// meanwhile, or are dropped in live mode.
     #[arg(long)]
     pub cold: bool,
 }

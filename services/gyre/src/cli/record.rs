@@ -12,8 +12,8 @@ pub struct RecordArguments {
     /// The file to write: NAME.mcap.
     #[arg(long, value_name = "FILE", value_parser = recording)]
     pub to: PathBuf,
-    /// What is recorded: scan, masked, rotation, motion, refined, pose, loop, correction, fix, log, health. Default: what the run has of
-    /// these but masked and rotation.
+    /// The topics that are recorded: scan, masked, rotation, motion, refined, pose, loop,
+    /// correction, fix, log, health. Default: what the run has of these but masked and rotation.
     #[arg(long, value_delimiter = ',')]
     pub topics: Vec<String>,
     /// When a file is ended.

@@ -12,8 +12,9 @@ pub struct Ros2Arguments {
     /// The domain of ROS 2. Default: ROS_DOMAIN_ID, or 0.
     #[arg(long, value_name = "NUMBER")]
     pub domain: Option<u16>,
-    /// Use only the network on which this machine has this address: 127.0.0.1 for this computer alone. Default: all networks, or as
-    /// ROS_LOCALHOST_ONLY and ROS_AUTOMATIC_DISCOVERY_RANGE say.
+    /// Use only the network on which this machine has this address: 127.0.0.1 for this computer
+    /// alone. Default: all networks, or as ROS_LOCALHOST_ONLY and ROS_AUTOMATIC_DISCOVERY_RANGE
+    /// say.
     #[arg(long, value_name = "ADDRESS")]
     pub interface: Option<String>,
     /// The namespace of the topics odom and map.
@@ -30,7 +31,8 @@ pub struct Ros2Arguments {
         allow_hyphen_values = true
     )]
     pub mounting: String,
-    /// Publish no transforms of odometry and map, where another program does, such as robot_localization. That of the radar stays.
+    /// Publish no transforms of odometry and map, where another program does, such as
+    /// robot_localization. That of the radar stays.
     #[arg(long)]
     pub no_tf: bool,
     /// Publish no map, which takes a tenth of a processor at most.

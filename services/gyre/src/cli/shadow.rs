@@ -14,7 +14,8 @@ pub struct ShadowArguments {
     /// The run.
     #[command(flatten)]
     pub run: RunChoice,
-    /// The program and its arguments, as in 'python3 stage.py --fast'; no shell is involved. Default: Gyre's own stage.
+    /// The program and its arguments, as in 'python3 stage.py --fast'; no shell is involved.
+    /// Default: Gyre's own stage.
     #[arg(long, value_name = "COMMAND")]
     pub command: Option<String>,
     /// Items to compare. Default: until the run ends.
@@ -23,7 +24,8 @@ pub struct ShadowArguments {
     /// Time after which it ends, s.
     #[arg(long, value_name = "S")]
     pub duration: Option<f64>,
-    /// Write shadow.json, shadow.csv with a row for each item, and what the program prints, shadow.txt, to this folder.
+    /// Write shadow.json, shadow.csv with a row for each item, and what the program prints,
+    /// shadow.txt, to this folder.
     #[arg(long, value_name = "DIR")]
     pub report: Option<PathBuf>,
     /// Niceness of the program, -20 to 19: the run goes first.

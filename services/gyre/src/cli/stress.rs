@@ -18,7 +18,8 @@ pub struct StressArguments {
     /// Print the scenarios, a line each.
     #[arg(long)]
     pub list: bool,
-    /// The recording's folder. Default: the configuration's simulation, which is rendered first, or its source.data.
+    /// The recording's folder. Default: the configuration's simulation, which is rendered first, or
+    /// its source.data.
     #[arg(long)]
     pub data: Option<PathBuf>,
     /// The folder of the report. Default: `out/stress`.
@@ -30,7 +31,8 @@ pub struct StressArguments {
     /// As --duration 10, for continuous integration.
     #[arg(long)]
     pub quick: bool,
-    /// The stage that is slowed, stopped or killed; may be repeated. Default: masking is slowed, all are stopped or killed.
+    /// The stage that is slowed, stopped or killed; may be repeated. Default: masking is slowed,
+    /// all are stopped or killed.
     #[arg(long = "stage", value_name = "NAME", value_parser = stage)]
     pub stages: Vec<StageId>,
     /// For the order of stages that are stopped or killed.

@@ -9,16 +9,20 @@ use clap::Args;
 pub struct WatchArguments {
     /// The folder of the run's results, its --out.
     pub out: PathBuf,
-    /// The address to serve at. Any but the loopback's needs the token of the address that is printed.
+    /// The address to serve at. Any but the loopback's needs the token of the address that is
+    /// printed.
     #[arg(long, default_value = "127.0.0.1:8080", value_name = "ADDRESS")]
     pub listen: SocketAddr,
-    /// Serve Foxglove and Lichtblick too, at this address by their WebSocket protocol. Any but the loopback's needs the token.
+    /// Serve Foxglove and Lichtblick too, at this address by their WebSocket protocol. Any but the
+    /// loopback's needs the token.
     #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "127.0.0.1:8765")]
     pub foxglove: Option<SocketAddr>,
-    /// Send a trace of each pose to this collector of OpenTelemetry too (OTLP over HTTP): http://127.0.0.1:4318.
+    /// Send a trace of each pose to this collector of OpenTelemetry too (OTLP over HTTP):
+    /// http://127.0.0.1:4318.
     #[arg(long, value_name = "URL")]
     pub otlp: Option<String>,
-    /// The file of the token, which is written with a random one if it is missing. Default: another token at each start.
+    /// The file of the token, which is written with a random one if it is missing. Default: another
+    /// token at each start.
     #[arg(long, value_name = "FILE")]
     pub token_file: Option<PathBuf>,
     /// Wait for a run that has not started yet.

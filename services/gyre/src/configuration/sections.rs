@@ -16,25 +16,27 @@ pub struct RunConfig {
     /// Maximum number of scans between admission and their pose, 1 to 64. More than the free cores
     /// increases latency and not throughput.
     pub window: usize,
-    /// Pace of the source: `max`, `realtime`, or a factor of real time from 0.001 to 1000. Live mode
-    /// needs another than `max`.
+    /// Pace of the source: `max`, `realtime`, or a factor of real time from 0.001 to 1000. Live
+    /// mode needs another than `max`.
     pub rate: Rate,
-    /// Room for programs that look on, 0 to 64 of each topic: `gyre watch`, a viewer, a recorder. They
-    /// change neither a result nor a latency. Each needs shared memory for one message of each topic.
+    /// Room for programs that look on, 0 to 64 of each topic: `gyre watch`, a viewer, a recorder.
+    /// They change neither a result nor a latency. Each needs shared memory for one message of each
+    /// topic.
     pub observers: usize,
-    /// Time for which a published scan may lack its pose, or the source a scan that is due, s; 0: no
-    /// limit. Then stages are restarted: first the source if it is late, else all but a live source;
-    /// if that does not help, all; if that does not help either, the run ends. With SLAM also the time
-    /// in which a follower that the run waits for at its end must make progress; else it is restarted.
+    /// Time for which a published scan may lack its pose, or the source a scan that is due, s; 0:
+    /// no limit. Then stages are restarted: first the source if it is late, else all but a live
+    /// source; if that does not help, all; if that does not help either, the run ends. With SLAM
+    /// also the time in which a follower that the run waits for at its end must make progress; else
+    /// it is restarted.
     pub stall_timeout_s: f64,
-    /// Time for a stage to open its topics after its start, s; 0: no limit. A stage that takes longer,
-    /// as one that cannot load its model, is treated as a stall.
+    /// Time for a stage to open its topics after its start, s; 0: no limit. A stage that takes
+    /// longer, as one that cannot load its model, is treated as a stall.
     pub start_timeout_s: f64,
-    /// How the system runs the stages: priority, processors, memory. Followers have their own alone.
+    /// The scheduling of the stages: priority, processors, memory. Followers have their own alone.
     #[serde(skip_serializing_if = "is_default")]
     pub scheduling: Scheduling,
-    /// Longest time that a processor may take to wake from idleness, us; 0: none sleeps, which costs
-    /// power. For the whole machine, while the run lives. It needs the right to write to
+    /// Longest time that a processor may take to wake from idleness, us; 0: none sleeps, which
+    /// costs power. For the whole machine, while the run lives. It needs the right to write to
     /// `/dev/cpu_dma_latency`. Default: as the system has it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cpu_wake_us: Option<u32>,
@@ -62,10 +64,11 @@ pub struct StageConfig {
     pub command: Vec<String>,
     /// Limits of its restarts.
     pub restart: RestartPolicy,
-    /// How the system runs it: its keys go before those of `run.scheduling`.
+    /// The scheduling of the process: its keys go before those of `run.scheduling`.
     #[serde(skip_serializing_if = "is_default")]
     pub scheduling: Scheduling,
-    /// Delay for each scan, ms, to test behaviour under load. Source and `pose-integration` have none.
+    /// Delay for each scan, ms, to test behaviour under load. Source and `pose-integration` have
+    /// none.
     #[serde(skip_serializing_if = "is_zero")]
     pub delay_ms: u64,
 }

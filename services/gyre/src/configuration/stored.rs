@@ -1,10 +1,11 @@
-//! What a recording says of itself, beside the configuration.
+//! The description that a recording stores of itself, beside the configuration.
 
 use super::Configuration;
 use crate::Failure;
 
 impl Configuration {
-    /// Returns the configuration with the options of the recording's `dataset.toml` where it has none.
+    /// Returns the configuration with the options of the recording's `dataset.toml` where it has
+    /// none.
     ///
     /// # Errors
     /// The file cannot be read.

@@ -50,7 +50,8 @@ impl Configuration {
         Ok(())
     }
 
-    /// A recording that takes the place of stages is a recording of a run, and has the topic of a stage that the run has.
+    /// A recording that takes the place of stages is a recording of a run, and has the topic of a
+    /// stage that the run has.
     fn validate_played_from(&self) -> Result<(), ConfigurationError> {
         let from = self.source.from;
         if from == PlayedFrom::Scan {
@@ -165,7 +166,7 @@ impl Configuration {
         scenarios.try_for_each(|(name, own)| limits(format!("budget.{name}"), own))
     }
 
-    /// What a simulation writes must be what the run reads.
+    /// Checks that the run reads what a simulation writes.
     fn validate_simulation(&self) -> Result<(), ConfigurationError> {
         let Some(simulation) = &self.simulation else {
             return Ok(());
@@ -183,7 +184,7 @@ impl Configuration {
         }
     }
 
-    /// What needs points must be given some.
+    /// Checks that there are points where they are needed.
     fn validate_points(&self) -> Result<(), ConfigurationError> {
         if self.odometry.points.capacity > 0 {
             return Ok(());

@@ -17,9 +17,11 @@ use super::Finding;
 
 /// The `f_type` of a tmpfs.
 const TMPFS: i128 = 0x0102_1994;
-/// Memory of the processes of a run beside shared memory. Measured: 50 MB, a network up to 100 MB more.
+/// Memory of the processes of a run beside shared memory. Measured: 50 MB, a network up to 100 MB
+/// more.
 const PROCESSES: u64 = 60_000_000;
-/// Room for results without which no run starts: the map of the refinement takes 10 MB, 55 MB with the largest window.
+/// Room for results without which no run starts: the map of the refinement takes 10 MB, 55 MB with
+/// the largest window.
 const RESULTS: u64 = 64_000_000;
 /// Results of a scan: its lines of the results, its record in the journal.
 const RESULTS_PER_SCAN: u64 = 1_000;

@@ -35,7 +35,7 @@ struct Open {
     is_described: bool,
 }
 
-/// What is not in the bag as it is in the source.
+/// The data that is not in the bag as it is in the source.
 #[derive(Debug, Default)]
 struct Losses {
     unreadable: u64,
@@ -43,7 +43,8 @@ struct Losses {
     chirps: bool,
     /// Rows that were not measured but have powers.
     interpolated: u64,
-    /// Scans whose time is another one than the middle of their first and last azimuth, and the largest difference, ns.
+    /// Scans whose time is another one than the middle of their first and last azimuth, and the
+    /// largest difference, ns.
     retimed: u64,
     retimed_by_ns: u64,
     /// The radar's constants in the settings of `[dataset]`.
@@ -257,7 +258,8 @@ impl Scans {
             return Ok(());
         }
         let angles = &mut scan.azimuth_rad[..scan.geometry.azimuths];
-        // The angle at which the correction is taken is itself corrected: its error is that of the eccentricity squared.
+        // The angle at which the correction is taken is itself corrected: its error is that of the
+        // eccentricity squared.
         let mut encoder = angles.to_vec();
         correct_eccentricity(&mut encoder, -self.eccentricity_rad);
         for (angle, encoder) in angles.iter_mut().zip(encoder) {

@@ -1,4 +1,4 @@
-//! What was found, lost and left out.
+//! Counts of what was found, lost and left out.
 
 use std::fmt::Write;
 

@@ -28,9 +28,9 @@ pub struct Scans {
 
 /// A scan with its motion.
 pub struct RegisteredScan<'a> {
-    /// Its number in the recording.
+    /// The number in the recording.
     pub number: usize,
-    /// What localisation needs of it.
+    /// The observation for the localisation.
     pub observation: Observation<'a>,
     /// The chain of motions starts with it: nothing is known of the motion since the scan before.
     pub starts: bool,

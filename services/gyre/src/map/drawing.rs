@@ -9,7 +9,8 @@ use nalgebra::Point2;
 
 use crate::configuration::Configuration;
 
-/// Odometry's trajectory is drawn if it is somewhere by so many cells beside the other one: nearer lines are one.
+/// Odometry's trajectory is drawn if it is somewhere by so many cells beside the other one: nearer
+/// lines are one.
 const APART_CELLS: f64 = 3.0;
 
 /// Returns the options of the map of a run: keyframes see as far as the run has extracted points.
@@ -22,13 +23,14 @@ pub fn options(configuration: &Configuration) -> MapOptions {
     }
 }
 
-/// The map of keyframes in the frame of the first one that is drawn. Poses are given in one other frame.
+/// The map of keyframes in the frame of the first one that is drawn. Poses are given in one other
+/// frame.
 pub struct Drawing {
     evidence: Evidence,
     first: Option<First>,
     /// The keyframes by odometry, in the map frame.
     odometry: Vec<Pose>,
-    /// Whether odometry has them elsewhere.
+    /// True if odometry has them elsewhere.
     is_corrected: bool,
 }
 
@@ -40,7 +42,8 @@ struct First {
 }
 
 impl Drawing {
-    /// Starts without a keyframe. What does not fit into memory lies in a file in `folder`, which has no name.
+    /// Starts without a keyframe. What does not fit into memory lies in a file in `folder`, which
+    /// has no name.
     ///
     /// # Errors
     /// An option that is out of bounds.
@@ -79,8 +82,8 @@ impl Drawing {
         self.odometry.len()
     }
 
-    /// Returns the picture of the map as a PNG file, with the trajectory and both ends of each loop; and with odometry's trajectory where
-    /// that is another one.
+    /// Returns the picture of the map as a PNG file, with the trajectory and both ends of each
+    /// loop; and with odometry's trajectory where that is another one.
     ///
     /// # Errors
     /// A map without keyframes or too large for a picture.

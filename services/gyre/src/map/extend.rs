@@ -1,7 +1,7 @@
 //! `gyre map RUN --extend MAP`: a drive is placed in the map of earlier ones.
 //!
-//! Its keyframes are found in the map one by one. A pose graph of these places and of the run's own motions and loops gives all poses of the
-//! run; the map stays where it is.
+//! The keyframes are found in the map one by one. A pose graph of these places and of the run's own
+//! motions and loops gives all poses of the run; the map stays where it is.
 
 use std::{collections::HashSet, fs, path::Path};
 
@@ -26,11 +26,12 @@ use crate::{
 const GRAPH: &str = "graph.g2o";
 /// The largest such file, bytes: a drive of 1,000 km.
 const MAX_GRAPH_BYTES: u64 = 1 << 30;
-/// Fixes along so many metres of the path count as one, and so do loops between two such stretches: their errors are dependent.
+/// Fixes along so many metres of the path count as one, and so do loops between two such stretches:
+/// their errors are dependent.
 const DEPENDENT_M: f64 = 5.0;
 /// The stretch that stands for the map in the groups of fixes.
 const OF_MAP: u64 = u32::MAX as u64;
-/// What is known of the first pose before any fix: standard deviations in m and rad.
+/// The uncertainty of the first pose before any fix: standard deviations in m and rad.
 const ANYWHERE: [f64; 3] = [1e5, 1e5, 3.0];
 /// Fixes that are compared as the start, at most.
 const STARTS: usize = 100;
@@ -54,8 +55,8 @@ struct Search {
 /// Places a run in the map in a folder, draws both, and writes the map of all.
 ///
 /// # Errors
-/// A folder without a map that can be localised in or the one that is written to, a run without `graph.g2o`, and one that is nowhere on the
-/// map.
+/// A folder without a map that can be localised in or the one that is written to, a run without
+/// `graph.g2o`, and one that is nowhere on the map.
 pub fn extend(arguments: &MapArguments, map: &Path) -> Result<Drawing, Failure> {
     let (run, out) = (&arguments.run, &arguments.out);
     require_another_folder(map, out)?;
@@ -117,7 +118,8 @@ fn read_graph(run: &Path, keyframes: usize) -> Result<G2o, Failure> {
     }
 }
 
-/// Finds the keyframes of a run, each by itself: what tracking finds depends on what it found before.
+/// Finds the keyframes of a run, each by itself: what tracking finds depends on what it found
+/// before.
 fn find(
     localiser: &mut Localiser,
     keyframes: &mut RecordReader<Keyframe>,
@@ -141,8 +143,8 @@ fn find(
     Ok(search)
 }
 
-/// Returns the pose of the run in the map by the fix that agrees best with the others: the least median of their distances. A wrong one
-/// would draw all others away. `None` without a fix.
+/// Returns the pose of the run in the map by the fix that agrees best with the others: the least
+/// median of their distances. A wrong one would draw all others away. `None` without a fix.
 fn most_agreed(run: &G2o, found: &[Found]) -> Option<Pose> {
     let step = found.len().div_ceil(STARTS).max(1);
     let starts = found.iter().step_by(step);
@@ -162,8 +164,8 @@ fn most_agreed(run: &G2o, found: &[Found]) -> Option<Pose> {
         .map(|(_, start)| start)
 }
 
-/// Returns the poses of the keyframes of a run in the map frame, those that fit its motions, its loops and its places on the map best, and
-/// the fixes that agree with them.
+/// Returns the poses of the keyframes of a run in the map frame, those that fit its motions, its
+/// loops and its places on the map best, and the fixes that agree with them.
 fn place(
     run: &G2o,
     search: &Search,
@@ -263,7 +265,8 @@ mod tests {
 
     #[test]
     fn a_drive_is_bent_to_where_it_was_found_and_no_farther() {
-        // Odometry turns by 0.1 degrees a keyframe; the drive goes straight on from (5, 7) at a quarter turn.
+        // Odometry turns by 0.1 degrees a keyframe; the drive goes straight on from (5, 7) at a
+        // quarter turn.
         let true_pose = |k: usize| pose(5.0, 7.0 + 2.0 * k as f64, std::f64::consts::FRAC_PI_2);
         let motion = uncertain(pose(2.0, 0.0, 0.1f64.to_radians()), 0.01);
         let mut poses = vec![Pose::identity()];

@@ -16,11 +16,13 @@ use crate::Failure;
 const NEXT: &str = ".next";
 /// The earlier map while the next one takes its place.
 const EARLIER: &str = ".earlier";
-/// Without the first nothing can be localised in the folder, and without the second it is not a map: they go first and come last.
+/// Without the first nothing can be localised in the folder, and without the second it is not a
+/// map: they go first and come last.
 const MARKS: [&str; 2] = [Keyframe::FILE, "map.toml"];
 
-/// Writes a map and its keyframes into `out`. A map that is there stays as it is until the new one is complete, and takes as much of
-/// the disk until then; pictures and exports stay. It survives a power failure when this returns.
+/// Writes a map and its keyframes into `out`. A map that is there stays as it is until the new one
+/// is complete, and takes as much of the disk until then; pictures and exports stay. It survives a
+/// power failure when this returns.
 ///
 /// # Errors
 /// A folder that cannot be written, or has other content than a map.
@@ -38,8 +40,8 @@ pub fn write(
     })
 }
 
-/// Lets `write` fill a folder, whose files and folders then take the place of those of the same names in `out`. A process that is killed
-/// between these renames leaves no map.
+/// Lets `write` fill a folder, whose files and folders then take the place of those of the same
+/// names in `out`. A process that is killed between these renames leaves no map.
 fn replace(out: &Path, write: impl FnOnce(&Path) -> Result<(), Failure>) -> Result<(), Failure> {
     let [next, earlier] = [NEXT, EARLIER].map(|name| out.join(name));
     // A process that was killed leaves them.

@@ -1,6 +1,6 @@
-//! A picture of what the mask keeps. Side by side: the raster with all its power, the mask (black is nothing, white is all), what the
-//! search gets, and the points, each in the colour of its factor. Where the mask looks at two scans, the scan before is below.
-//! Ahead is up, left is left.
+//! A picture of what the mask keeps. Side by side: the raster with all its power, the mask (black
+//! is nothing, white is all), what the search gets, and the points, each in the colour of its
+//! factor. Where the mask looks at two scans, the scan before is below. Ahead is up, left is left.
 
 use std::path::Path;
 
@@ -19,7 +19,8 @@ const AROUND: Colour = [60; 3];
 const SIDE: usize = 256;
 /// Power, in the sensor's counts, that has the brightest colour: what is above is rare.
 const BRIGHT: f32 = 120.0;
-/// The share of cells that the brightest colour goes to in what the search gets, of which proportions alone count.
+/// The share of cells that the brightest colour goes to in what the search gets, of which
+/// proportions alone count.
 const BRIGHTEST: f32 = 1e-3;
 /// Maximum brightness of the raster behind the points.
 const FAINT: f32 = 0.4;

@@ -15,7 +15,8 @@ pub struct Inspection {
     pub number: usize,
     /// The raster of the scan; where the mask looks at two scans, then that of the scan before.
     pub rasters: Vec<MaskedRaster>,
-    /// The points that lie in the raster: cell (row, column), and the factor of the mask on the weight.
+    /// The points that lie in the raster: cell (row, column), and the factor of the mask on the
+    /// weight.
     pub points: Vec<([usize; 2], f32)>,
     /// The velocity that its sweep was motion-compensated with.
     pub twist: Option<Twist>,

@@ -12,8 +12,9 @@ use ndarray::{Array2, ArrayView2};
 use super::inspection::{Inspection, MaskedRaster};
 use crate::{Failure, configuration::Configuration, print};
 
-/// Scans registered before each inspected one where those are far apart. The first motions are found without motion
-/// compensation, as at a run's start; a few scans later they are what a run finds, but for its noise.
+/// Scans registered before each inspected one where those are far apart. The first motions are
+/// found without motion compensation, as at a run's start; a few scans later they are what a run
+/// finds, but for its noise.
 const RUN_UP: usize = 8;
 
 /// Masks scans as a run does.
@@ -76,7 +77,8 @@ impl MaskInspector {
         })
     }
 
-    /// Advances to scan `number`, which is not before the last one, and inspects it; `None` if it cannot be read.
+    /// Advances to scan `number`, which is not before the last one, and inspects it; `None` if it
+    /// cannot be read.
     ///
     /// # Errors
     /// A scan that cannot be masked.
@@ -177,8 +179,8 @@ impl MaskInspector {
     }
 }
 
-/// The weight of each cell: nothing where no power is above the threshold, else the network's factor, if there is a
-/// network.
+/// The weight of each cell: nothing where no power is above the threshold, else the network's
+/// factor, if there is a network.
 fn mask_above(
     floor: u8,
     above_floor: &Array2<f32>,

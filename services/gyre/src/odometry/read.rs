@@ -26,7 +26,8 @@ const COLUMNS: [&str; 11] = [
     "cov_yawyaw",
 ];
 
-/// The fields of [`COLUMNS`], and how errors of motions depend on each other: not at all where that is not said.
+/// The fields of [`COLUMNS`], and how errors of motions depend on each other: not at all where that
+/// is not said.
 #[derive(Deserialize)]
 struct Row {
     stamp_ns: i64,
@@ -44,7 +45,8 @@ struct Row {
     scale_sigma: Option<f64>,
 }
 
-/// Reads the motions of an `odometry.csv`. A covariance that is left empty becomes NaN: the motion has none.
+/// Reads the motions of an `odometry.csv`. A covariance that is left empty becomes NaN: the motion
+/// has none.
 ///
 /// # Errors
 /// A file that cannot be read, a missing column, a row that is damaged.

@@ -35,7 +35,8 @@ const PERIOD: Duration = Duration::from_millis(50);
 /// Time after which what is waited for is printed.
 const EXPLAIN_AFTER: Duration = Duration::from_secs(3);
 
-/// Leaves the session of the terminal, if this run was started by `gyre up`: it goes on when that is closed.
+/// Leaves the session of the terminal, if this run was started by `gyre up`: it goes on when that
+/// is closed.
 pub fn detach_if_asked() {
     if env::var_os(DETACHED).is_some() {
         // Fails for the leader of a session, which has left it already.
@@ -43,7 +44,8 @@ pub fn detach_if_asked() {
     }
 }
 
-/// Starts a run in the background, and returns when all its stages are there, or when it has ended before.
+/// Starts a run in the background, and returns when all its stages are there, or when it has ended
+/// before.
 ///
 /// # Errors
 /// A run that does not start, in the words of `gyre run`.
@@ -165,7 +167,8 @@ pub fn down(choice: &RunChoice) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Returns what tells one version of the results from another: the summary is written last, and as a new file.
+/// Returns what tells one version of the results from another: the summary is written last, and as
+/// a new file.
 fn version_of_results(out: &Path) -> Option<(u64, SystemTime)> {
     let summary = fs::metadata(out.join(SUMMARY)).ok()?;
     Some((summary.ino(), summary.modified().ok()?))

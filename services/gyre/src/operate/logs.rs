@@ -17,7 +17,8 @@ use crate::{Failure, cli::LogsArguments, configuration::process_names, print};
 /// Time between two looks at the files.
 const PERIOD: Duration = Duration::from_millis(200);
 
-/// Prints the newest lines of a run's logs, also of one that has ended, and goes on with those that come if asked to.
+/// Prints the newest lines of a run's logs, also of one that has ended, and goes on with those that
+/// come if asked to.
 ///
 /// # Errors
 /// There is no such run or process, or a log cannot be read.
@@ -92,12 +93,13 @@ struct Log {
 enum Kind {
     /// `log.jsonl`, of one process or of all.
     Events(Option<String>),
-    /// What a process prints.
+    /// The output of a process.
     Printed(String),
 }
 
 impl Log {
-    /// Returns the complete lines since the last call. A log that cannot be read has none: it may come later.
+    /// Returns the complete lines since the last call. A log that cannot be read has none: it may
+    /// come later.
     fn lines(&mut self) -> Vec<String> {
         self.read().unwrap_or_default()
     }

@@ -21,7 +21,8 @@ struct Row {
 /// Lists the runs of this user.
 ///
 /// # Errors
-/// There is no run that writes to `--out`; standard output cannot be written; or, with `--check`, not all is well.
+/// There is no run that writes to `--out`; standard output cannot be written; or, with `--check`,
+/// not all is well.
 pub fn ps(arguments: &PsArguments) -> Result<ExitCode, Failure> {
     let (mut rows, mut silent) = (Vec::new(), Vec::new());
     let runs = match &arguments.out {

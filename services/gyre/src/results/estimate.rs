@@ -6,7 +6,8 @@ use gyre_radar::Trajectory;
 
 use crate::{Failure, odometry};
 
-/// An evaluation takes about 0.5 kB of memory a pose: this many take half a gigabyte, and are 28 hours at 10 Hz.
+/// An evaluation takes about 0.5 kB of memory a pose: this many take half a gigabyte, and are 28
+/// hours at 10 Hz.
 const MOST: usize = 1_000_000;
 
 /// The poses of a run, up to [`MOST`].

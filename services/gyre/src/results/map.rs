@@ -16,7 +16,8 @@ use crate::{
 /// Returns the picture as a PNG file; `None`, with a note, where the drive is too long for one.
 ///
 /// # Errors
-/// Keyframes that cannot be read, and a full disk: what does not fit into memory lies in a file without a name in `out`.
+/// Keyframes that cannot be read, and a full disk: what does not fit into memory lies in a file
+/// without a name in `out`.
 pub fn map_png(
     configuration: &Configuration,
     out: &Out,

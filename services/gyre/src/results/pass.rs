@@ -22,7 +22,7 @@ pub struct Pass<'a, 'b> {
     read: Read,
 }
 
-/// What was read.
+/// The data that was read.
 #[derive(Debug, Default)]
 pub struct Read {
     /// The end of the stream, if it came to that.
@@ -42,7 +42,8 @@ pub struct Read {
 }
 
 impl<'a, 'b> Pass<'a, 'b> {
-    /// Starts with a journal of which `resumed` poses are of earlier sessions. Poses are kept if they are to be judged.
+    /// Starts with a journal of which `resumed` poses are of earlier sessions. Poses are kept if
+    /// they are to be judged.
     ///
     /// # Errors
     /// A file that cannot be created.

@@ -6,7 +6,8 @@ use gyre_geometry::Pose;
 /// Up to twice as many poses are drawn.
 const ENOUGH: usize = 1 << 15;
 
-/// A path that is thinned as it grows: of a long one every 2nd, 4th, 8th, ... pose is kept, and the last one.
+/// A path that is thinned as it grows: of a long one every 2nd, 4th, 8th, ... pose is kept, and the
+/// last one.
 #[derive(Debug)]
 pub struct Sketch {
     kept: Vec<Pose>,

@@ -1,4 +1,5 @@
-//! The trajectory corrected by loops: a function of the keyframes, the loops and the journal, whenever loops were closed.
+//! The trajectory corrected by loops: a function of the keyframes, the loops and the journal,
+//! whenever loops were closed.
 
 use std::fmt::{self, Write};
 
@@ -28,8 +29,8 @@ pub struct Slam {
 }
 
 impl Slam {
-    /// Corrects the poses of the keyframes of a run by its loops; `None` without SLAM, and before the first keyframe. Of a run that goes
-    /// on, the loops so far are left out.
+    /// Corrects the poses of the keyframes of a run by its loops; `None` without SLAM, and before
+    /// the first keyframe. Of a run that goes on, the loops so far are left out.
     ///
     /// # Errors
     /// Keyframes that cannot be read or used.
@@ -124,7 +125,8 @@ impl Slam {
         Ok(rows)
     }
 
-    /// Returns `graph.g2o`: the corrected keyframes, the motions between them, and the loops that are used.
+    /// Returns `graph.g2o`: the corrected keyframes, the motions between them, and the loops that
+    /// are used.
     pub fn graph_g2o(&self) -> String {
         G2o::write(
             self.estimator.poses(),
@@ -132,7 +134,8 @@ impl Slam {
         )
     }
 
-    /// Returns the errors of the corrected keyframes with what their covariances say, against the first one that has a true pose.
+    /// Returns the errors of the corrected keyframes with what their covariances say, against the
+    /// first one that has a true pose.
     ///
     /// # Errors
     /// Constraints that do not determine the poses.

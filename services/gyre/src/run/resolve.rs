@@ -41,7 +41,8 @@ pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
         configuration.source.data = PathBuf::new();
     }
     configuration.odometry.masking.resolve()?;
-    // Absolute, so that the resolved configuration repeats the run from any folder. The reader reports what does not exist.
+    // Absolute, so that the resolved configuration repeats the run from any folder. The reader
+    // reports what does not exist.
     for path in [
         Some(&mut configuration.source.data),
         configuration.run.ground_truth.as_mut(),

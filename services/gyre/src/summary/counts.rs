@@ -3,8 +3,8 @@
 use gyre_messages::{Item, MotionEstimate, PoseHeader, flag, initial_guess, outcome};
 use serde::Serialize;
 
-/// Largest share of unreadable scans of a run that succeeds. With more, motions span more than one scan too often for
-/// the trajectory to be the recording's.
+/// Largest share of unreadable scans of a run that succeeds. With more, motions span more than one
+/// scan too often for the trajectory to be the recording's.
 const MAX_UNREADABLE_SHARE: f64 = 0.2;
 
 /// Motions from which the radar's period is taken, so that longer runs take no more memory.
@@ -93,7 +93,8 @@ impl Counter {
         self.motions.add(&pose.motion);
     }
 
-    /// Returns the counts, with the end of the stream if it came to that. `first` is the first scan played.
+    /// Returns the counts, with the end of the stream if it came to that. `first` is the first scan
+    /// played.
     pub fn counts(self, end: Option<&Item>, first: usize, refines: bool) -> Counts {
         let next = |of: fn(&Item) -> u64| {
             let after_last = || self.last.as_ref().map(|last| of(last) + 1);

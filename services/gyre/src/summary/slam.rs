@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-/// What the summary says of loops.
+/// The counts of loops in the summary.
 #[derive(Debug, Serialize)]
 pub struct SlamSummary {
     /// Keyframes.

@@ -1,7 +1,8 @@
-//! The masking stage: from `scan` to `masked`, with the motions of previous scans for motion compensation.
+//! The masking stage: from `scan` to `masked`, with the motions of previous scans for motion
+//! compensation.
 //!
-//! [`gyre_masking::Masker`] does the work. `scans` and `motions` are its inputs; `lossless` and `live` are the two modes of
-//! taking scans from the queue.
+//! [`gyre_masking::Masker`] does the work. `scans` and `motions` are its inputs; `lossless` and
+//! `live` are the two modes of taking scans from the queue.
 
 mod live;
 mod lossless;

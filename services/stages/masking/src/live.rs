@@ -1,8 +1,9 @@
-//! Live mode: only the newest scan is processed. Admitted scans get consecutive sequence numbers, so no later stage sees a gap;
-//! the gaps in the source's own count are the dropped scans.
+//! Live mode: only the newest scan is processed. Admitted scans get consecutive sequence numbers,
+//! so no later stage sees a gap; the gaps in the source's own count are the dropped scans.
 //!
-//! After a start scans are processed in order until masking has caught up, and as many may wait as the window has room for: so a restart
-//! that is shorter than that drops none of those that came meanwhile.
+//! After a start scans are processed in order until masking has caught up, and as many may wait as
+//! the window has room for: so a restart that is shorter than that drops none of those that came
+//! meanwhile.
 
 use std::collections::VecDeque;
 
@@ -14,8 +15,8 @@ use gyre_stage::{
     reader::{Port, Received},
 };
 
-/// Windows of scans after which masking counts as caught up all the same: a pipeline that is slower than its scans never is, and would
-/// have the latency of those that wait for ever.
+/// Windows of scans after which masking counts as caught up all the same: a pipeline that is slower
+/// than its scans never is, and would have the latency of those that wait for ever.
 const WINDOWS_IN_ORDER: usize = 8;
 
 /// The queue of masking in live mode.
@@ -38,9 +39,11 @@ struct Chain {
     previous_scan: Option<u64>,
     /// Time of the previous scan, ns; `None` after a restart.
     previous_ns: Option<i64>,
-    /// The source's count at the previous scan: a restarted source repeats the scans after the newest pose.
+    /// The source's count at the previous scan: a restarted source repeats the scans after the
+    /// newest pose.
     published: Option<u64>,
-    /// True if the current scan was processed before the restart: the other stages need it again as their previous scan.
+    /// True if the current scan was processed before the restart: the other stages need it again as
+    /// their previous scan.
     repeats: bool,
 }
 
@@ -78,8 +81,8 @@ impl NewestOnly {
         Ok(())
     }
 
-    /// Returns what to do with the current scan. `resume_at` is the item of the newest pose at the last start of the sink,
-    /// `newest_pose` the number of the newest pose now.
+    /// Returns what to do with the current scan. `resume_at` is the item of the newest pose at the
+    /// last start of the sink, `newest_pose` the number of the newest pose now.
     pub fn next_action(
         &mut self,
         resume_at: &Item,
@@ -97,15 +100,16 @@ impl NewestOnly {
         };
         let item = chain.number(front.item());
         Ok(match () {
-            // The end of the stream occupies a slot in every history like any item, so it waits for credit too.
+            // The end of the stream occupies a slot in every history like any item, so it waits for
+            // credit too.
             () if !self.window.admits(item.seq, newest_pose) => Action::Wait,
             () if item.is(flag::END) => Action::End(item),
             () => Action::Process(item, front.received_ns),
         })
     }
 
-    /// Resumes the chain after a start. `None` while all received scans precede the newest pose: a restarted source repeats such
-    /// scans, and the history of a running source begins with them.
+    /// Resumes the chain after a start. `None` while all received scans precede the newest pose: a
+    /// restarted source repeats such scans, and the history of a running source begins with them.
     fn resume(&mut self, newest_pose: &Item) -> Option<Chain> {
         while self
             .queue
@@ -123,7 +127,8 @@ impl NewestOnly {
         Some(Chain::resume(self.queue.front()?.item(), newest_pose))
     }
 
-    /// Drops all but the newest scan; until masking has caught up after a start, all but as many as the window has room for.
+    /// Drops all but the newest scan; until masking has caught up after a start, all but as many as
+    /// the window has room for.
     fn drop_the_oldest(&mut self) {
         let room = match self.in_order {
             0 => 1,
@@ -169,8 +174,8 @@ impl NewestOnly {
         self.port.listener()
     }
 
-    /// Returns the previous scan; `None` at the start of a chain. The source may have lost it when all stages were restarted; the
-    /// current scan is then masked as at the start of a chain.
+    /// Returns the previous scan; `None` at the start of a chain. The source may have lost it when
+    /// all stages were restarted; the current scan is then masked as at the start of a chain.
     pub fn previous(&self) -> Option<&Received<Scan>> {
         let item = self.chain?.number(self.queue.front()?.item());
         let expected = (!item.is(flag::BREAK)).then_some(item.previous_scan);

@@ -11,7 +11,8 @@ use gyre_stage::{
 pub struct InOrder {
     reader: Reader<Scan>,
     window: Window,
-    /// True once the first scan is processed. From then on none is skipped, which would leave a gap in the output.
+    /// True once the first scan is processed. From then on none is skipped, which would leave a gap
+    /// in the output.
     started: bool,
 }
 
@@ -29,7 +30,8 @@ impl InOrder {
         self.reader.head().map(drop)
     }
 
-    /// Returns what to do with the current scan when `newest_pose` is the number of the newest pose.
+    /// Returns what to do with the current scan when `newest_pose` is the number of the newest
+    /// pose.
     pub fn next_action(&mut self, newest_pose: Option<u64>) -> Result<Action, StageError> {
         let Some(head) = self.reader.head()? else {
             return Ok(Action::Wait);
@@ -76,8 +78,9 @@ impl InOrder {
     }
 }
 
-/// Returns whether a restarted masking has nothing to publish for an item: its readers have it already, or its own previous scan
-/// is missing and its mask would differ from the one before the restart.
+/// Returns whether a restarted masking has nothing to publish for an item: its readers have it
+/// already, or its own previous scan is missing and its mask would differ from the one before the
+/// restart.
 fn serves_only_as_previous(
     window: &Window,
     item: &Item,

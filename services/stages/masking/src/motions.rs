@@ -1,8 +1,9 @@
 //! The motions for motion compensation, by sequence number.
 //!
-//! Masking receives a motion twice: from the search, and with its journalled pose. It uses the first one, so both must be equal.
-//! Therefore only the searched motion is used, which refinement passes on unchanged. After a restart the motions up to the newest
-//! pose come from the journal; the search finds later ones again.
+//! Masking receives a motion twice: from the search, and with its journalled pose. It uses the
+//! first one, so both must be equal. Therefore only the searched motion is used, which refinement
+//! passes on unchanged. After a restart the motions up to the newest pose come from the journal;
+//! the search finds later ones again.
 
 use std::collections::VecDeque;
 
@@ -60,8 +61,8 @@ impl Motions {
         self.known.insert(seq, None);
     }
 
-    /// Returns the motion of the item `lag` items before item `seq`: `None` while it is unknown, `Some(None)` if the chain starts
-    /// there or later.
+    /// Returns the motion of the item `lag` items before item `seq`: `None` while it is unknown,
+    /// `Some(None)` if the chain starts there or later.
     pub fn before(&self, seq: u64, lag: u64) -> Option<Option<SearchedMotion>> {
         self.known.before(seq, lag)
     }

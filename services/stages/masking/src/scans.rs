@@ -64,7 +64,8 @@ impl Inputs for Scans {
             Queue::Live(queue) => queue.receive()?,
         }
         self.motions.update()?;
-        // The newest pose decides which scans are still needed, and in live mode where the chain resumes.
+        // The newest pose decides which scans are still needed, and in live mode where the chain
+        // resumes.
         let Some(resume_at) = self.motions.resume_at().copied() else {
             return Ok(Action::Wait);
         };
@@ -125,8 +126,8 @@ impl Inputs for Scans {
 }
 
 impl Scans {
-    /// Looks up the motions for a scan and the previous one; false while one is missing. They depend on the numbers alone, so they
-    /// are the same after a restart.
+    /// Looks up the motions for a scan and the previous one; false while one is missing. They
+    /// depend on the numbers alone, so they are the same after a restart.
     fn find_motions(&mut self, item: &Item) -> bool {
         if item.is(flag::BREAK) {
             self.motions.start_chain(item.seq);

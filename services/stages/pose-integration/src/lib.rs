@@ -1,4 +1,5 @@
-//! The pose-integration stage: composes motions and their covariances to poses, and journals each pose before it is published.
+//! The pose-integration stage: composes motions and their covariances to poses, and journals each
+//! pose before it is published.
 //!
 //! With SLAM it also selects the keyframes, and logs each of them before its pose is journalled.
 

@@ -38,31 +38,36 @@ impl SourceKind {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SourceConfig {
-    /// `recording`; or in live mode `colossus`, a Navtech radar on the network, or `ros2`, one behind its driver in
-    /// ROS 2. Then `data`, `first`, `retry_s` and `max_unreadable` are not used.
+    /// `recording`; or in live mode `colossus`, a Navtech radar on the network, or `ros2`, one
+    /// behind its driver in ROS 2. Then `data`, `first`, `retry_s` and `max_unreadable` are not
+    /// used.
     pub kind: SourceKind,
-    /// Address of the radar, as in `192.168.0.1`; its port is 6317 unless it is given. `udp://GROUP:PORT`: where a radar sends to whose
-    /// data output is CAT-240, as in `udp://239.192.43.78:4378`.
+    /// Address of the radar, as in `192.168.0.1`; its port is 6317 unless it is given.
+    /// `udp://GROUP:PORT`: where a radar sends to whose data output is CAT-240, as in
+    /// `udp://239.192.43.78:4378`.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub address: String,
-    /// Topic of ROS 2 on which Navtech's driver publishes azimuths, as in `/radar_data/fft_data`; `--ros2` on the command
-    /// line. Its configuration is beside it, `/radar_data/configuration_data`.
+    /// Topic of ROS 2 on which Navtech's driver publishes azimuths, as in `/radar_data/fft_data`;
+    /// `--ros2` on the command line. Its configuration is beside it,
+    /// `/radar_data/configuration_data`.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub topic: String,
     /// Domain of ROS 2. Default: `ROS_DOMAIN_ID`, or 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub domain: Option<u16>,
-    /// Address of this machine on the network of a radar that sends to a multicast group, as in `192.168.0.2`. Default: the system
-    /// chooses. Of ROS 2 the only network that is used; default: all.
+    /// Address of this machine on the network of a radar that sends to a multicast group, as in
+    /// `192.168.0.2`. Default: the system chooses. Of ROS 2 the only network that is used; default:
+    /// all.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub interface: String,
-    /// Time without an azimuth from the radar after which it is connected to anew, or in ROS 2 after which that is reported,
-    /// s; 0: no limit.
+    /// Time without an azimuth from the radar after which it is connected to anew, or in ROS 2
+    /// after which that is reported, s; 0: no limit.
     pub silence_s: f64,
     /// Folder of the recording; `--data` on the command line.
     pub data: PathBuf,
-    /// Topic from which on a recording of a run is played: `scan`, `masked`, `rotation`, `motion` or `refined`; `--from` on the
-    /// command line. The stages before it are absent. Of all but `scan` every message must have been recorded.
+    /// Topic from which on a recording of a run is played: `scan`, `masked`, `rotation`, `motion`
+    /// or `refined`; `--from` on the command line. The stages before it are absent. Of all but
+    /// `scan` every message must have been recorded.
     #[serde(skip_serializing_if = "is_scan")]
     pub from: PlayedFrom,
     /// First scan to play, from 0.
@@ -70,12 +75,13 @@ pub struct SourceConfig {
     /// Number of scans to play. Default: all, and of a radar without end.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scans: Option<usize>,
-    /// Play the recording again and again, with times that go on: `gyre stress`. `scans` then counts
-    /// those of all turns; without it the run has no end.
+    /// Play the recording again and again, with times that go on: `gyre stress`. `scans` then
+    /// counts those of all turns; without it the run has no end.
     #[serde(skip_serializing_if = "is_false")]
     pub repeat: bool,
-    /// Number of scans that become due at once, as from a network that holds them back; the mean rate
-    /// stays. They follow each other as fast as they are decoded. Only with a `run.rate` other than `max`.
+    /// Number of scans that become due at once, as from a network that holds them back; the mean
+    /// rate stays. They follow each other as fast as they are decoded. Only with a `run.rate` other
+    /// than `max`.
     #[serde(skip_serializing_if = "is_one")]
     pub burst: NonZeroUsize,
     /// Time for which a file that the disk or the network does not give is tried again, s. Then the
@@ -128,8 +134,8 @@ impl SourceConfig {
         first..end.min(scans)
     }
 
-    /// Returns the scans of the stream that is played of a dataset, counted on through all turns. It ends at `usize::MAX` if it is
-    /// without end.
+    /// Returns the scans of the stream that is played of a dataset, counted on through all turns.
+    /// It ends at `usize::MAX` if it is without end.
     pub fn stream(&self, dataset: &dyn Dataset) -> Range<usize> {
         self.turned(self.played(dataset))
     }

@@ -1,4 +1,5 @@
-//! The source stage: publishes the scans of a dataset on `scan`, decoded directly into shared memory.
+//! The source stage: publishes the scans of a dataset on `scan`, decoded directly into shared
+//! memory.
 //!
 //! [`run`] opens a recording; [`play`] plays any dataset.
 
@@ -24,7 +25,8 @@ use turns::Turns;
 /// A playback with a longer delay is reported, s.
 const NOTABLE_SLIP_S: f64 = 0.01;
 
-/// The pace of a dataset in live mode: the fate of scans that become due while the source is busy or down.
+/// The pace of a dataset in live mode: the fate of scans that become due while the source is busy
+/// or down.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
     /// They are dropped, as those of a real sensor.
@@ -43,8 +45,8 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
         return play_recorded(launch);
     }
     let options: DatasetOptions = launch.section("dataset")?;
-    // The supervisor has opened it before, so whatever is wrong now may pass. It has resolved the options too: a dataset.toml
-    // that is changed during a run does not change the run.
+    // The supervisor has opened it before, so whatever is wrong now may pass. It has resolved the
+    // options too: a dataset.toml that is changed during a run does not change the run.
     let root = &launch.manifest.root;
     let open = || open(root, &config, &options).map_err(|error| error.to_string());
     match source::open(launch, &config.tolerance(), open)? {

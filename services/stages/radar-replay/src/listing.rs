@@ -1,7 +1,7 @@
 //! The files of a recording as the run's supervisor has listed them.
 //!
-//! A source that is restarted need not list the folder again. And it plays the same files under the same numbers, even if files
-//! came or went meanwhile.
+//! A source that is restarted need not list the folder again. And it plays the same files under the
+//! same numbers, even if files came or went meanwhile.
 
 use std::{
     fs,

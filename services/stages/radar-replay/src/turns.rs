@@ -14,7 +14,8 @@ pub struct Turns {
 }
 
 impl Turns {
-    /// The turns of these scans. Where their times are not known without decoding, a turn lasts a period for each scan.
+    /// The turns of these scans. Where their times are not known without decoding, a turn lasts a
+    /// period for each scan.
     pub fn of(once: Range<usize>, dataset: &dyn Dataset) -> Self {
         let stamp_ns = |scan| dataset.nominal_stamp_ns(scan);
         let ends = || Some(stamp_ns(once.end.checked_sub(1)?)? - stamp_ns(once.start)?);
@@ -26,7 +27,8 @@ impl Turns {
         Self { once, turn_ns }
     }
 
-    /// Returns the index in the recording of scan `index` of the stream, and what is to be added to its times, ns.
+    /// Returns the index in the recording of scan `index` of the stream, and what is to be added to
+    /// its times, ns.
     pub fn place(&self, index: usize) -> (usize, i64) {
         let (scans, after) = (self.once.len(), index.saturating_sub(self.once.start));
         // Without a turn there is nothing to play; the reader says so.

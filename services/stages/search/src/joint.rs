@@ -1,5 +1,6 @@
-//! The joint-search stage: an exhaustive search for rotation and translation between consecutive scans over every angle (Masking
-//! by Moving; `raw` in Weston et al., Table III). It replaces both stages of the decoupled search.
+//! The joint-search stage: an exhaustive search for rotation and translation between consecutive
+//! scans over every angle (Masking by Moving; `raw` in Weston et al., Table III). It replaces both
+//! stages of the decoupled search.
 
 use gyre_messages::{Masked, Motion, MotionEstimate, StageId};
 use gyre_radar::raster::RasterConfig;

@@ -1,5 +1,5 @@
-//! The search for the motion between consecutive scans: its stages [`rotation`] and [`translation`], and [`joint`], which replaces
-//! both.
+//! The search for the motion between consecutive scans: its stages [`rotation`] and
+//! [`translation`], and [`joint`], which replaces both.
 
 pub mod joint;
 pub mod rotation;

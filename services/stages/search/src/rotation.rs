@@ -1,5 +1,5 @@
-//! The rotation-search stage: the rotation between consecutive scans from their magnitude spectra (Weston et al.,
-//! Sec. III-C, step 1).
+//! The rotation-search stage: the rotation between consecutive scans from their magnitude spectra
+//! (Weston et al., Sec. III-C, step 1).
 
 use gyre_messages::{Masked, Rotation, RotationEstimate, StageId};
 use gyre_radar::raster::RasterConfig;

@@ -1,5 +1,5 @@
-//! The translation-search stage: the translation between consecutive scans once their rotation is known (Weston et al.,
-//! Eq. 8).
+//! The translation-search stage: the translation between consecutive scans once their rotation is
+//! known (Weston et al., Eq. 8).
 
 use gyre_messages::{Masked, Motion, MotionEstimate, Rotation, StageId};
 use gyre_radar::raster::RasterConfig;

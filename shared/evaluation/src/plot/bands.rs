@@ -7,7 +7,8 @@ use plotters::prelude::*;
 use super::{PlotError, canvas::*};
 use crate::{BandSample, Bands, TruthSigma};
 
-/// Size of the document, px: the header and three panels of equal height, the last with the time axis.
+/// Size of the document, px: the header and three panels of equal height, the last with the time
+/// axis.
 const SIZE: (u32, u32) = (900, HEADER + 3 * PANEL + TIME_AXIS);
 const PANEL: u32 = 220;
 const TIME_AXIS: u32 = 56;
@@ -18,7 +19,8 @@ const HEADROOM: f64 = 0.08;
 /// The colour of a band: that of the estimate, pale.
 const BAND: RGBColor = RGBColor(205, 226, 243);
 
-/// Returns the plot as an SVG document: the errors in x, y and yaw over time, each with its 3-sigma band.
+/// Returns the plot as an SVG document: the errors in x, y and yaw over time, each with its 3-sigma
+/// band.
 ///
 /// # Errors
 /// [`PlotError::Empty`] if no pose has ground truth, and [`PlotError::Draw`].
@@ -94,7 +96,8 @@ struct Point {
 }
 
 impl Panel {
-    /// The panel of one component (x, y, yaw) of the error, in a unit of which `scale` make one SI unit.
+    /// The panel of one component (x, y, yaw) of the error, in a unit of which `scale` make one SI
+    /// unit.
     fn new(bands: &Bands, y_desc: &'static str, part: usize, scale: f64) -> Self {
         let point = |s: &BandSample| Point {
             time_s: s.time_s,

@@ -1,4 +1,5 @@
-//! Common parts of the plots: coordinates, colours, axes, and the header with title, caption and legend.
+//! Common parts of the plots: coordinates, colours, axes, and the header with title, caption and
+//! legend.
 
 use std::ops::Range;
 
@@ -17,8 +18,8 @@ pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 pub type Chart<'a, 'b> =
     ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
-/// Canvas units in a px. plotters rounds SVG coordinates to integers, which makes curves jagged: everything is drawn this
-/// much larger and shown smaller.
+/// Canvas units in a px. plotters rounds SVG coordinates to integers, which makes curves jagged:
+/// everything is drawn this much larger and shown smaller.
 const UNITS_PER_PX: u32 = 8;
 
 /// The colour of the estimate and of errors.
@@ -201,7 +202,8 @@ pub fn number(value: &f64) -> String {
     }
 }
 
-/// Returns the width of an entry, px; a letter of a 14 px sans-serif font is about half as wide as high.
+/// Returns the width of an entry, px; a letter of a 14 px sans-serif font is about half as wide as
+/// high.
 fn entry_width(entry: &Entry<'_>) -> f64 {
     33.0 + 7.6 * entry.label.len() as f64 + 14.0
 }

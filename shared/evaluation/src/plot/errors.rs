@@ -10,8 +10,8 @@ const SIZE: (u32, u32) = (900, 640);
 /// Margin above the largest error, as a share of it.
 const HEADROOM: f64 = 0.12;
 
-/// Returns the plot as an SVG document: the KITTI errors over segment length, or, without them, the RPE over the distance
-/// travelled.
+/// Returns the plot as an SVG document: the KITTI errors over segment length, or, without them, the
+/// RPE over the distance travelled.
 ///
 /// # Errors
 /// [`PlotError::Empty`] if the evaluation has neither, and [`PlotError::Draw`].

@@ -44,11 +44,13 @@ pub enum PlotError {
 
 /// Draws `estimate`, over `truth` if given, into an SVG file: equal axes in metres, start marked.
 ///
-/// The ground truth must have as many poses; the estimate is aligned with it in SE(2). An [`Evaluation`] holds such poses,
-/// of one handedness: `plot_trajectory(path, e.matched.estimate(), Some(e.matched.truth()))`.
+/// The ground truth must have as many poses; the estimate is aligned with it in SE(2). An
+/// [`Evaluation`] holds such poses, of one handedness:
+/// `plot_trajectory(path, e.matched.estimate(), Some(e.matched.truth()))`.
 ///
 /// # Errors
-/// [`PlotError`] if there are no poses, if poses are invalid or differ in number, or if the file cannot be written.
+/// [`PlotError`] if there are no poses, if poses are invalid or differ in number, or if the file
+/// cannot be written.
 pub fn plot_trajectory(
     path: &Path,
     estimate: &[Pose],
@@ -64,16 +66,18 @@ pub fn plot_trajectory(
     write(path, &svg)
 }
 
-/// Draws the KITTI errors over segment length into an SVG file, or, if the path is too short for them, the RPE over the
-/// distance travelled.
+/// Draws the KITTI errors over segment length into an SVG file, or, if the path is too short for
+/// them, the RPE over the distance travelled.
 ///
 /// # Errors
-/// [`PlotError`] if the evaluation has neither (a ground truth without heading), or if the file cannot be written.
+/// [`PlotError`] if the evaluation has neither (a ground truth without heading), or if the file
+/// cannot be written.
 pub fn plot_errors(path: &Path, evaluation: &Evaluation) -> Result<(), PlotError> {
     write(path, &errors_svg(evaluation)?)
 }
 
-/// Draws the error of the composed poses in x, y and yaw over time into an SVG file, with 3-sigma bands.
+/// Draws the error of the composed poses in x, y and yaw over time into an SVG file, with 3-sigma
+/// bands.
 ///
 /// # Errors
 /// [`PlotError`] if no pose has ground truth, or if the file cannot be written.

@@ -22,8 +22,8 @@ const BORDER: f64 = 0.06;
 /// Smallest extent shown, m.
 const MIN_EXTENT_M: f64 = 1.0;
 
-/// Returns the plot as an SVG document: the aligned estimate of `matched` over its ground truth, or `estimate` alone in its
-/// own frame.
+/// Returns the plot as an SVG document: the aligned estimate of `matched` over its ground truth, or
+/// `estimate` alone in its own frame.
 ///
 /// # Errors
 /// [`PlotError::Empty`], [`PlotError::Poses`] if a pose is invalid, and [`PlotError::Draw`].
@@ -40,7 +40,8 @@ pub fn trajectory_svg(
     }
 }
 
-/// Returns the plot of a trajectory of so many poses and metres, of which only some poses are `drawn`.
+/// Returns the plot of a trajectory of so many poses and metres, of which only some poses are
+/// `drawn`.
 ///
 /// # Errors
 /// As [`trajectory_svg`].

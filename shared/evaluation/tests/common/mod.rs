@@ -15,8 +15,8 @@ pub fn chain(start: Pose, motions: impl IntoIterator<Item = Pose>) -> Vec<Pose> 
     poses
 }
 
-/// Returns a drive of `n` motions of 2.37 m (no segment length is a multiple) with bends that repeat every `bend` motions,
-/// more to the left.
+/// Returns a drive of `n` motions of 2.37 m (no segment length is a multiple) with bends that
+/// repeat every `bend` motions, more to the left.
 pub fn drive(n: usize, bend: f64) -> Vec<Pose> {
     let turn = |k: usize| 0.03 * (k as f64 * std::f64::consts::TAU / bend).sin() + 0.003;
     chain(

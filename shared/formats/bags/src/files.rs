@@ -26,8 +26,8 @@ const MAX_METADATA_BYTES: u64 = 16 << 20;
 /// The longest first record of a file, bytes: names of the profile and of a library.
 const MAX_HEADER_BYTES: u64 = 4096;
 
-/// Returns whether a path names a bag, of whatever storage: a file of the MCAP profile `ros2`, an SQLite database, or a folder with a
-/// bag's description or such files.
+/// Returns whether a path names a bag, of whatever storage: a file of the MCAP profile `ros2`, an
+/// SQLite database, or a folder with a bag's description or such files.
 pub fn is_bag(path: &Path) -> bool {
     if path.is_dir() {
         return has_metadata(path) || listed(path).iter().any(|file| is_bag_file(file));

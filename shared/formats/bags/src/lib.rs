@@ -1,8 +1,10 @@
-//! Bags of ROS 2: a radar's scans in them as a [`Dataset`](gyre_radar::Dataset), and bags that `ros2 bag play` takes.
+//! Bags of ROS 2: a radar's scans in them as a [`Dataset`](gyre_radar::Dataset), and bags that
+//! `ros2 bag play` takes.
 //!
-//! A bag is a file of the MCAP profile `ros2`, or a folder of such files with a `metadata.yaml`. Reading order: `files` (what is a bag), [`damaged`] (MCAP records from
-//! damaged files), `spans` (where messages are), `topics` (which of them are a radar's), `azimuths` (messages as azimuths), `scans` (azimuths as scans),
-//! [`BagWriter`].
+//! A bag is a file of the MCAP profile `ros2`, or a folder of such files with a `metadata.yaml`.
+//! Reading order: `files` (what is a bag), [`damaged`] (MCAP records from damaged files), `spans`
+//! (where messages are), `topics` (which of them are a radar's), `azimuths` (messages as azimuths),
+//! `scans` (azimuths as scans), [`BagWriter`].
 
 mod azimuths;
 pub mod damaged;

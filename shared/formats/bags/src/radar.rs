@@ -114,7 +114,8 @@ impl Survey {
         })
     }
 
-    /// Returns the azimuths of a turn: rows of an image, or the encoder's counts divided by the usual step.
+    /// Returns the azimuths of a turn: rows of an image, or the encoder's counts divided by the
+    /// usual step.
     fn azimuths(&self, encoder_size: u16) -> Option<usize> {
         let first = self.samples.first()?;
         if !matches!(self.kind, Kind::Azimuths(_)) {

@@ -18,7 +18,8 @@ const MAX_KEPT_BYTES: usize = 256 << 20;
 /// The largest span, bytes in the file. ROS 2's chunks have 768 kB.
 const MAX_SPAN_BYTES: u64 = 256 << 20;
 
-/// The largest number of channels and of schemas of a file, the longest name of a topic, and what is kept of a schema, bytes.
+/// The largest number of channels and of schemas of a file, the longest name of a topic, and what
+/// is kept of a schema, bytes.
 const MAX_CHANNELS: usize = 4096;
 const MAX_NAME_BYTES: usize = 1024;
 const MAX_SCHEMA_BYTES: usize = 4096;

@@ -113,8 +113,8 @@ impl Bag {
         }
     }
 
-    /// Describes the radar: by its first configuration, otherwise by what its azimuths and the options show. Also returns whether it has
-    /// described itself.
+    /// Describes the radar: by its first configuration, otherwise by what its azimuths and the
+    /// options show. Also returns whether it has described itself.
     fn describe(
         &mut self,
         topics: &Topics,

@@ -36,7 +36,8 @@ pub(crate) struct Topic {
 }
 
 impl Topic {
-    /// Returns the topic of a channel, if it is a radar's. Packages of messages have had several names.
+    /// Returns the topic of a channel, if it is a radar's. Packages of messages have had several
+    /// names.
     pub fn of(channel: &Channel) -> Option<Self> {
         let (_, name) = channel.type_name.rsplit_once('/')?;
         // Where the definition is missing, the type's name decides.
@@ -76,7 +77,8 @@ pub(crate) struct Topics {
 }
 
 impl Topics {
-    /// Chooses the topic of scans, `wished` if it is named, and that of the radar's configuration nearest to it.
+    /// Chooses the topic of scans, `wished` if it is named, and that of the radar's configuration
+    /// nearest to it.
     ///
     /// # Errors
     /// There is none, or one of several must be chosen.
@@ -120,8 +122,8 @@ impl Topics {
     }
 }
 
-/// Returns the topics from which one is chosen. Images are of many sensors: only those that the driver names so are a radar's, unless one
-/// is named.
+/// Returns the topics from which one is chosen. Images are of many sensors: only those that the
+/// driver names so are a radar's, unless one is named.
 fn candidates<'a>(topics: &'a BTreeSet<Topic>, wished: Option<&str>) -> Vec<&'a Topic> {
     let scans = || topics.iter().filter(|topic| topic.has_scans());
     if let Some(wished) = wished {

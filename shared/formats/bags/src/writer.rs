@@ -29,7 +29,8 @@ const LEVEL: u32 = 1;
 pub enum Kept {
     /// For nobody: durability `volatile`.
     ForNobody,
-    /// For subscribers that come later: durability `transient_local`, as `/tf_static` and maps have it.
+    /// For subscribers that come later: durability `transient_local`, as `/tf_static` and maps have
+    /// it.
     ForLater,
 }
 
@@ -40,7 +41,8 @@ pub struct Topic<T> {
     message: PhantomData<T>,
 }
 
-/// Writes a bag: a folder with a `metadata.yaml`, or one file if the name ends in `.mcap`. It has another name until it is complete.
+/// Writes a bag: a folder with a `metadata.yaml`, or one file if the name ends in `.mcap`. It has
+/// another name until it is complete.
 pub struct BagWriter {
     path: PathBuf,
     aside: PathBuf,

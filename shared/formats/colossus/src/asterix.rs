@@ -1,15 +1,19 @@
-//! The powers of a Navtech radar by UDP: video messages of ASTERIX, category 240, with Navtech's special purpose field.
+//! The powers of a Navtech radar by UDP: video messages of ASTERIX, category 240, with Navtech's
+//! special purpose field.
 //!
-//! Navtech's own messages by UDP (at 239.69.69.69:6317) have other ids than those by TCP, and none of them carries powers: 10
-//! discovery, 20 network settings, 30 keep-alive, 40 the radar's own detections. A radar sends its powers by UDP when its data output
-//! is set to CAT-240: to one address or to a multicast group.
+//! Navtech's own messages by UDP (at 239.69.69.69:6317) have other ids than those by TCP, and none
+//! of them carries powers: 10 discovery, 20 network settings, 30 keep-alive, 40 the radar's own
+//! detections. A radar sends its powers by UDP when its data output is set to CAT-240: to one
+//! address or to a multicast group.
 //!
-//! Sources: EUROCONTROL's specification of category 240, edition 1.3, for the items and their order; Navtech's public IASDK,
-//! `cpp_17/src/network/protocols/CAT_240/messages`, for what stands in them and for the special purpose field; `Colossus/UDP/messages`
-//! of the same for the ids above. All numbers are big-endian.
+//! Sources: EUROCONTROL's specification of category 240, edition 1.3, for the items and their
+//! order; Navtech's public IASDK, `cpp_17/src/network/protocols/CAT_240/messages`, for what stands
+//! in them and for the special purpose field; `Colossus/UDP/messages` of the same for the ids
+//! above. All numbers are big-endian.
 //!
-//! An azimuth has more bytes than a datagram should have, so the radar sends it in several messages: each has the number of its first
-//! bin, and repeats angle, time and description. [`Datagrams`] puts them together.
+//! An azimuth has more bytes than a datagram should have, so the radar sends it in several
+//! messages: each has the number of its first bin, and repeats angle, time and description.
+//! [`Datagrams`] puts them together.
 
 mod assembly;
 mod datagrams;
@@ -136,7 +140,8 @@ impl Video<'_> {
     }
 }
 
-/// Returns the encoder count of an angle. The angle was rounded down, by less than a count of any encoder of up to 32,768.
+/// Returns the encoder count of an angle. The angle was rounded down, by less than a count of any
+/// encoder of up to 32,768.
 fn encoder(angle: u16, encoder_size: u16) -> u16 {
     let size = encoder_size.max(1);
     let count = (f64::from(angle) + 0.5) / ANGLES * f64::from(size);
@@ -167,7 +172,8 @@ impl<'a> Items<'a> {
         Ok(bytes)
     }
 
-    /// Takes an item that begins with its own length, which it has at least; returns it without that byte.
+    /// Takes an item that begins with its own length, which it has at least; returns it without
+    /// that byte.
     fn counted(
         &mut self,
         item: &'static str,

@@ -1,5 +1,6 @@
-//! The time of each azimuth. What a radar sends as its time depends on its software and on its network: the byte order of the
-//! seconds, the unit of their fraction, and whether it has the time at all.
+//! The time of each azimuth. What a radar sends as its time depends on its software and on its
+//! network: the byte order of the seconds, the unit of their fraction, and whether it has the time
+//! at all.
 
 use std::{fmt, iter};
 
@@ -8,11 +9,13 @@ use crate::kept::KeptAzimuth;
 use crate::message::Azimuth;
 
 const SECOND_NS: i64 = 1_000_000_000;
-/// 2001-01-01 and 2101-01-01, s since 1970. A radar that was never told the time counts from 1970 or from 2000.
+/// 2001-01-01 and 2101-01-01, s since 1970. A radar that was never told the time counts from 1970
+/// or from 2000.
 const YEARS_S: std::ops::Range<i64> = 978_307_200..4_133_980_800;
 /// Azimuths for which the clock is looked for. Stamps may come in bursts of a packet.
 const MAX_HELD: usize = 32;
-/// The largest ratio of the time between azimuths to that of the configured rotation. Units differ by 1000.
+/// The largest ratio of the time between azimuths to that of the configured rotation. Units differ
+/// by 1000.
 const MAX_RATIO: f64 = 20.0;
 
 /// The order of the bytes of a number.
@@ -72,7 +75,8 @@ pub struct ClockFormat {
 }
 
 impl ClockFormat {
-    /// Returns [`Azimuth::seconds`] and [`Azimuth::split_seconds`] of a time in ns since 1970, which is rounded down to the unit.
+    /// Returns [`Azimuth::seconds`] and [`Azimuth::split_seconds`] of a time in ns since 1970,
+    /// which is rounded down to the unit.
     pub fn fields(self, stamp_ns: i64) -> ([u8; 4], [u8; 4]) {
         let seconds = stamp_ns.div_euclid(SECOND_NS).clamp(0, u32::MAX.into());
         let split = stamp_ns.rem_euclid(SECOND_NS) / self.unit.ns();
@@ -111,9 +115,11 @@ impl ClockFormat {
 pub enum FoundClock {
     /// The radar has the time.
     Unix(ClockFormat),
-    /// The radar measures time from another start, such as its own. The host's time at the first azimuth is added.
+    /// The radar measures time from another start, such as its own. The host's time at the first
+    /// azimuth is added.
     Uptime(ClockFormat),
-    /// The radar's time does not advance as the radar turns. Azimuths have the times at which they arrive.
+    /// The radar's time does not advance as the radar turns. Azimuths have the times at which they
+    /// arrive.
     Arrival,
 }
 
@@ -136,9 +142,10 @@ impl fmt::Display for FoundClock {
 
 /// Gives each azimuth its time. One clock per connection.
 ///
-/// The first azimuths do not tell the format of their time: there are two byte orders, and a fraction below 1,000,000 may be of either
-/// unit. The difference of two azimuths does, because the configuration gives the time in which the radar turns from one to the
-/// other. So the first azimuth is held back until the second, and no azimuth is lost or has a wrong time.
+/// The first azimuths do not tell the format of their time: there are two byte orders, and a
+/// fraction below 1,000,000 may be of either unit. The difference of two azimuths does, because the
+/// configuration gives the time in which the radar turns from one to the other. So the first
+/// azimuth is held back until the second, and no azimuth is lost or has a wrong time.
 #[derive(Clone, Debug)]
 pub struct RadarClock {
     encoder_size: i32,
@@ -164,13 +171,14 @@ impl RadarClock {
         }
     }
 
-    /// Returns the kind of clock; `None` until it is found. It changes from uptime to Unix if the radar learns the time.
+    /// Returns the kind of clock; `None` until it is found. It changes from uptime to Unix if the
+    /// radar learns the time.
     pub fn found(&self) -> Option<FoundClock> {
         self.found
     }
 
-    /// Returns the azimuths that have a time now, in order, each with its time in ns since 1970. It is the azimuth given; none
-    /// while it is held back; or those held back, and the one given.
+    /// Returns the azimuths that have a time now, in order, each with its time in ns since 1970. It
+    /// is the azimuth given; none while it is held back; or those held back, and the one given.
     ///
     /// `arrived_ns` is the host's time, ns since 1970.
     pub fn stamp<'a>(
@@ -235,11 +243,12 @@ impl RadarClock {
         }
     }
 
-    /// Returns the format in which the time between two azimuths is nearest to that of the configured rotation; `None` if it is far
-    /// from that in all.
+    /// Returns the format in which the time between two azimuths is nearest to that of the
+    /// configured rotation; `None` if it is far from that in all.
     ///
-    /// In the wrong byte order a fraction of a second advances at random, and in the wrong unit by 1000 times as much or as little.
-    /// This is surer than whether the seconds are of these years: most numbers of 32 bits are, in either order.
+    /// In the wrong byte order a fraction of a second advances at random, and in the wrong unit by
+    /// 1000 times as much or as little. This is surer than whether the seconds are of these years:
+    /// most numbers of 32 bits are, in either order.
     fn format(
         &self,
         earlier: &Azimuth<'_>,

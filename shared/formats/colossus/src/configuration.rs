@@ -51,8 +51,8 @@ pub struct BadConfiguration {
 }
 
 impl Configuration {
-    /// Returns the depth of a range bin, m: the exact value of the protobuf if there is one, otherwise `bin_size`, which is rounded to
-    /// 0.1 mm (0.04381 m becomes 0.0438).
+    /// Returns the depth of a range bin, m: the exact value of the protobuf if there is one,
+    /// otherwise `bin_size`, which is rounded to 0.1 mm (0.04381 m becomes 0.0438).
     pub fn range_resolution_m(&self) -> f32 {
         // A protobuf leaves out zeros, so that a zero is no value.
         let exact = self.range_resolution_m.filter(|metres| *metres != 0.0);

@@ -33,7 +33,8 @@ pub struct Health {
     pub encoder_errors: Option<i32>,
 }
 
-/// A value that the radar watches, in a unit that is not documented (temperatures: degrees Celsius, by their limits).
+/// A value that the radar watches, in a unit that is not documented (temperatures: degrees Celsius,
+/// by their limits).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reading {
     /// The value.

@@ -1,4 +1,5 @@
-//! Navtech's network protocol Colossus (TCP), without I/O: bytes in, messages out; azimuths in, scans out.
+//! Navtech's network protocol Colossus (TCP), without I/O: bytes in, messages out; azimuths in,
+//! scans out.
 //!
 //! Reading order:
 //! - [`message`]: what a radar and its clients send;
@@ -10,8 +11,9 @@
 //! - [`clock`]: the time of each azimuth;
 //! - [`sweep`]: azimuths to scans.
 //!
-//! A client connects to [`PORT`]. The radar sends its configuration, the client sends [`Request::StartFft`], and the radar sends
-//! azimuths until [`Request::StopFft`]. A radar has at most three clients.
+//! A client connects to [`PORT`]. The radar sends its configuration, the client sends
+//! [`Request::StartFft`], and the radar sends azimuths until [`Request::StopFft`]. A radar has at
+//! most three clients.
 
 pub mod asterix;
 pub mod clock;

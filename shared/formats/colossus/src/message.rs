@@ -1,5 +1,6 @@
-//! Messages. Each is a header of 22 bytes (signature, version, id, payload size) and a payload. Numbers are big-endian, but for
-//! the time of an azimuth, whose byte order depends on the radar's software.
+//! Messages. Each is a header of 22 bytes (signature, version, id, payload size) and a payload.
+//! Numbers are big-endian, but for the time of an azimuth, whose byte order depends on the radar's
+//! software.
 
 use crate::configuration::{self, Configuration};
 use crate::health::{self, Health};
@@ -106,7 +107,8 @@ pub struct Azimuth<'a> {
 pub enum Powers<'a> {
     /// One byte per bin.
     Eight(&'a [u8]),
-    /// Two bytes per bin. Their order is not documented; [`SweepAssembler`](crate::SweepAssembler) finds it.
+    /// Two bytes per bin. Their order is not documented; [`SweepAssembler`](crate::SweepAssembler)
+    /// finds it.
     Sixteen(&'a [u8]),
 }
 

@@ -1,4 +1,5 @@
-//! Peaks that the radar itself has found in an azimuth: its navigation mode. Neither speed nor position are in it.
+//! Peaks that the radar itself has found in an azimuth: its navigation mode. Neither speed nor
+//! position are in it.
 
 use crate::malformed::{MalformedMessage, head};
 
@@ -7,7 +8,8 @@ const HEAD_BYTES: usize = 10;
 /// Range and power.
 const PEAK_BYTES: usize = 6;
 
-/// The peaks of one azimuth: id 123. All its numbers are big-endian, unlike the time of an [`Azimuth`](crate::Azimuth).
+/// The peaks of one azimuth: id 123. All its numbers are big-endian, unlike the time of an
+/// [`Azimuth`](crate::Azimuth).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Navigation<'a> {
     /// Encoder count of the antenna, clockwise from straight ahead.

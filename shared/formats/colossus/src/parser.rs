@@ -8,7 +8,8 @@ use crate::message::{HEADER_BYTES, MAX_PAYLOAD_BYTES, Message, SIGNATURE, VERSIO
 
 /// The most bytes that [`Parser::space`] promises.
 pub const MAX_SPACE_BYTES: usize = 1 << 16;
-/// The most memory of a parser: the largest message, all but a byte of it received, the end of the one before, and space for more.
+/// The most memory of a parser: the largest message, all but a byte of it received, the end of the
+/// one before, and space for more.
 pub const MAX_BUFFER_BYTES: usize =
     SIGNATURE.len() + HEADER_BYTES + MAX_PAYLOAD_BYTES + MAX_SPACE_BYTES;
 
@@ -51,17 +52,20 @@ pub enum Damage {
 
 /// A buffer that is filled from a socket, and the messages in it.
 ///
-/// Read into [`Parser::space`], say how much with [`Parser::filled`], and take all events with [`Parser::next`].
+/// Read into [`Parser::space`], say how much with [`Parser::filled`], and take all events with
+/// [`Parser::next`].
 ///
-/// After a fault the parser looks for the next signature. All whole messages after it are found; a message that is cut short may
-/// be returned with some bytes of the next one, and hold up the next ones until as many bytes are there as it says it has.
+/// After a fault the parser looks for the next signature. All whole messages after it are found; a
+/// message that is cut short may be returned with some bytes of the next one, and hold up the next
+/// ones until as many bytes are there as it says it has.
 #[derive(Debug, Default)]
 pub struct Parser {
     buffer: Vec<u8>,
     /// Received and not yet parsed: `buffer[start..end]`.
     start: usize,
     end: usize,
-    /// Bytes before `start`, of the last message, with which a signature may begin: the message was cut short then.
+    /// Bytes before `start`, of the last message, with which a signature may begin: the message was
+    /// cut short then.
     before: usize,
     /// The first fault of the bytes that are being skipped.
     damage: Option<Damage>,
@@ -74,8 +78,9 @@ impl Parser {
         Self::default()
     }
 
-    /// Returns memory to read into, of `at_least` bytes (at least 1, at most [`MAX_SPACE_BYTES`]), once all events have been
-    /// taken. It is shorter, perhaps empty, if they have not: the buffer never has more than [`MAX_BUFFER_BYTES`].
+    /// Returns memory to read into, of `at_least` bytes (at least 1, at most [`MAX_SPACE_BYTES`]),
+    /// once all events have been taken. It is shorter, perhaps empty, if they have not: the buffer
+    /// never has more than [`MAX_BUFFER_BYTES`].
     pub fn space(&mut self, at_least: usize) -> &mut [u8] {
         let at_least = at_least.clamp(1, MAX_SPACE_BYTES);
         if self.buffer.len() - self.end < at_least {
@@ -141,7 +146,8 @@ impl Parser {
         })
     }
 
-    /// Returns the number of bytes that have been skipped since the last event: it grows while the stream is not Colossus.
+    /// Returns the number of bytes that have been skipped since the last event: it grows while the
+    /// stream is not Colossus.
     pub fn skipped_bytes(&self) -> usize {
         self.skipped_bytes
     }
@@ -198,14 +204,16 @@ fn agree(one: &[u8], other: &[u8]) -> bool {
     one.iter().zip(other).all(|(a, b)| a == b)
 }
 
-/// Returns the number of bytes at the end with which a signature begins. There is one at most, as its first byte does not repeat.
+/// Returns the number of bytes at the end with which a signature begins. There is one at most, as
+/// its first byte does not repeat.
 fn begun(bytes: &[u8]) -> usize {
     let most = bytes.len().min(SIGNATURE.len() - 1);
     let begun = (1..=most).find(|n| bytes.ends_with(&SIGNATURE[..*n]));
     begun.unwrap_or(0)
 }
 
-/// Returns the place of the first signature (Horspool's search: most bytes of powers are not looked at).
+/// Returns the place of the first signature (Horspool's search: most bytes of powers are not looked
+/// at).
 fn find(bytes: &[u8]) -> Option<usize> {
     let mut at = 0;
     while let Some(window) = bytes.get(at..at + SIGNATURE.len()) {

@@ -30,7 +30,8 @@ impl Value<'_> {
     }
 }
 
-/// Calls `each` with number and value of each field, in order. The last one of a number counts, as protobuf requires.
+/// Calls `each` with number and value of each field, in order. The last one of a number counts, as
+/// protobuf requires.
 pub(crate) fn fields<'a>(
     message: &'static str,
     protobuf: &'a [u8],

@@ -1,6 +1,7 @@
 //! Azimuths to scans.
 //!
-//! Angles, times and scales are those of a recording of the same azimuths, to the bit: see [`gyre_radar::open`].
+//! Angles, times and scales are those of a recording of the same azimuths, to the bit: see
+//! [`gyre_radar::open`].
 
 mod counters;
 mod powers;
@@ -129,8 +130,8 @@ impl SweepAssembler {
         self.counters
     }
 
-    /// Returns the number of azimuths from the last one to the end of its turn; `None` before the first one. No scan is complete before
-    /// they are there.
+    /// Returns the number of azimuths from the last one to the end of its turn; `None` before the
+    /// first one. No scan is complete before they are there.
     pub fn azimuths_left(&self) -> Option<f64> {
         let last = self.last?;
         Some(self.grid.azimuths_after(last))
@@ -141,14 +142,16 @@ impl SweepAssembler {
         self.state == State::Open || self.kept.is_some()
     }
 
-    /// Returns the order of the two bytes of 16-bit powers, once it is known. It is not documented: it is the one in which neighbouring
-    /// bins differ less. In the wrong order the noise of the less significant byte is the more significant one.
+    /// Returns the order of the two bytes of 16-bit powers, once it is known. It is not documented:
+    /// it is the one in which neighbouring bins differ less. In the wrong order the noise of the
+    /// less significant byte is the more significant one.
     pub fn power_order(&self) -> Option<ByteOrder> {
         self.rows.order.decided()
     }
 
-    /// Writes an azimuth, and returns the sweep that is complete with it. An azimuth of the next sweep completes one that has lost its
-    /// last azimuths; it is kept, and written at the next call.
+    /// Writes an azimuth, and returns the sweep that is complete with it. An azimuth of the next
+    /// sweep completes one that has lost its last azimuths; it is kept, and written at the next
+    /// call.
     ///
     /// `slot` is the same memory until a sweep is returned, whose scan it then is.
     ///

@@ -29,8 +29,8 @@ pub fn write_configuration(out: &mut Vec<u8>, configuration: &Configuration) {
     }
 }
 
-/// Appends an azimuth. [`ClockFormat::fields`](crate::ClockFormat::fields) gives its time. Powers that do not fit into a message of
-/// [`MAX_PAYLOAD_BYTES`] are cut.
+/// Appends an azimuth. [`ClockFormat::fields`](crate::ClockFormat::fields) gives its time. Powers
+/// that do not fit into a message of [`MAX_PAYLOAD_BYTES`] are cut.
 pub fn write_azimuth(out: &mut Vec<u8>, azimuth: &Azimuth<'_>) {
     let id = match azimuth.powers {
         Powers::Eight(_) => id::AZIMUTH,

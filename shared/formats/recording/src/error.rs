@@ -32,7 +32,7 @@ pub enum RecordingError {
     Foreign {
         /// The file.
         path: PathBuf,
-        /// What is missing.
+        /// The missing part.
         reason: String,
     },
     /// A part of it is damaged.
@@ -42,7 +42,7 @@ pub enum RecordingError {
         path: PathBuf,
         /// The position of the record.
         offset: u64,
-        /// What is wrong.
+        /// The problem.
         reason: String,
     },
     /// A message that was not recorded.

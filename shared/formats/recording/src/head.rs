@@ -8,7 +8,8 @@ use mcap::records::Metadata;
 
 /// The name of the record.
 const NAME: &str = "gyre.recording";
-/// The version of everything that this crate writes beside the wire messages, which carry versions of their own.
+/// The version of everything that this crate writes beside the wire messages, which carry versions
+/// of their own.
 const FORMAT: &str = "1";
 
 /// The run that a recording is of.

@@ -57,7 +57,8 @@ impl Rows {
         }
     }
 
-    /// Returns the image and the rest of a payload, in order; `None` if the payload is shorter than the image.
+    /// Returns the image and the rest of a payload, in order; `None` if the payload is shorter than
+    /// the image.
     pub fn split(&self, payload: &[u8]) -> Option<(Vec<u8>, Vec<u8>)> {
         let mut image = Vec::with_capacity(self.count.checked_mul(self.width)?.min(payload.len()));
         let mut rest = payload.get(..self.first)?.to_vec();

@@ -8,17 +8,19 @@
 //! | `/motion`, `/pose`, `/tf`, `/log` and others | protobuf, Foxglove's schemas | what a viewer draws: [`view`] |
 //! | `gyre/TOPIC` | `gyre`, schema `gyre_TOPIC_header_vN` | the header of the wire message, then what of its payload no image holds |
 //!
-//! The image of a message stands directly before it, in the same chunk and with the same sequence number. [`image`] takes a
-//! payload apart and puts it together again.
+//! The image of a message stands directly before it, in the same chunk and with the same sequence
+//! number. [`image`] takes a payload apart and puts it together again.
 //!
-//! The log time of a message is the sensor's: the stamp of its scan. So a drive that was replayed thirty times faster plays at its own
-//! pace. The publish time is that of the machine at which the recorder received it.
+//! The log time of a message is the sensor's: the stamp of its scan. So a drive that was replayed
+//! thirty times faster plays at its own pace. The publish time is that of the machine at which the
+//! recorder received it.
 //!
-//! Behind each chunk a metadata record (`table`) lists the messages in it and what was missed so far. So a reader finds a message
-//! without decompressing what is before it, also in a file that has no summary because its writer was killed.
+//! Behind each chunk a metadata record (`table`) lists the messages in it and what was missed so
+//! far. So a reader finds a message without decompressing what is before it, also in a file that
+//! has no summary because its writer was killed.
 //!
-//! Reading order: `head` and `table` (the metadata), `writer`, `split` (several files), `walk` (the records of a file), `recording`, `scans` (a
-//! [`Dataset`](gyre_radar::Dataset)).
+//! Reading order: `head` and `table` (the metadata), `writer`, `split` (several files), `walk` (the
+//! records of a file), `recording`, `scans` (a [`Dataset`](gyre_radar::Dataset)).
 
 mod chunk;
 mod error;

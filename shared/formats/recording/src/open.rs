@@ -11,8 +11,8 @@ use crate::{
     scans::Scans,
 };
 
-/// Returns whether a path names a recording of a run: its first file, or a folder that holds it and no other one. A bag of ROS 2 is none,
-/// though it has files of the same form.
+/// Returns whether a path names a recording of a run: its first file, or a folder that holds it and
+/// no other one. A bag of ROS 2 is none, though it has files of the same form.
 pub fn is_recording(path: &Path) -> bool {
     if is_bag(path) {
         return false;

@@ -1,5 +1,5 @@
-//! The files of a recording: FILE.mcap, and FILE.2.mcap, FILE.3.mcap and so on, which are begun when the one before is large or
-//! long enough, and by recorders that were restarted.
+//! The files of a recording: FILE.mcap, and FILE.2.mcap, FILE.3.mcap and so on, which are begun
+//! when the one before is large or long enough, and by recorders that were restarted.
 
 use std::{
     fs,
@@ -14,7 +14,8 @@ fn part(path: &Path, number: usize) -> PathBuf {
     }
 }
 
-/// Returns the files of a recording that exist, in order. It is named by its first file, or by a folder that holds it and no other one.
+/// Returns the files of a recording that exist, in order. It is named by its first file, or by a
+/// folder that holds it and no other one.
 pub fn parts(path: &Path) -> Vec<PathBuf> {
     if path.is_dir() {
         return first_part_in(path).map_or_else(Vec::new, |first| parts(&first));

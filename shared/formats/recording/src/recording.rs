@@ -47,7 +47,7 @@ struct Part {
     file: File,
     channels: Channels,
     missed: BTreeMap<String, u64>,
-    /// Whether its writer came to its end.
+    /// True if its writer came to its end.
     is_complete: bool,
 }
 
@@ -135,7 +135,8 @@ impl Recording {
         &self.parts[place.map_or(0, |place| place.part)].path
     }
 
-    /// Returns the numbers of messages that the recorders have counted as missed, by topic. One that is in another part counts all the same.
+    /// Returns the numbers of messages that the recorders have counted as missed, by topic. One
+    /// that is in another part counts all the same.
     pub fn missed(&self) -> BTreeMap<&str, u64> {
         let mut missed = BTreeMap::new();
         for (topic, count) in self.parts.iter().flat_map(|part| &part.missed) {
@@ -191,7 +192,8 @@ impl Recording {
         })
     }
 
-    /// Returns the position of a chunk among those in memory, and reads it first if it is not there.
+    /// Returns the position of a chunk among those in memory, and reads it first if it is not
+    /// there.
     fn keep(&mut self, place: Place) -> Result<usize, RecordingError> {
         let is_it = |kept: &Kept| (kept.part, kept.chunk) == (place.part, place.chunk);
         if let Some(index) = self.kept.iter().position(is_it) {

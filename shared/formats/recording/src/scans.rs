@@ -1,4 +1,5 @@
-//! The scans of a recording as a dataset: bytes, azimuths, times and constants as they were recorded.
+//! The scans of a recording as a dataset: bytes, azimuths, times and constants as they were
+//! recorded.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -61,7 +62,8 @@ impl Scans {
         })
     }
 
-    /// Rejects options other than those that the scans were recorded with, which are in their numbers.
+    /// Rejects options other than those that the scans were recorded with, which are in their
+    /// numbers.
     pub fn check(
         &self,
         options: &DatasetOptions,

@@ -1,4 +1,5 @@
-//! A recording in several files: a file that is large or long enough is ended, and the next part begun.
+//! A recording in several files: a file that is large or long enough is ended, and the next part
+//! begun.
 
 use std::{collections::BTreeMap, path::PathBuf};
 
@@ -7,7 +8,7 @@ use crate::{Head, Incoming, LogLine, RecordingError, RecordingWriter, next_part}
 /// When a file is ended. What it holds then is looked at before each message.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Split {
-    /// Its size, bytes; `None`: any. A file is larger by at most a chunk and its summary.
+    /// The size, bytes; `None`: any. A file is larger by at most a chunk and its summary.
     pub bytes: Option<u64>,
     /// Time from its first to its newest scan on the sensor's clock, ns; `None`: any.
     pub span_ns: Option<i64>,

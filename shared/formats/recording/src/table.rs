@@ -6,13 +6,14 @@ use mcap::records::Metadata;
 
 /// The name of the record.
 const NAME: &str = "gyre.table";
-/// Before the name of a topic: the number of its messages that were missed, since the file was begun.
+/// Before the name of a topic: the number of its messages that were missed, since the file was
+/// begun.
 const MISSED: &str = "missed.";
 
 /// A message of a chunk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Entry {
-    /// Its sequence number.
+    /// The sequence number.
     pub seq: u64,
     /// The number of its scan.
     pub scan: u64,

@@ -1,4 +1,4 @@
-//! What viewers draw of a message, in Foxglove's schemas.
+//! Messages as viewers draw them, in Foxglove's schemas.
 //!
 //! | channel | schema | content |
 //! |---|---|---|
@@ -75,7 +75,7 @@ pub struct View {
 pub struct Channel {
     /// The topic that it is made of; [`LOG`] is made of no topic.
     pub topic: Option<&'static str>,
-    /// Its name.
+    /// The name.
     pub name: &'static str,
     /// Returns the schema of its messages.
     pub schema: fn() -> Option<Schema>,
@@ -118,7 +118,8 @@ impl View {
         }
     }
 
-    /// Returns the image of a message of a topic that has one; `None` if its payload is shorter than its header says.
+    /// Returns the image of a message of a topic that has one; `None` if its payload is shorter
+    /// than its header says.
     pub fn image_of(topic: &str, header: &[u8], payload: &[u8], stamp_ns: i64) -> Option<Self> {
         let rows = Rows::of(topic, header)?;
         let (image, _) = rows.split(payload)?;
@@ -139,7 +140,8 @@ impl View {
         Self::of(channel, &message)
     }
 
-    /// Returns the points of a scan, motion-compensated as its raster is. A point without weight is left out.
+    /// Returns the points of a scan, motion-compensated as its raster is. A point without weight is
+    /// left out.
     pub fn points(points: &[SparsePoint], header: &MaskedHeader) -> Self {
         let values = header
             .deskewed(points)

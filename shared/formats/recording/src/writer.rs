@@ -22,8 +22,8 @@ use crate::{
     view::{Recent, View, image_channel, views},
 };
 
-/// The longest time for which a message stays in memory. At four scans a second the history of the topics covers twice as much, so that
-/// a recorder that is killed and started again misses none.
+/// The longest time for which a message stays in memory. At four scans a second the history of the
+/// topics covers twice as much, so that a recorder that is killed and started again misses none.
 const FLUSH_PERIOD: Duration = Duration::from_millis(500);
 /// The size of a chunk, uncompressed, from which on it is written.
 const CHUNK_BYTES: usize = 4 << 20;
@@ -112,7 +112,8 @@ impl RecordingWriter {
             .compression_level(LEVEL)
             .compression_threads(0)
             .library(concat!("gyre ", env!("CARGO_PKG_VERSION")))
-            // Chunks end where a table is due. In memory until then: a killed recorder leaves no half of one.
+            // Chunks end where a table is due. In memory until then: a killed recorder leaves no
+            // half of one.
             .chunk_size(None)
             .disable_seeking(true);
         let unwritable = |source| RecordingError::of(path, source);
@@ -134,7 +135,8 @@ impl RecordingWriter {
         Ok(writer)
     }
 
-    /// Writes the head and the channels that replay needs, so that readers find them in the first chunk.
+    /// Writes the head and the channels that replay needs, so that readers find them in the first
+    /// chunk.
     fn begin(&mut self, head: &Head) -> Result<(), McapError> {
         self.mcap()?.write_metadata(&head.to_metadata())?;
         for topic in head.topics.iter().filter_map(|name| topic(name)) {
@@ -234,7 +236,8 @@ impl RecordingWriter {
         self.view(&View::log(line), Times::new(stamp_ns, line.written_ns, 0))
     }
 
-    /// Adds the health of the run, JSON, at the time of the newest scan; before the first one it is left out.
+    /// Adds the health of the run, JSON, at the time of the newest scan; before the first one it is
+    /// left out.
     ///
     /// # Errors
     /// As [`RecordingWriter::add`].
@@ -268,7 +271,8 @@ impl RecordingWriter {
         self.complete_bytes
     }
 
-    /// Returns the time from the first message of the file to the newest one on the sensor's clock, ns.
+    /// Returns the time from the first message of the file to the newest one on the sensor's clock,
+    /// ns.
     pub(crate) fn span_ns(&self) -> i64 {
         let newest_ns = self.newest_ns.zip(self.first_ns);
         newest_ns.map_or(0, |(newest, first)| newest.saturating_sub(first))
@@ -311,7 +315,8 @@ impl RecordingWriter {
         Ok(())
     }
 
-    /// Writes the messages so far as a chunk if they are many, or have waited for long. Call it twice a second while there are none.
+    /// Writes the messages so far as a chunk if they are many, or have waited for long. Call it
+    /// twice a second while there are none.
     ///
     /// # Errors
     /// As [`RecordingWriter::add`].
@@ -359,7 +364,8 @@ impl RecordingWriter {
         Ok(self.table.missed)
     }
 
-    /// Ends this file and goes on in the next part; returns the number of messages missed in this one, by topic.
+    /// Ends this file and goes on in the next part; returns the number of messages missed in this
+    /// one, by topic.
     pub(crate) fn go_on(
         &mut self,
         path: &Path,

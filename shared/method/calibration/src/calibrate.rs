@@ -19,9 +19,11 @@ use crate::{
 const ROUNDS: usize = 4;
 /// A round whose change is below this share of the standard deviations is the last.
 const CONVERGED: f64 = 0.5;
-/// Change of the eccentricity for the slope of the drift, rad: large, since two tracks differ by chance too.
+/// Change of the eccentricity for the slope of the drift, rad: large, since two tracks differ by
+/// chance too.
 const DRIFT_STEP_RAD: f64 = 3e-3;
-/// No estimate is better than this share of a cell of the local map, or its effect at the range of most points: the images' own error.
+/// No estimate is better than this share of a cell of the local map, or its effect at the range of
+/// most points: the images' own error.
 const CELL_SHARE: f64 = 0.05;
 /// Range of most points, m, and a usual speed, m/s.
 const USUAL_RANGE_M: f64 = 30.0;
@@ -30,7 +32,8 @@ const USUAL_SPEED_MPS: f64 = 10.0;
 const ROW_TIME_SHARE: f64 = 0.05;
 /// Revisits needed for the drift.
 const MIN_REVISITS: usize = 5;
-/// Facts that are solved for together. The others only confirm: odometry needs no correction of them.
+/// Facts that are solved for together. The others only confirm: odometry needs no correction of
+/// them.
 const SOLVED: [Fact; 3] = [Fact::RangeOffset, Fact::EccentricityCos, Fact::Doppler];
 
 /// Why a drive cannot be used.
@@ -75,13 +78,15 @@ pub struct FactEstimate {
 /// The constants of a radar, estimated from a drive.
 #[derive(Clone, Debug)]
 pub struct Calibration {
-    /// All facts in their order. The eccentricity to the side and the times of rows are checks, with the other facts as found.
+    /// All facts in their order. The eccentricity to the side and the times of rows are checks,
+    /// with the other facts as found.
     pub facts: [FactEstimate; FACTS],
     /// Places that were seen again.
     pub revisits: Vec<Revisit>,
     /// Pairs of scans that were compared.
     pub pairs: usize,
-    /// The last solution changed the facts by less than their standard deviations. Otherwise they are not to be trusted.
+    /// The last solution changed the facts by less than their standard deviations. Otherwise they
+    /// are not to be trusted.
     pub has_settled: bool,
     /// The mounting, by the corrected track.
     pub mounting: Option<Mounting>,
@@ -136,7 +141,8 @@ pub fn calibrate(drive: &Drive) -> Result<Calibration, CalibrationError> {
     Ok(calibration)
 }
 
-/// The mean of the tracks in both directions of time: errors of the processing that depend on the direction cancel.
+/// The mean of the tracks in both directions of time: errors of the processing that depend on the
+/// direction cancel.
 fn track(drive: &Drive, change: &FactVector) -> Result<Track, ConfigError> {
     let [forward, reversed] = [false, true].map(|reversed| drive.track(change, reversed));
     Ok(forward?.mean(&reversed?, drive))
@@ -204,7 +210,8 @@ fn round(
     })
 }
 
-/// Estimates the eccentricity from the drift between revisits, as a change against the configured one.
+/// Estimates the eccentricity from the drift between revisits, as a change against the configured
+/// one.
 fn drift_of(
     drive: &Drive,
     at: &Track,

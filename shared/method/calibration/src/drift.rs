@@ -1,4 +1,5 @@
-//! The drift between revisits: the track from one scan of a place to a later one must lead to where the two scans lie to each other.
+//! The drift between revisits: the track from one scan of a place to a later one must lead to where
+//! the two scans lie to each other.
 
 use gyre_geometry::{Pose, covariance, xy_yaw};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
@@ -10,7 +11,8 @@ const ALIGNMENT_SIGMA: [f64; 3] = [0.1, 0.1, 3e-3];
 /// Revisits that are used, evenly spread.
 pub(crate) const MAX_REVISITS: usize = 80;
 
-/// The residuals of all revisits: x, y (m) and yaw (rad) of the later scan as driven less as seen, in the frame of the earlier one.
+/// The residuals of all revisits: x, y (m) and yaw (rad) of the later scan as driven less as seen,
+/// in the frame of the earlier one.
 pub(crate) fn residuals(track: &Track, revisits: &[Revisit]) -> DVector<f64> {
     let rows = revisits.iter().flat_map(|revisit| {
         let driven = track.poses[revisit.earlier].inv_mul(&track.poses[revisit.later]);
@@ -26,7 +28,8 @@ fn difference(driven: &Pose, seen: &Pose) -> [f64; 3] {
     [x - seen_x, y - seen_y, turn]
 }
 
-/// Estimates the change of a fact that makes the revisits coincide: generalised least squares with the residuals' `slopes` by the fact.
+/// Estimates the change of a fact that makes the revisits coincide: generalised least squares with
+/// the residuals' `slopes` by the fact.
 pub(crate) fn solve(
     track: &Track,
     revisits: &[Revisit],

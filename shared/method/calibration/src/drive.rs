@@ -17,7 +17,8 @@ use crate::{
     facts::{Sign, correct},
 };
 
-/// Doppler coefficient of recordings that have none, s: small enough to change nothing, and it keeps the sign of each chirp.
+/// Doppler coefficient of recordings that have none, s: small enough to change nothing, and it
+/// keeps the sign of each chirp.
 const NO_DOPPLER_S: f32 = 1e-9;
 /// Directions for which the time of a row is kept.
 const DIRECTIONS: usize = 360;
@@ -129,9 +130,10 @@ impl Drive {
         Ok(())
     }
 
-    /// Extracts the points of rising chirps, then those of falling ones. Together, the stronger of two neighbours suppresses the other
-    /// where both chirps see it: of rising chirps the near edge of a thing would remain, of falling ones the far edge, which looks like
-    /// a larger Doppler shift.
+    /// Extracts the points of rising chirps, then those of falling ones. Together, the stronger of
+    /// two neighbours suppresses the other where both chirps see it: of rising chirps the near edge
+    /// of a thing would remain, of falling ones the far edge, which looks like a larger Doppler
+    /// shift.
     fn points_of_each_chirp(
         &mut self,
         scan: &PolarScan<'_>,

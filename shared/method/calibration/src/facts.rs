@@ -17,7 +17,8 @@ pub type FactMatrix = SMatrix<f64, FACTS, FACTS>;
 pub enum Fact {
     /// Offset of all ranges, m.
     RangeOffset,
-    /// Eccentricity of the encoder ahead: the true azimuth is the measured one plus this times its cosine, rad.
+    /// Eccentricity of the encoder ahead: the true azimuth is the measured one plus this times its
+    /// cosine, rad.
     EccentricityCos,
     /// Eccentricity of the encoder to the side: as before, times the sine, rad.
     EccentricitySin,
@@ -79,9 +80,11 @@ pub(crate) fn correct(
     }
 }
 
-/// Returns the derivatives by the facts of where a point is seen, in the sensor's frame: two rows, one column for each fact.
+/// Returns the derivatives by the facts of where a point is seen, in the sensor's frame: two rows,
+/// one column for each fact.
 ///
-/// `seen` is the point in that frame, `time_s` the time of its row and `chirp` the sign of its Doppler shift.
+/// `seen` is the point in that frame, `time_s` the time of its row and `chirp` the sign of its
+/// Doppler shift.
 pub(crate) fn displacements(
     seen: Vector2<f64>,
     time_s: f64,

@@ -1,16 +1,19 @@
 //! The constants of a radar, found from a drive alone, without ground truth.
 //!
-//! A wrong constant displaces what a scan sees by a smooth field, which moves with the vehicle. So two scans of one place from
-//! different poses cannot coincide, whatever their relative pose: the slope of their overlap by each constant, at the relative pose
-//! that is best for it, shows the direction of the right one. Wrong constants also make the track drift, and a road that is driven
+//! A wrong constant displaces what a scan sees by a smooth field, which moves with the vehicle. So
+//! two scans of one place from different poses cannot coincide, whatever their relative pose: the
+//! slope of their overlap by each constant, at the relative pose that is best for it, shows the
+//! direction of the right one. Wrong constants also make the track drift, and a road that is driven
 //! twice lies twice. Both are residuals of the constants, and [`calibrate`] solves them.
 //!
 //! Reading order:
 //! - [`Fact`]: the constants, and the fields of displacements;
 //! - [`Drive`]: the scans as points; [`Track`]: the poses by odometry in both directions of time;
 //! - `pair`, `image`: two scans with their relative pose and the slope of their overlap;
-//! - `overlap`: all pairs of a drive, solved for the constants, with the jackknife over blocks of the drive;
-//! - `revisits`, `drift`: places that are seen again, and what the drift between them says about the eccentricity;
+//! - `overlap`: all pairs of a drive, solved for the constants, with the jackknife over blocks of
+//!   the drive;
+//! - `revisits`, `drift`: places that are seen again, and what the drift between them says about
+//!   the eccentricity;
 //! - [`calibrate`]: the method;
 //! - [`Mounting`], [`OwnReflections`]: what follows from the track and from the scans directly.
 
@@ -42,8 +45,9 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// Returns the mean of two independent estimates, weighted by their information. Where they contradict each other by more than
-    /// their standard deviations, that of the mean is larger accordingly.
+    /// Returns the mean of two independent estimates, weighted by their information. Where they
+    /// contradict each other by more than their standard deviations, that of the mean is larger
+    /// accordingly.
     #[must_use]
     pub fn combined(&self, other: &Self) -> Self {
         let [own, others] = [self, other].map(|estimate| estimate.sigma.powi(-2));

@@ -12,7 +12,8 @@ const MAX_SLIP_RAD: f64 = 0.5;
 const MIN_SCANS: usize = 30;
 const BLOCKS: usize = 12;
 
-/// The mounting of the radar, from the direction of motion in its frame: yaw + curvature x distance ahead of the rear axle.
+/// The mounting of the radar, from the direction of motion in its frame: yaw + curvature x distance
+/// ahead of the rear axle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mounting {
     /// The yaw of the radar's straight ahead in the vehicle's frame, counter-clockwise, rad.
@@ -22,7 +23,8 @@ pub struct Mounting {
 }
 
 impl Mounting {
-    /// Estimates the mounting from the velocities at the scans; `None` if too few scans drive, or none turns.
+    /// Estimates the mounting from the velocities at the scans; `None` if too few scans drive, or
+    /// none turns.
     pub fn of(twists: &[Twist]) -> Option<Self> {
         let rows: Vec<[f64; 2]> = twists
             .iter()

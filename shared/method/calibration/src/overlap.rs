@@ -10,8 +10,8 @@ use crate::{
     pair::{PairSlope, View, compare},
 };
 
-/// Distances along the path between the scans of a pair, m. The longer, the more a wrong fact displaces, and the less the scans have
-/// in common.
+/// Distances along the path between the scans of a pair, m. The longer, the more a wrong fact
+/// displaces, and the less the scans have in common.
 const BASELINES_M: [f64; 4] = [5.0, 10.0, 20.0, 35.0];
 /// Distance along the path between the later scans of pairs, at least, m.
 const SPACING_M: f64 = 2.5;
@@ -162,8 +162,9 @@ impl System {
         self.rows.len()
     }
 
-    /// Solves for the change of the facts at which the slopes vanish, with the standard deviations by the jackknife over blocks of the
-    /// drive; the facts that are not in `free` keep their values. `None` if the pairs do not determine them.
+    /// Solves for the change of the facts at which the slopes vanish, with the standard deviations
+    /// by the jackknife over blocks of the drive; the facts that are not in `free` keep their
+    /// values. `None` if the pairs do not determine them.
     pub fn solve(&self, free: &[Fact]) -> Option<[Estimate; FACTS]> {
         let value = self.solve_without(free, None)?;
         let mut variance = FactVector::zeros();

@@ -1,4 +1,5 @@
-//! The reflections of the vehicle itself: returns that stay where they are in the sensor's frame while the vehicle moves.
+//! The reflections of the vehicle itself: returns that stay where they are in the sensor's frame
+//! while the vehicle moves.
 
 use std::f64::consts::TAU;
 

@@ -19,7 +19,8 @@ pub(crate) struct View {
     scan: usize,
     twist: Twist,
     points: Vec<Seen>,
-    /// The image of all points; where chirps alternate that of rising chirps, then that of falling ones.
+    /// The image of all points; where chirps alternate that of rising chirps, then that of falling
+    /// ones.
     images: Vec<Image>,
 }
 
@@ -36,7 +37,8 @@ struct Seen {
 pub(crate) struct PairSlope {
     /// The pose of the first view in the frame of the second one.
     pub pose: Pose,
-    /// The derivative of the overlap by the facts, for points of weight 1 in all: where they are right it vanishes.
+    /// The derivative of the overlap by the facts, for points of weight 1 in all: where they are
+    /// right it vanishes.
     pub slope: FactVector,
 }
 
@@ -80,8 +82,9 @@ impl View {
         }
     }
 
-    /// The image that a point of another view is compared with, and the sign of its Doppler shifts: where chirps alternate that of the
-    /// opposite chirp, which a wrong Doppler coefficient moves the other way. Those of one chirp would lie together whatever it is.
+    /// The image that a point of another view is compared with, and the sign of its Doppler shifts:
+    /// where chirps alternate that of the opposite chirp, which a wrong Doppler coefficient moves
+    /// the other way. Those of one chirp would lie together whatever it is.
     fn image_for(&self, point: &Seen) -> (&Image, f64) {
         match self.images.as_slice() {
             [rising, _] if point.chirp < 0.0 => (rising, 1.0),
@@ -106,7 +109,8 @@ struct Sums {
     slope: FactVector,
 }
 
-/// Aligns two views, each with the image of the other, and returns what their overlap says about the facts.
+/// Aligns two views, each with the image of the other, and returns what their overlap says about
+/// the facts.
 pub(crate) fn compare(drive: &Drive, a: &View, b: &View, initial: &Pose) -> Option<PairSlope> {
     let mut pose = *initial;
     let mut sums = sum(drive, a, b, &pose, false);

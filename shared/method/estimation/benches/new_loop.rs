@@ -1,5 +1,6 @@
-//! Times of a pose graph of 20,000 keyframes and 500 loops on this machine, one thread, medians: a new loop and its solution, the
-//! solution of the whole from the odometry, and the covariance of a pose. Processor time, so that other load counts little.
+//! Times of a pose graph of 20,000 keyframes and 500 loops on this machine, one thread, medians: a
+//! new loop and its solution, the solution of the whole from the odometry, and the covariance of a
+//! pose. Processor time, so that other load counts little.
 #![allow(clippy::unwrap_used)]
 
 #[path = "../tests/common/mod.rs"]

@@ -1,8 +1,10 @@
-//! Solves pose graphs of g2o files by plain least squares, from the poses in the file: `solve_g2o [--out DIR] FILE...`.
+//! Solves pose graphs of g2o files by plain least squares, from the poses in the file:
+//! `solve_g2o [--out DIR] FILE...`.
 //!
-//! Prints a line a file: poses, edges, cost at the start and at the solution (half the sum of chi-squares), linearisations, and the
-//! time of the solution in ms, with the analysis of the structure. `--out` writes the solutions as files of the same names.
-//! `compare_gtsam.py` beside this file compares with GTSAM.
+//! Prints a line a file: poses, edges, cost at the start and at the solution (half the sum of
+//! chi-squares), linearisations, and the time of the solution in ms, with the analysis of the
+//! structure. `--out` writes the solutions as files of the same names. `compare_gtsam.py` beside
+//! this file compares with GTSAM.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -47,7 +49,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Returns the graph of all constraints, none of them rejected or weighted down, at the poses of the file.
+/// Returns the graph of all constraints, none of them rejected or weighted down, at the poses of
+/// the file.
 fn graph(content: &G2o) -> Result<PoseGraph, Box<dyn Error>> {
     let options = GraphOptions {
         gate: f64::INFINITY,

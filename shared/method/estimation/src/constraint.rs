@@ -5,7 +5,8 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::EstimationError;
 
-/// The 99.9 % quantile of the chi-square distribution with three degrees of freedom: the default gate of loops.
+/// The 99.9 % quantile of the chi-square distribution with three degrees of freedom: the default
+/// gate of loops.
 pub const CHI_SQUARE_99_9: f64 = 16.266;
 
 /// A measured relative pose of two keyframes.
@@ -13,9 +14,11 @@ pub const CHI_SQUARE_99_9: f64 = 16.266;
 pub struct Constraint {
     /// The keyframe that the motion is measured from, counted from 0.
     pub from: usize,
-    /// The keyframe whose pose is measured. A loop may lead from the later keyframe to the earlier one.
+    /// The keyframe whose pose is measured. A loop may lead from the later keyframe to the earlier
+    /// one.
     pub to: usize,
-    /// The pose of keyframe `to` in the frame of keyframe `from`, and the covariance of its (x, y, yaw) along the axes of `from`.
+    /// The pose of keyframe `to` in the frame of keyframe `from`, and the covariance of its (x, y,
+    /// yaw) along the axes of `from`.
     pub motion: UncertainMotion,
     /// Where the measurement comes from.
     pub kind: Kind,
@@ -28,8 +31,8 @@ pub enum Kind {
     Odometry,
     /// A registration of two keyframes of the same place. It is tested, and may be wrong.
     Loop {
-        /// Loops of one group have dependent errors, for instance all loops along the same 20 m of a revisit. `None` for a loop whose
-        /// error is independent of all others.
+        /// Loops of one group have dependent errors, for instance all loops along the same 20 m of
+        /// a revisit. `None` for a loop whose error is independent of all others.
         group: Option<u64>,
     },
 }
@@ -89,7 +92,8 @@ impl Constraint {
 /// The chi-square test of a loop against an estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Verdict {
-    /// Squared normalised difference of the measured motion from the predicted one; 3 is expected of a right loop.
+    /// Squared normalised difference of the measured motion from the predicted one; 3 is expected
+    /// of a right loop.
     pub chi_square: f64,
     /// The result of the test.
     pub outcome: Outcome,
@@ -102,7 +106,8 @@ pub enum Outcome {
     Accepted,
     /// The constraint contradicts the estimate and is not part of it.
     Rejected,
-    /// The constraint agrees with the estimate, and its group has been counted in full: it is not part of the estimate.
+    /// The constraint agrees with the estimate, and its group has been counted in full: it is not
+    /// part of the estimate.
     Redundant,
 }
 
@@ -117,15 +122,17 @@ pub(crate) fn keyframe_exists(keyframe: usize, keyframes: usize) -> Result<(), E
     }
 }
 
-/// Returns the squared length of `residual` normalised by `covariance`; infinite if the covariance is not positive definite.
+/// Returns the squared length of `residual` normalised by `covariance`; infinite if the covariance
+/// is not positive definite.
 pub(crate) fn chi_square(residual: &Vector3<f64>, covariance: &Matrix3<f64>) -> f64 {
     covariance.cholesky().map_or(f64::INFINITY, |factor| {
         residual.dot(&factor.solve(residual))
     })
 }
 
-/// Returns the information of `members` loops of one group relative to that of one loop, if the errors of any two of them have the
-/// correlation `correlation` in 0..=1: that of the mean of equally correlated measurements.
+/// Returns the information of `members` loops of one group relative to that of one loop, if the
+/// errors of any two of them have the correlation `correlation` in 0..=1: that of the mean of
+/// equally correlated measurements.
 pub(crate) fn group_information(members: usize, correlation: f64) -> f64 {
     let members = members as f64;
     members / (1.0 + (members - 1.0).max(0.0) * correlation)

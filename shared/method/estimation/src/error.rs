@@ -2,8 +2,8 @@
 
 use thiserror::Error;
 
-/// Errors of [`TrajectoryFilter`](crate::TrajectoryFilter) and [`PoseGraph`](crate::PoseGraph). An estimator that returns one is
-/// unchanged.
+/// Errors of [`TrajectoryFilter`](crate::TrajectoryFilter) and [`PoseGraph`](crate::PoseGraph). An
+/// estimator that returns one is unchanged.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum EstimationError {

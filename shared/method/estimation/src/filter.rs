@@ -12,13 +12,15 @@ use crate::{CHI_SQUARE_99_9, Constraint, EstimationError, Kind, Outcome, Verdict
 /// A loop that adds less information to its group than this share of its own is redundant.
 const MIN_SHARE: f64 = 1e-9;
 
-/// Linearisations of a loop. After a long drift the second one moves poses by centimetres, the third by less than a millimetre.
+/// Linearisations of a loop. After a long drift the second one moves poses by centimetres, the
+/// third by less than a millimetre.
 const LINEARISATIONS: usize = 3;
 
 /// Options of [`TrajectoryFilter`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct FilterOptions {
-    /// The largest number of keyframes. The covariance takes 72 bytes times its square, and a loop costs time in proportion.
+    /// The largest number of keyframes. The covariance takes 72 bytes times its square, and a loop
+    /// costs time in proportion.
     pub max_keyframes: usize,
     /// A loop whose chi-square is larger is rejected.
     pub gate: f64,
@@ -27,7 +29,8 @@ pub struct FilterOptions {
 }
 
 impl Default for FilterOptions {
-    /// Returns 2,000 keyframes (a covariance of 288 MB), a gate at 99.9 %, and groups of which each counts as one loop.
+    /// Returns 2,000 keyframes (a covariance of 288 MB), a gate at 99.9 %, and groups of which each
+    /// counts as one loop.
     fn default() -> Self {
         Self {
             max_keyframes: 2000,
@@ -39,19 +42,22 @@ impl Default for FilterOptions {
 
 /// The extended Kalman filter over the poses of all keyframes.
 ///
-/// The state is the pose of each keyframe, and there is no map (Checchin et al., Sec. 4.1). The first pose is known exactly. A new
-/// keyframe costs time in proportion to the number of keyframes, a loop to its square, and no measurement is linearised again
-/// after later ones: use [`PoseGraph`](crate::PoseGraph) for long trajectories and for many loops.
+/// The state is the pose of each keyframe, and there is no map (Checchin et al., Sec. 4.1). The
+/// first pose is known exactly. A new keyframe costs time in proportion to the number of keyframes,
+/// a loop to its square, and no measurement is linearised again after later ones: use
+/// [`PoseGraph`](crate::PoseGraph) for long trajectories and for many loops.
 ///
-/// The paper's filter keeps the covariance of x, y and yaw of each pose. This one keeps that of a small motion of the world that takes
-/// the estimated pose to the true one. To first order both are the same, and [`TrajectoryFilter::pose`] converts. But here an error
-/// of yaw moves the poses after it around an arc instead of along its tangent, so a correction after a long drift is as good as that
-/// of the graph, and the Jacobians of Eqs. 2 and 3 are simpler.
+/// The paper's filter keeps the covariance of x, y and yaw of each pose. This one keeps that of a
+/// small motion of the world that takes the estimated pose to the true one. To first order both are
+/// the same, and [`TrajectoryFilter::pose`] converts. But here an error of yaw moves the poses
+/// after it around an arc instead of along its tangent, so a correction after a long drift is as
+/// good as that of the graph, and the Jacobians of Eqs. 2 and 3 are simpler.
 #[derive(Debug, Clone)]
 pub struct TrajectoryFilter {
     options: FilterOptions,
     poses: Vec<Pose>,
-    /// Of the errors of all poses in their order: true pose = exp(error) estimate. Rows and columns beyond the poses are reserve.
+    /// Of the errors of all poses in their order: true pose = exp(error) estimate. Rows and columns
+    /// beyond the poses are reserve.
     covariance: DMatrix<f64>,
     /// Loops accepted of each group.
     groups: BTreeMap<u64, usize>,
@@ -62,7 +68,8 @@ struct Observation {
     ends: [usize; 2],
     /// The relative pose as predicted.
     predicted: Pose,
-    /// Jacobian H of its x, y and yaw with respect to the error of the second pose, and with opposite sign to that of the first.
+    /// Jacobian H of its x, y and yaw with respect to the error of the second pose, and with
+    /// opposite sign to that of the first.
     jacobian: Matrix3<f64>,
 }
 
@@ -77,13 +84,16 @@ impl TrajectoryFilter {
         }
     }
 
-    /// Takes a constraint: an odometry constraint adds a keyframe, a loop is tested and corrects all poses.
+    /// Takes a constraint: an odometry constraint adds a keyframe, a loop is tested and corrects
+    /// all poses.
     ///
-    /// The result depends a little on the order of loops, as each is linearised at the estimate that it finds. A filter cannot take
-    /// information back: of a group of dependent loops, each later one adds what it raises the information of the group by.
+    /// The result depends a little on the order of loops, as each is linearised at the estimate
+    /// that it finds. A filter cannot take information back: of a group of dependent loops, each
+    /// later one adds what it raises the information of the group by.
     ///
     /// # Errors
-    /// The constraint does not continue the trajectory, names unknown keyframes or has no usable covariance; or the filter is full.
+    /// The constraint does not continue the trajectory, names unknown keyframes or has no usable
+    /// covariance; or the filter is full.
     pub fn apply(&mut self, constraint: &Constraint) -> Result<Verdict, EstimationError> {
         constraint.check(self.poses.len())?;
         match constraint.kind {
@@ -95,8 +105,8 @@ impl TrajectoryFilter {
         }
     }
 
-    /// Predicts the pose of keyframe `to` in the frame of `from`, with its covariance (Checchin et al., Eq. 3): the initial guess of
-    /// their registration (Eq. 4).
+    /// Predicts the pose of keyframe `to` in the frame of `from`, with its covariance (Checchin et
+    /// al., Eq. 3): the initial guess of their registration (Eq. 4).
     ///
     /// # Errors
     /// Either keyframe does not exist.
@@ -135,8 +145,9 @@ impl TrajectoryFilter {
 
     /// Adds a keyframe: state augmentation (Checchin et al., Eqs. 1 and 2).
     ///
-    /// The error of the last pose moves the new one along with it: the Jacobian of Eq. 2 is the identity. Eq. 2 prints the covariance
-    /// of the whole state beside it; its columns of the last pose are meant.
+    /// The error of the last pose moves the new one along with it: the Jacobian of Eq. 2 is the
+    /// identity. Eq. 2 prints the covariance of the whole state beside it; its columns of the last
+    /// pose are meant.
     fn augment(&mut self, motion: &UncertainMotion) -> Result<(), EstimationError> {
         let count = self.poses.len();
         self.reserve(count + 1)?;
@@ -202,8 +213,9 @@ impl TrajectoryFilter {
         }
     }
 
-    /// Corrects all poses by an observation: the iterated update, which linearises the observation again at the corrected poses.
-    /// `None` if the covariance of the innovation is singular; nothing is changed then.
+    /// Corrects all poses by an observation: the iterated update, which linearises the observation
+    /// again at the corrected poses. `None` if the covariance of the innovation is singular;
+    /// nothing is changed then.
     fn correct(
         &mut self,
         first: Observation,
@@ -236,7 +248,8 @@ impl TrajectoryFilter {
         Some(())
     }
 
-    /// Returns what the next loop of a group adds to the information of the group, relative to that of one loop, and counts it.
+    /// Returns what the next loop of a group adds to the information of the group, relative to that
+    /// of one loop, and counts it.
     fn share(&mut self, group: Option<u64>) -> f64 {
         let Some(group) = group else { return 1.0 };
         let members = self.groups.entry(group).or_default();
@@ -256,7 +269,8 @@ impl TrajectoryFilter {
         (self.columns(to) - self.columns(from)) * observation.jacobian.transpose()
     }
 
-    /// Updates the covariance in Joseph's form, (I - K H) P (I - K H)' + K R K', one factor after the other.
+    /// Updates the covariance in Joseph's form, (I - K H) P (I - K H)' + K R K', one factor after
+    /// the other.
     fn update_covariance(
         &mut self,
         observation: &Observation,
@@ -284,8 +298,8 @@ impl TrajectoryFilter {
 }
 
 impl Observation {
-    /// Predicts the relative pose of two keyframes, and linearises it (Checchin et al., Eq. 3). A common error of both poses does not
-    /// change it.
+    /// Predicts the relative pose of two keyframes, and linearises it (Checchin et al., Eq. 3). A
+    /// common error of both poses does not change it.
     fn new(ends: [usize; 2], [from, to]: [&Pose; 2]) -> Self {
         let relative = Relative::predict(from, to);
         Self {

@@ -1,9 +1,10 @@
 //! Pose graphs as g2o files: `VERTEX_SE2`, `EDGE_SE2` and `FIX` of the first vertex.
 //!
-//! The error of a g2o edge lies along the axes of the keyframe `to` as measured, and an edge carries its information matrix. The
-//! error of a [`Constraint`] lies along the axes of `from`, and it carries a covariance. Both give the same chi-square; reading and
-//! writing rotate and invert the matrix. A file has no groups and no kinds: the first edge from each keyframe to the next one is read
-//! as odometry, all others as independent loops.
+//! The error of a g2o edge lies along the axes of the keyframe `to` as measured, and an edge
+//! carries its information matrix. The error of a [`Constraint`] lies along the axes of `from`, and
+//! it carries a covariance. Both give the same chi-square; reading and writing rotate and invert
+//! the matrix. A file has no groups and no kinds: the first edge from each keyframe to the next one
+//! is read as odometry, all others as independent loops.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
@@ -35,7 +36,7 @@ pub enum G2oError {
     Tag {
         /// The line, counted from 1.
         line: usize,
-        /// Its first word.
+        /// The first word.
         tag: String,
     },
     /// A line has too few or too many fields, or one that is not a finite number.
@@ -43,7 +44,7 @@ pub enum G2oError {
     Fields {
         /// The line, counted from 1.
         line: usize,
-        /// Its first word.
+        /// The first word.
         tag: &'static str,
         /// The fields that it needs.
         needed: &'static str,
@@ -68,14 +69,15 @@ pub enum G2oError {
         /// The vertex that is measured.
         to: u64,
     },
-    /// An edge names a vertex that the file does not have, or a vertex is fixed that is not the first one.
+    /// An edge names a vertex that the file does not have, or a vertex is fixed that is not the
+    /// first one.
     #[error("line {line}: vertex {id} {problem}")]
     Vertex {
         /// The line, counted from 1.
         line: usize,
         /// The vertex.
         id: u64,
-        /// What is wrong with it.
+        /// The problem.
         problem: &'static str,
     },
     /// Two consecutive keyframes have no edge.
@@ -119,7 +121,8 @@ impl G2o {
         raw.resolve()
     }
 
-    /// Returns the text of a g2o file with these poses and constraints. Groups and kinds of constraints are not part of the format.
+    /// Returns the text of a g2o file with these poses and constraints. Groups and kinds of
+    /// constraints are not part of the format.
     pub fn write(poses: &[Pose], constraints: impl IntoIterator<Item = Constraint>) -> String {
         let mut text = String::new();
         for (id, pose) in poses.iter().enumerate() {
@@ -154,7 +157,8 @@ fn line(text: &mut String, content: std::fmt::Arguments<'_>) {
     let _ = writeln!(text, "{content}");
 }
 
-/// Returns the matrix that turns (x, y, yaw) along the axes of the keyframe `to` into that along those of `from`.
+/// Returns the matrix that turns (x, y, yaw) along the axes of the keyframe `to` into that along
+/// those of `from`.
 fn axes(motion: &Pose) -> Matrix3<f64> {
     motion.rotation.to_rotation_matrix().to_homogeneous()
 }

@@ -23,7 +23,7 @@ use system::System;
 pub struct GraphOptions {
     /// A loop whose chi-square against the odometry is larger is rejected.
     pub gate: f64,
-    /// How much a loop counts that disagrees with the other constraints.
+    /// The weight of a loop that disagrees with the other constraints.
     pub kernel: Kernel,
     /// The correlation of the errors of any two loops of one group, 0 to 1.
     pub group_correlation: f64,
@@ -34,7 +34,8 @@ pub struct GraphOptions {
 }
 
 impl Default for GraphOptions {
-    /// Returns a gate at 99.9 %, dynamic covariance scaling from a quarter of it, and groups of which each counts as one loop.
+    /// Returns a gate at 99.9 %, dynamic covariance scaling from a quarter of it, and groups of
+    /// which each counts as one loop.
     fn default() -> Self {
         Self {
             gate: CHI_SQUARE_99_9,
@@ -48,10 +49,12 @@ impl Default for GraphOptions {
     }
 }
 
-/// The pose graph: the poses of all keyframes that fit odometry and loops best, by sparse least squares.
+/// The pose graph: the poses of all keyframes that fit odometry and loops best, by sparse least
+/// squares.
 ///
-/// The first pose is known exactly. Loops are tested twice: each against the odometry alone when it comes, so that the verdict does not
-/// depend on what came before it, and all against each other by the kernel when the graph is solved.
+/// The first pose is known exactly. Loops are tested twice: each against the odometry alone when it
+/// comes, so that the verdict does not depend on what came before it, and all against each other by
+/// the kernel when the graph is solved.
 pub struct PoseGraph {
     options: GraphOptions,
     poses: Vec<Pose>,
@@ -61,7 +64,7 @@ pub struct PoseGraph {
     groups: BTreeMap<u64, usize>,
     /// The normal equations of the present constraints; `None` after a constraint was added.
     system: Option<System>,
-    /// Whether the system is factorised, undamped, at the present poses.
+    /// True if the system is factorised, undamped, at the present poses.
     factorised: bool,
 }
 
@@ -82,7 +85,8 @@ pub struct WeightedLoop {
     pub from: usize,
     /// The keyframe whose pose is measured.
     pub to: usize,
-    /// Squared normalised difference of the measured motion from the estimate; 3 is expected of a right loop.
+    /// Squared normalised difference of the measured motion from the estimate; 3 is expected of a
+    /// right loop.
     pub chi_square: f64,
     /// The kernel's weight at the last solution, from 0 to 1.
     pub weight: f64,
@@ -95,7 +99,8 @@ pub struct Solution {
     pub cost: f64,
     /// Number of linearisations.
     pub iterations: usize,
-    /// Whether the poses are at a minimum of the cost. If not, the iterations were too few, and a further solution goes on from there.
+    /// True if the poses are at a minimum of the cost. If not, the iterations were too few, and a
+    /// further solution goes on from there.
     pub converged: bool,
 }
 
@@ -113,11 +118,13 @@ impl PoseGraph {
         }
     }
 
-    /// Takes a constraint: an odometry constraint adds a keyframe where it leads, a loop is tested against the odometry between its
-    /// keyframes. Loops correct no pose until [`PoseGraph::solve`].
+    /// Takes a constraint: an odometry constraint adds a keyframe where it leads, a loop is tested
+    /// against the odometry between its keyframes. Loops correct no pose until
+    /// [`PoseGraph::solve`].
     ///
     /// # Errors
-    /// The constraint does not continue the trajectory, names unknown keyframes or has no usable covariance.
+    /// The constraint does not continue the trajectory, names unknown keyframes or has no usable
+    /// covariance.
     pub fn apply(&mut self, constraint: &Constraint) -> Result<Verdict, EstimationError> {
         let Kind::Odometry = constraint.kind else {
             let tested = self.test(constraint)?;
@@ -134,8 +141,9 @@ impl PoseGraph {
         })
     }
 
-    /// Takes a loop as [`PoseGraph::apply`] does, whose chi-square is known from an earlier [`PoseGraph::test`]: that takes time in
-    /// proportion to the path between the keyframes, and the odometry between them does not change.
+    /// Takes a loop as [`PoseGraph::apply`] does, whose chi-square is known from an earlier
+    /// [`PoseGraph::test`]: that takes time in proportion to the path between the keyframes, and
+    /// the odometry between them does not change.
     ///
     /// # Errors
     /// As [`PoseGraph::apply`].
@@ -156,7 +164,8 @@ impl PoseGraph {
         Ok(verdict)
     }
 
-    /// Tests a loop against the odometry between its keyframes, as [`PoseGraph::apply`] does, without taking it.
+    /// Tests a loop against the odometry between its keyframes, as [`PoseGraph::apply`] does,
+    /// without taking it.
     ///
     /// # Errors
     /// As [`PoseGraph::apply`].
@@ -172,12 +181,14 @@ impl PoseGraph {
         self.forget_system();
     }
 
-    /// Returns the poses of all keyframes, as last solved; those added since continue from there by odometry.
+    /// Returns the poses of all keyframes, as last solved; those added since continue from there by
+    /// odometry.
     pub fn poses(&self) -> &[Pose] {
         &self.poses
     }
 
-    /// Moves all poses, for instance to those of a file, as the start of the next solution. The first pose stays fixed where it is put.
+    /// Moves all poses, for instance to those of a file, as the start of the next solution. The
+    /// first pose stays fixed where it is put.
     ///
     /// # Errors
     /// There is not one pose for each keyframe.
@@ -193,12 +204,14 @@ impl PoseGraph {
         Ok(())
     }
 
-    /// Returns half the sum of the squared normalised residuals at the present poses, those of loops after the kernel.
+    /// Returns half the sum of the squared normalised residuals at the present poses, those of
+    /// loops after the kernel.
     pub fn cost(&self) -> f64 {
         0.5 * self.chi_square(&self.poses, Weights::Kernel)
     }
 
-    /// Returns all loops that passed the gate, in the order in which they came, or by keyframes after [`PoseGraph::solve_anew`].
+    /// Returns all loops that passed the gate, in the order in which they came, or by keyframes
+    /// after [`PoseGraph::solve_anew`].
     pub fn loops(&self) -> impl Iterator<Item = WeightedLoop> + '_ {
         self.loops.iter().map(|closing| {
             let [from, to] = closing.edge.ends;
@@ -211,7 +224,8 @@ impl PoseGraph {
         })
     }
 
-    /// Returns the constraints that are part of the graph: odometry, then loops as in [`PoseGraph::loops`].
+    /// Returns the constraints that are part of the graph: odometry, then loops as in
+    /// [`PoseGraph::loops`].
     pub fn constraints(&self) -> impl Iterator<Item = Constraint> + '_ {
         let constraint = |edge: &Edge, kind| Constraint {
             from: edge.ends[0],

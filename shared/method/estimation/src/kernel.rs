@@ -2,17 +2,21 @@
 
 /// A robust kernel of the chi-square of a loop.
 ///
-/// The cost of a loop is half of a concave function of its chi-square c; the derivative of this function is the loop's weight.
+/// The cost of a loop is half of a concave function of its chi-square c; the derivative of this
+/// function is the loop's weight.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Kernel {
-    /// Plain least squares: every loop that passed the gate has weight 1. One wrong loop bends the whole trajectory.
+    /// Plain least squares: every loop that passed the gate has weight 1. One wrong loop bends the
+    /// whole trajectory.
     None,
-    /// Geman and McClure, 1987: weight (s / (s + c))^2. Right loops lose some weight too: 0.71 at c = 3 for s = 16.
+    /// Geman and McClure, 1987: weight (s / (s + c))^2. Right loops lose some weight too: 0.71 at
+    /// c = 3 for s = 16.
     GemanMcClure {
         /// The chi-square s at which the weight is 1/4.
         scale: f64,
     },
-    /// Dynamic covariance scaling (Agarwal et al., ICRA 2013): weight 1 up to c = phi, then (2 phi / (phi + c))^2.
+    /// Dynamic covariance scaling (Agarwal et al., ICRA 2013): weight 1 up to c = phi, then (2 phi
+    /// / (phi + c))^2.
     DynamicCovarianceScaling {
         /// The chi-square up to which a loop keeps its weight.
         phi: f64,

@@ -1,14 +1,19 @@
 //! Estimation of a trajectory from motions and loops.
 //!
-//! A keyframe is a scan whose pose is estimated. A [`Constraint`] is a measured relative pose of two keyframes: a motion of the
-//! odometry, or a loop between keyframes of the same place. Reading order:
-//! - [`Constraint`]: a measurement, in the form that both estimators take; [`Verdict`]: its chi-square test;
-//! - [`TrajectoryFilter`]: the extended Kalman filter of Checchin et al. over the poses of all keyframes, for short trajectories;
-//! - [`PoseGraph`]: sparse least squares, for days of driving and many loops; [`Kernel`]: what it does with wrong loops;
+//! A keyframe is a scan whose pose is estimated. A [`Constraint`] is a measured relative pose of
+//! two keyframes: a motion of the odometry, or a loop between keyframes of the same place. Reading
+//! order:
+//! - [`Constraint`]: a measurement, in the form that both estimators take; [`Verdict`]: its
+//!   chi-square test;
+//! - [`TrajectoryFilter`]: the extended Kalman filter of Checchin et al. over the poses of all
+//!   keyframes, for short trajectories;
+//! - [`PoseGraph`]: sparse least squares, for days of driving and many loops; [`Kernel`]: what it
+//!   does with wrong loops;
 //! - [`G2o`]: pose graphs as files of other programs;
 //! - [`places`]: recognises places that are visited again, and measures the loops between them.
 //!
-//! A drive once around a square, whose odometry turns a little too far, and the loop that corrects it:
+//! A drive once around a square, whose odometry turns a little too far, and the loop that corrects
+//! it:
 //!
 //! ```
 //! use gyre_estimation::{Constraint, GraphOptions, PoseGraph};
@@ -33,9 +38,10 @@
 //! ```
 //!
 //! # Frames and units
-//! Those of [`gyre_geometry`]: x forward, y left in m, yaw counter-clockwise in rad. Poses are those of keyframes in the frame that
-//! the first pose is given in. The covariance of a pose or of a motion is that of its (x, y, yaw), with x and y along the axes of the
-//! frame that it is given in: for a constraint, of the keyframe `from`.
+//! Those of [`gyre_geometry`]: x forward, y left in m, yaw counter-clockwise in rad. Poses are
+//! those of keyframes in the frame that the first pose is given in. The covariance of a pose or of
+//! a motion is that of its (x, y, yaw), with x and y along the axes of the frame that it is given
+//! in: for a constraint, of the keyframe `from`.
 
 mod constraint;
 mod error;

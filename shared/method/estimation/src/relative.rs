@@ -17,8 +17,9 @@ pub(crate) struct Relative {
 impl Relative {
     /// Predicts the relative pose of two keyframes.
     ///
-    /// Checchin et al., Eq. 3: T = (-)((-) x_to (+) x_from). The outer inverse makes this equal to (-) x_from (+) x_to, the pose of `to`
-    /// seen from `from`, which is the direction of a [`Constraint`](crate::Constraint).
+    /// Checchin et al., Eq. 3: T = (-)((-) x_to (+) x_from). The outer inverse makes this equal to
+    /// (-) x_from (+) x_to, the pose of `to` seen from `from`, which is the direction of a
+    /// [`Constraint`](crate::Constraint).
     pub fn predict(from: &Pose, to: &Pose) -> Self {
         let motion = from.inv_mul(to);
         let apart = to.translation.vector - from.translation.vector;
@@ -34,7 +35,8 @@ impl Relative {
         }
     }
 
-    /// Returns (x, y, yaw) of the measured motion minus those of the predicted one, yaw in (-pi, pi]: the innovation.
+    /// Returns (x, y, yaw) of the measured motion minus those of the predicted one, yaw in (-pi,
+    /// pi]: the innovation.
     pub fn innovation(&self, measured: &UncertainMotion) -> Vector3<f64> {
         measured.error(&self.motion)
     }
@@ -55,7 +57,8 @@ mod tests {
 
     #[test]
     fn the_relative_pose_of_two_poses_worked_by_hand() {
-        // From 1 m ahead, facing left, a pose 3 m to its left that faces backward is 2 m ahead and 1 m to the right, turned left.
+        // From 1 m ahead, facing left, a pose 3 m to its left that faces backward is 2 m ahead and
+        // 1 m to the right, turned left.
         let relative = Relative::predict(&pose(1.0, 1.0, FRAC_PI_2), &pose(2.0, 3.0, PI));
         let [x, y, yaw] = xy_yaw(&relative.motion);
         assert!((x - 2.0).abs() < 1e-15 && (y + 1.0).abs() < 1e-15);

@@ -1,4 +1,5 @@
-//! Covariances agree with errors: the mean NEES of 200 simulated drives of 500 keyframes lies in its 95 % interval.
+//! Covariances agree with errors: the mean NEES of 200 simulated drives of 500 keyframes lies in
+//! its 95 % interval.
 
 use crate::common::{Drive, ODOMETRY};
 use gyre_estimation::{Outcome, PoseGraph};
@@ -22,7 +23,8 @@ impl MeanNees {
         self.samples += 1;
     }
 
-    /// Asserts that the mean lies in the interval that holds that of consistent covariances with a probability of 95 %.
+    /// Asserts that the mean lies in the interval that holds that of consistent covariances with a
+    /// probability of 95 %.
     fn check(&self, name: &str) {
         assert_eq!(self.samples, DRIVES as usize);
         let chi_square = ChiSquared::new((3 * self.samples) as f64).unwrap();

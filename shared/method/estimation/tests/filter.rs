@@ -33,7 +33,8 @@ fn a_loop_is_shared_among_the_poses_before_it_by_their_covariance() {
     let before = filter.pose(2).unwrap();
     assert!((before.covariance[(0, 0)] - 2.0).abs() < 1e-6);
 
-    // Predicted 2 m with variance 2, measured 2.4 m with variance 2: the gain is one half, and one quarter for the pose half-way.
+    // Predicted 2 m with variance 2, measured 2.4 m with variance 2: the gain is one half, and one
+    // quarter for the pose half-way.
     let verdict = filter
         .apply(&Constraint::closing(0, 2, along(2.4, 2.0)))
         .unwrap();
@@ -143,7 +144,8 @@ fn several_loops_approach_the_converged_batch_solution() {
 fn a_loop_that_contradicts_the_estimate_changes_nothing() {
     let mut filter = straight(2);
     let poses = filter.poses().to_vec();
-    // 12 m from the prediction, whose standard deviation is 1.4 m, with one of the measurement of 1.4 m: 36.
+    // 12 m from the prediction, whose standard deviation is 1.4 m, with one of the measurement of
+    // 1.4 m: 36.
     let wrong = Constraint::closing(0, 2, along(14.0, 2.0));
     let verdict = filter.apply(&wrong).unwrap();
     assert_eq!(verdict.outcome, Outcome::Rejected);

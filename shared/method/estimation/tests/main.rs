@@ -1,4 +1,5 @@
-//! Trajectories, graphs and places as their users call them. One program, so that all of it is linked once.
+//! Trajectories, graphs and places as their users call them. One program, so that all of it is
+//! linked once.
 
 #![allow(clippy::unwrap_used)]
 

@@ -38,8 +38,8 @@ impl Case {
         }
     }
 
-    /// Returns loops between places that are not the same, in runs of `length` that agree with each other and
-    /// are known to be of one place.
+    /// Returns loops between places that are not the same, in runs of `length` that agree with each
+    /// other and are known to be of one place.
     fn elsewhere(&mut self, length: usize) -> Vec<Constraint> {
         let mut loops = Vec::new();
         while loops.len() < WRONG {
@@ -58,8 +58,8 @@ impl Case {
         loops
     }
 
-    /// Returns loops between places that are the same, some metres and degrees off, as if one street were its neighbour. They are
-    /// within the uncertainty of the odometry.
+    /// Returns loops between places that are the same, some metres and degrees off, as if one
+    /// street were its neighbour. They are within the uncertainty of the odometry.
     fn nearby(&mut self, length: usize) -> Vec<Constraint> {
         let mut loops = Vec::new();
         while loops.len() < WRONG {

@@ -1,7 +1,8 @@
 //! Composition of motions whose errors are only in part independent.
 //!
-//! An odometry that registers each scan with a map of the last ones has a pose error of two parts: the noise of the scan's own
-//! registration, which the next motion takes back, and the drift of the map, which stays. All motions share the error of the scale.
+//! An odometry that registers each scan with a map of the last ones has a pose error of two parts:
+//! the noise of the scan's own registration, which the next motion takes back, and the drift of the
+//! map, which stays. All motions share the error of the scale.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -14,8 +15,8 @@ pub struct OdometryMotion {
     pub motion: Pose,
     /// The covariance of (x, y, yaw) along the axes of the earlier frame.
     pub covariance: Matrix3<f64>,
-    /// Share of the covariance that is drift, 0 to 1. The rest is noise of the two poses, one half each. With 1 the errors of
-    /// motions are independent.
+    /// Share of the covariance that is drift, 0 to 1. The rest is noise of the two poses, one half
+    /// each. With 1 the errors of motions are independent.
     pub drift_share: f64,
     /// Standard deviation of the scale, a factor that all motions of the drive share.
     pub scale_sigma: f64,
@@ -84,8 +85,9 @@ impl OdometryMotion {
 
 /// Motions of an odometry composed one after the other.
 ///
-/// With the drift D_k of the motion to pose k, the noise N_0 and N_n of the first and the last pose, the Jacobians J_k of Checchin et al.,
-/// Eqs. 1 and 2, from pose k to the last, the displacement d = (x, y, 0) and the standard deviation of the scale, the covariance is
+/// With the drift D_k of the motion to pose k, the noise N_0 and N_n of the first and the last
+/// pose, the Jacobians J_k of Checchin et al., Eqs. 1 and 2, from pose k to the last, the
+/// displacement d = (x, y, 0) and the standard deviation of the scale, the covariance is
 ///
 /// ```text
 /// J_1 N_0 J_1' + sum of J_k D_k J_k' + N_n + scale_sigma^2 d d'
@@ -126,8 +128,9 @@ impl ComposedMotion {
         }
     }
 
-    /// Continues with the next motion. One that is exactly zero, as of a vehicle that stands or where a chain starts anew, leaves the
-    /// pose as it is, with its noise. What a vehicle drives between two chains is in no covariance.
+    /// Continues with the next motion. One that is exactly zero, as of a vehicle that stands or
+    /// where a chain starts anew, leaves the pose as it is, with its noise. What a vehicle drives
+    /// between two chains is in no covariance.
     #[must_use]
     pub fn then(&self, next: &OdometryMotion) -> Self {
         let before = UncertainMotion {
@@ -158,7 +161,8 @@ impl ComposedMotion {
         }
     }
 
-    /// Returns the part of the covariance that further motions carry on: the drift, and the noise where the first motion begins.
+    /// Returns the part of the covariance that further motions carry on: the drift, and the noise
+    /// where the first motion begins.
     pub fn accumulated(&self) -> Matrix3<f64> {
         self.accumulated
     }
@@ -235,7 +239,8 @@ mod tests {
     fn the_noise_of_the_poses_between_cancels() {
         let step = step(0.0, 0.0);
         let end = composed(&step, 40);
-        // Half of the noise at the end, and half of that at the start with its lever: the motion itself is the same.
+        // Half of the noise at the end, and half of that at the start with its lever: the motion
+        // itself is the same.
         let turn = (0.05f64 * 39.0).sin_cos();
         let xx = 2e-4 * turn.1.powi(2) + 5e-5 * turn.0.powi(2);
         let lever_m = end.motion.translation.y - 0.1;

@@ -1,7 +1,8 @@
 //! Covariances of (x, y, yaw), in m^2, m rad and rad^2.
 //!
-//! The covariance of a motion is that of its x, y and yaw along the axes of the *earlier* frame. The error of a motion is
-//! therefore the difference of these values, estimate minus truth, with the difference in yaw wrapped to (-pi, pi].
+//! The covariance of a motion is that of its x, y and yaw along the axes of the *earlier* frame.
+//! The error of a motion is therefore the difference of these values, estimate minus truth, with
+//! the difference in yaw wrapped to (-pi, pi].
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -24,8 +25,8 @@ pub fn unpack(&[xx, xy, xyaw, yy, yyaw, yawyaw]: &Packed) -> Matrix3<f64> {
 /// Share by which rounding may take a covariance out of the cone of positive semidefinite matrices.
 const ROUNDING: f64 = 1e-6;
 
-/// Returns whether a covariance is finite and positive semidefinite, but for rounding: no variance is negative, and the correlations
-/// are possible together.
+/// Returns whether a covariance is finite and positive semidefinite, but for rounding: no variance
+/// is negative, and the correlations are possible together.
 pub fn is_positive_semidefinite(packed: &Packed) -> bool {
     let [xx, xy, xyaw, yy, yyaw, yawyaw] = *packed;
     // The correlation of two values; without variance there must be no covariance.
@@ -46,8 +47,9 @@ pub fn is_positive_semidefinite(packed: &Packed) -> bool {
         && determinant >= -ROUNDING
 }
 
-/// Returns the Jacobian of a composed pose with respect to its first pose, where (x, y) is the displacement from the first to the
-/// composed pose, m, along the same axes (Checchin et al., Eq. 1).
+/// Returns the Jacobian of a composed pose with respect to its first pose, where (x, y) is the
+/// displacement from the first to the composed pose, m, along the same axes (Checchin et al., Eq.
+/// 1).
 pub fn lever(x_m: f64, y_m: f64) -> Matrix3<f64> {
     Matrix3::new(1.0, 0.0, -y_m, 0.0, 1.0, x_m, 0.0, 0.0, 1.0)
 }
@@ -70,7 +72,8 @@ impl UncertainMotion {
         }
     }
 
-    /// Composes with the motion `next`, whose error is independent, to first order (Checchin et al., Eqs. 1 and 2).
+    /// Composes with the motion `next`, whose error is independent, to first order (Checchin et
+    /// al., Eqs. 1 and 2).
     pub fn then(&self, next: &Self) -> Self {
         let motion = self.motion * next.motion;
         let moved = motion.translation.vector - self.motion.translation.vector;
@@ -81,8 +84,9 @@ impl UncertainMotion {
         Self { motion, covariance }
     }
 
-    /// Rebuilds the motion from x, y, yaw and the upper triangle of the covariance, with a unit rotation and a symmetric matrix.
-    /// Messages carry this form; composing it everywhere gives the same bits in one process and in several.
+    /// Rebuilds the motion from x, y, yaw and the upper triangle of the covariance, with a unit
+    /// rotation and a symmetric matrix. Messages carry this form; composing it everywhere gives the
+    /// same bits in one process and in several.
     pub fn normalized(&self) -> Self {
         let [x_m, y_m, yaw_rad] = xy_yaw(&self.motion);
         Self {
@@ -101,7 +105,8 @@ impl UncertainMotion {
         )
     }
 
-    /// Returns whether the covariance is finite and positive definite, so that it can normalise errors.
+    /// Returns whether the covariance is finite and positive definite, so that it can normalise
+    /// errors.
     pub fn has_covariance(&self) -> bool {
         let c = &self.covariance;
         c.iter().all(|value| value.is_finite()) && c.cholesky().is_some()

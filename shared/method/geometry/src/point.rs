@@ -20,12 +20,14 @@ pub struct SparsePoint {
     pub time_s: f32,
     /// Weight from 0 to 1. A weight that is not above 0 counts as 0.
     pub weight: f32,
-    /// Metres to add to the range for each m/s at which the sensor approaches the point; 0 if unknown.
+    /// Metres to add to the range for each m/s at which the sensor approaches the point; 0 if
+    /// unknown.
     pub doppler_s: f32,
 }
 
 impl SparsePoint {
-    /// Returns where the point lies in the frame of its scan if the sensor has this velocity throughout: without Doppler shift and motion.
+    /// Returns where the point lies in the frame of its scan if the sensor has this velocity
+    /// throughout: without Doppler shift and motion.
     pub fn deskewed(&self, twist: &Twist) -> Point2<f64> {
         let seen = Point2::new(f64::from(self.x_m), f64::from(self.y_m));
         let range_m = seen.coords.norm().max(1e-3);

@@ -21,14 +21,16 @@ pub fn xy_yaw(pose: &Pose) -> [f64; 3] {
     ]
 }
 
-/// Interpolates between `from` (`share` 0) and `to` (1): linearly in position, and in yaw along the shorter arc.
+/// Interpolates between `from` (`share` 0) and `to` (1): linearly in position, and in yaw along the
+/// shorter arc.
 pub fn interpolate(from: &Pose, to: &Pose, share: f64) -> Pose {
     let position = from.translation.vector.lerp(&to.translation.vector, share);
     let turn = (to.rotation * from.rotation.inverse()).angle();
     Pose::new(position, from.rotation.angle() + share * turn)
 }
 
-/// Converts between frames with y to the right and clockwise yaw, and REP-103 frames, in either direction.
+/// Converts between frames with y to the right and clockwise yaw, and REP-103 frames, in either
+/// direction.
 pub fn mirrored(pose: &Pose) -> Pose {
     let [x_m, y_m, yaw_rad] = xy_yaw(pose);
     self::pose(x_m, -y_m, -yaw_rad)

@@ -16,12 +16,14 @@ pub struct Twist {
 }
 
 impl Twist {
-    /// Returns the twist of `motion` (the pose of the later frame in the earlier one) over `dt_s` seconds: the logarithm divided
-    /// by the time. It is not finite if `dt_s` is zero or `motion` is not finite.
+    /// Returns the twist of `motion` (the pose of the later frame in the earlier one) over `dt_s`
+    /// seconds: the logarithm divided by the time. It is not finite if `dt_s` is zero or `motion`
+    /// is not finite.
     pub fn from_motion(motion: &Pose, dt_s: f64) -> Self {
         let yaw = motion.rotation.angle();
         let half = 0.5 * yaw;
-        // The logarithm of SE(2): the chord, rotated back by half the yaw and scaled to the length of the arc.
+        // The logarithm of SE(2): the chord, rotated back by half the yaw and scaled to the length
+        // of the arc.
         let stretch = 1.0 / sinc(half);
         let arc = UnitComplex::new(-half) * motion.translation.vector * (stretch / dt_s);
         Self {
@@ -31,7 +33,8 @@ impl Twist {
         }
     }
 
-    /// Returns the pose after `t_s` seconds in the frame at time 0: exp(twist t). Negative times are in the past.
+    /// Returns the pose after `t_s` seconds in the frame at time 0: exp(twist t). Negative times
+    /// are in the past.
     pub fn pose_at(&self, t_s: f64) -> Pose {
         let half = 0.5 * self.yaw_rate_radps * t_s;
         let arc = self.linear_mps() * t_s;
@@ -39,7 +42,8 @@ impl Twist {
         Pose::from_parts(Translation2::from(chord), UnitComplex::new(2.0 * half))
     }
 
-    /// As [`Twist::from_motion`] with the chord instead of the arc, which underestimates the speed by a factor of yaw squared over
+    /// As [`Twist::from_motion`] with the chord instead of the arc, which underestimates the speed
+    /// by a factor of yaw squared over
     /// 24. The refinement uses this form throughout, as its kernel for single points does.
     pub fn from_chord(motion: &Pose, dt_s: f64) -> Self {
         let yaw = motion.rotation.angle();
@@ -51,7 +55,8 @@ impl Twist {
         }
     }
 
-    /// Returns the pose after `t_s` seconds if the chord is as long as the arc; the inverse of [`Twist::from_chord`].
+    /// Returns the pose after `t_s` seconds if the chord is as long as the arc; the inverse of
+    /// [`Twist::from_chord`].
     pub fn chord_pose_at(&self, t_s: f64) -> Pose {
         let yaw = self.yaw_rate_radps * t_s;
         Pose::new(Rotation2::new(0.5 * yaw) * self.linear_mps() * t_s, yaw)

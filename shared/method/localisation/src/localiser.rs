@@ -47,7 +47,8 @@ pub struct Fix {
     pub pose: UncertainMotion,
     /// Masked correlation of the scan with the submap.
     pub correlation: f64,
-    /// Difference of the correlation from that of any other pose that was tried; for a first fix only.
+    /// Difference of the correlation from that of any other pose that was tried; for a first fix
+    /// only.
     pub margin: f64,
     /// The keyframe of the map with which it was registered.
     pub keyframe: usize,
@@ -94,10 +95,12 @@ pub struct Localiser {
 }
 
 impl Localiser {
-    /// Plans the localisation of scans of at most `capacity` points. `refinement` is that of the odometry.
+    /// Plans the localisation of scans of at most `capacity` points. `refinement` is that of the
+    /// odometry.
     ///
     /// # Errors
-    /// The first value of `refinement` that is out of its bounds, or a reach of more than the rasters allow.
+    /// The first value of `refinement` that is out of its bounds, or a reach of more than the
+    /// rasters allow.
     pub fn new(
         map: Map,
         options: LocaliserOptions,
@@ -147,7 +150,8 @@ impl Localiser {
         Localisation { status, fix }
     }
 
-    /// Finds the place of a scan without prior; `None` if it is not on the map, or if two places of the map look like it.
+    /// Finds the place of a scan without prior; `None` if it is not on the map, or if two places of
+    /// the map look like it.
     pub fn find(&mut self, points: &[SparsePoint], twist: &Twist) -> Option<Fix> {
         let fix = self.most_similar(points, twist);
         fix.filter(|fix| self.is_accepted(fix))
@@ -310,7 +314,8 @@ impl Localiser {
         }
     }
 
-    /// Registers the scan with a keyframe, and updates the prediction with the result; `None` unless both agree.
+    /// Registers the scan with a keyframe, and updates the prediction with the result; `None`
+    /// unless both agree.
     fn register(&mut self, keyframe: usize, predicted: &UncertainMotion) -> Option<Fix> {
         let (measured, correlation) = self.align(keyframe, &predicted.motion)?;
         if correlation < self.options.tracked_correlation {
@@ -332,7 +337,8 @@ impl Localiser {
     }
 }
 
-/// Updates a prediction with a measurement (Joseph form); `None` if their difference exceeds the gate.
+/// Updates a prediction with a measurement (Joseph form); `None` if their difference exceeds the
+/// gate.
 fn fused(
     predicted: &UncertainMotion,
     measured: &UncertainMotion,

@@ -75,7 +75,8 @@ impl Map {
         Ok(map)
     }
 
-    /// Writes the map into a folder: `keyframes.log` and `places.index`. A map that is there is replaced.
+    /// Writes the map into a folder: `keyframes.log` and `places.index`. A map that is there is
+    /// replaced.
     ///
     /// # Errors
     /// Files that cannot be written.
@@ -138,7 +139,8 @@ impl Map {
             .unwrap_or((0, f64::INFINITY))
     }
 
-    /// Returns the keyframes by how much their submaps look like a descriptor, each at its best `angles` angles.
+    /// Returns the keyframes by how much their submaps look like a descriptor, each at its best
+    /// `angles` angles.
     pub(crate) fn similar(&mut self, descriptor: &Descriptor, angles: usize) -> &[Candidate] {
         self.index.rank_all(descriptor, angles)
     }

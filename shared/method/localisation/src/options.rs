@@ -3,7 +3,8 @@
 /// The options of localisation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LocaliserOptions {
-    /// Number of places and headings that are searched first for a first fix; if none of them is accepted, [`Self::candidates`] are.
+    /// Number of places and headings that are searched first for a first fix; if none of them is
+    /// accepted, [`Self::candidates`] are.
     pub first_candidates: usize,
     /// Largest number of places and headings that are searched for a first fix.
     pub candidates: usize,
@@ -11,9 +12,11 @@ pub struct LocaliserOptions {
     pub angles: usize,
     /// Two candidates are of different places if they are farther apart, m.
     pub apart_m: f64,
-    /// Largest distance of a scan from the keyframe by which its place is found, along each axis, m.
+    /// Largest distance of a scan from the keyframe by which its place is found, along each axis,
+    /// m.
     pub search_reach_m: f64,
-    /// Smallest correlation of a first fix with the map, 0 to 1. It is that of a single scan with a submap of many.
+    /// Smallest correlation of a first fix with the map, 0 to 1. It is that of a single scan with a
+    /// submap of many.
     pub min_correlation: f64,
     /// Smallest difference of the correlations of a first fix and of any other pose that was tried.
     pub min_margin: f64,
@@ -21,9 +24,11 @@ pub struct LocaliserOptions {
     pub same_m: f64,
     /// Smallest correlation of a tracked scan with the map, 0 to 1.
     pub tracked_correlation: f64,
-    /// Largest chi-square (3 degrees of freedom) between a registration and the prediction: 16.27 is passed by 99.9 %.
+    /// Largest chi-square (3 degrees of freedom) between a registration and the prediction: 16.27
+    /// is passed by 99.9 %.
     pub gate: f64,
-    /// Factor of the covariance of a registration with the map over that of one with the scans just before.
+    /// Factor of the covariance of a registration with the map over that of one with the scans just
+    /// before.
     pub variance_scale: f64,
     /// Distance from the nearest keyframe of the map beyond which there is no fix, m.
     pub reach_m: f64,

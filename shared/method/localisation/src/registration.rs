@@ -79,8 +79,8 @@ impl Registration {
         found.expect(PLANNED)
     }
 
-    /// Aligns the scan from an initial guess within some metres: its pose in the submap's frame, and the masked correlation there; `None`
-    /// if its points do not determine it.
+    /// Aligns the scan from an initial guess within some metres: its pose in the submap's frame,
+    /// and the masked correlation there; `None` if its points do not determine it.
     pub fn align(
         &mut self,
         scan: &Submap,

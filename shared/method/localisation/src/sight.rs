@@ -7,11 +7,12 @@ use ndarray::{Array2, ArrayView2};
 
 /// Sectors of a turn.
 const SECTORS: usize = 72;
-/// A span of empty sectors is hidden if it is at least this wide, sectors: 60 degrees. Shorter ones occur on open ground.
+/// A span of empty sectors is hidden if it is at least this wide, sectors: 60 degrees. Shorter ones
+/// occur on open ground.
 const HIDDEN: usize = 12;
 
-/// The cells of a raster that a sensor could see. A vehicle's roof, a wall or a broken sensor hides a part of the turn; what the map has
-/// there says nothing against a place.
+/// The cells of a raster that a sensor could see. A vehicle's roof, a wall or a broken sensor hides
+/// a part of the turn; what the map has there says nothing against a place.
 pub(crate) struct Sight {
     /// The sector of each cell.
     sectors: Array2<u8>,
@@ -44,7 +45,8 @@ impl Sight {
         cells.for_each(|(seen, sector)| *seen = f32::from(!hidden[usize::from(*sector)]));
     }
 
-    /// Returns 1 in each cell that could be seen, 0 elsewhere, row 0 far ahead; `None` if all could be.
+    /// Returns 1 in each cell that could be seen, 0 elsewhere, row 0 far ahead; `None` if all could
+    /// be.
     pub fn seen(&self) -> Option<ArrayView2<'_, f32>> {
         (!self.is_whole).then(|| self.seen.view())
     }

@@ -59,8 +59,9 @@ pub enum Library {
 }
 
 impl Library {
-    /// Returns the library that computes the networks of a configuration. ONNX Runtime that is named is required: only where none
-    /// is named or installed, rten stands in for it, and only on the processor.
+    /// Returns the library that computes the networks of a configuration. ONNX Runtime that is
+    /// named is required: only where none is named or installed, rten stands in for it, and only on
+    /// the processor.
     ///
     /// # Errors
     /// ONNX Runtime is required and missing.

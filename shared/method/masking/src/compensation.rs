@@ -25,7 +25,8 @@ impl CompensatedRaster {
         })
     }
 
-    /// Writes the raster to `out` (n x n, row 0 far ahead). Returns the velocity that was used for motion compensation.
+    /// Writes the raster to `out` (n x n, row 0 far ahead). Returns the velocity that was used for
+    /// motion compensation.
     pub fn make(
         &mut self,
         sweep: &Sweep<'_>,

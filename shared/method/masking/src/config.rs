@@ -15,8 +15,8 @@ use crate::{
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct MaskingConfig {
-    /// `none`: everything counts. `threshold`: power up to `threshold` counts as zero. `learned`: in
-    /// addition, a network weights each cell.
+    /// `none`: everything counts. `threshold`: power up to `threshold` counts as zero. `learned`:
+    /// in addition, a network weights each cell.
     pub kind: MaskKind,
     /// Power up to which a return counts as zero, 0 to 255, before any network. Rasters hold the
     /// power less the threshold.
@@ -27,8 +27,8 @@ pub struct MaskingConfig {
     /// SHA-256 of the network, to refuse another one. Default: the one of its card.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sha256: Option<String>,
-    /// The library that computes the network: `onnxruntime`; `rten`, which is built in and slower; or
-    /// `auto`: ONNX Runtime where it is found, else rten.
+    /// The library that computes the network: `onnxruntime`; `rten`, which is built in and slower;
+    /// or `auto`: ONNX Runtime where it is found, else rten.
     #[serde(deserialize_with = "backend::deserialize")]
     pub backend: Backend,
     /// The library of ONNX Runtime, or its folder. Default: it is searched for, see docs/masks.md.
@@ -37,21 +37,22 @@ pub struct MaskingConfig {
     /// Threads of ONNX Runtime, 1 to 64; rten computes with one. The other stages work at the same
     /// time.
     pub threads: usize,
-    /// Execution provider of the network: `cpu`, or `cuda`, `tensorrt` or `openvino` in a build with
-    /// that feature.
+    /// Execution provider of the network: `cpu`, or `cuda`, `tensorrt` or `openvino` in a build
+    /// with that feature.
     pub provider: Provider,
     /// Exponent of the network's mask in the weights of the sparse points, 0 to 4: 0 ignores the
     /// mask, 1 applies it as in the rasters. The weights are compressed powers, so the mask is
     /// compressed too; in full it gives the weakest single returns the largest weights.
     pub point_exponent: f32,
-    /// Whether rasters are motion compensated.
+    /// True if rasters are motion compensated.
     pub compensate: bool,
     /// Motion compensation of scan k uses the motion of scan k - lag; 1 to 16. With 2 or more the
     /// stages overlap across scans.
     pub lag: usize,
-    /// Whether rasters are also compensated for the Doppler shift, with the same motion. At constant
-    /// speed the shift cancels between rasters. Compensated, it cancels only between scans that both
-    /// have a known motion, so the motion where compensation begins is short by the whole shift.
+    /// True if rasters are also compensated for the Doppler shift, with the same motion. At
+    /// constant speed the shift cancels between rasters. Compensated, it cancels only between scans
+    /// that both have a known motion, so the motion where compensation begins is short by the whole
+    /// shift.
     pub undo_doppler: bool,
 }
 
@@ -80,7 +81,7 @@ pub enum Provider {
     Cuda,
     /// A GPU, by TensorRT.
     Tensorrt,
-    /// What OpenVINO finds.
+    /// The device that OpenVINO selects.
     Openvino,
 }
 
@@ -157,8 +158,9 @@ impl MaskingConfig {
         }
     }
 
-    /// Resolves the inputs of a learned mask, so that the stored configuration repeats the run from any folder or is rejected: the
-    /// absolute paths of model card and runtime, the checksum of the model, and the backend.
+    /// Resolves the inputs of a learned mask, so that the stored configuration repeats the run from
+    /// any folder or is rejected: the absolute paths of model card and runtime, the checksum of the
+    /// model, and the backend.
     ///
     /// # Errors
     /// A card that cannot be read, ONNX Runtime missing where it is required.

@@ -1,8 +1,9 @@
 //! Rasterises and masks scans, and extracts their sparse points.
 //!
-//! Reading order: [`Masker`]; `compensation` (motion-compensated rasters above the threshold); `learned` and [`network`] (masks
-//! of a network); `points` (weights of sparse points); [`model`] (networks and their cards), [`backend`] (the libraries that
-//! compute them) and [`runtime`] (the search for ONNX Runtime).
+//! Reading order: [`Masker`]; `compensation` (motion-compensated rasters above the threshold);
+//! `learned` and [`network`] (masks of a network); `points` (weights of sparse points); [`model`]
+//! (networks and their cards), [`backend`] (the libraries that compute them) and [`runtime`] (the
+//! search for ONNX Runtime).
 
 pub mod backend;
 mod compensation;
@@ -43,8 +44,9 @@ pub struct Sweep<'a> {
     pub twist: Option<Twist>,
 }
 
-/// Makes masked rasters and sparse points from scans, both above the same power threshold. The mask is a factor for each cell
-/// of a raster. Raised to [`MaskingConfig::point_exponent`], it is also a factor of the weights of the cell's points.
+/// Makes masked rasters and sparse points from scans, both above the same power threshold. The mask
+/// is a factor for each cell of a raster. Raised to [`MaskingConfig::point_exponent`], it is also a
+/// factor of the weights of the cell's points.
 #[derive(Debug)]
 pub struct Masker {
     raster: RasterConfig,
@@ -111,13 +113,14 @@ impl Masker {
         })
     }
 
-    /// Returns the number of scans that the mask takes and of the rasters that it gives: 1, or 2 (the scan and the previous one).
+    /// Returns the number of scans that the mask takes and of the rasters that it gives: 1, or 2
+    /// (the scan and the previous one).
     pub fn scans(&self) -> usize {
         self.learned.as_ref().map_or(1, LearnedMask::scans)
     }
 
-    /// Returns whether [`Masker::mask`] accepts a scan that follows this one: always if the mask takes one scan, else if this one was
-    /// masked or [set](Masker::set_previous) last.
+    /// Returns whether [`Masker::mask`] accepts a scan that follows this one: always if the mask
+    /// takes one scan, else if this one was masked or [set](Masker::set_previous) last.
     pub fn can_follow(&self, number: u64) -> bool {
         self.learned
             .as_ref()
@@ -135,13 +138,14 @@ impl Masker {
         }
     }
 
-    /// Masks a scan into `later` (n x n, row 0 far ahead). If the mask takes two scans, the previous scan that this one `follows`,
-    /// masked for this pair, goes into `earlier`; a scan that follows none is its own previous scan. Returns the velocity that was
-    /// used for motion compensation.
+    /// Masks a scan into `later` (n x n, row 0 far ahead). If the mask takes two scans, the
+    /// previous scan that this one `follows`, masked for this pair, goes into `earlier`; a scan
+    /// that follows none is its own previous scan. Returns the velocity that was used for motion
+    /// compensation.
     ///
     /// # Errors
-    /// An inconsistent scan, rasters of another shape, a network that fails, or a previous scan that this one
-    /// [cannot follow](Masker::can_follow).
+    /// An inconsistent scan, rasters of another shape, a network that fails, or a previous scan
+    /// that this one [cannot follow](Masker::can_follow).
     pub fn mask(
         &mut self,
         sweep: &Sweep<'_>,
@@ -155,9 +159,9 @@ impl Masker {
         }
     }
 
-    /// Writes the scan's points to the start of `out` and returns their number: see [`PointExtractor::extract`]. The mask of a
-    /// network, which is that of the last masked scan with compensation by `twist`, is applied with
-    /// [`MaskingConfig::point_exponent`].
+    /// Writes the scan's points to the start of `out` and returns their number: see
+    /// [`PointExtractor::extract`]. The mask of a network, which is that of the last masked scan
+    /// with compensation by `twist`, is applied with [`MaskingConfig::point_exponent`].
     ///
     /// # Errors
     /// An inconsistent scan.
@@ -175,13 +179,14 @@ impl Masker {
         Ok(count)
     }
 
-    /// Returns the network's factors from 0 to 1, n x n, of the last masked scan (0) or of its previous one (1, if the mask takes
-    /// two). `None` without a network.
+    /// Returns the network's factors from 0 to 1, n x n, of the last masked scan (0) or of its
+    /// previous one (1, if the mask takes two). `None` without a network.
     pub fn factors(&self, scan: usize) -> Option<ArrayView2<'_, f32>> {
         self.learned.as_ref()?.factors(scan)
     }
 
-    /// Returns the cell (row, column) of a point in a raster that is compensated by `twist`; `None` outside of the raster.
+    /// Returns the cell (row, column) of a point in a raster that is compensated by `twist`; `None`
+    /// outside of the raster.
     pub fn cell_of(&self, point: &SparsePoint, twist: Option<Twist>) -> Option<[usize; 2]> {
         self.frame(twist).cell_of(point)
     }

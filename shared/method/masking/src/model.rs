@@ -147,7 +147,8 @@ impl Card {
     /// Reads the card that `masking.model` names.
     ///
     /// # Errors
-    /// No card is named, the file cannot be read or is not a card, or `masking.sha256` is that of another model.
+    /// No card is named, the file cannot be read or is not a card, or `masking.sha256` is that of
+    /// another model.
     pub fn read(config: &MaskingConfig) -> Result<Self, ModelError> {
         let path = config.model.as_deref().ok_or(ModelError::NotNamed)?;
         let not_a_card = |reason: String| ModelError::NotACard {
@@ -198,7 +199,8 @@ impl Card {
         }
     }
 
-    /// Returns the settings that differ from those in training. The network runs, but its masks are less accurate.
+    /// Returns the settings that differ from those in training. The network runs, but its masks are
+    /// less accurate.
     pub fn training_mismatches(
         &self,
         masking: &MaskingConfig,
@@ -257,7 +259,8 @@ impl Model {
     /// Reads the model that `masking.model` names and checks that it fits these rasters.
     ///
     /// # Errors
-    /// As [`Card::read`]; rasters of another size; a file with another checksum than its card states.
+    /// As [`Card::read`]; rasters of another size; a file with another checksum than its card
+    /// states.
     pub fn read(config: &MaskingConfig, raster: &RasterConfig) -> Result<Self, ModelError> {
         let card = Card::read(config)?;
         let path = config.model.as_deref().ok_or(ModelError::NotNamed)?;

@@ -127,13 +127,14 @@ impl Network {
         Ok(Self { engine, masks })
     }
 
-    /// Returns the number of scans that it takes and of masks that it gives: 1, or 2 (this scan, then the previous one).
+    /// Returns the number of scans that it takes and of masks that it gives: 1, or 2 (this scan,
+    /// then the previous one).
     pub fn scans(&self) -> usize {
         self.masks.len_of(Axis(0))
     }
 
-    /// Computes the masks (scans x n x n) of rasters (scans x n x n). A mask is a factor from 0 to 1; the network's values are
-    /// clamped to that range.
+    /// Computes the masks (scans x n x n) of rasters (scans x n x n). A mask is a factor from 0 to
+    /// 1; the network's values are clamped to that range.
     ///
     /// # Errors
     /// Rasters of the wrong shape, an error of the backend, or factors that are NaN.

@@ -18,8 +18,8 @@ pub(crate) struct RasterFrame {
 }
 
 impl RasterFrame {
-    /// Multiplies the weight of each point by the mask at its cell raised to `exponent`. Points outside of the raster keep their
-    /// weights.
+    /// Multiplies the weight of each point by the mask at its cell raised to `exponent`. Points
+    /// outside of the raster keep their weights.
     pub fn weight(&self, mask: ArrayView2<'_, f32>, exponent: f32, points: &mut [SparsePoint]) {
         // All points of an azimuth have the same time.
         for points in points.chunk_by_mut(|a, b| a.time_s == b.time_s) {
@@ -49,7 +49,8 @@ impl RasterFrame {
         self.cell(sensor.map_or(place, |sensor| sensor * place))
     }
 
-    /// Returns the position of a point, without its Doppler shift if the raster is compensated for it: see [`SparsePoint`].
+    /// Returns the position of a point, without its Doppler shift if the raster is compensated for
+    /// it: see [`SparsePoint`].
     fn without_doppler(&self, seen: Point2<f64>, doppler_s: f64) -> Point2<f64> {
         match self.twist.filter(|_| self.doppler_compensated) {
             Some(twist) => {
@@ -90,7 +91,8 @@ mod tests {
         doppler_compensated: false,
     };
 
-    /// Returns the factor of a point's weight if the mask is 0.5 in cell (row, column) and 1 elsewhere.
+    /// Returns the factor of a point's weight if the mask is 0.5 in cell (row, column) and 1
+    /// elsewhere.
     fn factor(
         frame: RasterFrame,
         (row, column): (usize, usize),
@@ -200,7 +202,8 @@ mod tests {
         scan
     }
 
-    /// Returns the share of a scan's points that `frame` places in cells with power in the raster made with `twist`.
+    /// Returns the share of a scan's points that `frame` places in cells with power in the raster
+    /// made with `twist`.
     fn share_that_meets(twist: Twist, sense: Sense, frame: RasterFrame) -> f32 {
         let scan = spots(sense);
         let config = RasterConfig {

@@ -12,13 +12,16 @@ use std::{
 use ort::{LoadDynamicError, environment::Environment, logging::LogLevel};
 use thiserror::Error;
 
-/// The command that installs it in the user's data folder. The library does not depend on the version of Python.
+/// The command that installs it in the user's data folder. The library does not depend on the
+/// version of Python.
 pub const INSTALL: &str = "python3 -m pip install --no-deps --python-version 3.12 --target \"${XDG_DATA_HOME:-$HOME/.local/share}/gyre/onnxruntime\" -r models/onnxruntime.txt";
 /// The environment variable that may name the library.
 const VARIABLE: &str = "ORT_DYLIB_PATH";
-/// The folder that [`INSTALL`] creates in that of Gyre's data; beside the program it has the same name.
+/// The folder that [`INSTALL`] creates in that of Gyre's data; beside the program it has the same
+/// name.
 const INSTALLED: &str = "onnxruntime";
-/// Positions of the library in a named folder: the folder itself, the package, the parent of the package.
+/// Positions of the library in a named folder: the folder itself, the package, the parent of the
+/// package.
 const PLACES: [&str; 3] = ["", "capi", "onnxruntime/capi"];
 const LIBRARY: &str = "libonnxruntime.so";
 
@@ -62,12 +65,13 @@ pub enum RuntimeError {
     },
 }
 
-/// Returns the path of the library: named by `configured` (`masking.runtime`) or by the environment, installed by [`INSTALL`], or
-/// beside this program. A library is code, so no folder is searched that is not the user's own or the program's; the current one
-/// may be anybody's.
+/// Returns the path of the library: named by `configured` (`masking.runtime`) or by the
+/// environment, installed by [`INSTALL`], or beside this program. A library is code, so no folder
+/// is searched that is not the user's own or the program's; the current one may be anybody's.
 ///
 /// # Errors
-/// [`RuntimeError::NotFound`] if a named path has no library, [`RuntimeError::Missing`] if none is named or installed.
+/// [`RuntimeError::NotFound`] if a named path has no library, [`RuntimeError::Missing`] if none is
+/// named or installed.
 pub fn find(configured: Option<&Path>) -> Result<PathBuf, RuntimeError> {
     find_in(configured, env::var_os(VARIABLE), &installed_in())
 }
@@ -101,7 +105,8 @@ fn installed_in() -> Vec<PathBuf> {
     data.into_iter().chain(program).collect()
 }
 
-/// Returns the folder of Gyre's data. A relative path would be in the current folder and is ignored, as the XDG specification says.
+/// Returns the folder of Gyre's data. A relative path would be in the current folder and is
+/// ignored, as the XDG specification says.
 fn data_folder(data_home: Option<OsString>, home: Option<OsString>) -> Option<PathBuf> {
     let absolute =
         |path: Option<OsString>| path.map(PathBuf::from).filter(|path| path.is_absolute());
@@ -109,7 +114,8 @@ fn data_folder(data_home: Option<OsString>, home: Option<OsString>) -> Option<Pa
     Some(data.join("gyre"))
 }
 
-/// Returns the library at a path or in a folder, absolute, since stages may be started in another folder.
+/// Returns the library at a path or in a folder, absolute, since stages may be started in another
+/// folder.
 fn library_at(path: &Path) -> Option<PathBuf> {
     let path = path.canonicalize().ok()?;
     if path.is_file() {

@@ -1,4 +1,5 @@
-//! The models of `models/`: their files have the checksums of their cards, and all backends load them and agree.
+//! The models of `models/`: their files have the checksums of their cards, and all backends load
+//! them and agree.
 
 use std::{
     fs,
@@ -72,7 +73,8 @@ fn the_backends_agree_on_scans_of_a_simulated_drive() {
             apart.iter().copied().fold(0.0, f32::max),
             apart.mean().unwrap(),
         );
-        // An 8-bit network rounds the values of each layer to 256 steps. Where the libraries differ in the last digit, that may be a step.
+        // An 8-bit network rounds the values of each layer to 256 steps. Where the libraries differ
+        // in the last digit, that may be a step.
         let limits = match fs::metadata(path.with_extension("onnx")).unwrap().len() {
             ..4_000_000 => (16.0 / 255.0, 0.5 / 255.0),
             _ => (1e-5, 1e-6),

@@ -1,6 +1,9 @@
-//! Estimates the trajectory of a recording and prints it in TUM format (time, x, y, z and a quaternion; s, m).
+//! Estimates the trajectory of a recording and prints it in TUM format (time, x, y, z and a
+//! quaternion; s, m).
 //!
-//!     cargo run --release -p gyre-odometry --example trajectory -- DATASET [CONFIG.toml] > trajectory.tum
+//! ```sh
+//! cargo run --release -p gyre-odometry --example trajectory -- DATASET [CONFIG.toml] > trajectory.tum
+//! ```
 
 use std::{env, error::Error, fs, io, path::Path};
 

@@ -1,4 +1,5 @@
-//! The examples that people copy: `examples/own_sensor.rs`, `examples/own_dataset.rs` and `examples/own_search.rs`.
+//! The examples that people copy: `examples/own_sensor.rs`, `examples/own_dataset.rs` and
+//! `examples/own_search.rs`.
 
 #[allow(dead_code)] // Its `main`.
 #[path = "../../../../examples/own_dataset.rs"]

@@ -1,4 +1,5 @@
-//! Odometry of a simulated vehicle that stands in traffic, creeps and drives off: `configs/stop-and-go.toml`.
+//! Odometry of a simulated vehicle that stands in traffic, creeps and drives off:
+//! `configs/stop-and-go.toml`.
 
 use std::{fs, path::Path};
 

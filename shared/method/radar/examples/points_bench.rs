@@ -1,5 +1,5 @@
-//! Time to extract the points of a scan on one thread, and their number: medians over the first scans of each recording in
-//! `GYRE_DATA`.
+//! Time to extract the points of a scan on one thread, and their number: medians over the first
+//! scans of each recording in `GYRE_DATA`.
 //!
 //! `cargo run --release -p gyre-radar --example points_bench`
 
@@ -55,7 +55,8 @@ fn measure(scans: &[OwnedScan], floor: u8) -> Result<(usize, f64), Box<dyn Error
     let mut extractor = PointExtractor::new(&config)?;
     let mut out = vec![SparsePoint::default(); config.capacity];
     let (mut counts, mut times) = (Vec::new(), Vec::new());
-    // Repetitions in the outer loop, so that a scan has left the cache before it is processed again.
+    // Repetitions in the outer loop, so that a scan has left the cache before it is processed
+    // again.
     for _ in 0..REPETITIONS {
         for scan in scans {
             let start = Instant::now();

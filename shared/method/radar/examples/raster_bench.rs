@@ -1,5 +1,6 @@
-//! Time to make a raster on one thread: medians for an Oxford scan (the first in `GYRE_DATA`), or a synthetic one of its size,
-//! at three raster sizes, with both samplings, with and without motion compensation.
+//! Time to make a raster on one thread: medians for an Oxford scan (the first in `GYRE_DATA`), or a
+//! synthetic one of its size, at three raster sizes, with both samplings, with and without motion
+//! compensation.
 //!
 //! `cargo run --release -p gyre-radar --example raster_bench`
 

@@ -1,11 +1,13 @@
 //! Breaks in the time of a recording.
 
-/// The longest time between consecutive scans of a chain of motions, ns. After that a moving vehicle has left the reach of
-/// every search, and a prediction from its last velocity says nothing.
+/// The longest time between consecutive scans of a chain of motions, ns. After that a moving
+/// vehicle has left the reach of every search, and a prediction from its last velocity says
+/// nothing.
 pub const MAX_INTERVAL_NS: i64 = 10_000_000_000;
 
-/// Returns whether the scan at `later_ns` continues the chain of motions of the scan at `earlier_ns`: it is later, and by at most
-/// [`MAX_INTERVAL_NS`]. Otherwise there is a gap, or the clock was set.
+/// Returns whether the scan at `later_ns` continues the chain of motions of the scan at
+/// `earlier_ns`: it is later, and by at most [`MAX_INTERVAL_NS`]. Otherwise there is a gap, or the
+/// clock was set.
 pub fn continues(earlier_ns: i64, later_ns: i64) -> bool {
     (1..=MAX_INTERVAL_NS).contains(&later_ns.saturating_sub(earlier_ns))
 }

@@ -62,7 +62,8 @@ pub trait Dataset: Send {
     /// Size of the images as stored.
     fn image_size(&self) -> ImageSize;
 
-    /// Returns whether the images are stored as range x azimuth, and transposed by [`Dataset::read`].
+    /// Returns whether the images are stored as range x azimuth, and transposed by
+    /// [`Dataset::read`].
     fn is_transposed(&self) -> bool {
         false
     }
@@ -75,7 +76,8 @@ pub trait Dataset: Send {
         self.files().get(index).unwrap_or(Path::new(""))
     }
 
-    /// Time of a scan (the middle of the sweep on the sensor's clock), ns since 1970, as far as it is known without decoding.
+    /// Time of a scan (the middle of the sweep on the sensor's clock), ns since 1970, as far as it
+    /// is known without decoding.
     fn nominal_stamp_ns(&self, index: usize) -> Option<i64>;
 
     /// Median time between two scans, ns.
@@ -94,7 +96,8 @@ pub trait Dataset: Send {
         None
     }
 
-    /// Observations of the reader when it opened the dataset, and how it handles them: whole sentences.
+    /// Observations of the reader when it opened the dataset, and how it handles them: whole
+    /// sentences.
     fn notes(&self) -> &[String] {
         &[]
     }
@@ -102,15 +105,16 @@ pub trait Dataset: Send {
     /// Decodes a scan into `slot`, whose slices are at least as long as [`Dataset::limits`].
     ///
     /// # Errors
-    /// An index past the end, an image that cannot be read or decoded, metadata that is not of one sweep, a slot that is
-    /// too small.
+    /// An index past the end, an image that cannot be read or decoded, metadata that is not of one
+    /// sweep, a slot that is too small.
     fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError>;
 }
 
-/// Opens the dataset at `root`: the folder that holds the radar's folder, or the folder of images itself.
+/// Opens the dataset at `root`: the folder that holds the radar's folder, or the folder of images
+/// itself.
 ///
-/// The format is detected unless `options` names it. Options that are not set are read from a `dataset.toml` in the folder,
-/// if there is one.
+/// The format is detected unless `options` names it. Options that are not set are read from a
+/// `dataset.toml` in the folder, if there is one.
 ///
 /// # Errors
 /// A folder without images of a known format, options out of bounds, or files that cannot be read.
@@ -118,7 +122,8 @@ pub fn open(root: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, O
     open_resolved(root, &options.or(&stored_options(root)?))
 }
 
-/// Returns the options in the `dataset.toml` of a recording; none are set where there is no such file.
+/// Returns the options in the `dataset.toml` of a recording; none are set where there is no such
+/// file.
 ///
 /// # Errors
 /// A file that cannot be read or has other keys.
@@ -135,8 +140,9 @@ pub fn open_resolved(root: &Path, options: &DatasetOptions) -> Result<Box<dyn Da
     open_found(detect::locate(root, options.format)?, options)
 }
 
-/// Opens a dataset again as [`open_resolved`] has opened it before, with the format and the files that it had then. The folder is
-/// not listed, so it does not matter how many files it holds, or whether some came or went.
+/// Opens a dataset again as [`open_resolved`] has opened it before, with the format and the files
+/// that it had then. The folder is not listed, so it does not matter how many files it holds, or
+/// whether some came or went.
 ///
 /// # Errors
 /// No file, options out of bounds, or files that cannot be read.

@@ -62,7 +62,8 @@ impl Fingerprint {
         })
     }
 
-    /// Returns how `now` differs: one clause with the earlier and the present value. `None`: it does not.
+    /// Returns how `now` differs: one clause with the earlier and the present value. `None`: it
+    /// does not.
     pub fn difference(&self, now: &Self) -> Option<String> {
         let stamp = |ns: Option<i64>| ns.map_or("unknown".to_owned(), |ns| ns.to_string());
         if self.format != now.format {

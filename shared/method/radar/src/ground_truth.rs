@@ -86,7 +86,8 @@ pub enum TrajectoryFormat {
     Kitti,
 }
 
-/// Reads a trajectory of any known format, detected from its first line, and converts it to REP-103.
+/// Reads a trajectory of any known format, detected from its first line, and converts it to
+/// REP-103.
 ///
 /// # Errors
 /// A file that cannot be read, or is not of a known format.
@@ -114,7 +115,8 @@ pub fn parse_trajectory(text: &str, path: &Path) -> Result<Trajectory, Trajector
     })
 }
 
-/// Returns the ground truth file of a dataset, if there is one at a usual path. `root` may also be the folder of images.
+/// Returns the ground truth file of a dataset, if there is one at a usual path. `root` may also be
+/// the folder of images.
 pub fn find_ground_truth(root: &Path) -> Option<PathBuf> {
     let above = root
         .file_name()

@@ -80,7 +80,8 @@ pub struct Unreadable {
 
 /// Examines the dataset at `root`.
 ///
-/// With a `trajectory` of the dataset (an odometry result), the clock of each stamped ground truth is compared with it.
+/// With a `trajectory` of the dataset (an odometry result), the clock of each stamped ground truth
+/// is compared with it.
 ///
 /// # Errors
 /// A dataset that cannot be opened; see [`open`].

@@ -1,6 +1,7 @@
 //! The median.
 
-/// Returns the median: the upper of the two middle values if their number is even, `None` without values.
+/// Returns the median: the upper of the two middle values if their number is even, `None` without
+/// values.
 pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     let mut values: Vec<f64> = values.into_iter().collect();
     let middle = values.len() / 2;

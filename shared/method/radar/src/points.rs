@@ -1,11 +1,13 @@
-//! Extraction of sparse points from a polar scan: its strongest returns, at their measured positions.
+//! Extraction of sparse points from a polar scan: its strongest returns, at their measured
+//! positions.
 //!
-//! A point is a range cell above the floor that survives non-maximum suppression across the azimuths within the antenna's
-//! beam: a scatterer appears in several azimuths, and the strongest gives its bearing. There is no suppression along range,
-//! so that a wall at a grazing angle is kept as a whole.
+//! A point is a range cell above the floor that survives non-maximum suppression across the
+//! azimuths within the antenna's beam: a scatterer appears in several azimuths, and the strongest
+//! gives its bearing. There is no suppression along range, so that a wall at a grazing angle is
+//! kept as a whole.
 //!
-//! Steps: `RangeCells` sums the bins of each range cell, `peaks` finds the maxima across azimuths, and [`PointExtractor`]
-//! converts the strongest of them to points.
+//! Steps: `RangeCells` sums the bins of each range cell, `peaks` finds the maxima across azimuths,
+//! and [`PointExtractor`] converts the strongest of them to points.
 
 mod peaks;
 mod range_cells;
@@ -26,18 +28,20 @@ pub const MAX_POINTS: usize = 65_536;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PointsConfig {
-    /// Half width of the non-maximum suppression, degrees, rounded to whole azimuths: a point is the strongest return at its
-    /// range within it. Default 2.7: three azimuths of 0.9.
+    /// Half width of the non-maximum suppression, degrees, rounded to whole azimuths: a point is
+    /// the strongest return at its range within it. Default 2.7: three azimuths of 0.9.
     pub beam_deg: f32,
     /// Approximate depth of a range cell, m, rounded to whole bins. Default 0.17.
     pub range_cell_m: f32,
     /// Minimum range, m. Nearer returns are reflections of the vehicle itself. Default 5.
     pub min_range_m: f32,
-    /// Maximum range, m. Farther away the beam is metres wide, and bearings are inaccurate. Default 80.
+    /// Maximum range, m. Farther away the beam is metres wide, and bearings are inaccurate.
+    /// Default 80.
     pub max_range_m: f32,
     /// Power above the floor at which the weight of a point reaches 1. Default 60.
     pub weight_cap: f32,
-    /// Maximum number of points per scan; the weakest are dropped. 0 disables the extraction. Default 8192.
+    /// Maximum number of points per scan; the weakest are dropped. 0 disables the extraction.
+    /// Default 8192.
     pub capacity: usize,
 }
 
@@ -145,10 +149,11 @@ impl PointExtractor {
         })
     }
 
-    /// Writes the points of `scan` with a power above `floor` to the start of `out`, ordered by azimuth, then by range.
-    /// A point's weight is its power above the floor over [`PointsConfig::weight_cap`], at most 1.
-    /// Returns the number of points, at most [`PointsConfig::capacity`] and `out.len()`. Azimuths that were not measured
-    /// give no points and suppress none.
+    /// Writes the points of `scan` with a power above `floor` to the start of `out`, ordered by
+    /// azimuth, then by range. A point's weight is its power above the floor over
+    /// [`PointsConfig::weight_cap`], at most 1. Returns the number of points, at most
+    /// [`PointsConfig::capacity`] and `out.len()`. Azimuths that were not measured give no points
+    /// and suppress none.
     ///
     /// # Errors
     /// An inconsistent scan; `out` is unchanged then.

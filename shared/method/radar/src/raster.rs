@@ -1,15 +1,17 @@
-//! Conversion of a polar scan to a Cartesian raster, by the measured azimuths, with optional motion compensation.
+//! Conversion of a polar scan to a Cartesian raster, by the measured azimuths, with optional motion
+//! compensation.
 //!
-//! A raster is `n x n`, row-major: row 0 is far ahead, column 0 far left, and the sensor is at the centre of the middle
-//! cell (between the middle cells where `n` is even). Its frame is the sensor's at the scan's stamp, x forward and
-//! y left. A value is the power above a floor.
+//! A raster is `n x n`, row-major: row 0 is far ahead, column 0 far left, and the sensor is at the
+//! centre of the middle cell (between the middle cells where `n` is even). Its frame is the
+//! sensor's at the scan's stamp, x forward and y left. A value is the power above a floor.
 //!
 //! Steps:
-//! 1. `bearing_table`: maps a bearing to the fractional azimuth measured there, and to the time of the measurement;
-//! 2. `polar_image`: the powers above the floor, averaged along range over the depth of a cell, with the Doppler shift
-//!    compensated;
-//! 3. `kernels::locate`: the position of each cell in the polar image, seen from where the [`Twist`] places the sensor,
-//!    and bilinear interpolation there.
+//! 1. `bearing_table`: maps a bearing to the fractional azimuth measured there, and to the time of
+//!    the measurement;
+//! 2. `polar_image`: the powers above the floor, averaged along range over the depth of a cell,
+//!    with the Doppler shift compensated;
+//! 3. `kernels::locate`: the position of each cell in the polar image, seen from where the
+//!    [`Twist`] places the sensor, and bilinear interpolation there.
 
 mod bearing_table;
 mod cells;
@@ -41,10 +43,11 @@ pub const MAX_CELLS_PER_SIDE: usize = 4096;
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum Sampling {
-    /// The mean of the range bins that one cell covers, linear between azimuths: no aliasing where bins are finer than
-    /// cells. Bins are summed in groups of 2, 4, ... up to an eighth of that depth, which may shift a single bright bin
-    /// by a sixteenth of a cell. Azimuths are not averaged: near the sensor, where several fall into one cell, averaging
-    /// improved no trajectory.
+    /// The mean of the range bins that one cell covers, linear between azimuths: no aliasing where
+    /// bins are finer than cells. Bins are summed in groups of 2, 4, ... up to an eighth of that
+    /// depth, which may shift a single bright bin by a sixteenth of a cell. Azimuths are not
+    /// averaged: near the sensor, where several fall into one cell, averaging improved no
+    /// trajectory.
     #[default]
     Averaged,
     /// Bilinear between the four nearest measurements: samples one point of the scan per cell.
@@ -68,7 +71,8 @@ pub struct RasterConfig {
     pub n: usize,
     /// Size of a cell, m.
     pub cell_m: f32,
-    /// Minimum range, m. Nearer cells, which hold the vehicle or the ringing of the sensor, are set to zero.
+    /// Minimum range, m. Nearer cells, which hold the vehicle or the ringing of the sensor, are set
+    /// to zero.
     pub min_range_m: f32,
     /// The rule that computes the value of a cell from the range bins: `averaged` or `bilinear`.
     pub sampling: Sampling,
@@ -149,8 +153,8 @@ pub enum RasterError {
     },
 }
 
-/// Converts scans to rasters. [`Rasteriser::new`] allocates the memory that depends on the raster, and the first scan of
-/// a size the memory that depends on the scan.
+/// Converts scans to rasters. [`Rasteriser::new`] allocates the memory that depends on the raster,
+/// and the first scan of a size the memory that depends on the scan.
 #[derive(Debug)]
 pub struct Rasteriser {
     config: RasterConfig,
@@ -188,14 +192,15 @@ impl Rasteriser {
 
     /// Writes the raster of `scan`: `n x n` powers above `floor`, from 0 to `255 - floor`.
     ///
-    /// With a `twist` the raster is motion-compensated: it shows the scene as seen from the sensor's pose at
-    /// `scan.geometry.stamp_ns`, by the stamps of the azimuths. The Doppler shift of the ranges is compensated where the
-    /// scan's Doppler coefficient is known. Cells that no azimuth or bin covers are zero; a scan without azimuths or bins
-    /// gives zeros. Powers are interpolated between neighbouring azimuths, also between the last and the first.
+    /// With a `twist` the raster is motion-compensated: it shows the scene as seen from the
+    /// sensor's pose at `scan.geometry.stamp_ns`, by the stamps of the azimuths. The Doppler shift
+    /// of the ranges is compensated where the scan's Doppler coefficient is known. Cells that no
+    /// azimuth or bin covers are zero; a scan without azimuths or bins gives zeros. Powers are
+    /// interpolated between neighbouring azimuths, also between the last and the first.
     ///
     /// # Errors
-    /// A wrong shape or layout of `raster`, an inconsistent scan, a twist that is not finite or too large. `raster` is
-    /// unchanged then.
+    /// A wrong shape or layout of `raster`, an inconsistent scan, a twist that is not finite or too
+    /// large. `raster` is unchanged then.
     pub fn rasterise(
         &mut self,
         scan: &PolarScan<'_>,

@@ -1,7 +1,7 @@
 //! One sweep of the radar in the sensor's polar grid.
 //!
-//! The caller owns the memory (usually shared memory): [`PolarScan`] borrows it for reading, [`ScanSlot`] borrows it for
-//! a dataset reader to fill.
+//! The caller owns the memory (usually shared memory): [`PolarScan`] borrows it for reading,
+//! [`ScanSlot`] borrows it for a dataset reader to fill.
 
 mod check;
 
@@ -33,8 +33,9 @@ pub mod flag {
 
 /// The layout of the powers in the bytes of a scan, and their scale.
 ///
-/// The power of azimuth `a` at range bin `b` is byte `first_byte + a * stride + b`. Rows keep the metadata bytes that a
-/// file stores before each row (Oxford: 11), so that an image decodes in place.
+/// The power of azimuth `a` at range bin `b` is byte `first_byte + a * stride + b`. Rows keep the
+/// metadata bytes that a file stores before each row (Oxford: 11), so that an image decodes in
+/// place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SweepGeometry {
     /// Number of azimuths (rows).
@@ -47,15 +48,18 @@ pub struct SweepGeometry {
     pub first_byte: usize,
     /// Depth of a range bin, m.
     pub range_resolution_m: f32,
-    /// Offset of the ranges, m: the centre of bin `b` is at `(b + 0.5) * range_resolution_m + range_offset_m`.
+    /// Offset of the ranges, m: the centre of bin `b` is at
+    /// `(b + 0.5) * range_resolution_m + range_offset_m`.
     pub range_offset_m: f32,
-    /// Doppler coefficient, s: metres to add to a range for each m/s of closing speed; 0 if unknown. With a rising chirp
-    /// an approaching target appears too near, so the coefficient is positive, and with a falling chirp negative. Where
-    /// the chirp of an azimuth is known, it determines the sign.
+    /// Doppler coefficient, s: metres to add to a range for each m/s of closing speed; 0 if
+    /// unknown. With a rising chirp an approaching target appears too near, so the coefficient is
+    /// positive, and with a falling chirp negative. Where the chirp of an azimuth is known, it
+    /// determines the sign.
     pub doppler_s: f32,
     /// The direction in which azimuths increase.
     pub sense: Sense,
-    /// Time of the scan, ns since 1970: the middle of the sweep on the sensor's clock, unless the reader documents otherwise.
+    /// Time of the scan, ns since 1970: the middle of the sweep on the sensor's clock, unless the
+    /// reader documents otherwise.
     pub stamp_ns: i64,
 }
 
@@ -66,8 +70,8 @@ pub struct PolarScan<'a> {
     pub geometry: SweepGeometry,
     /// All bytes of the scan.
     pub bytes: &'a [u8],
-    /// Measured angle of each azimuth from straight ahead, rad in `[0, 2 pi)`, increasing in the direction of
-    /// `geometry.sense`.
+    /// Measured angle of each azimuth from straight ahead, rad in `[0, 2 pi)`, increasing in the
+    /// direction of `geometry.sense`.
     pub azimuth_rad: &'a [f32],
     /// Time of each azimuth, ns since 1970, on the sensor's clock.
     pub stamp_ns: &'a [i64],
@@ -82,7 +86,8 @@ impl<'a> PolarScan<'a> {
         &self.bytes[first..first + self.geometry.bins]
     }
 
-    /// Returns the powers, azimuth x range bin: a strided view of the bytes, without the metadata between rows.
+    /// Returns the powers, azimuth x range bin: a strided view of the bytes, without the metadata
+    /// between rows.
     ///
     /// # Panics
     /// If the scan does not pass [`PolarScan::check`].
@@ -104,8 +109,8 @@ impl<'a> PolarScan<'a> {
         self.stamp_ns[azimuth].saturating_sub(self.geometry.stamp_ns) as f64 * 1e-9
     }
 
-    /// Doppler coefficient of one azimuth, s: [`SweepGeometry::doppler_s`] with the sign of the azimuth's chirp where it
-    /// is known.
+    /// Doppler coefficient of one azimuth, s: [`SweepGeometry::doppler_s`] with the sign of the
+    /// azimuth's chirp where it is known.
     pub fn doppler_s(&self, azimuth: usize) -> f32 {
         let shift_s = self.geometry.doppler_s;
         match self.flags[azimuth] & (flag::CHIRP_KNOWN | flag::CHIRP_UP) {
@@ -115,13 +120,15 @@ impl<'a> PolarScan<'a> {
         }
     }
 
-    /// Range of the centre of a bin as measured (no Doppler compensation), m. Accepts fractional bins.
+    /// Range of the centre of a bin as measured (no Doppler compensation), m. Accepts fractional
+    /// bins.
     pub fn range_m(&self, bin: f32) -> f32 {
         (bin + 0.5) * self.geometry.range_resolution_m + self.geometry.range_offset_m
     }
 }
 
-/// Memory that a dataset reader fills with a scan. Each slice is at least as long as the dataset's [`ScanLimits`].
+/// Memory that a dataset reader fills with a scan. Each slice is at least as long as the dataset's
+/// [`ScanLimits`].
 #[derive(Debug)]
 pub struct ScanSlot<'a> {
     /// Bytes of the image.
@@ -159,8 +166,8 @@ pub struct OwnedScan {
 }
 
 impl OwnedScan {
-    /// Returns an empty scan with the capacity `limits`. Pass its [`OwnedScan::slot`] to a reader, and assign the
-    /// geometry that the reader returns.
+    /// Returns an empty scan with the capacity `limits`. Pass its [`OwnedScan::slot`] to a reader,
+    /// and assign the geometry that the reader returns.
     pub fn with_limits(limits: ScanLimits) -> Self {
         Self {
             geometry: SweepGeometry {

@@ -6,7 +6,8 @@ use nalgebra::{Complex, Translation2, Unit, UnitComplex};
 /// Poses of the sensor (REP-103) in the world frame of the source.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trajectory {
-    /// Time of each pose, ns (since 1970 in recordings), non-decreasing; `None` if the source has no times.
+    /// Time of each pose, ns (since 1970 in recordings), non-decreasing; `None` if the source has
+    /// no times.
     pub stamp_ns: Option<Vec<i64>>,
     /// Pose of the sensor in the world frame, one per stamp.
     pub poses: Vec<Pose>,
@@ -60,7 +61,8 @@ impl Trajectory {
         Some(interpolate(a, b, share))
     }
 
-    /// As [`Trajectory::at`], but accepts times up to `tolerance_ns` outside the span, since files round stamps.
+    /// As [`Trajectory::at`], but accepts times up to `tolerance_ns` outside the span, since files
+    /// round stamps.
     pub fn near(&self, stamp_ns: i64, tolerance_ns: u64) -> Option<Pose> {
         let (first, last) = self.span_ns()?;
         let within = stamp_ns.clamp(first, last);
@@ -82,8 +84,9 @@ impl Trajectory {
 
 /// Returns the planar pose of a row-major 3 x 4 matrix; the heading is that of the x axis.
 ///
-/// Cosine and sine are taken without normalisation if their norm is near 1: published KITTI results come from matrices
-/// rounded to six decimals, and normalising them changes the fifth decimal of the result.
+/// Cosine and sine are taken without normalisation if their norm is near 1: published KITTI results
+/// come from matrices rounded to six decimals, and normalising them changes the fifth decimal of
+/// the result.
 pub(crate) fn planar(matrix: &[f64; 12]) -> Pose {
     let (cos, sin) = (matrix[0], matrix[4]);
     let rotation = match (cos.hypot(sin) - 1.0).abs() < 1e-4 {

@@ -139,7 +139,8 @@ fn gaps_lost_rows_and_damaged_files_are_counted() {
     std::fs::remove_file(&files[4]).unwrap();
     let whole = std::fs::read(&files[7]).unwrap();
     std::fs::write(&files[7], &whole[..whole.len() / 2]).unwrap();
-    // Every tenth row interpolated, and one lost: since all images must have 40 rows, the last step is double.
+    // Every tenth row interpolated, and one lost: since all images must have 40 rows, the last step
+    // is double.
     let sweep = Sweep {
         start: crate::common::START_US + 9 * crate::common::PERIOD_US,
         byte_ten: |row| if row % 10 == 3 { 0 } else { 255 },

@@ -31,7 +31,8 @@ fn row(from: i64, to: i64, x: f64, y: f64, yaw: f64) -> String {
 
 #[test]
 fn oxford_motions_are_converted_to_rep_103_and_composed_from_identity() {
-    // 2 m ahead with a right turn of 90 degrees, then 1 m ahead and 0.5 m to the right. Rows may be in any order.
+    // 2 m ahead with a right turn of 90 degrees, then 1 m ahead and 0.5 m to the right. Rows may be
+    // in any order.
     let quarter = std::f64::consts::FRAC_PI_2;
     let text = [
         HEADER,
@@ -147,7 +148,8 @@ fn tum_yaw_is_independent_of_roll_and_pitch() {
 
 #[test]
 fn boreas_odometry_files_are_inverted_and_mirrored() {
-    // The first frame in the sensor frame after 2 m ahead and a right turn of 0.1 rad (y right, yaw clockwise).
+    // The first frame in the sensor frame after 2 m ahead and a right turn of 0.1 rad (y right, yaw
+    // clockwise).
     let later = Isometry2::new(Vector2::new(2.0, 0.3), 0.1);
     let m = later.inverse().to_homogeneous();
     let line = |t: i64, m: &nalgebra::Matrix3<f64>| {

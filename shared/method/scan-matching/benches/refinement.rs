@@ -1,4 +1,5 @@
-//! Times of the refinement of a scan on this machine, one thread, medians: of scans that become a keyframe, and of others in between.
+//! Times of the refinement of a scan on this machine, one thread, medians: of scans that become a
+//! keyframe, and of others in between.
 #![allow(clippy::unwrap_used)]
 
 #[path = "../tests/common/mod.rs"]

@@ -1,5 +1,5 @@
-//! Times of the search on this machine, one thread, medians: the transforms that no search of this form avoids, and each
-//! step. `gyre-lab tables` compares the whole with the papers and a baseline.
+//! Times of the search on this machine, one thread, medians: the transforms that no search of this
+//! form avoids, and each step. `gyre-lab tables` compares the whole with the papers and a baseline.
 #![allow(clippy::unwrap_used)]
 
 #[path = "../tests/common/mod.rs"]
@@ -73,7 +73,8 @@ fn real_ms(size: usize, count: usize) -> f64 {
     })
 }
 
-/// Prints the times of the one-dimensional transforms alone, without a transpose, a copy or a lookup between them.
+/// Prints the times of the one-dimensional transforms alone, without a transpose, a copy or a
+/// lookup between them.
 fn floor() {
     println!(
         "floor: transforms alone, ms\n{:>5} {:>11} {:>9} {:>13} {:>9} {:>9}",
@@ -173,7 +174,8 @@ fn candidates() {
             overlap: Overlap::None,
             ..default.clone()
         });
-        // Two angles share a transform: the rows of one, all columns forward and back, the rows within reach.
+        // Two angles share a transform: the rows of one, all columns forward and back, the rows
+        // within reach.
         let reach = (REACH_M / cell) as usize + 3;
         let size = fast_size(n + reach);
         let floor = complex_ms(size, n + 2 * size + 2 * reach + 1) / 2.0;

@@ -1,4 +1,5 @@
-//! Configuration of the searches. Every key has a default; an error names the key of an invalid value.
+//! Configuration of the searches. Every key has a default; an error names the key of an invalid
+//! value.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,7 +7,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{section}.{key} = {actual}: expected {expected}")]
 pub struct ConfigError {
-    /// Section of the configuration: `rotation`, `translation`, `exhaustive`, `refinement` or `raster`.
+    /// Section of the configuration: `rotation`, `translation`, `exhaustive`, `refinement` or
+    /// `raster`.
     pub section: &'static str,
     /// Key within the section.
     pub key: &'static str,
@@ -25,8 +27,8 @@ pub enum RotationForm {
     #[default]
     #[serde(rename = "eq7")]
     Eq7,
-    /// Mean over all radial shifts (Weston et al., Algorithm 1, line 14), which is the correlation of
-    /// the two profiles summed over the radius.
+    /// Mean over all radial shifts (Weston et al., Algorithm 1, line 14), which is the correlation
+    /// of the two profiles summed over the radius.
     #[serde(rename = "line14")]
     ProfileMean,
 }
@@ -73,8 +75,9 @@ pub enum Peak {
     /// A parabola through three samples along each axis: errors up to 0.1 of a step on narrow
     /// peaks.
     Parabola,
-    /// Mean of all positions within reach, weighted with exp(temperature z), where z is the score less
-    /// the highest score, over the scores' standard deviation (Weston et al., Algorithm 1, lines 15 and 19).
+    /// Mean of all positions within reach, weighted with exp(temperature z), where z is the score
+    /// less the highest score, over the scores' standard deviation (Weston et al., Algorithm 1,
+    /// lines 15 and 19).
     SoftArgmax {
         /// Inverse width of the weight; 2 for the angle and 1 for the shift in the paper.
         temperature: f64,
@@ -199,7 +202,8 @@ impl RotationConfig {
         }
     }
 
-    /// Phase correlation in (rho, theta) at radial shift 0 (Checchin et al., Algorithm 1, lines 6 to 8).
+    /// Phase correlation in (rho, theta) at radial shift 0 (Checchin et al., Algorithm 1, lines 6
+    /// to 8).
     pub fn checchin() -> Self {
         Self {
             magnitude: Magnitude::Linear,

@@ -9,8 +9,9 @@ use crate::kernels;
 
 /// Correlates real images, two at a time, with a kept one.
 ///
-/// With Z the spectrum of g + i h, the inverse transform of Z conj(F) is the correlation of f with g as its real part and
-/// that of f with h as its imaginary part: one complex transform computes both without separating them.
+/// With Z the spectrum of g + i h, the inverse transform of Z conj(F) is the correlation of f with
+/// g as its real part and that of f with h as its imaginary part: one complex transform computes
+/// both without separating them.
 pub(crate) struct KeptCorrelation {
     n: usize,
     size: usize,
@@ -21,7 +22,8 @@ pub(crate) struct KeptCorrelation {
     inverse_columns: Transform,
     inverse_row: Transform,
     block: Vec<Complex32>,
-    /// Column by column: the transformed rows above zeros; the conjugate spectrum of the kept image; the wanted shifts.
+    /// Column by column: the transformed rows above zeros; the conjugate spectrum of the kept
+    /// image; the wanted shifts.
     plane: Columns,
     kept: Columns,
     wanted: Columns,
@@ -29,7 +31,8 @@ pub(crate) struct KeptCorrelation {
 }
 
 impl KeptCorrelation {
-    /// Plans correlations of n x n images by transforms of `size` a side. `shifts` are the rows of the transform to keep.
+    /// Plans correlations of n x n images by transforms of `size` a side. `shifts` are the rows of
+    /// the transform to keep.
     pub fn new(n: usize, size: usize, shifts: Arc<[usize]>) -> Self {
         let mut planner = FftPlanner::new();
         Self {
@@ -69,15 +72,17 @@ impl KeptCorrelation {
         }
     }
 
-    /// C(s) = sum of f(x) g(x + s), and the same of h: calls `take(r, row)` for the r-th of the shifts down with all
-    /// shifts to the right, g's in the real parts and h's in the imaginary ones, not scaled.
+    /// C(s) = sum of f(x) g(x + s), and the same of h: calls `take(r, row)` for the r-th of the
+    /// shifts down with all shifts to the right, g's in the real parts and h's in the imaginary
+    /// ones, not scaled.
     pub fn correlate(&mut self, [g, h]: [&[f32]; 2], mut take: impl FnMut(usize, &[Complex32])) {
         let (n, size) = (self.n, self.size);
         self.rows.forward(&mut self.plane, n, |r, out| {
             kernels::interleave(&g[r * n..][..n], &h[r * n..][..n], out);
         });
         for c in 0..size {
-            // Forward and back while the column is in the nearest cache; few of its values are kept.
+            // Forward and back while the column is in the nearest cache; few of its values are
+            // kept.
             self.columns
                 .line_into(self.plane.column(c), &mut self.column);
             kernels::multiply(&mut self.column, self.kept.column(c));

@@ -2,7 +2,8 @@
 
 use nalgebra::{Matrix2, Matrix3, Rotation2, Vector2};
 
-/// The covariance of a shift, m^2: (1 - score) over the peak's curvature, scaled; at most `guess`, the variance without a match.
+/// The covariance of a shift, m^2: (1 - score) over the peak's curvature, scaled; at most `guess`,
+/// the variance without a match.
 ///
 /// `hessian` holds the second derivatives of the score per squared cell.
 pub(crate) fn shift_covariance(
@@ -25,8 +26,8 @@ pub(crate) fn shift_covariance(
     }
 }
 
-/// The covariance of (x, y, yaw) from that of the shift along the later scan's axes at a known angle, the variance of the
-/// angle, and the derivative of (x, y) by the angle, m/rad.
+/// The covariance of (x, y, yaw) from that of the shift along the later scan's axes at a known
+/// angle, the variance of the angle, and the derivative of (x, y) by the angle, m/rad.
 pub(crate) fn motion_covariance(
     turn: &Rotation2<f64>,
     shift: Matrix2<f64>,

@@ -23,12 +23,15 @@ use crate::{ShapeError, cells, kernels};
 use config::AngleGrid;
 pub use config::ExhaustiveConfig;
 
-/// Offset of the bilinear lookups from the cells' centres while angles are compared, cells down and to the right.
+/// Offset of the bilinear lookups from the cells' centres while angles are compared, cells down and
+/// to the right.
 ///
-/// Interpolation blurs: along each axis by 1 - 2 a (1 - a) (1 - cos w) in power, with a the position between two cells.
-/// A rotation goes through all a evenly, so a (1 - a) is 1/6 on average, but a rotation by zero would not blur at all and
-/// would score differently from its neighbours, which pushes the peak off zero. With a = (3 - sqrt 3) / 6, a (1 - a) is
-/// 1/6 there too. The delay of such a lookup is a for long waves only, so the final shift is found without the offset.
+/// Interpolation blurs: along each axis by 1 - 2 a (1 - a) (1 - cos w) in power, with a the
+/// position between two cells. A rotation goes through all a evenly, so a (1 - a) is 1/6 on
+/// average, but a rotation by zero would not blur at all and would score differently from its
+/// neighbours, which pushes the peak off zero. With a = (3 - sqrt 3) / 6, a (1 - a) is 1/6 there
+/// too. The delay of such a lookup is a for long waves only, so the final shift is found without
+/// the offset.
 const OFFSET: f64 = 0.211_324_865_405_187_1;
 
 /// The motion between two scans, and its angle alone.
@@ -36,19 +39,22 @@ const OFFSET: f64 = 0.211_324_865_405_187_1;
 pub struct JointMatch {
     /// The angle; its runner-up is the next highest local maximum over the angles.
     pub rotation: RotationMatch,
-    /// The whole motion; its runner-up is another shift at the same angle or the best shift at another angle.
+    /// The whole motion; its runner-up is another shift at the same angle or the best shift at
+    /// another angle.
     pub motion: MotionMatch,
 }
 
-/// Finds angle and shift together by trying all angles of a grid (Masking by Moving; `raw` in Weston et al., Table III).
+/// Finds angle and shift together by trying all angles of a grid (Masking by Moving; `raw` in
+/// Weston et al., Table III).
 ///
-/// For each angle the earlier raster g is rotated and correlated with the later one, f, at all shifts within reach. The
-/// peak over the angles is interpolated, and the correlation is computed again at that angle for the shift. Two angles
-/// share a complex transform, the spectrum of f is computed once per pair, and only the shifts within reach are
-/// transformed back.
+/// For each angle the earlier raster g is rotated and correlated with the later one, f, at all
+/// shifts within reach. The peak over the angles is interpolated, and the correlation is computed
+/// again at that angle for the shift. Two angles share a complex transform, the spectrum of f is
+/// computed once per pair, and only the shifts within reach are transformed back.
 ///
-/// The covariance is the inverse of the score's curvature in (x, y, yaw), scaled: the curvature over the shifts at the
-/// best angle, the curvature over the angles of the best score at each, and the dependence of the best shift on the angle.
+/// The covariance is the inverse of the score's curvature in (x, y, yaw), scaled: the curvature
+/// over the shifts at the best angle, the curvature over the angles of the best score at each, and
+/// the dependence of the best shift on the angle.
 ///
 /// Planned once for rasters of n x n cells; nothing is allocated afterwards.
 pub struct ExhaustiveSearch {
@@ -132,7 +138,8 @@ impl ExhaustiveSearch {
 
     /// Finds the motion between two rasters.
     ///
-    /// Rasters are n x n, row 0 far ahead, column 0 far left. Values that are not finite count as zero.
+    /// Rasters are n x n, row 0 far ahead, column 0 far left. Values that are not finite count as
+    /// zero.
     ///
     /// # Errors
     /// If a raster is not n x n in standard layout.
@@ -144,7 +151,8 @@ impl ExhaustiveSearch {
         self.search_around(later, earlier, 0.0)
     }
 
-    /// Finds the motion between two rasters whose angle is near `prior_rad`, the middle of the grid.
+    /// Finds the motion between two rasters whose angle is near `prior_rad`, the middle of the
+    /// grid.
     ///
     /// # Errors
     /// Those of [`search`](Self::search).
@@ -316,8 +324,8 @@ impl ExhaustiveSearch {
         JointMatch { rotation, motion }
     }
 
-    /// (1 - score) over the curvature of the best scores along the angle, scaled as the shift's: the angle's variance
-    /// whatever the shift is.
+    /// (1 - score) over the curvature of the best scores along the angle, scaled as the shift's:
+    /// the angle's variance whatever the shift is.
     fn angle_variance(&self, score: f64, curvature: f64) -> f64 {
         let variance = -self.config.variance_scale * (1.0 - score).max(1e-6) / curvature
             * self.angles.step.powi(2);
@@ -328,8 +336,8 @@ impl ExhaustiveSearch {
         }
     }
 
-    /// The derivative of (x, y) by the angle along the ridge of the scores, m/rad, from the best shifts at the
-    /// neighbouring angles.
+    /// The derivative of (x, y) by the angle along the ridge of the scores, m/rad, from the best
+    /// shifts at the neighbouring angles.
     fn ridge_slope(&self, found: &JointPeak) -> Vector2<f64> {
         let beside = [-1, 1].map(|by| self.angles.beside(found.best, by));
         if !self.angles.is_inner(found.best) || beside.iter().any(|&k| self.at(k) <= 0.0) {
@@ -408,7 +416,8 @@ impl ExhaustiveSearch {
 }
 
 impl Turned {
-    /// g'(x) = g(R x + o), so that f(x) ~ g'(x + R^T (t - o)); and its energy if the normalisation needs it.
+    /// g'(x) = g(R x + o), so that f(x) ~ g'(x + R^T (t - o)); and its energy if the normalisation
+    /// needs it.
     fn turn(&mut self, earlier: &[f32], n: usize, angle_rad: f64, offset: f64, overlap: Overlap) {
         let rotation = Rotation::new(n, angle_rad).with_offset([offset; 2]);
         self.raster
@@ -434,7 +443,8 @@ impl Turned {
     }
 }
 
-/// t = R t' with t' the shift along the raster's axes, cells: rows run backward, columns to the right.
+/// t = R t' with t' the shift along the raster's axes, cells: rows run backward, columns to the
+/// right.
 fn translation(angle_rad: f64, shift: Vector2<f64>, cell_m: f64) -> Vector2<f64> {
     Rotation2::new(angle_rad) * shift * -cell_m
 }

@@ -1,7 +1,7 @@
 //! Two-dimensional transforms that skip rows and columns that are not needed.
 //!
-//! A plane in the frequency domain is kept column by column ([`Columns`]), so that the second pass runs over
-//! contiguous memory. Rows go there in blocks of one cache line.
+//! A plane in the frequency domain is kept column by column ([`Columns`]), so that the second pass
+//! runs over contiguous memory. Rows go there in blocks of one cache line.
 
 use std::sync::Arc;
 
@@ -15,7 +15,8 @@ pub(crate) const BLOCK: usize = 8;
 
 /// Returns the fastest even transform size of at least `min`, among products of small primes.
 ///
-/// Factors 2 and 3 take about the same time per point, 5 and 11 a quarter more, 7 and other primes more than padding.
+/// Factors 2 and 3 take about the same time per point, 5 and 11 a quarter more, 7 and other primes
+/// more than padding.
 pub fn fast_size(min: usize) -> usize {
     let cost = |n: usize| n as f64 * if only_factors(n, &[2, 3]) { 1.0 } else { 1.25 };
     let min = min.max(8);
@@ -40,7 +41,8 @@ fn only_factors(n: usize, factors: &[usize]) -> bool {
 pub(crate) struct Columns {
     pub data: Vec<Complex32>,
     pub len: usize,
-    /// Distance between columns: an odd number of cache lines, so that a row's values do not all fall into one cache set.
+    /// Distance between columns: an odd number of cache lines, so that a row's values do not all
+    /// fall into one cache set.
     stride: usize,
 }
 
@@ -71,7 +73,8 @@ impl Columns {
         self.data.len() / self.stride
     }
 
-    /// Writes a block of transformed rows, `width` apart in `block`, as rows `first..` of every column.
+    /// Writes a block of transformed rows, `width` apart in `block`, as rows `first..` of every
+    /// column.
     fn write_rows(&mut self, first: usize, rows: usize, block: &[Complex32], width: usize) {
         for (c, column) in self.data.chunks_exact_mut(self.stride).enumerate() {
             for (r, out) in column[first..first + rows].iter_mut().enumerate() {
@@ -154,7 +157,8 @@ impl RowPass {
         }
     }
 
-    /// Transforms `rows` rows into the first ones of `plane`; `fill(r, row)` writes the start of row r, the rest is zero.
+    /// Transforms `rows` rows into the first ones of `plane`; `fill(r, row)` writes the start of
+    /// row r, the rest is zero.
     pub fn forward(
         &mut self,
         plane: &mut Columns,
@@ -193,8 +197,9 @@ impl RealLines {
         }
     }
 
-    /// Transforms the lines that `fill(0, line)` and `fill(1, line)` write into lines of zeros, and keeps the first harmonics of each, as
-    /// many as there is room for. Without room for the second one it is not asked for.
+    /// Transforms the lines that `fill(0, line)` and `fill(1, line)` write into lines of zeros, and
+    /// keeps the first harmonics of each, as many as there is room for. Without room for the second
+    /// one it is not asked for.
     pub fn forward(
         &mut self,
         mut fill: impl FnMut(usize, &mut [f32]),
@@ -217,12 +222,14 @@ pub(crate) struct RealSpectrum {
     rows: RealLines,
     columns: Transform,
     block: Vec<Complex32>,
-    /// Column c holds column frequency c; its row k holds row frequency k (k - size beyond the middle).
+    /// Column c holds column frequency c; its row k holds row frequency k (k - size beyond the
+    /// middle).
     pub plane: Columns,
 }
 
 impl RealSpectrum {
-    /// Transform of `size` a side that keeps the column frequencies below `kept`, at most size / 2 + 1.
+    /// Transform of `size` a side that keeps the column frequencies below `kept`, at most size /
+    /// 2 + 1.
     pub fn new(size: usize, kept: usize) -> Self {
         Self {
             rows: RealLines::new(size),
@@ -232,7 +239,8 @@ impl RealSpectrum {
         }
     }
 
-    /// Transforms `rows` rows of an image; `fill(r, row)` writes the start of row r, the rest is zero.
+    /// Transforms `rows` rows of an image; `fill(r, row)` writes the start of row r, the rest is
+    /// zero.
     pub fn forward(&mut self, rows: usize, mut fill: impl FnMut(usize, &mut [f32])) {
         let kept = self.plane.count();
         for first in (0..rows).step_by(BLOCK) {
@@ -260,9 +268,11 @@ pub(crate) struct PairSpectrum {
     block: Vec<Complex32>,
     scratch: Vec<Complex32>,
     real: Vec<f32>,
-    /// Spectrum of first + i second; after [`cross`](Self::cross) the cross-spectrum in columns 0 to size / 2.
+    /// Spectrum of first + i second; after [`cross`](Self::cross) the cross-spectrum in columns 0
+    /// to size / 2.
     plane: Columns,
-    /// The column of the opposite frequency: columns 0 and size / 2 are their own, and are overwritten as they are read.
+    /// The column of the opposite frequency: columns 0 and size / 2 are their own, and are
+    /// overwritten as they are read.
     mirror: Vec<Complex32>,
 }
 
@@ -290,7 +300,8 @@ impl PairSpectrum {
         self.size
     }
 
-    /// Transforms `rows` rows; `fill(r, row)` writes first + i second to the start of row r, the rest is zero.
+    /// Transforms `rows` rows; `fill(r, row)` writes first + i second to the start of row r, the
+    /// rest is zero.
     pub fn forward(&mut self, rows: usize, fill: impl FnMut(usize, &mut [Complex32])) {
         self.rows.forward(&mut self.plane, rows, fill);
         self.plane.clear_from(rows);
@@ -316,8 +327,8 @@ impl PairSpectrum {
         self.plane.first_mut(self.size / 2 + 1)
     }
 
-    /// Transforms back to the image domain: calls `take(r, row)` for each r of `rows` with the whole row `rows[r]`, not
-    /// scaled.
+    /// Transforms back to the image domain: calls `take(r, row)` for each r of `rows` with the
+    /// whole row `rows[r]`, not scaled.
     pub fn inverse(&mut self, rows: &[usize], mut take: impl FnMut(usize, &[f32])) {
         let width = self.size / 2 + 1;
         self.inverse_columns.columns(&mut self.plane, width);

@@ -1,7 +1,8 @@
-//! The inner loops, compiled for several vector units; the variant for the processor is chosen at run time.
+//! The inner loops, compiled for several vector units; the variant for the processor is chosen at
+//! run time.
 
-// Bilinear lookups read at computed positions, without checks and two neighbours at a time. Every position is clamped to the
-// image right before it is read.
+// Bilinear lookups read at computed positions, without checks and two neighbours at a time. Every
+// position is clamped to the image right before it is read.
 #![allow(unsafe_code)]
 
 use gyre_simd::simd;
@@ -13,7 +14,8 @@ const LANES: usize = 16;
 /// If less than this share of two rasters overlaps, the score is set to zero.
 pub(crate) const MIN_SHARE: f64 = 1e-3;
 
-/// The position of a sample among four neighbours: the first of them and the weights toward the others.
+/// The position of a sample among four neighbours: the first of them and the weights toward the
+/// others.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Bilinear {
     /// Index of the first neighbour; the others are 1, a row, and a row and 1 behind it.
@@ -27,7 +29,8 @@ pub(crate) struct Bilinear {
 /// Samples that are looked up together.
 const CHUNK: usize = 64;
 
-/// The four neighbours of a chunk of samples, pair by pair: those of the first row, and those a row behind.
+/// The four neighbours of a chunk of samples, pair by pair: those of the first row, and those a row
+/// behind.
 struct Neighbours([[[f32; 2]; CHUNK]; 2]);
 
 impl Neighbours {
@@ -37,7 +40,8 @@ impl Neighbours {
     ///
     /// # Safety
     /// Each place plus `stride + 1` must lie in the image.
-    // Not inlined: compiled for wider vectors this loop becomes gathers, which take longer than single reads.
+    // Not inlined: compiled for wider vectors this loop becomes gathers, which take longer than
+    // single reads.
     #[inline(never)]
     unsafe fn read(&mut self, image: &[f32], stride: usize, places: &[u32]) {
         let [first, second] = &mut self.0;
@@ -62,8 +66,8 @@ impl Neighbours {
 
 /// Bilinear values along a straight line through a square image of `n` a side.
 ///
-/// `start` and `step` are (row, column) in cells. The caller keeps the line within the image; a sample that rounding
-/// puts outside is clamped to the edge.
+/// `start` and `step` are (row, column) in cells. The caller keeps the line within the image; a
+/// sample that rounding puts outside is clamped to the edge.
 #[simd]
 pub(crate) fn bilinear_line(
     image: &[f32],
@@ -83,8 +87,8 @@ pub(crate) fn bilinear_line(
         for k in 0..CHUNK {
             let t = (first + k as i32) as f32;
             let (u, v) = (row + t * row_step, col + t * col_step);
-            // SAFETY: `max` and `min` leave a number in 0..=n - 2 whatever u and v are, NaN included. The checked conversion
-            // takes longer than all the rest.
+            // SAFETY: `max` and `min` leave a number in 0..=n - 2 whatever u and v are, NaN
+            // included. The checked conversion takes longer than all the rest.
             let [i, j] = [u, v].map(|w| unsafe { w.max(0.0).min(last).to_int_unchecked::<i32>() });
             places[k] = (i * n as i32 + j) as u32;
             along[k] = v - j as f32;
@@ -228,7 +232,8 @@ pub(crate) fn cross_of_pair(column: &mut [Complex32], mirror: &[Complex32]) {
     }
 }
 
-/// Divides each score by the share of `energy` that both rasters have left in the overlap; `f` is in reverse order.
+/// Divides each score by the share of `energy` that both rasters have left in the overlap; `f` is
+/// in reverse order.
 #[simd]
 pub(crate) fn divide_by_share(scores: &mut [f32], f: &[f64], g: &[f64], energy: f64) {
     for ((score, &f), &g) in scores.iter_mut().zip(f.iter().rev()).zip(g) {

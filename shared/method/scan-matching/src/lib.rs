@@ -1,27 +1,30 @@
 //! The decoupled Fourier search for rotation and translation (Weston et al., Algorithm 1).
 //!
-//! Two scans f (later) and g (earlier) of the same place satisfy f(x) ~ g(R x + t) (Eq. 1): (R, t) is the pose of the
-//! later scan's frame in the earlier one's. The search finds R from the magnitude spectra, which a shift does not change,
-//! and then t by one correlation.
+//! Two scans f (later) and g (earlier) of the same place satisfy f(x) ~ g(R x + t) (Eq. 1): (R, t)
+//! is the pose of the later scan's frame in the earlier one's. The search finds R from the
+//! magnitude spectra, which a shift does not change, and then t by one correlation.
 //!
 //! # Layout, in the order of the data
 //! - `taper`, `fft`, `polar`: the magnitude spectrum of a raster on a polar grid;
-//! - `spectrum`: [`PolarSpectrum`], what is kept of a scan; `rotation`: [`RotationSearch`], the angle;
-//!   `sequential`: [`SequentialRotation`], the angles along a stream of scans;
+//! - `spectrum`: [`PolarSpectrum`], what is kept of a scan; `rotation`: [`RotationSearch`], the
+//!   angle; `sequential`: [`SequentialRotation`], the angles along a stream of scans;
 //! - `warp`: the earlier raster turned by that angle;
-//! - `translation`: [`TranslationSearch`], the shift and the whole motion; `scores`: one score a shift; `overlap`
-//!   normalises them;
-//! - `exhaustive`: [`ExhaustiveSearch`], all three unknowns at once, angle by angle; `correlate`: its transforms;
-//! - `refinement`: [`Refiner`], the motion to a fraction of a cell, against a map of the last keyframes;
-//! - `submap`: [`Submap`], the points around a keyframe, for places that are visited again; [`KeyframeAligner`] and
-//!   `masked_correlation`, [`MaskedCorrelation`], register two of them;
-//! - `peak`: maxima between samples; `covariance`: covariances from the shapes of peaks; `whiten`: phase-only
-//!   correlation; `kernels`: inner loops.
+//! - `translation`: [`TranslationSearch`], the shift and the whole motion; `scores`: one score a
+//!   shift; `overlap` normalises them;
+//! - `exhaustive`: [`ExhaustiveSearch`], all three unknowns at once, angle by angle; `correlate`:
+//!   its transforms;
+//! - `refinement`: [`Refiner`], the motion to a fraction of a cell, against a map of the last
+//!   keyframes;
+//! - `submap`: [`Submap`], the points around a keyframe, for places that are visited again;
+//!   [`KeyframeAligner`] and `masked_correlation`, [`MaskedCorrelation`], register two of them;
+//! - `peak`: maxima between samples; `covariance`: covariances from the shapes of peaks; `whiten`:
+//!   phase-only correlation; `kernels`: inner loops.
 //!
 //! # Frames and shapes
-//! x forward, y left, yaw counter-clockwise; metres and radians. A raster is n x n `f32` in standard (row-major,
-//! contiguous) layout: row 0 is far ahead, column 0 far left, and the sensor is in the middle, which is the centre of the
-//! middle cell if n is odd. A motion is the pose of the later scan's frame in the earlier scan's frame.
+//! x forward, y left, yaw counter-clockwise; metres and radians. A raster is n x n `f32` in
+//! standard (row-major, contiguous) layout: row 0 is far ahead, column 0 far left, and the sensor
+//! is in the middle, which is the centre of the middle cell if n is odd. A motion is the pose of
+//! the later scan's frame in the earlier scan's frame.
 //!
 //! ```
 //! use gyre_scan_matching::{RotationConfig, RotationSearch, TranslationConfig, TranslationSearch};

@@ -9,7 +9,8 @@ use crate::scores::check_raster;
 use crate::warp::Rotation;
 use crate::{ConfigError, ShapeError, cells};
 
-/// The masked normalised correlation of two rasters at one motion, over the cells that lie within a range of both sensors.
+/// The masked normalised correlation of two rasters at one motion, over the cells that lie within a
+/// range of both sensors.
 ///
 /// Planned once for rasters of n x n cells; nothing is allocated afterwards.
 #[derive(Debug)]
@@ -33,10 +34,12 @@ struct Disc {
 type Sums = [f32; 3];
 
 impl MaskedCorrelation {
-    /// Plans correlations of rasters of `n` x `n` cells of `cell_m` metres within `range_m` of both sensors.
+    /// Plans correlations of rasters of `n` x `n` cells of `cell_m` metres within `range_m` of both
+    /// sensors.
     ///
     /// # Errors
-    /// Rasters of fewer than 16 or more than 8192 cells a side, or a size of cells that is not positive.
+    /// Rasters of fewer than 16 or more than 8192 cells a side, or a size of cells that is not
+    /// positive.
     pub fn new(n: usize, cell_m: f64, range_m: f64) -> Result<Self, ConfigError> {
         check_raster(n, cell_m)?;
         Ok(Self {
@@ -47,8 +50,9 @@ impl MaskedCorrelation {
         })
     }
 
-    /// Returns the sum of f(x) g(R x + t) over the root of the product of the sums of the squares, where (R, t) is the `motion` from
-    /// the earlier raster g to the later one f, and both x and R x + t are within range; 0 without energy there.
+    /// Returns the sum of f(x) g(R x + t) over the root of the product of the sums of the squares,
+    /// where (R, t) is the `motion` from the earlier raster g to the later one f, and both x and R
+    /// x + t are within range; 0 without energy there.
     ///
     /// # Errors
     /// If a raster is not n x n in standard layout.
@@ -61,7 +65,8 @@ impl MaskedCorrelation {
         self.correlate(later, earlier, None, motion)
     }
 
-    /// As [`at`](Self::at), with only those cells of the later raster that its sensor could see: `seen` is 1 there, and 0 elsewhere.
+    /// As [`at`](Self::at), with only those cells of the later raster that its sensor could see:
+    /// `seen` is 1 there, and 0 elsewhere.
     ///
     /// # Errors
     /// If a raster is not n x n in standard layout.
@@ -109,7 +114,8 @@ impl MaskedCorrelation {
         })
     }
 
-    /// The discs of both sensors along row `r`, in the frames of the later and of the earlier raster, cells.
+    /// The discs of both sensors along row `r`, in the frames of the later and of the earlier
+    /// raster, cells.
     fn discs(&self, r: usize, motion: &Pose) -> [Disc; 2] {
         let middle = (self.n - 1) as f64 / 2.0;
         let first = Point2::new(middle - r as f64, middle);

@@ -4,7 +4,8 @@ use nalgebra::Vector2;
 
 /// The energy that is left of a raster in the overlap, for shifts of up to `reach` cells each way.
 ///
-/// It is built from sums over rows, columns and the four corners, since there are far fewer shifts than cells.
+/// It is built from sums over rows, columns and the four corners, since there are far fewer shifts
+/// than cells.
 #[derive(Debug, Clone)]
 pub(crate) struct OverlapEnergy {
     n: usize,
@@ -79,8 +80,8 @@ impl OverlapEnergy {
         }
     }
 
-    /// Fills in the energy left after the shifts that drop cells at two of the edges: a rows and b columns are dropped,
-    /// and the a x b cells of the corner are in both.
+    /// Fills in the energy left after the shifts that drop cells at two of the edges: a rows and b
+    /// columns are dropped, and the a x b cells of the corner are in both.
     fn measure_corner(&mut self, vertical: usize, horizontal: usize, raster: &[f32]) {
         let (n, side, middle) = (self.n, self.reach + 1, self.left.len() / 2);
         let (rows, columns) = (&self.edges[vertical], &self.edges[horizontal]);
@@ -115,8 +116,9 @@ impl OverlapEnergy {
         }
     }
 
-    /// Energy left after each shift (down, right) of up to `reach` cells, row after row from the most negative on: `down`
-    /// rows are dropped at the top (at the bottom if negative), `right` columns at the left (at the right).
+    /// Energy left after each shift (down, right) of up to `reach` cells, row after row from the
+    /// most negative on: `down` rows are dropped at the top (at the bottom if negative), `right`
+    /// columns at the left (at the right).
     pub fn left(&self) -> &[f64] {
         &self.left
     }

@@ -1,7 +1,9 @@
-//! Interpolation of peaks: the position, height and curvature of the maximum of a sampled correlation.
+//! Interpolation of peaks: the position, height and curvature of the maximum of a sampled
+//! correlation.
 //!
-//! A parabola through three samples is pulled toward the middle one, by up to 0.1 of a step where the peak is narrow.
-//! Correlations of radar scans are closer to Gaussians over a pedestal, whose logarithm is a parabola.
+//! A parabola through three samples is pulled toward the middle one, by up to 0.1 of a step where
+//! the peak is narrow. Correlations of radar scans are closer to Gaussians over a pedestal, whose
+//! logarithm is a parabola.
 
 use nalgebra::{Matrix2, Vector2};
 
@@ -13,7 +15,8 @@ pub(crate) const SUPPORT: usize = 3;
 /// The largest distance of a fitted peak from the highest sample, samples.
 const MAX_OFFSET: f64 = 0.75;
 
-/// The pedestal lies below the lowest sample by this share of the range, so that the logarithm exists.
+/// The pedestal lies below the lowest sample by this share of the range, so that the logarithm
+/// exists.
 const PEDESTAL_MARGIN: f64 = 0.05;
 
 /// Maximum along one axis.

@@ -1,8 +1,8 @@
 //! Magnitude spectra on a polar grid.
 //!
-//! From f(x) ~ g(R x + t) follows |F(k)| = |G(R k)|: a rotation of the raster rotates its magnitude spectrum, and a shift
-//! does not change it.
-//! With k = rho (cos theta, sin theta) along the raster's x and y axes, P_f(theta) = P_g(theta + turn).
+//! From f(x) ~ g(R x + t) follows |F(k)| = |G(R k)|: a rotation of the raster rotates its magnitude
+//! spectrum, and a shift does not change it. With k = rho (cos theta, sin theta) along the raster's
+//! x and y axes, P_f(theta) = P_g(theta + turn).
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -26,7 +26,8 @@ pub(crate) struct PolarGrid {
 impl PolarGrid {
     /// The grid over a spectrum of `size` a side, of a raster of `n` a side.
     ///
-    /// theta_k = -pi/2 + k pi / angles: no angle is counted twice (the Linspace of Weston et al. counts both ends).
+    /// theta_k = -pi/2 + k pi / angles: no angle is counted twice (the Linspace of Weston et al.
+    /// counts both ends).
     pub fn new(n: usize, size: usize, config: &RotationConfig) -> Self {
         let (low, high) = (config.band_low, config.band_high);
         let radii = config
@@ -81,7 +82,8 @@ impl PolarGrid {
     }
 }
 
-/// The sample at row frequency `u` and column frequency `v`, in bins; a real image has the same at (-u, -v).
+/// The sample at row frequency `u` and column frequency `v`, in bins; a real image has the same at
+/// (-u, -v).
 fn sample_at(u: f64, v: f64, bins: usize) -> Bilinear {
     let (u, v) = if v < 0.0 { (-u, -v) } else { (u, v) };
     let row = (u + bins as f64).clamp(0.0, 2.0 * bins as f64);

@@ -31,11 +31,14 @@ pub struct RotationRunnerUp {
 /// The rotation between two scans.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RotationMatch {
-    /// Yaw of the later scan's frame in the earlier one's, radians, counter-clockwise, within the reach.
+    /// Yaw of the later scan's frame in the earlier one's, radians, counter-clockwise, within the
+    /// reach.
     pub angle_rad: f64,
-    /// Variance, from the shape of the peak; that of a uniform distribution over the reach if there is no peak.
+    /// Variance, from the shape of the peak; that of a uniform distribution over the reach if there
+    /// is no peak.
     pub variance_rad2: f64,
-    /// Correlation coefficient of the two polar spectra at the peak, at most 1; 0 if there is no match.
+    /// Correlation coefficient of the two polar spectra at the peak, at most 1; 0 if there is no
+    /// match.
     pub score: f64,
     /// The highest other local maximum within reach.
     pub runner_up: Option<RotationRunnerUp>,
@@ -67,7 +70,8 @@ impl RotationSearch {
     /// Plans a search over rasters of `n` x `n` cells.
     ///
     /// # Errors
-    /// A configuration value out of its bounds, or rasters of fewer than 16 or more than 8192 cells a side.
+    /// A configuration value out of its bounds, or rasters of fewer than 16 or more than 8192 cells
+    /// a side.
     pub fn new(n: usize, config: &RotationConfig) -> Result<Self, ConfigError> {
         config.validate()?;
         accept(
@@ -108,14 +112,16 @@ impl RotationSearch {
         })
     }
 
-    /// Returns an empty spectrum of this search's shape, to be filled by [`spectrum`](Self::spectrum).
+    /// Returns an empty spectrum of this search's shape, to be filled by
+    /// [`spectrum`](Self::spectrum).
     pub fn new_spectrum(&self) -> PolarSpectrum {
         PolarSpectrum::new(self.grid.angles, self.profiles())
     }
 
     /// Computes the polar magnitude spectrum of one scan. Keep it: the next pair needs it again.
     ///
-    /// `raster` is n x n, row 0 far ahead, column 0 far left. Values that are not finite count as zero.
+    /// `raster` is n x n, row 0 far ahead, column 0 far left. Values that are not finite count as
+    /// zero.
     ///
     /// # Errors
     /// If `raster` is not n x n in standard layout, or `out` is another search's.
@@ -209,8 +215,8 @@ impl RotationSearch {
         out.data[0] = Complex32::default();
     }
 
-    /// C[m] = sum over r of G[m, r] conj(F[m, r]), transformed back to angles, as correlation coefficients (Weston et al.,
-    /// Eq. 7; line 14 with a single profile).
+    /// C[m] = sum over r of G[m, r] conj(F[m, r]), transformed back to angles, as correlation
+    /// coefficients (Weston et al., Eq. 7; line 14 with a single profile).
     fn correlate(&mut self, later: &PolarSpectrum, earlier: &PolarSpectrum, energy: f64) {
         self.cross.fill(Complex32::default());
         let rows = later
@@ -220,8 +226,8 @@ impl RotationSearch {
         for (f, g) in rows {
             kernels::add_cross(f, g, &mut self.cross);
         }
-        // The highest harmonic of an even number of angles is real but for rounding, and the inverse transform requires
-        // that it is.
+        // The highest harmonic of an even number of angles is real but for rounding, and the
+        // inverse transform requires that it is.
         if let (true, Some(highest)) = (self.grid.angles.is_multiple_of(2), self.cross.last_mut()) {
             highest.im = 0.0;
         }
@@ -273,7 +279,8 @@ impl RotationSearch {
         }
     }
 
-    /// (1 - score) over the peak's curvature, scaled; at most that of a uniform distribution over the reach.
+    /// (1 - score) over the peak's curvature, scaled; at most that of a uniform distribution over
+    /// the reach.
     fn variance(&self, score: f64, curvature: f64) -> f64 {
         let variance = self.config.variance_scale * (1.0 - score).max(1e-6) / -curvature;
         let guess = self.config.reach_deg.to_radians().powi(2) / 3.0;

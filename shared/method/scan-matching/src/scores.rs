@@ -26,8 +26,8 @@ pub(crate) struct Scores {
 }
 
 impl Scores {
-    /// The smallest transform that keeps shifts of n x n rasters within `reach` free of wrap-around: n + reach, not
-    /// 2 n - 1.
+    /// The smallest transform that keeps shifts of n x n rasters within `reach` free of
+    /// wrap-around: n + reach, not 2 n - 1.
     pub fn min_size(n: usize, reach: usize) -> usize {
         n + Self::around(reach)
     }
@@ -67,7 +67,8 @@ impl Scores {
         }
     }
 
-    /// Normalises the scores by the overlap. `energy` is the energy that they have been divided by so far.
+    /// Normalises the scores by the overlap. `energy` is the energy that they have been divided by
+    /// so far.
     pub fn normalise(
         &mut self,
         overlap: Overlap,

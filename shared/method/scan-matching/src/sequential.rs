@@ -6,7 +6,8 @@ use crate::{
     ConfigError, PolarSpectrum, RotationConfig, RotationMatch, RotationSearch, ShapeError,
 };
 
-/// Finds the rotations between consecutive scans. The spectrum of each scan is computed once and kept for the next pair.
+/// Finds the rotations between consecutive scans. The spectrum of each scan is computed once and
+/// kept for the next pair.
 pub struct SequentialRotation {
     search: RotationSearch,
     later: PolarSpectrum,
@@ -33,8 +34,8 @@ impl SequentialRotation {
 
     /// Finds the rotation of scan `seq` against the one before; `None` without an earlier raster.
     ///
-    /// `earlier_changed`: the earlier raster is not the one that was given as the later one last time, as with a mask
-    /// that looks at both scans of a pair.
+    /// `earlier_changed`: the earlier raster is not the one that was given as the later one last
+    /// time, as with a mask that looks at both scans of a pair.
     ///
     /// # Errors
     /// If a raster is not n x n in standard layout.

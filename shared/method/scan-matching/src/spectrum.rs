@@ -5,14 +5,16 @@ use rustfft::num_complex::Complex32;
 
 use crate::{ShapeError, expect_shape, kernels};
 
-/// The polar magnitude spectrum of one scan, transformed along the angle: all that a rotation search needs of the scan.
+/// The polar magnitude spectrum of one scan, transformed along the angle: all that a rotation
+/// search needs of the scan.
 ///
 /// Radius x harmonic. Harmonic 0, the mean over the angle, is zero.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PolarSpectrum {
     angles: usize,
     pub(crate) data: Vec<Complex32>,
-    /// Sum of squares over all angles and radii, times the number of angles; 0 if that is not finite.
+    /// Sum of squares over all angles and radii, times the number of angles; 0 if that is not
+    /// finite.
     pub(crate) energy: f64,
 }
 
@@ -47,8 +49,8 @@ impl PolarSpectrum {
             .expect("the data are planned as radii x harmonics")
     }
 
-    /// Energy over all angles and radii: each harmonic stands for its mirror image too, but for the highest of an even
-    /// number of angles.
+    /// Energy over all angles and radii: each harmonic stands for its mirror image too, but for the
+    /// highest of an even number of angles.
     pub(crate) fn measure(&mut self) {
         let harmonics = self.harmonics();
         let alone = |row: &[Complex32]| {

@@ -8,8 +8,9 @@ use crate::{ShapeError, expect_shape};
 
 /// The points of a keyframe and of the keyframes around it, in its frame.
 ///
-/// Points are deskewed and free of the Doppler shift, so that submaps of opposite passes coincide: with the shift in them they lie a
-/// third of a metre apart. Nothing is allocated for as many points as it is planned for.
+/// Points are deskewed and free of the Doppler shift, so that submaps of opposite passes coincide:
+/// with the shift in them they lie a third of a metre apart. Nothing is allocated for as many
+/// points as it is planned for.
 #[derive(Debug, Default)]
 pub struct Submap {
     /// The points of the keyframe in the middle.
@@ -62,8 +63,9 @@ impl Submap {
             .map(|((x_m, y_m), weight)| [*x_m, *y_m, *weight])
     }
 
-    /// Draws the submap: each cell of the square `raster`, row 0 far ahead, is the sum of the weights of the points in it, each shared
-    /// bilinearly between four cells of `cell_m` metres. Points outside are left out.
+    /// Draws the submap: each cell of the square `raster`, row 0 far ahead, is the sum of the
+    /// weights of the points in it, each shared bilinearly between four cells of `cell_m` metres.
+    /// Points outside are left out.
     ///
     /// # Errors
     /// If the raster is not square or not in standard layout.
@@ -110,7 +112,8 @@ mod tests {
         let mut submap = Submap::default();
         submap.start(&[point(9.0, 9.0)], &Twist::default());
         let quarter = std::f64::consts::FRAC_PI_2;
-        // A quarter turn to the left, 2 m ahead: what is 3 m ahead there is 2 m ahead and 3 m to the left here.
+        // A quarter turn to the left, 2 m ahead: what is 3 m ahead there is 2 m ahead and 3 m to
+        // the left here.
         submap.start(&[point(4.0, -1.0)], &Twist::default());
         submap.add(
             &[point(3.0, 0.0), point(f32::NAN, 0.0)],
@@ -127,7 +130,8 @@ mod tests {
 
     #[test]
     fn the_doppler_shift_of_opposite_passes_is_removed() {
-        // A wall 20 m ahead is measured 0.42 m too near at 10 m/s; on the way back, behind, 0.42 m too far.
+        // A wall 20 m ahead is measured 0.42 m too near at 10 m/s; on the way back, behind, 0.42 m
+        // too far.
         let ahead = SparsePoint::from([19.58, 0.0, 0.0, 1.0, 0.042]);
         let behind = SparsePoint::from([-20.42, 0.0, 0.0, 1.0, 0.042]);
         let twist = Twist {

@@ -36,8 +36,8 @@ pub struct MotionMatch {
     pub y_m: f64,
     /// Counter-clockwise, radians.
     pub yaw_rad: f64,
-    /// Covariance of (x, y, yaw), m^2, m rad and rad^2: from the shapes of the peaks, and the shift's dependence on
-    /// the angle.
+    /// Covariance of (x, y, yaw), m^2, m rad and rad^2: from the shapes of the peaks, and the
+    /// shift's dependence on the angle.
     pub covariance: Matrix3<f64>,
     /// Correlation coefficient at the peak, at most 1; 0 if there is no match.
     pub score: f64,
@@ -54,7 +54,8 @@ impl MotionMatch {
     }
 }
 
-/// Finds the shift between two scans whose angle is known (Weston et al., Algorithm 1, lines 16 to 21).
+/// Finds the shift between two scans whose angle is known (Weston et al., Algorithm 1, lines 16 to
+/// 21).
 ///
 /// Planned once for rasters of n x n cells; nothing is allocated afterwards.
 pub struct TranslationSearch {
@@ -96,7 +97,8 @@ impl TranslationSearch {
 
     /// Finds the motion between two rasters, given the angle between them.
     ///
-    /// Rasters are n x n, row 0 far ahead, column 0 far left. Values that are not finite count as zero.
+    /// Rasters are n x n, row 0 far ahead, column 0 far left. Values that are not finite count as
+    /// zero.
     ///
     /// # Errors
     /// If a raster is not n x n in standard layout.
@@ -109,8 +111,9 @@ impl TranslationSearch {
         self.search_in(later, earlier, None, rotation)
     }
 
-    /// As [`search`](Self::search), where the later scan's sensor could not see everything: `seen`, in the directions of the later raster,
-    /// is 1 where it could, and 0 elsewhere. The earlier raster counts only there, as seen from its own sensor.
+    /// As [`search`](Self::search), where the later scan's sensor could not see everything: `seen`,
+    /// in the directions of the later raster, is 1 where it could, and 0 elsewhere. The earlier
+    /// raster counts only there, as seen from its own sensor.
     ///
     /// # Errors
     /// If a raster is not n x n in standard layout.
@@ -271,8 +274,9 @@ impl TranslationSearch {
         }
     }
 
-    /// The derivative of (x, y) by the angle, m/rad: an error e turns g' about the sensor, and the scene at `centre` of f
-    /// moves by R J centre e. The shift compensates, so the derivative is -R J centre.
+    /// The derivative of (x, y) by the angle, m/rad: an error e turns g' about the sensor, and the
+    /// scene at `centre` of f moves by R J centre e. The shift compensates, so the derivative is -R
+    /// J centre.
     fn lever(&self, turn: &Rotation2<f64>) -> Vector2<f64> {
         let centre = self.later_energy.centre() * -self.cell_m;
         turn * Vector2::new(centre.y, -centre.x)

@@ -1,6 +1,7 @@
 //! Rotation and translation of a raster.
 
-/// A rotation of rasters of n x n cells about their middle, and a shift, with bilinear interpolation.
+/// A rotation of rasters of n x n cells about their middle, and a shift, with bilinear
+/// interpolation.
 #[derive(Debug, Clone)]
 pub(crate) struct Rotation {
     n: usize,
@@ -38,7 +39,8 @@ impl Rotation {
         Self { offset, ..self }
     }
 
-    /// Writes row `r` of g'(x) = g(R x); zero where R x lies outside g (Weston et al., Algorithm 1, line 16).
+    /// Writes row `r` of g'(x) = g(R x); zero where R x lies outside g (Weston et al., Algorithm 1,
+    /// line 16).
     pub fn row(&self, g: &[f32], r: usize, out: &mut [f32]) {
         let span = self.span(r);
         out[..span.first].fill(0.0);
@@ -57,7 +59,8 @@ impl Rotation {
         }
     }
 
-    /// With u, v the cells down and right of the middle, x = -u and y = -v, so the source is u' = cos u - sin v, v' = sin u + cos v.
+    /// With u, v the cells down and right of the middle, x = -u and y = -v, so the source is u' =
+    /// cos u - sin v, v' = sin u + cos v.
     fn span(&self, r: usize) -> Span {
         let last = (self.n - 1) as f64;
         let middle = last / 2.0;
@@ -80,7 +83,8 @@ impl Rotation {
     }
 }
 
-/// The interval of k with 0 <= start + k step <= last, with a millionth of a cell of tolerance for rounding.
+/// The interval of k with 0 <= start + k step <= last, with a millionth of a cell of tolerance for
+/// rounding.
 fn inside(start: f64, step: f64, last: f64) -> (f64, f64) {
     const TOLERANCE: f64 = 1e-6;
     if step.abs() < 1e-12 {

@@ -29,8 +29,9 @@ fn brightest(raster: &Array2<f32>) -> [f64; 2] {
 
 #[test]
 fn a_motion_is_the_later_frame_in_the_earlier_one() {
-    // The vehicle drove 3 m ahead and turned 90 degrees to the left. What was 10 m ahead is now 7 m to the right, what
-    // was 5 m to the left of the new place is ahead, and the first position lies 3 m to the left.
+    // The vehicle drove 3 m ahead and turned 90 degrees to the left. What was 10 m ahead is now 7 m
+    // to the right, what was 5 m to the left of the new place is ahead, and the first position lies
+    // 3 m to the left.
     let motion = Motion::degrees(3.0, 0.0, 90.0);
     for (before, after) in [
         ([10.0, 0.0], [0.0, -7.0]),
@@ -94,8 +95,8 @@ fn three_points_give_their_motion_back() {
 
 #[test]
 fn scatterers_do_not_wrap_around_the_edges() {
-    // The only scatterer lies at the near edge before, and is gone after; another one stands at the far edge only after.
-    // Around a circle of n cells they would match at a shift of two cells.
+    // The only scatterer lies at the near edge before, and is gone after; another one stands at the
+    // far edge only after. Around a circle of n cells they would match at a shift of two cells.
     let (earlier, later) = ([[25.0, 0.0]], [[-24.5, 0.0]]);
     let raster = |points: &[[f64; 2]]| draw(points.iter().map(|&p| (p, 1.0)), N, CELL_M, 0.8);
     let config = TranslationConfig {
@@ -115,7 +116,8 @@ fn scatterers_do_not_wrap_around_the_edges() {
 
 #[test]
 fn the_scene_behind_the_lever_moves_with_the_angle() {
-    // All structure 20 m ahead: an angle that is wrong by e moves it to the side, and the shift compensates.
+    // All structure 20 m ahead: an angle that is wrong by e moves it to the side, and the shift
+    // compensates.
     let scene: Vec<_> = crate::common::scatterers(40, 6.0, 3)
         .iter()
         .map(|&([x, y], s)| ([x + 15.0, y + 4.0], s))

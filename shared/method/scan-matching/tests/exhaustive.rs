@@ -76,7 +76,8 @@ proptest! {
         prior_deg in -170.0_f64..170.0,
         (k, down, right) in (-1..=1, -3_isize..=3, -3_isize..=3),
     ) {
-        // Angles of 9 degrees, shifts of up to 3 cells of 1 m. f is g seen after one of these motions.
+        // Angles of 9 degrees, shifts of up to 3 cells of 1 m. f is g seen after one of these
+        // motions.
         let g: Vec<f32> = g[..n * n].iter().map(|v| v.powi(4)).collect();
         let angle = |k: i32| (prior_deg + 9.0 * f64::from(k)).to_radians();
         let moved = |at: usize| {

@@ -1,4 +1,5 @@
-//! The searches and the refinement on generated scenes. One program, so that all of it is linked once.
+//! The searches and the refinement on generated scenes. One program, so that all of it is linked
+//! once.
 
 #![allow(clippy::unwrap_used)]
 

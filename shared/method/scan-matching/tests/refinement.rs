@@ -148,8 +148,8 @@ fn mirrored_points_give_the_mirrored_motion() {
     println!(
         "after five scans {apart:.6?} m apart; yaw at the end {sums:.3?} degrees, mean {mean:.3}"
     );
-    // They differ by rounding alone: it ends an alignment one step sooner or later (1 mm, 1 mm at 50 m). The difference
-    // grows, in some scenes sooner, as any error of the points does.
+    // They differ by rounding alone: it ends an alignment one step sooner or later (1 mm, 1 mm at
+    // 50 m). The difference grows, in some scenes sooner, as any error of the points does.
     assert!(apart[2] < 0.05, "{apart:?}");
     assert!(mean.abs() < 0.15, "{sums:?}");
 }
@@ -171,8 +171,9 @@ fn traffic_does_not_pull_the_motion() {
 
 /// The yaw drift that a range offset b causes, rad/m: about b sin^2 / r^2.
 ///
-/// Per metre ahead the offset adds b du/dx = b (sin / r) u' to the apparent motion of the scene, where u' is across the line
-/// of sight u. The drift is the rotation of the rigid motion nearest to that.
+/// Per metre ahead the offset adds b du/dx = b (sin / r) u' to the apparent motion of the scene,
+/// where u' is across the line of sight u. The drift is the rotation of the rigid motion nearest to
+/// that.
 fn drift_of_offset(points: &[SparsePoint], offset_m: f64) -> f64 {
     let (mut information, mut right) = (Matrix3::zeros(), Vector3::zeros());
     for [x, y] in points.iter().map(|p| [p.x_m, p.y_m].map(f64::from)) {
@@ -329,8 +330,8 @@ fn a_factor_on_all_weights_changes_neither_motions_nor_covariances() {
     }
 }
 
-/// A corridor of hedges a metre deep. Points on top of their own image, as those of walls without depth, have no gradient,
-/// so the information matrix of such a corridor would be wrong.
+/// A corridor of hedges a metre deep. Points on top of their own image, as those of walls without
+/// depth, have no gradient, so the information matrix of such a corridor would be wrong.
 #[test]
 fn a_corridor_leaves_its_axis_uncertain() {
     let side = |y: f64| {
@@ -343,7 +344,8 @@ fn a_corridor_leaves_its_axis_uncertain() {
     let drive = Drive::steady(2.0, 0.0, 41);
     let scans = scans(&scene, &drive, &NOISY);
     for yaw in [0.0, 0.5, std::f64::consts::FRAC_PI_2] {
-        // The covariance is in the vehicle's frame: the direction of the corridor in the map does not matter.
+        // The covariance is in the vehicle's frame: the direction of the corridor in the map does
+        // not matter.
         let mut refiner = refiner();
         refiner.restore(
             TrackerState {

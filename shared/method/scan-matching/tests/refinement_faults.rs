@@ -1,4 +1,5 @@
-//! Faults of a few scans do not corrupt the refined trajectory, and a restored refiner continues bit for bit.
+//! Faults of a few scans do not corrupt the refined trajectory, and a restored refiner continues
+//! bit for bit.
 
 use crate::common::{Numbers, scenes::*};
 use gyre_geometry::{ComposedMotion, Pose, SparsePoint};
@@ -136,8 +137,8 @@ fn the_covariance_of_a_pose_recovers_after_a_prediction() {
     assert!(run.refined[30].motion.covariance[(0, 0)] > of_prediction);
 }
 
-/// The new map starts with noise, since the first pair is always accepted. A few scans and the heading are lost: the
-/// trajectory before and the one after are right, each in itself.
+/// The new map starts with noise, since the first pair is always accepted. A few scans and the
+/// heading are lost: the trajectory before and the one after are right, each in itself.
 #[test]
 fn after_enough_scans_of_noise_a_new_map_starts() {
     const FIRST: usize = 29;

@@ -1,5 +1,5 @@
-//! A radar with a sweep of one second, as K2Pi (Checchin et al., Table 1): a vehicle drives far between two scans, and its
-//! velocity changes within one.
+//! A radar with a sweep of one second, as K2Pi (Checchin et al., Table 1): a vehicle drives far
+//! between two scans, and its velocity changes within one.
 
 use std::f64::consts::TAU;
 
@@ -77,8 +77,9 @@ fn refined(seed: u64) -> Vec<Refined> {
     (1..SCANS).map(next).collect()
 }
 
-/// Measured: at most 1.7 degrees, and 0.6 m at the end. If the points are deskewed with the velocity of the scan before, the
-/// first scan in the bend matches nothing, and the yaw is 10 degrees off at once.
+/// Measured: at most 1.7 degrees, and 0.6 m at the end. If the points are deskewed with the
+/// velocity of the scan before, the first scan in the bend matches nothing, and the yaw is 10
+/// degrees off at once.
 #[test]
 fn a_bend_that_starts_between_two_scans_is_followed() {
     for seed in 1..=6 {

@@ -2,12 +2,12 @@
 
 use proc_macro::TokenStream;
 
-/// Compiles a function for AVX-512, for AVX2 and for NEON beside the baseline, and calls the best variant that the
-/// processor supports.
+/// Compiles a function for AVX-512, for AVX2 and for NEON beside the baseline, and calls the best
+/// variant that the processor supports.
 ///
-/// The variants give the same bits as long as the function is plain Rust: the compiler fuses no multiplication with an
-/// addition by itself, and changes no order of operations. The crate that uses the attribute depends on `multiversion`,
-/// whose macro this one fills in.
+/// The variants give the same bits as long as the function is plain Rust: the compiler fuses no
+/// multiplication with an addition by itself, and changes no order of operations. The crate that
+/// uses the attribute depends on `multiversion`, whose macro this one fills in.
 #[proc_macro_attribute]
 pub fn simd(_: TokenStream, function: TokenStream) -> TokenStream {
     let attributes = r#"

@@ -1,4 +1,5 @@
-//! Closing of loops: which earlier keyframes saw the place of a keyframe, and the motion between the two.
+//! Closing of loops: which earlier keyframes saw the place of a keyframe, and the motion between
+//! the two.
 
 mod cache;
 
@@ -34,7 +35,8 @@ pub trait KeyframeSource {
 pub struct LoopOptions {
     /// Submaps, descriptors and their verification.
     pub places: PlaceOptions,
-    /// Length of the path between a keyframe and the earlier ones that it is compared with, at least, m.
+    /// Length of the path between a keyframe and the earlier ones that it is compared with, at
+    /// least, m.
     pub gap_m: f64,
     /// Number of candidates that are verified.
     pub candidates: usize,
@@ -75,8 +77,9 @@ pub enum ClosingError<E> {
 
 /// Closes loops: a function of the sequence of keyframes, whatever the time at which they come.
 ///
-/// A keyframe is described and queried once its submap is complete, which lies as far ahead as behind: some keyframes later, or at the
-/// end. Descriptors are kept in memory and points are not: they are read again where a submap is drawn.
+/// A keyframe is described and queried once its submap is complete, which lies as far ahead as
+/// behind: some keyframes later, or at the end. Descriptors are kept in memory and points are not:
+/// they are read again where a submap is drawn.
 pub struct LoopCloser {
     options: LoopOptions,
     describer: Describer,
@@ -95,7 +98,8 @@ pub struct LoopCloser {
 }
 
 impl LoopCloser {
-    /// Plans the closing of loops between keyframes of at most `capacity` points. `refinement` is that of the odometry.
+    /// Plans the closing of loops between keyframes of at most `capacity` points. `refinement` is
+    /// that of the odometry.
     ///
     /// # Errors
     /// The first value of `refinement` that is out of its bounds.
@@ -136,8 +140,8 @@ impl LoopCloser {
         self.has_ended = true;
     }
 
-    /// Takes the next keyframe from its place, as [`LoopCloser::describe`] has returned it. The keyframes themselves follow after the
-    /// last of the places.
+    /// Takes the next keyframe from its place, as [`LoopCloser::describe`] has returned it. The
+    /// keyframes themselves follow after the last of the places.
     ///
     /// # Errors
     /// A place that does not continue the path.
@@ -186,7 +190,8 @@ impl LoopCloser {
         Ok(Some(place))
     }
 
-    /// Queries the next keyframe that is described, and verifies its candidates; `None` if there is none.
+    /// Queries the next keyframe that is described, and verifies its candidates; `None` if there is
+    /// none.
     ///
     /// # Errors
     /// A keyframe that cannot be read.
@@ -230,7 +235,8 @@ impl LoopCloser {
         Ok(())
     }
 
-    /// Returns whether all keyframes of a submap are known. Which they are does not change afterwards.
+    /// Returns whether all keyframes of a submap are known. Which they are does not change
+    /// afterwards.
     fn is_complete(&self, middle: usize) -> bool {
         let known = self.path_m.len();
         let end = self.neighbours(middle).end;

@@ -12,8 +12,8 @@ use crate::EstimatorKind;
 #[serde(default, deny_unknown_fields)]
 pub struct SlamConfig {
     /// `none`: odometry alone. `filter` and `graph`: the keyframes of the drive are kept in
-    /// `journal/keyframes.log`, for a correction of the trajectory by a filter or by a graph of their
-    /// poses. Odometry is the same with all three.
+    /// `journal/keyframes.log`, for a correction of the trajectory by a filter or by a graph of
+    /// their poses. Odometry is the same with all three.
     pub kind: SlamKind,
     /// Folder of a map of `gyre map`: the keyframes of the run are found in it while it drives, and
     /// published on the topic `fix`.

@@ -1,7 +1,8 @@
 //! Consistency of loops with each other: of a set of loops the largest part that agrees.
 //!
-//! Odometry over a long path is so uncertain that a wrong loop can pass its gate, and one that is taken bends the whole trajectory. But two
-//! loops and the odometry between their ends make a cycle, and odometry between the ends of two loops of one drive is mostly short.
+//! Odometry over a long path is so uncertain that a wrong loop can pass its gate, and one that is
+//! taken bends the whole trajectory. But two loops and the odometry between their ends make a
+//! cycle, and odometry between the ends of two loops of one drive is mostly short.
 
 use std::cmp::Reverse;
 
@@ -18,7 +19,8 @@ const SPEAKERS: usize = 256;
 #[derive(Default)]
 pub struct DeadReckoning {
     poses: Vec<Pose>,
-    /// Covariances of the errors of the poses: true pose = exp(error) pose. Those of the motions between add up.
+    /// Covariances of the errors of the poses: true pose = exp(error) pose. Those of the motions
+    /// between add up.
     covariances: Vec<Matrix3<f64>>,
 }
 
@@ -71,8 +73,9 @@ impl DeadReckoning {
 pub struct Speakers(Vec<Constraint>);
 
 impl Speakers {
-    /// Chooses among loops, evenly: in the order of how many others each agrees with, those that agree with most of those chosen before.
-    /// The loops must be in an order that does not depend on when they came.
+    /// Chooses among loops, evenly: in the order of how many others each agrees with, those that
+    /// agree with most of those chosen before. The loops must be in an order that does not depend
+    /// on when they came.
     pub fn choose(odometry: &DeadReckoning, loops: &[Constraint]) -> Self {
         let mut chosen = Self::default();
         for speaker in by_agreement(odometry, loops) {

@@ -6,8 +6,9 @@ use crate::trajectory::Corrected;
 
 /// Corrects the poses of all scans as those of the keyframes around them were corrected.
 ///
-/// The pose of a scan continues that of the keyframe before it by odometry, and leads to that of the keyframe after it as evenly: the
-/// corrected trajectory does not jump where a keyframe was moved against the one before.
+/// The pose of a scan continues that of the keyframe before it by odometry, and leads to that of
+/// the keyframe after it as evenly: the corrected trajectory does not jump where a keyframe was
+/// moved against the one before.
 #[derive(Clone, Debug, Default)]
 pub struct Correction {
     keyframes: Vec<Anchor>,
@@ -31,12 +32,14 @@ impl Correction {
         }
     }
 
-    /// Returns the pose of the odometry frame in the map frame after the last keyframe (REP-105: map -> odom); none without keyframes.
+    /// Returns the pose of the odometry frame in the map frame after the last keyframe (REP-105:
+    /// map -> odom); none without keyframes.
     pub fn map_from_odometry(&self) -> Option<Pose> {
         self.keyframes.last().map(|last| last.map_from_odometry)
     }
 
-    /// Corrects the pose of scan `seq` by odometry, which is returned as it is before the first keyframe.
+    /// Corrects the pose of scan `seq` by odometry, which is returned as it is before the first
+    /// keyframe.
     pub fn correct(&self, seq: u64, odometry: &Pose) -> Pose {
         let after = self
             .keyframes

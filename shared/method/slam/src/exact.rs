@@ -1,4 +1,5 @@
-//! Motions in files, bit for bit: a yaw would come back rounded, and a resumed run would not repeat the run that was not stopped.
+//! Motions in files, bit for bit: a yaw would come back rounded, and a resumed run would not repeat
+//! the run that was not stopped.
 
 use bytemuck::{Pod, Zeroable};
 use gyre_geometry::{Pose, UncertainMotion, covariance};

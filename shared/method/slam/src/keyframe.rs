@@ -16,19 +16,22 @@ pub struct Keyframe {
     pub scan: u64,
     /// Time of the scan, the middle of the sweep, ns since 1970 on the sensor's clock.
     pub stamp_ns: i64,
-    /// The pose by odometry, in the frame of the first scan, with the covariance of (x, y, yaw) in that frame.
+    /// The pose by odometry, in the frame of the first scan, with the covariance of (x, y, yaw) in
+    /// that frame.
     pub pose: UncertainMotion,
-    /// The motion by odometry from the keyframe before, with the covariance of its drift along that keyframe's axes; zero at the first
-    /// one.
+    /// The motion by odometry from the keyframe before, with the covariance of its drift along that
+    /// keyframe's axes; zero at the first one.
     pub motion: UncertainMotion,
-    /// Covariance of the noise of the pose, along its own axes. It is in the covariance of the corrected pose, and in none of motions or
-    /// loops. See [`OdometryMotion`](gyre_geometry::OdometryMotion).
+    /// Covariance of the noise of the pose, along its own axes. It is in the covariance of the
+    /// corrected pose, and in none of motions or loops. See
+    /// [`OdometryMotion`](gyre_geometry::OdometryMotion).
     pub noise: Matrix3<f64>,
     /// Velocity of the sensor.
     pub twist: Twist,
     /// Length of the path through all keyframes up to this one, m.
     pub path_m: f64,
-    /// The points of the scan as measured: with `twist` they are freed of motion and of the Doppler shift.
+    /// The points of the scan as measured: with `twist` they are freed of motion and of the Doppler
+    /// shift.
     pub points: Vec<SparsePoint>,
 }
 
@@ -112,11 +115,12 @@ impl Record for Keyframe {
 }
 
 impl RecordReader<Keyframe> {
-    /// Reads a keyframe without its points, which are a hundred times the rest. Its bytes are not checked: the checksum is that of the
-    /// whole record.
+    /// Reads a keyframe without its points, which are a hundred times the rest. Its bytes are not
+    /// checked: the checksum is that of the whole record.
     ///
     /// # Errors
-    /// A file that cannot be read, is damaged at the header of the record, or has something else there.
+    /// A file that cannot be read, is damaged at the header of the record, or has something else
+    /// there.
     ///
     /// # Panics
     /// There are no more than `index` keyframes.

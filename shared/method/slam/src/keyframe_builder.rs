@@ -51,7 +51,8 @@ impl KeyframeBuilder {
         }
     }
 
-    /// Continues after a keyframe, `path_m` along the path, whose pose is given as [`next`](Self::next) takes it.
+    /// Continues after a keyframe, `path_m` along the path, whose pose is given as
+    /// [`next`](Self::next) takes it.
     pub fn resume(&mut self, keyframe: &UncertainMotion, path_m: f64) {
         self.selector.resume(keyframe.motion, path_m);
         self.motion = UncertainMotion::identity();

@@ -4,8 +4,10 @@
 //! - [`Keyframe`]: a scan whose pose is corrected, with all that a loop or a map needs of it;
 //! - [`SlamConfig`]: the section `[slam]` of a run's configuration;
 //! - [`KeyframeBuilder`]: makes keyframes from the poses of odometry;
-//! - [`LoopCloser`]: which keyframes are of the same place; [`Query`]: the candidates of a keyframe with their verdicts;
-//! - [`RecordLog`]: the files of keyframes, places and queries of a run; [`RecordReader`] follows them;
+//! - [`LoopCloser`]: which keyframes are of the same place; [`Query`]: the candidates of a keyframe
+//!   with their verdicts;
+//! - [`RecordLog`]: the files of keyframes, places and queries of a run; [`RecordReader`] follows
+//!   them;
 //! - [`TrajectoryEstimator`]: the poses of all keyframes from odometry and loops;
 //! - [`Correction`]: the poses of all scans.
 

@@ -30,16 +30,18 @@ pub struct LoopCandidate {
     pub place: usize,
     /// The correlation coefficient of the descriptors.
     pub similarity: f64,
-    /// The pose of the queried keyframe in the frame of the found one, with its covariance; a covariance of zero if the two were not
-    /// aligned.
+    /// The pose of the queried keyframe in the frame of the found one, with its covariance; a
+    /// covariance of zero if the two were not aligned.
     pub motion: UncertainMotion,
-    /// The correlation of the submaps at the motion, and of the search before the alignment: the best one and the runner-up.
+    /// The correlation of the submaps at the motion, and of the search before the alignment: the
+    /// best one and the runner-up.
     pub correlation: f64,
     /// See [`Self::correlation`].
     pub searched: f64,
     /// See [`Self::correlation`].
     pub runner_up: f64,
-    /// Chi-square of the motion against the odometry, with three degrees of freedom; NaN if it was rejected before.
+    /// Chi-square of the motion against the odometry, with three degrees of freedom; NaN if it was
+    /// rejected before.
     pub chi_square: f64,
     /// The verdict.
     pub outcome: LoopOutcome,
@@ -87,7 +89,8 @@ impl From<VerificationOutcome> for LoopOutcome {
 }
 
 impl Query {
-    /// Returns the accepted loops as constraints from the found keyframe to the queried one, each with its candidate.
+    /// Returns the accepted loops as constraints from the found keyframe to the queried one, each
+    /// with its candidate.
     pub fn loops(&self) -> impl Iterator<Item = (&LoopCandidate, Constraint)> {
         let accepted = |candidate: &&LoopCandidate| candidate.outcome == LoopOutcome::Accepted;
         self.candidates.iter().filter(accepted).map(|candidate| {

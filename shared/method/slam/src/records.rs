@@ -1,8 +1,9 @@
 //! The files of keyframes, of places and of queries, from which SLAM continues.
 //!
-//! A keyframe is appended before its pose is journalled. So each pose of the journal that the selection of keyframes takes has its
-//! keyframe. Places and queries follow from the keyframes: they are made anew where they are missing, and what the keyframes lack is
-//! cut off. The end of the stream is a record without bytes.
+//! A keyframe is appended before its pose is journalled. So each pose of the journal that the
+//! selection of keyframes takes has its keyframe. Places and queries follow from the keyframes:
+//! they are made anew where they are missing, and what the keyframes lack is cut off. The end of
+//! the stream is a record without bytes.
 
 use std::{
     marker::PhantomData,
@@ -39,11 +40,12 @@ pub struct RecordLog<R> {
 }
 
 impl<R: Record> RecordLog<R> {
-    /// Opens or creates the file of the run that writes to `out`, and cuts off what a death or a power failure has left of the last
-    /// records.
+    /// Opens or creates the file of the run that writes to `out`, and cuts off what a death or a
+    /// power failure has left of the last records.
     ///
     /// # Errors
-    /// A file that cannot be read or written, is of another kind, is damaged, or to which another process writes.
+    /// A file that cannot be read or written, is of another kind, is damaged, or to which another
+    /// process writes.
     pub fn open(out: &Path) -> Result<Self, LogError> {
         Self::open_file(&records_path::<R>(out))
     }
@@ -76,7 +78,8 @@ impl<R: Record> RecordLog<R> {
         self.len() == 0
     }
 
-    /// Takes the memory for appending many records whose form in a file has up to so many bytes: none is allocated for each.
+    /// Takes the memory for appending many records whose form in a file has up to so many bytes:
+    /// none is allocated for each.
     pub fn reserve(&mut self, bytes: usize) {
         self.buffer.reserve(bytes);
         self.log.reserve(bytes);
@@ -104,7 +107,8 @@ impl<R: Record> RecordLog<R> {
         self.log.append(&self.buffer)
     }
 
-    /// Counts a change of another file that is of use only with the records that were appended. See [`Log::rely`].
+    /// Counts a change of another file that is of use only with the records that were appended. See
+    /// [`Log::rely`].
     ///
     /// # Errors
     /// A file that cannot be synchronised.
@@ -124,7 +128,8 @@ impl<R: Record> RecordLog<R> {
         self.log.sync()
     }
 
-    /// Keeps the first `records` records, and cuts off those behind them and the end. The cut survives a power failure.
+    /// Keeps the first `records` records, and cuts off those behind them and the end. The cut
+    /// survives a power failure.
     ///
     /// # Errors
     /// A file that cannot be written.
@@ -145,7 +150,8 @@ pub struct RecordReader<R> {
 }
 
 impl<R: Record> RecordReader<R> {
-    /// Opens the file of the run that writes to `out` and finds its complete records. One that does not exist yet is empty.
+    /// Opens the file of the run that writes to `out` and finds its complete records. One that does
+    /// not exist yet is empty.
     ///
     /// # Errors
     /// A file that cannot be read, is of another kind or damaged.
@@ -168,7 +174,8 @@ impl<R: Record> RecordReader<R> {
         Ok(reader)
     }
 
-    /// Looks for records that were appended or cut off meanwhile; returns the number of complete ones now.
+    /// Looks for records that were appended or cut off meanwhile; returns the number of complete
+    /// ones now.
     ///
     /// # Errors
     /// A file that cannot be read, is of another kind or damaged.
@@ -193,8 +200,8 @@ impl<R: Record> RecordReader<R> {
         self.len() == 0
     }
 
-    /// Returns how many of the first records were known before the last [`refresh`](Self::refresh), and are the same: fewer than were
-    /// known if some were cut off.
+    /// Returns how many of the first records were known before the last [`refresh`](Self::refresh),
+    /// and are the same: fewer than were known if some were cut off.
     pub fn unchanged(&self) -> usize {
         self.log.unchanged().min(self.len())
     }

@@ -10,7 +10,8 @@ use nalgebra::Matrix3;
 use crate::consistency::{DeadReckoning, Speakers};
 use crate::{Correction, JudgedLoop, Keyframe, LoopVerdict, Query, variance};
 
-/// All loops are judged anew when their number has grown by this share of it: that takes time in proportion to it.
+/// All loops are judged anew when their number has grown by this share of it: that takes time in
+/// proportion to it.
 const GROWTH: usize = 8;
 
 /// The estimator of the poses.
@@ -28,7 +29,8 @@ pub enum EstimatorKind {
 pub struct TrajectoryOptions {
     /// The estimator.
     pub kind: EstimatorKind,
-    /// Loops between two stretches of the path of this length count as one: their errors are dependent, m.
+    /// Loops between two stretches of the path of this length count as one: their errors are
+    /// dependent, m.
     pub group_m: f64,
 }
 
@@ -43,17 +45,18 @@ impl Default for TrajectoryOptions {
 
 /// Estimates the poses of all keyframes from their motions and loops.
 ///
-/// - [`TrajectoryEstimator::solve`] begins anew. Its result is a function of the keyframes and of the set of loops, and not of when
-///   loops came.
-/// - [`TrajectoryEstimator::update`] takes new loops into the standing estimate, in a fraction of the time. Its result may depend a
-///   little on when loops came.
+/// - [`TrajectoryEstimator::solve`] begins anew. Its result is a function of the keyframes and of
+///   the set of loops, and not of when loops came.
+/// - [`TrajectoryEstimator::update`] takes new loops into the standing estimate, in a fraction of
+///   the time. Its result may depend a little on when loops came.
 pub struct TrajectoryEstimator {
     options: TrajectoryOptions,
     keyframes: Vec<Corrected>,
     odometry: DeadReckoning,
     /// By the later keyframe, then by the earlier one.
     loops: Vec<JudgedLoop>,
-    /// The loops that the others were compared with when all were judged, and the number of loops at that time.
+    /// The loops that the others were compared with when all were judged, and the number of loops
+    /// at that time.
     speakers: Speakers,
     judged: usize,
     /// Of the covariances of the poses.
@@ -121,8 +124,8 @@ impl TrajectoryEstimator {
         }
     }
 
-    /// Takes the next keyframe. The first one stays where odometry has it. Until the next solution, a keyframe continues from the one
-    /// before by odometry.
+    /// Takes the next keyframe. The first one stays where odometry has it. Until the next solution,
+    /// a keyframe continues from the one before by odometry.
     ///
     /// # Errors
     /// A motion without a usable covariance, or too many keyframes for the filter.
@@ -147,7 +150,8 @@ impl TrajectoryEstimator {
         Ok(())
     }
 
-    /// Takes the accepted loops of a keyframe, for the next solution. They were tested against the same odometry.
+    /// Takes the accepted loops of a keyframe, for the next solution. They were tested against the
+    /// same odometry.
     ///
     /// # Errors
     /// Keyframes that were not pushed.
@@ -157,7 +161,8 @@ impl TrajectoryEstimator {
             .try_for_each(|(candidate, closing)| self.insert(&closing, candidate.chi_square))
     }
 
-    /// Takes a loop from an earlier to a later keyframe, for the next solution. Its group is decided by its keyframes.
+    /// Takes a loop from an earlier to a later keyframe, for the next solution. Its group is
+    /// decided by its keyframes.
     ///
     /// # Errors
     /// Keyframes that were not pushed.
@@ -183,8 +188,9 @@ impl TrajectoryEstimator {
         }
     }
 
-    /// Judges the loops that came since the last solution, and moves all poses from where they are to where they fit best. All loops are
-    /// judged anew from time to time, and if one was wrong the poses begin at the odometry.
+    /// Judges the loops that came since the last solution, and moves all poses from where they are
+    /// to where they fit best. All loops are judged anew from time to time, and if one was wrong
+    /// the poses begin at the odometry.
     ///
     /// # Errors
     /// The equations have no solution.
@@ -204,7 +210,8 @@ impl TrajectoryEstimator {
         &poses[..self.keyframes.len()]
     }
 
-    /// Returns the pose of a keyframe with its covariance along the axes of the frame of the first scan.
+    /// Returns the pose of a keyframe with its covariance along the axes of the frame of the first
+    /// scan.
     ///
     /// # Errors
     /// There is no such keyframe, or the constraints do not determine the poses.
@@ -219,8 +226,9 @@ impl TrajectoryEstimator {
         Ok(pose)
     }
 
-    /// Scales the covariances of the poses from now on so that the residuals of odometry and loops are as large as they say. Returns the
-    /// scale, which is 1 without loops and in the filter. It takes some 1,400 solutions of the equations.
+    /// Scales the covariances of the poses from now on so that the residuals of odometry and loops
+    /// are as large as they say. Returns the scale, which is 1 without loops and in the filter. It
+    /// takes some 1,400 solutions of the equations.
     ///
     /// # Errors
     /// The constraints do not determine the poses.
@@ -360,7 +368,8 @@ impl TrajectoryEstimator {
         }
     }
 
-    /// The filter over keyframes and loops in the order of the drive: each loop when its later keyframe was just added.
+    /// The filter over keyframes and loops in the order of the drive: each loop when its later
+    /// keyframe was just added.
     fn filter(&mut self) -> Result<(), EstimationError> {
         let mut estimator = self.start();
         let mut loops = self.loops.iter_mut().peekable();

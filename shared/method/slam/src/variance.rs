@@ -14,7 +14,8 @@ const STRETCHES: usize = 150;
 /// A number of residuals that say 1 before any is measured: a few loops change the scale little.
 const PRIOR: f64 = 15.0;
 
-/// Squared normalised residuals, and their sum as the covariances expect it, both over three degrees of freedom.
+/// Squared normalised residuals, and their sum as the covariances expect it, both over three
+/// degrees of freedom.
 struct Residuals {
     sum: f64,
     expected: f64,
@@ -28,9 +29,10 @@ impl Residuals {
 
 /// Returns the scale of the covariances of the poses of a solved graph with `loops`.
 ///
-/// The errors of odometry are not independent: over some lengths of the path they add up, over others they cancel. The scale is the
-/// largest of that of the whole graph and those of the odometry over stretches of some lengths, so that residuals of all lengths are as
-/// large as the covariances say, or smaller.
+/// The errors of odometry are not independent: over some lengths of the path they add up, over
+/// others they cancel. The scale is the largest of that of the whole graph and those of the
+/// odometry over stretches of some lengths, so that residuals of all lengths are as large as the
+/// covariances say, or smaller.
 pub fn scale(
     graph: &mut PoseGraph,
     odometry: &DeadReckoning,
@@ -45,7 +47,8 @@ pub fn scale(
     Ok(largest)
 }
 
-/// The residuals of all constraints. There are as many more constraints than poses as there are groups of loops.
+/// The residuals of all constraints. There are as many more constraints than poses as there are
+/// groups of loops.
 fn whole(graph: &PoseGraph, loops: &[JudgedLoop]) -> Residuals {
     let used = loops.iter().filter(|it| it.is_used());
     let groups: BTreeSet<Kind> = used.map(|it| it.constraint.kind).collect();
@@ -55,8 +58,9 @@ fn whole(graph: &PoseGraph, loops: &[JudgedLoop]) -> Residuals {
     }
 }
 
-/// The residuals of the odometry over stretches of `length` keyframes. With the covariance Q of the odometry and P of the corrected motion,
-/// that of their difference is Q - P, and its expected square, normalised by Q, the trace of 1 - P / Q.
+/// The residuals of the odometry over stretches of `length` keyframes. With the covariance Q of the
+/// odometry and P of the corrected motion, that of their difference is Q - P, and its expected
+/// square, normalised by Q, the trace of 1 - P / Q.
 fn stretches(
     graph: &mut PoseGraph,
     odometry: &DeadReckoning,

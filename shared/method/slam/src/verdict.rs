@@ -33,7 +33,8 @@ impl fmt::Display for LoopVerdict {
 pub struct JudgedLoop {
     /// The loop, from the earlier to the later keyframe, in its group.
     pub constraint: Constraint,
-    /// Chi-square against the odometry between its keyframes. The filter does not use it: it tests against the estimate.
+    /// Chi-square against the odometry between its keyframes. The filter does not use it: it tests
+    /// against the estimate.
     pub chi_square: f64,
     /// The verdict.
     pub verdict: LoopVerdict,

@@ -24,7 +24,8 @@ fn right(drive: &Drive) -> Vec<Constraint> {
     loops.collect()
 }
 
-/// Fifty loops between places that are not the same, in runs of `length` that agree with each other.
+/// Fifty loops between places that are not the same, in runs of `length` that agree with each
+/// other.
 fn wrong(drive: &Drive, length: usize) -> Vec<Constraint> {
     let mut random = ChaCha8Rng::seed_from_u64(length as u64);
     let mut loops = Vec::new();

@@ -37,8 +37,8 @@ pub struct TownConfig {
     pub leaves: f64,
     /// Share of the lots along streets that are building sites, 0 to 1.
     pub building_sites: f64,
-    /// True if all streets are alike: their houses repeat every 216 m, in the same order on each street, so
-    /// that places are hard to tell apart.
+    /// True if all streets are alike: their houses repeat every 216 m, in the same order on each
+    /// street, so that places are hard to tell apart.
     pub look_alike: bool,
 }
 

@@ -128,7 +128,8 @@ impl<'a> Frontage<'a> {
         Pose::new(self.place(along_m, out_m).coords, along.y.atan2(along.x))
     }
 
-    /// Returns whether a place belongs to this side: no other street, and no other part of this one, is nearer.
+    /// Returns whether a place belongs to this side: no other street, and no other part of this
+    /// one, is nearer.
     pub(super) fn owns(&self, along_m: f64, place: Point2<f64>) -> bool {
         let nearest = self.streets.nearest(place, 30.0);
         nearest.is_some_and(|found| {

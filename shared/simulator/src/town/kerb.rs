@@ -91,8 +91,8 @@ impl Kerb<'_> {
         })
     }
 
-    /// Returns whether a rectangle in the frame of a station, of half a length along the kerb and between two
-    /// distances from the frame's origin, stays off all carriageways.
+    /// Returns whether a rectangle in the frame of a station, of half a length along the kerb and
+    /// between two distances from the frame's origin, stays off all carriageways.
     fn has_room(&self, along_m: f64, out_m: f64, half_m: f64, y: [f64; 2]) -> bool {
         let frame = self.frontage.frame(along_m, out_m);
         let is_clear = |x: f64, y: f64| self.frontage.is_clear(frame * Point2::new(x, y), 0.1);

@@ -37,7 +37,8 @@ impl Actor {
         (to.translation.vector - from.translation.vector) / (sides.max(1.0) * half_s)
     }
 
-    /// Returns whether it overlaps the ego vehicle, as can happen where the route turns back on itself.
+    /// Returns whether it overlaps the ego vehicle, as can happen where the route turns back on
+    /// itself.
     pub fn overlaps(&self, ego: &Pose, pose: &Pose) -> bool {
         let seen = ego.inverse() * pose;
         let (cosine, sine) = (

@@ -94,8 +94,8 @@ fn images(folder: &Path) -> Result<BTreeSet<String>, SimulatorError> {
     Ok(names)
 }
 
-/// Returns whether `out` was made by `config`, up to the number of scans and how they are played; false if it does
-/// not say.
+/// Returns whether `out` was made by `config`, up to the number of scans and how they are played;
+/// false if it does not say.
 fn made_by_this(config: &SimulationConfig, out: &Path) -> Result<bool, SimulatorError> {
     match made_with(out)? {
         None => Ok(false),

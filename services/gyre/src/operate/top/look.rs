@@ -1,4 +1,4 @@
-//! What is known of a run at a moment, from its status, its newest poses and the kernel's counts.
+//! The state of a run at a moment, from its status, its newest poses and the kernel's counts.
 
 use std::{
     collections::{BTreeMap, VecDeque},
@@ -32,13 +32,13 @@ pub struct Look {
     pub in_flight: Option<u64>,
     /// Of the poses of the last 10 s that were seen.
     pub latency: Latency,
-    /// What each process uses, in the order of the status.
+    /// The usage of each process, in the order of the status.
     pub processes: Vec<Use>,
     /// The longest sensor-to-pose time between two looks, us, oldest first.
     pub history: Vec<u64>,
 }
 
-/// What a process uses.
+/// The usage of a process.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Use {
     /// Share of one processor since the last look.
@@ -154,7 +154,8 @@ impl<'run> Looks<'run> {
         Ok(look)
     }
 
-    /// Adds the longest time since the last look to what is drawn: where poses are owed and none comes, the time for which that lasts.
+    /// Adds the longest time since the last look to what is drawn: where poses are owed and none
+    /// comes, the time for which that lasts.
     fn draw(&mut self, now: Instant, in_flight: Option<u64>) {
         let is_owed =
             !std::mem::take(&mut self.has_new) && in_flight.is_some_and(|scans| scans > 0);

@@ -7,7 +7,8 @@ use mcap::{
     records::{Record, op},
 };
 
-/// Parses a header, a schema, a channel, a message or metadata. All other records are [`Record::Unknown`].
+/// Parses a header, a schema, a channel, a message or metadata. All other records are
+/// [`Record::Unknown`].
 ///
 /// # Errors
 /// The bytes end before the record does.
@@ -32,8 +33,8 @@ pub fn parse(opcode: u8, body: &[u8]) -> Result<Record<'_>, McapError> {
     }
 }
 
-/// Returns whether the records in all chunks that are not compressed end with their chunk. The reader subtracts their lengths from the
-/// chunk's, and would overflow.
+/// Returns whether the records in all chunks that are not compressed end with their chunk. The
+/// reader subtracts their lengths from the chunk's, and would overflow.
 pub(crate) fn chunks_hold_their_records(mut bytes: &[u8]) -> bool {
     while let Some((opcode, body)) = next(&mut bytes) {
         let fits = match opcode {

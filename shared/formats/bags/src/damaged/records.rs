@@ -8,10 +8,12 @@ use mcap::{
 
 use super::parse::{chunks_hold_their_records, parse};
 
-/// Calls `each` with all records in the bytes of a file, of chunks with those in them. Their checksums are compared.
+/// Calls `each` with all records in the bytes of a file, of chunks with those in them. Their
+/// checksums are compared.
 ///
 /// # Errors
-/// The bytes are damaged, a record is larger than `max_record_bytes`, or `each` has failed. Records at the end that are not whole are none.
+/// The bytes are damaged, a record is larger than `max_record_bytes`, or `each` has failed. Records
+/// at the end that are not whole are none.
 pub fn records(
     mut bytes: &[u8],
     max_record_bytes: usize,

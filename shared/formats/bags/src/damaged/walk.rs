@@ -55,7 +55,8 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// Returns the opcode and the place of the next record; `None` where the file ends, or ends within it.
+    /// Returns the opcode and the place of the next record; `None` where the file ends, or ends
+    /// within it.
     ///
     /// # Errors
     /// The file cannot be read.

@@ -13,9 +13,11 @@ pub(super) struct Described {
     pub messages: u64,
 }
 
-/// Returns the qualities of service of a topic, as `rosbag2` writes them: the last message or a hundred kept, reliable, no deadlines.
+/// Returns the qualities of service of a topic, as `rosbag2` writes them: the last message or a
+/// hundred kept, reliable, no deadlines.
 pub(super) fn qualities(kept: Kept) -> String {
-    // The numbers are those of rmw: history keep last, reliability reliable, durability transient local or volatile.
+    // The numbers are those of rmw: history keep last, reliability reliable, durability transient
+    // local or volatile.
     let (depth, durability) = match kept {
         Kept::ForLater => (1, 1),
         Kept::ForNobody => (100, 2),
@@ -27,7 +29,8 @@ pub(super) fn qualities(kept: Kept) -> String {
     )
 }
 
-/// Returns the description of a bag with one file, from the first to the last time in it, ns since 1970.
+/// Returns the description of a bag with one file, from the first to the last time in it, ns
+/// since 1970.
 pub(super) fn text(file: &str, topics: &[&Described], times: Option<(i64, i64)>) -> String {
     let (first_ns, last_ns) = times.unwrap_or_default();
     let duration_ns = last_ns - first_ns;

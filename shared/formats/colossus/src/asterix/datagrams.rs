@@ -9,16 +9,20 @@ use crate::parser::{Damage, Event};
 
 /// The largest datagram.
 const MAX_BYTES: usize = 1 << 16;
-/// The largest step of the number of a message: a larger one is that of a radar that has been started anew.
+/// The largest step of the number of a message: a larger one is that of a radar that has been
+/// started anew.
 const MAX_STEP: i32 = 1 << 16;
 
-/// A buffer that is filled with one datagram after the other, and the messages in them: those of the TCP protocol.
+/// A buffer that is filled with one datagram after the other, and the messages in them: those of
+/// the TCP protocol.
 ///
-/// Read a datagram into [`Datagrams::space`], say how long it is with [`Datagrams::filled`], and take all events with
-/// [`Datagrams::next`]. The first event is the radar's description of itself, which each datagram carries.
+/// Read a datagram into [`Datagrams::space`], say how long it is with [`Datagrams::filled`], and
+/// take all events with [`Datagrams::next`]. The first event is the radar's description of itself,
+/// which each datagram carries.
 ///
-/// An azimuth is returned when its last part is there, in whatever order they come. It is lost if a part of another azimuth comes
-/// before that: no azimuth waits for another. So the scan says which azimuths were lost.
+/// An azimuth is returned when its last part is there, in whatever order they come. It is lost if a
+/// part of another azimuth comes before that: no azimuth waits for another. So the scan says which
+/// azimuths were lost.
 #[derive(Clone, Debug)]
 pub struct Datagrams {
     encoder_size: u16,
@@ -46,7 +50,8 @@ enum Step {
 }
 
 impl Datagrams {
-    /// Returns a parser for a radar whose encoder has so many counts per turn: angles are rounded to them.
+    /// Returns a parser for a radar whose encoder has so many counts per turn: angles are rounded
+    /// to them.
     pub fn new(encoder_size: u16) -> Self {
         Self {
             encoder_size,
@@ -102,14 +107,15 @@ impl Datagrams {
         }
     }
 
-    /// Passes over the description that was returned last, and the datagram that it came with. The next datagram is described anew, so
-    /// that none is taken for one of another radar.
+    /// Passes over the description that was returned last, and the datagram that it came with. The
+    /// next datagram is described anew, so that none is taken for one of another radar.
     pub fn refuse_description(&mut self) {
         self.described = None;
         self.filled = 0;
     }
 
-    /// Returns whether a datagram of the radar has come since the last call, whatever became of its azimuth.
+    /// Returns whether a datagram of the radar has come since the last call, whatever became of its
+    /// azimuth.
     pub fn take_part(&mut self) -> bool {
         mem::take(&mut self.has_part)
     }

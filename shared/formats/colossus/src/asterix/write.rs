@@ -6,17 +6,20 @@ use crate::message::{Azimuth, Powers};
 
 /// The bytes of a datagram that a radar sends unless it is configured otherwise, at most.
 pub const MAX_DATAGRAM_BYTES: usize = 1400;
-/// Bytes before the powers, their padding to a block of 64 bytes, time of day and special purpose field.
+/// Bytes before the powers, their padding to a block of 64 bytes, time of day and special purpose
+/// field.
 const OVERHEAD_BYTES: usize = 32 + 63 + 3 + SPECIAL_BYTES;
-/// Data source, message type, number, femtosecond header and resolution; more follow: size, blocks of 64 bytes, time, special.
+/// Data source, message type, number, femtosecond header and resolution; more follow: size, blocks
+/// of 64 bytes, time, special.
 const FEATURES: [u8; 2] = [0b1110_0111, 0b1010_1010];
 /// The identification that Navtech's library gives a radar.
 const SOURCE: [u8; 2] = [0xca, 0xfe];
 /// All healthy, as Navtech's library writes it.
 const HEALTHY: u16 = 0b1010_1010_1010_1010;
 
-/// Hands the datagrams of an azimuth to `send`, each with the next `number`. The time must be big-endian seconds and nanoseconds: see
-/// [`ClockFormat::fields`](crate::ClockFormat::fields). Its bins are those of the configuration.
+/// Hands the datagrams of an azimuth to `send`, each with the next `number`. The time must be
+/// big-endian seconds and nanoseconds: see [`ClockFormat::fields`](crate::ClockFormat::fields). Its
+/// bins are those of the configuration.
 pub fn write_azimuth(
     radar: &Configuration,
     azimuth: &Azimuth<'_>,

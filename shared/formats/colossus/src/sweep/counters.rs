@@ -9,8 +9,9 @@ pub struct Counters {
     pub missing_azimuths: u64,
     /// Sweeps dropped because more than half of their azimuths did not arrive.
     pub incomplete_sweeps: u64,
-    /// Sweeps dropped because a turn or more is missing in the middle, or the radar's clock was set. One each, however many turns are
-    /// missing: those of which no azimuth arrived are not counted here.
+    /// Sweeps dropped because a turn or more is missing in the middle, or the radar's clock was
+    /// set. One each, however many turns are missing: those of which no azimuth arrived are not
+    /// counted here.
     pub broken_sweeps: u64,
     /// Azimuths dropped because their sweep had begun before the stream.
     pub discarded_azimuths: u64,

@@ -122,7 +122,8 @@ impl Rows {
         }
     }
 
-    /// Returns the bytes of the next row, whose angle, time and flags are written; `None` if the scan is full.
+    /// Returns the bytes of the next row, whose angle, time and flags are written; `None` if the
+    /// scan is full.
     fn next_row<'a>(
         &mut self,
         (encoder, stamp_ns): (f64, i64),

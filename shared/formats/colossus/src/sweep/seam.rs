@@ -3,8 +3,8 @@
 use super::{Empty, Place};
 use crate::configuration::Configuration;
 
-/// The part of a turn by which the time between two azimuths may differ from that of the rotation. Where it differs by more, a
-/// turn or more is missing, or the clock was set.
+/// The part of a turn by which the time between two azimuths may differ from that of the rotation.
+/// Where it differs by more, a turn or more is missing, or the clock was set.
 const BREAK_TURNS: f64 = 0.75;
 
 /// The encoder counts and times of a turn.
@@ -46,7 +46,8 @@ impl Grid {
         }
     }
 
-    /// Returns an encoder count below that of a turn. A full turn is 0, as for the readers of recordings.
+    /// Returns an encoder count below that of a turn. A full turn is 0, as for the readers of
+    /// recordings.
     pub(super) fn encoder(&self, count: u16) -> Option<u16> {
         (count <= self.encoder_size).then_some(count % self.encoder_size)
     }
@@ -83,7 +84,8 @@ impl Grid {
         // Positions before zero, which zero itself is not.
         let before_zero = (to_zero / self.step).ceil() as usize - 1;
         if self.is_break(last, here) {
-            // Nothing is known of the time in between: both sweeps are continued at the radar's rotation.
+            // Nothing is known of the time in between: both sweeps are continued at the radar's
+            // rotation.
             return Seam {
                 trailing: before_zero,
                 leading: (f64::from(here.encoder) / self.step) as usize,

@@ -12,9 +12,10 @@ use crate::relative::Relative;
 impl PoseGraph {
     /// Returns the pose of a keyframe with its covariance along the axes of the frame of the poses.
     ///
-    /// The covariance is that of the present constraints, linearised at the present poses: exact after [`PoseGraph::solve`], and that of
-    /// dead reckoning for keyframes added since. The first call after a change factorises the equations; each call solves them for three
-    /// right-hand sides.
+    /// The covariance is that of the present constraints, linearised at the present poses: exact
+    /// after [`PoseGraph::solve`], and that of dead reckoning for keyframes added since. The first
+    /// call after a change factorises the equations; each call solves them for three right-hand
+    /// sides.
     ///
     /// # Errors
     /// There is no such keyframe, or the constraints do not determine the poses.
@@ -27,7 +28,8 @@ impl PoseGraph {
         })
     }
 
-    /// Predicts the pose of keyframe `to` in the frame of `from`, with its covariance: the initial guess of their registration, as
+    /// Predicts the pose of keyframe `to` in the frame of `from`, with its covariance: the initial
+    /// guess of their registration, as
     /// [`TrajectoryFilter::predict`](crate::TrajectoryFilter::predict).
     ///
     /// # Errors

@@ -37,7 +37,8 @@ impl Dogleg {
         self.gauss_newton.norm_l2()
     }
 
-    /// Returns the step of a length of at most `radius`: along the path from here over the Cauchy point to the Gauss-Newton step.
+    /// Returns the step of a length of at most `radius`: along the path from here over the Cauchy
+    /// point to the Gauss-Newton step.
     pub fn within(&self, radius: f64) -> Mat<f64> {
         if self.full_length() <= radius {
             return self.gauss_newton.clone();

@@ -26,7 +26,8 @@ impl Edge {
         })
     }
 
-    /// Returns the squared normalised difference of the measured motion from that between the poses.
+    /// Returns the squared normalised difference of the measured motion from that between the
+    /// poses.
     pub fn chi_square(&self, poses: &[Pose]) -> f64 {
         let [from, to] = self.ends;
         let innovation = self.motion.error(&poses[from].inv_mul(&poses[to]));
@@ -52,7 +53,7 @@ impl Edge {
     }
 }
 
-/// What an edge adds to the normal equations.
+/// The contribution of an edge to the normal equations.
 pub(super) struct Linear {
     /// The diagonal blocks of both poses.
     pub blocks: [Matrix3<f64>; 2],

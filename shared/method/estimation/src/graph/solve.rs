@@ -1,4 +1,5 @@
-//! The solution of a pose graph: Gauss-Newton with reweighted loops, within a trust radius where a step would raise the cost.
+//! The solution of a pose graph: Gauss-Newton with reweighted loops, within a trust radius where a
+//! step would raise the cost.
 
 use faer::Mat;
 use gyre_geometry::{Pose, xy_yaw};
@@ -17,13 +18,14 @@ const GOOD_GAIN: f64 = 0.75;
 /// Below this share of the predicted decrease the trust radius shrinks.
 const POOR_GAIN: f64 = 0.25;
 
-/// A shorter step, in m and rad over all poses, goes nowhere: the poses are at a minimum but for rounding.
+/// A shorter step, in m and rad over all poses, goes nowhere: the poses are at a minimum but for
+/// rounding.
 const SHORTEST_STEP: f64 = 1e-12;
 
 /// The tolerance of the first descent, which only has to bring the poses near their place.
 const COARSE: f64 = 0.1;
 
-/// Whether loops keep their weights while the poses are moved.
+/// True if loops keep their weights while the poses are moved.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Weights {
     Kept,
@@ -33,12 +35,14 @@ pub(super) enum Weights {
 impl PoseGraph {
     /// Moves all poses to where they fit the constraints best, from where they are.
     ///
-    /// New loops start with the weight of their test against the odometry, so that a long drift does not speak against the loop that
-    /// corrects it; then the kernel decides. With many loops the result can depend on the order in which they came and on when the
-    /// graph was solved between: [`PoseGraph::solve_anew`] depends on neither.
+    /// New loops start with the weight of their test against the odometry, so that a long drift
+    /// does not speak against the loop that corrects it; then the kernel decides. With many loops
+    /// the result can depend on the order in which they came and on when the graph was solved
+    /// between: [`PoseGraph::solve_anew`] depends on neither.
     ///
     /// # Errors
-    /// The equations have no solution within the range of numbers, or do not fit into memory. The poses are then those before.
+    /// The equations have no solution within the range of numbers, or do not fit into memory. The
+    /// poses are then those before.
     pub fn solve(&mut self) -> Result<Solution, EstimationError> {
         let before = self.poses.clone();
         let solved = self.descend(Weights::Kept, COARSE).and_then(|(first, _)| {
@@ -54,7 +58,8 @@ impl PoseGraph {
         })
     }
 
-    /// Solves the graph from the odometry alone. The result depends on the constraints, and not on the order in which loops came.
+    /// Solves the graph from the odometry alone. The result depends on the constraints, and not on
+    /// the order in which loops came.
     ///
     /// # Errors
     /// As [`PoseGraph::solve`].
@@ -118,8 +123,8 @@ impl PoseGraph {
         self.odometry.iter().chain(loops)
     }
 
-    /// Moves the poses until a full Gauss-Newton step lowers the cost by less than `tolerance` of it. Returns the number of
-    /// linearisations, and whether this was reached.
+    /// Moves the poses until a full Gauss-Newton step lowers the cost by less than `tolerance` of
+    /// it. Returns the number of linearisations, and whether this was reached.
     fn descend(
         &mut self,
         weights: Weights,
@@ -142,7 +147,8 @@ impl PoseGraph {
         Ok((self.options.max_iterations, false))
     }
 
-    /// Returns poses whose cost is not above `cost`, with their cost; `None` if there are none nearby. Adapts the trust radius.
+    /// Returns poses whose cost is not above `cost`, with their cost; `None` if there are none
+    /// nearby. Adapts the trust radius.
     fn step(
         &mut self,
         dogleg: &Dogleg,

@@ -12,11 +12,11 @@ use faer::{Conj, Mat, Par, Side};
 
 use super::edge::{Ends, Linear};
 
-/// A symmetric system of equations with three rows a pose and a block for each pair of poses that share an edge, of which the lower
-/// triangle is stored. Pose 0 is fixed and has no rows.
+/// A symmetric system of equations with three rows a pose and a block for each pair of poses that
+/// share an edge, of which the lower triangle is stored. Pose 0 is fixed and has no rows.
 pub(super) struct System {
-    /// Of each edge in the order given: the block below the diagonal, as its column and its number within the column. `None` for an
-    /// edge of pose 0.
+    /// Of each edge in the order given: the block below the diagonal, as its column and its number
+    /// within the column. `None` for an edge of pose 0.
     slots: Vec<Option<[usize; 2]>>,
     columns: Vec<usize>,
     rows: Vec<usize>,
@@ -149,7 +149,8 @@ impl System {
     }
 }
 
-/// Returns the column and the row of the block of an edge below the diagonal; `None` for an edge of pose 0.
+/// Returns the column and the row of the block of an edge below the diagonal; `None` for an edge of
+/// pose 0.
 fn below(&[a, b]: &Ends) -> Option<[usize; 2]> {
     Some([a.min(b).checked_sub(1)?, a.max(b) - 1])
 }
@@ -185,8 +186,8 @@ impl Pattern {
         [column, self.column(column).partition_point(|&r| r < row)]
     }
 
-    /// Returns an order of elimination of the single rows that keeps the factor sparse (approximate minimum degree of the blocks), and
-    /// its inverse.
+    /// Returns an order of elimination of the single rows that keeps the factor sparse (approximate
+    /// minimum degree of the blocks), and its inverse.
     fn elimination_order(&self) -> Result<[Vec<usize>; 2], FaerError> {
         let blocks = self.columns.len() - 1;
         let (columns, rows) = (&self.columns, &self.rows);

@@ -13,12 +13,14 @@ pub(super) const HARMONICS: usize = 64;
 /// Harmonics whose amplitudes make the sieve, from the first on.
 pub(super) const SIEVE_HARMONICS: usize = 16;
 pub(super) const SPECTRUM_BYTES: usize = RADII * 2 * HARMONICS;
-/// Radii of the spectrum that are added up for each of the descriptor's: the samples of a coarser grid would miss half of the spectrum.
+/// Radii of the spectrum that are added up for each of the descriptor's: the samples of a coarser
+/// grid would miss half of the spectrum.
 const FOLD: usize = 2;
 /// Largest amplitude in the sieve, as a share of its radius.
 const SIEVE_FULL: f32 = 0.64;
 
-/// What a submap looks like, whatever its heading: its polar magnitude spectrum over the angle, in harmonics.
+/// The appearance of a submap, whatever its heading: its polar magnitude spectrum over the angle,
+/// in harmonics.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Descriptor {
     /// Radius after radius the real parts of all harmonics, then the imaginary parts.
@@ -59,7 +61,8 @@ impl Descriptor {
         bytes.extend_from_slice(bytemuck::cast_slice(&self.spectrum));
     }
 
-    /// Decodes what [`encode`](Self::encode) has written; `None` if `bytes` are not [`BYTES`](Self::BYTES).
+    /// Decodes what [`encode`](Self::encode) has written; `None` if `bytes` are not
+    /// [`BYTES`](Self::BYTES).
     pub fn decode(bytes: &[u8]) -> Option<Self> {
         let (sieve, spectrum) = bytes.split_at_checked(Self::SIEVE_BYTES)?;
         (spectrum.len() == SPECTRUM_BYTES).then(|| Self {
@@ -89,7 +92,8 @@ impl Describer {
     /// Plans the transforms.
     pub fn new() -> Self {
         let config = RotationConfig {
-            // Lengths along the angle are padded fourfold, so that the spectrum's structure is sampled often enough.
+            // Lengths along the angle are padded fourfold, so that the spectrum's structure is
+            // sampled often enough.
             angles: 4 * HARMONICS,
             radii: Some(FOLD * RADII),
             band_low: 0.02,

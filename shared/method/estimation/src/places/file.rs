@@ -1,7 +1,7 @@
 //! Place indexes in files.
 //!
-//! Little-endian: the mark, the version, the sizes of a descriptor (sieve, spectrum) and the number of places; for each place its id,
-//! its path, its sieve and its spectrum; the CRC-32 of all this.
+//! Little-endian: the mark, the version, the sizes of a descriptor (sieve, spectrum) and the number
+//! of places; for each place its id, its path, its sieve and its spectrum; the CRC-32 of all this.
 
 use std::fs::{self, File};
 use std::io::{self, BufReader, BufWriter, Read, Write};
@@ -53,7 +53,7 @@ pub enum PlaceFileError {
     Version {
         /// The file.
         path: PathBuf,
-        /// Its version.
+        /// The version.
         version: u32,
     },
     /// The file is damaged.
@@ -61,7 +61,7 @@ pub enum PlaceFileError {
     Damaged {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The problem.
         reason: String,
     },
 }

@@ -24,7 +24,8 @@ pub struct Candidate {
     pub place: usize,
     /// Correlation coefficient of the descriptors at the best angle.
     pub score: f64,
-    /// Yaw of the queried place in the found one's frame, in (-pi/2, pi/2] rad: the descriptors cannot tell it from half a turn more.
+    /// Yaw of the queried place in the found one's frame, in (-pi/2, pi/2] rad: the descriptors
+    /// cannot tell it from half a turn more.
     pub yaw_rad: f64,
 }
 
@@ -40,7 +41,7 @@ pub struct OrderError {
     pub last_m: f64,
 }
 
-/// What is known of a place beside its descriptor.
+/// The data of a place beside its descriptor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Place {
     /// Number that the caller gave it.
@@ -79,7 +80,8 @@ impl Default for PlaceIndex {
 }
 
 impl PlaceIndex {
-    /// Memory of a place, bytes: its descriptor with its norm, its id and path, and its distance in a query.
+    /// Memory of a place, bytes: its descriptor with its norm, its id and path, and its distance in
+    /// a query.
     pub const BYTES_PER_PLACE: usize = Descriptor::SIEVE_BYTES
         + SPECTRUM_BYTES
         + size_of::<f32>()
@@ -148,8 +150,9 @@ impl PlaceIndex {
         self.places.partition_point(|place| place.path_m <= path_m)
     }
 
-    /// Finds the places among the first `eligible` ones that look most similar: at most 32, the best first. Of places that lie less
-    /// than `apart_m` along the path from a better one none is returned.
+    /// Finds the places among the first `eligible` ones that look most similar: at most 32, the
+    /// best first. Of places that lie less than `apart_m` along the path from a better one none is
+    /// returned.
     pub fn query(
         &mut self,
         descriptor: &Descriptor,
@@ -168,8 +171,9 @@ impl PlaceIndex {
         &self.query.found
     }
 
-    /// Ranks all places by their whole descriptors, the best first, each at the best `angles` angles: for a query that must not miss
-    /// its place, such as a scan of which half is hidden. It takes some microseconds a place.
+    /// Ranks all places by their whole descriptors, the best first, each at the best `angles`
+    /// angles: for a query that must not miss its place, such as a scan of which half is hidden. It
+    /// takes some microseconds a place.
     pub fn rank_all(&mut self, descriptor: &Descriptor, angles: usize) -> &[Candidate] {
         let places = 0..self.places.len() as u32;
         self.query.distances.clear();
@@ -260,8 +264,9 @@ impl Query {
         f64::from(self.correlation[k.rem_euclid(ANGLES as isize) as usize])
     }
 
-    /// Fills in the samples of the highest local maxima, the highest first, of equal ones the earlier; returns those that there are. A flat
-    /// correlation has its maximum at the first sample.
+    /// Fills in the samples of the highest local maxima, the highest first, of equal ones the
+    /// earlier; returns those that there are. A flat correlation has its maximum at the first
+    /// sample.
     fn highest<'a>(&self, peaks: &'a mut [isize]) -> &'a [isize] {
         let mut count = 0;
         let is_peak = |k: &isize| self.at(*k) > self.at(k - 1) && self.at(*k) >= self.at(k + 1);
@@ -313,8 +318,8 @@ fn norm(spectrum: &[i8]) -> f32 {
     (energy as f32).sqrt()
 }
 
-/// The sum over radii of G conj(F), with F the later and G the earlier spectrum: real parts of all harmonics, then imaginary parts.
-/// Exact, since it is of integers.
+/// The sum over radii of G conj(F), with F the later and G the earlier spectrum: real parts of all
+/// harmonics, then imaginary parts. Exact, since it is of integers.
 #[simd]
 fn cross_spectrum(later: &[i8], earlier: &[i8]) -> [i32; 2 * HARMONICS] {
     let mut cross = [0_i32; 2 * HARMONICS];
@@ -338,7 +343,8 @@ mod tests {
 
     use super::*;
 
-    /// The correlation coefficient at an angle of the grid: the sum over radii and angles of the two spectra as functions of the angle.
+    /// The correlation coefficient at an angle of the grid: the sum over radii and angles of the
+    /// two spectra as functions of the angle.
     fn direct(later: &[i8], earlier: &[i8], shift: usize) -> f64 {
         let mut sums = [0.0; 3];
         for (f, g) in later

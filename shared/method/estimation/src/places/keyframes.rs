@@ -6,7 +6,8 @@ use gyre_geometry::Pose;
 
 use super::PlaceOptions;
 
-/// Largest number of keyframes of a submap to each side of the middle one. A vehicle that turns on the spot makes many keyframes.
+/// Largest number of keyframes of a submap to each side of the middle one. A vehicle that turns on
+/// the spot makes many keyframes.
 pub const MAX_NEIGHBOURS: usize = 8;
 
 /// Selects the scans that become keyframes, and measures the path along them.
@@ -32,8 +33,8 @@ impl KeyframeSelector {
         self.last = Some((pose, path_m));
     }
 
-    /// Takes the odometry's pose of the next scan. If it becomes a keyframe, returns the length of the path through all keyframes up to
-    /// it, m.
+    /// Takes the odometry's pose of the next scan. If it becomes a keyframe, returns the length of
+    /// the path through all keyframes up to it, m.
     pub fn next(&mut self, pose: &Pose) -> Option<f64> {
         let path_m = match &self.last {
             None => 0.0,
@@ -52,8 +53,9 @@ impl KeyframeSelector {
     }
 }
 
-/// Returns the keyframes of the submap around keyframe `middle`: those within `reach_m` along the path, at most [`MAX_NEIGHBOURS`] to
-/// each side. `path_m` is the path up to each keyframe, as [`KeyframeSelector::next`] returns it.
+/// Returns the keyframes of the submap around keyframe `middle`: those within `reach_m` along the
+/// path, at most [`MAX_NEIGHBOURS`] to each side. `path_m` is the path up to each keyframe, as
+/// [`KeyframeSelector::next`] returns it.
 ///
 /// The submap is complete once a keyframe behind these is known.
 pub fn neighbours(path_m: &[f64], middle: usize, reach_m: f64) -> Range<usize> {

@@ -16,7 +16,8 @@ pub struct PlaceOptions {
     pub reach_m: f64,
     /// Smallest correlation of a loop that is accepted, 0 to 1.
     pub min_correlation: f64,
-    /// Smallest difference of the correlations of an accepted loop and of any other motion between the two places.
+    /// Smallest difference of the correlations of an accepted loop and of any other motion between
+    /// the two places.
     pub min_margin: f64,
 }
 

@@ -13,7 +13,8 @@ use super::{CELL_M, Candidate, PLANNED, PlaceOptions, RASTER_CELLS};
 
 /// Cells within this range of both sensors are correlated: farther away few points are extracted.
 const MASK_M: f64 = 80.0;
-/// A match on whole cells at an angle of the descriptors' grid is this much below the final one at most.
+/// A match on whole cells at an angle of the descriptors' grid is this much below the final one at
+/// most.
 const COARSE_LOSS: f64 = 0.15;
 
 /// The verdict on a candidate, and the reason of a rejection.
@@ -34,13 +35,16 @@ pub enum VerificationOutcome {
 pub struct Verification {
     /// The verdict.
     pub outcome: VerificationOutcome,
-    /// The pose of the queried keyframe in the frame of the found one, with its covariance; only as searched, with a covariance of
-    /// zero, if the outcome is `LowCorrelation` before the alignment, or `Undetermined`.
+    /// The pose of the queried keyframe in the frame of the found one, with its covariance; only as
+    /// searched, with a covariance of zero, if the outcome is `LowCorrelation` before the
+    /// alignment, or `Undetermined`.
     pub motion: UncertainMotion,
-    /// Masked correlation of the submaps at the motion; that of the search if there was no alignment.
+    /// Masked correlation of the submaps at the motion; that of the search if there was no
+    /// alignment.
     pub correlation: f64,
-    /// Correlation on whole cells at the candidate's angle, of the best translation and of the runner-up: another translation, or the
-    /// best at the other angle. Their difference is the margin.
+    /// Correlation on whole cells at the candidate's angle, of the best translation and of the
+    /// runner-up: another translation, or the best at the other angle. Their difference is the
+    /// margin.
     pub searched: f64,
     /// See [`Self::searched`].
     pub runner_up: f64,
@@ -62,11 +66,12 @@ pub struct LoopVerifier {
 }
 
 impl LoopVerifier {
-    /// Plans registrations of keyframes of at most `capacity` points. `refinement` is that of the odometry: its cells and reach, and
-    /// the scales of its covariance.
+    /// Plans registrations of keyframes of at most `capacity` points. `refinement` is that of the
+    /// odometry: its cells and reach, and the scales of its covariance.
     ///
     /// # Errors
-    /// The first value of `refinement` that is out of its bounds, or a reach of more than the rasters allow.
+    /// The first value of `refinement` that is out of its bounds, or a reach of more than the
+    /// rasters allow.
     pub fn new(
         options: &PlaceOptions,
         refinement: &RefinementConfig,

@@ -93,7 +93,8 @@ pub fn dead_reckoning(start: Pose, odometry: &[Constraint]) -> Vec<Pose> {
     poses
 }
 
-/// A linearised least-squares problem over all poses but the first, by dense matrices and differences.
+/// A linearised least-squares problem over all poses but the first, by dense matrices and
+/// differences.
 pub struct Batch {
     pub poses: Vec<Pose>,
     pub covariance: DMatrix<f64>,
@@ -158,7 +159,8 @@ fn normal_equations(poses: &[Pose], constraints: &[Constraint]) -> (DMatrix<f64>
     (information, gradient)
 }
 
-/// Returns the largest distance between two trajectories, m, and the largest difference of yaw, rad.
+/// Returns the largest distance between two trajectories, m, and the largest difference of yaw,
+/// rad.
 pub fn apart(a: &[Pose], b: &[Pose]) -> (f64, f64) {
     assert_eq!(a.len(), b.len());
     let pairs = || a.iter().zip(b);

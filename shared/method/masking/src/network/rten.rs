@@ -71,7 +71,8 @@ impl Rten {
         self.outputs.clone()
     }
 
-    /// Computes the masks of empty rasters. Only now does rten find operators that do not fit each other.
+    /// Computes the masks of empty rasters. Only now does rten find operators that do not fit each
+    /// other.
     pub fn rehearse(&mut self, model: &Model, empty: Array3<f32>) -> Result<(), NetworkError> {
         match self.run(empty.view(), empty.clone().view_mut()) {
             Err(NetworkError::Run(reason)) => Err(NetworkError::Load {
@@ -105,7 +106,8 @@ fn failed(error: impl Display) -> NetworkError {
     NetworkError::Run(one_line(&error.to_string()))
 }
 
-/// Calls rten. A model may have what rten does not expect, and then it panics: this becomes an error too.
+/// Calls rten. A model may have what rten does not expect, and then it panics: this becomes an
+/// error too.
 fn guarded<T, E: Display>(call: impl FnOnce() -> Result<T, E>) -> Result<T, String> {
     match catch_unwind(AssertUnwindSafe(call)) {
         Ok(result) => result.map_err(|error| one_line(&error.to_string())),
@@ -122,7 +124,8 @@ fn newest_operators(file: &ModelProto) -> i64 {
     own.filter_map(|import| import.version).max().unwrap_or(0)
 }
 
-/// Adds the sizes of kernels to convolutions that leave them out. In ONNX the weights state them too, but rten does not look there.
+/// Adds the sizes of kernels to convolutions that leave them out. In ONNX the weights state them
+/// too, but rten does not look there.
 fn state_kernel_sizes(graph: &mut GraphProto) {
     const NAME: &str = "kernel_shape";
     for node in &mut graph.node {

@@ -140,7 +140,8 @@ pub fn unmasked(sweep: &Sweep<'_>) -> Array2<f32> {
     raster
 }
 
-/// Computes the masks of the test models, one for each raster: the sigmoid of a convolution, as in `models/make.py`.
+/// Computes the masks of the test models, one for each raster: the sigmoid of a convolution, as in
+/// `models/make.py`.
 pub fn reference_masks(rasters: &[Array2<f32>]) -> Vec<Array2<f32>> {
     let channels = rasters.len();
     let kernel = |place: usize| ((place * 5 % 13) as f64 - 6.0) / 64.0;

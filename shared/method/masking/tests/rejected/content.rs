@@ -1,4 +1,4 @@
-//! What a model's file contains.
+//! The content of a model's file.
 
 use std::fs;
 

@@ -1,4 +1,5 @@
-//! Models and runtimes that do not fit are rejected with one sentence: the cause, the place and the remedy.
+//! Models and runtimes that do not fit are rejected with one sentence: the cause, the place and the
+//! remedy.
 
 mod content;
 

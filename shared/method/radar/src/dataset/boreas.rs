@@ -1,8 +1,9 @@
 //! Boreas, and Boreas Road Trip with its newer radar.
 //!
-//! `radar/<us>.png`, metadata columns as in Oxford, named by the time of azimuth `n / 2 - 1`. Azimuths are clockwise from
-//! ahead; the antenna does not turn quite uniformly, so the encoder is used. A bin is at `bin * resolution - 0.31 m`; whether
-//! this is its near edge or its centre is not documented, and half a bin (0.02 m) is below the accuracy of the offset.
+//! `radar/<us>.png`, metadata columns as in Oxford, named by the time of azimuth `n / 2 - 1`.
+//! Azimuths are clockwise from ahead; the antenna does not turn quite uniformly, so the encoder is
+//! used. A bin is at `bin * resolution - 0.31 m`; whether this is its near edge or its centre is
+//! not documented, and half a bin (0.02 m) is below the accuracy of the offset.
 
 use super::detect::Found;
 use super::error::OpenError;

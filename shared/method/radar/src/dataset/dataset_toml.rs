@@ -1,7 +1,8 @@
 //! `dataset.toml`: options stored with a recording.
 //!
-//! Range offset, Doppler coefficient and encoder eccentricity are properties of a radar, so they are best stored beside its
-//! recordings. Simulated recordings include the file. Options given explicitly take precedence.
+//! Range offset, Doppler coefficient and encoder eccentricity are properties of a radar, so they
+//! are best stored beside its recordings. Simulated recordings include the file. Options given
+//! explicitly take precedence.
 
 use std::io::ErrorKind;
 use std::path::Path;

@@ -254,8 +254,8 @@ fn evidence(image: &FirstImage) -> String {
 /// The score of formats that cannot be detected from an image.
 const NEVER: i32 = -100;
 
-/// Scores how well a format fits the first image. Formats without metadata columns are excluded, and so is OORD, which differs
-/// from Oxford only in its folders.
+/// Scores how well a format fits the first image. Formats without metadata columns are excluded,
+/// and so is OORD, which differs from Oxford only in its folders.
 fn score(format: Format, image: &FirstImage, boreas_folders: bool) -> i32 {
     let (bins, named, chirps): (&[usize], NamedBy, bool) = match format {
         Format::Oxford => (&[3768], NamedBy::Start, false),

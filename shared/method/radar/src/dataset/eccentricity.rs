@@ -2,11 +2,13 @@
 
 use std::f32::consts::TAU;
 
-/// Corrects azimuths by the first harmonic of the encoder error: `azimuth + eccentricity * cos(azimuth)`.
+/// Corrects azimuths by the first harmonic of the encoder error:
+/// `azimuth + eccentricity * cos(azimuth)`.
 ///
-/// A disc that is 0.1 mm off its axis, at a radius of 40 mm, causes an error of 2.5 mrad, with opposite signs ahead and
-/// behind. The scene then appears to rotate while the vehicle moves, and the odometry drifts in yaw: per metre by about that
-/// angle over the distance to the scene. The sine term compresses the scan laterally and causes no drift.
+/// A disc that is 0.1 mm off its axis, at a radius of 40 mm, causes an error of 2.5 mrad, with
+/// opposite signs ahead and behind. The scene then appears to rotate while the vehicle moves, and
+/// the odometry drifts in yaw: per metre by about that angle over the distance to the scene. The
+/// sine term compresses the scan laterally and causes no drift.
 pub fn correct_eccentricity(azimuth_rad: &mut [f32], eccentricity_rad: f32) {
     if eccentricity_rad == 0.0 {
         return;

@@ -245,8 +245,9 @@ pub enum ReadError {
 }
 
 impl ReadError {
-    /// Returns whether the file cannot be read, as opposed to a file with invalid content: it may be readable at another time.
-    /// A file that is missing counts too, because it was there when the dataset was opened.
+    /// Returns whether the file cannot be read, as opposed to a file with invalid content: it may
+    /// be readable at another time. A file that is missing counts too, because it was there when
+    /// the dataset was opened.
     pub fn is_io(&self) -> bool {
         matches!(self, Self::Io { .. })
     }

@@ -6,7 +6,8 @@ use super::images::Images;
 use super::navtech_png::{METADATA_BYTES, RowMetadata, chirps_alternate, rows};
 use super::stamp;
 
-/// Maximum difference between the time in the name of a file and the stamp of a row that it refers to, ns.
+/// Maximum difference between the time in the name of a file and the stamp of a row that it refers
+/// to, ns.
 const SAME_TIME_NS: i64 = 5_000_000;
 
 /// The time in the sweep that an image is named by.
@@ -95,7 +96,8 @@ impl FirstImage {
         self.rows.iter().all(|row| row.byte_ten == 0)
     }
 
-    /// Returns the time in the sweep that the file is named by; `None` if its name is not a time of the sweep.
+    /// Returns the time in the sweep that the file is named by; `None` if its name is not a time of
+    /// the sweep.
     pub(crate) fn named_by(&self) -> Option<NamedBy> {
         let (name, last) = (self.name_ns?, self.rows.len() - 1);
         let rows = [

@@ -1,4 +1,5 @@
-//! FoMo: `navtech/<us>.png`, metadata columns as in Oxford, an encoder of 5595 counts by its development kit.
+//! FoMo: `navtech/<us>.png`, metadata columns as in Oxford, an encoder of 5595 counts by its
+//! development kit.
 
 use super::detect::Found;
 use super::error::OpenError;

@@ -38,7 +38,8 @@ pub enum Format {
     Fomo,
     /// A recording of a run as MCAP, of `gyre record`.
     Mcap,
-    /// A format that Gyre has no reader for: of a program with a [`Dataset`](super::Dataset) of its own. No configuration names it.
+    /// A format that Gyre has no reader for: of a program with a [`Dataset`](super::Dataset) of its
+    /// own. No configuration names it.
     #[serde(skip_deserializing)]
     Other,
     /// A bag of ROS 2 with the messages of Navtech's driver.

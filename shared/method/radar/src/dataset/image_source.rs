@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use super::format::Format;
 use super::image_size::ImageSize;
 
-/// A generator of a recording's images on request. [`open_source`](super::open_source) reads them like images on disk.
+/// A generator of a recording's images on request. [`open_source`](super::open_source) reads them
+/// like images on disk.
 pub trait ImageSource: Send {
     /// The file format.
     fn format(&self) -> Format;

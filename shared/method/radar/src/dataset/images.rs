@@ -125,7 +125,8 @@ impl Images {
         }
     }
 
-    /// Returns the first image that can be decoded, with its index; `None` if the first ones are damaged.
+    /// Returns the first image that can be decoded, with its index; `None` if the first ones are
+    /// damaged.
     ///
     /// # Errors
     /// One of the first ones cannot be read, and none can be decoded.

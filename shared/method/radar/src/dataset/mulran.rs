@@ -1,8 +1,9 @@
-//! MulRan: `sensor_data/radar/polar/<ns>.png` as recorded (3360 rows of range x 400 columns of azimuth, no metadata), or
-//! converted to the format of Oxford in `polar_oxford_form/<ns>.png` with stamps in ns. Named by the last row's stamp.
+//! MulRan: `sensor_data/radar/polar/<ns>.png` as recorded (3360 rows of range x 400 columns of
+//! azimuth, no metadata), or converted to the format of Oxford in `polar_oxford_form/<ns>.png` with
+//! stamps in ns. Named by the last row's stamp.
 //!
-//! Column k as recorded is row k of the other form, where the encoder says 7, 21, ..., 5593 of 5600 counts (KAIST03): the middle of the
-//! k-th of 400 equal parts of the turn.
+//! Column k as recorded is row k of the other form, where the encoder says 7, 21, ..., 5593 of 5600
+//! counts (KAIST03): the middle of the k-th of 400 equal parts of the turn.
 
 use super::detect::Found;
 use super::error::OpenError;

@@ -1,4 +1,5 @@
-//! The metadata columns that Navtech drivers store before the powers of each row: stamp, encoder count, one byte of flags.
+//! The metadata columns that Navtech drivers store before the powers of each row: stamp, encoder
+//! count, one byte of flags.
 
 use std::path::Path;
 
@@ -43,7 +44,8 @@ pub(crate) fn rows(pixels: &[u8], size: ImageSize) -> impl Iterator<Item = RowMe
         .map(RowMetadata::parse)
 }
 
-/// Returns whether byte 10 alternates between 0 and 255 from row to row. Then it is the direction of the chirp, not validity.
+/// Returns whether byte 10 alternates between 0 and 255 from row to row. Then it is the direction
+/// of the chirp, not validity.
 pub(crate) fn chirps_alternate(bytes_ten: impl Iterator<Item = u8>) -> bool {
     let (mut pairs, mut changes, mut last) = (0_usize, 0_usize, None);
     for byte in bytes_ten {
@@ -146,7 +148,8 @@ fn check_order(
     Ok(())
 }
 
-/// Writes the logged time of each row, ns. Rejects invalid times, and times that are not of one sweep of at most `max_sweep_ns`.
+/// Writes the logged time of each row, ns. Rejects invalid times, and times that are not of one
+/// sweep of at most `max_sweep_ns`.
 pub(crate) fn fill_stamps(
     path: &Path,
     pixels: &[u8],
@@ -168,8 +171,9 @@ pub(crate) fn fill_stamps(
     })
 }
 
-/// Replaces stamps that come in bursts (the rows of a packet share the time of receipt) by a linear fit over the azimuth,
-/// shifted so that the middle of the sweep keeps its time: the mean of the first and last row's stamps.
+/// Replaces stamps that come in bursts (the rows of a packet share the time of receipt) by a linear
+/// fit over the azimuth, shifted so that the middle of the sweep keeps its time: the mean of the
+/// first and last row's stamps.
 pub(crate) fn smooth_stamps(azimuth_rad: &[f32], stamp_ns: &mut [i64]) {
     let n = stamp_ns.len();
     if n < 2 {

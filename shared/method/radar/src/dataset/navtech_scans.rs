@@ -1,5 +1,5 @@
-//! Reader of images with Navtech metadata columns, parameterised by a profile per format: Oxford, OORD, Boreas, MulRan
-//! (Oxford format) and FoMo.
+//! Reader of images with Navtech metadata columns, parameterised by a profile per format: Oxford,
+//! OORD, Boreas, MulRan (Oxford format) and FoMo.
 
 use super::Dataset;
 use super::detect::Found;
@@ -59,7 +59,8 @@ impl Profile {
     }
 }
 
-/// The scans of a folder. Images decode in place: the rows of a scan keep their 11 bytes of metadata.
+/// The scans of a folder. Images decode in place: the rows of a scan keep their 11 bytes of
+/// metadata.
 #[derive(Debug)]
 pub(crate) struct NavtechScans {
     images: Images,
@@ -78,7 +79,8 @@ const MAX_SWEEP_NS: i64 = 5 * stamp::SECOND_NS;
 const MAX_SWEEP_PERIODS: i64 = 2;
 
 impl NavtechScans {
-    /// `profile` returns the defaults of the format, which may depend on the first image; `options` take precedence.
+    /// `profile` returns the defaults of the format, which may depend on the first image; `options`
+    /// take precedence.
     pub(crate) fn open(
         found: Found,
         options: &DatasetOptions,
@@ -124,7 +126,8 @@ impl NavtechScans {
         }
     }
 
-    /// Rejects a scan that is far from the time in its file's name, if that is how the files are named.
+    /// Rejects a scan that is far from the time in its file's name, if that is how the files are
+    /// named.
     fn check_name(&self, index: usize, scan_ns: i64) -> Result<(), ReadError> {
         let named_ns = self.nominal_stamp_ns(index).filter(|_| self.named_by_time);
         let apart_ns = named_ns.map_or(0, |named_ns| scan_ns - named_ns);
@@ -137,7 +140,8 @@ impl NavtechScans {
         }
     }
 
-    /// Time between the names of this file and the next, ns, if that can be one turn; otherwise the period.
+    /// Time between the names of this file and the next, ns, if that can be one turn; otherwise the
+    /// period.
     fn interval_ns(&self, index: usize) -> i64 {
         let name = |i: usize| self.images.name_stamp_ns(i);
         let next = index

@@ -21,37 +21,42 @@ pub enum AzimuthSource {
 /// The longest name of a topic, bytes.
 const TOPIC_BYTES: usize = 256;
 
-/// The way to read a dataset: the section `[dataset]` of a configuration. All keys are optional; the defaults depend on the format.
+/// The way to read a dataset: the section `[dataset]` of a configuration. All keys are optional;
+/// the defaults depend on the format.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct DatasetOptions {
     /// The file format. Default: detected from the folder, else from the first image.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub format: Option<Format>,
-    /// Depth of a range bin, m. Default: Oxford, OORD and FoMo 0.0438, Boreas 0.0596 (0.04381 from 2021-09-21), Boreas-RT 0.04381,
-    /// MulRan 200/3360, RADIATE 100/576.
+    /// Depth of a range bin, m. Default: Oxford, OORD and FoMo 0.0438, Boreas 0.0596 (0.04381 from
+    /// 2021-09-21), Boreas-RT 0.04381, MulRan 200/3360, RADIATE 100/576.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub range_resolution_m: Option<f32>,
     /// Offset of the ranges, m. Default: Boreas and Boreas-RT -0.31, all others 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub range_offset_m: Option<f32>,
     /// Doppler coefficient, s: metres to add to a range for each m/s of closing speed, see
-    /// [`SweepGeometry::doppler_s`](crate::SweepGeometry::doppler_s). About 0.04 for older Navtech radars (negative for falling
-    /// chirps), 0.049 for those with alternating chirps. Default: 0, unknown.
+    /// [`SweepGeometry::doppler_s`](crate::SweepGeometry::doppler_s). About 0.04 for older Navtech
+    /// radars (negative for falling chirps), 0.049 for those with alternating chirps. Default: 0,
+    /// unknown.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub doppler_s: Option<f32>,
-    /// Eccentricity of the encoder, rad: the true azimuth is the encoder's plus this times its cosine. It is specific to one
-    /// radar, and found by driving a road in both directions; 2.5e-3 corresponds to 0.1 mm. Default: 0, unknown.
+    /// Eccentricity of the encoder, rad: the true azimuth is the encoder's plus this times its
+    /// cosine. It is specific to one radar, and found by driving a road in both directions; 2.5e-3
+    /// corresponds to 0.1 mm. Default: 0, unknown.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub azimuth_eccentricity_rad: Option<f32>,
-    /// Source of the azimuth angles. Default: `encoder`; `uniform` for OORD, whose encoder columns are unreliable, and for
-    /// images without metadata (RADIATE, MulRan as recorded), which have no encoder.
+    /// Source of the azimuth angles. Default: `encoder`; `uniform` for OORD, whose encoder columns
+    /// are unreliable, and for images without metadata (RADIATE, MulRan as recorded), which have no
+    /// encoder.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub azimuth_source: Option<AzimuthSource>,
     /// Encoder counts per turn. Default: FoMo 5595, all others 5600.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub encoder_counts: Option<u16>,
-    /// The topic of the scans in a bag of ROS 2. Default: the one whose type is of Navtech's driver.
+    /// The topic of the scans in a bag of ROS 2. Default: the one whose type is of Navtech's
+    /// driver.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<String>")]
     pub topic: Option<ArrayString<TOPIC_BYTES>>,

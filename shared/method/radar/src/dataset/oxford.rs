@@ -1,7 +1,8 @@
 //! Oxford Radar RobotCar, and the Oxford Offroad dataset (OORD), which uses its format.
 //!
-//! `radar/<us>.png`, 400 azimuths x (11 + 3768), named by the start of the sweep; azimuths clockwise from ahead.
-//! OORD stores the images in `Navtech_CTS350-X_Radar/`, and its encoder columns are unreliable.
+//! `radar/<us>.png`, 400 azimuths x (11 + 3768), named by the start of the sweep; azimuths
+//! clockwise from ahead. OORD stores the images in `Navtech_CTS350-X_Radar/`, and its encoder
+//! columns are unreliable.
 
 use super::detect::Found;
 use super::error::OpenError;
@@ -11,8 +12,8 @@ use super::navtech_png::ByteTen;
 use super::navtech_scans::{NavtechScans, Profile, ScanTime};
 use super::options::{AzimuthSource, DatasetOptions};
 
-/// Depth of a range bin, m. The development kit of the dataset gives 0.0432, with which paths are 1.4 % shorter than the
-/// ground truth.
+/// Depth of a range bin, m. The development kit of the dataset gives 0.0432, with which paths are
+/// 1.4 % shorter than the ground truth.
 pub const RANGE_RESOLUTION_M: f32 = 0.0438;
 
 const STAMPS: &str = "Files are named by the stamp of the first row; the time of a scan is the mean of its first and last row's \

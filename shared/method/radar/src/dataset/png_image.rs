@@ -31,7 +31,8 @@ pub(crate) fn read_size(path: &Path) -> Result<ImageSize, ReadError> {
     parse_header(path, &header[..filled])
 }
 
-/// Parses the header chunk. Rejects pixels other than 8-bit grey and images too large for a radar scan.
+/// Parses the header chunk. Rejects pixels other than 8-bit grey and images too large for a radar
+/// scan.
 fn parse_header(path: &Path, bytes: &[u8]) -> Result<ImageSize, ReadError> {
     let shown = bytes.len().min(SIGNATURE.len());
     if bytes[..shown] != SIGNATURE[..shown] {
@@ -126,7 +127,8 @@ impl ImageReader {
     fn load(&mut self, path: &Path) -> Result<(), ReadError> {
         let file = File::open(path).map_err(|e| io_error(path, e))?;
         self.file.clear();
-        // One byte more than accepted distinguishes a file of exactly the maximum size from a larger one.
+        // One byte more than accepted distinguishes a file of exactly the maximum size from a
+        // larger one.
         file.take(MAX_IMAGE_BYTES + 1)
             .read_to_end(&mut self.file)
             .map_err(|e| io_error(path, e))?;
@@ -166,7 +168,8 @@ impl ImageReader {
     }
 }
 
-/// Cuts the name of a chunk, which the decoder shows in a debugging format, with bytes of the file as they are.
+/// Cuts the name of a chunk, which the decoder shows in a debugging format, with bytes of the file
+/// as they are.
 fn plain(reason: &str) -> &str {
     let words = reason.split("ChunkType").next().unwrap_or(reason);
     let words = words.trim_end().trim_end_matches(':');

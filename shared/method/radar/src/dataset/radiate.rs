@@ -1,7 +1,9 @@
-//! RADIATE: `Navtech_Polar/<frame>.png`, 576 rows of range x 400 columns of azimuth, and `Navtech_Polar.txt` with times.
+//! RADIATE: `Navtech_Polar/<frame>.png`, 576 rows of range x 400 columns of azimuth, and
+//! `Navtech_Polar.txt` with times.
 //!
-//! The times are `seconds.nanoseconds`, without leading zeros in the nanoseconds, and they are the times of receipt at the
-//! host: after a stall they are late by up to 1.4 s while the antenna turns uniformly. The sensor clock is reconstructed.
+//! The times are `seconds.nanoseconds`, without leading zeros in the nanoseconds, and they are the
+//! times of receipt at the host: after a stall they are late by up to 1.4 s while the antenna turns
+//! uniformly. The sensor clock is reconstructed.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -69,8 +71,8 @@ struct Segment {
     receipts: Vec<Receipt>,
 }
 
-/// Divides the frames where the time between two of them is not that of their numbers, as after a pause or when the clock was set.
-/// A single time that is off is left out.
+/// Divides the frames where the time between two of them is not that of their numbers, as after a
+/// pause or when the clock was set. A single time that is off is left out.
 fn segments(received: &[Receipt]) -> Vec<Segment> {
     let mut segments: Vec<Segment> = Vec::new();
     for (index, receipt) in received.iter().enumerate() {

@@ -14,11 +14,13 @@ pub(crate) struct SensorClock {
 }
 
 impl SensorClock {
-    /// Fits the uniform series that is closest to the times of receipt from below: a host is late, never early.
+    /// Fits the uniform series that is closest to the times of receipt from below: a host is late,
+    /// never early.
     ///
-    /// `received` holds (scan number, ns) with increasing numbers; `period` bounds the period, ns. Minimises
-    /// `sum(received - start - period * number)` such that no term is negative: a linear programme in two unknowns, whose
-    /// optimum is the edge of the lower convex hull of the points at their mean number. `None` without points.
+    /// `received` holds (scan number, ns) with increasing numbers; `period` bounds the period, ns.
+    /// Minimises `sum(received - start - period * number)` such that no term is negative: a linear
+    /// programme in two unknowns, whose optimum is the edge of the lower convex hull of the points
+    /// at their mean number. `None` without points.
     pub(crate) fn below(
         received: &[(i64, i64)],
         period: std::ops::RangeInclusive<f64>,

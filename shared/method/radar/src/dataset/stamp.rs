@@ -20,7 +20,8 @@ pub(crate) fn plausible(stamp_ns: i64) -> bool {
     YEARS_S.contains(&stamp_ns.div_euclid(SECOND_NS))
 }
 
-/// Converts a stamp of unknown unit to ns: the years 2015 to 2040 do not overlap in s, ms, us and ns.
+/// Converts a stamp of unknown unit to ns: the years 2015 to 2040 do not overlap in s, ms, us and
+/// ns.
 pub(crate) fn to_ns(raw: i64) -> Option<i64> {
     [1, 1_000, 1_000_000, SECOND_NS]
         .into_iter()
@@ -28,7 +29,8 @@ pub(crate) fn to_ns(raw: i64) -> Option<i64> {
         .find(|ns| plausible(*ns))
 }
 
-/// Parses decimal seconds to ns, exactly: `12.5` is 12,500,000,000. Values with an exponent are rounded to `f64`.
+/// Parses decimal seconds to ns, exactly: `12.5` is 12,500,000,000. Values with an exponent are
+/// rounded to `f64`.
 pub(crate) fn parse_seconds(text: &str) -> Option<i64> {
     let (whole, fraction) = text.split_once('.').unwrap_or((text, ""));
     let digits = |t: &str| t.bytes().all(|b| b.is_ascii_digit());
@@ -51,8 +53,8 @@ fn rounded_ns(seconds: f64) -> Option<i64> {
     (ns.abs() <= MAX_NS as f64).then_some(ns.round() as i64)
 }
 
-/// Duration of a turn, ns: the median time between consecutive scans without those that span a gap, which are half as long again as
-/// the shortest tenth, or longer. `None` if no time can be a turn.
+/// Duration of a turn, ns: the median time between consecutive scans without those that span a gap,
+/// which are half as long again as the shortest tenth, or longer. `None` if no time can be a turn.
 pub fn turn_ns(stamps: impl Iterator<Item = i64>) -> Option<i64> {
     let stamps: Vec<i64> = stamps.collect();
     let mut times: Vec<i64> = stamps

@@ -1,4 +1,5 @@
-//! Reader of transposed images without metadata: rows are range (nearest first), columns azimuth from straight ahead.
+//! Reader of transposed images without metadata: rows are range (nearest first), columns azimuth
+//! from straight ahead.
 
 use super::Dataset;
 use super::detect::Found;
@@ -35,7 +36,8 @@ pub(crate) enum FirstAzimuth {
     HalfAStep,
 }
 
-/// The scans of a folder, with scratch memory for the transposition. Images that are wider than high are not transposed.
+/// The scans of a folder, with scratch memory for the transposition. Images that are wider than
+/// high are not transposed.
 #[derive(Debug)]
 pub(crate) struct TransposedScans {
     pub(crate) images: Images,
@@ -56,7 +58,8 @@ pub(crate) struct TransposedScans {
 }
 
 impl TransposedScans {
-    /// `metres_per_bin` returns the range resolution of the format from the number of range bins. The caller adds the turns.
+    /// `metres_per_bin` returns the range resolution of the format from the number of range bins.
+    /// The caller adds the turns.
     pub(crate) fn open(
         found: Found,
         options: &DatasetOptions,
@@ -224,7 +227,8 @@ fn mean_after_start_ns(period_ns: i64, azimuths: usize) -> i64 {
     period_ns * (n - 1) / (2 * n)
 }
 
-/// `to[column][row] = from[row][column]`, for `from` of `columns` columns and `to` of the same size.
+/// `to[column][row] = from[row][column]`, for `from` of `columns` columns and `to` of the same
+/// size.
 fn transpose(from: &[u8], columns: usize, to: &mut [u8]) {
     let rows = from.len() / columns;
     for top in (0..rows).step_by(BLOCK) {

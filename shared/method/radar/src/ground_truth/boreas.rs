@@ -1,4 +1,5 @@
-//! Boreas `radar_poses.csv`: poses of the radar in east-north-up; the radar frame is x forward, y right, z down (roll near pi).
+//! Boreas `radar_poses.csv`: poses of the radar in east-north-up; the radar frame is x forward, y
+//! right, z down (roll near pi).
 
 use gyre_geometry::pose;
 
@@ -32,10 +33,12 @@ pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
     })
 }
 
-/// Returns the direction of the sensor's x axis in the east-north plane, counter-clockwise from east.
+/// Returns the direction of the sensor's x axis in the east-north plane, counter-clockwise from
+/// east.
 ///
-/// The rotation from sensor to ENU is `roll(r) pitch(p) yaw(h)` of transposed elementary matrices; its first column is the x axis.
-/// The x axis does not depend on whether y points right (z down) or left.
+/// The rotation from sensor to ENU is `roll(r) pitch(p) yaw(h)` of transposed elementary matrices;
+/// its first column is the x axis. The x axis does not depend on whether y points right (z down) or
+/// left.
 fn forward_heading(roll: f64, pitch: f64, heading: f64) -> f64 {
     let ((sr, cr), (sp, cp), (sh, ch)) = (roll.sin_cos(), pitch.sin_cos(), heading.sin_cos());
     let (x, y) = (cp * ch, cr * -sh + sr * sp * ch);

@@ -1,5 +1,5 @@
-//! KITTI: twelve numbers per line, a row-major 3 x 4 pose, after an optional index. Also Boreas odometry files, whose 13
-//! columns are a stamp and the inverse of the pose.
+//! KITTI: twelve numbers per line, a row-major 3 x 4 pose, after an optional index. Also Boreas
+//! odometry files, whose 13 columns are a stamp and the inverse of the pose.
 
 use std::io::{self, Write};
 
@@ -29,7 +29,8 @@ pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
                 })?;
                 check_increasing(line, stamps, stamp)?;
                 stamps.push(stamp);
-                // The first frame in the current sensor frame, y right: invert, then mirror to y left.
+                // The first frame in the current sensor frame, y right: invert, then mirror to y
+                // left.
                 poses.push(mirrored(&pose.inverse()));
             }
         }

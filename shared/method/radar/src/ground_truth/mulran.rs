@@ -1,4 +1,5 @@
-//! MulRan `global_pose.csv`: time and row-major 3 x 4 pose of the vehicle (x forward, y left, z up) in UTM, without header.
+//! MulRan `global_pose.csv`: time and row-major 3 x 4 pose of the vehicle (x forward, y left, z up)
+//! in UTM, without header.
 
 use gyre_geometry::{Pose, pose};
 use nalgebra::{Matrix3, Vector3};

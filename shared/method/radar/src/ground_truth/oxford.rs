@@ -1,5 +1,5 @@
-//! Oxford `radar_odometry.csv`: each row is the pose of the later scan (source) in the frame of the earlier one (destination),
-//! x forward, y right, yaw clockwise; stamps are at mid-sweep.
+//! Oxford `radar_odometry.csv`: each row is the pose of the later scan (source) in the frame of the
+//! earlier one (destination), x forward, y right, yaw clockwise; stamps are at mid-sweep.
 
 use gyre_geometry::{Pose, mirrored, pose};
 
@@ -15,7 +15,8 @@ struct Motion {
     motion: Pose,
 }
 
-/// Composes the motions from the identity. Rows may be in any order; a gap between them is an error.
+/// Composes the motions from the identity. Rows may be in any order; a gap between them is an
+/// error.
 pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
     let mut motions = parse_rows(text)?;
     motions.sort_by_key(|m| m.from_ns);

@@ -27,7 +27,8 @@ pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
             });
         }
         stamps.push(stamp);
-        // Direction of the x axis in the plane: correct for any roll and pitch, and for quaternions that are not exactly normalised.
+        // Direction of the x axis in the plane: correct for any roll and pitch, and for quaternions
+        // that are not exactly normalised.
         let yaw = (2.0 * (qw * qz + qx * qy)).atan2(qw * qw + qx * qx - qy * qy - qz * qz);
         poses.push(pose(x, y, yaw));
     }

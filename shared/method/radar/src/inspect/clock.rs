@@ -7,7 +7,8 @@ use crate::trajectory::Trajectory;
 /// Range and step of the offsets that are evaluated, ns.
 const MAX_OFFSET_NS: i64 = 10_000_000_000;
 const STEP_NS: i64 = 50_000_000;
-/// Duration of the motions that are compared, ns: longer than a scan, to average the noise of positions.
+/// Duration of the motions that are compared, ns: longer than a scan, to average the noise of
+/// positions.
 const BASELINE_NS: i64 = 1_000_000_000;
 /// Minimum number and share of motions within both trajectories for an offset to be considered.
 const MIN_MOTIONS: usize = 12;
@@ -20,7 +21,8 @@ const MIN_CORRELATION: f64 = 0.6;
 /// Offset between the clocks of two trajectories.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ClockOffset {
-    /// Delay, s: the motion of the reference at `t` is that of the other trajectory at `t + late_s`.
+    /// Delay, s: the motion of the reference at `t` is that of the other trajectory at
+    /// `t + late_s`.
     pub late_s: f64,
     /// Correlation of the speeds at that offset.
     pub speed_correlation: f64,
@@ -51,7 +53,8 @@ struct Motion {
     turn_rad: f64,
 }
 
-/// Returns the offset of `other` with the highest correlation of speeds and yaw rates; `None` without sufficient overlap.
+/// Returns the offset of `other` with the highest correlation of speeds and yaw rates; `None`
+/// without sufficient overlap.
 pub(super) fn offset(reference: &Trajectory, other: &Trajectory) -> Option<ClockOffset> {
     let motions = motions(reference);
     let turns = reference.has_heading() && other.has_heading();

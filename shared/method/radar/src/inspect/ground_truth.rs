@@ -10,7 +10,8 @@ use crate::ground_truth::{find_ground_truth, read_trajectory};
 use crate::median::median;
 use crate::trajectory::Trajectory;
 
-/// Tolerance of the time span, ns: without decoding, times of scans are known to a few milliseconds.
+/// Tolerance of the time span, ns: without decoding, times of scans are known to a few
+/// milliseconds.
 const MARGIN_NS: i64 = 20_000_000;
 
 /// Summary of a ground truth file.

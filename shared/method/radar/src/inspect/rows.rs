@@ -9,7 +9,8 @@ use crate::scan::{PolarScan, Sense, flag};
 const POWER_SCANS: usize = 40;
 /// Ringing exceeds the mean of all powers by this factor ...
 const RINGING_BRIGHTNESS: f64 = 1.5;
-/// ... and is nearly constant over azimuth and time: its standard deviation is at most this share of its mean.
+/// ... and is nearly constant over azimuth and time: its standard deviation is at most this share
+/// of its mean.
 const RINGING_VARIATION: f64 = 0.3;
 /// Number of consecutive bins without ringing that end it.
 const QUIET_BINS: usize = 3;
@@ -140,7 +141,8 @@ impl Survey {
     }
 }
 
-/// Steps between azimuths, including that from the last to the first, positive in the sense of rotation.
+/// Steps between azimuths, including that from the last to the first, positive in the sense of
+/// rotation.
 fn steps_rad<'a>(scan: &PolarScan<'a>) -> impl Iterator<Item = f64> + 'a {
     let sign = if scan.geometry.sense == Sense::Clockwise {
         1.0

@@ -34,11 +34,13 @@ impl Beam {
         }
     }
 
-    /// Returns the cells of all azimuths, in order, that have power and are not exceeded within the beam.
+    /// Returns the cells of all azimuths, in order, that have power and are not exceeded within the
+    /// beam.
     pub fn peaks(&mut self, scan: &PolarScan<'_>, cells: &RangeCells) -> &[Peak] {
         let azimuths = scan.geometry.azimuths;
         self.found.clear();
-        // The upper bound, so that no later scan of this size allocates. Untouched memory is not committed.
+        // The upper bound, so that no later scan of this size allocates. Untouched memory is not
+        // committed.
         self.found.reserve(azimuths * cells.cells());
         for azimuth in 0..azimuths {
             let Some(powers) = cells.powers(azimuth) else {
@@ -57,8 +59,8 @@ impl Beam {
     }
 }
 
-/// Returns the other azimuths within a half width on either side, also across the end of the sweep, each once. Half of the
-/// mean spacing is added, since antennas do not turn quite uniformly.
+/// Returns the other azimuths within a half width on either side, also across the end of the sweep,
+/// each once. Half of the mean spacing is added, since antennas do not turn quite uniformly.
 fn neighbours(
     scan: &PolarScan<'_>,
     azimuth: usize,

@@ -93,8 +93,8 @@ impl RangeCells {
         self.layout.bins_per_cell
     }
 
-    /// Powers of the cells of an azimuth, nearest first, 0 where not above the floor. `None` where all are 0, or where the
-    /// azimuth was not measured.
+    /// Powers of the cells of an azimuth, nearest first, 0 where not above the floor. `None` where
+    /// all are 0, or where the azimuth was not measured.
     pub fn powers(&self, azimuth: usize) -> Option<&[i16]> {
         let cells = self.layout.cells;
         self.active[azimuth].then(|| &self.powers[azimuth * cells..][..cells])

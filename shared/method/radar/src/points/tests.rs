@@ -160,7 +160,8 @@ proptest! {
     }
 }
 
-/// Scatterers in all directions except straight ahead, where a moving sensor may see them twice or not at all.
+/// Scatterers in all directions except straight ahead, where a moving sensor may see them twice or
+/// not at all.
 fn places() -> Vec<Point2<f64>> {
     let polar = |k: u32| {
         (

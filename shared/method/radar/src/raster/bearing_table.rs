@@ -3,14 +3,17 @@
 use crate::scan::{MAX_AZIMUTHS, PolarScan};
 use std::f64::consts::TAU;
 
-/// Nodes per turn: ten between Navtech azimuths. The table is linear between nodes, so its error is confined to the
-/// neighbourhood of a measured azimuth, and below `azimuths / (4 NODES)` of the change in spacing there.
+/// Nodes per turn: ten between Navtech azimuths. The table is linear between nodes, so its error is
+/// confined to the neighbourhood of a measured azimuth, and below `azimuths / (4 NODES)` of the
+/// change in spacing there.
 pub(super) const NODES: usize = 4096;
 
-/// The most that an azimuth may lie behind the previous one, turns: encoder jitter, or a sweep that ends past its start.
+/// The most that an azimuth may lie behind the previous one, turns: encoder jitter, or a sweep that
+/// ends past its start.
 const BACKLASH: f64 = 0.1;
 
-/// Fractional azimuths and times at bearings `k / NODES`, over the turn that starts at the first azimuth.
+/// Fractional azimuths and times at bearings `k / NODES`, over the turn that starts at the first
+/// azimuth.
 #[derive(Debug)]
 pub(super) struct BearingTable {
     /// Bearing of the first azimuth, turns in `[0, 1)`.
@@ -75,7 +78,8 @@ impl BearingTable {
             } else {
                 0.0
             };
-            // The time past the last azimuth stays constant: the first azimuth was measured a sweep earlier.
+            // The time past the last azimuth stays constant: the first azimuth was measured a sweep
+            // earlier.
             let (earlier, later) = (seconds(below), seconds(below + 1));
             self.row[node] = (below as f64 + share) as f32;
             self.time_s[node] = (earlier + share * (later - earlier)) as f32;

@@ -10,9 +10,10 @@ pub(super) const BLOCK: usize = 32;
 /// One value per cell of a block.
 pub(super) type Block<T> = [T; BLOCK];
 
-/// The centres of all cells, Cartesian and polar, in a frame whose second axis `z` points towards increasing azimuths:
-/// y for counter-clockwise sensors, -y for clockwise ones. The kernels therefore need not know the sense of rotation.
-/// Rows are padded to whole blocks with cells at the sensor.
+/// The centres of all cells, Cartesian and polar, in a frame whose second axis `z` points towards
+/// increasing azimuths: y for counter-clockwise sensors, -y for clockwise ones. The kernels
+/// therefore need not know the sense of rotation. Rows are padded to whole blocks with cells at the
+/// sensor.
 #[derive(Debug)]
 pub(super) struct Cells {
     n: usize,

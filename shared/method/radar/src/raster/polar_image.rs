@@ -1,12 +1,14 @@
-//! The polar image that cells are sampled from: power above the floor, averaged along range over the depth of a cell. Its
-//! columns are finer than a cell but coarser than a bin, so that it stays in the cache.
+//! The polar image that cells are sampled from: power above the floor, averaged along range over
+//! the depth of a cell. Its columns are finer than a cell but coarser than a bin, so that it stays
+//! in the cache.
 
 use super::kernels::window::{self, Window};
 use super::sweep_motion::SweepMotion;
 use crate::scan::{PolarScan, SweepGeometry};
 
-/// Row-major samples, in units of 1/256 of the scan's power: one row per azimuth, the first one repeated at the end, and
-/// empty columns on both sides. Bilinear sampling uses a window of one bin.
+/// Row-major samples, in units of 1/256 of the scan's power: one row per azimuth, the first one
+/// repeated at the end, and empty columns on both sides. Bilinear sampling uses a window of one
+/// bin.
 #[derive(Debug)]
 pub(super) struct PolarImage {
     window_m: f32,
@@ -43,7 +45,8 @@ impl Layout {
         }
     }
 
-    /// Columns before the first piece. The first of them is out of reach of the window, and so empty.
+    /// Columns before the first piece. The first of them is out of reach of the window, and so
+    /// empty.
     fn lead(&self) -> usize {
         self.window.reach() + 1
     }
@@ -71,8 +74,9 @@ impl PolarImage {
         }
     }
 
-    /// Computes the image of a scan out to `max_range_m`; columns beyond are undefined. With a `motion` the Doppler shift is
-    /// compensated azimuth by azimuth, so that rising and falling chirps may alternate.
+    /// Computes the image of a scan out to `max_range_m`; columns beyond are undefined. With a
+    /// `motion` the Doppler shift is compensated azimuth by azimuth, so that rising and falling
+    /// chirps may alternate.
     pub fn fill(
         &mut self,
         scan: &PolarScan<'_>,

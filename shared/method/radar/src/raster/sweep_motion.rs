@@ -27,7 +27,8 @@ impl SweepMotion {
             .fold(0.0, f64::max);
         let turn_rad = (twist.yaw_rate_radps * longest_s).abs();
         let travel_m = twist.speed_mps() * longest_s;
-        // Where all rows have the same time any velocity moves nothing, but it must be a number in f32.
+        // Where all rows have the same time any velocity moves nothing, but it must be a number in
+        // f32.
         let velocity = [twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps];
         let is_finite = velocity.iter().all(|v| (*v as f32).is_finite());
         if !(is_finite && turn_rad <= MAX_TURN_RAD && travel_m <= MAX_TRAVEL_M) {
@@ -60,10 +61,11 @@ impl SweepMotion {
         self.vx_mps.hypot(self.vz_mps)
     }
 
-    /// Transforms a point from the frame at the scan's stamp to the sensor's frame `t_s` seconds later: exp(twist t)^-1 p.
+    /// Transforms a point from the frame at the scan's stamp to the sensor's frame `t_s` seconds
+    /// later: exp(twist t)^-1 p.
     ///
-    /// With R the rotation by half of the yaw, the pose at t is (R d, R R), where d is the chord of the arc before that
-    /// rotation; its inverse maps p to R' (R' p - d).
+    /// With R the rotation by half of the yaw, the pose at t is (R d, R R), where d is the chord of
+    /// the arc before that rotation; its inverse maps p to R' (R' p - d).
     #[inline(always)]
     pub fn in_sensor(&self, x: f32, z: f32, t_s: f32) -> (f32, f32) {
         let half = self.half_yaw_rate_radps * t_s;
@@ -75,7 +77,8 @@ impl SweepMotion {
     }
 }
 
-/// (sin x / x, cos x) by the first terms of their series, accurate to 1e-6 for |x| <= MAX_TURN_RAD / 2.
+/// (sin x / x, cos x) by the first terms of their series, accurate to 1e-6 for |x| <= MAX_TURN_RAD
+/// / 2.
 #[inline(always)]
 fn sinc_cos(x: f32) -> (f32, f32) {
     let s = x * x;

@@ -4,8 +4,8 @@ use super::{MAX_AZIMUTHS, PolarScan};
 use crate::chain::MAX_INTERVAL_NS;
 use std::ops::RangeInclusive;
 
-/// Maximum step back from row to row, ns: a clock that is being adjusted. A row that is so much off is displaced by less than
-/// a cell of a raster.
+/// Maximum step back from row to row, ns: a clock that is being adjusted. A row that is so much off
+/// is displaced by less than a cell of a raster.
 const MAX_STEP_BACK_NS: i64 = 5_000_000;
 
 /// An inconsistent scan.
@@ -70,7 +70,8 @@ pub enum ScanError {
 }
 
 impl PolarScan<'_> {
-    /// Checks that the slices are as long as the geometry requires, and that every number is within its bounds.
+    /// Checks that the slices are as long as the geometry requires, and that every number is within
+    /// its bounds.
     ///
     /// # Errors
     /// Returns the first inconsistency.
@@ -123,7 +124,8 @@ impl PolarScan<'_> {
         }
     }
 
-    /// Checks that the times of the rows, and the scan's own, are those of one sweep. For a scan that passes [`PolarScan::check`].
+    /// Checks that the times of the rows, and the scan's own, are those of one sweep. For a scan
+    /// that passes [`PolarScan::check`].
     ///
     /// # Errors
     /// Returns the first row that is not of the sweep.

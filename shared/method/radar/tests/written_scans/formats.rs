@@ -9,7 +9,8 @@ use gyre_radar::{AzimuthSource, DatasetOptions, Format, OpenError, open};
 use super::{first_scan, folder, opened, rejected};
 use crate::common::{PERIOD_US, START_US, Sweep, read, write_png, write_radiate};
 
-/// Writes three scans to `folder`, named by the stamp of row `named`; a microsecond has `unit` units of the stamps.
+/// Writes three scans to `folder`, named by the stamp of row `named`; a microsecond has `unit`
+/// units of the stamps.
 fn write_named(folder: &Path, bins: usize, start_us: i64, named: i64, unit: i64) {
     for k in 0..3 {
         let start = (start_us + k * PERIOD_US) * unit;

@@ -1,4 +1,5 @@
-//! Readers on small generated datasets, valid and invalid: images, the rows of a sweep, formats and options.
+//! Readers on small generated datasets, valid and invalid: images, the rows of a sweep, formats and
+//! options.
 
 mod formats;
 mod images;

@@ -1,4 +1,5 @@
-//! Alignment of a scan's points with the local map: Gauss-Newton over (x, y, yaw) with a line search.
+//! Alignment of a scan's points with the local map: Gauss-Newton over (x, y, yaw) with a line
+//! search.
 
 #[cfg(test)]
 mod tests;
@@ -14,9 +15,11 @@ use super::{
 
 /// Converged if a step is shorter than this in each unknown: m, m, rad.
 const MIN_STEP: [f64; 3] = [5e-4, 5e-4, 1e-5];
-/// Relative increase of the information's diagonal: keeps the equations solvable where points on one line leave an unknown open.
+/// Relative increase of the information's diagonal: keeps the equations solvable where points on
+/// one line leave an unknown open.
 const DAMPING: f64 = 1e-4;
-/// Share of the first Gauss-Newton step that is taken. On a map, such a step is about three times too long, see [`align`].
+/// Share of the first Gauss-Newton step that is taken. On a map, such a step is about three times
+/// too long, see [`align`].
 const FIRST_SHARE: f64 = 0.3;
 /// The next share is within these factors of the last one.
 const SHARE_FACTORS: (f64, f64) = (0.25, 4.0);
@@ -30,12 +33,15 @@ pub(super) struct Alignment {
     pub normal: NormalEquations,
 }
 
-/// Aligns points with the map from an initial pose by Gauss-Newton steps with a line search. The cost never rises.
+/// Aligns points with the map from an initial pose by Gauss-Newton steps with a line search. The
+/// cost never rises.
 ///
-/// Gauss-Newton takes the residuals for small. Here a point's residual 1 - M is large everywhere, so the cost is curved several times
-/// as much as the information says, and a whole step goes too far. The parabola through the cost and its slope before a step and the
-/// cost after it gives the share of the step at which the cost is least. That share is nearly the same from step to step, so each
-/// step takes the share that the one before would have needed, at one evaluation of the cost a step.
+/// Gauss-Newton takes the residuals for small. Here a point's residual 1 - M is large everywhere,
+/// so the cost is curved several times as much as the information says, and a whole step goes too
+/// far. The parabola through the cost and its slope before a step and the cost after it gives the
+/// share of the step at which the cost is least. That share is nearly the same from step to step,
+/// so each step takes the share that the one before would have needed, at one evaluation of the
+/// cost a step.
 pub(super) fn align(
     map: &MapView<'_>,
     points: &DeskewedPoints,
@@ -75,7 +81,8 @@ fn gauss_newton_step(normal: &NormalEquations) -> Option<Vector3<f64>> {
     step.iter().all(|s| s.is_finite()).then_some(step)
 }
 
-/// Returns the share of a step at which the parabola through the costs before and after it is least.
+/// Returns the share of a step at which the parabola through the costs before and after it is
+/// least.
 fn best_share(before: &NormalEquations, step: &Vector3<f64>, after: &NormalEquations) -> f64 {
     let (least, most) = SHARE_FACTORS;
     let descent = 2.0 * before.right_hand_side.dot(step);

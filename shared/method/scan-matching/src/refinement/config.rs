@@ -52,10 +52,12 @@ pub struct RefinementConfig {
     /// Standard deviation of the heading that is added to the covariance, degrees, for the uneven
     /// rotation of the antenna.
     pub yaw_sigma_deg: f64,
-    /// Standard deviation of the drift of a map of k keyframes with each motion, over 2 / (k + 1) of that of the motion. The share
-    /// (drift_scale x 2 / (k + 1))² of the covariance accumulates, at most all of it; the next motion takes back the rest.
+    /// Standard deviation of the drift of a map of k keyframes with each motion, over 2 / (k + 1)
+    /// of that of the motion. The share (drift_scale x 2 / (k + 1))² of the covariance accumulates,
+    /// at most all of it; the next motion takes back the rest.
     pub drift_scale: f64,
-    /// Standard deviation of the scale that all motions of a drive share: how well the range resolution is known.
+    /// Standard deviation of the scale that all motions of a drive share: how well the range
+    /// resolution is known.
     pub scale_sigma: f64,
     /// Holds the pose of a standing vehicle: no motion until the displacement exceeds the noise.
     pub hold_standstill: bool,

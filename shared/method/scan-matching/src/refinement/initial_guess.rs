@@ -16,7 +16,8 @@ pub enum InitialGuess {
     YawOffset,
 }
 
-/// The prediction, the search's motion, and the prediction from the scan before in case the last match was wrong.
+/// The prediction, the search's motion, and the prediction from the scan before in case the last
+/// match was wrong.
 pub(super) fn initial_guesses(predicted: [Pose; 2], searched: Pose) -> [(InitialGuess, Pose); 3] {
     let [from_last, from_second_last] = predicted;
     [

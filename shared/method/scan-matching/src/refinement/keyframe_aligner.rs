@@ -8,14 +8,16 @@ use super::{
 };
 use crate::{ConfigError, Submap};
 
-/// Initial guesses come from a search on coarse cells, so more iterations are allowed than from scan to scan.
+/// Initial guesses come from a search on coarse cells, so more iterations are allowed than from
+/// scan to scan.
 const COARSE_ITERATIONS: usize = 20;
 const FINE_ITERATIONS: usize = 20;
 
 /// Aligns the middle keyframes of two submaps.
 ///
-/// It is the [`Refiner`](crate::Refiner)'s alignment with a map of one image. [`align`](Self::align) takes the points of these two scans
-/// alone: laid together by odometry, the neighbours in the submaps would carry its errors into the result.
+/// It is the [`Refiner`](crate::Refiner)'s alignment with a map of one image.
+/// [`align`](Self::align) takes the points of these two scans alone: laid together by odometry, the
+/// neighbours in the submaps would carry its errors into the result.
 ///
 /// Nothing is allocated after construction.
 #[derive(Debug)]
@@ -27,8 +29,8 @@ pub struct KeyframeAligner {
 }
 
 impl KeyframeAligner {
-    /// Plans alignments of scans of at most `capacity` points. Of `config` count the cells and reach of the map, and the scales of the
-    /// covariance.
+    /// Plans alignments of scans of at most `capacity` points. Of `config` count the cells and
+    /// reach of the map, and the scales of the covariance.
     ///
     /// # Errors
     /// The first key of `config` that is out of its bounds.
@@ -45,8 +47,8 @@ impl KeyframeAligner {
         })
     }
 
-    /// Returns the pose of the later keyframe in the earlier one's frame, from an initial guess; `None` if the points do not
-    /// determine it.
+    /// Returns the pose of the later keyframe in the earlier one's frame, from an initial guess;
+    /// `None` if the points do not determine it.
     pub fn align(
         &mut self,
         later: &Submap,
@@ -56,8 +58,8 @@ impl KeyframeAligner {
         self.align_to(later, &earlier.keyframe, initial)
     }
 
-    /// As [`align`](Self::align), with all points of the earlier submap: where its keyframes lie better to each other than one scan
-    /// measures.
+    /// As [`align`](Self::align), with all points of the earlier submap: where its keyframes lie
+    /// better to each other than one scan measures.
     pub fn align_to_submap(
         &mut self,
         later: &Submap,

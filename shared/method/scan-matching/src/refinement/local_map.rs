@@ -23,10 +23,11 @@ pub struct Keyframe {
 }
 
 impl Keyframe {
-    /// Returns its fine and its coarse image, each with the map's cell (x, y) that its first value belongs to.
+    /// Returns its fine and its coarse image, each with the map's cell (x, y) that its first value
+    /// belongs to.
     ///
-    /// Rows are of equal x, which grows with the row; y grows with the column. A cell is 0 where the scan saw nothing,
-    /// and at most 255.
+    /// Rows are of equal x, which grows with the row; y grows with the column. A cell is 0 where
+    /// the scan saw nothing, and at most 255.
     pub fn images(&self) -> [([i64; 2], ArrayView2<'_, u8>); 2] {
         [&self.fine, &self.coarse].map(|image| (image.corner, image.view()))
     }
@@ -109,7 +110,8 @@ impl LocalMap {
         self.used.push_back(keyframe);
     }
 
-    /// Replaces the keyframes by those that `load` fills in, oldest first, until it returns `false` or the map is full.
+    /// Replaces the keyframes by those that `load` fills in, oldest first, until it returns `false`
+    /// or the map is full.
     pub fn restore(&mut self, mut load: impl FnMut(&mut Keyframe) -> bool) {
         self.clear();
         while let Some(mut keyframe) = self.spare.pop() {
@@ -153,7 +155,8 @@ mod tests {
 
     use super::*;
 
-    /// Keyframes come and go, the map is cleared and filled again: the sum is that of the keyframes in it.
+    /// Keyframes come and go, the map is cleared and filled again: the sum is that of the keyframes
+    /// in it.
     #[test]
     fn the_sum_is_that_of_the_keyframes_in_the_map() {
         let config = RefinementConfig {

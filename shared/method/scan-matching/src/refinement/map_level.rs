@@ -1,7 +1,7 @@
 //! One level of the local map: the keyframes' images on the grid of the map, and their sum.
 //!
-//! A keyframe is drawn once, from its own points at its own pose, and never resampled: repeated resampling blurs the map
-//! along the path, and a blurred map pulls the next scan with it.
+//! A keyframe is drawn once, from its own points at its own pose, and never resampled: repeated
+//! resampling blurs the map along the path, and a blurred map pulls the next scan with it.
 
 use gyre_geometry::Pose;
 use gyre_simd::simd;
@@ -58,9 +58,10 @@ pub(super) struct MapLevel {
     /// Sum of the images.
     sum: Vec<u16>,
     images: usize,
-    /// A keyframe before it is saturated; all zero between calls of `draw`. Whole chunks: a few cells more than n x n.
+    /// A keyframe before it is saturated; all zero between calls of `draw`. Whole chunks: a few
+    /// cells more than n x n.
     drawing: Vec<f32>,
-    /// Whether there is anything in a chunk of the drawing.
+    /// True if there is anything in a chunk of the drawing.
     drawn: Vec<bool>,
 }
 
@@ -102,8 +103,8 @@ impl MapLevel {
 
     /// Draws a keyframe: spreads its points, and saturates.
     ///
-    /// The saturation m / (m + mean) bounds the weight of a cell: without it bright clutter, and what moves with the
-    /// vehicle, outweighs the many faint returns that determine the motion.
+    /// The saturation m / (m + mean) bounds the weight of a cell: without it bright clutter, and
+    /// what moves with the vehicle, outweighs the many faint returns that determine the motion.
     pub fn draw(&mut self, points: &DeskewedPoints, pose: &Pose, image: &mut Image) {
         let half = (self.n / 2) as i64;
         image.corner = [pose.translation.x, pose.translation.y]
@@ -119,7 +120,8 @@ impl MapLevel {
         saturate(&mut self.drawing, &mut self.drawn, mean, &mut image.cells);
     }
 
-    /// Sums these images, oldest first, on the square of the last one. The sums are of integers, so exact in any order.
+    /// Sums these images, oldest first, on the square of the last one. The sums are of integers, so
+    /// exact in any order.
     pub fn sum_images<'a>(&mut self, images: impl Iterator<Item = &'a Image> + Clone) {
         self.sum.fill(0);
         self.images = 0;
@@ -139,8 +141,8 @@ impl MapLevel {
         self.combine(image, [[0, 0], [self.n, self.n]], subtract);
     }
 
-    /// Moves the sum to the square of a new image, and adds it. `others` are all images that the sum has already: newly covered
-    /// cells are summed anew.
+    /// Moves the sum to the square of a new image, and adds it. `others` are all images that the
+    /// sum has already: newly covered cells are summed anew.
     pub fn add_newest<'a>(
         &mut self,
         newest: &Image,
@@ -157,8 +159,9 @@ impl MapLevel {
         self.combine(newest, [[0, 0], [self.n, self.n]], add);
     }
 
-    /// Moves the square of the sum by so many cells, and empties the newly covered ones: the rows and the columns that are returned,
-    /// each as the first cell and the one behind the last, (x, y).
+    /// Moves the square of the sum by so many cells, and empties the newly covered ones: the rows
+    /// and the columns that are returned, each as the first cell and the one behind the last, (x,
+    /// y).
     fn move_sum(&mut self, down: i64, right: i64) -> [[[usize; 2]; 2]; 2] {
         let n = self.n;
         let (rows, columns) = (exposed(down, n), exposed(right, n));
@@ -195,7 +198,8 @@ impl MapLevel {
         parts
     }
 
-    /// Combines a part of the sum, from its first cell (x, y) to the one behind its last, with an image.
+    /// Combines a part of the sum, from its first cell (x, y) to the one behind its last, with an
+    /// image.
     fn combine(
         &mut self,
         image: &Image,
@@ -283,7 +287,8 @@ fn spread(points: &DeskewedPoints, place: &Place, drawing: &mut [f32], drawn: &m
     }
 }
 
-/// Returns the weights of the cells along an axis, for a point that lies this fraction of a cell behind the fourth of them.
+/// Returns the weights of the cells along an axis, for a point that lies this fraction of a cell
+/// behind the fourth of them.
 #[inline(always)]
 fn shares(behind: f32) -> [f32; SPREAD] {
     const NEAR: [f32; SPREAD] = [
@@ -422,7 +427,8 @@ mod tests {
         }
     }
 
-    /// The definition: the points are shared between the cells around them, and these are blurred one by one.
+    /// The definition: the points are shared between the cells around them, and these are blurred
+    /// one by one.
     fn drawn_directly(places: &[[f32; 2]], level: &MapLevel, corner: [i64; 2]) -> Vec<f64> {
         let n = level.n;
         let blur = |steps: usize| f64::from(BLUR.get(steps).copied().unwrap_or(0.0));

@@ -1,7 +1,7 @@
 //! The cost of a pose and its normal equations.
 //!
-//! The cost is the sum of w (1 - M(T p))^2 over the points p with weights w, where M is the map, 0 to 1, and T the pose:
-//! each point should lie on an occupied cell.
+//! The cost is the sum of w (1 - M(T p))^2 over the points p with weights w, where M is the map, 0
+//! to 1, and T the pose: each point should lie on an occupied cell.
 
 use gyre_geometry::Pose;
 use gyre_simd::simd;
@@ -146,7 +146,8 @@ fn padded(column: &[f32]) -> Lanes {
     lanes
 }
 
-/// The map at the four corners around each point: the first, the one beside it, and the two in the next row.
+/// The map at the four corners around each point: the first, the one beside it, and the two in the
+/// next row.
 #[inline(always)]
 fn corners(map: &MapView<'_>, first: &[i32; LANES]) -> [Lanes; 4] {
     let mut corners = [[0.0; LANES]; 4];

@@ -22,7 +22,8 @@ impl DeskewedPoints {
         }
     }
 
-    /// Moves each point from the sensor's frame at the point's time to that at the stamp, at constant velocity.
+    /// Moves each point from the sensor's frame at the point's time to that at the stamp, at
+    /// constant velocity.
     pub fn deskew(&mut self, points: &[SparsePoint], twist: &Twist) {
         for column in self.columns() {
             column.clear();
@@ -98,7 +99,8 @@ fn deskew(
             weight: w,
             doppler_s: doppler,
         } = *point;
-        // The Doppler shift along the line of sight u: r + doppler (u . v), so x + doppler (u . v) u.
+        // The Doppler shift along the line of sight u: r + doppler (u . v), so x + doppler (u . v)
+        // u.
         let toward = doppler * (x * vx + y * vy) / (x * x + y * y).max(1e-6);
         let (x, y) = (x + toward * x, y + toward * y);
         let (sin, cos) = sin_cos(rate * t);

@@ -1,4 +1,5 @@
-//! The state kept from scan to scan: the last poses, the predictions from them, and how well scans match on average.
+//! The state kept from scan to scan: the last poses, the predictions from them, and how well scans
+//! match on average.
 
 use gyre_geometry::{Pose, Twist};
 
@@ -14,7 +15,8 @@ const FIT_GAIN: f64 = 0.2;
 pub struct TrackerState {
     /// Pose of the last scan in the first one's frame.
     pub pose: Pose,
-    /// The last two refined scans, newest first. The second one is used if the first turns out to be wrong.
+    /// The last two refined scans, newest first. The second one is used if the first turns out to
+    /// be wrong.
     pub anchors: [Option<Anchor>; 2],
     /// Running mean of the overlap of matched scans.
     pub mean_overlap: f64,
@@ -64,7 +66,8 @@ impl Anchor {
         Twist::from_chord(&self.pose.inv_mul(pose), self.age_s + interval_s)
     }
 
-    /// Returns whether a vehicle can have come from here to `pose`: within the limits of acceleration, and `jitter_share` (0 to
+    /// Returns whether a vehicle can have come from here to `pose`: within the limits of
+    /// acceleration, and `jitter_share` (0 to
     /// 1) of the jitter of a match.
     fn can_reach(
         &self,
@@ -85,14 +88,16 @@ impl Anchor {
 }
 
 impl TrackerState {
-    /// The poses after the interval at constant velocity, predicted from each anchor; the last pose if there is none.
+    /// The poses after the interval at constant velocity, predicted from each anchor; the last pose
+    /// if there is none.
     pub(super) fn predict(&self, interval_s: f64) -> [Pose; 2] {
         let from = |anchor: &Anchor| anchor.predict(interval_s);
         let first = self.anchors[0].as_ref().map_or(self.pose, from);
         [first, self.anchors[1].as_ref().map_or(first, from)]
     }
 
-    /// The mean velocity from the newest anchor, (or from the last pose if there is none) to `pose`.
+    /// The mean velocity from the newest anchor, (or from the last pose if there is none) to
+    /// `pose`.
     pub(super) fn twist_to(&self, pose: &Pose, interval_s: f64) -> Twist {
         match &self.anchors[0] {
             Some(anchor) => anchor.twist_to(pose, interval_s),
@@ -147,7 +152,8 @@ impl TrackerState {
         self.pose = pose;
     }
 
-    /// Makes `pose` the newest anchor. An anchor from which it cannot be reached was wrong and is dropped.
+    /// Makes `pose` the newest anchor. An anchor from which it cannot be reached was wrong and is
+    /// dropped.
     fn push_anchor(&mut self, pose: Pose, interval_s: f64, config: &RefinementConfig) {
         let valid = self
             .anchors

@@ -86,7 +86,8 @@ pub fn draw(
     raster
 }
 
-/// The earlier and the later raster of a scene with 150 scatterers, around the sensor and beyond the raster's edge.
+/// The earlier and the later raster of a scene with 150 scatterers, around the sensor and beyond
+/// the raster's edge.
 pub fn pair(n: usize, cell_m: f64, motion: Motion, seed: u64) -> (Array2<f32>, Array2<f32>) {
     let scene = scatterers(150, 0.75 * n as f64 * cell_m, seed);
     let earlier = draw(scene.iter().copied(), n, cell_m, 1.2);

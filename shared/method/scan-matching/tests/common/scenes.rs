@@ -1,4 +1,5 @@
-//! Generated point scans with exact truth: reflectors in the plane, seen by a moving sensor that scans clockwise.
+//! Generated point scans with exact truth: reflectors in the plane, seen by a moving sensor that
+//! scans clockwise.
 
 use gyre_geometry::{Pose, SparsePoint};
 use gyre_scan_matching::{Refined, RefinementConfig, Refiner};
@@ -13,7 +14,8 @@ const VISIBLE_M: std::ops::RangeInclusive<f64> = 5.0..=95.0;
 /// Capacity of a scan, points.
 pub const CAPACITY: usize = 4096;
 
-/// A line that gives a number of points to each scan, at other positions along it each time. A post has no length.
+/// A line that gives a number of points to each scan, at other positions along it each time. A post
+/// has no length.
 #[derive(Debug, Clone, Copy)]
 pub struct Reflector {
     pub from: Vector2<f64>,
@@ -208,8 +210,8 @@ pub fn point(values: [f64; 5]) -> SparsePoint {
     }
 }
 
-/// The time at which the beam, clockwise from straight ahead, meets a reflector that is `seen` at a position at each time:
-/// s from the middle of the sweep. `None` if the reflector crosses the seam.
+/// The time at which the beam, clockwise from straight ahead, meets a reflector that is `seen` at a
+/// position at each time: s from the middle of the sweep. `None` if the reflector crosses the seam.
 fn swept(seen: impl Fn(f64) -> Point2<f64>) -> Option<f64> {
     let meets = |t: f64| {
         let at = seen(t);
@@ -273,7 +275,8 @@ fn true_motion(drive: &Drive, k: usize) -> Pose {
     drive.pose(k).inv_mul(&drive.pose(k + 1))
 }
 
-/// The true motion to scan k + 1 with the errors of a search, up to a quarter of a metre and half a degree.
+/// The true motion to scan k + 1 with the errors of a search, up to a quarter of a metre and half a
+/// degree.
 pub fn searched(drive: &Drive, k: usize) -> Pose {
     let mut numbers = Numbers(0x5ea2c4 + k as u64);
     let off = Vector3::from_fn(|_, _| numbers.within(1.0));

@@ -7,8 +7,9 @@ use super::window::UNIT;
 use gyre_simd::simd;
 use std::array::from_fn;
 
-/// Steps from the bearing of a cell to the time of measurement, to the position relative to the sensor at that time, to
-/// the bearing there. After the second step the error at 30 m/s is centimetres for a cell 12 m away, and less for others.
+/// Steps from the bearing of a cell to the time of measurement, to the position relative to the
+/// sensor at that time, to the bearing there. After the second step the error at 30 m/s is
+/// centimetres for a cell 12 m away, and less for others.
 const FIXED_POINT_STEPS: usize = 2;
 
 /// The tables that cells are looked up in.
@@ -30,7 +31,8 @@ pub struct Lookup<'a> {
     pub min_range_m: f32,
 }
 
-/// Interpolation of a block of cells: the first of the four samples around each cell, and the weights of the others.
+/// Interpolation of a block of cells: the first of the four samples around each cell, and the
+/// weights of the others.
 #[derive(Clone, Copy, Debug)]
 pub struct Taps {
     sample: Block<u32>,
@@ -57,8 +59,9 @@ pub fn locate(cells: &CellRow, lookup: &Lookup, taps: &mut [Taps]) {
     }
 }
 
-/// Computes the taps of a row of cells for a moving sensor, by fixed-point iteration: the sensor's position depends on the
-/// time of the measurement, which depends on the bearing of the cell from that position.
+/// Computes the taps of a row of cells for a moving sensor, by fixed-point iteration: the sensor's
+/// position depends on the time of the measurement, which depends on the bearing of the cell from
+/// that position.
 #[simd]
 pub fn locate_moving(cells: &CellRow, motion: &SweepMotion, lookup: &Lookup, taps: &mut [Taps]) {
     let start = lookup.bearings.start;
@@ -136,8 +139,9 @@ fn interpolate(table: &[f32; NODES + 1], turns: f32) -> f32 {
     below + (place - node as f32) * (above - below)
 }
 
-/// The integer below `value`; at an integer, that or the previous one, which interpolates alike. Valid in `[0, 2^22]`, and
-/// in `[0, 2^23)` for any input. A cast takes ten times longer, since it handles overflow and NaN.
+/// The integer below `value`; at an integer, that or the previous one, which interpolates alike.
+/// Valid in `[0, 2^22]`, and in `[0, 2^23)` for any input. A cast takes ten times longer, since it
+/// handles overflow and NaN.
 #[inline(always)]
 fn integer_below(value: f32) -> i32 {
     const MANTISSA: u32 = (1 << 23) - 1;
@@ -145,8 +149,8 @@ fn integer_below(value: f32) -> i32 {
     (rounded.to_bits() & MANTISSA) as i32
 }
 
-/// atan2(z, x) in turns, `[0, 1]`, accurate to 1e-8 turns before rounding: a minimax polynomial in the ratio of the
-/// smaller coordinate to the larger.
+/// atan2(z, x) in turns, `[0, 1]`, accurate to 1e-8 turns before rounding: a minimax polynomial in
+/// the ratio of the smaller coordinate to the larger.
 #[inline(always)]
 fn turns(x: f32, z: f32) -> f32 {
     const ARCTANGENT: [f32; 8] = [

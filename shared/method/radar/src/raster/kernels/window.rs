@@ -5,8 +5,9 @@ use gyre_simd::simd;
 /// Units of a sample per unit of power. The largest mean, 255, fits a u16.
 pub const UNIT: u32 = 256;
 
-/// Minimum number of pieces per window, if it has as many bins. On Oxford scans with cells of 0.8 m, 8 pieces keep rasters
-/// within 0.5 % (RMS) of the mean with exact ends, and 4 pieces within 3 % in two thirds of the time.
+/// Minimum number of pieces per window, if it has as many bins. On Oxford scans with cells of 0.8
+/// m, 8 pieces keep rasters within 0.5 % (RMS) of the mean with exact ends, and 4 pieces within 3 %
+/// in two thirds of the time.
 const PIECES_PER_WINDOW: f32 = 8.0;
 
 /// Maximum number of bins per piece: the sum must fit a u16.
@@ -14,8 +15,8 @@ const MAX_BINS_PER_PIECE: usize = 128;
 
 /// Fixed-point weights of a moving mean along range.
 ///
-/// Bins are summed to *pieces* of 1, 2, 4, ... bins. The pieces in the middle of the window count in full, one more on each
-/// side partially.
+/// Bins are summed to *pieces* of 1, 2, 4, ... bins. The pieces in the middle of the window count
+/// in full, one more on each side partially.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Window {
     /// A power of two.
@@ -113,8 +114,8 @@ fn sum_long(bins: &[u8], bins_per_piece: usize, pieces: &mut [u16]) {
 /// Columns per iteration, so that their sums stay in registers.
 const BLOCK: usize = 32;
 
-/// Writes the mean of the window at each column; column `c` is centred on `pieces[c + window.reach()]`.
-/// Requires `out.len() + 2 * window.reach()` pieces.
+/// Writes the mean of the window at each column; column `c` is centred on
+/// `pieces[c + window.reach()]`. Requires `out.len() + 2 * window.reach()` pieces.
 #[simd]
 pub fn average(pieces: &[u16], window: &Window, out: &mut [u16]) {
     let (blocks, rest) = out.as_chunks_mut::<BLOCK>();
@@ -150,7 +151,8 @@ fn sums<const COLUMNS: usize>(pieces: &[u16], terms: usize, spacing: usize) -> [
     sums
 }
 
-/// Shifts samples by `by` columns towards higher ranges, linear between columns; zero where there is no source.
+/// Shifts samples by `by` columns towards higher ranges, linear between columns; zero where there
+/// is no source.
 #[simd]
 pub fn shift(samples: &[u16], by: f32, out: &mut [u16]) {
     let whole = (-by).floor();
@@ -178,8 +180,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// The mean of pieces over `[centre - width / 2, centre + width / 2]`, in bins; the outer pieces count partially, and
-    /// outside the scan the power is zero.
+    /// The mean of pieces over `[centre - width / 2, centre + width / 2]`, in bins; the outer
+    /// pieces count partially, and outside the scan the power is zero.
     fn direct_mean(bins: &[u8], floor: u8, bins_per_piece: usize, centre: f64, width: f64) -> f64 {
         let (start, end) = (centre - 0.5 * width, centre + 0.5 * width);
         let mean = |(index, piece): (usize, &[u8])| {

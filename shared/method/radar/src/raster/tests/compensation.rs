@@ -13,7 +13,8 @@ fn polar(range_m: f64, bearing_rad: f64) -> Point2<f64> {
     Point2::new(range_m * bearing_rad.cos(), range_m * bearing_rad.sin())
 }
 
-/// Scatterers in all directions except straight ahead, where a moving sensor may see them twice or not at all.
+/// Scatterers in all directions except straight ahead, where a moving sensor may see them twice or
+/// not at all.
 fn places() -> Vec<Point2<f64>> {
     let ranges = [25.0, 60.0, 12.0, 80.0, 40.0, 70.0, 18.0];
     let bearings = (1..8).map(|k| f64::from(k) * std::f64::consts::FRAC_PI_4);

@@ -120,7 +120,8 @@ fn averaged_raster_equals_direct_mean() {
         let depth = f64::from(config.cell_m / resolution_m);
         let expected = direct(&config, &scan, Some(depth));
         let (rms, largest) = difference(&raster(&config, &scan, None), &expected);
-        // The mean is 127, with a standard deviation of 17 or more between cells; only the ends of the windows differ.
+        // The mean is 127, with a standard deviation of 17 or more between cells; only the ends of
+        // the windows differ.
         assert!(
             rms < 2.5 && largest < 20.0,
             "{resolution_m} m: {rms}, maximum {largest}"

@@ -79,7 +79,8 @@ impl Sensor {
         scan
     }
 
-    /// The scan of Gaussians of height 200 and the given sigma around points in the frame at the scan's stamp.
+    /// The scan of Gaussians of height 200 and the given sigma around points in the frame at the
+    /// scan's stamp.
     pub fn measure(&self, scatterers: &[Point2<f64>], sigma_m: f64) -> OwnedScan {
         let mut scan = self.scan();
         let first_centre_m =
@@ -157,8 +158,8 @@ pub fn centre_m(config: &RasterConfig, row: usize, column: usize) -> Point2<f64>
     )
 }
 
-/// Distance of the centroid of the raster within `reach_m` of `expected` from it, cells. Infinite if the raster is zero
-/// there.
+/// Distance of the centroid of the raster within `reach_m` of `expected` from it, cells. Infinite
+/// if the raster is zero there.
 pub fn miss_cells(
     config: &RasterConfig,
     raster: &[f32],

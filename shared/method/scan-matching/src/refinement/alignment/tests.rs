@@ -55,7 +55,8 @@ fn moved(pose: &Pose, unknown: usize, by: f64) -> Pose {
     )
 }
 
-/// Returns whether a point is far enough from its cell's edges for the finite differences to stay in the cell.
+/// Returns whether a point is far enough from its cell's edges for the finite differences to stay
+/// in the cell.
 fn inside_a_cell(pose: &Pose, [x, y]: &[f64; 2]) -> bool {
     (pose * Point2::new(*x, *y)).coords.iter().all(|v| {
         let share = (v / CELL_M).rem_euclid(1.0);
@@ -151,8 +152,8 @@ fn an_empty_map_or_scan_leaves_the_initial_pose() {
     );
 }
 
-/// Points scattered about two walls along the way, and about the houses between them, by the square root of two: irregular, and
-/// different for each `seed`.
+/// Points scattered about two walls along the way, and about the houses between them, by the square
+/// root of two: irregular, and different for each `seed`.
 fn street(seed: usize) -> Vec<[f64; 2]> {
     let scattered = |k: usize| ((k + 97 * seed) as f64 * std::f64::consts::SQRT_2).fract() - 0.5;
     let wall = |k: usize, y: f64| [0.12 * k as f64 - 12.0, y + 0.4 * scattered(3 * k)];
