@@ -44,8 +44,6 @@ mod session;
 #[cfg(all(test, feature = "zenoh"))]
 mod tests;
 #[cfg(feature = "zenoh")]
-mod topic_observer;
-#[cfg(feature = "zenoh")]
 mod waker;
 
 pub use config::{LinkConfig, Side};

@@ -20,7 +20,7 @@ use gyre_messages::{
 };
 use gyre_stage::{
     Manifest, StageError, launch,
-    observer::{ObservedRun, wait_for_any},
+    observer::{ObservedRun, TopicObserver, wait_for_any},
     wake::{MAX_WAIT, Signals},
 };
 use serde::{Deserialize, Serialize};
@@ -31,7 +31,6 @@ use crate::{
     replay_buffer::{LoopBuffer, MemoryBuffer, MotionBuffer, PoseBuffer, PoseLog, ReplayBuffer},
     request,
     serve::{Offer, Server},
-    topic_observer::{TopicObserver, observe},
 };
 
 /// The name of this process in the log of the run.
@@ -169,7 +168,7 @@ impl<'run> Sending<'run> {
         let logs = Logs::of(manifest)?;
         let names = topics(&options.topics, manifest)?;
         let topics = names.iter().copied().map(|name| {
-            let observer = observe(run, name).ok_or_else(|| no_topic(name))??;
+            let observer = run.observe_topic(name)?.ok_or_else(|| no_topic(name))?;
             let buffer = logs.buffer(name, manifest);
             Ok(SentTopic {
                 name,
@@ -247,10 +246,15 @@ impl<'run> Sending<'run> {
 impl SentTopic<'_> {
     /// Buffers the messages that the run has published.
     fn take(&mut self) -> Result<(), StageError> {
-        while let Some(message) = self.observer.take()? {
-            self.buffer.add(&message);
+        loop {
+            match self.observer.take() {
+                Ok(Some(message)) => self.buffer.add(&message),
+                Ok(None) => return Ok(()),
+                // The run judges what its stages send. The message counts as missed.
+                Err(StageError::Malformed { .. }) => {}
+                Err(error) => return Err(error),
+            }
         }
-        Ok(())
     }
 }
 

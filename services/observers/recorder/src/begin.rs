@@ -8,12 +8,11 @@ use std::{
 };
 
 use gyre_recording::{Head, Recording, RecordingError, next_part, parts};
-use gyre_stage::{Manifest, StageError};
+use gyre_stage::{Manifest, StageError, clock};
 
 use crate::{
     RecorderError,
     options::{HEALTH, LOG, Options},
-    tap::now_ns,
 };
 
 /// A recording that is begun, or goes on in its next part.
@@ -72,7 +71,11 @@ pub(crate) fn begin(
     let earlier = (part > 1).then(|| EarlierParts::read(&options.to, topics));
     let earlier = earlier.transpose()?;
     let id = match &earlier {
-        None => format!("{}-{}", manifest.prefix.trim_matches('_'), now_ns()),
+        None => format!(
+            "{}-{}",
+            manifest.prefix.trim_matches('_'),
+            clock::since_1970_ns()
+        ),
         Some(earlier) => earlier.id.clone(),
     };
     let file = manifest.root.join("config.toml");

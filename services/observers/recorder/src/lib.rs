@@ -23,4 +23,3 @@ pub use gyre_recording::Split;
 pub use log_tail::LogTail;
 pub use options::Options;
 pub use recorder::{Recorded, record};
-pub use tap::now_ns;

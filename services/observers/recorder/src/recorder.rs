@@ -11,7 +11,7 @@ use std::{
 use gyre_messages::{Message, Refined, Sender as PublishedBy, topic};
 use gyre_recording::SplitWriter;
 use gyre_stage::{
-    Manifest, StageError, launch,
+    Manifest, StageError, clock, launch,
     observer::{ObservedRun, wait_for_any},
     run,
     wake::{MAX_WAIT, Signals},
@@ -24,7 +24,7 @@ use crate::{
     log_tail::LogTail,
     options::{HEALTH, LOG, Options},
     queue::{Entry, LIMIT_BYTES, Sender, queue},
-    tap::{Counts, Tap, now_ns},
+    tap::{Counts, Tap},
     writing,
 };
 
@@ -202,11 +202,15 @@ impl Recorder<'_> {
             tap.drain(&self.queue)?;
         }
         self.report_missed()?;
-        for line in self.log.iter_mut().flat_map(|log| log.lines(now_ns())) {
+        for line in self
+            .log
+            .iter_mut()
+            .flat_map(|log| log.lines(clock::since_1970_ns()))
+        {
             self.queue.put(Entry::Log(line));
         }
         for json in self.health.iter().flat_map(Receiver::try_iter) {
-            self.queue.put(Entry::Health(json, now_ns()));
+            self.queue.put(Entry::Health(json, clock::since_1970_ns()));
         }
         Ok(())
     }

@@ -1,11 +1,9 @@
 //! The observers of the topics that are recorded.
 
-use std::time::{SystemTime, UNIX_EPOCH};
-
 use gyre_messages::{Correction, Message};
 use gyre_recording::Incoming;
 use gyre_stage::{
-    Listener, StageError,
+    Listener, StageError, clock,
     observer::{ObservedRun, TopicObserver},
     source::RecordedMessage,
 };
@@ -96,7 +94,7 @@ impl<'run> Tap<'run> {
             topic: self.observer.topic(),
             header: message.header,
             payload: message.payload,
-            received_ns: now_ns(),
+            received_ns: clock::since_1970_ns(),
             missed: missed - self.reported,
         };
         match queue.put(Entry::Message(incoming)) {
@@ -123,10 +121,4 @@ impl<'run> Tap<'run> {
     pub(crate) fn has_ended(&self) -> bool {
         self.observer.has_ended()
     }
-}
-
-/// Returns the time of the machine, ns since 1970.
-pub fn now_ns() -> i64 {
-    let now = SystemTime::now().duration_since(UNIX_EPOCH);
-    now.map_or(0, |now| now.as_nanos() as i64)
 }
