@@ -20,8 +20,10 @@ use crate::{
     },
 };
 
-/// The recording's six seconds in two: time for a person's commands.
+/// The recording's six seconds in two.
 const MODERATE: &str = "3";
+/// The same in twenty: time for commands, also while other tests keep the machine busy.
+const SLOW: &str = "0.3";
 const THIRD: usize = recording::SCANS / 3;
 
 /// A command about a run.
@@ -67,16 +69,18 @@ pub(crate) fn process<'a>(status: &'a Value, name: &str) -> &'a Value {
     processes.iter().find(|it| it["name"] == name).unwrap()
 }
 
+/// A run of six seconds that has begun.
 pub(crate) fn started() -> (Run, Running) {
-    let run = Run::of_recording().rate(MODERATE);
+    let run = Run::of_recording().rate("1");
     let mut running = run.start();
-    running.await_poses(THIRD / 2);
+    running.await_poses(2);
     (run, running)
 }
 
 #[test]
 fn a_health_check_names_the_process_that_is_silent_and_fails_without_a_run() {
-    let (run, mut running) = started();
+    let run = Run::of_recording().rate(SLOW);
+    let mut running = run.start();
     let check = || ask(&run, &["ps", "--check"]);
     await_status(&run, "all there", |status| status["phase"] == "running");
     assert!(check().succeeded().stdout.is_empty());
@@ -97,7 +101,8 @@ fn a_health_check_names_the_process_that_is_silent_and_fails_without_a_run() {
     assert_eq!(failed.status.code(), Some(1));
     assert!(failed.stderr.contains("masking is silent"), "{failed:?}");
     send(masking, Signal::CONT);
-    running.finish().succeeded();
+    ask(&run, &["down"]).succeeded();
+    running.finish();
     assert_eq!(check().status.code(), Some(1), "the run has ended");
 }
 
@@ -190,17 +195,20 @@ fn a_follower_that_hangs_is_restarted_alone_while_odometry_goes_on() {
 
 #[test]
 fn down_says_that_results_are_not_written_and_that_a_killed_run_is_not_running() {
-    let (run, running) = started();
+    let run = Run::of_recording();
+    let slow = run.clone().rate(SLOW);
+    let mut running = slow.start();
+    running.await_poses(1);
     // Nothing can be put in its place.
     fs::create_dir(run.out().join("summary.json")).unwrap();
     ask(&run, &["down"]).failed_with(&["results are not written"]);
     assert!(!running.finish().status.success());
     fs::remove_dir(run.out().join("summary.json")).unwrap();
-    let mut running = run.start();
-    running.await_poses(THIRD);
+    let mut running = slow.start();
+    running.await_poses(2);
     running.kill_supervisor();
     ask(&run, &["down"]).refused_with(&["no run"]);
-    let other = Run::of_recording().rate(MODERATE);
+    let other = Run::of_recording().rate(SLOW);
     let going = other.start();
     await_status(&other, "poses", |status| {
         status["poses"].as_u64() >= Some(1)
@@ -212,7 +220,8 @@ fn down_says_that_results_are_not_written_and_that_a_killed_run_is_not_running()
         !ended.stdout.contains(run.out().to_str().unwrap()),
         "{ended:?}"
     );
-    going.finish().succeeded();
+    ask(&other, &["down"]).succeeded();
+    going.finish();
     assert_eq!(run.complete(), undisturbed());
 }
 
