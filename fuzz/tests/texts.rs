@@ -3,7 +3,7 @@
 use std::{fs, path::Path};
 
 use bolero::check;
-use gyre::{configuration::Configuration, judgement::judge, odometry};
+use gyre_configuration::Configuration;
 use gyre_fuzz::{
     Failure, Target,
     edit::{TextEdit, edit_text},
@@ -11,6 +11,7 @@ use gyre_fuzz::{
 use gyre_masking::{MaskKind, MaskingConfig, model::Model};
 use gyre_odometry::Odometry;
 use gyre_radar::{RasterConfig, ground_truth::parse_trajectory, write_tum};
+use gyre_results::{judgement::judge, odometry};
 
 use crate::recordings::folder;
 

@@ -3,7 +3,7 @@
 
 use std::{path::Path, process::ExitCode, slice};
 
-use gyre::Failure;
+use gyre_terminal::Failure;
 use serde::Deserialize;
 
 use crate::{
@@ -110,7 +110,7 @@ fn variations(sequence: &Sequence, changes: &[String], out: &Path) -> Result<Tab
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use gyre::configuration::Configuration;
+    use gyre_configuration::Configuration;
     use gyre_masking::MaskKind;
 
     use super::*;

@@ -11,7 +11,7 @@ use crate::{
 
 /// Gyre's laboratory: what research on radar odometry needs, and a robot does not.
 ///
-/// It has all commands of `gyre` as well, so that whatever it runs is of the same build.
+/// What it runs is the `gyre` beside it, which has to be of the same build.
 #[derive(Debug, Parser)]
 #[command(version, about)]
 pub struct Lab {
@@ -41,9 +41,6 @@ pub enum Command {
     /// Measure localisation in a map: the first fix by each scan alone, whole and half hidden, and
     /// tracking.
     Localisation(LocalisationArguments),
-    /// A command of `gyre`.
-    #[command(flatten)]
-    Gyre(gyre::cli::Command),
 }
 
 #[derive(Debug, Args)]

@@ -18,8 +18,9 @@ use std::{
 };
 
 use clap::{Args, ValueEnum, builder::PossibleValue};
-use gyre::{Failure, picture::write_grey, print};
+use gyre_masks::picture::write_grey;
 use gyre_radar::{Dataset, DatasetOptions, OwnedScan};
+use gyre_terminal::{Failure, print};
 use rand::{RngCore, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

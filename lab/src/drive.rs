@@ -1,16 +1,17 @@
 //! The keyframes of a run, with their points and true poses.
 
-use std::convert::Infallible;
-use std::path::Path;
+use std::{convert::Infallible, path::Path};
 
-use gyre::{Failure, configuration::Configuration, odometry};
+use gyre_configuration::Configuration;
 use gyre_estimation::places::{KeyframeSelector, MAX_NEIGHBOURS, PlaceOptions, neighbours};
 use gyre_evaluation::TimedMotion;
 use gyre_geometry::{ComposedMotion, Pose, SparsePoint, Twist, UncertainMotion};
 use gyre_masking::{MaskKind, Masker};
 use gyre_radar::{OwnedScan, Trajectory, find_ground_truth, read_trajectory};
+use gyre_results::odometry;
 use gyre_scan_matching::{RefinementConfig, Submap};
 use gyre_slam::{Keyframe, KeyframeSource};
+use gyre_terminal::Failure;
 
 /// Poses of a run and of the truth belong to a scan if they are this near in time.
 const SAME_TIME_NS: u64 = 50_000_000;

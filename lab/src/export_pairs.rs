@@ -27,9 +27,10 @@ mod provenance;
 
 use std::{fs, path::PathBuf, process::ExitCode, time::Instant};
 
-use gyre::{Failure, configuration::Configuration, print};
+use gyre_configuration::Configuration;
 use gyre_geometry::Pose;
 use gyre_radar::OwnedScan;
+use gyre_terminal::{Failure, print};
 
 use crate::{
     cli::ExportPairsArguments,

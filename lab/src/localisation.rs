@@ -6,13 +6,11 @@ mod figures;
 use std::{path::PathBuf, process::ExitCode};
 
 use clap::Args;
-use gyre::{
-    Failure,
-    configuration::Configuration,
-    localise::{Scans, known},
-};
+use gyre_configuration::Configuration;
 use gyre_geometry::{Pose, SparsePoint};
 use gyre_localisation::{Fix, Localiser, Status};
+use gyre_maps::localise::{Scans, known};
+use gyre_terminal::Failure;
 use rustix::time::{ClockId, clock_gettime};
 
 use crate::{

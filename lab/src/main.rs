@@ -19,14 +19,9 @@ mod tables;
 use std::process::ExitCode;
 
 use cli::{Command, Lab};
-use gyre_stage::CountingAllocator;
-
-/// The runs that the laboratory starts report the allocations of their stages.
-#[global_allocator]
-static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 fn main() -> ExitCode {
-    let command = match gyre::parse::<Lab>("gyre-lab") {
+    let command = match gyre_terminal::parse::<Lab>("gyre-lab") {
         Ok(lab) => lab.command,
         Err(code) => return code,
     };
@@ -39,7 +34,6 @@ fn main() -> ExitCode {
         Command::Places(arguments) => places::places(&arguments),
         Command::Slam(arguments) => slam::slam(&arguments),
         Command::Localisation(arguments) => localisation::localisation(&arguments),
-        Command::Gyre(command) => return gyre::report("gyre", gyre::execute(command)),
     };
-    gyre::report("gyre-lab", result)
+    gyre_terminal::report("gyre-lab", result)
 }

@@ -64,7 +64,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use std::fs;
 
-    use gyre::configuration::Configuration;
+    use gyre_configuration::Configuration;
     use gyre_masking::runtime;
 
     use super::*;

@@ -5,11 +5,11 @@ mod counts;
 use std::{fmt::Write, path::PathBuf, process::ExitCode, time::Instant};
 
 use clap::Args;
-use gyre::Failure;
 use gyre_estimation::places::{
     Describer, Descriptor, LoopVerifier, PlaceIndex, PlaceOptions, Verification,
 };
 use gyre_geometry::xy_yaw;
+use gyre_terminal::Failure;
 use nalgebra::Vector3;
 
 use crate::{

@@ -23,7 +23,7 @@ mod tests;
 
 use std::process::ExitCode;
 
-use gyre::{Failure, print};
+use gyre_terminal::{Failure, print};
 
 use crate::{
     cli::RealismArguments,

@@ -5,12 +5,14 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use gyre::{Failure, configuration::Configuration, preflight, print, results};
+use gyre_configuration::{Configuration, Played};
 use gyre_geometry::Pose;
 use gyre_radar::{
     Dataset, OwnedScan, Trajectory,
     ground_truth::{find_ground_truth, parse_trajectory, read_trajectory},
 };
+use gyre_results::SIMULATED_TRUTH;
+use gyre_terminal::{Failure, print};
 
 /// A trajectory is not interpolated across wider gaps, as in `gyre evaluate`.
 const MAX_GAP_NS: u64 = 1_000_000_000;
@@ -37,7 +39,7 @@ pub struct Track {
 impl Recording {
     /// Opens what a configuration names, as a run of it would.
     pub fn open(configuration: &Configuration) -> Result<Self, Failure> {
-        let preflight::Played { dataset, truth } = preflight::open(configuration)?;
+        let Played { dataset, truth } = gyre_configuration::open(configuration)?;
         let named = configuration.run.ground_truth.clone();
         let truth = match truth {
             Some(tum) if named.is_none() => Some(Track::simulated(&tum)?),
@@ -85,7 +87,7 @@ impl Track {
     /// The truth about a simulation: what `gyre simulate` writes, so that it does not matter
     /// whether that was done.
     fn simulated(tum: &[u8]) -> Result<Self, Failure> {
-        let path = PathBuf::from(results::SIMULATED_TRUTH);
+        let path = PathBuf::from(SIMULATED_TRUTH);
         let trajectory = parse_trajectory(&String::from_utf8_lossy(tum), &path)?;
         Ok(Self { path, trajectory })
     }

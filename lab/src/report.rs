@@ -3,11 +3,8 @@
 
 use std::{collections::BTreeMap, env, fs, io, path::Path};
 
-use gyre::{
-    Failure,
-    machine::{Machine, today},
-    print,
-};
+use gyre_results::machine::{Machine, today};
+use gyre_terminal::{Failure, print};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 

@@ -8,8 +8,9 @@ use std::{
 };
 
 use clap::Args;
-use gyre::{Failure, configuration::Configuration, print};
+use gyre_configuration::Configuration;
 use gyre_messages::StageId;
+use gyre_terminal::{Failure, print};
 use serde_json::{Value, json};
 
 use crate::{
@@ -140,10 +141,9 @@ impl Sequence {
         let changes: Vec<String> = changes.iter().cloned().chain(masked).collect();
         let arguments = self.run_arguments(&changes, &out);
         let command = command("gyre", &arguments);
-        // This program has gyre's commands too: so what runs is of the same build.
-        let mut run = Command::new(env::current_exe()?);
+        let mut run = Command::new(env::current_exe()?.with_file_name("gyre"));
         let status = run.args(&arguments).stdout(Stdio::null()).status();
-        let status = status.map_err(|error| format!("cannot start gyre run: {error}"))?;
+        let status = status.map_err(|error| format!("cannot start the gyre beside gyre-lab: {error}; build it with `cargo build --release -p gyre`"))?;
         if !status.success() {
             return Err(format!("`{command}` did not succeed").into());
         }

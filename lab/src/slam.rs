@@ -7,11 +7,11 @@ mod wrong;
 use std::{path::PathBuf, process::ExitCode, time::Instant};
 
 use clap::Args;
-use gyre::Failure;
 use gyre_estimation::Constraint;
 use gyre_slam::{
     EstimatorKind, LoopCloser, LoopOptions, Query, TrajectoryEstimator, TrajectoryOptions,
 };
+use gyre_terminal::Failure;
 
 use crate::{
     drive::Drive,

@@ -3,8 +3,12 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::common::{Ended, Run, gyre, odometry, real_data, recording};
 use serde_json::Value;
+
+use crate::{
+    common::{Ended, Run, odometry, real_data, recording},
+    gyre_lab,
+};
 
 /// The place in `summary.json` of the count of doubtful motions.
 const DOUBTED: &str = "/motions/doubtful";
@@ -129,7 +133,7 @@ fn no_fault_leads_a_real_drive_astray_and_each_is_counted() {
 
 /// `gyre-lab corrupt`.
 fn corrupt(data: &Path, fault: &str, every: usize, out: &Path) -> Ended {
-    let mut command = gyre();
+    let mut command = gyre_lab();
     command
         .arg("corrupt")
         .arg(data)

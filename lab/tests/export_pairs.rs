@@ -6,7 +6,6 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::common::{Ended, Run, gyre, recording};
 use gyre_geometry::Twist;
 use gyre_radar::{
     Trajectory,
@@ -16,6 +15,11 @@ use gyre_radar::{
 use nalgebra::{Isometry2, Vector2};
 use tempfile::TempDir;
 use toml::Table;
+
+use crate::{
+    common::{Ended, Run, recording},
+    gyre_lab,
+};
 
 const N: usize = 127;
 const SMALL: &str = "[raster]\nn = 127\ncell_m = 0.8\n";
@@ -97,7 +101,7 @@ impl Exports {
     }
 
     fn run_to(&self, out: &str, configuration: &str, arguments: &[&str]) -> Ended {
-        let mut command = gyre();
+        let mut command = gyre_lab();
         command
             .current_dir(self.folder.path())
             .args(["export-pairs", configuration, "--out", out])

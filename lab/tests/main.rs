@@ -10,7 +10,14 @@ mod export_pairs;
 mod realism;
 mod tables;
 
+/// The program that is measured, beside the laboratory: `cargo build -p gyre` makes it, as do all tests of the workspace.
+const PROGRAM: &str = LAB.split_at(LAB.len() - "-lab".len()).0;
 /// The program under test.
-const PROGRAM: &str = env!("CARGO_BIN_EXE_gyre-lab");
+const LAB: &str = env!("CARGO_BIN_EXE_gyre-lab");
 /// The project's folder.
 const PROJECT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
+
+/// The program under test.
+fn gyre_lab() -> std::process::Command {
+    std::process::Command::new(LAB)
+}

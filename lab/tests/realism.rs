@@ -2,10 +2,14 @@
 
 use std::{fs, path::Path};
 
-use crate::common::{Ended, gyre, real_data, recording};
 use gyre_simulator::{SimulationConfig, write_dataset};
 use serde_json::Value;
 use tempfile::TempDir;
+
+use crate::{
+    common::{Ended, real_data, recording},
+    gyre_lab,
+};
 
 /// A folder with `other`, a drive through another town, and the configuration that simulated
 /// recordings are read with.
@@ -23,7 +27,7 @@ fn folder() -> TempDir {
 
 /// `gyre-lab realism` in a folder.
 fn realism(folder: &Path, arguments: &[&str]) -> Ended {
-    let mut command = gyre();
+    let mut command = gyre_lab();
     command
         .current_dir(folder)
         .args(["realism", "--out", "out", "--configs"])

@@ -3,9 +3,13 @@
 
 use std::{fs, path::Path, process::Command};
 
-use crate::common::{Ended, folder, gyre, recording, runtime_is_installed};
 use serde_json::Value;
 use tempfile::TempDir;
+
+use crate::{
+    common::{Ended, folder, recording, runtime_is_installed},
+    gyre_lab,
+};
 
 const SIZE: usize = 63;
 const ROWS: [&str; 7] = [
@@ -59,7 +63,7 @@ fn lab_folder() -> TempDir {
 
 /// A command of `gyre-lab` on the small recording.
 fn lab(folder: &Path, name: &str) -> Command {
-    let mut command = gyre();
+    let mut command = gyre_lab();
     command.current_dir(folder);
     command.args([name, "--config", "small.toml", "--out", "out", "--data"]);
     command.arg(recording::small());
@@ -289,7 +293,7 @@ fn single_changes_are_run_alone() {
 fn repeats(folder: &Path, line: &Value) {
     let words: Vec<&str> = line["command"].as_str().unwrap().split(' ').collect();
     let out = words[1 + words.iter().position(|word| *word == "--out").unwrap()];
-    let mut again = gyre();
+    let mut again = gyre_lab();
     let elsewhere = words[1..]
         .iter()
         .map(|word| if *word == out { "again" } else { word });

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use gyre::{configuration::Configuration, preflight};
+use gyre_configuration::Configuration;
 use gyre_journal as journal;
 use gyre_messages::{PoseHeader, flag};
 use gyre_odometry::{Odometry, OdometryConfig, Outcome, Registered};
@@ -16,7 +16,7 @@ fn register_all(run: &Run) -> Vec<Registered> {
     let configuration = Configuration::read(&resolved, &[]).unwrap();
     let config: OdometryConfig = toml::from_str(&run.result("config.toml")).unwrap();
     assert_eq!(config, configuration.odometry);
-    let mut dataset = preflight::open(&configuration).unwrap().dataset;
+    let mut dataset = gyre_configuration::open(&configuration).unwrap().dataset;
     let mut scan = OwnedScan::with_limits(dataset.limits());
     let mut odometry = Odometry::new(&config).unwrap();
     let scans = configuration.source.played(dataset.as_ref());

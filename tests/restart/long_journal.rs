@@ -16,10 +16,11 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre::{configuration::Configuration, out::Out, results, summary::Session};
+use gyre_configuration::Configuration;
 use gyre_journal::{self as journal, Journal};
 use gyre_messages::{Hop, Item, MotionEstimate, PoseHeader, flag};
-use gyre_supervise::Ending;
+use gyre_results::{Out, Session};
+use gyre_run::Ending;
 use tempfile::TempDir;
 
 /// Poses that a restart asks for with a usual window.
@@ -159,7 +160,7 @@ fn results_take_bounded_memory() {
         report: None,
     };
     let since = Instant::now();
-    let written = results::write(&configuration, &out, &session).unwrap();
+    let written = gyre_results::write(&configuration, &out, &session).unwrap();
     assert_eq!((written.poses as u64, written.ended), (poses, true));
     let (took, peak) = (since.elapsed(), peak_mb());
     println!("{poses} poses: results in {took:?}, peak {peak:.1} MB");

@@ -1,4 +1,4 @@
-"""The simulated training worlds and the pairs made of them, by calls of `gyre-lab`."""
+"""The simulated training worlds and the pairs made of them, by calls of `gyre-lab` and of the `gyre` beside it."""
 
 import os
 import subprocess
@@ -16,14 +16,14 @@ def find_gyre_lab(given: Path | None) -> Path:
     for place in places:
         if place.is_file():
             return place.resolve()
-    raise SystemExit(f"no gyre-lab at {' or '.join(map(str, places))}: cargo build --release -p gyre-lab, or give --gyre-lab")
+    raise SystemExit(f"no gyre-lab at {' or '.join(map(str, places))}: cargo build --release -p gyre -p gyre-lab, or give --gyre-lab")
 
 
 def simulate(gyre_lab: Path, folder: Path) -> None:
     """Renders every world of `worlds/` that is not in `folder`; an interrupted one is resumed."""
     for split in SPLITS:
         for world in worlds_of(split):
-            call(gyre_lab, "simulate", world, "--out", folder / split / world.stem, "--format", "oxford", *trajectory(world))
+            call(gyre_lab.with_name("gyre"), "simulate", world, "--out", folder / split / world.stem, "--format", "oxford", *trajectory(world))
 
 
 def worlds_of(split: str) -> list[Path]:

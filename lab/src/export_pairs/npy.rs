@@ -11,7 +11,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use gyre::Failure;
+use gyre_terminal::Failure;
 
 use crate::report::cannot_write;
 

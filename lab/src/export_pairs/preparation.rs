@@ -3,12 +3,13 @@
 
 use std::collections::VecDeque;
 
-use gyre::{Failure, configuration::Configuration};
+use gyre_configuration::Configuration;
 use gyre_geometry::{Pose, Twist, xy_yaw};
 use gyre_masking::MaskKind;
 use gyre_odometry::{Odometry, OdometryError, SearchConfig};
 use gyre_radar::PolarScan;
 use gyre_scan_matching::RefinementKind;
+use gyre_terminal::Failure;
 use half::{f16, slice::HalfFloatSliceExt};
 
 /// A network masks what networks are trained on.

@@ -2,7 +2,8 @@
 
 use std::{fs, path::Path};
 
-use gyre::{Failure, configuration::Configuration};
+use gyre_configuration::Configuration;
+use gyre_terminal::Failure;
 use serde_json::json;
 use toml::Table;
 

@@ -3,7 +3,7 @@
 //! Lengths, shares and errors are compared by the magnitude of the natural logarithm of their
 //! ratio: 0.1 is a tenth more or less, 0.69 twice or half.
 
-use gyre::Failure;
+use gyre_terminal::Failure;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 

@@ -3,10 +3,11 @@
 
 use std::{ops::Range, path::Path};
 
-use gyre::{Failure, odometry};
 use gyre_evaluation::TimedMotion;
 use gyre_geometry::{Pose, wrap_angle};
 use gyre_radar::{DatasetOptions, OwnedScan, SweepGeometry};
+use gyre_results::odometry;
+use gyre_terminal::Failure;
 use serde_json::json;
 
 use super::{

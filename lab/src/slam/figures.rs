@@ -2,11 +2,12 @@
 
 use std::{collections::BTreeMap, time::Duration};
 
-use gyre::{Failure, judgement::judge};
 use gyre_evaluation::Options;
 use gyre_geometry::UncertainMotion;
 use gyre_radar::Trajectory;
+use gyre_results::judgement::judge;
 use gyre_slam::{LoopCandidate, Query, TrajectoryEstimator};
+use gyre_terminal::Failure;
 use serde_json::json;
 
 use crate::{

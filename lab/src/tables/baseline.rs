@@ -2,7 +2,7 @@
 
 use std::{fs, path::Path, process::Command};
 
-use gyre::Failure;
+use gyre_terminal::Failure;
 use serde::Deserialize;
 
 use crate::{cli::TablesArguments, sequence::Sequence};

@@ -90,7 +90,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use std::{collections::BTreeSet, path::Path};
 
-    use gyre::configuration::Configuration;
+    use gyre_configuration::Configuration;
     use serde_json::{Value, json};
 
     use super::*;

@@ -2,11 +2,12 @@
 
 use std::{hint::black_box, time::Instant};
 
-use gyre::{Failure, configuration::Configuration};
+use gyre_configuration::Configuration;
 use gyre_masking::{MaskKind, network::Network};
 use gyre_odometry::Odometry;
 use gyre_radar::OwnedScan;
 use gyre_scan_matching::{JointMatch, Refined};
+use gyre_terminal::Failure;
 use ndarray::Array3;
 
 use crate::models::Model;

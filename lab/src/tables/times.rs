@@ -1,8 +1,8 @@
 //! Table IIIa: how long mask, search and refinement take for a pair of scans, as far as a row has
 //! them, on one thread of this process.
 
-use gyre::Failure;
 use gyre_radar::OwnedScan;
+use gyre_terminal::Failure;
 use serde_json::json;
 
 use super::{

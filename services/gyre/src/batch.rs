@@ -13,9 +13,11 @@ use std::{
 use gyre_batch::{
     Batch, DriveOutcome, Ended, List, Settings, Slice, Table, collect, compute, table,
 };
+use gyre_results::Out;
 use gyre_stage::wake::Signals;
+use gyre_terminal::{Failure, INTERRUPTED, own, print};
 
-use crate::{Failure, cli::BatchArguments, out::Out, print, program, run::INTERRUPTED};
+use crate::cli::BatchArguments;
 
 pub use drive::drive;
 
@@ -43,7 +45,7 @@ pub fn batch(arguments: &BatchArguments) -> Result<ExitCode, Failure> {
         .map_err(|error| format!("cannot write to {}: {error}", arguments.out.display()))?;
     let out = existing(&arguments.out)?;
     let batch = Batch {
-        program: program::own(),
+        program: own(),
         list: &list,
         drives: match slice {
             Some(slice) => list.slice(slice)?,

@@ -1,32 +1,17 @@
 //! `gyre calibrate`: finds the constants of a radar from a drive alone.
-//!
-//! - `found`: the constants beside the configured ones, with what each rests on;
-//! - `section`: `calibration.toml`, for `gyre run --calibration`;
-//! - `picture`: `calibration.svg`, a place seen twice before and after.
-
-mod found;
-mod picture;
-mod section;
 
 use std::{
-    path::Path,
     process::ExitCode,
     time::{Duration, Instant},
 };
 
-use gyre_calibration::{Drive, calibrate as solve};
-use gyre_configuration::strict::{self, syntax};
+use gyre_calibration::{Configured, Drive, Found, calibrate as solve, svg, toml};
+use gyre_configuration::{Configuration, Played, describe_masks};
 use gyre_radar::{DatasetOptions, OwnedScan, SweepGeometry};
 use gyre_storage as storage;
+use gyre_terminal::{Failure, print};
 
-use crate::{
-    Failure,
-    cli::CalibrateArguments,
-    configuration::Configuration,
-    preflight::{self, Played},
-    print,
-};
-use found::Found;
+use crate::cli::CalibrateArguments;
 
 /// The section for the configuration.
 const SECTION: &str = "calibration.toml";
@@ -34,16 +19,6 @@ const SECTION: &str = "calibration.toml";
 const PICTURE: &str = "calibration.svg";
 /// Time between two lines of progress.
 const EVERY: Duration = Duration::from_secs(5);
-
-/// The configuration of the drive before it is calibrated.
-pub(crate) struct Configured {
-    /// The constants by which the scans were read.
-    pub geometry: SweepGeometry,
-    pub eccentricity_rad: f64,
-    pub min_range_m: f64,
-    /// Length of the path by another sensor, m.
-    pub distance_m: Option<f64>,
-}
 
 /// Finds the constants, prints them, and writes `calibration.toml` and `calibration.svg`.
 ///
@@ -53,7 +28,11 @@ pub(crate) struct Configured {
 pub fn calibrate(arguments: &CalibrateArguments) -> Result<ExitCode, Failure> {
     let configuration = match (&arguments.config, &arguments.data) {
         (Some(path), _) => Configuration::read(path, &arguments.set)?,
-        (None, Some(data)) => Configuration::of_recording(data, &arguments.set)?,
+        (None, Some(data)) => {
+            let (configuration, sentence) = Configuration::of_recording(data, &arguments.set)?;
+            print::note(sentence);
+            configuration
+        }
         (None, None) => Configuration::of_overrides(&arguments.set)?,
     }
     .streaming(arguments.data.as_deref());
@@ -74,8 +53,8 @@ pub fn calibrate(arguments: &CalibrateArguments) -> Result<ExitCode, Failure> {
     let found = Found::new(&drive, &calibration, &configured)?;
     print::line(&found)?;
     let (section, picture) = (arguments.out.join(SECTION), arguments.out.join(PICTURE));
-    storage::write(&section, section::toml(&found))?;
-    storage::write(&picture, picture::svg(&drive, &calibration))?;
+    storage::write(&section, toml(&found))?;
+    storage::write(&picture, svg(&drive, &calibration))?;
     print::line(format_args!(
         "{:.0} s; {} for `gyre run --calibration`, {}",
         started.elapsed().as_secs_f64(),
@@ -99,8 +78,8 @@ fn read(
     configuration: &Configuration,
     arguments: &CalibrateArguments,
 ) -> Result<(Drive, SweepGeometry), Failure> {
-    let Played { mut dataset, .. } = preflight::open(configuration)?;
-    preflight::describe_masks(configuration)?;
+    let Played { mut dataset, .. } = gyre_configuration::open(configuration)?;
+    describe_masks(configuration)?.iter().for_each(print::note);
     let mut scan = OwnedScan::with_limits(dataset.limits());
     let mut drive = Drive::new(&configuration.odometry)?;
     let played = configuration.source.played(dataset.as_ref());
@@ -131,65 +110,4 @@ fn read(
         }
     }
     Ok((drive, scan.geometry))
-}
-
-/// Returns the section `[dataset]` of a file of `gyre calibrate` as overrides `dataset.key=value`.
-///
-/// # Errors
-/// A file that cannot be read, or has anything else.
-pub fn overrides(file: &Path) -> Result<Vec<String>, Failure> {
-    let unusable = |reason: String| format!("{}: {reason}", file.display());
-    let text = storage::read_text(file, storage::SETTINGS)
-        .map_err(|error| unusable(format!("cannot be read: {error}")))?;
-    let table: toml::Table = text
-        .parse()
-        .map_err(|error: toml::de::Error| unusable(syntax(&text, &error)))?;
-    let section = match table.get("dataset") {
-        Some(toml::Value::Table(section)) if table.len() == 1 => section,
-        _ => {
-            return Err(unusable(
-                "a calibration has the section [dataset] and no other: give the calibration.toml of `gyre calibrate`".to_owned(),
-            )
-            .into());
-        }
-    };
-    strict::section::<DatasetOptions>(&mut table.clone(), "dataset")
-        .map_err(|error| unusable(error.to_string()))?;
-    Ok(section
-        .iter()
-        .map(|(key, value)| format!("dataset.{key}={value}"))
-        .collect())
-}
-
-#[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used)]
-    use super::*;
-
-    #[test]
-    fn a_calibration_overrides_the_dataset_and_nothing_else() {
-        let folder = tempfile::tempdir().unwrap();
-        let file = folder.path().join(SECTION);
-        storage::write(
-            &file,
-            "[dataset]\nrange_offset_m = -0.31 # m\ndoppler_s = 0.049\n",
-        )
-        .unwrap();
-        let mut keys = overrides(&file).unwrap();
-        keys.sort();
-        assert_eq!(
-            keys,
-            ["dataset.doppler_s=0.049", "dataset.range_offset_m=-0.31"]
-        );
-        storage::write(
-            &file,
-            "[dataset]\ndoppler_s = 0.049\n[points]\nmin_range_m = 7\n",
-        )
-        .unwrap();
-        let refused = overrides(&file).unwrap_err().to_string();
-        assert!(
-            refused.contains("the section [dataset] and no other"),
-            "{refused}"
-        );
-    }
 }

@@ -2,12 +2,7 @@
 
 mod batch;
 mod conformance;
-mod evaluate;
-mod export;
 mod link;
-mod map;
-mod operate;
-mod radar_server;
 mod record;
 mod ros2;
 mod shadow;
@@ -16,22 +11,25 @@ mod watch;
 
 use std::{num::NonZeroUsize, path::PathBuf};
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, Parser, Subcommand};
+use gyre_doctor::DoctorArguments;
+use gyre_export::ExportArguments;
+use gyre_maps::{localise::LocaliseArguments, map::MapArguments};
+use gyre_masks::MasksArguments;
+use gyre_operate::{
+    EchoArguments, LogsArguments, PsArguments, RestartArguments, RunChoice, SwapArguments,
+    TopArguments,
+};
+use gyre_radar_server::RadarServerArguments;
+use gyre_results::evaluate::EvaluateArguments;
+use gyre_run::Rate;
 use gyre_simulator::OutputFormat;
 
-use crate::configuration::Rate;
 pub use batch::{BatchArguments, BatchDriveArguments};
 pub use conformance::ConformanceArguments;
-pub use evaluate::EvaluateArguments;
-pub use export::{ExportArguments, ScanForm};
 pub use link::{LinkArguments, LinkEnd, NetworkArguments, ReceiveArguments, SendArguments};
-pub use map::{MapArguments, MapFormat};
-pub use operate::{
-    LogsArguments, PsArguments, RestartArguments, RunChoice, SwapArguments, TopArguments,
-};
-pub use radar_server::RadarServerArguments;
 pub use record::{RecordArguments, SplitArguments};
-pub use ros2::{Names, Ros2Arguments};
+pub use ros2::Ros2Arguments;
 pub use shadow::ShadowArguments;
 pub use stress::StressArguments;
 pub use watch::WatchArguments;
@@ -175,47 +173,6 @@ pub struct RunArguments {
     pub fresh: bool,
 }
 
-/// The arguments of `gyre echo`.
-#[derive(Debug, Args)]
-pub struct EchoArguments {
-    /// The folder of the run's results, its --out.
-    pub out: PathBuf,
-    /// The topic.
-    #[arg(value_enum, default_value_t = Topic::Pose)]
-    pub topic: Topic,
-}
-
-/// The topics of a run, in the order of the stream.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub enum Topic {
-    /// Scans as measured.
-    Scan,
-    /// Masked rasters and points.
-    Masked,
-    /// Rotations between scans.
-    Rotation,
-    /// Motions between scans.
-    Motion,
-    /// Motions after refinement.
-    Refined,
-    /// Poses.
-    Pose,
-    /// Loops between keyframes, in a run with SLAM.
-    Loop,
-    /// Corrections of the odometry, in a run with SLAM.
-    Correction,
-    /// Places of keyframes in a map, in a run with SLAM that names one.
-    Fix,
-}
-
-/// The arguments of `gyre doctor`.
-#[derive(Debug, Args)]
-pub struct DoctorArguments {
-    /// The folder of the results of the run to come.
-    #[arg(long, default_value = "out")]
-    pub out: PathBuf,
-}
-
 /// The arguments of `gyre inspect`.
 #[derive(Debug, Args)]
 pub struct InspectArguments {
@@ -228,25 +185,6 @@ pub struct InspectArguments {
     #[arg(long)]
     pub json: bool,
     /// Override a key, as in dataset.topic=/radar_data/fft_data; may be repeated.
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    pub set: Vec<String>,
-}
-
-/// The arguments of `gyre localise`.
-#[derive(Debug, Args)]
-pub struct LocaliseArguments {
-    /// The configuration, a TOML file: its odometry.
-    pub configuration: PathBuf,
-    /// The folder of the map, of `gyre map --format folder`.
-    #[arg(long)]
-    pub map: PathBuf,
-    /// The recording's folder. Default: the configuration's simulation, or its source.data.
-    #[arg(long)]
-    pub data: Option<PathBuf>,
-    /// The folder of fixes.csv.
-    #[arg(long, default_value = "out/localise")]
-    pub out: PathBuf,
-    /// Override a key, as in source.first=100; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub set: Vec<String>,
 }
@@ -271,28 +209,6 @@ pub struct CalibrateArguments {
     #[arg(long, default_value = "2000")]
     pub scans: usize,
     /// Override a key, as in source.first=100; may be repeated.
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    pub set: Vec<String>,
-}
-
-/// The arguments of `gyre masks`.
-#[derive(Debug, Args)]
-pub struct MasksArguments {
-    /// The configuration, a TOML file: its raster, masking and search.
-    pub configuration: PathBuf,
-    /// The recording's folder. Default: the configuration's simulation, or its source.data.
-    #[arg(long)]
-    pub data: Option<PathBuf>,
-    /// The folder of masks.png and of a scan-NUMBER.png for each scan.
-    #[arg(long, default_value = "out/masks")]
-    pub out: PathBuf,
-    /// Numbers of the scans to draw. Default: eight, evenly spread.
-    #[arg(long, value_delimiter = ',')]
-    pub scans: Vec<usize>,
-    /// Draw every Nth scan.
-    #[arg(long, conflicts_with = "scans")]
-    pub every: Option<NonZeroUsize>,
-    /// Override a key, as in masking.kind=threshold; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub set: Vec<String>,
 }

@@ -1,21 +1,21 @@
 //! `gyre conformance`: tests whether a program keeps the contract of a stage.
 
-use std::{path::Path, process::ExitCode, time::Duration};
+use std::{path::Path, process::ExitCode};
 
+use gyre_configuration::{Configuration, describe_masks, with_stored_options};
 use gyre_conformance::{Candidate, ConformanceError, Demands, InputScans, Report, Test, check};
 use gyre_messages::StageId;
 use gyre_odometry::SearchKind;
+use gyre_run::Scheduling;
 use gyre_scan_matching::RefinementKind;
 use gyre_stage::{Manifest, wake::Signals};
-use gyre_supervise::Scheduling;
+use gyre_terminal::{Failure, INTERRUPTED, own, print, seconds, words};
 
 use crate::{
-    Failure,
     cli::{ConformanceArguments, RunArguments},
-    configuration::Configuration,
     preflight::{self, Preflight},
-    print, program,
-    run::{self, INTERRUPTED},
+    program,
+    run::resolve,
 };
 
 /// The configuration of a test without `--config` and `--data`: the shape of the program's messages
@@ -52,11 +52,11 @@ fn examine(arguments: &ConformanceArguments) -> Result<Option<Report>, Failure> 
     preflight::check_open_files()?;
     let checked = preflight::check(&configuration)?;
     preflight::check_shared_memory(&checked.footprint)?;
-    preflight::describe_masks(&configuration)?;
+    describe_masks(&configuration)?.iter().for_each(print::note);
     let folder = tempfile::Builder::new()
         .prefix("gyre-conformance-")
         .tempdir()?;
-    let dataset = preflight::open(&configuration)?.dataset;
+    let dataset = gyre_configuration::open(&configuration)?.dataset;
     let scans = InputScans {
         played: configuration.source.played(dataset.as_ref()),
         dataset,
@@ -66,7 +66,7 @@ fn examine(arguments: &ConformanceArguments) -> Result<Option<Report>, Failure> 
             stage,
             command,
             scheduling: Scheduling::default(),
-            gyre: program::own().to_string_lossy().into_owned(),
+            gyre: own().to_string_lossy().into_owned(),
             manifest: manifest(&configuration, &checked, folder.path())?,
             configuration: configuration.to_toml()?,
         },
@@ -108,10 +108,6 @@ fn print(report: &Report, as_json: bool) -> Result<ExitCode, Failure> {
 }
 
 fn demands(arguments: &ConformanceArguments) -> Result<Demands, Failure> {
-    let seconds = |option: &str, seconds: f64| {
-        Duration::try_from_secs_f64(seconds)
-            .map_err(|_| format!("{option} is {seconds}, but must be 0 or more"))
-    };
     let budget = arguments
         .budget_ms
         .map(|ms| seconds("--budget-ms", ms / 1e3));
@@ -137,13 +133,13 @@ fn configuration(
         .filter(|_| is_small)
         .map(|key| (*key).to_owned());
     let lossless = ["run.mode='lossless'", "run.rate='max'"].map(str::to_owned);
-    let resolved = run::resolve::resolve(&RunArguments {
+    let resolved = resolve(&RunArguments {
         configuration: arguments.configuration.clone(),
         data: arguments.data.clone(),
         set: small.chain(arguments.set.clone()).chain(lossless).collect(),
         ..RunArguments::default()
     })?;
-    let mut configuration = resolved.with_stored_options()?.streaming(None);
+    let mut configuration = with_stored_options(&resolved)?.streaming(None);
     configuration.source.scans = Some(arguments.scans.into());
     let method = &mut configuration.odometry;
     match stage {
@@ -169,7 +165,7 @@ fn command(
 ) -> Result<Vec<String>, Failure> {
     let own = || {
         vec![
-            program::own().to_string_lossy().into_owned(),
+            own().to_string_lossy().into_owned(),
             "stage".to_owned(),
             stage.name().to_owned(),
         ]
@@ -181,7 +177,7 @@ fn command(
             .filter(|command| !command.is_empty())
             .unwrap_or_else(own));
     };
-    program::words(command)
+    words(command)
 }
 
 fn manifest(
@@ -198,6 +194,6 @@ fn manifest(
         live: false,
         refines: configuration.has(StageId::Refinement),
         rate: None,
-        build: program::sha256(&program::own())?,
+        build: program::sha256(&own())?,
     })
 }

@@ -6,24 +6,19 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use gyre_configuration::Configuration;
 use gyre_journal::{
     self as journal, Content, JournalError,
     checkpoint::{self, Checkpoint, CheckpointError},
     keyframes::{KeyframesError, complete_poses},
 };
 use gyre_messages::StageId;
+use gyre_results::{Identity, Out, Programs};
+use gyre_run::COMPLETE;
 use gyre_scan_matching::Refiner;
 use gyre_slam::{Keyframe, Place, Query, RecordReader, records_path};
-use gyre_stage::run::COMPLETE;
 use gyre_storage::{self as storage, GroupSync, LogError};
-
-use crate::{
-    Failure,
-    configuration::Configuration,
-    identity::{Identity, Programs},
-    out::Out,
-    print, results,
-};
+use gyre_terminal::{Failure, print};
 
 const CONFIGURATION: &str = "config.toml";
 const LOGS: [&str; 2] = ["log.jsonl", "log.jsonl.old"];
@@ -207,7 +202,7 @@ pub fn begin(out: &Out, identity: &Identity, resolved: &str) -> Result<(), Failu
         out.join(COMPLETE),
     ];
     // A new run may not write all of them: none of the earlier ones must be taken for its own.
-    let results = results::FILES
+    let results = gyre_results::FILES
         .iter()
         .chain(&LOGS)
         .map(|name| out.join(name));

@@ -2,9 +2,11 @@
 
 use std::process::ExitCode;
 
+use gyre_configuration::Configuration;
 use gyre_radar::ground_truth::read_trajectory;
+use gyre_terminal::{Failure, print};
 
-use crate::{Failure, cli::InspectArguments, configuration::Configuration, print};
+use crate::cli::InspectArguments;
 
 /// Prints what a dataset contains and what looks wrong with it.
 ///

@@ -1,62 +1,42 @@
-//! Gyre's command line as a library: `gyre` is this crate's binary, and the laboratory builds on
-//! the same parts.
+//! Gyre's command line as a library: `gyre` is this crate's binary.
 //!
-//! Reading order: [`cli`], then [`run`] (what `gyre run` does, on a page), [`earlier`],
-//! [`configuration`], [`results`].
+//! Reading order: [`cli`], then [`run`] (what `gyre run` does, on a page), [`earlier`], [`plan`].
 
 pub mod batch;
 pub mod calibrate;
 pub mod cli;
-pub mod configuration;
 pub mod conformance;
-pub mod doctor;
 pub mod earlier;
-pub mod echo;
-pub mod evaluate;
-pub mod export;
 #[cfg(not(all(feature = "link", feature = "ros2")))]
 mod features;
-pub mod identity;
 pub mod inspect;
-pub mod judgement;
+#[cfg(feature = "link")]
 pub mod link;
-pub mod localise;
-pub mod machine;
-pub mod map;
-pub mod masks;
 pub mod notify;
-pub mod odometry;
-pub mod operate;
-pub mod out;
-pub mod picture;
+pub mod plan;
 pub mod preflight;
-pub mod print;
 pub mod program;
 pub mod progress;
 pub mod radar;
-pub mod radar_server;
 pub mod record;
-pub mod results;
 pub mod ros2;
 pub mod run;
-pub mod schema;
 pub mod shadow;
 pub mod simulate;
+pub mod split;
 pub mod stage;
 pub mod stress;
-pub mod summary;
 pub mod watch;
 
 use std::process::ExitCode;
 
-use clap::Parser;
-use cli::Command;
+use gyre_configuration::{Configuration, schema};
+use gyre_doctor::DoctorArguments;
+use gyre_terminal::{Failure, print};
 
-/// The exit code after wrong arguments.
-const WRONG_ARGUMENTS: u8 = 2;
-
-/// A sentence for the person at the terminal.
-pub type Failure = Box<dyn std::error::Error + Send + Sync>;
+use cli::{Command, SchemaArguments};
+#[cfg(not(feature = "link"))]
+use split::absent as link;
 
 /// Executes a command of `gyre`.
 ///
@@ -74,14 +54,14 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
             Ok(ExitCode::SUCCESS)
         }
         Command::Run(arguments) => run::run(&arguments),
-        Command::Up(arguments) => operate::up(&arguments),
-        Command::Down(run) => operate::down(&run),
-        Command::Ps(arguments) => operate::ps(&arguments),
-        Command::Logs(arguments) => operate::logs(&arguments),
-        Command::Top(arguments) => operate::top(&arguments),
-        Command::Restart(arguments) => operate::restart(&arguments),
-        Command::Swap(arguments) => operate::swap(&arguments),
-        Command::Echo(arguments) => echo::echo(&arguments),
+        Command::Up(arguments) => gyre_operate::up(&run::results_folder(&arguments)),
+        Command::Down(run) => gyre_operate::down(&run),
+        Command::Ps(arguments) => gyre_operate::ps(&arguments),
+        Command::Logs(arguments) => gyre_operate::logs(&arguments),
+        Command::Top(arguments) => gyre_operate::top(&arguments),
+        Command::Restart(arguments) => gyre_operate::restart(&arguments),
+        Command::Swap(arguments) => gyre_operate::swap(&arguments),
+        Command::Echo(arguments) => gyre_operate::echo(&arguments),
         Command::Watch(arguments) => watch::watch(&arguments),
         Command::Ros2(arguments) => ros2::publish(&arguments),
         Command::Shadow(arguments) => shadow::shadow(&arguments),
@@ -91,19 +71,27 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::StressHelper { words } => stress::help(&words),
         Command::Record(arguments) => Ok(record::record(&arguments)),
         Command::Link(arguments) => link::link(&arguments),
-        Command::Doctor(arguments) => doctor::doctor(&arguments),
-        Command::RadarServer(arguments) => radar_server::serve(&arguments),
+        Command::Doctor(arguments) => doctor(&arguments),
+        Command::RadarServer(arguments) => gyre_radar_server::serve(&arguments),
         Command::Inspect(arguments) => inspect::inspect(&arguments),
-        Command::Evaluate(arguments) => evaluate::evaluate(&arguments),
-        Command::Map(arguments) => map::map(&arguments),
-        Command::Localise(arguments) => localise::localise(&arguments),
+        Command::Evaluate(arguments) => gyre_results::evaluate::evaluate(&arguments),
+        Command::Map(arguments) => gyre_maps::map::map(&arguments),
+        Command::Localise(arguments) => gyre_maps::localise::localise(&arguments),
         Command::Calibrate(arguments) => calibrate::calibrate(&arguments),
-        Command::Masks(arguments) => masks::masks(&arguments),
-        Command::Export(arguments) => export::export(&arguments),
+        Command::Masks(arguments) => gyre_masks::masks(&arguments),
+        Command::Export(arguments) => gyre_export::export(&arguments),
         Command::Simulate(arguments) => simulate::simulate(&arguments),
         Command::Conformance(arguments) => conformance::conformance(&arguments),
-        Command::Schema(arguments) => schema::schema(&arguments),
+        Command::Schema(arguments) => print_schema(&arguments),
     }
+}
+
+/// Looks for what this machine lacks for a run of the default configuration, whose scans are as
+/// large as those of Oxford.
+fn doctor(arguments: &DoctorArguments) -> Result<ExitCode, Failure> {
+    let simulated = Configuration::of_overrides(&["simulation.scans=2".to_owned()])?;
+    let checked = preflight::check(&simulated)?;
+    gyre_doctor::doctor(arguments, &checked.footprint, checked.window.observers)
 }
 
 /// Returns whether the files of a command are its user's alone: those of a run and of its
@@ -125,22 +113,11 @@ fn is_private(command: &Command) -> bool {
     )
 }
 
-/// Parses the command line. Help is printed to standard output, a wrong argument to standard error,
-/// and the exit code is returned.
-///
-/// # Errors
-/// Help that was asked for, or a wrong argument.
-pub fn parse<P: Parser>(program: &str) -> Result<P, ExitCode> {
-    P::try_parse().map_err(|error| match (error.use_stderr(), error.print()) {
-        (true, _) => ExitCode::from(WRONG_ARGUMENTS),
-        (false, written) => report(program, print::printed(written).map(|()| ExitCode::SUCCESS)),
-    })
-}
-
-/// The exit code of a command; a failure is printed as `program: sentence`.
-pub fn report(program: &str, result: Result<ExitCode, Failure>) -> ExitCode {
-    result.unwrap_or_else(|error| {
-        print::note(format_args!("{program}: {error}"));
-        ExitCode::FAILURE
-    })
+/// Prints the schema of configurations, or their reference.
+fn print_schema(arguments: &SchemaArguments) -> Result<ExitCode, Failure> {
+    print::line(match arguments.markdown {
+        true => schema::reference(),
+        false => schema::json(),
+    })?;
+    Ok(ExitCode::SUCCESS)
 }

@@ -1,122 +1,88 @@
-//! The link of a run that is split between two machines, and `gyre link`.
+//! `gyre link send` and `gyre link receive`.
 
-use std::{env, os::unix::process::CommandExt, process::Command};
+use std::{path::PathBuf, process::ExitCode};
 
-use gyre_link::{LinkConfig, ONE_THREAD, Side};
+use gyre_link::{Network, ReceiveOptions, SendOptions};
+use gyre_messages::Footprint;
+use gyre_results::Out;
+use gyre_stage::{run::sweep, wake::Signals};
+use gyre_terminal::{Failure, INTERRUPTED, own, print, seconds};
 
-use crate::{Failure, configuration::Configuration, print, program};
+use crate::{
+    cli::{LinkArguments, LinkEnd, NetworkArguments, ReceiveArguments, SendArguments},
+    preflight, split,
+};
 
-#[cfg(feature = "link")]
-mod ends;
-
-#[cfg(feature = "link")]
-pub use ends::link;
-#[cfg(feature = "link")]
-pub use gyre_link::{run_base, run_robot};
-
-#[cfg(not(feature = "link"))]
-pub use absent::{link, run_base, run_robot};
-
-/// Checks that the other side of a split run can be reached as it is configured.
+/// Runs one end of a link.
 ///
 /// # Errors
-/// One sentence: an endpoint or a certificate that is missing or not allowed, or a build without
-/// link.
-pub fn check(configuration: &Configuration) -> Result<(), Failure> {
-    if configuration.link.side.is_none() {
-        return Ok(());
-    }
-    #[cfg(not(feature = "link"))]
-    return Err(absent::ABSENT.into());
-    #[cfg(feature = "link")]
-    configuration
-        .link
-        .network()
-        .check()
-        .map_err(|error| format!("[link]: {error}").into())
-}
-
-/// Executes the same command again with the environment that the network layer needs, unless it has
-/// that already.
-///
-/// # Errors
-/// The program cannot be executed.
-pub fn set_environment() -> Result<(), Failure> {
-    let (name, value) = ONE_THREAD;
-    if env::var_os(name).is_some_and(|set| set == value) {
-        return Ok(());
-    }
-    let failed = Command::new(program::own())
-        .args(env::args_os().skip(1))
-        .env(name, value)
-        .exec();
-    Err(format!("cannot begin with {name} in the environment: {failed}").into())
-}
-
-/// Says which part of a split run this is.
-pub fn describe(configuration: &Configuration) {
-    let (name, cut) = (&configuration.link.name, configuration.link.cut.name());
-    match configuration.link.side {
-        Some(Side::Robot) => print::note(format_args!(
-            "link {name}: the stages up to `{cut}` are here; scans wait for the base"
-        )),
-        Some(Side::Base) => print::note(format_args!(
-            "link {name}: the stages after `{cut}` are here; they wait for the robot"
-        )),
-        None => {}
+/// There is no such run, the network cannot be used, or the other end is of another version.
+pub fn link(arguments: &LinkArguments) -> Result<ExitCode, Failure> {
+    split::set_environment()?;
+    match &arguments.end {
+        LinkEnd::Send(arguments) => send(arguments),
+        LinkEnd::Receive(arguments) => receive(arguments),
     }
 }
 
-/// Returns the size of the largest scan, bytes, if scans are sent: the robot knows it.
-///
-/// # Errors
-/// The robot cannot be asked.
-pub(crate) fn scan_bytes(link: &LinkConfig) -> Result<usize, Failure> {
-    match link.cut {
-        #[cfg(feature = "link")]
-        gyre_radar_replay::PlayedFrom::Scan => {
-            let name = &link.name;
-            print::note(format_args!(
-                "link {name}: waiting for the robot, which knows how large its scans are"
-            ));
-            Ok(gyre_link::ask_robot(link)?.bytes)
-        }
-        _ => Ok(0),
+fn send(arguments: &SendArguments) -> Result<ExitCode, Failure> {
+    let linger = seconds("--linger-s", arguments.linger_s)?;
+    let sent = gyre_link::send(&SendOptions {
+        out: arguments.out.clone(),
+        network: network(&arguments.network),
+        topics: arguments.topics.clone(),
+        linger,
+    })?;
+    print::note(format_args!("gyre link: {sent}"));
+    if sent.is_incomplete {
+        print::note(
+            "gyre link: a receiver was out of reach at the end and has not everything; the run's journal has its poses",
+        );
     }
+    Ok(match sent.is_incomplete {
+        true => ExitCode::FAILURE,
+        false => ExitCode::SUCCESS,
+    })
 }
 
-/// Takes the place of the link in a build without it.
-#[cfg(not(feature = "link"))]
-mod absent {
-    use std::process::ExitCode;
+fn receive(arguments: &ReceiveArguments) -> Result<ExitCode, Failure> {
+    let out = Out::lock(&arguments.out)?;
+    sweep();
+    let network = network(&arguments.network);
+    let signals = Signals::install()?;
+    let Some(seen) = gyre_link::ask(&network, &signals)? else {
+        return Ok(ExitCode::from(INTERRUPTED));
+    };
+    let manifest = seen.manifest(out.path());
+    preflight::check_shared_memory(&Footprint::new(&manifest.window, &manifest.limits))?;
+    print::note(format_args!(
+        "gyre link: the run {} is here as {}",
+        network.name,
+        out.path().display()
+    ));
+    let options = ReceiveOptions {
+        out: out.path().to_owned(),
+        network,
+        gyre: own().to_string_lossy().into_owned(),
+        topics: arguments.topics.clone(),
+    };
+    let received = gyre_link::receive(&options, seen, &signals)?;
+    print::note(format_args!("gyre link: {received}"));
+    Ok(match received.is_complete() {
+        _ if received.is_interrupted => ExitCode::from(INTERRUPTED),
+        true => ExitCode::SUCCESS,
+        false => ExitCode::FAILURE,
+    })
+}
 
-    use gyre_stage::{Launch, StageCounters, StageError};
-
-    use crate::{Failure, cli::LinkArguments, features::Absent};
-
-    pub const ABSENT: Absent = Absent("zenoh, which links machines");
-
-    /// Refuses to run.
-    ///
-    /// # Errors
-    /// Always.
-    pub fn run_robot(_: &Launch) -> Result<StageCounters, StageError> {
-        Err(ABSENT.into())
-    }
-
-    /// Refuses to run.
-    ///
-    /// # Errors
-    /// Always.
-    pub fn run_base(_: &Launch) -> Result<StageCounters, StageError> {
-        Err(ABSENT.into())
-    }
-
-    /// Refuses to link.
-    ///
-    /// # Errors
-    /// Always.
-    pub fn link(_: &LinkArguments) -> Result<ExitCode, Failure> {
-        Err(ABSENT.into())
+fn network(arguments: &NetworkArguments) -> Network {
+    let file = |path: &Option<PathBuf>| path.clone().unwrap_or_default();
+    Network {
+        name: arguments.name.clone(),
+        listen: arguments.listen.clone(),
+        connect: arguments.connect.clone(),
+        ca: file(&arguments.ca),
+        certificate: file(&arguments.certificate),
+        key: file(&arguments.key),
     }
 }

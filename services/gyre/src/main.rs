@@ -10,8 +10,8 @@ use gyre_stage::CountingAllocator;
 static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 fn main() -> ExitCode {
-    match gyre::parse::<Gyre>("gyre") {
-        Ok(gyre) => gyre::report("gyre", gyre::execute(gyre.command)),
+    match gyre_terminal::parse::<Gyre>("gyre") {
+        Ok(gyre) => gyre_terminal::report("gyre", gyre::execute(gyre.command)),
         Err(code) => code,
     }
 }

@@ -8,9 +8,8 @@ use std::{
 
 use gyre_messages::PoseHeader;
 use gyre_supervise::Event;
+use gyre_terminal::print;
 use sd_notify::NotifyState;
-
-use crate::print;
 
 /// Time between two lines of status.
 const STATUS_EVERY: Duration = Duration::from_secs(5);

@@ -2,30 +2,23 @@
 
 use std::time::Duration;
 
-use gyre_link::Side;
-use gyre_masking::{MaskKind, Masker, backend::Library, model::Card, runtime::INSTALL};
+use gyre_configuration::{Configuration, Played, open};
+use gyre_maps::localise::known;
+use gyre_masking::Masker;
 use gyre_messages::{Footprint, Limits, StageId, Window};
-use gyre_odometry::OdometryConfig;
-use gyre_radar::{DEFAULT_TURN_NS, Dataset, Fingerprint, turn_ns};
-use gyre_radar_replay::{Listing, PlayedFrom, Player, SourceKind};
-use gyre_simulator::SimulatedDrive;
+use gyre_radar::{DEFAULT_TURN_NS, Fingerprint, turn_ns};
+use gyre_radar_replay::{Listing, Player};
+use gyre_run::{MOST_OPEN_FILES, PlayedFrom, Side, SourceKind};
 use gyre_stage::run::free_shared_memory;
+use gyre_terminal::Failure;
 use rustix::process::{Resource, getrlimit};
 use thiserror::Error;
 
-use crate::{configuration::Configuration, link, localise::known, print, radar, ros2};
-
-/// Open files of the process that has most of them, masking, without observers. Measured: 105.
-pub const FILES: u64 = 120;
+use crate::{radar, ros2, split};
 
 /// Why a run cannot start.
 #[derive(Debug, Error)]
 pub enum PreflightError {
-    /// Nothing to play.
-    #[error(
-        "no dataset is named: give its folder with --data, or as source.data in the configuration, or add a section [simulation]"
-    )]
-    NoData,
     /// A recording of a run is needed.
     #[error(
         "--from {from} (source.from) plays the messages of a recorded run, and {data} is no such recording: `gyre record` and `gyre run --record` make one"
@@ -35,12 +28,6 @@ pub enum PreflightError {
         from: &'static str,
         /// The source that was named.
         data: String,
-    },
-    /// A recording is needed.
-    #[error("the configuration is of {radar}, but this needs a recording: name one with --data")]
-    Radar {
-        /// The radar.
-        radar: String,
     },
     /// One scan makes no motion.
     #[error("{path} has {scans} scan{}: a motion is between two, so there is nothing to run; `gyre inspect` shows what is there", if *scans == 1 { "" } else { "s" })]
@@ -63,7 +50,7 @@ pub enum PreflightError {
     },
     /// A process could not open what it needs.
     #[error(
-        "a process may have {limit} open files, but one of a run has up to {FILES}: raise the limit with `ulimit -n 1024`"
+        "a process may have {limit} open files, but one of a run has up to {MOST_OPEN_FILES}: raise the limit with `ulimit -n 1024`"
     )]
     OpenFiles {
         /// The limit.
@@ -102,8 +89,8 @@ pub struct Recording {
 ///
 /// # Errors
 /// A dataset or a mask that cannot be used.
-pub fn check(configuration: &Configuration) -> Result<Preflight, crate::Failure> {
-    link::check(configuration)?;
+pub fn check(configuration: &Configuration) -> Result<Preflight, Failure> {
+    split::check(configuration)?;
     let scans = match configuration.is_radar() {
         true => Scans::of_radar(configuration)?,
         false if configuration.is_side(Side::Base) => Scans::of_base(configuration)?,
@@ -140,19 +127,6 @@ pub fn check(configuration: &Configuration) -> Result<Preflight, crate::Failure>
     })
 }
 
-/// Returns what tells the recording of a run from another one; `None`: its configuration does.
-///
-/// # Errors
-/// A recording that cannot be opened.
-pub fn fingerprint(configuration: &Configuration) -> Result<Option<Fingerprint>, crate::Failure> {
-    let plays_scans = configuration.source.from == PlayedFrom::Scan && !configuration.is_radar();
-    if !plays_scans || configuration.streamed().is_some() {
-        return Ok(None);
-    }
-    let played = open(configuration)?;
-    Ok(Some(Fingerprint::of(played.dataset.as_ref())?))
-}
-
 /// The properties of the scans that the source knows before the run.
 pub(crate) struct Scans {
     /// `None`: without end.
@@ -165,7 +139,7 @@ pub(crate) struct Scans {
 }
 
 impl Scans {
-    fn of_recording(configuration: &Configuration) -> Result<Self, crate::Failure> {
+    fn of_recording(configuration: &Configuration) -> Result<Self, Failure> {
         let Played { dataset, truth } = open(configuration)?;
         let count = configuration.source.stream_len(dataset.as_ref());
         if let Some(scans @ 0..2) = count {
@@ -192,7 +166,7 @@ impl Scans {
     }
 
     /// The messages of a recording, which take the place of stages.
-    fn of_messages(configuration: &Configuration) -> Result<Self, crate::Failure> {
+    fn of_messages(configuration: &Configuration) -> Result<Self, Failure> {
         let source = &configuration.source;
         if !gyre_recording::is_recording(&source.data) {
             return Err(PreflightError::NoRecording {
@@ -215,18 +189,18 @@ impl Scans {
     }
 
     /// Returns the properties of the robot's scans, which a base asks for before the run.
-    fn of_base(configuration: &Configuration) -> Result<Self, crate::Failure> {
+    fn of_base(configuration: &Configuration) -> Result<Self, Failure> {
         Ok(Self {
             count: None,
             period_ns: DEFAULT_TURN_NS,
-            bytes: link::scan_bytes(&configuration.link)?,
+            bytes: split::scan_bytes(&configuration.link)?,
             truth: None,
             recording: None,
         })
     }
 
     /// Asks the radar.
-    fn of_radar(configuration: &Configuration) -> Result<Self, crate::Failure> {
+    fn of_radar(configuration: &Configuration) -> Result<Self, Failure> {
         configuration.dataset.check()?;
         let (source, options) = (&configuration.source, &configuration.dataset);
         let radar = match source.kind {
@@ -250,84 +224,8 @@ impl Scans {
 /// It may not.
 pub fn check_open_files() -> Result<(), PreflightError> {
     match getrlimit(Resource::Nofile).current {
-        Some(limit) if limit < FILES => Err(PreflightError::OpenFiles { limit }),
+        Some(limit) if limit < MOST_OPEN_FILES => Err(PreflightError::OpenFiles { limit }),
         _ => Ok(()),
-    }
-}
-
-/// Says which library computes learned masks, and warns where a configuration differs from the one
-/// that its network was trained for.
-///
-/// # Errors
-/// A model card that cannot be read, or ONNX Runtime missing where it is required.
-pub fn describe_masks(configuration: &Configuration) -> Result<(), crate::Failure> {
-    let OdometryConfig {
-        masking, raster, ..
-    } = &configuration.odometry;
-    let (MaskKind::Learned, Some(card), true) = (
-        masking.kind,
-        &masking.model,
-        configuration.starts(StageId::Masking),
-    ) else {
-        return Ok(());
-    };
-    let card = card.display();
-    print::note(match Library::find(masking)? {
-        Library::OnnxRuntime(path) => {
-            format!(
-                "the masks of {card} are computed by ONNX Runtime, {}",
-                path.display()
-            )
-        }
-        Library::Rten => format!(
-            "the masks of {card} are computed by rten, in one thread; ONNX Runtime is several times faster: \
-             `{INSTALL}` in the folder of Gyre's sources installs it"
-        ),
-    });
-    let unlike = Card::read(masking)?.training_mismatches(masking, raster);
-    if !unlike.is_empty() {
-        print::note(format!(
-            "the masks of {card} may be less accurate than in training: {}",
-            unlike.join(", ")
-        ));
-    }
-    Ok(())
-}
-
-/// An open recording or simulation.
-pub struct Played {
-    /// The scans.
-    pub dataset: Box<dyn Dataset>,
-    /// `ground_truth.tum` of a simulation that is played without being stored.
-    pub truth: Option<Vec<u8>>,
-}
-
-/// Opens the recording or the simulation that is to be played.
-///
-/// # Errors
-/// No dataset is named, or it cannot be opened.
-pub fn open(configuration: &Configuration) -> Result<Played, crate::Failure> {
-    let (data, options) = (&configuration.source.data, &configuration.dataset);
-    if configuration.is_radar() {
-        return Err(PreflightError::Radar {
-            radar: configuration.data(),
-        }
-        .into());
-    }
-    if let Some(simulation) = configuration.streamed() {
-        let drive = SimulatedDrive::new(simulation)?;
-        let truth = Some(drive.ground_truth_tum());
-        return Ok(Played {
-            dataset: drive.open(options)?,
-            truth,
-        });
-    }
-    match data.as_os_str().is_empty() {
-        true => Err(PreflightError::NoData.into()),
-        false => Ok(Played {
-            dataset: gyre_recording::open(data, options)?,
-            truth: None,
-        }),
     }
 }
 

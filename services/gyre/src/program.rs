@@ -4,34 +4,15 @@
 //! from the file that the supervisor executes, which stays while it runs, even if another build
 //! takes its name.
 
-use std::{
-    collections::BTreeMap,
-    fs::File,
-    io,
-    path::{Path, PathBuf},
-};
+use std::{collections::BTreeMap, fs::File, io, path::Path};
 
+use gyre_configuration::Configuration;
+use gyre_results::Programs;
 use gyre_supervise::StagePlan;
+use gyre_terminal::own;
 use sha2::{Digest, Sha256};
 
-use crate::Failure;
-
-/// Returns a path that leads to the program that this process executes, for this process and its
-/// children.
-pub fn own() -> PathBuf {
-    PathBuf::from(format!("/proc/{}/exe", std::process::id()))
-}
-
-/// Returns the program and the arguments of a `--command`, as a shell would part them.
-///
-/// # Errors
-/// No program, or a quote that is not closed.
-pub fn words(command: &str) -> Result<Vec<String>, Failure> {
-    match shlex::split(command) {
-        Some(words) if !words.is_empty() => Ok(words),
-        _ => Err(format!("--command is `{command}`, but must be a program and its arguments, with its quotes closed").into()),
-    }
-}
+use crate::plan::stage_plans;
 
 /// Returns the SHA-256 of a file.
 ///
@@ -48,7 +29,8 @@ pub fn sha256(path: &Path) -> io::Result<String> {
 ///
 /// # Errors
 /// A file that cannot be read.
-pub fn replacements(stages: &[StagePlan]) -> io::Result<BTreeMap<String, String>> {
+pub fn replaced(configuration: &Configuration) -> io::Result<BTreeMap<String, String>> {
+    let stages = stage_plans(configuration, &own());
     let replaced = stages.iter().filter(|stage| !stage.programs.is_empty());
     let digest = |stage: &StagePlan| -> io::Result<(String, String)> {
         let mut digest = Sha256::new();
@@ -62,4 +44,12 @@ pub fn replacements(stages: &[StagePlan]) -> io::Result<BTreeMap<String, String>
         Ok((stage.name.clone(), format!("{:x}", digest.finalize())))
     };
     replaced.map(digest).collect()
+}
+
+/// Returns the programs of a run that is started now.
+///
+/// # Errors
+/// A program that cannot be read.
+pub fn now(configuration: &Configuration) -> io::Result<Programs> {
+    Ok(Programs::new(sha256(&own())?, replaced(configuration)?))
 }

@@ -8,9 +8,8 @@ use std::{
 use gyre_messages::{FollowerId, Footprint, Item, PoseHeader};
 use gyre_stage::{clock, follower::Progress as Following};
 use gyre_supervise::Event;
+use gyre_terminal::print;
 use indicatif::{ProgressBar, ProgressStyle};
-
-use crate::print;
 
 /// Time between two plain lines.
 const EVERY: Duration = Duration::from_secs(2);

@@ -2,9 +2,10 @@
 
 use std::time::Duration;
 
-use gyre_live_radar::{Address, BadAddress, Settings};
+use gyre_colossus::{Address, BadAddress};
+use gyre_live_radar::Settings;
 use gyre_radar::DatasetOptions;
-use gyre_radar_replay::SourceConfig;
+use gyre_run::SourceConfig;
 
 /// Encoder counts per turn of a radar that does not tell them, unless `dataset.encoder_counts` says
 /// otherwise.

@@ -3,11 +3,9 @@
 use std::{process::ExitCode, time::Duration};
 
 use gyre_recorder::{Options, Split};
+use gyre_terminal::print;
 
-use crate::{
-    cli::{RecordArguments, SplitArguments},
-    print,
-};
+use crate::cli::{RecordArguments, SplitArguments};
 
 /// Records a run until it ends or an interrupt, and says what was recorded and what was missed.
 ///

@@ -1,6 +1,6 @@
 //! `gyre run`: prepares a run, supervises it, writes its results.
 
-pub(crate) mod resolve;
+mod resolve;
 
 use std::{
     env,
@@ -10,35 +10,33 @@ use std::{
     time::{Duration, Instant},
 };
 
+use gyre_configuration::{Configuration, describe_masks, with_stored_options};
 use gyre_messages::StageId;
+use gyre_operate::detach_if_asked;
+use gyre_results::{Identity, Out, Programs, Results, SIMULATED_TRUTH, Session};
+use gyre_run::{Ending, Mode};
 use gyre_stage::{
     Manifest,
     run::{RootError, RunRoot, sweep},
     wake::Signals,
 };
 use gyre_storage as storage;
-use gyre_supervise::{Ending, Plan, SuperviseError, supervise};
+use gyre_supervise::{Plan, SuperviseError, supervise};
+use gyre_terminal::{Failure, INTERRUPTED, own, print};
 
 use crate::{
-    Failure,
     cli::RunArguments,
-    configuration::{Configuration, Mode},
     earlier::{self, Begun, Earlier},
-    identity::{Identity, Programs},
-    link,
     notify::Notifier,
-    operate,
-    out::Out,
+    plan,
     preflight::{self, Preflight},
-    print, program,
+    program,
     progress::Progress,
-    results::{self, Results},
-    simulate,
-    summary::Session,
+    simulate, split,
 };
 
-/// The exit code of an interrupted program, as shells have it.
-pub(crate) const INTERRUPTED: u8 = 130;
+pub use resolve::resolve;
+
 /// The folder of a simulated recording that is stored.
 const RECORDING: &str = "recording";
 
@@ -48,10 +46,10 @@ const RECORDING: &str = "recording";
 /// # Errors
 /// A run that cannot start, fails, or finds fewer than two readable scans.
 pub fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
-    operate::detach_if_asked();
-    let configuration = resolve::resolve(arguments)?;
+    detach_if_asked();
+    let configuration = resolve(arguments)?;
     if configuration.link.side.is_some() {
-        link::set_environment()?;
+        split::set_environment()?;
     }
     let out = Out::lock(&results_folder(arguments))?;
     compute(configuration, out, arguments.fresh)
@@ -70,7 +68,7 @@ pub(crate) fn compute(
     // memory itself.
     sweep();
     place_recording(&mut configuration, &out);
-    let programs = Programs::now(&configuration)?;
+    let programs = program::now(&configuration)?;
     match Earlier::of(&out, &configuration, &programs, fresh)? {
         Earlier::Nothing => play(&configuration, &programs, out, None),
         Earlier::Unfinished(begun) => play(&configuration, &programs, out, Some(begun)),
@@ -130,13 +128,19 @@ fn make_ready(
         simulate::store(simulation, &configuration.source.data, replace)?;
     }
     if unfinished.is_none() {
-        configuration.record.require_new()?;
+        plan::require_new(&configuration.record)?;
     }
     preflight::check_open_files()?;
     // The stages read the options of dataset.toml from here: it may change while they run.
-    let resolved = configuration.with_stored_options()?;
+    let resolved = with_stored_options(configuration)?;
     let checked = preflight::check(&resolved)?;
-    let identity = Identity::of(configuration, programs, resolved.dataset, &checked)?;
+    let identity = Identity::of(
+        configuration,
+        programs,
+        resolved.dataset,
+        checked.scans,
+        checked.recording.as_ref().map(|it| &it.fingerprint),
+    )?;
     if let Some(begun) = unfinished {
         let (earlier, poses) = (&begun.identity, begun.poses);
         earlier.require_recording(&identity, out.path(), poses)?;
@@ -175,7 +179,7 @@ fn play(
     preflight::check_shared_memory(&checked.footprint)?;
     let earlier = unfinished.as_ref();
     prepare(configuration, &identity, &out, &checked, earlier)?;
-    let plan = plan(
+    let plan = plan_of(
         &resolved,
         manifest(&resolved, programs, &out, &checked, &root),
     );
@@ -186,8 +190,8 @@ fn play(
         recording.listing.write(root.path()).map_err(failed)?;
     }
 
-    preflight::describe_masks(&resolved)?;
-    link::describe(&resolved);
+    describe_masks(&resolved)?.iter().for_each(print::note);
+    split::describe(&resolved);
     let resumed = unfinished.map_or(0, |begun| begun.poses as usize);
     let mut progress = Progress::new(checked.scans, resumed, &checked.footprint);
     let mut notifier = Notifier::of_environment();
@@ -232,16 +236,16 @@ fn prepare(
         None => earlier::begin(out, identity, &configuration.to_toml()?)?,
     }
     if let Some(truth) = &checked.truth {
-        storage::write(&out.join(results::SIMULATED_TRUTH), truth)?;
+        storage::write(&out.join(SIMULATED_TRUTH), truth)?;
     }
     Ok(storage::create_folder(&out.join("log"))?)
 }
 
-fn plan(configuration: &Configuration, manifest: Manifest) -> Plan {
-    let gyre = program::own();
+fn plan_of(configuration: &Configuration, manifest: Manifest) -> Plan {
+    let gyre = own();
     Plan {
-        stages: configuration.stage_plans(&gyre),
-        recorder: configuration.record.plan(&gyre, &manifest.out),
+        stages: plan::stage_plans(configuration, &gyre),
+        recorder: plan::recorder(&configuration.record, &gyre, &manifest.out),
         guardian: vec![gyre.to_string_lossy().into_owned(), "guard".to_owned()],
         stall_timeout: limit(configuration.run.stall_timeout_s),
         start_timeout: limit(configuration.run.start_timeout_s),
@@ -307,7 +311,7 @@ fn finish(
     out: &Out,
     session: &Session<'_>,
 ) -> Result<Results, Failure> {
-    let written = results::write(configuration, out, session)?;
+    let written = gyre_results::write(configuration, out, session)?;
     // With all poses there may still be loops to find.
     let has_followed = session.ending == Some(Ending::Complete) || !configuration.slam.is_on();
     if written.ended && has_followed {
@@ -361,7 +365,7 @@ fn start_over(resumed: usize) -> Result<ExitCode, Failure> {
     print::note(
         "gyre: the transport did not finish cleaning up after a dead process; starting over from the journal",
     );
-    let failed = Command::new(program::own())
+    let failed = Command::new(own())
         .args(env::args_os().skip(1).filter(|a| a != "--fresh"))
         .env(STARTED_OVER, resumed.to_string())
         .exec();

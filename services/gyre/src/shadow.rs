@@ -1,14 +1,16 @@
 //! `gyre shadow`: runs a second program beside a stage of a running run, and compares their
 //! results.
 
-use std::{process::ExitCode, time::Duration};
+use std::process::ExitCode;
 
 use gyre_messages::{FollowerId, Footprint, StageId, Window};
+use gyre_operate::chosen;
+use gyre_run::Scheduling;
 use gyre_shadow::{Options, STAGES};
 use gyre_stage::{control::Control, observer::ObservedRun};
-use gyre_supervise::Scheduling;
+use gyre_terminal::{Failure, own, print, seconds, words};
 
-use crate::{Failure, cli::ShadowArguments, operate, preflight, print, program};
+use crate::{cli::ShadowArguments, preflight};
 
 /// Compares until the run ends or as long as the arguments say, and prints the report. The exit
 /// code is 1 if nothing was compared, or the program died, hung or broke the contract.
@@ -18,7 +20,7 @@ use crate::{Failure, cli::ShadowArguments, operate, preflight, print, program};
 pub fn shadow(arguments: &ShadowArguments) -> Result<ExitCode, Failure> {
     let stage = stage(&arguments.stage)?;
     let options = options(arguments, stage)?;
-    let control = operate::chosen(&arguments.run)?;
+    let control = chosen(&arguments.run)?;
     require_stage(&control, stage)?;
     let run = ObservedRun::writing_to(control.out())?;
     let manifest = run.manifest();
@@ -71,13 +73,9 @@ fn require_stage(control: &Control, stage: StageId) -> Result<(), Failure> {
 }
 
 fn options(arguments: &ShadowArguments, stage: StageId) -> Result<Options, Failure> {
-    let seconds = |option: &str, seconds: f64| {
-        Duration::try_from_secs_f64(seconds)
-            .map_err(|_| format!("{option} is {seconds}, but must be 0 or more"))
-    };
-    let gyre = program::own().to_string_lossy().into_owned();
+    let gyre = own().to_string_lossy().into_owned();
     let own = || vec![gyre.clone(), "stage".to_owned(), stage.name().to_owned()];
-    let command = arguments.command.as_deref().map(program::words);
+    let command = arguments.command.as_deref().map(words);
     let duration = arguments.duration.map(|it| seconds("--duration", it));
     Ok(Options {
         stage,

@@ -9,10 +9,12 @@ use std::{
     time::Instant,
 };
 
+use gyre_configuration::Configuration;
 use gyre_simulator::{SimulationConfig, SimulatorError, Summary, remove_dataset, write_dataset_on};
+use gyre_terminal::{Failure, print};
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::{Failure, cli::SimulateArguments, configuration::Configuration, print};
+use crate::cli::SimulateArguments;
 
 /// Writes a simulated recording, or completes one.
 ///

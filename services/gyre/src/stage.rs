@@ -7,18 +7,20 @@ use std::{
     process::ExitCode,
 };
 
-use gyre_link::{LinkConfig, Side};
+use gyre_configuration::process_names;
 use gyre_messages::{FollowerId, StageId};
 use gyre_radar::DatasetOptions;
-use gyre_radar_replay::{Pace, SourceConfig, SourceKind};
+use gyre_radar_replay::Pace;
+use gyre_run::{LinkConfig, Side, SourceConfig, SourceKind};
 use gyre_simulator::{SimulatedDrive, SimulationConfig};
 use gyre_stage::{Launch, Manifest, StageCounters, StageError, launch};
+use gyre_terminal::{own, print};
 use rustix::{
     process::{Pid, getppid},
     thread::set_name,
 };
 
-use crate::{configuration::process_names, link, print, program, radar, ros2};
+use crate::{program, radar, ros2, split};
 
 /// The work of a process.
 type Work = fn(&Launch) -> Result<StageCounters, StageError>;
@@ -63,7 +65,7 @@ fn work_of_follower(follower: FollowerId) -> Work {
 
 /// Checks that this is the supervisor's build. A command of the configuration may name another one.
 fn require_same_build(manifest: &Manifest) -> Result<(), StageError> {
-    let path = program::own();
+    let path = own();
     let supervisor = PathBuf::from(format!(
         "/proc/{}/exe",
         getppid().map_or(0, Pid::as_raw_pid)
@@ -85,7 +87,7 @@ fn require_same_build(manifest: &Manifest) -> Result<(), StageError> {
 /// Integrates motions to poses, or leaves that to the other side of a link.
 fn integrate(launch: &Launch) -> Result<StageCounters, StageError> {
     match launch.section::<LinkConfig>("link")?.side {
-        Some(Side::Robot) => link::run_robot(launch),
+        Some(Side::Robot) => split::run_robot(launch),
         _ => gyre_pose_integration::run(launch),
     }
 }
@@ -95,7 +97,7 @@ fn integrate(launch: &Launch) -> Result<StageCounters, StageError> {
 fn play(launch: &Launch) -> Result<StageCounters, StageError> {
     let input = |error: &dyn std::error::Error| StageError::Input(error.to_string());
     if launch.section::<LinkConfig>("link")?.side == Some(Side::Base) {
-        return link::run_base(launch);
+        return split::run_base(launch);
     }
     let source: SourceConfig = launch.section("source")?;
     match source.kind {

@@ -2,20 +2,21 @@
 
 use std::{fs, path::Path, process::ExitCode, time::Duration};
 
+use gyre_configuration::Configuration;
 use gyre_messages::{Masked, Message, Motion, Scan, StageId, topics};
-use gyre_stress::{
-    MessageKind, Options, Provenance, Report, Scenario, TestedPipeline, report::Verdict,
+use gyre_results::{
+    Out,
+    machine::{Machine, today},
 };
+use gyre_run::Scenario;
+use gyre_stress::{MessageKind, Options, Provenance, Report, TestedPipeline, report::Verdict};
+use gyre_terminal::{Failure, own, print};
 
 use crate::{
-    Failure,
     cli::{RunArguments, StressArguments},
-    configuration::Configuration,
-    machine::{Machine, today},
-    out::Out,
     preflight::{self, Preflight},
-    print, program,
-    run::resolve::resolve,
+    program,
+    run::resolve,
     simulate,
 };
 
@@ -56,7 +57,7 @@ pub fn stress(arguments: &StressArguments) -> Result<ExitCode, Failure> {
 /// # Errors
 /// A failure of it.
 pub fn help(arguments: &[String]) -> Result<ExitCode, Failure> {
-    gyre_stress::help(&program::own(), arguments)?;
+    gyre_stress::help(&own(), arguments)?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -73,14 +74,14 @@ fn carry_out(arguments: &StressArguments) -> Result<Report, Failure> {
     configuration.record = Default::default();
     render(&mut configuration, &out)?;
     // First, since a radar that is configured is no recording, and would be asked for its scans.
-    let played = preflight::open(&configuration)?;
+    let played = gyre_configuration::open(&configuration)?;
     let period = Duration::from_nanos(played.dataset.period_ns().max(1) as u64);
     let checked = preflight::check(&configuration)?;
     let file = out.join("config.toml");
     fs::write(&file, configuration.to_toml()?)?;
     let stages = StageId::ALL.into_iter();
     let tested = TestedPipeline {
-        program: program::own(),
+        program: own(),
         configuration: file,
         out: out.path().to_owned(),
         period,
@@ -167,7 +168,7 @@ fn provenance(
         machine: Machine::this().to_string(),
         kernel: uname.release().to_string_lossy().into_owned(),
         gyre: env!("CARGO_PKG_VERSION").to_owned(),
-        build: program::sha256(&program::own())?,
+        build: program::sha256(&own())?,
         configuration: file.unwrap_or(Path::new("")).display().to_string(),
         source: configuration.data(),
         load_before: load.split(' ').next().and_then(|load| load.parse().ok()),

@@ -2,10 +2,12 @@
 
 use std::{net::SocketAddr, process::ExitCode};
 
+use gyre_results::absolute;
 use gyre_stage::{observer::ObservedRun, wake::Signals};
+use gyre_terminal::{Failure, print};
 use gyre_watch::{Endpoint, Exporter, Server, Token};
 
-use crate::{Failure, cli::WatchArguments, earlier, out, print};
+use crate::{cli::WatchArguments, earlier};
 
 /// Serves the page until a signal arrives. From another machine it is read with a token alone.
 ///
@@ -26,7 +28,7 @@ pub fn watch(arguments: &WatchArguments) -> Result<ExitCode, Failure> {
     let say = |sentence: &str| print::note(format_args!("gyre: {sentence}"));
     let traces = arguments.otlp.as_deref();
     let traces = traces.map(|url| Exporter::start(url, say)).transpose()?;
-    let out = out::absolute(&arguments.out)?;
+    let out = absolute(&arguments.out)?;
     print::note(format_args!(
         "gyre: {} is shown at {}",
         out.display(),

@@ -52,8 +52,11 @@ pub fn value(section: &str, reason: impl Display) -> ConfigurationError {
 ///
 /// # Errors
 /// That of the check.
-pub fn within<E: Display>(section: &str, checked: Result<(), E>) -> Result<(), ConfigurationError> {
-    checked.map_err(|error| value(section, error))
+pub fn within<T, E: Display>(
+    section: &str,
+    checked: Result<T, E>,
+) -> Result<(), ConfigurationError> {
+    checked.map(drop).map_err(|error| value(section, error))
 }
 
 /// Takes a section out of the table; its defaults where it is missing.

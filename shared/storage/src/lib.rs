@@ -8,6 +8,7 @@
 //! - [`DurableFile`] is such a file of one process, synchronised so; its records are in [`Slots`],
 //!   each with a [`Checksum`].
 //! - [`Log`] is a file of records that grows at its end; [`LogReader`] reads it meanwhile.
+//! - [`lock`]: locks of files.
 //! - [`read_text`] and [`read_bytes`] read files that may come from elsewhere, up to a size.
 //!
 //! A file and its name are two things: the name of a new or renamed file is safe once its folder is
@@ -20,6 +21,7 @@ mod file;
 mod folder;
 mod group_sync;
 mod limited;
+pub mod lock;
 mod log;
 #[cfg(feature = "record")]
 pub mod record;

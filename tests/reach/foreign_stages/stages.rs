@@ -8,7 +8,7 @@ use gyre_messages::{
     Rotation, Scan, ScanHeader, StageId, compose, flag,
 };
 use gyre_radar::{Dataset, DatasetOptions};
-use gyre_radar_replay::SourceConfig;
+use gyre_run::SourceConfig;
 use gyre_stage::{
     Launch, Sink, Source, Stage, StageCounters, StageError,
     inputs::{Joined, JoinedView, PairView, Pairs},
@@ -200,7 +200,7 @@ impl Stage for ForeignMasking {
 fn replay(launch: &Launch, fault: Fault) -> Result<StageCounters, StageError> {
     let config: SourceConfig = launch.section("source")?;
     let dataset = gyre_radar::open(&config.data, &DatasetOptions::default()).unwrap();
-    let tolerance = config.tolerance();
+    let tolerance = gyre_radar_replay::tolerance(&config);
     source::run(launch, &mut ForeignSource { fault, dataset }, &tolerance)
 }
 

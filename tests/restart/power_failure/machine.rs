@@ -3,28 +3,23 @@
 use std::{fs, path::Path, sync::OnceLock, time::Duration};
 
 use gyre::{
-    Failure,
-    configuration::Configuration,
     earlier::{self, Begun, Earlier},
-    identity::{Identity, Programs},
-    out::Out,
-    preflight::Preflight,
-    results,
-    summary::Session,
+    program,
 };
+use gyre_configuration::Configuration;
 use gyre_geometry::SparsePoint;
 use gyre_journal::{
     self as journal, Journal,
     checkpoint::{self, Checkpoint},
     keyframes::Keyframes,
 };
-use gyre_messages::{
-    Footprint, Item, Limits, MotionEstimate, MotionHeader, PoseHeader, Window, compose, flag,
-};
+use gyre_messages::{Item, MotionEstimate, MotionHeader, PoseHeader, compose, flag};
 use gyre_radar::DatasetOptions;
+use gyre_results::{Identity, Out, Programs, Session};
+use gyre_run::Ending;
 use gyre_scan_matching::Refiner;
 use gyre_slam::{Keyframe, SlamKind, records_path};
-use gyre_supervise::Ending;
+use gyre_terminal::Failure;
 use nalgebra::{Isometry2, Vector2};
 
 /// Scans of the drive: three groups of synchronised changes.
@@ -65,7 +60,7 @@ impl Machine {
         ]
         .map(str::to_owned);
         let configuration = Configuration::of_overrides(&overrides).unwrap();
-        let programs = Programs::now(&configuration).unwrap();
+        let programs = program::now(&configuration).unwrap();
         Self {
             configuration,
             programs,
@@ -108,7 +103,7 @@ impl Machine {
             ending: Some(Ending::Complete),
             report: None,
         };
-        let written = results::write(&self.configuration, &out, &session)?;
+        let written = gyre_results::write(&self.configuration, &out, &session)?;
         assert!(written.ended);
         earlier::mark_complete(&out, written.poses)
     }
@@ -131,35 +126,12 @@ impl Machine {
     }
 
     fn identity(&self) -> Identity {
-        let window = Window {
-            scans: WINDOW,
-            lag: 0,
-            look_back: 1,
-            live_depth: 0,
-            observers: 0,
-            slam: self.configuration.slam.is_on(),
-            localises: false,
-        };
-        let limits = Limits {
-            scan_bytes: 1,
-            raster_cells: 1,
-            rasters: 1,
-            points: POINTS,
-            cell_m: 1.0,
-        };
-        let checked = Preflight {
-            scans: Some(SCANS as usize),
-            window,
-            limits,
-            footprint: Footprint::new(&window, &limits),
-            truth: None,
-            recording: None,
-        };
         Identity::of(
             &self.configuration,
             &self.programs,
             DatasetOptions::default(),
-            &checked,
+            Some(SCANS as usize),
+            None,
         )
         .unwrap()
     }

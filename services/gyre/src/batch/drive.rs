@@ -9,26 +9,22 @@ use std::{
 };
 
 use gyre_batch::DriveOutcome;
-use gyre_configuration::{AutomaticError, ConfigurationError};
+use gyre_configuration::{AutomaticError, Configuration, ConfigurationError, SourceError};
 use gyre_masking::MaskerError;
 use gyre_radar::OpenError;
+use gyre_results::{Identity, Out, OutError, Problem, SUMMARY};
 use gyre_simulator::SimulatorError;
 use gyre_stage::run::end_with;
+use gyre_terminal::{Failure, INTERRUPTED, print};
 use rustix::{io::Errno, process::Signal};
 use thiserror::Error;
 
 use crate::{
-    Failure,
     cli::{BatchDriveArguments, RunArguments},
-    configuration::Configuration,
     earlier,
-    identity::{Identity, Programs},
-    out::{Out, OutError},
     preflight::PreflightError,
-    print,
-    results::SUMMARY,
-    run::{self, INTERRUPTED, resolve::resolve},
-    summary::Problem,
+    program,
+    run::{self, resolve},
 };
 
 /// The run of a batch that was killed writes its results for so long, and has its folder meanwhile.
@@ -107,7 +103,8 @@ fn locked(path: &Path) -> Result<Out, OutError> {
 fn is_finished(out: &Out, configuration: &Configuration) -> bool {
     let is_complete = earlier::is_complete(out.path()) && out.join(SUMMARY).exists();
     // Where it is not known what the results are of, the run says what cannot be read.
-    let is_same = |begun: Identity| begun.has_inputs_of(configuration);
+    let is_same =
+        |begun: Identity| begun.has_inputs_of(configuration, &program::replaced(configuration)?);
     is_complete && Identity::read(out, 0).and_then(is_same).unwrap_or(false)
 }
 
@@ -131,10 +128,13 @@ fn continues(out: &Out, configuration: &Configuration) -> Result<bool, Failure> 
     let Ok(begun) = Identity::read(out, 0) else {
         return Ok(true);
     };
-    let programs = Programs::now(configuration)?;
+    let programs = program::now(configuration)?;
     let goes_on = begun.require(configuration, &programs, out.path(), 0);
     // What cannot be read the run itself reports, and keeps what it has.
-    Ok(goes_on.is_ok() && begun.has_inputs_of(configuration).unwrap_or(true))
+    let is_same = program::replaced(configuration)
+        .map_err(Failure::from)
+        .and_then(|replaced| begun.has_inputs_of(configuration, &replaced));
+    Ok(goes_on.is_ok() && is_same.unwrap_or(true))
 }
 
 /// Says of what has no type of its own that it is the configuration's.
@@ -159,6 +159,12 @@ fn outcome_of(failure: &Failure) -> DriveOutcome {
         return match error {
             AutomaticError::Open(error) => outcome_of_open(error),
             AutomaticError::Read(_) | AutomaticError::Empty => DriveOutcome::NotADataset,
+            _ => DriveOutcome::Configuration,
+        };
+    }
+    if let Some(error) = failure.downcast_ref::<SourceError>() {
+        return match error {
+            SourceError::Open(error) => outcome_of_open(error),
             _ => DriveOutcome::Configuration,
         };
     }
@@ -192,7 +198,6 @@ fn outcome_of_preflight(error: &PreflightError) -> DriveOutcome {
         PreflightError::TooFew { .. } | PreflightError::NoRecording { .. } => {
             DriveOutcome::NotADataset
         }
-        PreflightError::NoData | PreflightError::Radar { .. } => DriveOutcome::Configuration,
         PreflightError::SharedMemory { .. }
         | PreflightError::OpenFiles { .. }
         | PreflightError::NoSharedMemory(_) => DriveOutcome::Machine,

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use gyre_ros2_messages::frames::Frames;
 
 /// The arguments of `gyre ros2`.
 #[derive(Debug, Args)]
@@ -21,8 +22,12 @@ pub struct Ros2Arguments {
     #[arg(long, value_name = "NAME", default_value = "/")]
     pub namespace: String,
     /// Names of the frames: of the map, of odometry, of the vehicle and of the radar.
-    #[arg(long, value_name = "MAP,ODOM,BASE,RADAR", default_value = "map,odom,base_link,radar", value_parser = frames)]
-    pub frames: Names,
+    #[arg(
+        long,
+        value_name = "MAP,ODOM,BASE,RADAR",
+        default_value = "map,odom,base_link,radar"
+    )]
+    pub frames: Frames,
     /// Where the radar is on the vehicle: m forward, m to the left, degrees counter-clockwise.
     #[arg(
         long,
@@ -41,38 +46,4 @@ pub struct Ros2Arguments {
     /// Wait for a run that has not started yet.
     #[arg(long)]
     pub wait: bool,
-}
-
-/// The names of the frames from the map's to the radar's.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Names(pub [String; 4]);
-
-/// Parses four names.
-pub fn frames(text: &str) -> Result<Names, String> {
-    let names: Vec<String> = text.split(',').map(|name| name.trim().to_owned()).collect();
-    let names = <[String; 4]>::try_from(names).ok();
-    let is_name = |name: &String| !name.is_empty() && !name.starts_with('/');
-    let names = names.filter(|names| names.iter().all(is_name));
-    names.map(Names).ok_or_else(|| {
-        "four names without `/` before them are needed, as in map,odom,base_link,radar".to_owned()
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn frames_are_four_names() {
-        let names = ["map", "odom", "car/base", "radar_top"].map(str::to_owned);
-        assert_eq!(frames("map, odom,car/base,radar_top"), Ok(Names(names)));
-        for text in [
-            "",
-            "map,odom,base_link",
-            "map,odom,,radar",
-            "/map,odom,base_link,radar",
-        ] {
-            assert!(frames(text).is_err(), "{text}");
-        }
-    }
 }

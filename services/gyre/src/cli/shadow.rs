@@ -3,8 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-
-use super::RunChoice;
+use gyre_operate::RunChoice;
 
 /// The arguments of `gyre shadow`.
 #[derive(Debug, Args)]

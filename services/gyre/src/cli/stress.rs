@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use gyre_messages::StageId;
-use gyre_stress::Scenario;
+use gyre_run::Scenario;
 
 /// The arguments of `gyre stress`.
 #[derive(Debug, Args)]

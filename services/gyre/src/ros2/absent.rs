@@ -4,10 +4,11 @@ use std::process::ExitCode;
 
 use gyre_live_radar::Sizes;
 use gyre_radar::DatasetOptions;
-use gyre_radar_replay::SourceConfig;
+use gyre_run::SourceConfig;
 use gyre_stage::{Launch, StageCounters, StageError};
+use gyre_terminal::Failure;
 
-use crate::{Failure, cli::Ros2Arguments, features::Absent};
+use crate::{cli::Ros2Arguments, features::Absent};
 
 const ABSENT: Absent = Absent("ROS 2");
 
@@ -16,14 +17,6 @@ const ABSENT: Absent = Absent("ROS 2");
 /// # Errors
 /// Always.
 pub fn publish(_: &Ros2Arguments) -> Result<ExitCode, Failure> {
-    Err(ABSENT.into())
-}
-
-/// Says that there is no ROS 2.
-///
-/// # Errors
-/// Always.
-pub fn check(_: &SourceConfig, _: &DatasetOptions) -> Result<(), Failure> {
     Err(ABSENT.into())
 }
 

@@ -2,21 +2,20 @@
 
 use std::{path::Path, process::ExitCode};
 
+use gyre_configuration::Configuration;
 use gyre_live_radar::Sizes;
 use gyre_radar::DatasetOptions;
-use gyre_radar_replay::SourceConfig;
+use gyre_results::{absolute, map_options};
 use gyre_ros2_bridge::{
-    Bridge, Domain, DomainError, Frames, MapSettings, Settings,
+    Bridge, MapSettings, Settings,
     source::{self, AskError},
 };
+use gyre_ros2_messages::{Domain, DomainError};
+use gyre_run::SourceConfig;
 use gyre_stage::{Launch, StageCounters, StageError, observer::ObservedRun, wake::Signals};
+use gyre_terminal::{Failure, print};
 
-use crate::{
-    Failure,
-    cli::{Names, Ros2Arguments},
-    configuration::Configuration,
-    map, out, print, radar,
-};
+use crate::{cli::Ros2Arguments, radar};
 
 /// Publishes the runs of a folder until a signal arrives.
 ///
@@ -28,17 +27,11 @@ pub fn publish(arguments: &Ros2Arguments) -> Result<ExitCode, Failure> {
         ObservedRun::writing_to(&arguments.out)?;
     }
     let domain = Domain::new(arguments.domain, arguments.interface.as_deref())?;
-    let Names([map, odom, base, radar]) = arguments.frames.clone();
     let bridge = Bridge::open(Settings {
-        out: out::absolute(&arguments.out)?,
+        out: absolute(&arguments.out)?,
         domain,
         namespace: arguments.namespace.clone(),
-        frames: Frames {
-            map,
-            odom,
-            base,
-            radar,
-        },
+        frames: arguments.frames.clone(),
         mounting: arguments.mounting.parse()?,
         transforms: !arguments.no_tf,
         map: (!arguments.no_map).then_some(map_settings),
@@ -66,17 +59,9 @@ fn map_settings(out: &Path) -> Result<MapSettings, String> {
     let configuration = configuration.map_err(|error| error.to_string())?;
     let estimator = configuration.slam.kind.estimator();
     Ok(MapSettings {
-        options: map::options(&configuration),
+        options: map_options(&configuration),
         estimator: estimator.ok_or("slam.kind is none")?,
     })
-}
-
-/// Checks a source.
-///
-/// # Errors
-/// No such domain or interface.
-pub fn check(source: &SourceConfig, options: &DatasetOptions) -> Result<(), Failure> {
-    Ok(settings(source, options).map(drop)?)
 }
 
 /// Asks the driver of a source for the sizes of its radar's scans.

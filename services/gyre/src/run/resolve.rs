@@ -2,9 +2,11 @@
 
 use std::path::PathBuf;
 
-use gyre_radar_replay::PlayedFrom;
+use gyre_configuration::{Configuration, calibration};
+use gyre_run::PlayedFrom;
+use gyre_terminal::{Failure, print};
 
-use crate::{Failure, calibrate, cli::RunArguments, configuration::Configuration};
+use crate::cli::RunArguments;
 
 /// Reads the configuration and resolves what it leaves open.
 ///
@@ -14,7 +16,11 @@ pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
     let overrides = overrides(arguments)?;
     let mut configuration = match (&arguments.configuration, &arguments.data) {
         (Some(file), _) => Configuration::read(file, &overrides)?,
-        (None, Some(data)) => Configuration::of_recording(data, &overrides)?,
+        (None, Some(data)) => {
+            let (configuration, sentence) = Configuration::of_recording(data, &overrides)?;
+            print::note(sentence);
+            configuration
+        }
         (None, None) => Configuration::of_overrides(&overrides)?,
     };
     if arguments.data.is_some() {
@@ -66,7 +72,7 @@ pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
 /// # Errors
 /// A calibration that cannot be read.
 fn overrides(arguments: &RunArguments) -> Result<Vec<String>, Failure> {
-    let calibration = arguments.calibration.as_deref().map(calibrate::overrides);
+    let calibration = arguments.calibration.as_deref().map(calibration::overrides);
     // Quoted, because a folder may be named 2019-01-10 or 7.
     let quoted = |data: &PathBuf| toml::Value::from(data.to_string_lossy().into_owned());
     let data = arguments.data.iter().flat_map(|data| {

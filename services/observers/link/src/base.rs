@@ -15,7 +15,7 @@ use std::{
 };
 
 use gyre_messages::{Item, Message as _, Motion, Pose, flag, topic};
-use gyre_radar_replay::PlayedFrom;
+use gyre_run::{LinkConfig, PlayedFrom, Side};
 use gyre_stage::{Launch, StageCounters, StageError, relay::FirstStages, source::RecordedMessage};
 use zenoh::{
     Session, Wait,
@@ -24,7 +24,7 @@ use zenoh::{
 };
 
 use crate::{
-    LinkConfig, LinkError, Side,
+    LinkError, Network,
     connection_log::ConnectionLog,
     fetch::{Fetcher, Request},
     handshake::{self, Agreement, StartAnswer},
@@ -55,7 +55,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let mut stages = FirstStages::open(launch, &topics, config.returns_motions())?;
     let waker = Waker::new()?;
     let sleep = || Ok(stages.sleep(waker.descriptor())?);
-    let Some(session) = config.network().open(sleep)? else {
+    let Some(session) = Network::from(&config).open(sleep)? else {
         return Ok(stages.counters());
     };
     let mut base = Base {

@@ -4,11 +4,12 @@
 use std::{fs, path::Path, thread, time::Duration};
 
 use gyre_messages::{Limits, topic};
-use gyre_stage::{Manifest, run::BEGUN_WITH};
+use gyre_run::{BEGUN_WITH, LinkConfig, Side};
+use gyre_stage::Manifest;
 use serde::{Deserialize, Serialize};
 use zenoh::{Session, Wait};
 
-use crate::{LinkConfig, LinkError, Side, request::Question};
+use crate::{LinkError, Network, request::Question};
 
 /// Time between two questions before there is a run that waits by itself.
 const PAUSE: Duration = Duration::from_millis(200);
@@ -57,7 +58,7 @@ pub fn ask_robot(config: &LinkConfig) -> Result<ScanSize, LinkError> {
         thread::sleep(PAUSE);
         Ok(false)
     };
-    let session = config.network().open(pause)?;
+    let session = Network::from(config).open(pause)?;
     let failed = || LinkError::zenoh(ASK_FOR_SCANS.action, &"it was interrupted");
     let session = session.ok_or_else(failed)?;
     loop {

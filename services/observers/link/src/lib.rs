@@ -10,11 +10,10 @@
 //! no state of a receiver. The messages that are still there depend on the topic: see
 //! `replay_buffer`.
 //!
-//! Reading order: `config`, `network` and `session` (endpoints and certificates), `replay_buffer`
+//! Reading order: `network` and `session` (endpoints and certificates), `replay_buffer`
 //! (the messages that can be sent), `serve` and `fetch` (the two ends of a topic), `handshake` with
 //! `robot` and `base`, then `send` and `receive`.
 
-pub mod config;
 mod network;
 
 #[cfg(feature = "zenoh")]
@@ -46,7 +45,6 @@ mod tests;
 #[cfg(feature = "zenoh")]
 mod waker;
 
-pub use config::{LinkConfig, Side};
 pub use network::{Network, NetworkError, ONE_THREAD};
 
 #[cfg(feature = "zenoh")]

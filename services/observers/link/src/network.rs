@@ -2,6 +2,7 @@
 
 use std::{net::IpAddr, path::PathBuf};
 
+use gyre_run::LinkConfig;
 use thiserror::Error;
 
 /// The environment variable, and its value, with which zenoh does all its work in one thread.
@@ -29,6 +30,19 @@ pub struct Network {
     pub certificate: PathBuf,
     /// Private key of the certificate, PEM.
     pub key: PathBuf,
+}
+
+impl From<&LinkConfig> for Network {
+    fn from(config: &LinkConfig) -> Self {
+        Self {
+            name: config.name.clone(),
+            listen: config.listen.clone(),
+            connect: config.connect.clone(),
+            ca: config.ca.clone(),
+            certificate: config.certificate.clone(),
+            key: config.key.clone(),
+        }
+    }
 }
 
 /// A network that cannot be used.

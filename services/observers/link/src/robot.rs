@@ -11,12 +11,12 @@ use gyre_journal::{self as journal, Journal};
 use gyre_messages::{
     Hop, Item, Masked, Message as _, Motion, MotionHeader, Pose, PoseHeader, StageId, flag,
 };
-use gyre_radar_replay::PlayedFrom;
+use gyre_run::{LinkConfig, PlayedFrom, Side};
 use gyre_stage::{Launch, StageCounters, StageError, clock, relay::LastStages};
 use zenoh::{Session, Wait, qos::Priority};
 
 use crate::{
-    LinkConfig, LinkError, Side,
+    LinkError, Network,
     connection_log::ConnectionLog,
     fetch::{Fetcher, Request},
     handshake::{self, Agreement, ScanSize, StartAnswer},
@@ -39,7 +39,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let mut stages = LastStages::open(launch, config.returns_motions())?;
     let waker = Waker::new()?;
     let sleep = || Ok(stages.sleep(waker.descriptor())?);
-    let Some(session) = config.network().open(sleep)? else {
+    let Some(session) = Network::from(&config).open(sleep)? else {
         return Ok(stages.counters());
     };
     let mut robot = Robot {

@@ -7,6 +7,7 @@ use std::{
 
 use gyre_mapping::MapOptions;
 use gyre_ros2_messages::{
+    Domain,
     diagnostic_msgs::DiagnosticArray,
     frames::{self, Frames},
     nav_msgs::OccupancyGrid,
@@ -16,7 +17,7 @@ use gyre_slam::EstimatorKind;
 use gyre_stage::{StageError, clock, wake::Signals};
 
 use crate::{
-    Domain, Mounting, NodeError,
+    Mounting, NodeError,
     following::{POLL_INTERVAL, PoseTopics, follow_corrections, follow_poses},
     health::report,
     live_map::follow_maps,

@@ -2,7 +2,7 @@
 //! Navtech radar from its driver.
 //!
 //! Reading order:
-//! 1. `Domain`: domain and network; `node`: a node there, and its topics.
+//! 1. `node`: a node in a domain, and its topics.
 //! 2. `Bridge`: an observer of a run, which publishes it. `following` are its threads,
 //!    `run_state` is their shared state.
 //! 3. `clock`, `Mounting`, `health`, `live_map`: stamps, frames, diagnostics, the map.
@@ -12,7 +12,6 @@
 
 mod bridge;
 mod clock;
-mod domain;
 mod following;
 mod health;
 mod live_map;
@@ -22,6 +21,5 @@ mod run_state;
 pub mod source;
 
 pub use bridge::{Bridge, MapSettings, MapSettingsOf, Settings};
-pub use domain::{Domain, DomainError};
 pub use gyre_ros2_messages::{BadMounting, Mounting, frames::Frames};
 pub use node::NodeError;

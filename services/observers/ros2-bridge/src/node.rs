@@ -1,15 +1,16 @@
 //! A node of ROS 2, and its topics.
 
-use std::time::Duration;
+use std::{net::IpAddr, time::Duration};
 
-use gyre_ros2_messages::Ros2Message;
+use gyre_ros2_messages::{Domain, Ros2Message};
 use ros2_client::{
     Context, MessageTypeName, Name, NodeName, NodeOptions, QosProfile, Subscription,
+    dds::rustdds::{DomainParticipant, DomainParticipantBuilder},
     qos::{Durability, History, Reliability, WhenFull},
 };
 use thiserror::Error;
 
-use crate::{Domain, outlet::Outlet};
+use crate::outlet::Outlet;
 
 /// The longest wait for slow readers, after which a message is dropped and counted.
 const MAX_WAIT: Duration = Duration::from_millis(100);
@@ -76,6 +77,16 @@ impl Keep {
     }
 }
 
+/// Joins a domain, or returns why not.
+fn join(domain: &Domain) -> Result<DomainParticipant, String> {
+    let builder = DomainParticipantBuilder::new(domain.id());
+    let builder = match domain.interface() {
+        Some(address) => builder.with_only_networks([IpAddr::V4(address)]),
+        None => builder,
+    };
+    builder.build().map_err(|error| error.to_string())
+}
+
 impl Node {
     /// Joins a domain as a node of this name in this namespace, such as `/` or `/robot`.
     ///
@@ -90,7 +101,7 @@ impl Node {
             name: format!("{namespace} {name}"),
             reason: error.to_string(),
         })?;
-        let participant = domain.join().map_err(failed)?;
+        let participant = join(domain).map_err(failed)?;
         let context = Context::from_domain_participant(participant)
             .map_err(|error| failed(error.to_string()))?;
         let options = NodeOptions::new()

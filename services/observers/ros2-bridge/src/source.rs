@@ -10,9 +10,8 @@ mod wakeups;
 use std::time::Duration;
 
 use gyre_colossus::Constants;
+use gyre_ros2_messages::Domain;
 use gyre_stage::{Launch, StageCounters, StageError, source};
-
-use crate::Domain;
 
 pub use ask::{AskError, ask};
 pub use gyre_live_radar::Sizes;

@@ -7,12 +7,12 @@ use std::{
 };
 
 use gyre_colossus::{
-    BadConfiguration, Configuration, Damage, Event, Message, Request, SweepAssembler,
+    Address, BadConfiguration, Configuration, Damage, Event, Message, Request, SweepAssembler,
 };
 use gyre_radar::ScanLimits;
 use thiserror::Error;
 
-use crate::{Address, Settings, connection::RadarSocket};
+use crate::{Settings, connection::RadarSocket};
 
 /// The longest wait for an answer.
 const MAX_WAIT: Duration = Duration::from_secs(5);

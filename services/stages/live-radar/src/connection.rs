@@ -9,10 +9,10 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_colossus::{Request, write_request};
+use gyre_colossus::{Address, Request, write_request};
 use rustix::net::{AddressFamily, SocketFlags, SocketType, bind, socket_with, sockopt};
 
-use crate::{Address, Settings, parser::RadarParser};
+use crate::{Settings, parser::RadarParser};
 
 /// The longest time for an attempt to connect.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(1);
@@ -213,12 +213,17 @@ impl Drop for Connection {
 /// An open connection, or the socket that receives datagrams.
 #[derive(Debug)]
 pub enum RadarSocket {
+    /// A connection by TCP.
     Tcp(TcpStream),
+    /// A socket that receives datagrams.
     Udp(UdpSocket),
 }
 
 impl RadarSocket {
     /// Connects and sends requests, or begins to receive.
+    ///
+    /// # Errors
+    /// The radar cannot be reached.
     pub fn open(address: &Address, requests: &[Request]) -> io::Result<Self> {
         match address {
             Address::Tcp(address) => connect(address, requests).map(Self::Tcp),

@@ -1,14 +1,11 @@
 //! The source stage of a live radar: receives azimuths by Navtech's protocol Colossus (TCP), or as
 //! ASTERIX CAT-240 by UDP, and publishes each sweep on `scan`, written directly into shared memory.
-//! [`server`] is the other end: it plays a recording as a radar.
 //!
 //! Reading order: `radar` (the sensor), `connection` and `parser` (bytes to messages), [`Intake`]
 //! and `scan_assembly` (azimuths to scans), `turn_counter` (turns without a scan), `read_delay`
 //! (the time at which a scan was complete).
 
-mod address;
 mod ask;
-pub mod capture;
 mod connection;
 mod health_log;
 mod intake;
@@ -16,20 +13,18 @@ mod parser;
 mod radar;
 mod read_delay;
 mod scan_assembly;
-pub mod server;
 mod turn_counter;
 
 use std::time::Duration;
 
-use gyre_colossus::Constants;
+use gyre_colossus::{Address, Constants};
 use gyre_stage::{Launch, StageCounters, StageError, source};
 
-pub use address::{Address, BadAddress};
 pub use ask::{AskError, Sizes, ask};
+pub use connection::RadarSocket;
 pub use gyre_colossus::PORT;
 pub use intake::{Intake, NoScans};
-
-use parser::RadarParser;
+pub use parser::RadarParser;
 
 /// The address of a radar, and the properties that it does not send.
 #[derive(Clone, Debug, PartialEq)]

@@ -3,23 +3,22 @@
 //!
 //! [`run`] opens a recording; [`play`] plays any dataset.
 
-mod config;
 mod listing;
 mod player;
 mod turns;
 
-use std::{error::Error, num::NonZeroUsize, ops::Range, path::Path};
+use std::{error::Error, num::NonZeroUsize, ops::Range, path::Path, time::Duration};
 
 use gyre_messages::{ScanHeader, StageId};
 use gyre_radar::{Dataset, DatasetOptions};
+use gyre_run::{PlayedFrom, SourceConfig};
 use gyre_stage::{
     Launch, Source, StageCounters, StageError,
-    source::{self, Unreadable},
+    source::{self, Tolerance, Unreadable},
 };
 
-pub use config::{SourceConfig, SourceKind};
 pub use listing::Listing;
-pub use player::{PlayedFrom, Player, play_recorded};
+pub use player::{Player, play_recorded};
 use turns::Turns;
 
 /// A playback with a longer delay is reported, s.
@@ -49,9 +48,17 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     // options too: a dataset.toml that is changed during a run does not change the run.
     let root = &launch.manifest.root;
     let open = || open(root, &config, &options).map_err(|error| error.to_string());
-    match source::open(launch, &config.tolerance(), open)? {
+    match source::open(launch, &tolerance(&config), open)? {
         Some(dataset) => play(launch, dataset, Pace::Sensor),
         None => Ok(StageCounters::default()),
+    }
+}
+
+/// Returns the limits on input that cannot be read.
+pub fn tolerance(config: &SourceConfig) -> Tolerance {
+    Tolerance {
+        retry: Duration::try_from_secs_f64(config.retry_s).unwrap_or(Duration::MAX),
+        max_unreadable: config.max_unreadable,
     }
 }
 
@@ -86,7 +93,7 @@ pub fn play(
         dataset,
         pace,
     };
-    let counters = source::run(launch, &mut replay, &config.tolerance())?;
+    let counters = source::run(launch, &mut replay, &tolerance(&config))?;
     let slipped_s = counters.slipped_ns as f64 * 1e-9;
     if slipped_s > NOTABLE_SLIP_S {
         tracing::warn!(slipped_s, "the simulation did not keep up with the rate");

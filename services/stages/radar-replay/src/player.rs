@@ -3,60 +3,11 @@
 use std::ops::Range;
 
 use gyre_recording::Recording;
+use gyre_run::SourceConfig;
 use gyre_stage::{
     Launch, StageCounters, StageError,
     source::{Recorded, RecordedMessage, run_player},
 };
-use serde::{Deserialize, Serialize};
-
-use crate::SourceConfig;
-
-/// The topic that a recording is played from: the stages that compute it and what is before it are
-/// absent.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
-)]
-#[serde(rename_all = "kebab-case")]
-pub enum PlayedFrom {
-    /// Scans: all stages compute.
-    #[default]
-    Scan,
-    /// Masked scans.
-    Masked,
-    /// Rotations, beside masked scans.
-    Rotation,
-    /// Searched motions, beside masked scans.
-    Motion,
-    /// Refined motions.
-    Refined,
-}
-
-impl PlayedFrom {
-    /// The name of the topic.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Scan => "scan",
-            Self::Masked => "masked",
-            Self::Rotation => "rotation",
-            Self::Motion => "motion",
-            Self::Refined => "refined",
-        }
-    }
-
-    /// Returns the topics that the stages after it read. `reads_masked`: the last stage reads
-    /// masked scans, for the keyframes of SLAM.
-    pub fn topics(self, refines: bool, reads_masked: bool) -> Vec<&'static str> {
-        match self {
-            Self::Scan => vec!["scan"],
-            Self::Masked => vec!["masked"],
-            Self::Rotation => vec!["masked", "rotation"],
-            Self::Motion if refines || reads_masked => vec!["masked", "motion"],
-            Self::Motion => vec!["motion"],
-            Self::Refined if reads_masked => vec!["masked", "refined"],
-            Self::Refined => vec!["refined"],
-        }
-    }
-}
 
 /// Plays the recording of the section `[source]` from its topic on, until SIGTERM.
 ///

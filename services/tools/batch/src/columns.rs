@@ -132,7 +132,7 @@ fn driven(path: &Path) -> Result<(f64, f64), BatchError> {
 
 /// Returns the first digits of the build that began the run.
 fn build(out: &Path) -> Result<Option<String>, BatchError> {
-    let text = optional_text(&out.join(gyre_stage::run::BEGUN_WITH))?;
+    let text = optional_text(&out.join(gyre_run::BEGUN_WITH))?;
     let identity: Option<toml::Table> = text.and_then(|text| text.parse().ok());
     let build = identity
         .as_ref()

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use gyre_stage::run::COMPLETE;
+use gyre_run::COMPLETE;
 use serde::{Deserialize, Serialize};
 
 use crate::{

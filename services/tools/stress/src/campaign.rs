@@ -3,16 +3,16 @@
 use std::{sync::Arc, thread, time::Duration};
 
 use gyre_messages::StageId;
+use gyre_run::{Limits, RADAR_HZ, Scenario};
 use gyre_stage::run::{free_shared_memory, sweep};
 
 use crate::{
-    Limits, Report, StressError, TestedPipeline,
-    budget::Check,
+    Report, StressError, TestedPipeline,
+    check::Check,
     copying,
     fault::{self, FaultKind},
     pipeline::{Measured, Setup, measure},
     report::{Figures, ScenarioOutcome, Step, Verdict},
-    scenario::{RADAR_HZ, Scenario},
     search::{Found, Steps, largest, step_duration},
     work::Work,
 };

@@ -6,7 +6,8 @@
 //!
 //! Reading order:
 //!
-//! 1. [`scenario`]: the scenarios; [`budget`]: their limits.
+//! 1. [`Scenario`] and `Budget` of `gyre-run`: the scenarios and their limits; [`check`]: the
+//!    verdict.
 //! 2. [`stress`] (in `campaign.rs`): one scenario after the other; [`pipeline`]: one run from its
 //!    start to its end.
 //! 3. [`record`]: poses in, distributions out; drops are samples too.
@@ -16,8 +17,8 @@
 //! 6. [`copying`]: the transport beside copies through sockets.
 //! 7. [`report`]: `report.json`, `report.md` and the plots, all of one [`Report`].
 
-pub mod budget;
 mod campaign;
+pub mod check;
 pub mod copying;
 mod error;
 pub mod fault;
@@ -29,16 +30,14 @@ pub mod pipeline;
 pub mod processes;
 pub mod record;
 pub mod report;
-pub mod scenario;
 mod search;
 mod tested;
 mod work;
 
-pub use budget::{Budget, Limits};
 pub use campaign::{Options, stress};
 pub use error::StressError;
+pub use gyre_run::Scenario;
 pub use help::help;
 pub use report::{Provenance, Report};
-pub use scenario::Scenario;
 pub use tested::{MessageKind, TestedPipeline};
 pub use work::Work;

@@ -11,6 +11,7 @@ use std::{
 };
 
 use gyre_messages::{Footprint, Pose, PoseHeader, StageId};
+use gyre_run::Scenario;
 use gyre_stage::{
     clock,
     observer::{Next, Observer},
@@ -24,7 +25,6 @@ use crate::{
     processes::Sampler,
     record::Recorder,
     report::Figures,
-    scenario::Scenario,
     tested::TestedPipeline,
     work::Work,
 };

@@ -3,8 +3,7 @@
 use std::{path::PathBuf, time::Duration};
 
 use gyre_messages::StageId;
-
-use crate::budget::Budget;
+use gyre_run::Budget;
 
 /// The pipeline that is tested.
 #[derive(Clone, Debug)]

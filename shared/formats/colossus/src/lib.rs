@@ -15,6 +15,7 @@
 //! [`Request::StartFft`], and the radar sends azimuths until [`Request::StopFft`]. A radar has at
 //! most three clients.
 
+mod address;
 pub mod asterix;
 pub mod clock;
 pub mod configuration;
@@ -28,6 +29,7 @@ mod protobuf;
 pub mod sweep;
 pub mod write;
 
+pub use address::{Address, BadAddress};
 pub use asterix::{Datagrams, MalformedDatagram};
 pub use clock::{ByteOrder, ClockFormat, FoundClock, RadarClock, SplitUnit};
 pub use configuration::{BadConfiguration, Configuration};

@@ -4,6 +4,8 @@
 //! at the first scan, and `map` is where loops have corrected it to be. All follow REP-103, as
 //! Gyre's own frames do, so that no axis is turned.
 
+use std::str::FromStr;
+
 use gyre_geometry::{Pose, Twist, UncertainMotion, pose as planar, xy_yaw};
 use nalgebra::{Matrix3, Rotation2, Vector2};
 
@@ -33,6 +35,31 @@ pub struct Frames {
     pub base: String,
     /// The radar's frame.
     pub radar: String,
+}
+
+impl FromStr for Frames {
+    type Err = String;
+
+    /// Parses four names, as in `map,odom,base_link,radar`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let names: Vec<String> = text.split(',').map(|name| name.trim().to_owned()).collect();
+        let is_name = |name: &String| !name.is_empty() && !name.starts_with('/');
+        match <[String; 4]>::try_from(names) {
+            Ok(names) if names.iter().all(is_name) => {
+                let [map, odom, base, radar] = names;
+                Ok(Self {
+                    map,
+                    odom,
+                    base,
+                    radar,
+                })
+            }
+            _ => Err(
+                "four names without `/` before them are needed, as in map,odom,base_link,radar"
+                    .to_owned(),
+            ),
+        }
+    }
 }
 
 impl Default for Frames {
@@ -199,6 +226,24 @@ mod tests {
     use std::f64::consts::FRAC_PI_2;
 
     use super::*;
+
+    #[test]
+    fn frames_are_four_names() {
+        let frames = Frames {
+            base: "car/base".to_owned(),
+            radar: "radar_top".to_owned(),
+            ..Frames::default()
+        };
+        assert_eq!("map, odom,car/base,radar_top".parse(), Ok(frames));
+        for text in [
+            "",
+            "map,odom,base_link",
+            "map,odom,,radar",
+            "/map,odom,base_link,radar",
+        ] {
+            assert!(text.parse::<Frames>().is_err(), "{text}");
+        }
+    }
 
     fn uncertain(motion: Pose, covariance: Matrix3<f64>) -> UncertainMotion {
         UncertainMotion { motion, covariance }

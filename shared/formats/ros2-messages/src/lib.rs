@@ -4,6 +4,7 @@
 //! - [`Definition`]: names and fields of a type, and the text of its schema;
 //! - a module for each ROS package: [`nav_msgs`], [`tf2_msgs`], [`navtech_msgs`] and those that
 //!   they consist of;
+//! - [`Domain`]: where on the network;
 //! - [`encode`], [`decode`]: messages as CDR;
 //! - [`frames`]: poses and motions of Gyre as odometry and transforms;
 //! - [`radar`]: Navtech's messages as azimuths of [`gyre_colossus`], and scans as Navtech's
@@ -13,6 +14,7 @@ pub mod builtin_interfaces;
 mod cdr;
 mod definition;
 pub mod diagnostic_msgs;
+mod domain;
 pub mod frames;
 pub mod geometry_msgs;
 pub mod messages;
@@ -26,4 +28,5 @@ pub mod tf2_msgs;
 
 pub use cdr::{BadMessage, decode, encode};
 pub use definition::{Definition, Ros2Message};
+pub use domain::{Domain, DomainError};
 pub use mounting::{BadMounting, Mounting};

@@ -57,6 +57,16 @@ pub enum CalibrationError {
     /// Places that are seen again cannot be looked for.
     #[error("revisits cannot be found: {0}")]
     Revisits(#[from] ClosingError<Infallible>),
+    /// A length that cannot be that of the path.
+    #[error(
+        "--distance-m is {distance_m:.1}, but the path of the scans is {path_m:.1} m: give the length of this drive, from its first scan to its last"
+    )]
+    Distance {
+        /// The given length, m.
+        distance_m: f64,
+        /// The length of the path by odometry, m.
+        path_m: f64,
+    },
     /// The refinement's configuration.
     #[error(transparent)]
     Refinement(#[from] ConfigError),

@@ -15,25 +15,33 @@
 //! - `revisits`, `drift`: places that are seen again, and what the drift between them says about
 //!   the eccentricity;
 //! - [`calibrate`]: the method;
-//! - [`Mounting`], [`OwnReflections`]: what follows from the track and from the scans directly.
+//! - [`Mounting`], [`OwnReflections`]: what follows from the track and from the scans directly;
+//! - [`Found`]: the constants beside the configured ones, with what each rests on; [`toml()`]: as a section of a configuration;
+//!   [`svg`]: a place seen twice, before and after.
 
 mod calibrate;
 mod drift;
 mod drive;
 mod facts;
+mod found;
 mod image;
 mod mounting;
 mod overlap;
 mod own_reflections;
 mod pair;
+mod picture;
 mod revisits;
+mod section;
 
 pub use calibrate::{Calibration, CalibrationError, FactEstimate, calibrate};
 pub use drive::{Drive, Sweep, Track};
 pub use facts::{FACTS, Fact, FactMatrix, FactVector};
+pub use found::{Configured, Found};
 pub use mounting::Mounting;
 pub use own_reflections::OwnReflections;
+pub use picture::svg;
 pub use revisits::Revisit;
+pub use section::toml;
 
 /// A number with its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -27,6 +27,7 @@
 //! Those of [`gyre_geometry`]. The map frame is that of the poses. Rows of pictures run from the
 //! highest y to the lowest, columns from the lowest x to the highest.
 
+mod drawing;
 mod evidence;
 mod export;
 mod georeference;
@@ -41,6 +42,7 @@ mod strips;
 mod tile;
 mod view;
 
+pub use drawing::Drawing;
 pub use evidence::Evidence;
 pub use export::{Grid, grid, write_geotiff, write_pgm, write_web_tiles};
 pub use georeference::{Origin, OriginError};

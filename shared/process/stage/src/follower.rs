@@ -117,7 +117,7 @@ impl<M: Message> Flow<M> {
         let mut step = follower.step()?;
         if let Step::Worked(message) = &mut step {
             let (finished_ns, allocated) = (clock::now_ns(), allocations::so_far() - allocated);
-            self.counters.record(allocated, finished_ns - started_ns);
+            crate::counters::record(&mut self.counters, allocated, finished_ns - started_ns);
             if let Some(header) = message.take() {
                 self.publish(header)?;
             }

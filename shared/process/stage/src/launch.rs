@@ -21,7 +21,7 @@ use serde::de::DeserializeOwned;
 use tracing::span::EnteredSpan;
 
 use crate::{
-    Manifest, StageCounters, StageError,
+    Manifest, StageCounters, StageError, counters,
     heartbeat::HeartbeatWriter,
     run,
     transport::Node,
@@ -211,7 +211,7 @@ pub fn main(
     let result = Launch::from_environment(name).and_then(|launch| {
         tracing::debug!(pid = std::process::id(), "started");
         let counters = work(&launch)?;
-        counters.write(&launch.manifest, name)
+        counters::write(&counters, &launch.manifest, name)
     });
     match result {
         Ok(()) => ExitCode::SUCCESS,

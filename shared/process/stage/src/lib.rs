@@ -2,7 +2,7 @@
 //!
 //! Reading order:
 //!
-//! 1. [`run`]: the manifest that a process reads, and the files of a run; [`lock`]: locks of files.
+//! 1. [`run`]: the manifest that a process reads, and the files of a run.
 //! 2. [`launch`]: how a process starts and ends: configuration, log, signals, exit codes.
 //! 3. `transport`: the boundary of iceoryx2; [`writer`], [`reader`]: publisher and subscriber of a
 //!    topic, with the handshake that gives a new reader the history.
@@ -30,7 +30,7 @@
 mod allocations;
 pub mod clock;
 pub mod control;
-mod counters;
+pub mod counters;
 pub mod elsewhere;
 mod error;
 pub mod follower;
@@ -38,7 +38,6 @@ pub mod hand_over;
 pub mod heartbeat;
 pub mod inputs;
 pub mod launch;
-pub mod lock;
 mod log_id;
 pub mod observer;
 mod outlet;
@@ -59,9 +58,9 @@ pub mod wake;
 pub mod writer;
 
 pub use allocations::CountingAllocator;
-pub use counters::StageCounters;
 pub use error::StageError;
 pub use follower::Follower;
+pub use gyre_run::StageCounters;
 pub use launch::Launch;
 pub use run::Manifest;
 pub use sink::Sink;

@@ -32,11 +32,6 @@ pub(crate) use root::{is_alive, roots, shared_memory_is_full};
 /// The environment variable with the path of the run's root.
 pub const ENVIRONMENT: &str = "GYRE_RUN";
 
-/// The file in the folder of the results that says what the run was begun with, TOML.
-pub const BEGUN_WITH: &str = "journal/run.toml";
-/// The file there that a run leaves when it has all its results. The next run begins anew.
-pub const COMPLETE: &str = "journal/complete";
-
 /// The environment variable of a process that stands by for another one. When it has loaded what it
 /// needs it creates the file `NAME.ready` in the run's root, and it opens its topics when its
 /// standard input ends.

@@ -243,7 +243,8 @@ impl<S: Sink> Integration<'_, S> {
         let hop = motion.item.hop_mut(S::HOP);
         (hop.received_ns, hop.started_ns) = (input.received_ns, started_ns);
         let pose = self.sink.integrate(&motion, input.scan)?;
-        self.counters.record(
+        crate::counters::record(
+            &mut self.counters,
             allocations::so_far() - allocated,
             clock::now_ns() - started_ns,
         );

@@ -122,7 +122,7 @@ impl<S: Stage> Flow<'_, S> {
             published_ns: 0,
         };
         *draft.header().item_mut() = item;
-        self.counters.record(allocated, finished_ns - started_ns);
+        crate::counters::record(&mut self.counters, allocated, finished_ns - started_ns);
         self.send(item.seq, draft)
     }
 

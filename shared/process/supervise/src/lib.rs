@@ -44,10 +44,8 @@ mod watchdog;
 
 pub use child::Death;
 pub use guardian::guard;
+pub use gyre_run::{Ending, Report, RestartPolicy, Scheduling, Swapped};
 pub use log::last_line;
-pub use plan::{
-    Ending, Event, Plan, Report, RestartPolicy, StagePlan, Stall, SuperviseError, Swapped,
-};
+pub use plan::{Event, Plan, StagePlan, Stall, SuperviseError};
 pub use program::Program;
-pub use scheduling::Scheduling;
 pub use supervisor::supervise;

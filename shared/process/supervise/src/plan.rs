@@ -1,17 +1,16 @@
-//! The supervisor's plan, events, report and errors.
+//! The supervisor's plan, events and errors.
 
 use std::{
-    collections::BTreeMap,
     path::{Path, PathBuf},
     time::Duration,
 };
 
 use gyre_messages::PoseHeader;
-use gyre_stage::{Manifest, StageCounters, StageError, follower::Progress};
-use serde::{Deserialize, Serialize};
+use gyre_run::{RestartPolicy, Scheduling};
+use gyre_stage::{Manifest, StageError, follower::Progress};
 use thiserror::Error;
 
-use crate::{child::Death, program::Program, scheduling::Scheduling};
+use crate::{child::Death, program::Program};
 
 /// The plan of a run.
 #[derive(Debug)]
@@ -64,29 +63,6 @@ impl StagePlan {
     pub(crate) fn changed_file(&self) -> Option<&Path> {
         let changed = self.programs.iter().find(|program| !program.is_unchanged());
         changed.map(Program::path)
-    }
-}
-
-/// When to give up on a stage: after `limit` restarts within `window_s`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct RestartPolicy {
-    /// Maximum number of restarts within `window_s`; one more ends the run.
-    pub limit: usize,
-    /// Length of the time window of `limit`, s.
-    pub window_s: f64,
-    /// Delay before the restart of a stage that ended by itself, ms. A killed one is restarted at
-    /// once.
-    pub backoff_ms: u64,
-}
-
-impl Default for RestartPolicy {
-    fn default() -> Self {
-        Self {
-            limit: 5,
-            window_s: 30.0,
-            backoff_ms: 100,
-        }
     }
 }
 
@@ -201,42 +177,6 @@ pub enum Stall {
         /// The time limit.
         limit: Duration,
     },
-}
-
-/// The end of a run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Ending {
-    /// All scans are in the trajectory.
-    Complete,
-    /// Stopped by SIGINT or SIGTERM.
-    Interrupted,
-}
-
-/// The supervisor's report at the end of a run.
-#[derive(Debug)]
-pub struct Report {
-    /// The end of the run.
-    pub ending: Ending,
-    /// Number of restarts by stage.
-    pub restarts: BTreeMap<String, usize>,
-    /// Time from each death to the first pose with work of the new process.
-    pub recovery: Vec<Duration>,
-    /// Counters of the last process of each stage.
-    pub counters: BTreeMap<String, StageCounters>,
-    /// The programs that have taken the place of others, in order.
-    pub swaps: Vec<Swapped>,
-}
-
-/// A program that has taken the place of a stage.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Swapped {
-    /// The name of the stage.
-    pub stage: String,
-    /// The program and its arguments.
-    pub command: Vec<String>,
-    /// Number of poses before.
-    pub after_poses: u64,
 }
 
 /// An error that ends a run.

@@ -1,87 +1,32 @@
-//! The scheduling of a process: its priority, and the processors that it may use.
+//! Applies how the system is to run a process: its priority, and the processors that it may use.
 
 use std::io;
 
+use gyre_run::Scheduling;
 use rustix::{
     process::setpriority_process,
     thread::{CpuSet, sched_setaffinity},
 };
-use serde::{Deserialize, Serialize};
 
-/// The scheduling of a process. A key that is left out leaves what the process inherits.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Scheduling {
-    /// Niceness, -20 (first) to 19 (last). Below 0 it needs CAP_SYS_NICE, or `ulimit -e`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub nice: Option<i32>,
-    /// Priority of the real-time policy SCHED_FIFO, 1 to 99: it runs before all processes without
-    /// one. It needs CAP_SYS_NICE, or `ulimit -r`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub realtime_priority: Option<u8>,
-    /// Processors that it may use, from 0. Default: all.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub cpus: Vec<usize>,
-    /// True to keep its memory from being paged out. It needs CAP_IPC_LOCK, or `ulimit -l`. A
-    /// replacement has to do that itself.
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
-    pub lock_memory: bool,
+/// Returns what a new process can apply to itself between fork and exec.
+pub(super) fn prepare(scheduling: &Scheduling) -> Prepared {
+    let mut set = CpuSet::new();
+    scheduling.cpus.iter().for_each(|cpu| set.set(*cpu));
+    Prepared {
+        cpus: (!scheduling.cpus.is_empty()).then_some(set),
+        nice: scheduling.nice,
+        realtime_priority: scheduling.realtime_priority,
+    }
 }
 
-impl Scheduling {
-    /// Returns this one, with the keys of `other` that it leaves out.
-    #[must_use]
-    pub fn or(&self, other: &Self) -> Self {
-        Self {
-            nice: self.nice.or(other.nice),
-            realtime_priority: self.realtime_priority.or(other.realtime_priority),
-            cpus: match self.cpus.is_empty() {
-                true => other.cpus.clone(),
-                false => self.cpus.clone(),
-            },
-            lock_memory: self.lock_memory || other.lock_memory,
-        }
-    }
-
-    /// Checks the ranges of the values.
-    ///
-    /// # Errors
-    /// The key and the range, as the end of a sentence that begins with the section.
-    pub fn validate(&self) -> Result<(), String> {
-        if self.nice.is_some_and(|nice| !(-20..=19).contains(&nice)) {
-            return Err("scheduling.nice must be from -20 to 19".to_owned());
-        }
-        let is_priority = |priority| (1..=99).contains(&priority);
-        if self.realtime_priority.is_some_and(|p| !is_priority(p)) {
-            return Err("scheduling.realtime_priority must be from 1 to 99".to_owned());
-        }
-        if self.cpus.iter().any(|cpu| *cpu >= CpuSet::MAX_CPU) {
-            let last = CpuSet::MAX_CPU - 1;
-            return Err(format!("scheduling.cpus must be from 0 to {last}"));
-        }
-        Ok(())
-    }
-
-    /// Returns what a new process can apply to itself between fork and exec.
-    pub(crate) fn prepare(&self) -> Prepared {
-        let mut set = CpuSet::new();
-        self.cpus.iter().for_each(|cpu| set.set(*cpu));
-        Prepared {
-            cpus: (!self.cpus.is_empty()).then_some(set),
-            nice: self.nice,
-            realtime_priority: self.realtime_priority,
-        }
-    }
-
-    /// Returns a key with its value, for a sentence.
-    pub(crate) fn describe(&self, key: Key) -> String {
-        match key {
-            Key::Cpus => format!("cpus = {:?}", self.cpus),
-            Key::Nice => format!("nice = {}", self.nice.unwrap_or_default()),
-            Key::RealtimePriority => {
-                let priority = self.realtime_priority.unwrap_or_default();
-                format!("realtime_priority = {priority}")
-            }
+/// Returns a key with its value, for a sentence.
+pub(super) fn describe(scheduling: &Scheduling, key: Key) -> String {
+    match key {
+        Key::Cpus => format!("cpus = {:?}", scheduling.cpus),
+        Key::Nice => format!("nice = {}", scheduling.nice.unwrap_or_default()),
+        Key::RealtimePriority => {
+            let priority = scheduling.realtime_priority.unwrap_or_default();
+            format!("realtime_priority = {priority}")
         }
     }
 }
@@ -133,44 +78,5 @@ fn set_realtime(priority: u8) -> io::Result<()> {
     match unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &raw const parameters) } {
         0 => Ok(()),
         _ => Err(io::Error::last_os_error()),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used)]
-    use super::*;
-
-    #[test]
-    fn a_stage_s_own_keys_go_before_those_of_the_run() {
-        let run = Scheduling {
-            nice: Some(-5),
-            cpus: vec![0, 1],
-            ..Scheduling::default()
-        };
-        let own = Scheduling {
-            nice: Some(0),
-            ..Scheduling::default()
-        };
-        let both = own.or(&run);
-        assert_eq!((both.nice, both.cpus), (Some(0), vec![0, 1]));
-    }
-
-    #[test]
-    fn values_out_of_range_are_refused() {
-        let with = |nice, realtime_priority, cpus: &[usize]| Scheduling {
-            nice,
-            realtime_priority,
-            cpus: cpus.to_vec(),
-            lock_memory: false,
-        };
-        assert!(with(Some(-20), Some(99), &[0]).validate().is_ok());
-        for wrong in [
-            with(Some(-21), None, &[]),
-            with(None, Some(0), &[]),
-            with(None, None, &[CpuSet::MAX_CPU]),
-        ] {
-            assert!(wrong.validate().is_err(), "{wrong:?}");
-        }
     }
 }

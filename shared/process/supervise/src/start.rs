@@ -14,7 +14,7 @@ use rustix::process::{Signal, getpid, getppid, set_parent_process_death_signal};
 use crate::{
     StagePlan, SuperviseError,
     guardian::{self, Guardian},
-    scheduling::Key,
+    scheduling::{self, Key},
 };
 
 /// Pauses after a failure to start a process for want of processes or memory; the sum is the time
@@ -76,7 +76,7 @@ impl<'a> Starter<'a> {
                 let key = Key::ALL[usize::from(key[0]).min(Key::ALL.len() - 1)];
                 Err(SuperviseError::Scheduling {
                     stage: plan.name.clone(),
-                    what: plan.scheduling.describe(key),
+                    what: scheduling::describe(&plan.scheduling, key),
                     source,
                 })
             }
@@ -108,7 +108,7 @@ impl<'a> Starter<'a> {
             // supervisor, which then stops each stage.
             .process_group(0);
         let (supervisor, guardian) = (getpid(), self.guardian.pipe());
-        let scheduling = plan.scheduling.prepare();
+        let scheduling = scheduling::prepare(&plan.scheduling);
         let prepare = move || {
             set_parent_process_death_signal(Some(Signal::KILL))?;
             guardian.into_iter().for_each(guardian::join);

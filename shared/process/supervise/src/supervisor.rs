@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use gyre_stage::{
-    StageCounters, transport,
+    StageCounters, counters, transport,
     wake::{self, Signals},
 };
 
@@ -215,6 +215,6 @@ impl<'a> Supervisor<'a> {
 fn counters(plan: &Plan) -> BTreeMap<String, StageCounters> {
     let names = plan.stages.iter().map(|stage| &stage.name);
     names
-        .filter_map(|name| Some((name.clone(), StageCounters::of(&plan.manifest, name)?)))
+        .filter_map(|name| Some((name.clone(), counters::read(&plan.manifest, name)?)))
         .collect()
 }

@@ -10,6 +10,7 @@ use std::{
 };
 
 use gyre_messages::{Pose, PoseHeader};
+use gyre_run::Scenario;
 use gyre_stage::{
     StageError,
     control::Control,
@@ -24,7 +25,6 @@ use crate::{
     StressError,
     helper::{self, Helper},
     memory::Taken,
-    scenario::Scenario,
     tested::TestedPipeline,
     work::Work,
 };

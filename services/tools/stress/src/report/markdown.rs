@@ -1,5 +1,7 @@
 //! `report.md`.
 
+use gyre_run::Scenario;
+
 use super::{Figures, Provenance, Report, ScenarioOutcome, Verdict};
 use crate::{
     copying::HandOverCost,
@@ -7,7 +9,6 @@ use crate::{
     memory::Taken,
     processes::Cost,
     record::{Counts, Distribution},
-    scenario::Scenario,
 };
 
 /// A cell without a figure.

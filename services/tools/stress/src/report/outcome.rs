@@ -2,17 +2,17 @@
 
 use std::{collections::BTreeMap, fmt::Write, time::Duration};
 
+use gyre_run::{Judged, Scenario};
 use serde::Serialize;
 
 use super::Step;
 use crate::{
-    budget::Check,
+    check::Check,
     copying::HandOverCost,
     fault::Fault,
     memory::Taken,
     processes::Cost,
     record::{Counts, RunLatency},
-    scenario::{Judged, Scenario},
 };
 
 /// The verdict on a scenario.

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::Figures;
-use crate::{budget::Check, record::Distribution};
+use crate::{check::Check, record::Distribution};
 
 /// A step of a search for the largest load.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -119,7 +119,7 @@ impl<'a> FirstStages<'a> {
             let Some(message) = message else { continue };
             outlet.send(message, item)?;
         }
-        self.counters.record(0, clock::now_ns() - now_ns);
+        crate::counters::record(&mut self.counters, 0, clock::now_ns() - now_ns);
         self.schedule.has_published(item.published)
     }
 

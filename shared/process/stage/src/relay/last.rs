@@ -91,7 +91,7 @@ impl<'a> LastStages<'a> {
     pub fn publish_pose(&mut self, pose: PoseHeader) -> Result<(), StageError> {
         let item = &pose.item;
         let hop = item.hops[StageId::PoseIntegration as usize];
-        self.counters.record(0, hop.finished_ns - hop.started_ns);
+        crate::counters::record(&mut self.counters, 0, hop.finished_ns - hop.started_ns);
         sink::publish(&self.poses, sink::newest(pose), StageId::PoseIntegration)
     }
 

@@ -14,6 +14,7 @@ use std::{
     time::{Duration, Instant},
 };
 
+use gyre_storage::lock::{Attempt, try_lock, try_lock_existing};
 use rustix::{
     fs::{Mode, OFlags, statvfs},
     io::Errno,
@@ -21,11 +22,7 @@ use rustix::{
 };
 use thiserror::Error;
 
-use crate::{
-    StageError, clock,
-    lock::{Attempt, try_lock, try_lock_existing},
-    wake::Signals,
-};
+use crate::{StageError, clock, wake::Signals};
 
 /// The file system of all shared memory.
 pub const SHARED_MEMORY: &str = "/dev/shm";

@@ -183,8 +183,11 @@ impl<S: Source> Playback<'_, S> {
             match self.source.read(position.index, header, bytes) {
                 Ok(()) => {
                     let finished_ns = clock::now_ns();
-                    self.counters
-                        .record(allocations::so_far() - allocated, finished_ns - started_ns);
+                    crate::counters::record(
+                        &mut self.counters,
+                        allocations::so_far() - allocated,
+                        finished_ns - started_ns,
+                    );
                     position.identify(&mut header.item);
                     *header.item.hop_mut(S::HOP) = Hop {
                         received_ns: started_ns,

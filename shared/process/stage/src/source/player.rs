@@ -100,7 +100,7 @@ impl<R: Recorded> Player<'_, R> {
                 output.send(message, item)?;
             }
             self.schedule.has_published(item.published)?;
-            self.counters.record(0, clock::now_ns() - started_ns);
+            crate::counters::record(&mut self.counters, 0, clock::now_ns() - started_ns);
             (seq, last) = (seq + 1, Some(item));
         }
         if self.wait_for_admission(seq, None)? {

@@ -136,7 +136,11 @@ impl Stream<'_> {
                 match arrival {
                     Arrival::Scan => {
                         let allocations = allocations::so_far() - allocated;
-                        self.counters.record(allocations, finished_ns - started_ns);
+                        crate::counters::record(
+                            &mut self.counters,
+                            allocations,
+                            finished_ns - started_ns,
+                        );
                         break started_ns;
                     }
                     Arrival::Nothing(limit) => {

@@ -1,0 +1,152 @@
+//! The processes of a run: `gyre stage NAME` or their replacements, and the recorder.
+
+use std::path::Path;
+
+use gyre_configuration::Configuration;
+use gyre_messages::{FollowerId, StageId};
+use gyre_recorder::RecorderError;
+use gyre_run::{Mode, RecordConfig, Scheduling, Side};
+use gyre_supervise::{Program, StagePlan};
+use gyre_terminal::Failure;
+
+/// Returns the processes to start: `gyre stage NAME`, or their replacements.
+pub fn stage_plans(configuration: &Configuration, gyre: &Path) -> Vec<StagePlan> {
+    let live = configuration.run.mode == Mode::Live;
+    let plan = |name: &str| {
+        let own = configuration.stages.get(name).cloned().unwrap_or_default();
+        let ours = || {
+            vec![
+                gyre.to_string_lossy().into_owned(),
+                "stage".to_owned(),
+                name.to_owned(),
+            ]
+        };
+        // The supervisor keeps its own program; those of others can change under their names.
+        let is_ours = own.command.is_empty() || configuration.is_link(name);
+        let (command, programs) = match is_ours {
+            true => (ours(), Vec::new()),
+            false => (own.command.clone(), Program::all_of(&own.command, None)),
+        };
+        let scheduling = match FollowerId::by_name(name) {
+            Some(_) => own.scheduling,
+            None => own.scheduling.or(&configuration.run.scheduling),
+        };
+        StagePlan {
+            name: name.to_owned(),
+            command,
+            programs,
+            directory: None,
+            scheduling,
+            restart: own.restart,
+            outlives_restarts: live
+                && name == StageId::RadarReplay.name()
+                && !configuration.is_link(name),
+            // Live masking alone knows which scans it admitted, and on a base the link which of them have come.
+            restarts_all: live
+                && (name == StageId::Masking.name()
+                    || (configuration.is_side(Side::Base) && configuration.is_link(name))),
+        }
+    };
+    let stages = StageId::ALL
+        .into_iter()
+        .filter(|stage| configuration.starts(*stage));
+    let window = configuration.window(None, 1);
+    let has_slam = configuration.slam.is_on();
+    let followers = FollowerId::ALL.into_iter();
+    let followers = followers.filter(|it| has_slam && it.is_in(&window));
+    let followers = followers.map(FollowerId::name);
+    stages
+        .map(StageId::name)
+        .chain(followers)
+        .map(plan)
+        .collect()
+}
+
+/// Returns the process that records the run that writes to `out`.
+pub fn recorder(record: &RecordConfig, gyre: &Path, out: &Path) -> Option<StagePlan> {
+    if !record.is_on() {
+        return None;
+    }
+    let text = |path: &Path| path.to_string_lossy().into_owned();
+    let mut command = vec![text(gyre), "record".to_owned(), text(out)];
+    command.extend([
+        "--continues".to_owned(),
+        "--to".to_owned(),
+        text(&record.file),
+    ]);
+    for (option, value) in [
+        ("--split-mb", record.split_mb.to_string()),
+        ("--split-s", record.split_s.to_string()),
+    ] {
+        if value != "0" {
+            command.extend([option.to_owned(), value]);
+        }
+    }
+    if !record.topics.is_empty() {
+        command.extend(["--topics".to_owned(), record.topics.join(",")]);
+    }
+    Some(StagePlan {
+        name: "recorder".to_owned(),
+        command,
+        programs: Vec::new(),
+        directory: None,
+        scheduling: Scheduling::default(),
+        restart: record.restart,
+        outlives_restarts: true,
+        restarts_all: false,
+    })
+}
+
+/// Checks that a run that begins writes over no recording.
+///
+/// # Errors
+/// There is one.
+pub fn require_new(record: &RecordConfig) -> Result<(), Failure> {
+    match record.is_on() && record.file.exists() {
+        true => Err(RecorderError::Exists(record.file.clone()).into()),
+        false => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn from(text: &str) -> Configuration {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("run.toml");
+        std::fs::write(&file, text).unwrap();
+        Configuration::read(&file, &[]).unwrap()
+    }
+
+    #[test]
+    fn one_line_chooses_the_search_and_another_the_refinement() {
+        let names = |text: &str| -> Vec<String> {
+            stage_plans(&from(text), Path::new("gyre"))
+                .into_iter()
+                .map(|plan| plan.name)
+                .collect()
+        };
+        let (source, halves) = (
+            ["radar-replay", "masking"],
+            ["rotation-search", "translation-search"],
+        );
+        let (joint, refined, searched) = (
+            ["joint-search"],
+            ["refinement", "pose-integration"],
+            ["pose-integration"],
+        );
+        assert_eq!(names(""), [&source[..], &halves, &refined].concat());
+        assert_eq!(
+            names("[refinement]\nkind = 'none'"),
+            [&source[..], &halves, &searched].concat()
+        );
+        let exhaustive = "[search]\nkind = 'exhaustive'\n";
+        assert_eq!(names(exhaustive), [&source[..], &joint, &refined].concat());
+        assert_eq!(
+            names(&format!("{exhaustive}[refinement]\nkind = 'none'")),
+            [&source[..], &joint, &searched].concat()
+        );
+    }
+}

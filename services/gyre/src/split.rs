@@ -1,0 +1,115 @@
+//! The link of a run that is split between two machines.
+
+use std::{env, os::unix::process::CommandExt, process::Command};
+
+use gyre_configuration::Configuration;
+use gyre_link::ONE_THREAD;
+use gyre_run::{LinkConfig, Side};
+use gyre_terminal::{Failure, own, print};
+
+#[cfg(feature = "link")]
+pub use gyre_link::{run_base, run_robot};
+
+#[cfg(not(feature = "link"))]
+pub use absent::{run_base, run_robot};
+
+/// Checks that the other side of a split run can be reached as it is configured.
+///
+/// # Errors
+/// One sentence: an endpoint or a certificate that is missing or not allowed, or a build without link.
+pub fn check(configuration: &Configuration) -> Result<(), Failure> {
+    if configuration.link.side.is_none() {
+        return Ok(());
+    }
+    #[cfg(not(feature = "link"))]
+    return Err(absent::ABSENT.into());
+    #[cfg(feature = "link")]
+    gyre_link::Network::from(&configuration.link)
+        .check()
+        .map_err(|error| format!("[link]: {error}").into())
+}
+
+/// Executes the same command again with the environment that the network layer needs, unless it has that already.
+///
+/// # Errors
+/// The program cannot be executed.
+pub fn set_environment() -> Result<(), Failure> {
+    let (name, value) = ONE_THREAD;
+    if env::var_os(name).is_some_and(|set| set == value) {
+        return Ok(());
+    }
+    let failed = Command::new(own())
+        .args(env::args_os().skip(1))
+        .env(name, value)
+        .exec();
+    Err(format!("cannot begin with {name} in the environment: {failed}").into())
+}
+
+/// Says which part of a split run this is.
+pub fn describe(configuration: &Configuration) {
+    let (name, cut) = (&configuration.link.name, configuration.link.cut.name());
+    match configuration.link.side {
+        Some(Side::Robot) => print::note(format_args!(
+            "link {name}: the stages up to `{cut}` are here; scans wait for the base"
+        )),
+        Some(Side::Base) => print::note(format_args!(
+            "link {name}: the stages after `{cut}` are here; they wait for the robot"
+        )),
+        None => {}
+    }
+}
+
+/// Returns the size of the largest scan, bytes, if scans are sent: the robot knows it.
+///
+/// # Errors
+/// The robot cannot be asked.
+pub fn scan_bytes(link: &LinkConfig) -> Result<usize, Failure> {
+    match link.cut {
+        #[cfg(feature = "link")]
+        gyre_run::PlayedFrom::Scan => {
+            let name = &link.name;
+            print::note(format_args!(
+                "link {name}: waiting for the robot, which knows how large its scans are"
+            ));
+            Ok(gyre_link::ask_robot(link)?.bytes)
+        }
+        _ => Ok(0),
+    }
+}
+
+/// Takes the place of the link in a build without it.
+#[cfg(not(feature = "link"))]
+pub mod absent {
+    use std::process::ExitCode;
+
+    use gyre_stage::{Launch, StageCounters, StageError};
+    use gyre_terminal::Failure;
+
+    use crate::{cli::LinkArguments, features::Absent};
+
+    pub(super) const ABSENT: Absent = Absent("zenoh, which links machines");
+
+    /// Refuses to run.
+    ///
+    /// # Errors
+    /// Always.
+    pub fn run_robot(_: &Launch) -> Result<StageCounters, StageError> {
+        Err(ABSENT.into())
+    }
+
+    /// Refuses to run.
+    ///
+    /// # Errors
+    /// Always.
+    pub fn run_base(_: &Launch) -> Result<StageCounters, StageError> {
+        Err(ABSENT.into())
+    }
+
+    /// Refuses to link.
+    ///
+    /// # Errors
+    /// Always.
+    pub fn link(_: &LinkArguments) -> Result<ExitCode, Failure> {
+        Err(ABSENT.into())
+    }
+}

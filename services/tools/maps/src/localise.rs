@@ -1,0 +1,142 @@
+//! `gyre localise`: finds a drive in a map.
+//!
+//! - `scans`: registers scan after scan by odometry in this process;
+//! - `known`: opens the map;
+//! - `fixes`: `fixes.csv`;
+//! - `counts`: what was found, lost and left out.
+
+mod counts;
+pub mod fixes;
+pub mod known;
+mod scans;
+
+use std::{
+    io::IsTerminal,
+    path::PathBuf,
+    process::ExitCode,
+    time::{Duration, Instant},
+};
+
+use clap::Args;
+use gyre_configuration::Configuration;
+use gyre_localisation::{Localiser, Status};
+use gyre_storage::{self as storage, Draft};
+use gyre_terminal::{Failure, print};
+use indicatif::{ProgressBar, ProgressStyle};
+
+use counts::Counts;
+
+pub use scans::{RegisteredScan, Scans};
+
+/// The table of all places.
+const FIXES: &str = "fixes.csv";
+/// Time between two plain lines.
+const EVERY: Duration = Duration::from_secs(2);
+
+/// The arguments of `gyre localise`.
+#[derive(Debug, Args)]
+pub struct LocaliseArguments {
+    /// The configuration, a TOML file: its odometry.
+    pub configuration: PathBuf,
+    /// The folder of the map, of `gyre map --format folder`.
+    #[arg(long)]
+    pub map: PathBuf,
+    /// The recording's folder. Default: the configuration's simulation, or its source.data.
+    #[arg(long)]
+    pub data: Option<PathBuf>,
+    /// The folder of fixes.csv.
+    #[arg(long, default_value = "out/localise")]
+    pub out: PathBuf,
+    /// Override a key, as in source.first=100; may be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+}
+
+/// Localises the scans of a recording in a map, and writes `fixes.csv`.
+///
+/// # Errors
+/// A map or a recording that cannot be used, a file that cannot be written.
+pub fn localise(arguments: &LocaliseArguments) -> Result<ExitCode, Failure> {
+    let configuration = Configuration::read(&arguments.configuration, &arguments.set)?;
+    let configuration = configuration.streaming(arguments.data.as_deref());
+    let mut localiser = known::open(&arguments.map, &configuration)?;
+    let mut scans = Scans::open(&configuration)?;
+    let out = &arguments.out;
+    storage::create_folder(out)?;
+    let mut fixes = Draft::create(&out.join(FIXES))?;
+    let (started, mut counts) = (Instant::now(), Counts::default());
+    let ended = follow(&mut scans, &mut localiser, &mut fixes, &mut counts);
+    fixes.commit()?;
+    storage::sync_folder(out)?;
+    ended?;
+    print::line(counts.summary(scans.left_out()))?;
+    print::line(format_args!(
+        "{:.1} ms a scan; {}",
+        started.elapsed().as_secs_f64() * 1e3 / counts.scans().max(1) as f64,
+        out.join(FIXES).display()
+    ))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Localises all scans. The rows so far are whole when it fails.
+fn follow(
+    scans: &mut Scans,
+    localiser: &mut Localiser,
+    fixes: &mut Draft,
+    counts: &mut Counts,
+) -> Result<(), Failure> {
+    fixes.append(fixes::HEADER)?;
+    let (mut progress, mut row) = (Progress::new(scans.len()), String::new());
+    while let Some(scan) = scans.register_next()? {
+        if scan.starts {
+            localiser.reset();
+        }
+        let found = localiser.locate(&scan.observation);
+        row.clear();
+        fixes::write_row(&scan, &found, localiser.map(), &mut row);
+        fixes.append(&row)?;
+        counts.add(&scan, found.status);
+        progress.show(counts.scans(), found.status);
+    }
+    progress.finish();
+    Ok(())
+}
+
+/// A bar on a terminal, plain lines elsewhere.
+struct Progress {
+    bar: Option<ProgressBar>,
+    scans: usize,
+    last_line: Instant,
+}
+
+impl Progress {
+    fn new(scans: usize) -> Self {
+        let bar = std::io::stderr().is_terminal().then(|| {
+            let style = ProgressStyle::with_template("{bar:32} {pos}/{len} scans  {msg}")
+                .unwrap_or_else(|_| ProgressStyle::default_bar());
+            ProgressBar::new(scans as u64).with_style(style)
+        });
+        Self {
+            bar,
+            scans,
+            last_line: Instant::now(),
+        }
+    }
+
+    fn show(&mut self, done: usize, status: Status) {
+        let name = fixes::status_name(status);
+        if let Some(bar) = &self.bar {
+            bar.set_position(done as u64);
+            bar.set_message(name);
+        } else if self.last_line.elapsed() >= EVERY {
+            print::note(format_args!("{done}/{} scans  {name}", self.scans));
+            self.last_line = Instant::now();
+        }
+    }
+
+    fn finish(self) {
+        if let Some(bar) = self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}

@@ -1,0 +1,41 @@
+//! The map in which scans are localised.
+
+use std::path::Path;
+
+use gyre_configuration::Configuration;
+use gyre_localisation::{Localiser, LocaliserOptions, Map};
+use gyre_terminal::Failure;
+
+/// Opens the map in a folder, and plans localisation in it.
+///
+/// # Errors
+/// A folder without a whole map, a configuration that extracts no points.
+pub fn open(folder: &Path, configuration: &Configuration) -> Result<Localiser, Failure> {
+    let drawn = gyre_mapping::Map::open(folder)?;
+    let map = Map::open(folder)
+        .map_err(|error| format!("{} cannot be localised in: {error}", folder.display()))?;
+    if map.keyframes().len() != drawn.keyframes() {
+        return Err(format!(
+            "{} was drawn from {} keyframes and keeps {}: draw the map again with gyre map",
+            folder.display(),
+            drawn.keyframes(),
+            map.keyframes().len()
+        )
+        .into());
+    }
+    let odometry = &configuration.odometry;
+    if odometry.points.capacity == 0 {
+        return Err(
+            "points.capacity is 0, but scans are localised by their points: it must be 1 or more"
+                .into(),
+        );
+    }
+    let options = LocaliserOptions::default();
+    let capacity = odometry.points.capacity;
+    Ok(Localiser::new(
+        map,
+        options,
+        &odometry.refinement,
+        capacity,
+    )?)
+}

@@ -1,0 +1,124 @@
+//! The scans of a recording, registered by odometry in this process.
+
+use std::ops::Range;
+
+use gyre_configuration::{Configuration, Played, describe_masks};
+use gyre_geometry::Twist;
+use gyre_localisation::Observation;
+use gyre_odometry::{Odometry, Outcome};
+use gyre_radar::{Dataset, OwnedScan};
+use gyre_terminal::{Failure, print};
+
+/// The scans of a recording, one after the other.
+pub struct Scans {
+    dataset: Box<dyn Dataset>,
+    played: Range<usize>,
+    odometry: Odometry,
+    scan: OwnedScan,
+    left_out: usize,
+    /// Scans in a row that were left out, and the most that may be.
+    unreadable: usize,
+    max_unreadable: usize,
+}
+
+/// A scan with its motion.
+pub struct RegisteredScan<'a> {
+    /// The number in the recording.
+    pub number: usize,
+    /// The observation for the localisation.
+    pub observation: Observation<'a>,
+    /// The chain of motions starts with it: nothing is known of the motion since the scan before.
+    pub starts: bool,
+}
+
+impl Scans {
+    /// Opens what a configuration plays.
+    ///
+    /// # Errors
+    /// A recording or a configuration that cannot be used.
+    pub fn open(configuration: &Configuration) -> Result<Self, Failure> {
+        let Played { dataset, .. } = gyre_configuration::open(configuration)?;
+        describe_masks(configuration)?.iter().for_each(print::note);
+        Ok(Self {
+            played: configuration.source.played(dataset.as_ref()),
+            odometry: Odometry::new(&configuration.odometry)?,
+            scan: OwnedScan::with_limits(dataset.limits()),
+            left_out: 0,
+            unreadable: 0,
+            max_unreadable: configuration.source.max_unreadable,
+            dataset,
+        })
+    }
+
+    /// Returns the number of scans that are left.
+    pub fn len(&self) -> usize {
+        self.played.len()
+    }
+
+    /// Returns whether no scan is left.
+    pub fn is_empty(&self) -> bool {
+        self.played.is_empty()
+    }
+
+    /// Returns the number of scans that could not be used.
+    pub fn left_out(&self) -> usize {
+        self.left_out
+    }
+
+    /// Registers the next scan that can be read; `None` after the last one.
+    ///
+    /// # Errors
+    /// More scans in a row that cannot be used than the configuration allows.
+    pub fn register_next(&mut self) -> Result<Option<RegisteredScan<'_>>, Failure> {
+        while let Some(number) = self.played.next() {
+            let registered = match self.dataset.read(number, self.scan.slot()) {
+                Ok(geometry) => {
+                    self.scan.geometry = geometry;
+                    let registered = self.odometry.register(&self.scan.view());
+                    registered.map_err(|error| format!("scan {number}: {error}"))
+                }
+                Err(error) => Err(error.to_string()),
+            };
+            let registered = match registered {
+                Ok(registered) => registered,
+                Err(reason) => {
+                    self.leave_out(&reason)?;
+                    continue;
+                }
+            };
+            self.unreadable = 0;
+            let starts = registered.outcome == Outcome::Start;
+            let interval_s = registered.interval_ns as f64 * 1e-9;
+            let twist = match starts {
+                true => Twist::default(),
+                false => Twist::from_chord(&registered.motion.motion, interval_s),
+            };
+            let observation = Observation {
+                stamp_ns: self.scan.geometry.stamp_ns,
+                points: self.odometry.points(),
+                twist,
+                motion: registered.motion.alone(),
+            };
+            return Ok(Some(RegisteredScan {
+                number,
+                observation,
+                starts,
+            }));
+        }
+        Ok(None)
+    }
+
+    fn leave_out(&mut self, reason: &str) -> Result<(), Failure> {
+        self.left_out += 1;
+        self.unreadable += 1;
+        if self.unreadable > self.max_unreadable {
+            return Err(format!(
+                "{} scans in a row cannot be used (source.max_unreadable), the last one: {reason}",
+                self.unreadable
+            )
+            .into());
+        }
+        print::note(format_args!("left out: {reason}"));
+        Ok(())
+    }
+}

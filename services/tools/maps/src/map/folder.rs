@@ -1,0 +1,150 @@
+//! The folder of a map, which is replaced as a whole.
+
+use std::{
+    fs, io,
+    path::{Path, PathBuf},
+};
+
+use gyre_localisation::Map;
+use gyre_mapping::{Evidence, Origin, require_tiles_only, write_map};
+use gyre_slam::{Keyframe, Record};
+use gyre_storage::{self as storage, StorageError};
+use gyre_terminal::Failure;
+
+/// The next map while it is written, in the folder of the map.
+const NEXT: &str = ".next";
+/// The earlier map while the next one takes its place.
+const EARLIER: &str = ".earlier";
+/// Without the first nothing can be localised in the folder, and without the second it is not a
+/// map: they go first and come last.
+const MARKS: [&str; 2] = [Keyframe::FILE, "map.toml"];
+
+/// Writes a map and its keyframes into `out`. A map that is there stays as it is until the new one
+/// is complete, and takes as much of the disk until then; pictures and exports stay. It survives a
+/// power failure when this returns.
+///
+/// # Errors
+/// A folder that cannot be written, or has other content than a map.
+pub fn write(
+    out: &Path,
+    keyframes: &Map,
+    evidence: &mut Evidence,
+    origin: Option<Origin>,
+) -> Result<(), Failure> {
+    require_tiles_only(out)?;
+    replace(out, |next| {
+        keyframes.save(next)?;
+        let made_by = concat!("gyre ", env!("CARGO_PKG_VERSION"));
+        Ok(write_map(next, evidence, origin, made_by)?)
+    })
+}
+
+/// Lets `write` fill a folder, whose files and folders then take the place of those of the same
+/// names in `out`. A process that is killed between these renames leaves no map.
+fn replace(out: &Path, write: impl FnOnce(&Path) -> Result<(), Failure>) -> Result<(), Failure> {
+    let [next, earlier] = [NEXT, EARLIER].map(|name| out.join(name));
+    // A process that was killed leaves them.
+    for folder in [&next, &earlier] {
+        remove(folder)?;
+        storage::create_folder(folder)?;
+    }
+    let written = write(&next);
+    if written.is_ok() {
+        swap(out, &next, &earlier)?;
+    }
+    remove(&next)?;
+    remove(&earlier)?;
+    written
+}
+
+/// Moves what `next` has to `out`, and what `out` has of the same names to `earlier`.
+fn swap(out: &Path, next: &Path, earlier: &Path) -> Result<(), StorageError> {
+    storage::sync_folder(next)?;
+    let names = names(next)?;
+    for name in names.iter().rev().filter(|name| out.join(name).exists()) {
+        rename(&out.join(name), &earlier.join(name))?;
+    }
+    storage::sync_folder(out)?;
+    for name in &names {
+        rename(&next.join(name), &out.join(name))?;
+    }
+    storage::sync_folder(out)
+}
+
+/// Returns the names in a folder, the marks last.
+fn names(folder: &Path) -> Result<Vec<PathBuf>, StorageError> {
+    let entries = fs::read_dir(folder).and_then(|entries| {
+        let name = |entry: io::Result<fs::DirEntry>| Ok(entry?.file_name().into());
+        entries.map(name).collect::<io::Result<Vec<PathBuf>>>()
+    });
+    let mut names = entries.map_err(StorageError::at("read", folder))?;
+    names.sort_by_key(|name| MARKS.iter().position(|mark| name == Path::new(mark)));
+    Ok(names)
+}
+
+fn rename(from: &Path, to: &Path) -> Result<(), StorageError> {
+    fs::rename(from, to).map_err(StorageError::at("write", to))
+}
+
+fn remove(folder: &Path) -> Result<(), StorageError> {
+    match fs::remove_dir_all(folder) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        removed => removed.map_err(StorageError::at("remove", folder)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn content(folder: &Path, name: &str) -> String {
+        fs::read_to_string(folder.join(name)).unwrap()
+    }
+
+    fn write_all(folder: &Path, text: &str) {
+        fs::create_dir_all(folder.join("tiles")).unwrap();
+        for name in ["tiles/0_0.png", "keyframes.log", "map.toml"] {
+            fs::write(folder.join(name), text).unwrap();
+        }
+    }
+
+    #[test]
+    fn an_earlier_map_stays_whole_until_the_next_one_is_complete() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path();
+        write_all(out, "earlier");
+        fs::write(out.join("map.png"), "a picture").unwrap();
+        let failed = replace(out, |next| {
+            fs::write(next.join("keyframes.log"), "half of").unwrap();
+            Err("a full disk".into())
+        });
+        failed.unwrap_err();
+        for name in ["tiles/0_0.png", "keyframes.log", "map.toml"] {
+            assert_eq!(content(out, name), "earlier");
+        }
+        assert_eq!(names(out).unwrap().len(), 4);
+        fs::create_dir(out.join(NEXT)).unwrap();
+        fs::write(out.join(NEXT).join("keyframes.log"), "of a killed one").unwrap();
+        replace(out, |next| {
+            assert_eq!(names(next).unwrap(), [] as [PathBuf; 0]);
+            write_all(next, "later");
+            Ok(())
+        })
+        .unwrap();
+        for name in ["tiles/0_0.png", "keyframes.log", "map.toml"] {
+            assert_eq!(content(out, name), "later");
+        }
+        assert_eq!(content(out, "map.png"), "a picture");
+        assert_eq!(names(out).unwrap().len(), 4);
+    }
+
+    #[test]
+    fn the_marks_of_a_map_come_last() {
+        let folder = tempfile::tempdir().unwrap();
+        write_all(folder.path(), "");
+        fs::write(folder.path().join("places.index"), "").unwrap();
+        let names = names(folder.path()).unwrap();
+        assert_eq!(names[2..], MARKS.map(PathBuf::from));
+    }
+}

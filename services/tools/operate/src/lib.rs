@@ -1,0 +1,25 @@
+//! The commands that operate running runs: `gyre up`, `down`, `ps`, `logs`, `top`, `restart`, `swap` and `echo`.
+//!
+//! Each asks the supervisor of a run at its control socket ([`gyre_stage::control`]); nothing of a run is looked up elsewhere, but its
+//! logs.
+
+mod arguments;
+mod background;
+mod choice;
+mod echo;
+mod events;
+mod logs;
+mod processes;
+mod programs;
+mod top;
+
+pub use arguments::{
+    LogsArguments, PsArguments, RestartArguments, RunChoice, SwapArguments, TopArguments,
+};
+pub use background::{detach_if_asked, down, up};
+pub use choice::chosen;
+pub use echo::{EchoArguments, echo};
+pub use logs::logs;
+pub use processes::ps;
+pub use programs::{restart, swap};
+pub use top::top;

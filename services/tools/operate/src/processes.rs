@@ -1,0 +1,184 @@
+//! `gyre ps`: the running runs and their processes.
+
+use std::{fmt, process::ExitCode};
+
+use gyre_stage::{
+    control::{Activity, Control, Phase, ProcessStatus, Status},
+    source::Received,
+    usage::Usage,
+};
+use gyre_terminal::{Failure, print};
+use serde::Serialize;
+
+use crate::arguments::PsArguments;
+
+/// A run with what its processes use, in the order of the status.
+#[derive(Serialize)]
+struct Row {
+    status: Status,
+    usage: Vec<Option<Usage>>,
+}
+
+/// Lists the runs of this user.
+///
+/// # Errors
+/// There is no run that writes to `--out`; standard output cannot be written; or, with `--check`,
+/// not all is well.
+pub fn ps(arguments: &PsArguments) -> Result<ExitCode, Failure> {
+    let (mut rows, mut silent) = (Vec::new(), Vec::new());
+    let runs = match &arguments.out {
+        Some(out) => vec![Control::of(out)?],
+        None => Control::of_all(),
+    };
+    for run in runs {
+        match run.status() {
+            Ok(status) => rows.push(Row::of(status)),
+            // It has ended meanwhile, or it hangs.
+            Err(error) => silent.push(error.to_string()),
+        }
+    }
+    if arguments.check {
+        let ills = rows.iter().flat_map(|row| ills(&row.status));
+        silent.extend(ills);
+        return match (rows.is_empty(), silent.is_empty()) {
+            (_, false) => Err(silent.join("; ").into()),
+            (true, true) => Err("no run is running".into()),
+            (false, true) => Ok(ExitCode::SUCCESS),
+        };
+    }
+    for error in silent {
+        print::note(format_args!("gyre: {error}"));
+    }
+    if arguments.json {
+        print::line(serde_json::to_string_pretty(&rows)?)?;
+    } else if rows.is_empty() {
+        print::line("no run is running")?;
+    }
+    if !arguments.json {
+        for row in &rows {
+            print::line(row)?;
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+impl Row {
+    fn of(status: Status) -> Self {
+        let usage = status.processes.iter().map(|it| Usage::of(it.pid));
+        Self {
+            usage: usage.collect(),
+            status,
+        }
+    }
+}
+
+impl fmt::Display for Row {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let status = &self.status;
+        writeln!(f, "{}", status.out.display())?;
+        writeln!(f, "{}", summary(status))?;
+        writeln!(
+            f,
+            "  {:20} {:>8} {:9} {:>8} {:>9} {:>8} {:>9}",
+            "process", "pid", "state", "for", "cpu", "memory", "restarts"
+        )?;
+        for (process, usage) in status.processes.iter().zip(&self.usage) {
+            let usage = usage.unwrap_or_default();
+            writeln!(
+                f,
+                "  {:20} {:>8} {:9} {:>8} {:>7.1} s {:>5.0} MB {:>9}{}",
+                process.name,
+                process.pid,
+                process.activity.name(),
+                process.activity_s.map_or_else(String::new, duration),
+                usage.cpu_s,
+                usage.own_bytes as f64 * 1e-6,
+                process.restarts,
+                remarks(process),
+            )?;
+        }
+        Ok(())
+    }
+}
+
+/// Returns what is wrong with a run, a sentence each.
+fn ills(status: &Status) -> Vec<String> {
+    let out = status.out.display();
+    let is_ill = |activity| matches!(activity, Activity::Silent | Activity::Ended);
+    // Followers end one after the other when the stream has.
+    let ends = status.phase == Phase::Following;
+    let ill = status.processes.iter().filter(|it| is_ill(it.activity));
+    let ill = ill.filter(|it| !(ends && it.activity == Activity::Ended));
+    let ill = ill.map(|it| format!("{out}: {} is {}", it.name, it.activity.name()));
+    let received = status.processes.iter().filter_map(|it| it.received);
+    let deaf = received.filter(|it| !it.is_receiving && status.phase == Phase::Running);
+    let deaf = deaf.map(|it| {
+        let again = it.reconnections();
+        format!("{out}: no azimuths arrive from the radar, {again} reconnections so far")
+    });
+    let starting = (status.phase == Phase::Starting).then(|| format!("{out} is starting"));
+    starting.into_iter().chain(ill).chain(deaf).collect()
+}
+
+/// Returns the state of a run in a line.
+pub fn summary(status: &Status) -> String {
+    let mode = if status.live { "live" } else { "lossless" };
+    let pose = status.last_pose_s.map_or_else(String::new, |age| {
+        format!(", the last {} ago", duration(age))
+    });
+    format!(
+        "{} for {}, {mode}, supervised by {}: {} poses{pose}, {} dropped",
+        status.phase.name(),
+        duration(status.uptime_s),
+        status.pid,
+        status.poses,
+        status.dropped
+    )
+}
+
+/// Returns what is unusual about a process.
+fn remarks(process: &ProcessStatus) -> String {
+    let mut remarks = String::new();
+    if let Some(death) = &process.last_death {
+        remarks += &format!("  died by {death}");
+    }
+    if let Some(missed) = process.missed.filter(|missed| *missed > 0) {
+        remarks += &format!("  missed {missed} messages");
+    }
+    if let Some(received) = &process.received {
+        remarks += &lacks(received);
+    }
+    if process.is_swapped {
+        remarks += &format!("  is `{}`", process.command.join(" "));
+    }
+    remarks
+}
+
+/// Returns what a radar has not delivered.
+pub fn lacks(received: &Received) -> String {
+    let counts = [
+        (received.scans_left_out, "scans left out"),
+        (received.missing_azimuths, "azimuths missing"),
+        (received.damaged_messages, "messages damaged"),
+        (received.foreign_messages, "messages of others"),
+        (received.reconnections(), "reconnections"),
+    ];
+    let counts = counts.into_iter().filter(|(count, _)| *count > 0);
+    let counts: String = counts
+        .map(|(count, of)| format!("  {count} {of}"))
+        .collect();
+    match received.is_receiving {
+        true => counts,
+        false => format!("  no azimuths{counts}"),
+    }
+}
+
+/// Returns a time in two or three digits.
+pub fn duration(seconds: f64) -> String {
+    match seconds {
+        s if s < 0.9995 => format!("{:.0} ms", s * 1e3),
+        s if s < 99.5 => format!("{s:.1} s"),
+        s if s < 5400.0 => format!("{:.0} min", s / 60.0),
+        s => format!("{:.1} h", s / 3600.0),
+    }
+}

@@ -1,0 +1,134 @@
+//! `gyre top`: rates, latencies and processes of a running run in the terminal.
+
+mod look;
+mod screen;
+
+use std::{
+    process::ExitCode,
+    time::{Duration, Instant},
+};
+
+use gyre_stage::{
+    observer::{ObservedRun, Observer},
+    wake::Signals,
+};
+use gyre_terminal::{Failure, print};
+use ratatui::{
+    DefaultTerminal,
+    crossterm::event::{self, Event, KeyCode, KeyEventKind, KeyModifiers},
+};
+
+use crate::{arguments::TopArguments, choice::chosen};
+use look::{Look, Looks};
+
+/// Time between two looks at the queue of poses, which has room for nine.
+const PERIOD: Duration = Duration::from_millis(50);
+
+/// Shows a run until it ends, or until `q` is pressed.
+///
+/// # Errors
+/// There is no such run, it has no place for an observer, or the terminal cannot be used.
+pub fn top(arguments: &TopArguments) -> Result<ExitCode, Failure> {
+    let every = Duration::try_from_secs_f64(arguments.every)
+        .ok()
+        .filter(|every| *every >= PERIOD)
+        .ok_or("--every must be 0.05 s or more")?;
+    let control = chosen(&arguments.run)?;
+    let run = ObservedRun::writing_to(control.out())?;
+    let poses = run.observe()?;
+    let mut looks = Looks::of(control, poses);
+    if arguments.once {
+        // Shares and rates are over the time between two looks.
+        let signals = Signals::install()?;
+        looks.look()?;
+        wait(&mut looks, every, || Ok(signals.sleep(PERIOD)?))?;
+        print::line(screen::text(&looks.look()?))?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let mut terminal = ratatui::try_init()
+        .map_err(|error| format!("the terminal cannot be used: {error}; --once prints text"))?;
+    let shown = show(&mut terminal, &mut looks, every);
+    ratatui::restore();
+    let last = shown?;
+    if let Some(last) = last {
+        print::line(screen::text(&last))?;
+        print::line("the run has ended")?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Returns the last look at a run that has ended; `None` if the person ended it.
+fn show(
+    terminal: &mut DefaultTerminal,
+    looks: &mut Looks<'_>,
+    every: Duration,
+) -> Result<Option<Look>, Failure> {
+    loop {
+        let look = match looks.look() {
+            Ok(look) => look,
+            Err(_) if looks.has_ended() => return Ok(looks.last()),
+            Err(error) => return Err(error),
+        };
+        terminal.draw(|frame| screen::draw(frame, &look))?;
+        let mut resized = false;
+        let quit = || match next_key()? {
+            Key::Quit => Ok(true),
+            Key::Resized => {
+                resized = true;
+                Ok(false)
+            }
+            Key::None => Ok(false),
+        };
+        if wait(looks, every, quit)? {
+            return Ok(None);
+        }
+        if resized {
+            terminal.autoresize()?;
+        }
+    }
+}
+
+/// Takes the poses that come within `time`; true if `quit` says so.
+fn wait(
+    looks: &mut Looks<'_>,
+    time: Duration,
+    mut quit: impl FnMut() -> Result<bool, Failure>,
+) -> Result<bool, Failure> {
+    let since = Instant::now();
+    while since.elapsed() < time {
+        if quit()? {
+            return Ok(true);
+        }
+        looks.take_poses()?;
+    }
+    Ok(false)
+}
+
+enum Key {
+    Quit,
+    Resized,
+    None,
+}
+
+/// Waits a moment for a key.
+fn next_key() -> Result<Key, Failure> {
+    if !event::poll(PERIOD)? {
+        return Ok(Key::None);
+    }
+    Ok(match event::read()? {
+        Event::Key(key) if key.kind == KeyEventKind::Press => {
+            let is_interrupt =
+                key.code == KeyCode::Char('c') && key.modifiers.contains(KeyModifiers::CONTROL);
+            match key.code {
+                KeyCode::Char('q') | KeyCode::Esc => Key::Quit,
+                _ if is_interrupt => Key::Quit,
+                _ => Key::None,
+            }
+        }
+        Event::Resize(..) => Key::Resized,
+        _ => Key::None,
+    })
+}
+
+/// The poses of a run, for [`Looks`].
+type Poses<'run> = Observer<'run, gyre_messages::Pose>;

@@ -1,0 +1,174 @@
+//! A look at a run as a screen, or as text.
+
+use gyre_latency::{HopLatency, Percentiles};
+use gyre_stage::control::{Activity, ProcessStatus, Status};
+use ratatui::{
+    Frame,
+    layout::{Constraint, Layout, Rect},
+    style::{Color, Modifier, Style, Stylize},
+    text::Line,
+    widgets::{Block, Cell, Row, Sparkline, Table},
+};
+
+use super::look::{Look, Use};
+use crate::processes::{duration, lacks, summary};
+
+/// The columns of the table: title and width.
+const COLUMNS: [(&str, u16); 12] = [
+    ("process", 19),
+    ("pid", 8),
+    ("state", 8),
+    ("for", 7),
+    ("cpu", 6),
+    ("work p50", 9),
+    ("p99", 9),
+    ("hop p50", 8),
+    ("p99", 8),
+    ("memory", 7),
+    ("wakes/s", 8),
+    ("restarts", 8),
+];
+
+/// Draws a look.
+pub fn draw(frame: &mut Frame<'_>, look: &Look) {
+    let rows = look.status.processes.len() as u16;
+    let [head, latency, table, foot] = Layout::vertical([
+        Constraint::Length(4),
+        Constraint::Max(12),
+        Constraint::Length(rows + 3),
+        Constraint::Length(1),
+    ])
+    .areas(frame.area());
+    let lines: Vec<Line<'_>> = head_lines(look).into_iter().map(Line::from).collect();
+    let mut title = lines;
+    title[0] = title[0].clone().bold();
+    frame.render_widget(ratatui::text::Text::from(title), head);
+    draw_latency(frame, look, latency);
+    draw_processes(frame, look, table);
+    frame.render_widget(Line::from(" q quit").dim(), foot);
+}
+
+fn draw_latency(frame: &mut Frame<'_>, look: &Look, area: Rect) {
+    let longest = look.history.iter().max().copied().unwrap_or_default();
+    let title = format!(
+        " sensor to pose: the longest of each look, up to {} ",
+        duration(longest as f64 * 1e-6)
+    );
+    let block = Block::bordered().title(title);
+    let width = usize::from(block.inner(area).width);
+    let first = look.history.len().saturating_sub(width);
+    let sparkline = Sparkline::default()
+        .block(block)
+        .data(&look.history[first..])
+        .style(Style::new().fg(Color::Cyan));
+    frame.render_widget(sparkline, area);
+}
+
+fn draw_processes(frame: &mut Frame<'_>, look: &Look, area: Rect) {
+    let style = |process: &ProcessStatus| match process.activity {
+        Activity::Silent | Activity::Ended => Style::new().fg(Color::Red),
+        Activity::Starting => Style::new().fg(Color::Yellow),
+        _ if process.restarts > 0 => Style::new().fg(Color::Yellow),
+        _ => Style::new(),
+    };
+    let rows = look.status.processes.iter().zip(&look.processes);
+    let rows = rows.map(|(process, used)| {
+        let cells = cells(look, process, used).map(Cell::from);
+        Row::new(cells).style(style(process))
+    });
+    let header = Row::new(COLUMNS.map(|(title, _)| title));
+    let widths = COLUMNS.map(|(_, width)| Constraint::Length(width));
+    let table = Table::new(rows, widths)
+        .header(header.style(Style::new().add_modifier(Modifier::BOLD)))
+        .block(Block::bordered().title(" processes "));
+    frame.render_widget(table, area);
+}
+
+/// Returns a look as text.
+pub fn text(look: &Look) -> String {
+    let mut lines = head_lines(look).to_vec();
+    let line = |cells: [String; COLUMNS.len()]| {
+        let cells = cells.iter().zip(COLUMNS);
+        let cells = cells.map(|(cell, (_, width))| format!("{cell:width$}", width = width.into()));
+        cells.collect::<Vec<_>>().join(" ").trim_end().to_owned()
+    };
+    lines.push(line(COLUMNS.map(|(title, _)| title.to_owned())));
+    for (process, used) in look.status.processes.iter().zip(&look.processes) {
+        lines.push(line(cells(look, process, used)));
+    }
+    lines.join("\n")
+}
+
+fn head_lines(look: &Look) -> [String; 4] {
+    let status = &look.status;
+    let in_flight = look
+        .in_flight
+        .map_or_else(|| "unknown".to_owned(), |count| count.to_string());
+    let Percentiles {
+        p50_us,
+        p99_us,
+        max_us,
+        ..
+    } = look.latency.sensor_to_pose;
+    [
+        status.out.display().to_string(),
+        summary(status),
+        format!(
+            "{:.1} scans/s, {in_flight} in flight, {} dropped{}{}",
+            look.rate,
+            status.dropped,
+            missed_by_recorder(status),
+            status
+                .processes
+                .iter()
+                .filter_map(|it| it.received.as_ref())
+                .map(lacks)
+                .collect::<String>()
+        ),
+        format!(
+            "sensor to pose p50 {}, p99 {}, max {} over {} poses of the last 10 s",
+            us(p50_us),
+            us(p99_us),
+            us(max_us),
+            look.latency.scans
+        ),
+    ]
+}
+
+/// Returns what a recorder lacks, if it lacks anything.
+fn missed_by_recorder(status: &Status) -> String {
+    let missed: u64 = status.processes.iter().filter_map(|it| it.missed).sum();
+    match missed {
+        0 => String::new(),
+        missed => format!(", {missed} messages missed by the recorder"),
+    }
+}
+
+fn cells(look: &Look, process: &ProcessStatus, used: &Use) -> [String; COLUMNS.len()] {
+    let latency = look.latency.stages.get(process.name.as_str());
+    let of = |value: fn(&HopLatency) -> Option<f64>| latency.and_then(value).map(us);
+    [
+        process.name.clone(),
+        process.pid.to_string(),
+        process.activity.name().to_owned(),
+        process.activity_s.map(duration).unwrap_or_default(),
+        format!("{:.1} %", 100.0 * used.cpu),
+        of(|it| Some(it.work.p50_us)).unwrap_or_default(),
+        of(|it| Some(it.work.p99_us)).unwrap_or_default(),
+        of(|it| Some(it.transport?.p50_us)).unwrap_or_default(),
+        of(|it| Some(it.transport?.p99_us)).unwrap_or_default(),
+        format!("{:.0} MB", used.own_bytes as f64 * 1e-6),
+        format!("{:.0}", used.wake_ups),
+        process.restarts.to_string(),
+    ]
+}
+
+/// Returns microseconds in three digits or so.
+fn us(us: f64) -> String {
+    match us {
+        us if us < 999.5 => format!("{us:.0} us"),
+        us if us < 9_995.0 => format!("{:.2} ms", us * 1e-3),
+        us if us < 99_950.0 => format!("{:.1} ms", us * 1e-3),
+        us => duration(us * 1e-6),
+    }
+}

@@ -1,0 +1,50 @@
+//! What is to be said of learned masks before they are computed.
+
+use std::error::Error;
+
+use gyre_masking::{MaskKind, backend::Library, model::Card, runtime::INSTALL};
+use gyre_messages::StageId;
+use gyre_odometry::OdometryConfig;
+
+use crate::configuration::Configuration;
+
+/// Returns sentences: which library computes learned masks, and where a configuration differs from the one that its network was
+/// trained for. None without learned masks.
+///
+/// # Errors
+/// A model card that cannot be read, or ONNX Runtime missing where it is required.
+pub fn describe_masks(
+    configuration: &Configuration,
+) -> Result<Vec<String>, Box<dyn Error + Send + Sync>> {
+    let OdometryConfig {
+        masking, raster, ..
+    } = &configuration.odometry;
+    let (MaskKind::Learned, Some(card), true) = (
+        masking.kind,
+        &masking.model,
+        configuration.starts(StageId::Masking),
+    ) else {
+        return Ok(Vec::new());
+    };
+    let card = card.display();
+    let mut sentences = vec![match Library::find(masking)? {
+        Library::OnnxRuntime(path) => {
+            format!(
+                "the masks of {card} are computed by ONNX Runtime, {}",
+                path.display()
+            )
+        }
+        Library::Rten => format!(
+            "the masks of {card} are computed by rten, in one thread; ONNX Runtime is several times faster: \
+             `{INSTALL}` in the folder of Gyre's sources installs it"
+        ),
+    }];
+    let unlike = Card::read(masking)?.training_mismatches(masking, raster);
+    if !unlike.is_empty() {
+        sentences.push(format!(
+            "the masks of {card} may be less accurate than in training: {}",
+            unlike.join(", ")
+        ));
+    }
+    Ok(sentences)
+}

@@ -1,0 +1,93 @@
+//! The scans that a configuration names: a recording, or a simulation that is rendered while it is read.
+
+use gyre_radar::{Dataset, Fingerprint, OpenError};
+use gyre_run::PlayedFrom;
+use gyre_simulator::{SimulatedDrive, SimulatorError};
+use thiserror::Error;
+
+use crate::configuration::Configuration;
+
+/// Why the scans of a configuration cannot be read.
+#[derive(Debug, Error)]
+pub enum SourceError {
+    /// Nothing to play.
+    #[error(
+        "no dataset is named: give its folder with --data, or as source.data in the configuration, or add a section [simulation]"
+    )]
+    NoData,
+    /// A recording is needed.
+    #[error("the configuration is of {radar}, but this needs a recording: name one with --data")]
+    Radar {
+        /// The radar.
+        radar: String,
+    },
+    /// The simulation cannot be rendered.
+    #[error(transparent)]
+    Simulator(#[from] SimulatorError),
+    /// The recording cannot be opened.
+    #[error(transparent)]
+    Open(#[from] OpenError),
+}
+
+/// An open recording or simulation.
+pub struct Played {
+    /// Its scans.
+    pub dataset: Box<dyn Dataset>,
+    /// `ground_truth.tum` of a simulation that is played without being stored.
+    pub truth: Option<Vec<u8>>,
+}
+
+/// Opens the recording or the simulation that is to be played.
+///
+/// # Errors
+/// No dataset is named, or it cannot be opened.
+pub fn open(configuration: &Configuration) -> Result<Played, SourceError> {
+    let (data, options) = (&configuration.source.data, &configuration.dataset);
+    if configuration.is_radar() {
+        return Err(SourceError::Radar {
+            radar: configuration.data(),
+        });
+    }
+    if let Some(simulation) = configuration.streamed() {
+        let drive = SimulatedDrive::new(simulation)?;
+        let truth = Some(drive.ground_truth_tum());
+        return Ok(Played {
+            dataset: drive.open(options)?,
+            truth,
+        });
+    }
+    match data.as_os_str().is_empty() {
+        true => Err(SourceError::NoData),
+        false => Ok(Played {
+            dataset: gyre_recording::open(data, options)?,
+            truth: None,
+        }),
+    }
+}
+
+/// Returns the configuration with the options of the recording's `dataset.toml` where it has none.
+///
+/// # Errors
+/// The file cannot be read.
+pub fn with_stored_options(configuration: &Configuration) -> Result<Configuration, OpenError> {
+    let mut resolved = configuration.clone();
+    let data = &configuration.source.data;
+    if configuration.streamed().is_none() && !data.as_os_str().is_empty() {
+        let stored = gyre_recording::stored_options(data)?;
+        resolved.dataset = resolved.dataset.or(&stored);
+    }
+    Ok(resolved)
+}
+
+/// Returns what tells the recording of a run from another one; `None`: its configuration does.
+///
+/// # Errors
+/// A recording that cannot be opened.
+pub fn fingerprint(configuration: &Configuration) -> Result<Option<Fingerprint>, SourceError> {
+    let plays_scans = configuration.source.from == PlayedFrom::Scan && !configuration.is_radar();
+    if !plays_scans || configuration.streamed().is_some() {
+        return Ok(None);
+    }
+    let played = open(configuration)?;
+    Ok(Some(Fingerprint::of(played.dataset.as_ref())?))
+}

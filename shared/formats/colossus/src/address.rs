@@ -1,0 +1,103 @@
+//! The address at which a radar is received.
+
+use std::{
+    fmt,
+    net::{Ipv4Addr, SocketAddrV4},
+};
+
+use thiserror::Error;
+
+use crate::PORT;
+
+/// The prefix of an address of datagrams.
+const UDP: &str = "udp://";
+
+/// The address at which a radar is received.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Address {
+    /// Host and port of the radar, which is connected to by TCP.
+    Tcp(String),
+    /// The destination of the radar's datagrams.
+    Udp {
+        /// A multicast group, or an address of this machine, and the port.
+        to: SocketAddrV4,
+        /// The address of this machine on the radar's network; unspecified: the system chooses.
+        interface: Ipv4Addr,
+    },
+}
+
+/// An address that cannot be used.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum BadAddress {
+    /// The address is none for datagrams.
+    #[error(
+        "address `{0}` is none for datagrams: give group and port, as in `udp://239.192.43.78:4378`"
+    )]
+    Udp(String),
+    /// The interface is no address of this machine.
+    #[error("interface `{0}` is no IPv4 address: give this machine's, as in `192.168.0.2`")]
+    Interface(String),
+    /// A connection by TCP needs no interface.
+    #[error("interface is set, but only an address that begins with `udp://` needs one: remove it")]
+    Unused,
+}
+
+impl Address {
+    /// Parses `HOST`, `HOST:PORT` or `udp://GROUP:PORT`, for the last with an interface or "".
+    ///
+    /// # Errors
+    /// The text is no address.
+    pub fn parse(text: &str, interface: &str) -> Result<Self, BadAddress> {
+        let Some(to) = text.strip_prefix(UDP) else {
+            return match interface {
+                "" if text.contains(':') => Ok(Self::Tcp(text.to_owned())),
+                "" => Ok(Self::Tcp(format!("{text}:{PORT}"))),
+                _ => Err(BadAddress::Unused),
+            };
+        };
+        let bad = |_| BadAddress::Udp(text.to_owned());
+        let own = |_| BadAddress::Interface(interface.to_owned());
+        Ok(Self::Udp {
+            to: to.parse().map_err(bad)?,
+            interface: match interface {
+                "" => Ipv4Addr::UNSPECIFIED,
+                interface => interface.parse().map_err(own)?,
+            },
+        })
+    }
+
+    /// Returns whether the radar is received by UDP.
+    pub fn is_udp(&self) -> bool {
+        matches!(self, Self::Udp { .. })
+    }
+}
+
+impl fmt::Display for Address {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Tcp(address) => f.write_str(address),
+            Self::Udp { to, .. } => write!(f, "{UDP}{to}"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn addresses_are_parsed_as_they_are_written() {
+        let parse = |text, interface| Address::parse(text, interface).map(|it| it.to_string());
+        assert_eq!(parse("10.0.0.1", "").as_deref(), Ok("10.0.0.1:6317"));
+        assert_eq!(parse("radar:99", "").as_deref(), Ok("radar:99"));
+        let group = "udp://239.192.43.78:4378";
+        assert_eq!(parse(group, "").as_deref(), Ok(group));
+        assert_eq!(parse(group, "127.0.0.1").as_deref(), Ok(group));
+        assert_eq!(parse("radar", "127.0.0.1"), Err(BadAddress::Unused));
+        let no_port = "udp://239.192.43.78";
+        let bad = Err(BadAddress::Udp(no_port.to_owned()));
+        assert_eq!(parse(no_port, ""), bad);
+        let bad = Err(BadAddress::Interface("eth0".to_owned()));
+        assert_eq!(parse(group, "eth0"), bad);
+    }
+}

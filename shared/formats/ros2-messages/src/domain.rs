@@ -1,0 +1,140 @@
+//! The domain of ROS 2 and the network interface.
+
+use std::{env, net::Ipv4Addr};
+
+use thiserror::Error;
+
+/// The variable of ROS 2 that names the domain.
+const DOMAIN: &str = "ROS_DOMAIN_ID";
+/// The variables of ROS 2 that keep it on this computer, and the value of each that does.
+const ON_THIS_COMPUTER: [(&str, &str); 2] = [
+    ("ROS_LOCALHOST_ONLY", "1"),
+    ("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST"),
+];
+/// The highest domain whose ports are below 65536.
+const MAX_DOMAIN: u16 = 232;
+
+/// A domain of ROS 2, and the network on which it is joined.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Domain {
+    id: u16,
+    /// Address of this machine on the only network that is used; `None`: all networks.
+    interface: Option<Ipv4Addr>,
+}
+
+/// A domain that cannot be joined.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum DomainError {
+    /// The variable is not the number of a domain.
+    #[error("ROS_DOMAIN_ID is `{0}`, but must be a number from 0 to {MAX_DOMAIN}")]
+    Variable(String),
+    /// The number is too high.
+    #[error("domain {0} does not exist: domains of ROS 2 are numbers from 0 to {MAX_DOMAIN}")]
+    TooHigh(u16),
+    /// The interface is no address of this machine.
+    #[error(
+        "interface `{0}` is no IPv4 address: give this machine's, as in `192.168.0.2`, or `127.0.0.1` for this computer alone"
+    )]
+    Interface(String),
+}
+
+impl Domain {
+    /// Returns the domain of this number, or of the variable `ROS_DOMAIN_ID`, or 0; on the network
+    /// on which this machine has this address, or on all. Where ROS 2 is restricted to this
+    /// computer (`ROS_LOCALHOST_ONLY=1`, `ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST`), no address
+    /// means the loopback.
+    ///
+    /// # Errors
+    /// No such domain, or no address.
+    pub fn new(id: Option<u16>, interface: Option<&str>) -> Result<Self, DomainError> {
+        let variable = |name: &str| env::var(name).ok().filter(|value| !value.is_empty());
+        Self::of(id, interface, &variable)
+    }
+
+    fn of(
+        id: Option<u16>,
+        interface: Option<&str>,
+        variable: &dyn Fn(&str) -> Option<String>,
+    ) -> Result<Self, DomainError> {
+        let id = match (id, variable(DOMAIN)) {
+            (Some(id), _) => id,
+            (None, None) => 0,
+            (None, Some(text)) => text.parse().map_err(|_| DomainError::Variable(text))?,
+        };
+        if id > MAX_DOMAIN {
+            return Err(DomainError::TooHigh(id));
+        }
+        let stays = |(name, value): &(&str, &str)| variable(name).as_deref() == Some(*value);
+        let interface = match interface {
+            Some(text) => Some(
+                text.parse()
+                    .map_err(|_| DomainError::Interface(text.to_owned()))?,
+            ),
+            None => ON_THIS_COMPUTER
+                .iter()
+                .any(stays)
+                .then_some(Ipv4Addr::LOCALHOST),
+        };
+        Ok(Self { id, interface })
+    }
+
+    /// Returns the number of the domain.
+    pub fn id(&self) -> u16 {
+        self.id
+    }
+
+    /// Returns whether other machines can take part.
+    pub fn is_open(&self) -> bool {
+        self.interface.is_none_or(|address| !address.is_loopback())
+    }
+
+    /// Returns the address of this machine on the only network that is used; `None`: all networks.
+    pub fn interface(&self) -> Option<Ipv4Addr> {
+        self.interface
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn domain(
+        id: Option<u16>,
+        interface: Option<&str>,
+        set: &[(&str, &str)],
+    ) -> Result<Domain, DomainError> {
+        let variable = |name: &str| {
+            let found = set.iter().find(|(variable, _)| *variable == name);
+            found.map(|(_, value)| (*value).to_owned())
+        };
+        Domain::of(id, interface, &variable)
+    }
+
+    #[test]
+    fn the_domain_is_that_of_ros_unless_it_is_given() {
+        let of = |id, set: &[_]| domain(id, None, set).map(|domain| domain.id());
+        assert_eq!(of(None, &[]), Ok(0));
+        assert_eq!(of(None, &[(DOMAIN, "42")]), Ok(42));
+        assert_eq!(of(Some(7), &[(DOMAIN, "42")]), Ok(7));
+        assert_eq!(of(Some(233), &[]), Err(DomainError::TooHigh(233)));
+        let bad = Err(DomainError::Variable("robots".to_owned()));
+        assert_eq!(of(None, &[(DOMAIN, "robots")]), bad);
+    }
+
+    #[test]
+    fn ros_that_stays_on_this_computer_keeps_the_bridge_there() {
+        let is_open =
+            |interface, set: &[_]| domain(None, interface, set).map(|domain| domain.is_open());
+        assert_eq!(is_open(None, &[]), Ok(true));
+        for (name, value) in ON_THIS_COMPUTER {
+            assert_eq!(is_open(None, &[(name, value)]), Ok(false));
+        }
+        assert_eq!(
+            is_open(Some("192.168.0.2"), &[("ROS_LOCALHOST_ONLY", "1")]),
+            Ok(true)
+        );
+        assert_eq!(is_open(Some("127.0.0.1"), &[]), Ok(false));
+        let bad = Err(DomainError::Interface("lo".to_owned()));
+        assert_eq!(is_open(Some("lo"), &[]), bad);
+    }
+}

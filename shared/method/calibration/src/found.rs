@@ -1,0 +1,376 @@
+//! The constants that were found, beside the configured ones, and the evidence for each.
+
+use std::fmt;
+
+use gyre_radar::{Sense, SweepGeometry};
+
+use crate::{
+    Calibration, CalibrationError, Drive, Estimate, Fact, FactEstimate, Mounting, OwnReflections,
+};
+
+/// What is known of the drive before it is calibrated.
+pub struct Configured {
+    /// The constants by which the scans were read.
+    pub geometry: SweepGeometry,
+    /// The eccentricity of the encoder by which they were read, rad.
+    pub eccentricity_rad: f64,
+    /// The range from which on points are used, m.
+    pub min_range_m: f64,
+    /// Length of the path by another sensor, m.
+    pub distance_m: Option<f64>,
+}
+
+/// A configured value that is off by so many standard deviations is wrong.
+const WRONG_SIGMAS: f64 = 3.0;
+/// The given length of the path over that by the scans: beyond, it is of another drive, or scans
+/// are missing.
+const PLAUSIBLE_RATIO: std::ops::RangeInclusive<f64> = 0.8..=1.25;
+/// Share of the path by which that in both directions of time differs, at least: the error of its
+/// length.
+const PATH_ERROR: f64 = 1e-3;
+
+/// A constant that the configuration has a key for.
+pub struct Constant {
+    /// The key of the section `[dataset]`.
+    pub key: &'static str,
+    /// The name for a person.
+    pub name: &'static str,
+    /// The unit in which it is printed.
+    pub unit: &'static str,
+    /// The factor to the printed unit.
+    pub scale: f64,
+    /// The configured value.
+    pub configured: f64,
+    /// The value by the drive.
+    pub found: Estimate,
+    /// The drive says more about it than was known.
+    pub is_determined: bool,
+    /// The data that it rests on.
+    pub basis: String,
+}
+
+impl Constant {
+    /// Returns whether the configured value contradicts the drive.
+    pub fn is_wrong(&self) -> bool {
+        (self.configured - self.found.value).abs() > WRONG_SIGMAS * self.found.sigma
+    }
+}
+
+/// All that was found.
+pub struct Found {
+    /// Number of scans.
+    pub scans: usize,
+    /// Length of the path, m.
+    pub path_m: f64,
+    has_settled: bool,
+    /// The constants but for the range resolution.
+    pub constants: Vec<Constant>,
+    /// The range resolution, if the length of the path is given.
+    resolution: Result<Constant, String>,
+    /// Further properties, a line each.
+    others: Vec<[String; 2]>,
+}
+
+impl Found {
+    /// Compares what was found with what is configured.
+    ///
+    /// # Errors
+    /// A length of the path that cannot be that of this drive.
+    pub fn new(
+        drive: &Drive,
+        calibration: &Calibration,
+        configured: &Configured,
+    ) -> Result<Self, CalibrationError> {
+        let path_m = calibration
+            .after
+            .path_m()
+            .last()
+            .copied()
+            .unwrap_or_default();
+        let geometry = &configured.geometry;
+        // Where the scans say which chirps rise, its sign is that of the chirp.
+        let doppler_s = match (drive.alternates(), f64::from(geometry.doppler_s)) {
+            (true, configured) => configured.abs(),
+            (false, configured) => configured,
+        };
+        let fact = |fact: Fact| &calibration.facts[fact as usize];
+        let constants = vec![
+            constant(
+                "range_offset_m",
+                "range offset",
+                ("m", 1.0),
+                geometry.range_offset_m.into(),
+                fact(Fact::RangeOffset),
+                0.2,
+                calibration,
+            ),
+            constant(
+                "azimuth_eccentricity_rad",
+                "encoder eccentricity",
+                ("mrad", 1e3),
+                configured.eccentricity_rad,
+                fact(Fact::EccentricityCos),
+                0.6e-3,
+                calibration,
+            ),
+            constant(
+                "doppler_s",
+                "Doppler shift",
+                ("s", 1.0),
+                doppler_s,
+                fact(Fact::Doppler),
+                0.01,
+                calibration,
+            ),
+        ];
+        Ok(Self {
+            scans: drive.sweeps.len(),
+            path_m,
+            has_settled: calibration.has_settled,
+            constants,
+            resolution: resolution(path_m, configured)?,
+            others: others(drive, calibration, configured),
+        })
+    }
+
+    /// Returns the constants that are written: those that the drive determines.
+    pub fn determined(&self) -> impl Iterator<Item = &Constant> {
+        let solved = self
+            .constants
+            .iter()
+            .filter(|constant| constant.is_determined);
+        solved.chain(self.resolution.as_ref().ok())
+    }
+
+    /// Returns the constants that it does not determine.
+    pub fn undetermined(&self) -> impl Iterator<Item = &Constant> {
+        self.constants
+            .iter()
+            .filter(|constant| !constant.is_determined)
+    }
+}
+
+fn constant(
+    key: &'static str,
+    name: &'static str,
+    (unit, scale): (&'static str, f64),
+    configured: f64,
+    fact: &FactEstimate,
+    useful: f64,
+    calibration: &Calibration,
+) -> Constant {
+    let found = Estimate {
+        value: configured + fact.change.value,
+        sigma: fact.change.sigma,
+    };
+    let part = |estimate: &Estimate| {
+        format!(
+            "{:.3} \u{b1} {:.3}",
+            (configured + estimate.value) * scale,
+            estimate.sigma * scale
+        )
+    };
+    let basis = match (&fact.by_drift, calibration.revisits.is_empty()) {
+        (Some(drift), _) => format!(
+            "overlap {}; drift between {} revisits {}",
+            part(&fact.by_overlap),
+            calibration.revisits.len(),
+            part(drift)
+        ),
+        (None, true) => format!(
+            "overlap of {} pairs of scans alone: no revisit in this drive",
+            calibration.pairs
+        ),
+        (None, false) => format!(
+            "overlap of {} pairs of scans, {} of them revisits",
+            calibration.pairs,
+            calibration.revisits.len()
+        ),
+    };
+    Constant {
+        key,
+        name,
+        unit,
+        scale,
+        configured,
+        found,
+        is_determined: found.sigma < useful && calibration.has_settled,
+        basis,
+    }
+}
+
+/// The range resolution from the length of the path, or why the drive cannot tell it.
+///
+/// # Errors
+/// A length that is not of this drive.
+fn resolution(
+    path_m: f64,
+    configured: &Configured,
+) -> Result<Result<Constant, String>, CalibrationError> {
+    let resolution_m = f64::from(configured.geometry.range_resolution_m);
+    let Some(distance_m) = configured.distance_m else {
+        return Ok(Err(format!(
+            "{resolution_m:.5} m as configured: a drive alone cannot tell it, since a larger world driven through faster looks the same; \
+             the path is {path_m:.1} m: give its length by an odometer or GNSS with --distance-m"
+        )));
+    };
+    let ratio = distance_m / path_m;
+    if !PLAUSIBLE_RATIO.contains(&ratio) {
+        return Err(CalibrationError::Distance { distance_m, path_m });
+    }
+    let value = resolution_m * ratio;
+    Ok(Ok(Constant {
+        key: "range_resolution_m",
+        name: "range resolution",
+        unit: "m",
+        scale: 1.0,
+        configured: resolution_m,
+        found: Estimate {
+            value,
+            sigma: value * PATH_ERROR,
+        },
+        is_determined: true,
+        basis: format!(
+            "{distance_m:.1} m given for {path_m:.1} m of path, with the constants as found"
+        ),
+    }))
+}
+
+fn others(drive: &Drive, calibration: &Calibration, configured: &Configured) -> Vec<[String; 2]> {
+    let fact = |fact: Fact| &calibration.facts[fact as usize].change;
+    let (sine, row_time) = (fact(Fact::EccentricitySin), fact(Fact::RowTime));
+    vec![
+        [
+            "eccentricity aside".to_owned(),
+            format!(
+                "{:.2} \u{b1} {:.2} mrad times the azimuth's sine, overlap alone; it makes no drift and has no key",
+                sine.value * 1e3,
+                sine.sigma * 1e3
+            ),
+        ],
+        [
+            "row times".to_owned(),
+            format!(
+                "a sweep takes {:.3} \u{b1} {:.3} of what they say{}; an offset of all times cannot be told from a drive: \
+             it moves each pose along the path",
+                1.0 + row_time.value,
+                row_time.sigma,
+                if (row_time.value).abs() > WRONG_SIGMAS * row_time.sigma {
+                    ", which contradicts them"
+                } else {
+                    ""
+                }
+            ),
+        ],
+        [
+            "sense of rotation".to_owned(),
+            sense(drive, calibration, configured),
+        ],
+        [
+            "mounting".to_owned(),
+            calibration.mounting.as_ref().map_or_else(
+                || "too little driving, no bend, or a radar that looks elsewhere than ahead: not told".to_owned(),
+                mounting,
+            ),
+        ],
+        ["own reflections".to_owned(), reflections(drive, configured)],
+    ]
+}
+
+/// A mirrored world is as consistent; only the driver knows.
+fn sense(drive: &Drive, calibration: &Calibration, configured: &Configured) -> String {
+    let name = match configured.geometry.sense {
+        Sense::Clockwise => "clockwise",
+        Sense::CounterClockwise => "counter-clockwise",
+    };
+    let poses = &calibration.after.poses;
+    const SCANS: usize = 20;
+    let turn = |k: usize| poses[k - SCANS].inv_mul(&poses[k]).rotation.angle();
+    let largest = (SCANS..poses.len()).max_by(|a, b| turn(*a).abs().total_cmp(&turn(*b).abs()));
+    let Some(at) = largest else {
+        return format!("{name}; a mirrored drive looks the same");
+    };
+    let side = if turn(at) > 0.0 { "left" } else { "right" };
+    format!(
+        "{name}; a mirrored drive looks the same: check that the vehicle turned {side} by {:.0} degrees before scan {}",
+        turn(at).to_degrees().abs(),
+        drive.sweeps[at].number
+    )
+}
+
+fn mounting(mounting: &Mounting) -> String {
+    let Mounting { yaw_rad, ahead_m } = mounting;
+    format!(
+        "yaw {:+.2} \u{b1} {:.2} degrees counter-clockwise of the vehicle's straight ahead, {:.1} \u{b1} {:.1} m ahead of the rear axle, \
+         from the direction of motion; poses are the radar's, so there is no key",
+        yaw_rad.value.to_degrees(),
+        yaw_rad.sigma.to_degrees(),
+        ahead_m.value,
+        ahead_m.sigma
+    )
+}
+
+fn reflections(drive: &Drive, configured: &Configured) -> String {
+    match drive.reflections().end_m() {
+        None => "too few moving scans to tell them".to_owned(),
+        Some(end_m) if end_m >= OwnReflections::REACH_M => format!(
+            "power everywhere within {end_m:.0} m in nine of ten moving scans: raise masking.threshold to tell them"
+        ),
+        Some(end_m) if end_m > configured.min_range_m => format!(
+            "to {end_m:.2} m in nine of ten moving scans, beyond points.min_range_m = {}: set it and raster.min_range_m to {:.1}",
+            configured.min_range_m,
+            (end_m * 10.0).ceil() / 10.0
+        ),
+        Some(end_m) => format!(
+            "to {end_m:.2} m, within points.min_range_m = {}",
+            configured.min_range_m
+        ),
+    }
+}
+
+impl fmt::Display for Found {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{} scans, {:.0} m", self.scans, self.path_m)?;
+        if !self.has_settled {
+            writeln!(
+                f,
+                "the constants have not settled: take a longer drive, or begin with constants that are nearer"
+            )?;
+        }
+        for constant in self.constants.iter().chain(self.resolution.as_ref().ok()) {
+            let Constant {
+                name,
+                unit,
+                scale,
+                configured,
+                found,
+                ..
+            } = constant;
+            let verdict = match (constant.is_determined, constant.is_wrong()) {
+                (false, _) => "the drive does not tell it well enough",
+                (true, true) => "CONTRADICTS the configured value",
+                (true, false) => "agrees with the configured value",
+            };
+            writeln!(
+                f,
+                "{name:<21} {:.4} \u{b1} {:.4} {unit}, configured {:.4}: {verdict}",
+                found.value * scale,
+                found.sigma * scale,
+                configured * scale
+            )?;
+            writeln!(f, "{:<21} {}", "", constant.basis)?;
+        }
+        if let Err(reason) = &self.resolution {
+            writeln!(f, "{:<21} {reason}", "range resolution")?;
+        }
+        let last = self.others.len().saturating_sub(1);
+        for (k, [name, sentence]) in self.others.iter().enumerate() {
+            write!(
+                f,
+                "{name:<21} {sentence}{}",
+                if k < last { "\n" } else { "" }
+            )?;
+        }
+        Ok(())
+    }
+}

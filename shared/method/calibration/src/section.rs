@@ -1,0 +1,34 @@
+//! `calibration.toml`: the section `[dataset]` with the constants that the drive determines.
+
+use std::fmt::Write;
+
+use crate::found::Found;
+
+/// Returns the file's text.
+pub fn toml(found: &Found) -> String {
+    let mut text = format!(
+        "# Found by gyre calibrate from {} scans, {:.0} m.\n\n[dataset]\n",
+        found.scans, found.path_m
+    );
+    for constant in found.determined() {
+        let digits = digits(constant.found.sigma);
+        let _ = writeln!(
+            text,
+            "{} = {:.digits$} # \u{b1} {:.digits$}: {}",
+            constant.key, constant.found.value, constant.found.sigma, constant.basis
+        );
+    }
+    for constant in found.undetermined() {
+        let _ = writeln!(
+            text,
+            "# {} stays as configured: {:.5} \u{b1} {:.5} is no better",
+            constant.key, constant.found.value, constant.found.sigma
+        );
+    }
+    text
+}
+
+/// Two digits of the standard deviation.
+fn digits(sigma: f64) -> usize {
+    (1.0 - sigma.log10().floor()).clamp(1.0, 9.0) as usize
+}

@@ -1,0 +1,98 @@
+//! A map of keyframes, and its picture.
+
+use std::path::Path;
+
+use gyre_geometry::Pose;
+use gyre_slam::Keyframe;
+use nalgebra::Point2;
+
+use crate::{Evidence, MapError, MapOptions, Overlay, map_png};
+
+/// Odometry's trajectory is drawn if it is somewhere by so many cells beside the other one: nearer
+/// lines are one.
+const APART_CELLS: f64 = 3.0;
+
+/// The map of keyframes in the frame of the first one that is drawn. Poses are given in one other
+/// frame.
+pub struct Drawing {
+    evidence: Evidence,
+    first: Option<First>,
+    /// The keyframes by odometry, in the map frame.
+    odometry: Vec<Pose>,
+    /// True if odometry has them elsewhere.
+    is_corrected: bool,
+}
+
+/// The first keyframe, in the frame that poses are given in, and in that of odometry.
+#[derive(Clone, Copy)]
+struct First {
+    pose: Pose,
+    odometry: Pose,
+}
+
+impl Drawing {
+    /// Starts without a keyframe. What does not fit into memory lies in a file in `folder`, which
+    /// has no name.
+    ///
+    /// # Errors
+    /// An option that is out of bounds.
+    pub fn new(options: &MapOptions, folder: &Path) -> Result<Self, MapError> {
+        Ok(Self {
+            evidence: Evidence::new(options, folder)?,
+            first: None,
+            odometry: Vec::new(),
+            is_corrected: false,
+        })
+    }
+
+    /// Draws the next keyframe at `pose`.
+    ///
+    /// # Errors
+    /// The file of what does not fit into memory cannot be read or written.
+    pub fn draw(&mut self, keyframe: &Keyframe, pose: &Pose) -> Result<(), MapError> {
+        let odometry = keyframe.pose.motion;
+        let pose = *pose;
+        let first = *self.first.get_or_insert(First { pose, odometry });
+        let (pose, odometry) = (first.pose.inv_mul(&pose), first.odometry.inv_mul(&odometry));
+        self.evidence.draw(keyframe, &pose)?;
+        let apart_m = (pose.translation.vector - odometry.translation.vector).norm();
+        self.is_corrected |= apart_m > APART_CELLS * self.evidence.options().cell_m;
+        self.odometry.push(odometry);
+        Ok(())
+    }
+
+    /// Returns what the keyframes say.
+    pub fn evidence(&mut self) -> &mut Evidence {
+        &mut self.evidence
+    }
+
+    /// Returns the number of keyframes.
+    pub fn keyframes(&self) -> usize {
+        self.odometry.len()
+    }
+
+    /// Returns the picture of the map as a PNG file, with the trajectory and both ends of each
+    /// loop; and with odometry's trajectory where that is another one.
+    ///
+    /// # Errors
+    /// A map without keyframes or too large for a picture.
+    pub fn png(&mut self, trajectory: &[Pose], loops: &[[Pose; 2]]) -> Result<Vec<u8>, MapError> {
+        let map_from_given = self.first.map_or(Pose::identity(), |it| it.pose.inverse());
+        let trajectory: Vec<Pose> = trajectory
+            .iter()
+            .map(|pose| map_from_given * pose)
+            .collect();
+        let place = |pose: Pose| Point2::from((map_from_given * pose).translation.vector);
+        let loops: Vec<[Point2<f64>; 2]> = loops.iter().map(|ends| ends.map(place)).collect();
+        let overlay = Overlay {
+            trajectory: &trajectory,
+            odometry: if self.is_corrected {
+                &self.odometry
+            } else {
+                &[]
+            },
+            loops: &loops,
+        };
+        map_png(&mut self.evidence, &overlay)
+    }
+}

@@ -1,0 +1,36 @@
+//! A run as data: the sections of its configuration that its processes read, and what it reports at its end.
+//!
+//! - [`RunConfig`], [`SourceConfig`], [`RecordConfig`], [`LinkConfig`], [`StageConfig`] and [`Budget`] are sections;
+//! - [`Report`] is what the supervisor reports, with the [`StageCounters`] of each process.
+//!
+//! It is light, so that a stage which reads its own section, and a program which only writes configurations, need neither the method
+//! nor the transport.
+
+mod budget;
+mod link;
+mod played_from;
+mod processes;
+mod rate;
+mod record;
+mod report;
+mod scenario;
+mod scheduling;
+mod source;
+
+pub use budget::{Budget, Limits};
+pub use link::{LinkConfig, Side};
+pub use played_from::PlayedFrom;
+pub use processes::{Mode, RestartPolicy, RunConfig, StageConfig};
+pub use rate::Rate;
+pub use record::RecordConfig;
+pub use report::{Ending, Report, StageCounters, Swapped};
+pub use scenario::{Judged, RADAR_HZ, Scenario};
+pub use scheduling::Scheduling;
+pub use source::{SourceConfig, SourceKind};
+
+/// The file in the folder of the results that says what the run was begun with, TOML.
+pub const BEGUN_WITH: &str = "journal/run.toml";
+/// The file there that a run leaves when it has all its results. The next run begins anew.
+pub const COMPLETE: &str = "journal/complete";
+/// The open files of the process of a run that has most of them, masking, without observers. Measured: 105.
+pub const MOST_OPEN_FILES: u64 = 120;

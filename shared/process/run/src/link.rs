@@ -1,0 +1,83 @@
+//! The section `[link]`.
+
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+
+use crate::PlayedFrom;
+
+/// The side of a run that is split between two machines.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Side {
+    /// The source, and the stages up to the cut.
+    Robot,
+    /// The stages after the cut, and the results.
+    Base,
+}
+
+/// A run that is split between two machines: section `[link]`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct LinkConfig {
+    /// The side that this machine has: `robot`, with the source and the stages up to the cut, or
+    /// `base`, with those after it. Default: the run is not split.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub side: Option<Side>,
+    /// Topic at which the run is split: `scan`, `masked`, `rotation`, `motion` or `refined`. The
+    /// stage that publishes it is the last one on the robot.
+    pub cut: PlayedFrom,
+    /// Name of the link, the same on both sides, and another one for each robot.
+    pub name: String,
+    /// Where this side waits for the other, as in `tls/0.0.0.0:7447`; `tcp/` on loopback addresses
+    /// alone.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub listen: Vec<String>,
+    /// Where this side reaches the other, or a router between them, as in `tls/base.internal:7447`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub connect: Vec<String>,
+    /// Certificate of the authority that has signed those of both sides, PEM.
+    #[serde(skip_serializing_if = "is_empty")]
+    pub ca: PathBuf,
+    /// Certificate of this side, PEM.
+    #[serde(skip_serializing_if = "is_empty")]
+    pub certificate: PathBuf,
+    /// Private key of the certificate, PEM.
+    #[serde(skip_serializing_if = "is_empty")]
+    pub key: PathBuf,
+    /// True if a robot sends masked scans beside a later cut: the keyframes of SLAM need them. Set
+    /// by `slam.kind`.
+    #[serde(skip_serializing_if = "is_false")]
+    pub keyframes: bool,
+}
+
+fn is_empty(path: &std::path::Path) -> bool {
+    path.as_os_str().is_empty()
+}
+
+fn is_false(value: &bool) -> bool {
+    !value
+}
+
+impl Default for LinkConfig {
+    fn default() -> Self {
+        Self {
+            side: None,
+            cut: PlayedFrom::Masked,
+            name: "gyre".to_owned(),
+            listen: Vec::new(),
+            connect: Vec::new(),
+            ca: PathBuf::new(),
+            certificate: PathBuf::new(),
+            key: PathBuf::new(),
+            keyframes: false,
+        }
+    }
+}
+
+impl LinkConfig {
+    /// Returns whether motions go back from the searches to masking, over the cut.
+    pub fn returns_motions(&self) -> bool {
+        matches!(self.cut, PlayedFrom::Masked | PlayedFrom::Rotation)
+    }
+}

@@ -1,0 +1,119 @@
+//! The sections that are about the processes of a run.
+
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+
+use crate::{Rate, Scheduling};
+
+/// The section `[run]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct RunConfig {
+    /// `lossless`: every scan is processed, and the source waits. `live`: the newest scan wins.
+    pub mode: Mode,
+    /// Maximum number of scans between admission and their pose, 1 to 64. More than the free cores
+    /// increases latency and not throughput.
+    pub window: usize,
+    /// Pace of the source: `max`, `realtime`, or a factor of real time from 0.001 to 1000. Live
+    /// mode needs another than `max`.
+    pub rate: Rate,
+    /// Room for programs that look on, 0 to 64 of each topic: `gyre watch`, a viewer, a recorder.
+    /// They change neither a result nor a latency. Each needs shared memory for one message of each
+    /// topic.
+    pub observers: usize,
+    /// Time for which a published scan may lack its pose, or the source a scan that is due, s; 0:
+    /// no limit. Then stages are restarted: first the source if it is late, else all but a live
+    /// source; if that does not help, all; if that does not help either, the run ends. With SLAM
+    /// also the time in which a follower that the run waits for at its end must make progress; else
+    /// it is restarted.
+    pub stall_timeout_s: f64,
+    /// Time for a stage to open its topics after its start, s; 0: no limit. A stage that takes
+    /// longer, as one that cannot load its model, is treated as a stall.
+    pub start_timeout_s: f64,
+    /// The scheduling of the stages: priority, processors, memory. Followers have their own alone.
+    #[serde(skip_serializing_if = "is_default")]
+    pub scheduling: Scheduling,
+    /// Longest time that a processor may take to wake from idleness, us; 0: none sleeps, which
+    /// costs power. For the whole machine, while the run lives. It needs the right to write to
+    /// `/dev/cpu_dma_latency`. Default: as the system has it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cpu_wake_us: Option<u32>,
+    /// Ground truth for the evaluation. Default: the one in the recording's folder.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ground_truth: Option<PathBuf>,
+}
+
+/// The policy when scans arrive faster than they can be processed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Mode {
+    /// The source waits.
+    Lossless,
+    /// The newest scan wins.
+    Live,
+}
+
+/// A section `[stages.NAME]`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct StageConfig {
+    /// Program and arguments of a replacement. Default: `gyre stage NAME`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub command: Vec<String>,
+    /// Limits of its restarts.
+    pub restart: RestartPolicy,
+    /// The scheduling of the process: its keys go before those of `run.scheduling`.
+    #[serde(skip_serializing_if = "is_default")]
+    pub scheduling: Scheduling,
+    /// Delay for each scan, ms, to test behaviour under load. Source and `pose-integration` have
+    /// none.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub delay_ms: u64,
+}
+
+/// When to give up on a stage: after `limit` restarts within `window_s`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct RestartPolicy {
+    /// Maximum number of restarts within `window_s`; one more ends the run.
+    pub limit: usize,
+    /// Length of the time window of `limit`, s.
+    pub window_s: f64,
+    /// Delay before the restart of a stage that ended by itself, ms. A killed one is restarted at once.
+    pub backoff_ms: u64,
+}
+
+impl Default for RestartPolicy {
+    fn default() -> Self {
+        Self {
+            limit: 5,
+            window_s: 30.0,
+            backoff_ms: 100,
+        }
+    }
+}
+
+fn is_default(scheduling: &Scheduling) -> bool {
+    *scheduling == Scheduling::default()
+}
+
+fn is_zero(value: &u64) -> bool {
+    *value == 0
+}
+
+impl Default for RunConfig {
+    fn default() -> Self {
+        Self {
+            mode: Mode::Lossless,
+            window: 4,
+            rate: Rate::Max,
+            observers: 8,
+            stall_timeout_s: 60.0,
+            start_timeout_s: 300.0,
+            scheduling: Scheduling::default(),
+            cpu_wake_us: None,
+            ground_truth: None,
+        }
+    }
+}

@@ -1,0 +1,176 @@
+//! The section `[source]`.
+
+use std::{num::NonZeroUsize, ops::Range, path::PathBuf};
+
+use gyre_radar::Dataset;
+use serde::{Deserialize, Serialize};
+
+use crate::PlayedFrom;
+
+/// Where scans come from.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum SourceKind {
+    /// A recording, or a simulation.
+    #[default]
+    Recording,
+    /// A Navtech radar on the network, by its protocol Colossus or as ASTERIX CAT-240.
+    Colossus,
+    /// A Navtech radar behind its driver in ROS 2.
+    Ros2,
+}
+
+impl SourceKind {
+    /// Returns its name in configurations.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Recording => "recording",
+            Self::Colossus => "colossus",
+            Self::Ros2 => "ros2",
+        }
+    }
+}
+
+/// The source of scans: section `[source]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct SourceConfig {
+    /// `recording`; or in live mode `colossus`, a Navtech radar on the network, or `ros2`, one
+    /// behind its driver in ROS 2. Then `data`, `first`, `retry_s` and `max_unreadable` are not
+    /// used.
+    pub kind: SourceKind,
+    /// Address of the radar, as in `192.168.0.1`; its port is 6317 unless it is given.
+    /// `udp://GROUP:PORT`: where a radar sends to whose data output is CAT-240, as in
+    /// `udp://239.192.43.78:4378`.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub address: String,
+    /// Topic of ROS 2 on which Navtech's driver publishes azimuths, as in `/radar_data/fft_data`;
+    /// `--ros2` on the command line. Its configuration is beside it,
+    /// `/radar_data/configuration_data`.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub topic: String,
+    /// Domain of ROS 2. Default: `ROS_DOMAIN_ID`, or 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub domain: Option<u16>,
+    /// Address of this machine on the network of a radar that sends to a multicast group, as in
+    /// `192.168.0.2`. Default: the system chooses. Of ROS 2 the only network that is used; default:
+    /// all.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub interface: String,
+    /// Time without an azimuth from the radar after which it is connected to anew, or in ROS 2
+    /// after which that is reported, s; 0: no limit.
+    pub silence_s: f64,
+    /// Folder of the recording; `--data` on the command line.
+    pub data: PathBuf,
+    /// Topic from which on a recording of a run is played: `scan`, `masked`, `rotation`, `motion`
+    /// or `refined`; `--from` on the command line. The stages before it are absent. Of all but
+    /// `scan` every message must have been recorded.
+    #[serde(skip_serializing_if = "is_scan")]
+    pub from: PlayedFrom,
+    /// First scan to play, from 0.
+    pub first: usize,
+    /// Number of scans to play. Default: all, and of a radar without end.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scans: Option<usize>,
+    /// Play the recording again and again, with times that go on: `gyre stress`. `scans` then
+    /// counts those of all turns; without it the run has no end.
+    #[serde(skip_serializing_if = "is_false")]
+    pub repeat: bool,
+    /// Number of scans that become due at once, as from a network that holds them back; the mean
+    /// rate stays. They follow each other as fast as they are decoded. Only with a `run.rate` other
+    /// than `max`.
+    #[serde(skip_serializing_if = "is_one")]
+    pub burst: NonZeroUsize,
+    /// Time for which a file that the disk or the network does not give is tried again, s. Then the
+    /// run ends, and the same command continues it.
+    pub retry_s: f64,
+    /// Number of damaged scans in a row that are skipped; one more ends the run. Over ten scans at
+    /// four per second a car drives farther than the search reaches.
+    pub max_unreadable: usize,
+}
+
+fn is_false(value: &bool) -> bool {
+    !value
+}
+
+fn is_one(value: &NonZeroUsize) -> bool {
+    value.get() == 1
+}
+
+fn is_scan(from: &PlayedFrom) -> bool {
+    *from == PlayedFrom::Scan
+}
+
+impl Default for SourceConfig {
+    fn default() -> Self {
+        Self {
+            kind: SourceKind::Recording,
+            address: String::new(),
+            topic: String::new(),
+            domain: None,
+            interface: String::new(),
+            silence_s: 3.0,
+            data: PathBuf::new(),
+            from: PlayedFrom::Scan,
+            first: 0,
+            scans: None,
+            repeat: false,
+            burst: NonZeroUsize::MIN,
+            retry_s: 10.0,
+            max_unreadable: 10,
+        }
+    }
+}
+
+impl SourceConfig {
+    /// Returns the scans to play of a dataset, by their index in it.
+    pub fn played(&self, dataset: &dyn Dataset) -> Range<usize> {
+        let scans = dataset.len();
+        let first = self.first.max(dataset.first()).min(scans);
+        let end = first.saturating_add(self.scans.unwrap_or(usize::MAX));
+        first..end.min(scans)
+    }
+
+    /// Returns the scans of the stream that is played of a dataset, counted on through all turns.
+    /// It ends at `usize::MAX` if it is without end.
+    pub fn stream(&self, dataset: &dyn Dataset) -> Range<usize> {
+        self.turned(self.played(dataset))
+    }
+
+    /// Returns the number of scans of [`stream`](Self::stream); `None`: without end.
+    pub fn stream_len(&self, dataset: &dyn Dataset) -> Option<usize> {
+        let stream = self.stream(dataset);
+        (stream.end < usize::MAX).then_some(stream.len())
+    }
+
+    /// Returns the scans of a stream whose first turn is this one.
+    fn turned(&self, once: Range<usize>) -> Range<usize> {
+        match self.repeat && !once.is_empty() {
+            true => once.start..once.start.saturating_add(self.scans.unwrap_or(usize::MAX)),
+            false => once,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stream_that_repeats_has_no_end_unless_its_scans_are_counted() {
+        let turned = |repeat, scans, once: Range<usize>| {
+            let source = SourceConfig {
+                repeat,
+                scans,
+                ..SourceConfig::default()
+            };
+            source.turned(once)
+        };
+        assert_eq!(turned(false, Some(100), 3..10), 3..10);
+        assert_eq!(turned(true, Some(100), 3..10), 3..103);
+        assert_eq!(turned(true, None, 3..10), 3..usize::MAX);
+        assert_eq!(turned(true, None, 3..3), 3..3);
+    }
+}

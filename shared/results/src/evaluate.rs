@@ -1,0 +1,134 @@
+//! `gyre evaluate`: evaluates a trajectory against ground truth.
+
+mod arguments;
+
+use std::{fs, process::ExitCode};
+
+use gyre_evaluation::{Evaluation, MatchedMotions, NeesOptions, Options, TimedMotion, TruthSigma};
+use gyre_radar::{Trajectory, ground_truth::read_trajectory};
+use gyre_terminal::{Failure, print};
+
+use crate::{
+    judgement::{Judgement, judge, judge_motions},
+    odometry,
+};
+
+pub use arguments::EvaluateArguments;
+
+/// Prints the errors of an estimate as a table or as JSON, and draws it.
+///
+/// # Errors
+/// A file that cannot be read, trajectories that do not overlap.
+pub fn evaluate(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> {
+    let estimate = read_trajectory(&arguments.estimate)?;
+    let truth = read_trajectory(&arguments.ground_truth)?;
+    let evaluation = judge(
+        &estimate,
+        &truth,
+        Options {
+            step: arguments.step,
+            ..Options::default()
+        },
+    )?;
+    let motions = judged_motions(arguments, &estimate, &truth, &evaluation)?;
+    let judgement = Judgement::new(evaluation, motions.as_ref(), &nees_options(arguments));
+    match arguments.json {
+        true => print::line(serde_json::to_string_pretty(&judgement)?)?,
+        false => print::line(format_args!("{judgement:#}"))?,
+    }
+    if let Some(directory) = &arguments.plots {
+        fs::create_dir_all(directory)
+            .map_err(|error| format!("cannot make {}: {error}", directory.display()))?;
+        for (name, plot) in judgement.plots()? {
+            gyre_storage::write(&directory.join(name), plot)?;
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn nees_options(arguments: &EvaluateArguments) -> NeesOptions {
+    let truth_sigma = TruthSigma {
+        position_m: arguments.truth_sigma_m,
+        yaw_rad: arguments.truth_sigma_deg.to_radians(),
+    };
+    NeesOptions {
+        lengths: arguments.nees_lengths.clone(),
+        truth_sigma,
+    }
+}
+
+/// Returns the motions of the odometry that was named, or of the one beside the estimate if it
+/// fits.
+fn judged_motions(
+    arguments: &EvaluateArguments,
+    estimate: &Trajectory,
+    truth: &Trajectory,
+    evaluation: &Evaluation,
+) -> Result<Option<MatchedMotions>, Failure> {
+    let judge =
+        |motions: &[TimedMotion]| judge_motions(arguments.nees_part.of(motions), truth, evaluation);
+    if let Some(path) = &arguments.odometry {
+        return judge(&odometry::read(path)?).map(Some);
+    }
+    let beside = arguments.estimate.with_file_name("odometry.csv");
+    if !beside.is_file() {
+        return Ok(None);
+    }
+    let judged = odometry::read(&beside).and_then(|motions| match has_stamps(estimate, &motions) {
+        true => judge(&motions),
+        false => Err("its stamps are not the estimate's".into()),
+    });
+    let note = |reason: &Failure| {
+        print::note(format_args!(
+            "{} is not evaluated: {reason}",
+            beside.display()
+        ))
+    };
+    Ok(judged.inspect_err(note).ok())
+}
+
+/// Trajectories may be written in microseconds.
+const ROUNDING_NS: i64 = 1_000;
+
+/// Returns whether every motion ends at a pose of the trajectory.
+fn has_stamps(trajectory: &Trajectory, motions: &[TimedMotion]) -> bool {
+    let stamps = trajectory.stamp_ns.as_deref().unwrap_or_default();
+    motions.iter().all(|motion| {
+        let next =
+            stamps.partition_point(|stamp| *stamp < motion.to_ns.saturating_sub(ROUNDING_NS));
+        stamps
+            .get(next)
+            .is_some_and(|stamp| *stamp <= motion.to_ns.saturating_add(ROUNDING_NS))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use gyre_geometry::OdometryMotion;
+
+    use super::*;
+
+    #[test]
+    fn an_odometry_fits_where_all_its_motions_end_at_poses_but_for_rounding() {
+        let stamps = vec![1_000_000_000, 1_250_000_400, 1_500_000_000];
+        let trajectory = Trajectory {
+            stamp_ns: Some(stamps),
+            poses: Vec::new(),
+        };
+        let ends_at = |to_ns| TimedMotion {
+            from_ns: 0,
+            to_ns,
+            estimate: OdometryMotion::default(),
+        };
+        assert!(has_stamps(
+            &trajectory,
+            &[ends_at(1_250_000_000), ends_at(1_500_000_999)]
+        ));
+        assert!(!has_stamps(
+            &trajectory,
+            &[ends_at(1_250_000_000), ends_at(1_400_000_000)]
+        ));
+        assert!(!has_stamps(&trajectory, &[ends_at(1_500_001_001)]));
+        assert!(!has_stamps(&Trajectory::default(), &[ends_at(0)]));
+    }
+}

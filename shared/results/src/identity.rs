@@ -1,0 +1,222 @@
+//! `journal/run.toml`: what the run was begun with. A run is resumed only with the same.
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fs, io,
+    path::Path,
+};
+
+use gyre_configuration::{Configuration, difference, fingerprint, with_stored_options};
+use gyre_radar::{DatasetOptions, Fingerprint};
+use gyre_run::BEGUN_WITH;
+use gyre_storage as storage;
+use gyre_terminal::Failure;
+use serde::{Deserialize, Serialize};
+
+use crate::out::Out;
+
+const HEAD: &str = "# What the run was begun with, which the same command compares before it resumes the run.\n# CRC-32 of the rest: ";
+
+/// The identity that a run was begun with.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Identity {
+    /// Scans to play; `None`: without end.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scans: Option<usize>,
+    /// The programs.
+    programs: Programs,
+    /// The options to read the recording, those of its `dataset.toml` among them.
+    dataset: DatasetOptions,
+    /// The recording; `None` for a simulation that is not stored, which its configuration tells.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    recording: Option<Fingerprint>,
+    /// The resolved configuration.
+    pub configuration: toml::Table,
+}
+
+/// The programs of a run.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Programs {
+    /// Gyre's version.
+    version: String,
+    /// SHA-256 of Gyre's program.
+    pub build: String,
+    /// SHA-256 of each replaced stage's command and of the files that it names.
+    replaced: BTreeMap<String, String>,
+}
+
+impl Programs {
+    /// Returns those of a run: the SHA-256 of Gyre's program, and of each stage that is replaced.
+    pub fn new(build: String, replaced: BTreeMap<String, String>) -> Self {
+        Self {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            build,
+            replaced,
+        }
+    }
+
+    fn difference(&self, now: &Self) -> Option<String> {
+        if self.build != now.build {
+            let short = |sha256: &str| sha256.get(..12).unwrap_or_default().to_owned();
+            return Some(format!(
+                "gyre was build {} of version {} and is now build {} of version {}",
+                short(&self.build),
+                self.version,
+                short(&now.build),
+                now.version
+            ));
+        }
+        let stages: BTreeSet<&String> = self.replaced.keys().chain(now.replaced.keys()).collect();
+        let other = |stage: &&String| self.replaced.get(*stage) != now.replaced.get(*stage);
+        let stage = stages.into_iter().find(other)?;
+        Some(format!("the program of {stage} is another one"))
+    }
+}
+
+impl Identity {
+    /// The identity of a run that begins now. Its configuration has the options of `dataset.toml`
+    /// in `dataset`.
+    ///
+    /// # Errors
+    /// A recording that cannot be read, or a configuration that TOML cannot hold.
+    pub fn of(
+        configuration: &Configuration,
+        programs: &Programs,
+        dataset: DatasetOptions,
+        scans: Option<usize>,
+        recording: Option<&Fingerprint>,
+    ) -> Result<Self, Failure> {
+        Ok(Self {
+            scans,
+            programs: programs.clone(),
+            dataset,
+            recording: recording.cloned(),
+            configuration: configuration.to_toml()?.parse()?,
+        })
+    }
+
+    /// Writes it, once for a run. It survives a power failure when this returns.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write(&self, out: &Out) -> Result<(), Failure> {
+        let text = toml::to_string_pretty(self)?;
+        let checksum = checksum(&text);
+        Ok(storage::write(
+            &out.join(BEGUN_WITH),
+            format!("{HEAD}{checksum}\n{text}"),
+        )?)
+    }
+
+    /// Reads that of the run whose journal holds `poses` poses.
+    ///
+    /// # Errors
+    /// One sentence that says what is wrong with the file. It is written as a whole before the
+    /// first pose, so the run did not leave it like that.
+    pub fn read(out: &Out, poses: u64) -> Result<Self, Failure> {
+        let path = out.join(BEGUN_WITH);
+        Self::read_file(&path).map_err(|state| {
+            format!(
+                "{} {state}: it says what the {poses} poses in the journal beside it were computed from, so the run cannot be resumed \
+                 without it; restore it from a backup, or choose another --out (--fresh would discard the poses)",
+                path.display()
+            )
+            .into()
+        })
+    }
+
+    fn read_file(path: &Path) -> Result<Self, String> {
+        let text = fs::read_to_string(path).map_err(|error| match error.kind() {
+            io::ErrorKind::NotFound => "is missing".to_owned(),
+            _ => format!("cannot be read ({error})"),
+        })?;
+        if text.is_empty() {
+            return Err("is empty".to_owned());
+        }
+        let (found, text) = text
+            .strip_prefix(HEAD)
+            .and_then(|rest| rest.split_once('\n'))
+            .ok_or("is damaged")?;
+        // A part of a TOML file is one as well.
+        match found == checksum(text) {
+            true => toml::from_str(text)
+                .map_err(|error| format!("is of another version ({})", error.message())),
+            false => Err("is damaged".to_owned()),
+        }
+    }
+
+    /// Checks that this configuration and these programs continue the run.
+    ///
+    /// # Errors
+    /// One sentence that says what differs.
+    pub fn require(
+        &self,
+        configuration: &Configuration,
+        programs: &Programs,
+        out: &Path,
+        poses: u64,
+    ) -> Result<(), Failure> {
+        if let Some(difference) = configuration.difference(&self.configuration)? {
+            return Err(other(out, poses, "configuration", &difference));
+        }
+        match self.programs.difference(programs) {
+            None => Ok(()),
+            Some(difference) => Err(other(out, poses, "program", &difference)),
+        }
+    }
+
+    /// Checks that the recording is the one that the run was begun with, and is read in the same
+    /// way.
+    ///
+    /// # Errors
+    /// One sentence that says what differs.
+    pub fn require_recording(&self, now: &Self, out: &Path, poses: u64) -> Result<(), Failure> {
+        let options = |of: &Self| toml::Table::try_from(of.dataset);
+        if let Some(difference) = difference::first(&options(self)?, &options(now)?) {
+            let difference = format!("dataset.{difference}");
+            return Err(other(out, poses, "configuration", &difference));
+        }
+        let difference = match (&self.recording, &now.recording) {
+            (Some(begun), Some(now)) => begun.difference(now),
+            _ => None,
+        };
+        difference.map_or(Ok(()), |difference| {
+            Err(other(out, poses, "recording", &difference))
+        })
+    }
+
+    /// Returns whether a run of this configuration that begins now would compute the same and judge
+    /// it by the same truth, if these are the replaced stages as in [`Programs::new`]. Gyre's own
+    /// build may be another one.
+    ///
+    /// # Errors
+    /// A recording that cannot be read.
+    pub fn has_inputs_of(
+        &self,
+        configuration: &Configuration,
+        replaced: &BTreeMap<String, String>,
+    ) -> Result<bool, Failure> {
+        let resolved = with_stored_options(configuration)?;
+        let truth = |table: &toml::Table| table.get("run")?.get("ground_truth").cloned();
+        let now: toml::Table = configuration.to_toml()?.parse()?;
+        Ok(configuration.difference(&self.configuration)?.is_none()
+            && truth(&self.configuration) == truth(&now)
+            && self.programs.replaced == *replaced
+            && self.dataset == resolved.dataset
+            && self.recording == fingerprint(&resolved)?)
+    }
+}
+
+fn other(out: &Path, poses: u64, what: &str, difference: &str) -> Failure {
+    format!(
+        "{} holds an unfinished run of another {what} ({poses} poses; {difference}): choose another --out, or discard it with --fresh",
+        out.display()
+    )
+    .into()
+}
+
+fn checksum(text: &str) -> String {
+    format!("{:08x}", crc32fast::hash(text.as_bytes()))
+}

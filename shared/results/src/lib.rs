@@ -1,0 +1,21 @@
+//! The files that a run leaves in the folder of its results, written and read; and reports of them.
+//!
+//! - [`Out`]: the folder, which one run at a time may change;
+//! - [`write`](write()): all results, made from the journal in one pass;
+//! - [`odometry`]: the rows of `odometry.csv`; [`Summary`]: `summary.json`; [`judgement`]: the evaluation in it;
+//! - [`Identity`]: what the run was begun with;
+//! - [`evaluate`]: the report on a trajectory beside ground truth.
+
+pub mod evaluate;
+mod identity;
+pub mod judgement;
+pub mod machine;
+pub mod odometry;
+mod out;
+mod results;
+mod summary;
+
+pub use identity::{Identity, Programs};
+pub use out::{Out, OutError, absolute};
+pub use results::{FILES, Results, SIMULATED_TRUTH, SUMMARY, map_options, write};
+pub use summary::{Counter, Counts, MotionCounts, Problem, Session, SlamSummary, Summary};

@@ -1,0 +1,204 @@
+//! Reads `odometry.csv` back, by the names in its header: other columns may be added or removed.
+
+use std::{
+    fs::File,
+    io::{self, BufReader, Read},
+    path::Path,
+};
+
+use gyre_evaluation::TimedMotion;
+use gyre_geometry::{OdometryMotion, covariance::unpack, pose};
+use gyre_terminal::Failure;
+use serde::Deserialize;
+
+const COLUMNS: [&str; 11] = [
+    "stamp_ns",
+    "interval_ns",
+    "x_m",
+    "y_m",
+    "yaw_rad",
+    "cov_xx",
+    "cov_xy",
+    "cov_xyaw",
+    "cov_yy",
+    "cov_yyaw",
+    "cov_yawyaw",
+];
+
+/// The fields of [`COLUMNS`], and how errors of motions depend on each other: not at all where that
+/// is not said.
+#[derive(Deserialize)]
+struct Row {
+    stamp_ns: i64,
+    interval_ns: i64,
+    x_m: f64,
+    y_m: f64,
+    yaw_rad: f64,
+    cov_xx: Option<f64>,
+    cov_xy: Option<f64>,
+    cov_xyaw: Option<f64>,
+    cov_yy: Option<f64>,
+    cov_yyaw: Option<f64>,
+    cov_yawyaw: Option<f64>,
+    drift_share: Option<f64>,
+    scale_sigma: Option<f64>,
+}
+
+/// Reads the motions of an `odometry.csv`. A covariance that is left empty becomes NaN: the motion
+/// has none.
+///
+/// # Errors
+/// A file that cannot be read, a missing column, a row that is damaged.
+pub fn read(path: &Path) -> Result<Vec<TimedMotion>, Failure> {
+    let file =
+        File::open(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
+    let lines = ShortLines {
+        text: BufReader::new(file),
+        line: 0,
+    };
+    parse(lines).map_err(|reason| format!("{}: {reason}", path.display()).into())
+}
+
+/// The longest line, bytes: several times that of a row in full.
+const LONGEST_LINE: usize = 1 << 16;
+
+/// Refuses a line without end, which would be kept in memory.
+struct ShortLines<R> {
+    text: R,
+    /// Bytes of the current line.
+    line: usize,
+}
+
+impl<R: Read> Read for ShortLines<R> {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        let count = self.text.read(bytes)?;
+        for part in bytes[..count].split_inclusive(|byte| *byte == b'\n') {
+            self.line += part.len();
+            if self.line > LONGEST_LINE {
+                let reason = format!("it has a line of more than {LONGEST_LINE} bytes");
+                return Err(io::Error::new(io::ErrorKind::InvalidData, reason));
+            }
+            if part.ends_with(b"\n") {
+                self.line = 0;
+            }
+        }
+        Ok(count)
+    }
+}
+
+fn parse(text: impl Read) -> Result<Vec<TimedMotion>, Failure> {
+    let mut reader = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .from_reader(text);
+    let header = reader.headers()?;
+    let missing = |name: &&&str| header.iter().all(|column| column != **name);
+    if let Some(name) = COLUMNS.iter().find(missing) {
+        return Err(format!("not an odometry.csv: its header has no column {name}").into());
+    }
+    reader.deserialize().map(|row| Row::motion(&row?)).collect()
+}
+
+impl Row {
+    fn motion(&self) -> Result<TimedMotion, Failure> {
+        let from_ns = self.stamp_ns.checked_sub(self.interval_ns);
+        let share = |value: Option<f64>, default| {
+            let value = value.unwrap_or(default);
+            (0.0..=1.0).contains(&value).then_some(value)
+        };
+        let covariance = [
+            self.cov_xx,
+            self.cov_xy,
+            self.cov_xyaw,
+            self.cov_yy,
+            self.cov_yyaw,
+            self.cov_yawyaw,
+        ];
+        Ok(TimedMotion {
+            from_ns: from_ns.ok_or("interval_ns is out of range")?,
+            to_ns: self.stamp_ns,
+            estimate: OdometryMotion {
+                motion: pose(self.x_m, self.y_m, self.yaw_rad),
+                covariance: unpack(&covariance.map(|value| value.unwrap_or(f64::NAN))),
+                drift_share: share(self.drift_share, 1.0).ok_or("drift_share is not 0 to 1")?,
+                scale_sigma: share(self.scale_sigma, 0.0).ok_or("scale_sigma is not 0 to 1")?,
+            },
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use gyre_messages::{Item, MotionEstimate, PoseHeader};
+
+    use super::*;
+    use crate::odometry::{HEADER, motion, write_row};
+
+    fn csv(poses: &[PoseHeader]) -> String {
+        let mut text = HEADER.to_owned();
+        poses.iter().for_each(|pose| write_row(pose, &mut text));
+        text
+    }
+
+    fn motions(poses: &[PoseHeader]) -> Vec<TimedMotion> {
+        poses.iter().filter_map(motion).collect()
+    }
+
+    fn poses() -> Vec<PoseHeader> {
+        let pose = |k: i64| PoseHeader {
+            item: Item {
+                stamp_ns: 1_549_986_608_000_000_007 + 250_000_000 * k,
+                ..Item::default()
+            },
+            motion: MotionEstimate {
+                x_m: 1.5,
+                y_m: -0.25,
+                yaw_rad: 0.125 * k as f64,
+                covariance: [0.04, 0.001, 0.002, 0.05, 0.003, 0.006],
+                drift_share: 0.25,
+                scale_sigma: 0.01,
+                interval_ns: 250_000_000,
+                ..MotionEstimate::default()
+            },
+            ..PoseHeader::default()
+        };
+        (1..4).map(pose).collect()
+    }
+
+    #[test]
+    fn what_was_written_is_read_whatever_columns_are_beside_it() {
+        let (poses, text) = (poses(), csv(&poses()));
+        assert_eq!(parse(text.as_bytes()).unwrap(), motions(&poses));
+        let wider: String = text
+            .lines()
+            .map(|line| format!("new,{line},newer\n"))
+            .collect();
+        assert_eq!(parse(wider.as_bytes()).unwrap(), motions(&poses));
+    }
+
+    #[test]
+    fn an_empty_covariance_is_none_and_the_motion_stays() {
+        let read = parse(csv(&poses()).replace("0.040000000000", "").as_bytes()).unwrap();
+        assert_eq!(read.len(), 3);
+        assert!(
+            read[0].estimate.motion == motions(&poses())[0].estimate.motion
+                && !read[0].estimate.alone().has_covariance()
+        );
+    }
+
+    #[test]
+    fn other_files_and_damaged_rows_are_named() {
+        let refused = |text: &str| parse(text.as_bytes()).unwrap_err().to_string();
+        let text = csv(&poses());
+        assert!(refused("").contains("no column stamp_ns"));
+        assert!(refused(&text.replacen("cov_yyaw", "c", 1)).contains("no column cov_yyaw"));
+        let far = refused(&text.replacen("1.500000000", "far", 1));
+        assert!(
+            far.contains("line: 2") && far.contains("invalid float"),
+            "{far}"
+        );
+        assert!(refused(&text[..text.len() - 40]).contains("line: 4"));
+        let out_of_range = text.replace(",250000000,", ",-9223372036854775808,");
+        assert!(refused(&out_of_range).contains("interval_ns"));
+    }
+}

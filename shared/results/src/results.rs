@@ -1,0 +1,215 @@
+//! Results of a run in `--out`, all made from the journal: an interrupted run leaves the same
+//! files.
+//!
+//! The journal is read once, from its start to its end, and nothing is kept of it but what a result
+//! needs: a month takes no more memory than a minute. Only an evaluation needs all poses.
+
+mod estimate;
+mod files;
+mod map;
+mod pass;
+mod sketch;
+mod slam;
+
+use std::path::{Path, PathBuf};
+
+use gyre_configuration::Configuration;
+use gyre_evaluation::{NeesOptions, Options, plot::bands_svg};
+use gyre_journal as journal;
+use gyre_messages::StageId;
+use gyre_radar::{
+    Trajectory,
+    ground_truth::{find_ground_truth, read_trajectory},
+};
+use gyre_terminal::{Failure, print};
+
+use crate::{
+    judgement::{Judgement, judge, judge_motions},
+    out::Out,
+    summary::{Session, SlamSummary, Summary},
+};
+use estimate::Estimate;
+use files::Files;
+use pass::Pass;
+use sketch::Sketch;
+use slam::Slam;
+
+pub use map::map_options;
+
+/// The figures of a run. It is put in place after all other results.
+pub const SUMMARY: &str = "summary.json";
+
+/// The ground truth of a simulation that is played without being stored.
+pub const SIMULATED_TRUTH: &str = "ground_truth.tum";
+/// All results.
+pub const FILES: [&str; 13] = [
+    "odometry.csv",
+    "trajectory.tum",
+    "trajectory.svg",
+    "errors.svg",
+    "bands.svg",
+    "trajectory_slam.tum",
+    "loops.csv",
+    "graph.g2o",
+    "bands_slam.svg",
+    "map.png",
+    "latency.json",
+    SUMMARY,
+    SIMULATED_TRUTH,
+];
+
+/// The files that were written.
+#[derive(Debug)]
+pub struct Results {
+    /// Poses in the journal.
+    pub poses: usize,
+    /// True if the journal has its end.
+    pub ended: bool,
+    /// The summary to print.
+    pub summary: Summary,
+}
+
+/// Writes all files from the journal. Each is written aside first, and none takes its place before
+/// all are complete; a result of an earlier session that cannot be made any more is removed. They
+/// survive a power failure when this returns.
+///
+/// # Errors
+/// A journal that cannot be read, a file that cannot be written.
+pub fn write(
+    configuration: &Configuration,
+    out: &Out,
+    session: &Session<'_>,
+) -> Result<Results, Failure> {
+    let truth = truth_of(configuration, out);
+    let mut slam = slam_of(configuration, out);
+    let mut files = Files::new(out);
+    let mut pass = Pass::new(&mut files, session.resumed, truth.is_some(), slam.as_ref())?;
+    for record in journal::records(&journal::path(out.path()))?
+        .into_iter()
+        .flatten()
+    {
+        pass.add(&record?)?;
+    }
+    let read = pass.finish();
+    let corrected = slam.as_mut();
+    let corrected = corrected
+        .map(|slam| add_corrected(&mut files, slam, truth.as_deref(), &read.corrected))
+        .transpose()?;
+    if let Some(slam) = &slam {
+        let trajectory = read.corrected_sketch.path();
+        let png = map::map_png(configuration, out, slam, &trajectory)?;
+        png.map_or(Ok(()), |png| files.add("map.png", png))?;
+    }
+    let judgement = truth.and_then(|truth| judged(&truth, &read.estimate));
+    for (name, plot) in plots(&read.sketch, judgement.as_ref())? {
+        files.add(name, plot)?;
+    }
+    let latency = read.latency.latency();
+    files.add("latency.json", serde_json::to_string_pretty(&latency)?)?;
+    let refines = configuration.has(StageId::Refinement);
+    let counts = read
+        .counter
+        .counts(read.end.as_ref(), configuration.source.first, refines);
+    let summary = Summary::new(
+        configuration,
+        out.path(),
+        session,
+        counts,
+        latency,
+        judgement,
+        corrected,
+    );
+    files.add(SUMMARY, serde_json::to_string_pretty(&summary)?)?;
+    files.commit()?;
+    Ok(Results {
+        poses: counts.processed as usize,
+        ended: read.end.is_some(),
+        summary,
+    })
+}
+
+/// Returns the dataset's ground truth, where there is one.
+fn truth_of(configuration: &Configuration, out: &Out) -> Option<PathBuf> {
+    let given = configuration.run.ground_truth.clone();
+    let simulated = || configuration.streamed().map(|_| out.join(SIMULATED_TRUTH));
+    given
+        .or_else(simulated)
+        .or_else(|| match configuration.source.data.as_os_str().is_empty() {
+            true => None,
+            false => find_ground_truth(&configuration.source.data),
+        })
+}
+
+/// Corrects the trajectory by loops. Without that, the run has all other results.
+fn slam_of(configuration: &Configuration, out: &Out) -> Option<Slam> {
+    Slam::read(configuration, out)
+        .inspect_err(|reason| print::note(format_args!("no corrected trajectory: {reason}")))
+        .ok()
+        .flatten()
+}
+
+/// Adds the results of SLAM but for the trajectory itself and the map.
+fn add_corrected(
+    files: &mut Files<'_>,
+    slam: &mut Slam,
+    truth: Option<&Path>,
+    corrected: &Trajectory,
+) -> Result<SlamSummary, Failure> {
+    files.add("loops.csv", slam.loops_csv()?)?;
+    files.add("graph.g2o", slam.graph_g2o())?;
+    // Why a truth cannot be used is said where odometry is evaluated.
+    let truth = truth.and_then(|path| read_trajectory(path).ok());
+    let Some(truth) = truth.filter(|_| corrected.len() > 1) else {
+        return Ok(slam.summary(None));
+    };
+    let ate = judge(corrected, &truth, Options::default()).map(|evaluation| evaluation.ate);
+    let bands = slam.bands(&truth).and_then(|bands| Ok(bands_svg(&bands)?));
+    match bands {
+        Ok(svg) => files.add("bands_slam.svg", svg)?,
+        Err(reason) => print::note(format_args!("no bands_slam.svg: {reason}")),
+    }
+    Ok(slam.summary(ate.ok().map(|ate| ate.rmse_m)))
+}
+
+/// Evaluates the trajectory and its covariances against the ground truth, if that fits.
+fn judged(path: &Path, estimate: &Estimate) -> Option<Judgement> {
+    if estimate.poses() < 2 {
+        return None;
+    }
+    let by = |truth: Trajectory| -> Result<Judgement, Failure> {
+        let evaluation = judge(estimate.trajectory(), &truth, Options::default())?;
+        let motions = judge_motions(estimate.motions(), &truth, &evaluation)
+            .inspect_err(|reason| print::note(format_args!("no NEES and no bands.svg: {reason}")));
+        Ok(Judgement::new(
+            evaluation,
+            motions.ok().as_ref(),
+            &NeesOptions::default(),
+        ))
+    };
+    let judged = estimate
+        .require_all()
+        .and_then(|()| read_trajectory(path).map_err(Failure::from))
+        .and_then(by);
+    judged
+        .inspect_err(|reason| {
+            print::note(format_args!(
+                "not evaluated against {}: {reason}",
+                path.display()
+            ))
+        })
+        .ok()
+}
+
+fn plots(
+    sketch: &Sketch,
+    judgement: Option<&Judgement>,
+) -> Result<Vec<(&'static str, String)>, Failure> {
+    match judgement {
+        Some(judgement) => judgement.plots(),
+        None => Ok(sketch
+            .svg()?
+            .map(|svg| ("trajectory.svg", svg))
+            .into_iter()
+            .collect()),
+    }
+}

@@ -1,0 +1,130 @@
+//! One pass over the journal.
+
+use gyre_latency::LatencyMeter;
+use gyre_messages::{Item, PoseHeader, flag};
+use gyre_radar::{Trajectory, ground_truth::write_tum_pose};
+use gyre_storage::Draft;
+use gyre_terminal::Failure;
+
+use super::{Estimate, Files, Sketch, Slam};
+use crate::{odometry, summary::Counter};
+
+/// Writes the tables row by row, and measures and counts all else.
+pub struct Pass<'a, 'b> {
+    files: &'a mut Files<'b>,
+    odometry: Draft,
+    tum: Draft,
+    row: String,
+    /// Poses of earlier sessions that are still to come.
+    resumed: usize,
+    is_judged: bool,
+    /// The correction of the poses, and their table.
+    slam: Option<(&'a Slam, Draft)>,
+    read: Read,
+}
+
+/// The data that was read.
+#[derive(Debug, Default)]
+pub struct Read {
+    /// The end of the stream, if it came to that.
+    pub end: Option<Item>,
+    /// The poses of all sessions.
+    pub counter: Counter,
+    /// Those of this session: earlier ones may be of another boot, whose clock is another one.
+    pub latency: LatencyMeter,
+    /// The path to be drawn.
+    pub sketch: Sketch,
+    /// The poses to be evaluated.
+    pub estimate: Estimate,
+    /// The corrected poses to be evaluated.
+    pub corrected: Trajectory,
+    /// The corrected path to be drawn.
+    pub corrected_sketch: Sketch,
+}
+
+impl<'a, 'b> Pass<'a, 'b> {
+    /// Starts with a journal of which `resumed` poses are of earlier sessions. Poses are kept if
+    /// they are to be judged.
+    ///
+    /// # Errors
+    /// A file that cannot be created.
+    pub fn new(
+        files: &'a mut Files<'b>,
+        resumed: usize,
+        is_judged: bool,
+        slam: Option<&'a Slam>,
+    ) -> Result<Self, Failure> {
+        let (mut odometry, tum) = (
+            files.create("odometry.csv")?,
+            files.create("trajectory.tum")?,
+        );
+        odometry.append(odometry::HEADER)?;
+        let corrected = |slam| Ok::<_, Failure>((slam, files.create("trajectory_slam.tum")?));
+        Ok(Self {
+            slam: slam.map(corrected).transpose()?,
+            files,
+            odometry,
+            tum,
+            row: String::new(),
+            resumed,
+            is_judged,
+            read: Read::default(),
+        })
+    }
+
+    /// Adds the next record.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn add(&mut self, pose: &PoseHeader) -> Result<(), Failure> {
+        if pose.item.is(flag::END) {
+            self.read.end = Some(pose.item);
+            return Ok(());
+        }
+        self.row.clear();
+        odometry::write_row(pose, &mut self.row);
+        self.odometry.append(&self.row)?;
+        let place = pose.pose().motion;
+        let mut line = Vec::new();
+        write_tum_pose(pose.item.stamp_ns, &place, &mut line)?;
+        self.tum.append(line)?;
+        self.correct(pose)?;
+        self.read.counter.add(pose);
+        self.read.sketch.add(place);
+        match self.resumed.checked_sub(1) {
+            Some(left) => self.resumed = left,
+            None => self.read.latency.add(pose),
+        }
+        if self.is_judged {
+            self.read.estimate.add(pose);
+        }
+        Ok(())
+    }
+
+    fn correct(&mut self, pose: &PoseHeader) -> Result<(), Failure> {
+        let Some((slam, tum)) = &mut self.slam else {
+            return Ok(());
+        };
+        let stamp_ns = pose.item.stamp_ns;
+        let corrected = slam.correct(pose.item.seq, &pose.pose().motion);
+        let mut line = Vec::new();
+        write_tum_pose(stamp_ns, &corrected, &mut line)?;
+        self.read.corrected_sketch.add(corrected);
+        if self.is_judged {
+            let trajectory = &mut self.read.corrected;
+            trajectory.stamp_ns.get_or_insert_default().push(stamp_ns);
+            trajectory.poses.push(corrected);
+        }
+        Ok(tum.append(line)?)
+    }
+
+    /// Returns what was read.
+    pub fn finish(self) -> Read {
+        self.files.push(self.odometry);
+        self.files.push(self.tum);
+        if let Some((_, tum)) = self.slam {
+            self.files.push(tum);
+        }
+        self.read
+    }
+}

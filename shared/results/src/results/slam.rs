@@ -1,0 +1,229 @@
+//! The trajectory corrected by loops: a function of the keyframes, the loops and the journal,
+//! whenever loops were closed.
+
+use std::fmt::{self, Write};
+
+use gyre_configuration::Configuration;
+use gyre_estimation::{Constraint, EstimationError, G2o};
+use gyre_evaluation::{BandSample, Bands, TruthSigma};
+use gyre_geometry::{Pose, xy_yaw};
+use gyre_radar::Trajectory;
+use gyre_slam::{
+    Correction, Keyframe, LoopOutcome, LoopVerdict, Query, RecordReader, TrajectoryEstimator,
+    TrajectoryOptions,
+};
+use gyre_terminal::Failure;
+
+use crate::{out::Out, summary::SlamSummary};
+
+/// Keyframes whose covariance is computed, at most: each takes a millisecond in a long drive.
+const DRAWN: usize = 1000;
+
+const HEADER: &str = "scan,found_scan,x_m,y_m,yaw_rad,similarity,correlation,searched,runner_up,chi_square,weight,verdict\n";
+
+/// Keyframes, loops and corrected poses.
+pub struct Slam {
+    estimator: TrajectoryEstimator,
+    correction: Correction,
+    queries: Vec<Query>,
+    /// The scan and the time of each keyframe.
+    keyframes: Vec<(u64, i64)>,
+}
+
+impl Slam {
+    /// Corrects the poses of the keyframes of a run by its loops; `None` without SLAM, and before
+    /// the first keyframe. Of a run that goes on, the loops so far are left out.
+    ///
+    /// # Errors
+    /// Keyframes that cannot be read or used.
+    pub fn read(configuration: &Configuration, out: &Out) -> Result<Option<Self>, Failure> {
+        let Some(kind) = configuration.slam.kind.estimator() else {
+            return Ok(None);
+        };
+        let mut keyframes = RecordReader::<Keyframe>::open(out.path())?;
+        if keyframes.is_empty() {
+            return Ok(None);
+        }
+        let queries = queries(out)?;
+        let mut estimator = TrajectoryEstimator::new(TrajectoryOptions {
+            kind,
+            ..TrajectoryOptions::default()
+        });
+        let mut known = Vec::new();
+        for index in 0..keyframes.len() {
+            // With its points: the checksum is that of the whole record.
+            let keyframe = keyframes.read(index)?;
+            estimator.push(&keyframe)?;
+            known.push((keyframe.scan, keyframe.stamp_ns));
+        }
+        for query in &queries {
+            check(query, known.len())?;
+            estimator.close(query)?;
+        }
+        estimator.solve()?;
+        Ok(Some(Self {
+            correction: estimator.correction(),
+            estimator,
+            queries,
+            keyframes: known,
+        }))
+    }
+
+    /// Corrects the pose of scan `seq`.
+    pub fn correct(&self, seq: u64, pose: &Pose) -> Pose {
+        self.correction.correct(seq, pose)
+    }
+
+    /// Returns the corrected poses of the keyframes.
+    pub fn poses(&self) -> &[Pose] {
+        self.estimator.poses()
+    }
+
+    /// Returns the corrected poses of both keyframes of each loop that is used.
+    pub fn loops(&self) -> Vec<[Pose; 2]> {
+        let ends = |it: Constraint| [it.from, it.to].map(|keyframe| self.poses()[keyframe]);
+        self.used().map(ends).collect()
+    }
+
+    fn used(&self) -> impl Iterator<Item = Constraint> + '_ {
+        let used = self.estimator.loops().iter();
+        let used = used.filter(|it| it.verdict == LoopVerdict::Used);
+        used.map(|it| it.constraint)
+    }
+
+    /// Returns `loops.csv`: a row for each verified candidate.
+    ///
+    /// # Errors
+    /// None: writing to a string does not fail.
+    pub fn loops_csv(&self) -> Result<String, fmt::Error> {
+        let mut rows = HEADER.to_owned();
+        let judged = self.estimator.loops();
+        for query in &self.queries {
+            for candidate in &query.candidates {
+                let ends = (query.keyframe, candidate.place);
+                let of = |it: &gyre_slam::JudgedLoop| (it.constraint.to, it.constraint.from);
+                let judged = judged.binary_search_by_key(&ends, of).map(|at| judged[at]);
+                let [query, place] = [ends.0, ends.1].map(|keyframe| self.keyframes[keyframe].0);
+                let [x, y, yaw] = xy_yaw(&candidate.motion.motion);
+                write!(rows, "{query},{place},{x:.4},{y:.4},{yaw:.6},")?;
+                for figure in [
+                    candidate.similarity,
+                    candidate.correlation,
+                    candidate.searched,
+                    candidate.runner_up,
+                ] {
+                    write!(rows, "{figure:.4},")?;
+                }
+                match candidate.chi_square.is_nan() {
+                    true => write!(rows, ",")?,
+                    false => write!(rows, "{:.3},", candidate.chi_square)?,
+                }
+                match judged {
+                    Ok(judged) => writeln!(rows, "{:.4},{}", judged.weight, judged.verdict)?,
+                    Err(_) => writeln!(rows, ",{}", unjudged(candidate.outcome))?,
+                }
+            }
+        }
+        Ok(rows)
+    }
+
+    /// Returns `graph.g2o`: the corrected keyframes, the motions between them, and the loops that
+    /// are used.
+    pub fn graph_g2o(&self) -> String {
+        G2o::write(
+            self.estimator.poses(),
+            self.estimator.odometry().chain(self.used()),
+        )
+    }
+
+    /// Returns the errors of the corrected keyframes with what their covariances say, against the
+    /// first one that has a true pose.
+    ///
+    /// # Errors
+    /// Constraints that do not determine the poses.
+    pub fn bands(&mut self, truth: &Trajectory) -> Result<Bands, Failure> {
+        self.estimator.scale_covariances()?;
+        let step = self.keyframes.len().div_ceil(DRAWN);
+        let (mut samples, mut start) = (Vec::new(), None);
+        for keyframe in (0..self.keyframes.len()).step_by(step) {
+            let stamp_ns = self.keyframes[keyframe].1;
+            let Some(truth) = truth.near(stamp_ns, Trajectory::ROUNDING_NS) else {
+                continue;
+            };
+            let pose = self.estimator.pose(keyframe)?;
+            let (map_from_truth, start_ns) =
+                *start.get_or_insert((pose.motion * truth.inverse(), stamp_ns));
+            samples.push(BandSample {
+                time_s: (stamp_ns - start_ns) as f64 * 1e-9,
+                error: pose.error(&(map_from_truth * truth)),
+                sigma: pose
+                    .covariance
+                    .diagonal()
+                    .map(|variance| variance.max(0.0).sqrt()),
+            });
+        }
+        Ok(Bands {
+            chains: vec![samples],
+            truth_sigma: TruthSigma::default(),
+        })
+    }
+
+    /// Returns what the summary says. `ate_m` is the error of the corrected trajectory.
+    pub fn summary(&self, ate_m: Option<f64>) -> SlamSummary {
+        let loops_used = self.used().count();
+        let verified = |query: &Query| {
+            let candidates = query.candidates.iter();
+            let verified = |outcome| {
+                matches!(
+                    outcome,
+                    LoopOutcome::Accepted | LoopOutcome::ContradictsOdometry
+                )
+            };
+            candidates.filter(|it| verified(it.outcome)).count()
+        };
+        SlamSummary {
+            keyframes: self.keyframes.len(),
+            loops_used,
+            loops_rejected: self.queries.iter().map(verified).sum::<usize>() - loops_used,
+            ate_m,
+        }
+    }
+}
+
+/// Returns the verdict on a candidate that the trajectory was not given.
+fn unjudged(outcome: LoopOutcome) -> &'static str {
+    match outcome {
+        LoopOutcome::Accepted => "not judged",
+        LoopOutcome::LowCorrelation => "low correlation",
+        LoopOutcome::Ambiguous => "ambiguous",
+        LoopOutcome::Undetermined => "undetermined",
+        LoopOutcome::ContradictsOdometry => "contradicts odometry",
+    }
+}
+
+/// Refuses a query of keyframes that the run does not have: its log belongs to other keyframes.
+fn check(query: &Query, keyframes: usize) -> Result<(), EstimationError> {
+    let to = query.keyframe;
+    let places = query.candidates.iter().map(|candidate| candidate.place);
+    let from = places.max().unwrap_or(to);
+    match from.max(to) < keyframes {
+        true => Ok(()),
+        false => Err(EstimationError::UnknownKeyframe {
+            from,
+            to,
+            keyframes,
+        }),
+    }
+}
+
+/// Reads the candidates of all keyframes, if all of them have been queried.
+fn queries(out: &Out) -> Result<Vec<Query>, Failure> {
+    let mut queries = RecordReader::open(out.path())?;
+    if !queries.has_ended() {
+        return Ok(Vec::new());
+    }
+    let all = 0..queries.len();
+    Ok(all
+        .map(|index| queries.read(index))
+        .collect::<Result<_, _>>()?)
+}

@@ -1,0 +1,299 @@
+//! `summary.json`, and the same as a table.
+
+mod counts;
+mod slam;
+
+use std::{collections::BTreeMap, fmt, path::Path, time::Duration};
+
+use gyre_configuration::Configuration;
+use gyre_latency::{Latency, Percentiles};
+use gyre_masking::{Backend, MaskKind, MaskingConfig};
+use gyre_messages::{Footprint, StageId};
+use gyre_run::{Ending, Mode, Rate, Report, StageCounters, Swapped};
+use serde::Serialize;
+use thiserror::Error;
+
+use crate::{judgement::Judgement, machine::Machine};
+
+pub use counts::{Counter, Counts, MotionCounts};
+pub use slam::SlamSummary;
+
+/// This session of a run.
+pub struct Session<'a> {
+    /// Scans to play; `None`: without end.
+    pub scans: Option<usize>,
+    /// Poses that were in the journal before.
+    pub resumed: usize,
+    /// Wall-clock time.
+    pub wall: Duration,
+    /// Shared memory; `None` if no process was started, because only results were missing.
+    pub footprint: Option<&'a Footprint>,
+    /// The end; `None`: it failed.
+    pub ending: Option<Ending>,
+    /// The supervisor's report; `None` if it failed or no process was started.
+    pub report: Option<&'a Report>,
+}
+
+/// The network that makes the masks.
+#[derive(Debug, Serialize)]
+struct Mask {
+    /// The model card.
+    model: String,
+    /// The SHA-256 of the network's file.
+    sha256: String,
+    /// The library that computes it.
+    backend: Backend,
+}
+
+impl Mask {
+    /// From a resolved configuration.
+    fn of(masking: &MaskingConfig) -> Option<Self> {
+        let (model, sha256) = (masking.model.as_ref()?, masking.sha256.as_ref()?);
+        let mask = Self {
+            model: model.display().to_string(),
+            sha256: sha256.clone(),
+            backend: masking.backend,
+        };
+        (masking.kind == MaskKind::Learned).then_some(mask)
+    }
+}
+
+/// Why the results of a run that has played all scans are hardly those of its recording.
+#[derive(Clone, Debug, Error, Serialize)]
+#[error("{0}")]
+#[serde(transparent)]
+pub struct Problem(String);
+
+impl Problem {
+    fn of(data: &str, out: &Path, session: &Session<'_>, counts: &Counts) -> Option<Self> {
+        let scans = session.scans.unwrap_or(counts.processed as usize);
+        let log = out.join("log.jsonl");
+        let (poses, unreadable, log) = (counts.processed, counts.unreadable, log.display());
+        if session.ending != Some(Ending::Complete) {
+            return None;
+        }
+        if poses < 2 {
+            return Some(Self(format!(
+                "only {poses} of the {scans} scans of {data} can be read, and a motion is between two: {log} says what is wrong with them"
+            )));
+        }
+        counts.too_many_are_unreadable().then(|| {
+            Self(format!(
+                "{unreadable} of the {scans} scans of {data} cannot be read: the results are of the others, and {log} says what is wrong with each"
+            ))
+        })
+    }
+}
+
+/// The summary of a run: `summary.json`.
+#[derive(Debug, Serialize)]
+pub struct Summary {
+    version: &'static str,
+    machine: Machine,
+    out: String,
+    data: String,
+    /// `None`: the run failed.
+    ending: Option<Ending>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    problem: Option<Problem>,
+    mode: Mode,
+    rate: Rate,
+    window: usize,
+    /// `None`: no network makes the masks.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mask: Option<Mask>,
+    /// `None`: a radar's, without end.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    scans_in_recording: Option<usize>,
+    resumed_after: usize,
+    #[serde(flatten)]
+    counts: Counts,
+    wall_s: f64,
+    scans_per_s: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    shared_memory: Option<Footprint>,
+    restarts: BTreeMap<String, usize>,
+    recovery_ms: Vec<f64>,
+    /// The programs that took the place of others, in order.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    swaps: Vec<Swapped>,
+    /// Counters of each stage since its last start.
+    stages: BTreeMap<String, StageCounters>,
+    latency: Latency,
+    /// As `gyre evaluate --json` prints it.
+    evaluation: Option<Judgement>,
+    /// `None`: the trajectory is not corrected by loops.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    slam: Option<SlamSummary>,
+}
+
+impl Summary {
+    /// The counts of scans.
+    pub fn counts(&self) -> &Counts {
+        &self.counts
+    }
+
+    /// Returns why the results of all scans are hardly those of the recording.
+    pub fn problem(&self) -> Option<&Problem> {
+        self.problem.as_ref()
+    }
+
+    /// Puts it together.
+    pub fn new(
+        configuration: &Configuration,
+        out: &Path,
+        session: &Session<'_>,
+        counts: Counts,
+        latency: Latency,
+        evaluation: Option<Judgement>,
+        slam: Option<SlamSummary>,
+    ) -> Self {
+        let (wall_s, report) = (session.wall.as_secs_f64(), session.report);
+        Self {
+            version: env!("CARGO_PKG_VERSION"),
+            machine: Machine::this(),
+            out: out.display().to_string(),
+            problem: Problem::of(&configuration.data(), out, session, &counts),
+            data: configuration.data(),
+            ending: session.ending,
+            mode: configuration.run.mode,
+            rate: configuration.run.rate,
+            window: configuration.run.window,
+            mask: Mask::of(&configuration.odometry.masking),
+            scans_in_recording: session.scans,
+            resumed_after: session.resumed,
+            counts,
+            wall_s,
+            scans_per_s: latency.scans as f64 / wall_s.max(f64::MIN_POSITIVE),
+            shared_memory: session.footprint.cloned(),
+            restarts: report
+                .map(|report| report.restarts.clone())
+                .unwrap_or_default(),
+            recovery_ms: report
+                .into_iter()
+                .flat_map(|r| &r.recovery)
+                .map(|time| time.as_secs_f64() * 1e3)
+                .collect(),
+            swaps: report
+                .map(|report| report.swaps.clone())
+                .unwrap_or_default(),
+            stages: report
+                .map(|report| report.counters.clone())
+                .unwrap_or_default(),
+            latency,
+            evaluation,
+            slam,
+        }
+    }
+}
+
+impl fmt::Display for Summary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let c = &self.counts;
+        let ending = match self.ending {
+            Some(Ending::Complete) if c.unreadable > 0 => "complete but for unreadable scans",
+            Some(Ending::Complete) => "complete",
+            Some(Ending::Interrupted) => "interrupted: the same command resumes from here",
+            None => "failed",
+        };
+        let of = self.scans_in_recording;
+        let of = of.map_or(String::new(), |scans| format!(" of {scans}"));
+        writeln!(
+            f,
+            "\n{ending}: {}{of} scans in {:.1} s, {:.1} scans/s",
+            c.processed, self.wall_s, self.scans_per_s
+        )?;
+        writeln!(
+            f,
+            "published {}  dropped {}  unreadable {}  missing {}  breaks {}",
+            c.published, c.dropped, c.unreadable, c.missing, c.breaks
+        )?;
+        if let Some(m) = &c.motions {
+            writeln!(
+                f,
+                "motions refined {} ({} by a second hypothesis)  weak {}  predicted {}  stationary {}",
+                m.refined, m.second_hypothesis, m.weak, m.predicted, m.stationary
+            )?;
+        }
+        if let Some(mask) = &self.mask {
+            writeln!(f, "masks of {} by {}", mask.model, mask.backend.name())?;
+        }
+        if !self.restarts.is_empty() {
+            let restarts: Vec<_> = self
+                .restarts
+                .iter()
+                .map(|(stage, times)| format!("{stage} {times}"))
+                .collect();
+            let recovery: Vec<_> = self
+                .recovery_ms
+                .iter()
+                .map(|ms| format!("{ms:.0}"))
+                .collect();
+            writeln!(
+                f,
+                "restarts {}  recovered after {} ms",
+                restarts.join(", "),
+                recovery.join(", ")
+            )?;
+        }
+        self.latency_table(f)?;
+        if let Some(evaluation) = &self.evaluation {
+            writeln!(f, "\n{evaluation}")?;
+        }
+        if let Some(slam) = &self.slam {
+            writeln!(f, "\n{slam}")?;
+        }
+        let corrected = match self.slam {
+            Some(_) => ", trajectory_slam.tum, loops.csv, graph.g2o, map.png",
+            None => "",
+        };
+        write!(
+            f,
+            "\nresults in {}: odometry.csv, trajectory.tum, trajectory.svg{corrected}, latency.json, summary.json",
+            self.out
+        )
+    }
+}
+
+impl Summary {
+    fn latency_table(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "\n{:22}{:>10}{:>10}{:>10}{:>10}   busy   allocations",
+            "latency, us", "p50", "p90", "p99", "max"
+        )?;
+        row(f, "sensor to pose", &self.latency.sensor_to_pose)?;
+        writeln!(f)?;
+        for stage in StageId::ALL {
+            let Some(hop) = self.latency.stages.get(stage.name()) else {
+                continue;
+            };
+            if let Some(transport) = &hop.transport {
+                row(f, "  transport", transport)?;
+                writeln!(f)?;
+            }
+            row(f, stage.name(), &hop.work)?;
+            write!(f, "{:6.0} %", hop.busy * 100.0)?;
+            let counters = self.stages.get(stage.name());
+            match counters.and_then(|counters| counters.allocations_after_five) {
+                Some(allocations) => writeln!(f, "{allocations:14}")?,
+                None => writeln!(f)?,
+            }
+        }
+        let bound_by = self.latency.bound_by.unwrap_or("nothing");
+        write!(
+            f,
+            "bounded by {bound_by}; two or more stages busy at once {:.0} % of the time",
+            self.latency.overlap * 100.0
+        )?;
+        writeln!(f, "; allocations: in `process` after its first five items")
+    }
+}
+
+fn row(f: &mut fmt::Formatter<'_>, name: &str, p: &Percentiles) -> fmt::Result {
+    write!(
+        f,
+        "{name:22}{:10.0}{:10.0}{:10.0}{:10.0}",
+        p.p50_us, p.p90_us, p.p99_us, p.max_us
+    )
+}

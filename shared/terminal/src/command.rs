@@ -1,0 +1,30 @@
+//! What the words of a command line mean: programs and times.
+
+use std::{path::PathBuf, time::Duration};
+
+use crate::failure::Failure;
+
+/// Returns a path that leads to the program that this process executes, for this process and its children.
+pub fn own() -> PathBuf {
+    PathBuf::from(format!("/proc/{}/exe", std::process::id()))
+}
+
+/// Returns the program and the arguments of a `--command`, as a shell would part them.
+///
+/// # Errors
+/// No program, or a quote that is not closed.
+pub fn words(command: &str) -> Result<Vec<String>, Failure> {
+    match shlex::split(command) {
+        Some(words) if !words.is_empty() => Ok(words),
+        _ => Err(format!("--command is `{command}`, but must be a program and its arguments, with its quotes closed").into()),
+    }
+}
+
+/// Returns the time that an option gives in seconds.
+///
+/// # Errors
+/// A number below 0, or none that is finite.
+pub fn seconds(option: &str, seconds: f64) -> Result<Duration, Failure> {
+    Duration::try_from_secs_f64(seconds)
+        .map_err(|_| format!("{option} is {seconds}, but must be 0 or more").into())
+}

@@ -1,0 +1,10 @@
+//! The terminal: what a program of Gyre says to the person there, and how it ends.
+
+mod command;
+mod failure;
+pub mod print;
+mod program;
+
+pub use command::{own, seconds, words};
+pub use failure::Failure;
+pub use program::{INTERRUPTED, parse, report};

@@ -1,0 +1,59 @@
+//! Printing to the terminal; a closed pipe is not an error.
+
+use std::{
+    fmt::Display,
+    io::{self, Write},
+};
+
+use crate::failure::Failure;
+
+/// Prints a line to standard output. A closed pipe (`gyre inspect ... | head`) is not an error.
+///
+/// # Errors
+/// Any other failure to write.
+pub fn line(text: impl Display) -> Result<(), Failure> {
+    printed(writeln!(io::stdout(), "{text}"))
+}
+
+/// Returns whether standard output was written, in a sentence.
+///
+/// # Errors
+/// Any failure but a closed pipe.
+pub fn printed(written: io::Result<()>) -> Result<(), Failure> {
+    match written {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            Err(format!("cannot write to standard output: {error}").into())
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Prints a line to standard error. Failures are ignored: a run does not end because its terminal
+/// is closed.
+pub fn note(text: impl Display) {
+    let _ = writeln!(io::stderr(), "{}", printable(&text.to_string()));
+}
+
+/// Replaces what a terminal would take as a command: names and words of files are quoted as they
+/// are.
+fn printable(text: &str) -> String {
+    let plain = |c: char| {
+        if c.is_control() && c != '\n' {
+            char::REPLACEMENT_CHARACTER
+        } else {
+            c
+        }
+    };
+    text.chars().map(plain).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_that_is_quoted_commands_the_terminal() {
+        let text = printable("cannot read \u{1b}[2J\t\u{7}é:\nno");
+        assert_eq!(text, "cannot read \u{fffd}[2J\u{fffd}\u{fffd}é:\nno");
+    }
+}

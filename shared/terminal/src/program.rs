@@ -1,0 +1,32 @@
+//! A program from its arguments to its exit code.
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use crate::{failure::Failure, print};
+
+/// The exit code after wrong arguments.
+const WRONG_ARGUMENTS: u8 = 2;
+
+/// The exit code of an interrupted program, as shells have it.
+pub const INTERRUPTED: u8 = 130;
+
+/// Parses the command line. Help is printed to standard output, a wrong argument to standard error, and the exit code is returned.
+///
+/// # Errors
+/// Help that was asked for, or a wrong argument.
+pub fn parse<P: Parser>(program: &str) -> Result<P, ExitCode> {
+    P::try_parse().map_err(|error| match (error.use_stderr(), error.print()) {
+        (true, _) => ExitCode::from(WRONG_ARGUMENTS),
+        (false, written) => report(program, print::printed(written).map(|()| ExitCode::SUCCESS)),
+    })
+}
+
+/// The exit code of a command; a failure is printed as `program: sentence`.
+pub fn report(program: &str, result: Result<ExitCode, Failure>) -> ExitCode {
+    result.unwrap_or_else(|error| {
+        print::note(format_args!("{program}: {error}"));
+        ExitCode::FAILURE
+    })
+}
