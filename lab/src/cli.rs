@@ -11,7 +11,7 @@ use crate::{
 
 /// Gyre's laboratory: what research on radar odometry needs, and a robot does not.
 ///
-/// What it runs is the `gyre` beside it, which has to be of the same build.
+/// It runs the `gyre` beside it, which has to be of the same build.
 #[derive(Debug, Parser)]
 #[command(version, about)]
 pub struct Lab {

@@ -10,7 +10,8 @@ mod export_pairs;
 mod realism;
 mod tables;
 
-/// The program that is measured, beside the laboratory: `cargo build -p gyre` makes it, as do all tests of the workspace.
+/// The program that is measured, beside the laboratory: `cargo build -p gyre` makes it, as do all
+/// tests of the workspace.
 const PROGRAM: &str = LAB.split_at(LAB.len() - "-lab".len()).0;
 /// The program under test.
 const LAB: &str = env!("CARGO_BIN_EXE_gyre-lab");

@@ -41,7 +41,8 @@ pub fn stage_plans(configuration: &Configuration, gyre: &Path) -> Vec<StagePlan>
             outlives_restarts: live
                 && name == StageId::RadarReplay.name()
                 && !configuration.is_link(name),
-            // Live masking alone knows which scans it admitted, and on a base the link which of them have come.
+            // Live masking alone knows which scans it admitted, and on a base the link which of
+            // them have come.
             restarts_all: live
                 && (name == StageId::Masking.name()
                     || (configuration.is_side(Side::Base) && configuration.is_link(name))),

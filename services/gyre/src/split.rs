@@ -16,7 +16,8 @@ pub use absent::{run_base, run_robot};
 /// Checks that the other side of a split run can be reached as it is configured.
 ///
 /// # Errors
-/// One sentence: an endpoint or a certificate that is missing or not allowed, or a build without link.
+/// One sentence: an endpoint or a certificate that is missing or not allowed, or a build without
+/// link.
 pub fn check(configuration: &Configuration) -> Result<(), Failure> {
     if configuration.link.side.is_none() {
         return Ok(());
@@ -29,7 +30,8 @@ pub fn check(configuration: &Configuration) -> Result<(), Failure> {
         .map_err(|error| format!("[link]: {error}").into())
 }
 
-/// Executes the same command again with the environment that the network layer needs, unless it has that already.
+/// Executes the same command again with the environment that the network layer needs, unless it has
+/// that already.
 ///
 /// # Errors
 /// The program cannot be executed.

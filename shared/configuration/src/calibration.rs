@@ -1,4 +1,4 @@
-//! What `gyre calibrate` has found, as overrides of a configuration.
+//! The constants that `gyre calibrate` has found, as overrides of a configuration.
 
 use std::path::{Path, PathBuf};
 

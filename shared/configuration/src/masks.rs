@@ -1,4 +1,4 @@
-//! What is to be said of learned masks before they are computed.
+//! The library that computes learned masks, and what their training had otherwise.
 
 use std::error::Error;
 
@@ -8,8 +8,8 @@ use gyre_odometry::OdometryConfig;
 
 use crate::configuration::Configuration;
 
-/// Returns sentences: which library computes learned masks, and where a configuration differs from the one that its network was
-/// trained for. None without learned masks.
+/// Returns sentences: which library computes learned masks, and where a configuration differs from
+/// the one that its network was trained for. None without learned masks.
 ///
 /// # Errors
 /// A model card that cannot be read, or ONNX Runtime missing where it is required.

@@ -1,4 +1,5 @@
-//! The scans that a configuration names: a recording, or a simulation that is rendered while it is read.
+//! The scans that a configuration names: a recording, or a simulation that is rendered while it is
+//! read.
 
 use gyre_radar::{Dataset, Fingerprint, OpenError};
 use gyre_run::PlayedFrom;
@@ -31,7 +32,7 @@ pub enum SourceError {
 
 /// An open recording or simulation.
 pub struct Played {
-    /// Its scans.
+    /// The scans.
     pub dataset: Box<dyn Dataset>,
     /// `ground_truth.tum` of a simulation that is played without being stored.
     pub truth: Option<Vec<u8>>,

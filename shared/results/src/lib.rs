@@ -2,7 +2,8 @@
 //!
 //! - [`Out`]: the folder, which one run at a time may change;
 //! - [`write`](write()): all results, made from the journal in one pass;
-//! - [`odometry`]: the rows of `odometry.csv`; [`Summary`]: `summary.json`; [`judgement`]: the evaluation in it;
+//! - [`odometry`]: the rows of `odometry.csv`; [`Summary`]: `summary.json`; [`judgement`]: the
+//!   evaluation in it;
 //! - [`Identity`]: what the run was begun with;
 //! - [`evaluate`]: the report on a trajectory beside ground truth.
 

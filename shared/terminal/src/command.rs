@@ -1,10 +1,11 @@
-//! What the words of a command line mean: programs and times.
+//! Programs and times as they are given on a command line.
 
 use std::{path::PathBuf, time::Duration};
 
 use crate::failure::Failure;
 
-/// Returns a path that leads to the program that this process executes, for this process and its children.
+/// Returns a path that leads to the program that this process executes, for this process and its
+/// children.
 pub fn own() -> PathBuf {
     PathBuf::from(format!("/proc/{}/exe", std::process::id()))
 }

@@ -12,7 +12,8 @@ const WRONG_ARGUMENTS: u8 = 2;
 /// The exit code of an interrupted program, as shells have it.
 pub const INTERRUPTED: u8 = 130;
 
-/// Parses the command line. Help is printed to standard output, a wrong argument to standard error, and the exit code is returned.
+/// Parses the command line. Help is printed to standard output, a wrong argument to standard error,
+/// and the exit code is returned.
 ///
 /// # Errors
 /// Help that was asked for, or a wrong argument.

@@ -41,6 +41,10 @@ impl RadarParser {
     }
 
     /// Returns the next message or fault.
+    #[expect(
+        clippy::should_implement_trait,
+        reason = "a message borrows the parser"
+    )]
     pub fn next(&mut self) -> Option<Event<'_>> {
         match self {
             Self::Stream(parser) => parser.next(),

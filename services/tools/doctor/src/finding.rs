@@ -1,4 +1,4 @@
-//! A finding, with what is to be done.
+//! The findings about a machine, with their remedies.
 
 use std::fmt;
 
@@ -7,9 +7,9 @@ use std::fmt;
 pub struct Finding {
     pub subject: &'static str,
     pub state: State,
-    /// What was found.
+    /// The finding, a sentence.
     pub found: String,
-    /// What to do about it; empty if there is nothing to do.
+    /// The remedy; empty if there is nothing to do.
     pub remedy: String,
 }
 

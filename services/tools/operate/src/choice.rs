@@ -6,6 +6,9 @@ use gyre_terminal::Failure;
 use crate::arguments::RunChoice;
 
 /// Returns the run that is meant: the one that is named, or the only one.
+///
+/// # Errors
+/// There is no such run, or there are several and none is named.
 pub fn chosen(choice: &RunChoice) -> Result<Control, Failure> {
     if let Some(out) = &choice.out {
         return Ok(Control::of(out)?);

@@ -1,4 +1,4 @@
-//! The verdict on what was measured.
+//! The comparison of measured figures with their limits.
 
 use serde::Serialize;
 
@@ -7,7 +7,7 @@ use serde::Serialize;
 pub struct Check {
     /// The key of `[budget]`.
     pub key: &'static str,
-    /// What was measured; `None`: nothing, which misses the limit.
+    /// The measured figure; `None`: there is none, which misses the limit.
     pub measured: Option<f64>,
     /// The limit.
     pub limit: f64,

@@ -8,7 +8,7 @@ use crate::{
     Calibration, CalibrationError, Drive, Estimate, Fact, FactEstimate, Mounting, OwnReflections,
 };
 
-/// What is known of the drive before it is calibrated.
+/// The configuration of the drive before it is calibrated.
 pub struct Configured {
     /// The constants by which the scans were read.
     pub geometry: SweepGeometry,

@@ -16,7 +16,8 @@
 //!   the eccentricity;
 //! - [`calibrate`]: the method;
 //! - [`Mounting`], [`OwnReflections`]: what follows from the track and from the scans directly;
-//! - [`Found`]: the constants beside the configured ones, with what each rests on; [`toml()`]: as a section of a configuration;
+//! - [`Found`]: the constants beside the configured ones, with what each rests on; [`toml()`]: as a
+//!   section of a configuration;
 //!   [`svg`]: a place seen twice, before and after.
 
 mod calibrate;

@@ -1,10 +1,12 @@
-//! A run as data: the sections of its configuration that its processes read, and what it reports at its end.
+//! A run as data: the sections of its configuration that its processes read, and what it reports at
+//! its end.
 //!
-//! - [`RunConfig`], [`SourceConfig`], [`RecordConfig`], [`LinkConfig`], [`StageConfig`] and [`Budget`] are sections;
+//! - [`RunConfig`], [`SourceConfig`], [`RecordConfig`], [`LinkConfig`], [`StageConfig`] and
+//!   [`Budget`] are sections;
 //! - [`Report`] is what the supervisor reports, with the [`StageCounters`] of each process.
 //!
-//! It is light, so that a stage which reads its own section, and a program which only writes configurations, need neither the method
-//! nor the transport.
+//! It is light, so that a stage which reads its own section, and a program which only writes
+//! configurations, need neither the method nor the transport.
 
 mod budget;
 mod link;
@@ -32,5 +34,6 @@ pub use source::{SourceConfig, SourceKind};
 pub const BEGUN_WITH: &str = "journal/run.toml";
 /// The file there that a run leaves when it has all its results. The next run begins anew.
 pub const COMPLETE: &str = "journal/complete";
-/// The open files of the process of a run that has most of them, masking, without observers. Measured: 105.
+/// The open files of the process of a run that has most of them, masking, without observers.
+/// Measured: 105.
 pub const MOST_OPEN_FILES: u64 = 120;

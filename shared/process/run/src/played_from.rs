@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// The topic that a recording is played from: the stages that compute it and what is before it are absent.
+/// The topic that a recording is played from: the stages that compute it and what is before it are
+/// absent.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
 )]
@@ -33,7 +34,8 @@ impl PlayedFrom {
         }
     }
 
-    /// Returns the topics that the stages after it read. `reads_masked`: the last stage reads masked scans, for the keyframes of SLAM.
+    /// Returns the topics that the stages after it read. `reads_masked`: the last stage reads
+    /// masked scans, for the keyframes of SLAM.
     pub fn topics(self, refines: bool, reads_masked: bool) -> Vec<&'static str> {
         match self {
             Self::Scan => vec!["scan"],

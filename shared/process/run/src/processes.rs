@@ -80,7 +80,8 @@ pub struct RestartPolicy {
     pub limit: usize,
     /// Length of the time window of `limit`, s.
     pub window_s: f64,
-    /// Delay before the restart of a stage that ended by itself, ms. A killed one is restarted at once.
+    /// Delay before the restart of a stage that ended by itself, ms. A killed one is restarted at
+    /// once.
     pub backoff_ms: u64,
 }
 

@@ -1,4 +1,4 @@
-//! What a run reports at its end.
+//! The report of a run at its end.
 
 use std::{collections::BTreeMap, time::Duration};
 
@@ -45,8 +45,8 @@ pub struct Swapped {
 pub struct StageCounters {
     /// Items processed.
     pub processed: u64,
-    /// Heap allocations in `process` after its first five items; `None` if the program does not count them
-    /// (see `CountingAllocator` of `gyre-stage`).
+    /// Heap allocations in `process` after its first five items; `None` if the program does not
+    /// count them (see `CountingAllocator` of `gyre-stage`).
     pub allocations_after_five: Option<u64>,
     /// Heap allocations in `process` during its first five items.
     pub allocations_in_first_five: Option<u64>,
@@ -58,19 +58,21 @@ pub struct StageCounters {
     pub wakes_caught_late: u64,
     /// Scans that could not be read and were skipped (source only).
     pub unreadable: u64,
-    /// Azimuths that are missing from the published scans of a live radar (source only). This and the next four are counts since the
-    /// start of the run, also of sources that have died.
+    /// Azimuths that are missing from the published scans of a live radar (source only). This and
+    /// the next four are counts since the start of the run, also of sources that have died.
     pub missing_azimuths: u64,
-    /// Turns of a live radar of which there is no scan: nothing arrived, the connection broke in the middle, half of the azimuths are
-    /// missing, or times that do not increase (source only).
+    /// Turns of a live radar of which there is no scan: nothing arrived, the connection broke in
+    /// the middle, half of the azimuths are missing, or times that do not increase (source only).
     pub scans_left_out: u64,
     /// Messages of a live radar that could not be read (source only).
     pub damaged_messages: u64,
-    /// Datagrams of others than the live radar, and descriptions of scans that do not fit into the run (source only).
+    /// Datagrams of others than the live radar, and descriptions of scans that do not fit into the
+    /// run (source only).
     pub foreign_messages: u64,
     /// Connections to a live radar after the first (source only).
     pub reconnections: u64,
-    /// Delay of a simulation in live mode that is rendered more slowly than its rate, ns (source only).
+    /// Delay of a simulation in live mode that is rendered more slowly than its rate, ns (source
+    /// only).
     pub slipped_ns: u64,
     /// Time spent in `process`, ns.
     pub busy_ns: u64,

@@ -1,24 +1,24 @@
-//! How the system runs a process: its priority, and the processors that it may use.
+//! The scheduling of a process: its priority, and the processors that it may use.
 
 use rustix::thread::CpuSet;
 use serde::{Deserialize, Serialize};
 
-/// How the system runs a process. A key that is left out leaves what the process inherits.
+/// The scheduling of a process. A key that is left out leaves what the process inherits.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Scheduling {
     /// Niceness, -20 (first) to 19 (last). Below 0 it needs CAP_SYS_NICE, or `ulimit -e`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nice: Option<i32>,
-    /// Priority of the real-time policy SCHED_FIFO, 1 to 99: it runs before all processes without one. It
-    /// needs CAP_SYS_NICE, or `ulimit -r`.
+    /// Priority of the real-time policy SCHED_FIFO, 1 to 99: it runs before all processes without
+    /// one. It needs CAP_SYS_NICE, or `ulimit -r`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub realtime_priority: Option<u8>,
     /// Processors that it may use, from 0. Default: all.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub cpus: Vec<usize>,
-    /// True to keep its memory from being paged out. It needs CAP_IPC_LOCK, or `ulimit -l`. A replacement
-    /// has to do that itself.
+    /// True to keep its memory from being paged out. It needs CAP_IPC_LOCK, or `ulimit -l`. A
+    /// replacement has to do that itself.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub lock_memory: bool,
 }

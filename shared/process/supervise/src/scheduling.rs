@@ -1,4 +1,4 @@
-//! Applies how the system is to run a process: its priority, and the processors that it may use.
+//! Applies the scheduling of a process: its priority, and the processors that it may use.
 
 use std::io;
 
