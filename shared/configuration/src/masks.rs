@@ -2,7 +2,7 @@
 
 use std::error::Error;
 
-use gyre_masking::{MaskKind, backend::Library, model::Card, runtime::INSTALL};
+use gyre_masking::{Library, MaskKind, model::Card, runtime::INSTALL};
 use gyre_messages::StageId;
 use gyre_odometry::OdometryConfig;
 

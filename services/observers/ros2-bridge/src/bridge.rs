@@ -1,23 +1,14 @@
 //! The bridge: a node that publishes the runs of a folder.
 
-use std::{
-    path::{Path, PathBuf},
-    thread,
-};
+use std::thread;
 
-use gyre_mapping::MapOptions;
 use gyre_ros2_messages::{
-    Domain,
-    diagnostic_msgs::DiagnosticArray,
-    frames::{self, Frames},
-    nav_msgs::OccupancyGrid,
-    tf2_msgs::TFMessage,
+    diagnostic_msgs::DiagnosticArray, frames, nav_msgs::OccupancyGrid, tf2_msgs::TFMessage,
 };
-use gyre_slam::EstimatorKind;
 use gyre_stage::{StageError, clock, wake::Signals};
 
 use crate::{
-    Mounting, NodeError,
+    MapSettingsOf, NodeError, Settings,
     following::{POLL_INTERVAL, PoseTopics, follow_corrections, follow_poses},
     health::report,
     live_map::follow_maps,
@@ -30,37 +21,6 @@ use crate::{
 const NODE: &str = "gyre";
 /// Messages that are kept for slow readers: 25 s at four turns a second.
 const DEPTH: usize = 100;
-
-/// The options of the bridge.
-#[derive(Clone, Debug)]
-pub struct Settings {
-    /// The folder of the results of the run, and of the next one.
-    pub out: PathBuf,
-    /// The domain and the network.
-    pub domain: Domain,
-    /// The namespace of `odom` and `map`, such as `/` or `/robot`.
-    pub namespace: String,
-    /// Names of the frames.
-    pub frames: Frames,
-    /// The radar on the vehicle.
-    pub mounting: Mounting,
-    /// True to publish `odom` -> `base_link` and `map` -> `odom`: only one program may.
-    pub transforms: bool,
-    /// The settings of the map of a run with SLAM; `None`: no map.
-    pub map: Option<MapSettingsOf>,
-}
-
-/// Returns the settings of the map of the run in a folder, or why it has none.
-pub type MapSettingsOf = fn(&Path) -> Result<MapSettings, String>;
-
-/// The settings of a map.
-#[derive(Clone, Debug, PartialEq)]
-pub struct MapSettings {
-    /// Cells and ranges.
-    pub options: MapOptions,
-    /// The estimator that corrects the poses of keyframes by loops.
-    pub estimator: EstimatorKind,
-}
 
 /// A node that publishes the runs of a folder, one after the other.
 pub struct Bridge {

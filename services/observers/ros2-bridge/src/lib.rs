@@ -18,8 +18,10 @@ mod live_map;
 mod node;
 mod outlet;
 mod run_state;
+mod settings;
 pub mod source;
 
-pub use bridge::{Bridge, MapSettings, MapSettingsOf, Settings};
+pub use bridge::Bridge;
 pub use gyre_ros2_messages::{BadMounting, Mounting, frames::Frames};
 pub use node::NodeError;
+pub use settings::{MapSettings, MapSettingsOf, Settings};

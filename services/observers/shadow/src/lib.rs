@@ -9,24 +9,23 @@
 //! Reading order: [`shadow`], `shadowing` (the loop), `observation` (the items of the run),
 //! `renumbering` (the items as the shadow gets them), `life` (the process), `record`, [`Report`].
 
+mod error;
 mod life;
 mod observation;
+mod options;
 mod record;
 mod renumbering;
 mod report;
 mod shadowing;
 
-use std::{
-    fs, io,
-    path::{Path, PathBuf},
-    time::Duration,
-};
+use std::fs;
 
-use gyre_harness::{Candidate, Scheduling, SuperviseError};
+use gyre_harness::Candidate;
 use gyre_messages::{StageId, Window};
-use gyre_stage::{Manifest, StageError, observer::ObservedRun, wake::Signals};
-use thiserror::Error;
+use gyre_stage::{Manifest, observer::ObservedRun, wake::Signals};
 
+pub use error::ShadowError;
+pub use options::Options;
 pub use record::Counts;
 pub use report::{Beside, Report, Spread, Spreads, Verdict};
 
@@ -42,53 +41,6 @@ pub const STAGES: [StageId; 5] = [
     StageId::JointSearch,
     StageId::Refinement,
 ];
-
-/// The program, the stage that it shadows, and the limits of the comparison.
-#[derive(Clone, Debug)]
-pub struct Options {
-    /// The stage.
-    pub stage: StageId,
-    /// The program and its arguments.
-    pub command: Vec<String>,
-    /// The program of the guardian, which ends the shadow if this process is killed.
-    pub gyre: String,
-    /// The priority of the shadow.
-    pub scheduling: Scheduling,
-    /// Time for it to open its topics.
-    pub start_timeout: Duration,
-    /// Time for an item.
-    pub item_timeout: Duration,
-    /// Items to compare; `None`: until the run ends.
-    pub scans: Option<u64>,
-    /// Time after which it ends.
-    pub duration: Option<Duration>,
-    /// A folder for `shadow.json`, `shadow.csv`, and the output of the program, `shadow.txt`.
-    pub report: Option<PathBuf>,
-}
-
-/// Why there is no comparison.
-#[derive(Debug, Error)]
-pub enum ShadowError {
-    /// The run cannot be observed, or the transport fails.
-    #[error(transparent)]
-    Stage(#[from] StageError),
-    /// The program cannot be started.
-    #[error(transparent)]
-    Supervise(#[from] SuperviseError),
-    /// The rows of `shadow.csv` cannot be written.
-    #[error("cannot write shadow.csv: {0}")]
-    Rows(csv::Error),
-    /// The report cannot be written.
-    #[error("cannot write shadow.json: {0}")]
-    Report(#[from] serde_json::Error),
-}
-
-impl ShadowError {
-    fn file(path: &Path) -> impl FnOnce(io::Error) -> Self + use<> {
-        let path = path.to_owned();
-        move |source| StageError::File { path, source }.into()
-    }
-}
 
 /// Runs a program as the shadow of a stage until the run ends, a limit is reached, or a signal
 /// requests a stop. `observe` receives lines about the progress.

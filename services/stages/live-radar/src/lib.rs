@@ -13,11 +13,9 @@ mod parser;
 mod radar;
 mod read_delay;
 mod scan_assembly;
+mod settings;
 mod turn_counter;
 
-use std::time::Duration;
-
-use gyre_colossus::{Address, Constants};
 use gyre_stage::{Launch, StageCounters, StageError, source};
 
 pub use ask::{AskError, Sizes, ask};
@@ -25,27 +23,7 @@ pub use connection::RadarSocket;
 pub use gyre_colossus::PORT;
 pub use intake::{Intake, NoScans};
 pub use parser::RadarParser;
-
-/// The address of a radar, and the properties that it does not send.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Settings {
-    /// The address at which it is received.
-    pub address: Address,
-    /// Encoder counts per turn, to which the angles of a radar are rounded that sends by UDP.
-    pub encoder_counts: u16,
-    /// Time without an azimuth after which the run reconnects.
-    pub silence: Duration,
-    /// Scans to receive; `None`: without end.
-    pub scans: Option<u64>,
-    /// Constants of its ranges and angles.
-    pub constants: Constants,
-}
-
-impl Settings {
-    fn parser(&self) -> RadarParser {
-        RadarParser::new(self.address.is_udp(), self.encoder_counts)
-    }
-}
+pub use settings::Settings;
 
 /// Receives the scans of a radar until SIGTERM, or until there are enough.
 ///

@@ -10,6 +10,7 @@
 mod checks;
 mod context;
 mod deviation;
+mod error;
 mod malformed;
 mod reference;
 mod report;
@@ -17,10 +18,9 @@ mod rule;
 mod session;
 mod test;
 
-use gyre_stage::{StageError, wake::Signals};
-use gyre_supervise::SuperviseError;
-use thiserror::Error;
+use gyre_stage::wake::Signals;
 
+pub use error::ConformanceError;
 pub use gyre_harness::Candidate;
 pub use report::{Report, Work};
 pub use rule::{Rule, Verdict};
@@ -29,36 +29,6 @@ pub use test::{Demands, InputScans, Prepare, Test};
 use checks::Examination;
 use context::Context;
 use reference::Reference;
-
-/// Why a program could not be tested.
-#[derive(Debug, Error)]
-pub enum ConformanceError {
-    /// A process or the transport.
-    #[error(transparent)]
-    Supervise(#[from] SuperviseError),
-    /// The inputs cannot be computed.
-    #[error("cannot compute the inputs: our own {stage} ended: {reason}")]
-    Own {
-        /// The stage.
-        stage: &'static str,
-        /// The reason.
-        reason: String,
-    },
-    /// Too few scans.
-    #[error(
-        "{0} scans are too few to test a stage with: name a recording of more, or raise --scans"
-    )]
-    TooFew(usize),
-    /// A signal asked for the end.
-    #[error("interrupted")]
-    Interrupted,
-}
-
-impl From<StageError> for ConformanceError {
-    fn from(error: StageError) -> Self {
-        Self::Supervise(error.into())
-    }
-}
 
 /// Tests a program with inputs from these scans; `observe` receives what is tested.
 ///

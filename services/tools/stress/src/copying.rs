@@ -6,7 +6,6 @@
 //! writes the message anew, then sends it; a reader sleeps in `ppoll`, and has a message when it
 //! has read a byte of each of its cache lines.
 
-pub(crate) mod plan;
 mod reader;
 mod sender;
 mod sending;
@@ -25,7 +24,7 @@ use crate::{
     work::Work,
 };
 
-pub use plan::{HandOver, Medium};
+pub use crate::hand_over::{HandOver, Medium};
 pub(crate) use reader::read;
 pub(crate) use sender::send;
 

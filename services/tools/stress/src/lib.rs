@@ -22,6 +22,7 @@ pub mod check;
 pub mod copying;
 mod error;
 pub mod fault;
+mod hand_over;
 mod help;
 pub mod helper;
 mod load;

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use crate::copying::plan::HandOver;
+use crate::hand_over::HandOver;
 
 /// The work of a helper.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

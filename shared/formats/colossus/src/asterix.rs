@@ -22,13 +22,10 @@ mod write;
 pub use datagrams::Datagrams;
 pub use write::{MAX_DATAGRAM_BYTES, write_azimuth, write_description};
 
-use thiserror::Error;
-
 use crate::configuration::Configuration;
+use crate::malformed::{CATEGORY, MalformedDatagram};
 use crate::message::MAX_PAYLOAD_BYTES;
 
-/// The category: the first byte of a message.
-const CATEGORY: u8 = 240;
 /// The message type of a video message.
 const VIDEO: u8 = 2;
 /// Angles in a turn.
@@ -45,58 +42,6 @@ const BLOCK_BYTES: [usize; 3] = [4, 64, 256];
 /// Version and ids of Navtech's own messages by UDP, which carry no powers.
 const COLOSSUS_UDP_VERSION: u8 = 2;
 const COLOSSUS_UDP_IDS: std::ops::RangeInclusive<u8> = 10..=50;
-
-/// A datagram that is no part of an azimuth.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-pub enum MalformedDatagram {
-    /// Navtech's own message by UDP.
-    #[error(
-        "Navtech's message {id} by UDP carries no powers: set the radar's data output to CAT-240"
-    )]
-    Colossus {
-        /// The kind of message.
-        id: u8,
-    },
-    /// Another category of ASTERIX, or none.
-    #[error("a datagram begins with {0}, expected the category {CATEGORY} of ASTERIX")]
-    Category(u8),
-    /// The datagram is shorter or longer than its message.
-    #[error("a message of {expected} bytes is in a datagram of {actual}")]
-    Length {
-        /// Bytes of the message, as it says.
-        expected: usize,
-        /// Bytes of the datagram.
-        actual: usize,
-    },
-    /// The message ends within an item.
-    #[error("a message ends within its item {0}")]
-    Short(&'static str),
-    /// An item that is required is missing.
-    #[error("a message lacks the item {0}")]
-    Missing(&'static str),
-    /// Powers in a form that no Navtech radar sends.
-    #[error(
-        "a message has powers of resolution {resolution} (4: 8 bits, 5: 16 bits), compressed: {compressed}"
-    )]
-    Resolution {
-        /// The item's number.
-        resolution: u8,
-        /// The powers are compressed.
-        compressed: bool,
-    },
-    /// The cells do not fit in their blocks, or beyond the last bin.
-    #[error("a message has {cells} bins from bin {first} in {bytes} bytes, of {bins} bins")]
-    Cells {
-        /// Bins in the message.
-        cells: usize,
-        /// The first bin.
-        first: usize,
-        /// Bytes of its cells.
-        bytes: usize,
-        /// Bins of an azimuth.
-        bins: usize,
-    },
-}
 
 /// A video message: a part of an azimuth.
 #[derive(Clone, Copy, Debug, PartialEq)]

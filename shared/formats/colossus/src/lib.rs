@@ -30,11 +30,11 @@ pub mod sweep;
 pub mod write;
 
 pub use address::{Address, BadAddress};
-pub use asterix::{Datagrams, MalformedDatagram};
+pub use asterix::Datagrams;
 pub use clock::{ByteOrder, ClockFormat, FoundClock, RadarClock, SplitUnit};
 pub use configuration::{BadConfiguration, Configuration};
 pub use health::{Health, HealthStatus, Reading};
-pub use malformed::MalformedMessage;
+pub use malformed::{MalformedDatagram, MalformedMessage};
 pub use message::{Azimuth, Message, PORT, Powers, Request, decode};
 pub use navigation::{Navigation, Peak};
 pub use parser::{Damage, Event, Parser};

@@ -1,4 +1,4 @@
-//! Payloads that do not fit their messages.
+//! Payloads and datagrams that do not fit their messages.
 
 use thiserror::Error;
 
@@ -47,6 +47,61 @@ pub enum MalformedMessage {
         message: &'static str,
         /// The first byte of the field that cannot be parsed.
         at: usize,
+    },
+}
+
+/// The category of ASTERIX: the first byte of a message.
+pub(crate) const CATEGORY: u8 = 240;
+
+/// A datagram that is no part of an azimuth.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum MalformedDatagram {
+    /// Navtech's own message by UDP.
+    #[error(
+        "Navtech's message {id} by UDP carries no powers: set the radar's data output to CAT-240"
+    )]
+    Colossus {
+        /// The kind of message.
+        id: u8,
+    },
+    /// Another category of ASTERIX, or none.
+    #[error("a datagram begins with {0}, expected the category {CATEGORY} of ASTERIX")]
+    Category(u8),
+    /// The datagram is shorter or longer than its message.
+    #[error("a message of {expected} bytes is in a datagram of {actual}")]
+    Length {
+        /// Bytes of the message, as it says.
+        expected: usize,
+        /// Bytes of the datagram.
+        actual: usize,
+    },
+    /// The message ends within an item.
+    #[error("a message ends within its item {0}")]
+    Short(&'static str),
+    /// An item that is required is missing.
+    #[error("a message lacks the item {0}")]
+    Missing(&'static str),
+    /// Powers in a form that no Navtech radar sends.
+    #[error(
+        "a message has powers of resolution {resolution} (4: 8 bits, 5: 16 bits), compressed: {compressed}"
+    )]
+    Resolution {
+        /// The item's number.
+        resolution: u8,
+        /// The powers are compressed.
+        compressed: bool,
+    },
+    /// The cells do not fit in their blocks, or beyond the last bin.
+    #[error("a message has {cells} bins from bin {first} in {bytes} bytes, of {bins} bins")]
+    Cells {
+        /// Bins in the message.
+        cells: usize,
+        /// The first bin.
+        first: usize,
+        /// Bytes of its cells.
+        bytes: usize,
+        /// Bins of an azimuth.
+        bins: usize,
     },
 }
 

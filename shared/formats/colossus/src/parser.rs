@@ -2,8 +2,7 @@
 
 use thiserror::Error;
 
-use crate::asterix::MalformedDatagram;
-use crate::malformed::MalformedMessage;
+use crate::malformed::{MalformedDatagram, MalformedMessage};
 use crate::message::{HEADER_BYTES, MAX_PAYLOAD_BYTES, Message, SIGNATURE, VERSION, decode};
 
 /// The most bytes that [`Parser::space`] promises.

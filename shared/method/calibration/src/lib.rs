@@ -17,12 +17,12 @@
 //! - [`calibrate`]: the method;
 //! - [`Mounting`], [`OwnReflections`]: what follows from the track and from the scans directly;
 //! - [`Found`]: the constants beside the configured ones, with what each rests on; [`toml()`]: as a
-//!   section of a configuration;
-//!   [`svg`]: a place seen twice, before and after.
+//!   section of a configuration; [`svg`]: a place seen twice, before and after.
 
 mod calibrate;
 mod drift;
 mod drive;
+mod error;
 mod facts;
 mod found;
 mod image;
@@ -34,8 +34,9 @@ mod picture;
 mod revisits;
 mod section;
 
-pub use calibrate::{Calibration, CalibrationError, FactEstimate, calibrate};
+pub use calibrate::{Calibration, FactEstimate, calibrate};
 pub use drive::{Drive, Sweep, Track};
+pub use error::CalibrationError;
 pub use facts::{FACTS, Fact, FactMatrix, FactVector};
 pub use found::{Configured, Found};
 pub use mounting::Mounting;

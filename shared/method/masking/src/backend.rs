@@ -1,15 +1,10 @@
-//! The library that computes the networks.
+//! The settings of what computes a network: the library, and the execution provider.
 
-use std::{fmt, path::PathBuf};
+use std::fmt;
 
 use serde::{
     Deserialize, Deserializer, Serialize,
     de::{Error as _, IntoDeserializer},
-};
-
-use crate::{
-    MaskingConfig, Provider,
-    runtime::{self, RuntimeError},
 };
 
 /// The library that computes a network.
@@ -49,40 +44,31 @@ impl fmt::Display for Backend {
     }
 }
 
-/// The library that a configuration chooses on this machine.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Library {
-    /// ONNX Runtime, with the path of its library.
-    OnnxRuntime(PathBuf),
-    /// rten.
-    Rten,
+/// The execution provider of a network.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+)]
+#[serde(rename_all = "lowercase")]
+pub enum Provider {
+    /// The processor.
+    #[default]
+    Cpu,
+    /// A GPU, by CUDA.
+    Cuda,
+    /// A GPU, by TensorRT.
+    Tensorrt,
+    /// The device that OpenVINO selects.
+    Openvino,
 }
 
-impl Library {
-    /// Returns the library that computes the networks of a configuration. ONNX Runtime that is
-    /// named is required: only where none is named or installed, rten stands in for it, and only on
-    /// the processor.
-    ///
-    /// # Errors
-    /// ONNX Runtime is required and missing.
-    pub fn find(config: &MaskingConfig) -> Result<Self, RuntimeError> {
-        if config.backend == Backend::Rten {
-            return Ok(Self::Rten);
-        }
-        let is_required =
-            config.backend == Backend::OnnxRuntime || config.provider != Provider::Cpu;
-        match runtime::find(config.runtime.as_deref()) {
-            Err(RuntimeError::Missing) if !is_required => Ok(Self::Rten),
-            found => Ok(Self::OnnxRuntime(found?)),
-        }
-    }
-
-    /// Returns the backend.
-    pub fn backend(&self) -> Backend {
-        match self {
-            Self::OnnxRuntime(_) => Backend::OnnxRuntime,
-            Self::Rten => Backend::Rten,
-        }
+impl fmt::Display for Provider {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Cpu => "cpu",
+            Self::Cuda => "cuda",
+            Self::Tensorrt => "tensorrt",
+            Self::Openvino => "openvino",
+        })
     }
 }
 

@@ -1,15 +1,11 @@
 //! The section `[masking]`.
 
-use std::{fmt, path::PathBuf};
+use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::{
-    backend::{self, Backend, Library},
-    model::Card,
-    network::NetworkError,
-};
+use crate::backend::{self, Backend, Provider};
 
 /// The mask and motion compensation: section `[masking]`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -66,34 +62,6 @@ pub enum MaskKind {
     Threshold,
     /// A network weights what is above the threshold.
     Learned,
-}
-
-/// The execution provider of a network.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
-)]
-#[serde(rename_all = "lowercase")]
-pub enum Provider {
-    /// The processor.
-    #[default]
-    Cpu,
-    /// A GPU, by CUDA.
-    Cuda,
-    /// A GPU, by TensorRT.
-    Tensorrt,
-    /// The device that OpenVINO selects.
-    Openvino,
-}
-
-impl fmt::Display for Provider {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Cpu => "cpu",
-            Self::Cuda => "cuda",
-            Self::Tensorrt => "tensorrt",
-            Self::Openvino => "openvino",
-        })
-    }
 }
 
 /// A setting out of its bounds.
@@ -156,29 +124,6 @@ impl MaskingConfig {
             () if self.compensate && self.lag == 0 => Err(MaskingConfigError::Lag),
             () => Ok(()),
         }
-    }
-
-    /// Resolves the inputs of a learned mask, so that the stored configuration repeats the run from
-    /// any folder or is rejected: the absolute paths of model card and runtime, the checksum of the
-    /// model, and the backend.
-    ///
-    /// # Errors
-    /// A card that cannot be read, ONNX Runtime missing where it is required.
-    pub fn resolve(&mut self) -> Result<(), NetworkError> {
-        if self.kind == MaskKind::Learned {
-            self.sha256 = Some(Card::read(self)?.model.sha256);
-            let library = Library::find(self)?;
-            self.backend = library.backend();
-            self.runtime = match library {
-                Library::OnnxRuntime(path) => Some(path),
-                Library::Rten => None,
-            };
-            self.model = self
-                .model
-                .take()
-                .map(|card| card.canonicalize().unwrap_or(card));
-        }
-        Ok(())
     }
 
     /// Returns the power up to which returns are set to zero.

@@ -2,47 +2,38 @@
 //!
 //! Reading order: [`Masker`]; `compensation` (motion-compensated rasters above the threshold);
 //! `learned` and [`network`] (masks of a network); `points` (weights of sparse points); [`model`]
-//! (networks and their cards), [`backend`] (the libraries that compute them) and [`runtime`] (the
-//! search for ONNX Runtime).
+//! (networks and their cards), [`Library`] (what computes them) and [`runtime`] (the search for
+//! ONNX Runtime).
 
 pub mod backend;
 mod compensation;
 mod config;
+mod error;
 mod learned;
+mod library;
 pub mod model;
 pub mod network;
 mod points;
+mod resolve;
 pub mod runtime;
+mod sweep;
 
 #[cfg(test)]
 mod tests;
 
 use gyre_geometry::{SparsePoint, Twist};
-use gyre_radar::{
-    PointExtractor, PointsConfig, PointsError, PolarScan, ScanError,
-    raster::{RasterConfig, RasterError},
-};
+use gyre_radar::{PointExtractor, PointsConfig, PolarScan, ScanError, raster::RasterConfig};
 use ndarray::{ArrayView2, ArrayViewMut2};
-use thiserror::Error;
 
-pub use backend::Backend;
-pub use config::{MaskKind, MaskingConfig, MaskingConfigError, Provider};
+pub use backend::{Backend, Provider};
+pub use config::{MaskKind, MaskingConfig, MaskingConfigError};
+pub use error::{MaskError, MaskerError};
+pub use library::Library;
+pub use sweep::Sweep;
 
 use compensation::CompensatedRaster;
 use learned::LearnedMask;
-use network::NetworkError;
 use points::RasterFrame;
-
-/// A scan and the velocity for its motion compensation.
-#[derive(Clone, Copy, Debug)]
-pub struct Sweep<'a> {
-    /// The number that identifies the scan in later calls.
-    pub number: u64,
-    /// The scan.
-    pub scan: PolarScan<'a>,
-    /// The velocity of the sensor; `None` if it is unknown.
-    pub twist: Option<Twist>,
-}
 
 /// Makes masked rasters and sparse points from scans, both above the same power threshold. The mask
 /// is a factor for each cell of a raster. Raised to [`MaskingConfig::point_exponent`], it is also a
@@ -54,39 +45,6 @@ pub struct Masker {
     rasters: CompensatedRaster,
     learned: Option<LearnedMask>,
     points: PointExtractor,
-}
-
-/// An invalid configuration of a masker.
-#[derive(Debug, Error)]
-pub enum MaskerError {
-    /// The mask's.
-    #[error("masking.{0}")]
-    Masking(#[from] MaskingConfigError),
-    /// Of the rasters.
-    #[error(transparent)]
-    Raster(#[from] RasterError),
-    /// Of the points.
-    #[error(transparent)]
-    Points(#[from] PointsError),
-    /// Of the network.
-    #[error(transparent)]
-    Network(#[from] NetworkError),
-}
-
-/// An error in masking a scan.
-#[derive(Debug, Error)]
-pub enum MaskError {
-    /// The scan cannot be rasterised.
-    #[error(transparent)]
-    Raster(#[from] RasterError),
-    /// The network failed.
-    #[error(transparent)]
-    Network(#[from] NetworkError),
-    /// The mask takes two scans, but the previous one or the output for it is missing.
-    #[error(
-        "the mask takes two scans, but the previous scan {0} or the output for its raster is missing"
-    )]
-    MissingPrevious(u64),
 }
 
 impl Masker {

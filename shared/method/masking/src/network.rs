@@ -10,8 +10,7 @@ use ndarray::{Array3, ArrayView3, ArrayViewMut3, Axis};
 use thiserror::Error;
 
 use crate::{
-    Backend, MaskingConfig, Provider,
-    backend::Library,
+    Backend, Library, MaskingConfig, Provider,
     model::{Model, ModelError},
     runtime::RuntimeError,
 };

@@ -15,7 +15,7 @@
 //!   its transforms;
 //! - `refinement`: [`Refiner`], the motion to a fraction of a cell, against a map of the last
 //!   keyframes;
-//! - `submap`: [`Submap`], the points around a keyframe, for places that are visited again;
+//! - [`Submap`], the points around a keyframe, for places that are visited again;
 //!   [`KeyframeAligner`] and `masked_correlation`, [`MaskedCorrelation`], register two of them;
 //! - `peak`: maxima between samples; `covariance`: covariances from the shapes of peaks; `whiten`:
 //!   phase-only correlation; `kernels`: inner loops.
@@ -67,7 +67,6 @@ mod rotation;
 mod scores;
 mod sequential;
 mod spectrum;
-mod submap;
 mod taper;
 mod translation;
 mod warp;
@@ -84,12 +83,11 @@ pub use masked_correlation::MaskedCorrelation;
 pub use peak::{LinePeak, line_peak};
 pub use refinement::{
     Anchor, InitialGuess, Keyframe, KeyframeAligner, Outcome, Refined, RefinementConfig,
-    RefinementKind, Refiner, Standstill, TrackerState,
+    RefinementKind, Refiner, Standstill, Submap, TrackerState,
 };
 pub use rotation::{RotationMatch, RotationRunnerUp, RotationSearch};
 pub use sequential::SequentialRotation;
 pub use spectrum::PolarSpectrum;
-pub use submap::Submap;
 pub use translation::{MotionMatch, MotionRunnerUp, TranslationSearch};
 
 /// A raster or a spectrum that does not fit the search.

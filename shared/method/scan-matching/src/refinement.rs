@@ -14,6 +14,7 @@
 //!   reached;
 //! - `uncertainty`: covariances, and the shares of them that accumulate;
 //! - `standstill`: the pose of a standing vehicle is held;
+//! - [`Submap`]: the points of a keyframe and of those around it;
 //! - [`KeyframeAligner`]: the same alignment for two keyframes of one place that are far apart in
 //!   time.
 
@@ -27,6 +28,7 @@ mod normal_equations;
 mod points;
 mod registration;
 mod standstill;
+mod submap;
 mod tracker;
 mod uncertainty;
 
@@ -36,11 +38,12 @@ pub use initial_guess::InitialGuess;
 pub use keyframe_aligner::KeyframeAligner;
 pub use local_map::Keyframe;
 pub use standstill::Standstill;
+pub use submap::Submap;
 pub use tracker::{Anchor, TrackerState};
 
 use crate::ConfigError;
 use local_map::LocalMap;
-pub(crate) use points::DeskewedPoints;
+use points::DeskewedPoints;
 use registration::{Candidate, Registration, Scan};
 use standstill::{Estimate, Report};
 use uncertainty::Uncertainty;

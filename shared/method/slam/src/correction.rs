@@ -2,8 +2,6 @@
 
 use gyre_geometry::{Pose, interpolate};
 
-use crate::trajectory::Corrected;
-
 /// Corrects the poses of all scans as those of the keyframes around them were corrected.
 ///
 /// The pose of a scan continues that of the keyframe before it by odometry, and leads to that of
@@ -22,13 +20,15 @@ struct Anchor {
 }
 
 impl Correction {
-    pub(crate) fn new(keyframes: &[Corrected], poses: &[Pose]) -> Self {
-        let anchor = |(keyframe, pose): (&Corrected, &Pose)| Anchor {
-            seq: keyframe.seq,
-            map_from_odometry: pose * keyframe.odometry.inverse(),
+    /// Takes the sequence numbers of keyframes with their poses by odometry, and the corrected
+    /// poses.
+    pub(crate) fn new(keyframes: impl Iterator<Item = (u64, Pose)>, poses: &[Pose]) -> Self {
+        let anchor = |((seq, odometry), pose): ((u64, Pose), &Pose)| Anchor {
+            seq,
+            map_from_odometry: pose * odometry.inverse(),
         };
         Self {
-            keyframes: keyframes.iter().zip(poses).map(anchor).collect(),
+            keyframes: keyframes.zip(poses).map(anchor).collect(),
         }
     }
 

@@ -65,9 +65,9 @@ pub struct TrajectoryEstimator {
 }
 
 /// A keyframe with its pose by odometry.
-pub(crate) struct Corrected {
-    pub seq: u64,
-    pub odometry: Pose,
+struct Corrected {
+    seq: u64,
+    odometry: Pose,
     motion: UncertainMotion,
     noise: Matrix3<f64>,
     path_m: f64,
@@ -253,7 +253,8 @@ impl TrajectoryEstimator {
 
     /// Returns the correction of the poses of all scans.
     pub fn correction(&self) -> Correction {
-        Correction::new(&self.keyframes, self.poses())
+        let keyframes = self.keyframes.iter().map(|it| (it.seq, it.odometry));
+        Correction::new(keyframes, self.poses())
     }
 
     /// Starts an estimator with the first keyframe.

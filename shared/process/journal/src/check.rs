@@ -5,7 +5,7 @@ use std::{collections::VecDeque, path::Path};
 use gyre_messages::{PoseHeader, flag};
 use gyre_storage::{File, GroupSync};
 
-use crate::{JournalError, RECORDS, records::Places};
+use crate::{JournalError, record::RECORDS, records::Places};
 
 /// Number of the last poses that a check returns: more than a power failure can take.
 const LAST: usize = 8 * GroupSync::LIMIT as usize;

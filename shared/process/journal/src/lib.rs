@@ -9,6 +9,7 @@
 
 mod check;
 pub mod checkpoint;
+mod error;
 pub mod keyframes;
 mod record;
 mod records;
@@ -18,40 +19,12 @@ mod tests;
 use std::path::{Path, PathBuf};
 
 use gyre_messages::{PoseHeader, flag};
-use gyre_storage::{Busy, DurableFile, Slots, StorageError};
-use thiserror::Error;
+use gyre_storage::DurableFile;
 
 pub use check::{Content, check, cut};
-use record::{RECORD, Record};
+pub use error::JournalError;
+use record::{MAGIC, RECORD, RECORDS, Record};
 pub use records::{Records, records, records_from};
-
-/// The start of a journal, with the version of its records.
-const MAGIC: [u8; 16] = *b"gyre journal v6\n";
-
-/// An error of a journal.
-#[derive(Debug, Error)]
-pub enum JournalError {
-    /// The file cannot be read or written.
-    #[error(transparent)]
-    Storage(#[from] StorageError),
-    /// The file is not a journal, or of another version.
-    #[error("{path} is not a journal of this version: move it away, or choose another --out")]
-    Foreign {
-        /// The file.
-        path: PathBuf,
-    },
-    /// A record is not what was written.
-    #[error("{path} is damaged at pose {pose}, although it had been written whole")]
-    Damaged {
-        /// The file.
-        path: PathBuf,
-        /// The number of the pose.
-        pose: u64,
-    },
-    /// Another process appends to the file.
-    #[error(transparent)]
-    Busy(#[from] Busy),
-}
 
 /// A journal open for appending.
 #[derive(Debug)]
@@ -67,12 +40,6 @@ pub struct Journal {
 pub fn path(out: &Path) -> PathBuf {
     out.join("journal").join("poses.journal")
 }
-
-/// The places of the records. So the offset of the one behind them is the length of a journal.
-const RECORDS: Slots = Slots {
-    start: MAGIC.len() as u64,
-    bytes: RECORD,
-};
 
 impl Journal {
     /// Opens or creates a journal and cuts off an incomplete record at its end. Only the end is

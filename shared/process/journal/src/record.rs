@@ -1,13 +1,20 @@
-//! The binary layout of a record.
+//! The binary layout of a journal and of its records.
 
 use gyre_messages::PoseHeader;
-use gyre_storage::Checksum;
+use gyre_storage::{Checksum, Slots};
 
+/// The start of a journal, with the version of its records.
+pub(crate) const MAGIC: [u8; 16] = *b"gyre journal v6\n";
 const POSE: usize = size_of::<PoseHeader>();
 /// Bytes of a record: the pose, the number of records before it that were in danger, and a checksum
 /// of both.
 pub(crate) const RECORD: usize = POSE + 8;
 const CHECK: usize = POSE + 4;
+/// The places of the records. So the offset of the one behind them is the length of a journal.
+pub(crate) const RECORDS: Slots = Slots {
+    start: MAGIC.len() as u64,
+    bytes: RECORD,
+};
 
 /// A valid record.
 #[derive(Clone, Copy, Debug)]

@@ -10,8 +10,8 @@ use gyre_messages::PoseHeader;
 use gyre_storage::StorageError;
 
 use crate::{
-    JournalError, MAGIC, RECORDS,
-    record::{RECORD, Record},
+    JournalError,
+    record::{MAGIC, RECORD, RECORDS, Record},
 };
 
 /// Bytes that are read at once.

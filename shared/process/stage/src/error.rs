@@ -5,7 +5,7 @@ use std::{fmt::Debug, path::PathBuf};
 use gyre_storage::LogError;
 use thiserror::Error;
 
-use crate::run::{self, SHARED_MEMORY};
+use crate::shared_memory::{self, SHARED_MEMORY};
 
 /// An error that ends a stage. The exit code tells the supervisor whether a restart can help.
 #[derive(Debug, Error)]
@@ -129,7 +129,7 @@ impl StageError {
     /// Creates an error of the transport.
     pub fn transport(action: impl Into<String>, reason: impl Debug) -> Self {
         // The transport does not name this cause.
-        let full = match run::shared_memory_is_full() {
+        let full = match shared_memory::is_full() {
             true => format!("; {SHARED_MEMORY} is full"),
             false => String::new(),
         };

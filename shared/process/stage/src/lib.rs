@@ -2,7 +2,7 @@
 //!
 //! Reading order:
 //!
-//! 1. [`run`]: the manifest that a process reads, and the files of a run.
+//! 1. [`Manifest`] and [`run`]: the manifest that a process reads, and the files of a run.
 //! 2. [`launch`]: how a process starts and ends: configuration, log, signals, exit codes.
 //! 3. `transport`: the boundary of iceoryx2; [`writer`], [`reader`]: publisher and subscriber of a
 //!    topic, with the handshake that gives a new reader the history.
@@ -39,6 +39,7 @@ pub mod heartbeat;
 pub mod inputs;
 pub mod launch;
 mod log_id;
+mod manifest;
 pub mod observer;
 mod outlet;
 pub mod reader;
@@ -47,6 +48,7 @@ mod reservation;
 pub mod run;
 pub mod schedule;
 pub mod services;
+mod shared_memory;
 pub mod sink;
 pub mod source;
 pub mod stage;
@@ -62,7 +64,7 @@ pub use error::StageError;
 pub use follower::Follower;
 pub use gyre_run::StageCounters;
 pub use launch::Launch;
-pub use run::Manifest;
+pub use manifest::Manifest;
 pub use sink::Sink;
 pub use source::Source;
 pub use stage::Stage;

@@ -49,6 +49,16 @@ pub fn silence() {
     set_log_level(LogLevel::Fatal);
 }
 
+impl Manifest {
+    /// Returns the transport of the run.
+    ///
+    /// # Errors
+    /// A failure of the transport.
+    pub fn transport(&self) -> Result<Transport, StageError> {
+        Transport::of(self)
+    }
+}
+
 impl Transport {
     /// The transport of a run. Names and paths are unique to the run, and only the supervisor
     /// cleans up.

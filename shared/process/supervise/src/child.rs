@@ -2,7 +2,7 @@
 
 use std::{
     collections::VecDeque,
-    fmt, fs,
+    fs,
     os::unix::process::ExitStatusExt,
     path::{Path, PathBuf},
     process::ExitStatus,
@@ -19,7 +19,7 @@ use gyre_stage::{
 use rustix::process::{Pid, Signal, kill_process_group};
 
 use crate::{
-    StagePlan, SuperviseError,
+    Death, StagePlan, SuperviseError,
     end::ends_within,
     log::Log,
     start::{Place, Starter},
@@ -28,30 +28,6 @@ use crate::{
 /// Time for a killed process to end. The kernel holds one that waits for a device, as for a network
 /// folder.
 const KILL_TIMEOUT: Duration = Duration::from_secs(10);
-
-/// The death of a process.
-#[derive(Clone, Debug)]
-pub struct Death {
-    /// True if a signal killed it, false if it exited by itself.
-    pub killed: bool,
-    /// The cause, as `signal 9` or `exit code 3`.
-    pub cause: String,
-    /// The exit code, if it exited by itself.
-    pub code: Option<i32>,
-    /// The last line of its output.
-    pub last_output: Option<String>,
-}
-
-/// The end of a sentence, as `it ended with exit code 3, its last line: ...`.
-impl fmt::Display for Death {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "it ended with {}", self.cause)?;
-        match &self.last_output {
-            Some(line) => write!(f, ", its last line: {line}"),
-            None => Ok(()),
-        }
-    }
-}
 
 pub(crate) struct Child {
     plan: StagePlan,

@@ -14,6 +14,7 @@
 
 mod child;
 mod clean;
+mod death;
 mod end;
 mod followers;
 mod guardian;
@@ -42,7 +43,7 @@ mod tests;
 mod wake_limit;
 mod watchdog;
 
-pub use child::Death;
+pub use death::Death;
 pub use guardian::guard;
 pub use gyre_run::{Ending, Report, RestartPolicy, Scheduling, Swapped};
 pub use log::last_line;

@@ -10,7 +10,7 @@ use gyre_run::{RestartPolicy, Scheduling};
 use gyre_stage::{Manifest, StageError, follower::Progress};
 use thiserror::Error;
 
-use crate::{child::Death, program::Program};
+use crate::{death::Death, program::Program};
 
 /// The plan of a run.
 #[derive(Debug)]

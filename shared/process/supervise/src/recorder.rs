@@ -11,7 +11,8 @@ use gyre_stage::{
 
 use crate::{
     Ending, Event, SuperviseError,
-    child::{Child, Death},
+    child::Child,
+    death::Death,
     process_status::{activity, of_child},
     run::Run,
     start::Place,

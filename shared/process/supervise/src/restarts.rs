@@ -5,12 +5,8 @@ use std::time::{Duration, Instant};
 use gyre_stage::clock;
 
 use crate::{
-    Event, Stall, SuperviseError,
-    child::{Child, Death},
-    followers::Patience,
-    recovery::restarted_after,
-    supervisor::Supervisor,
-    watchdog::Starting,
+    Event, Stall, SuperviseError, child::Child, death::Death, followers::Patience,
+    recovery::restarted_after, supervisor::Supervisor, watchdog::Starting,
 };
 
 impl Supervisor<'_> {

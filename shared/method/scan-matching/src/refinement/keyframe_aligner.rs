@@ -3,10 +3,10 @@
 use gyre_geometry::{Pose, UncertainMotion};
 
 use super::{
-    DeskewedPoints, RefinementConfig, alignment::align, local_map::LocalMap,
+    DeskewedPoints, RefinementConfig, Submap, alignment::align, local_map::LocalMap,
     registration::COARSE_STRIDE, uncertainty,
 };
-use crate::{ConfigError, Submap};
+use crate::ConfigError;
 
 /// Initial guesses come from a search on coarse cells, so more iterations are allowed than from
 /// scan to scan.

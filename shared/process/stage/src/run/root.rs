@@ -16,16 +16,14 @@ use std::{
 
 use gyre_storage::lock::{Attempt, try_lock, try_lock_existing};
 use rustix::{
-    fs::{Mode, OFlags, statvfs},
+    fs::{Mode, OFlags},
     io::Errno,
     process::{Uid, geteuid},
 };
 use thiserror::Error;
 
-use crate::{StageError, clock, wake::Signals};
+use crate::{StageError, clock, shared_memory::SHARED_MEMORY, wake::Signals};
 
-/// The file system of all shared memory.
-pub const SHARED_MEMORY: &str = "/dev/shm";
 const OWNER_ONLY: u32 = 0o700;
 /// Hexadecimal digits in the name of a run.
 const DIGITS: usize = 10;
@@ -313,20 +311,6 @@ pub fn own_files(directory: &Path, prefix: &str) -> impl Iterator<Item = (PathBu
         .filter(move |entry| entry.file_name().to_string_lossy().starts_with(prefix))
         .filter_map(|entry| Some((entry.path(), entry.metadata().ok()?)))
         .filter(move |(_, file)| file.is_file() && file.uid() == user)
-}
-
-/// Returns the bytes of shared memory that are free; `None` if they are not limited.
-///
-/// # Errors
-/// There is no shared memory.
-pub fn free_shared_memory() -> rustix::io::Result<Option<u64>> {
-    let there = statvfs(SHARED_MEMORY)?;
-    Ok((there.f_blocks > 0).then_some(there.f_bavail * there.f_frsize))
-}
-
-/// Returns whether no shared memory is left.
-pub(crate) fn shared_memory_is_full() -> bool {
-    free_shared_memory().is_ok_and(|free| free == Some(0))
 }
 
 /// Closes the files of a run to other users. The transport opens one of them, the counter of its

@@ -15,7 +15,7 @@ pub enum Medium {
 }
 
 impl Medium {
-    pub(super) const ALL: [Self; 2] = [Self::SharedMemory, Self::Sockets];
+    pub(crate) const ALL: [Self; 2] = [Self::SharedMemory, Self::Sockets];
 
     /// Returns its name.
     pub const fn name(self) -> &'static str {
@@ -29,17 +29,17 @@ impl Medium {
 /// The plan of one hand-over.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HandOver {
-    pub(super) medium: Medium,
+    pub(crate) medium: Medium,
     /// The folder that names the topic, or the socket.
-    pub(super) place: PathBuf,
-    pub(super) bytes: usize,
-    pub(super) messages: u64,
-    pub(super) readers: usize,
+    pub(crate) place: PathBuf,
+    pub(crate) bytes: usize,
+    pub(crate) messages: u64,
+    pub(crate) readers: usize,
 }
 
 impl HandOver {
     /// Returns the path of the socket.
-    pub(super) fn socket(&self) -> PathBuf {
+    pub(crate) fn socket(&self) -> PathBuf {
         self.place.join("socket")
     }
 }

@@ -3,7 +3,7 @@
 use gyre_geometry::{Pose, SparsePoint, Twist};
 use ndarray::ArrayViewMut2;
 
-use crate::refinement::DeskewedPoints;
+use super::points::DeskewedPoints;
 use crate::{ShapeError, expect_shape};
 
 /// The points of a keyframe and of the keyframes around it, in its frame.
@@ -14,9 +14,9 @@ use crate::{ShapeError, expect_shape};
 #[derive(Debug, Default)]
 pub struct Submap {
     /// The points of the keyframe in the middle.
-    pub(crate) keyframe: DeskewedPoints,
+    pub(super) keyframe: DeskewedPoints,
     /// The points of all keyframes.
-    pub(crate) all: DeskewedPoints,
+    pub(super) all: DeskewedPoints,
     /// The points of the keyframe that is being added, in its own frame.
     added: DeskewedPoints,
 }

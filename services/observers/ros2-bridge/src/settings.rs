@@ -1,0 +1,40 @@
+//! The options of the bridge, and of the map that it publishes.
+
+use std::path::{Path, PathBuf};
+
+use gyre_mapping::MapOptions;
+use gyre_ros2_messages::{Domain, frames::Frames};
+use gyre_slam::EstimatorKind;
+
+use crate::Mounting;
+
+/// The options of the bridge.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// The folder of the results of the run, and of the next one.
+    pub out: PathBuf,
+    /// The domain and the network.
+    pub domain: Domain,
+    /// The namespace of `odom` and `map`, such as `/` or `/robot`.
+    pub namespace: String,
+    /// Names of the frames.
+    pub frames: Frames,
+    /// The radar on the vehicle.
+    pub mounting: Mounting,
+    /// True to publish `odom` -> `base_link` and `map` -> `odom`: only one program may.
+    pub transforms: bool,
+    /// The settings of the map of a run with SLAM; `None`: no map.
+    pub map: Option<MapSettingsOf>,
+}
+
+/// Returns the settings of the map of the run in a folder, or why it has none.
+pub type MapSettingsOf = fn(&Path) -> Result<MapSettings, String>;
+
+/// The settings of a map.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MapSettings {
+    /// Cells and ranges.
+    pub options: MapOptions,
+    /// The estimator that corrects the poses of keyframes by loops.
+    pub estimator: EstimatorKind,
+}

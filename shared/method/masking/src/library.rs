@@ -1,0 +1,45 @@
+//! The library that computes the networks.
+
+use std::path::PathBuf;
+
+use crate::{
+    Backend, MaskingConfig, Provider,
+    runtime::{self, RuntimeError},
+};
+
+/// The library that a configuration chooses on this machine.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Library {
+    /// ONNX Runtime, with the path of its library.
+    OnnxRuntime(PathBuf),
+    /// rten.
+    Rten,
+}
+
+impl Library {
+    /// Returns the library that computes the networks of a configuration. ONNX Runtime that is
+    /// named is required: only where none is named or installed, rten stands in for it, and only on
+    /// the processor.
+    ///
+    /// # Errors
+    /// ONNX Runtime is required and missing.
+    pub fn find(config: &MaskingConfig) -> Result<Self, RuntimeError> {
+        if config.backend == Backend::Rten {
+            return Ok(Self::Rten);
+        }
+        let is_required =
+            config.backend == Backend::OnnxRuntime || config.provider != Provider::Cpu;
+        match runtime::find(config.runtime.as_deref()) {
+            Err(RuntimeError::Missing) if !is_required => Ok(Self::Rten),
+            found => Ok(Self::OnnxRuntime(found?)),
+        }
+    }
+
+    /// Returns the backend.
+    pub fn backend(&self) -> Backend {
+        match self {
+            Self::OnnxRuntime(_) => Backend::OnnxRuntime,
+            Self::Rten => Backend::Rten,
+        }
+    }
+}

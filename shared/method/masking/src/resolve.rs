@@ -1,0 +1,28 @@
+//! Resolves the inputs of a learned mask.
+
+use crate::{Library, MaskKind, MaskingConfig, model::Card, network::NetworkError};
+
+impl MaskingConfig {
+    /// Resolves the inputs of a learned mask, so that the stored configuration repeats the run from
+    /// any folder or is rejected: the absolute paths of model card and runtime, the checksum of the
+    /// model, and the backend.
+    ///
+    /// # Errors
+    /// A card that cannot be read, ONNX Runtime missing where it is required.
+    pub fn resolve(&mut self) -> Result<(), NetworkError> {
+        if self.kind == MaskKind::Learned {
+            self.sha256 = Some(Card::read(self)?.model.sha256);
+            let library = Library::find(self)?;
+            self.backend = library.backend();
+            self.runtime = match library {
+                Library::OnnxRuntime(path) => Some(path),
+                Library::Rten => None,
+            };
+            self.model = self
+                .model
+                .take()
+                .map(|card| card.canonicalize().unwrap_or(card));
+        }
+        Ok(())
+    }
+}

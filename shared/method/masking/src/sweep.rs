@@ -1,0 +1,15 @@
+//! The input of a mask.
+
+use gyre_geometry::Twist;
+use gyre_radar::PolarScan;
+
+/// A scan and the velocity for its motion compensation.
+#[derive(Clone, Copy, Debug)]
+pub struct Sweep<'a> {
+    /// The number that identifies the scan in later calls.
+    pub number: u64,
+    /// The scan.
+    pub scan: PolarScan<'a>,
+    /// The velocity of the sensor; `None` if it is unknown.
+    pub twist: Option<Twist>,
+}

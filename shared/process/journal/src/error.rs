@@ -1,0 +1,31 @@
+//! The error of a journal.
+
+use std::path::PathBuf;
+
+use gyre_storage::{Busy, StorageError};
+use thiserror::Error;
+
+/// An error of a journal.
+#[derive(Debug, Error)]
+pub enum JournalError {
+    /// The file cannot be read or written.
+    #[error(transparent)]
+    Storage(#[from] StorageError),
+    /// The file is not a journal, or of another version.
+    #[error("{path} is not a journal of this version: move it away, or choose another --out")]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A record is not what was written.
+    #[error("{path} is damaged at pose {pose}, although it had been written whole")]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// The number of the pose.
+        pose: u64,
+    },
+    /// Another process appends to the file.
+    #[error(transparent)]
+    Busy(#[from] Busy),
+}

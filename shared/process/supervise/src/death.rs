@@ -1,0 +1,27 @@
+//! The death of a process.
+
+use std::fmt;
+
+/// The death of a process.
+#[derive(Clone, Debug)]
+pub struct Death {
+    /// True if a signal killed it, false if it exited by itself.
+    pub killed: bool,
+    /// The cause, as `signal 9` or `exit code 3`.
+    pub cause: String,
+    /// The exit code, if it exited by itself.
+    pub code: Option<i32>,
+    /// The last line of its output.
+    pub last_output: Option<String>,
+}
+
+/// The end of a sentence, as `it ended with exit code 3, its last line: ...`.
+impl fmt::Display for Death {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "it ended with {}", self.cause)?;
+        match &self.last_output {
+            Some(line) => write!(f, ", its last line: {line}"),
+            None => Ok(()),
+        }
+    }
+}
