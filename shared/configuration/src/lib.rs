@@ -1,25 +1,34 @@
 //! Configurations: TOML that is read strictly, and overridden key by key; and those of a recording
 //! that is played without one.
 //!
-//! - [`Configuration`]: that of a run of processes, with the sections of `gyre-run`;
 //! - [`MethodConfig`]: the settings of the method alone, for a program that computes by itself;
 //! - [`automatic`](automatic()): the settings of a recording without a configuration;
-//! - [`open`]: the scans that a configuration names;
-//! - [`schema`]: the schema and the reference, made from the structures.
+//!
+//! and with the feature `run`:
+//! - `Configuration`: that of a run of processes, with the sections of `gyre-run`;
+//! - `open`: the scans that a configuration names;
+//! - `schema`: the schema and the reference, made from the structures.
 
 mod automatic;
 pub mod calibration;
+#[cfg(feature = "run")]
 mod configuration;
 mod error;
+#[cfg(feature = "run")]
 mod masks;
 mod method;
+#[cfg(feature = "run")]
 mod scans;
+#[cfg(feature = "run")]
 pub mod schema;
 pub mod strict;
 
 pub use automatic::{Automatic, AutomaticError, automatic, radar_constants};
+#[cfg(feature = "run")]
 pub use configuration::{Configuration, difference, process_names};
 pub use error::ConfigurationError;
+#[cfg(feature = "run")]
 pub use masks::describe_masks;
 pub use method::MethodConfig;
+#[cfg(feature = "run")]
 pub use scans::{Played, SourceError, fingerprint, open, with_stored_options};
