@@ -17,7 +17,6 @@ pub mod plan;
 pub mod preflight;
 pub mod program;
 pub mod progress;
-pub mod radar;
 pub mod record;
 pub mod ros2;
 pub mod run;

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use gyre_configuration::{Configuration, Played, open};
+use gyre_live_radar::Settings;
 use gyre_maps::localise::known;
 use gyre_masking::Masker;
 use gyre_messages::{Footprint, Limits, StageId, Window};
@@ -14,7 +15,7 @@ use gyre_terminal::Failure;
 use rustix::process::{Resource, getrlimit};
 use thiserror::Error;
 
-use crate::{radar, ros2, split};
+use crate::{ros2, split};
 
 /// Why a run cannot start.
 #[derive(Debug, Error)]
@@ -205,7 +206,7 @@ impl Scans {
         let (source, options) = (&configuration.source, &configuration.dataset);
         let radar = match source.kind {
             SourceKind::Ros2 => ros2::ask(source, options)?,
-            _ => gyre_live_radar::ask(&radar::settings(source, options)?)?,
+            _ => gyre_live_radar::ask(&Settings::of(source, options)?)?,
         };
         Ok(Self {
             count: configuration.source.scans,

@@ -1,11 +1,12 @@
 //! The progress of a run: a bar on a terminal, plain lines elsewhere.
 
 use std::{
+    fmt::Display,
     io::IsTerminal,
     time::{Duration, Instant},
 };
 
-use gyre_messages::{FollowerId, Footprint, Item, PoseHeader};
+use gyre_messages::{FollowerId, Item, PoseHeader};
 use gyre_stage::{clock, follower::Progress as Following};
 use gyre_supervise::Event;
 use gyre_terminal::print;
@@ -26,7 +27,7 @@ pub struct Progress {
 
 impl Progress {
     /// Starts with a run of `scans` scans, of which `resumed` are in the journal already.
-    pub fn new(scans: Option<usize>, resumed: usize, footprint: &Footprint) -> Self {
+    pub fn new(scans: Option<usize>, resumed: usize, footprint: &impl Display) -> Self {
         let bar = std::io::stderr().is_terminal().then(|| {
             let (bar, template) = match scans {
                 Some(scans) => (
@@ -146,33 +147,11 @@ impl Progress {
 
 #[cfg(test)]
 mod tests {
-    use gyre_messages::{Limits, Window};
-
     use super::*;
-
-    fn progress() -> Progress {
-        let window = Window {
-            scans: 1,
-            lag: 0,
-            look_back: 1,
-            live_depth: 0,
-            observers: 0,
-            slam: false,
-            localises: false,
-        };
-        let limits = Limits {
-            scan_bytes: 1,
-            raster_cells: 1,
-            cell_m: 0.8,
-            rasters: 1,
-            points: 0,
-        };
-        Progress::new(Some(100), 0, &Footprint::new(&window, &limits))
-    }
 
     #[test]
     fn poses_that_were_not_seen_are_no_dropped_scans() {
-        let mut progress = progress();
+        let mut progress = Progress::new(Some(100), 0, &"");
         let pose = |seq, published| Item {
             seq,
             published,

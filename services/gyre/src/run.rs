@@ -191,7 +191,7 @@ fn play(
     }
 
     describe_masks(&resolved)?.iter().for_each(print::note);
-    split::describe(&resolved);
+    resolved.link.describe().iter().for_each(print::note);
     let resumed = unfinished.map_or(0, |begun| begun.poses as usize);
     let mut progress = Progress::new(checked.scans, resumed, &checked.footprint);
     let mut notifier = Notifier::of_environment();

@@ -4,8 +4,8 @@ use std::{env, os::unix::process::CommandExt, process::Command};
 
 use gyre_configuration::Configuration;
 use gyre_link::ONE_THREAD;
-use gyre_run::{LinkConfig, Side};
-use gyre_terminal::{Failure, own, print};
+use gyre_run::LinkConfig;
+use gyre_terminal::{Failure, own};
 
 #[cfg(feature = "link")]
 pub use gyre_link::{run_base, run_robot};
@@ -47,20 +47,6 @@ pub fn set_environment() -> Result<(), Failure> {
     Err(format!("cannot begin with {name} in the environment: {failed}").into())
 }
 
-/// Says which part of a split run this is.
-pub fn describe(configuration: &Configuration) {
-    let (name, cut) = (&configuration.link.name, configuration.link.cut.name());
-    match configuration.link.side {
-        Some(Side::Robot) => print::note(format_args!(
-            "link {name}: the stages up to `{cut}` are here; scans wait for the base"
-        )),
-        Some(Side::Base) => print::note(format_args!(
-            "link {name}: the stages after `{cut}` are here; they wait for the robot"
-        )),
-        None => {}
-    }
-}
-
 /// Returns the size of the largest scan, bytes, if scans are sent: the robot knows it.
 ///
 /// # Errors
@@ -70,7 +56,7 @@ pub fn scan_bytes(link: &LinkConfig) -> Result<usize, Failure> {
         #[cfg(feature = "link")]
         gyre_run::PlayedFrom::Scan => {
             let name = &link.name;
-            print::note(format_args!(
+            gyre_terminal::print::note(format_args!(
                 "link {name}: waiting for the robot, which knows how large its scans are"
             ));
             Ok(gyre_link::ask_robot(link)?.bytes)

@@ -8,6 +8,7 @@ use std::{
 };
 
 use gyre_configuration::process_names;
+use gyre_live_radar::Settings;
 use gyre_messages::{FollowerId, StageId};
 use gyre_radar::DatasetOptions;
 use gyre_radar_replay::Pace;
@@ -20,7 +21,7 @@ use rustix::{
     thread::set_name,
 };
 
-use crate::{program, radar, ros2, split};
+use crate::{program, ros2, split};
 
 /// The work of a process.
 type Work = fn(&Launch) -> Result<StageCounters, StageError>;
@@ -102,7 +103,7 @@ fn play(launch: &Launch) -> Result<StageCounters, StageError> {
     let source: SourceConfig = launch.section("source")?;
     match source.kind {
         SourceKind::Colossus => {
-            let settings = radar::settings(&source, &launch.section("dataset")?);
+            let settings = Settings::of(&source, &launch.section("dataset")?);
             return gyre_live_radar::run(launch, settings.map_err(|error| input(&error))?);
         }
         SourceKind::Ros2 => return ros2::receive(launch, &source, &launch.section("dataset")?),

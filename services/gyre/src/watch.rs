@@ -32,12 +32,12 @@ pub fn watch(arguments: &WatchArguments) -> Result<ExitCode, Failure> {
     print::note(format_args!(
         "gyre: {} is shown at {}",
         out.display(),
-        link("http", &page)
+        page.url("http")
     ));
     if let Some(foxglove) = &foxglove {
         print::note(format_args!(
             "gyre: Foxglove and Lichtblick connect to {}",
-            link("ws", foxglove)
+            foxglove.url("ws")
         ));
     }
     if lets_others_in(arguments) {
@@ -70,20 +70,4 @@ fn token(arguments: &WatchArguments) -> Result<Option<Token>, Failure> {
 fn lets_others_in(arguments: &WatchArguments) -> bool {
     let mut addresses = [arguments.listen].into_iter().chain(arguments.foxglove);
     addresses.any(|address| !address.ip().is_loopback())
-}
-
-/// Returns the address for a browser. One of all interfaces is reached by the machine's name.
-fn link(scheme: &str, server: &Endpoint) -> String {
-    let address = server.address();
-    let host = match address.ip().is_unspecified() {
-        true => {
-            let system = rustix::system::uname();
-            let name = system.nodename().to_string_lossy();
-            format!("{name}:{}", address.port())
-        }
-        false => address.to_string(),
-    };
-    let token = server.token().map(Token::as_str);
-    let query = token.map_or(String::new(), |token| format!("?token={token}"));
-    format!("{scheme}://{host}/{query}")
 }

@@ -10,12 +10,12 @@ use gyre_ros2_bridge::{
     Bridge, MapSettings, Settings,
     source::{self, AskError},
 };
-use gyre_ros2_messages::{Domain, DomainError};
+use gyre_ros2_messages::Domain;
 use gyre_run::SourceConfig;
 use gyre_stage::{Launch, StageCounters, StageError, observer::ObservedRun, wake::Signals};
 use gyre_terminal::{Failure, print};
 
-use crate::{cli::Ros2Arguments, radar};
+use crate::cli::Ros2Arguments;
 
 /// Publishes the runs of a folder until a signal arrives.
 ///
@@ -69,7 +69,7 @@ fn map_settings(out: &Path) -> Result<MapSettings, String> {
 /// # Errors
 /// No driver, or a radar that cannot be used.
 pub fn ask(source: &SourceConfig, options: &DatasetOptions) -> Result<Sizes, Failure> {
-    let settings = settings(source, options)?;
+    let settings = source::Settings::of(source, options)?;
     source::ask(&settings).map_err(|error: AskError| error.into())
 }
 
@@ -82,22 +82,7 @@ pub fn receive(
     source: &SourceConfig,
     options: &DatasetOptions,
 ) -> Result<StageCounters, StageError> {
-    let settings = settings(source, options);
+    let settings = source::Settings::of(source, options);
     let settings = settings.map_err(|error| StageError::Input(error.to_string()))?;
     source::run(launch, settings)
-}
-
-fn settings(
-    source: &SourceConfig,
-    options: &DatasetOptions,
-) -> Result<source::Settings, DomainError> {
-    let interface = Some(source.interface.as_str()).filter(|address| !address.is_empty());
-    Ok(source::Settings {
-        domain: Domain::new(source.domain, interface)?,
-        topic: source.topic.clone(),
-        encoder_counts: radar::encoder_counts(options),
-        silence: radar::silence(source),
-        scans: source.scans.map(|scans| scans as u64),
-        constants: options.into(),
-    })
 }

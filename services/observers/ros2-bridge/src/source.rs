@@ -10,7 +10,10 @@ mod wakeups;
 use std::time::Duration;
 
 use gyre_colossus::Constants;
-use gyre_ros2_messages::Domain;
+use gyre_live_radar::{encoder_counts, silence};
+use gyre_radar::DatasetOptions;
+use gyre_ros2_messages::{Domain, DomainError};
+use gyre_run::SourceConfig;
 use gyre_stage::{Launch, StageCounters, StageError, source};
 
 pub use ask::{AskError, ask};
@@ -34,6 +37,23 @@ pub struct Settings {
 }
 
 impl Settings {
+    /// Returns the settings of the section `[source]`, with the constants of the section
+    /// `[dataset]`.
+    ///
+    /// # Errors
+    /// No such domain or interface.
+    pub fn of(source: &SourceConfig, options: &DatasetOptions) -> Result<Self, DomainError> {
+        let interface = Some(source.interface.as_str()).filter(|address| !address.is_empty());
+        Ok(Self {
+            domain: Domain::new(source.domain, interface)?,
+            topic: source.topic.clone(),
+            encoder_counts: encoder_counts(options),
+            silence: silence(source),
+            scans: source.scans.map(|scans| scans as u64),
+            constants: options.into(),
+        })
+    }
+
     /// The topic of the configuration, beside that of the azimuths.
     fn configuration_topic(&self) -> String {
         match self.topic.rsplit_once('/') {

@@ -107,14 +107,19 @@ impl Endpoint {
         })
     }
 
-    /// Returns the address that it listens at.
-    pub fn address(&self) -> SocketAddr {
-        self.address
-    }
-
-    /// Returns the token that a reader needs.
-    pub fn token(&self) -> Option<&Token> {
-        self.token.as_ref()
+    /// Returns the address for a browser. One of all interfaces is reached by the machine's name.
+    pub fn url(&self, scheme: &str) -> String {
+        let host = match self.address.ip().is_unspecified() {
+            true => {
+                let system = rustix::system::uname();
+                let name = system.nodename().to_string_lossy();
+                format!("{name}:{}", self.address.port())
+            }
+            false => self.address.to_string(),
+        };
+        let token = self.token.as_ref().map(Token::as_str);
+        let query = token.map_or(String::new(), |token| format!("?token={token}"));
+        format!("{scheme}://{host}/{query}")
     }
 
     /// Serves until the program stops.

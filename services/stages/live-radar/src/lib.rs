@@ -23,7 +23,7 @@ pub use connection::RadarSocket;
 pub use gyre_colossus::PORT;
 pub use intake::{Intake, NoScans};
 pub use parser::RadarParser;
-pub use settings::Settings;
+pub use settings::{Settings, encoder_counts, silence};
 
 /// Receives the scans of a radar until SIGTERM, or until there are enough.
 ///

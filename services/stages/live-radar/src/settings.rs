@@ -2,9 +2,15 @@
 
 use std::time::Duration;
 
-use gyre_colossus::{Address, Constants};
+use gyre_colossus::{Address, BadAddress, Constants};
+use gyre_radar::DatasetOptions;
+use gyre_run::SourceConfig;
 
 use crate::parser::RadarParser;
+
+/// Encoder counts per turn of a radar that does not tell them, unless `dataset.encoder_counts` says
+/// otherwise.
+const ENCODER_COUNTS: u16 = 5600;
 
 /// The address of a radar, and the properties that it does not send.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,7 +28,35 @@ pub struct Settings {
 }
 
 impl Settings {
+    /// Returns the settings of the section `[source]`, with the constants of the section
+    /// `[dataset]`.
+    ///
+    /// # Errors
+    /// The address is none.
+    pub fn of(source: &SourceConfig, options: &DatasetOptions) -> Result<Self, BadAddress> {
+        Ok(Self {
+            address: Address::parse(&source.address, &source.interface)?,
+            encoder_counts: encoder_counts(options),
+            silence: silence(source),
+            scans: source.scans.map(|scans| scans as u64),
+            constants: options.into(),
+        })
+    }
+
     pub(crate) fn parser(&self) -> RadarParser {
         RadarParser::new(self.address.is_udp(), self.encoder_counts)
+    }
+}
+
+/// Returns the encoder counts per turn of a radar that does not tell them.
+pub fn encoder_counts(options: &DatasetOptions) -> u16 {
+    options.encoder_counts.unwrap_or(ENCODER_COUNTS)
+}
+
+/// Returns the time without a byte or a message after which something is done about it.
+pub fn silence(source: &SourceConfig) -> Duration {
+    match Duration::try_from_secs_f64(source.silence_s) {
+        Ok(silence) if !silence.is_zero() => silence,
+        _ => Duration::MAX,
     }
 }

@@ -76,6 +76,19 @@ impl Default for LinkConfig {
 }
 
 impl LinkConfig {
+    /// Returns which part of a split run this is, a sentence; `None`: the run is not split.
+    pub fn describe(&self) -> Option<String> {
+        let (name, cut) = (&self.name, self.cut.name());
+        match self.side? {
+            Side::Robot => Some(format!(
+                "link {name}: the stages up to `{cut}` are here; scans wait for the base"
+            )),
+            Side::Base => Some(format!(
+                "link {name}: the stages after `{cut}` are here; they wait for the robot"
+            )),
+        }
+    }
+
     /// Returns whether motions go back from the searches to masking, over the cut.
     pub fn returns_motions(&self) -> bool {
         matches!(self.cut, PlayedFrom::Masked | PlayedFrom::Rotation)
