@@ -1,5 +1,6 @@
 //! The pose graph: all poses by least squares over sparse constraints.
 
+mod cholesky;
 mod covariance;
 mod dogleg;
 mod edge;

@@ -50,20 +50,22 @@ impl PoseGraph {
         jacobians: &[(usize, Matrix3<f64>)],
     ) -> Result<Matrix3<f64>, EstimationError> {
         let system = self.factorised()?;
-        let mut sides = system.right_hand_side(3);
         let rows = |&(keyframe, jacobian): &(usize, Matrix3<f64>)| {
             System::row(keyframe).map(|row| (row, jacobian))
         };
-        for (row, jacobian) in jacobians.iter().filter_map(rows) {
-            for (axis, column) in (0..9).map(|i| (i / 3, i % 3)) {
-                sides[(row + axis, column)] += jacobian[(column, axis)];
-            }
-        }
-        system.solve(&mut sides);
+        let jacobians: Vec<_> = jacobians.iter().filter_map(rows).collect();
         let mut covariance = Matrix3::zeros();
-        for (row, jacobian) in jacobians.iter().filter_map(rows) {
-            let solved = Matrix3::from_fn(|axis, column| sides[(row + axis, column)]);
-            covariance += jacobian * solved;
+        for axis in 0..3 {
+            let mut side = system.right_hand_side();
+            for (row, jacobian) in &jacobians {
+                let mut side = side.fixed_rows_mut::<3>(*row);
+                side += jacobian.row(axis).transpose();
+            }
+            system.solve(&mut side);
+            for (row, jacobian) in &jacobians {
+                let mut column = covariance.column_mut(axis);
+                column += jacobian * side.fixed_rows::<3>(*row);
+            }
         }
         Ok(0.5 * (covariance + covariance.transpose()))
     }

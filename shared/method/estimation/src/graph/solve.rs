@@ -1,9 +1,8 @@
 //! The solution of a pose graph: Gauss-Newton with reweighted loops, within a trust radius where a
 //! step would raise the cost.
 
-use faer::Mat;
 use gyre_geometry::{Pose, xy_yaw};
-use nalgebra::Vector3;
+use nalgebra::DVector;
 
 use super::dogleg::Dogleg;
 use super::edge::Edge;
@@ -165,11 +164,11 @@ impl PoseGraph {
                 if gain > GOOD_GAIN {
                     *radius *= 2.0;
                 } else if gain < POOR_GAIN {
-                    *radius = 0.5 * step.norm_l2();
+                    *radius = 0.5 * step.norm();
                 }
                 return Ok(Some((poses, lower)));
             }
-            *radius = 0.25 * step.norm_l2();
+            *radius = 0.25 * step.norm();
         }
         match cost.is_finite() {
             true => Ok(None),
@@ -178,7 +177,7 @@ impl PoseGraph {
     }
 
     /// Puts the equations at the present poses into the system, and returns their right-hand side.
-    fn linearise(&mut self, weights: Weights) -> Result<Mat<f64>, EstimationError> {
+    fn linearise(&mut self, weights: Weights) -> Result<DVector<f64>, EstimationError> {
         self.prepare()?;
         let shares: Vec<_> = self
             .loops
@@ -197,10 +196,10 @@ impl PoseGraph {
             return Err(EstimationError::Singular);
         };
         system.clear();
-        let mut sides = system.right_hand_side(1);
+        let mut side = system.right_hand_side();
         for (number, edge) in odometry.iter().enumerate() {
             let linear = edge.linearise(poses);
-            system.add(number, edge.ends, &linear, 1.0, &mut sides);
+            system.add(number, edge.ends, &linear, 1.0, &mut side);
         }
         for (number, (closing, share)) in loops.iter_mut().zip(shares).enumerate() {
             let linear = closing.edge.linearise(poses);
@@ -209,9 +208,9 @@ impl PoseGraph {
             }
             let number = odometry.len() + number;
             let weight = share * closing.weight;
-            system.add(number, closing.edge.ends, &linear, weight, &mut sides);
+            system.add(number, closing.edge.ends, &linear, weight, &mut side);
         }
-        Ok(sides)
+        Ok(side)
     }
 
     /// Returns the sum of the squared normalised residuals at `poses`, those of loops weighted.
@@ -228,12 +227,9 @@ impl PoseGraph {
         odometry.chain(loops).sum()
     }
 
-    fn moved(&self, step: &Mat<f64>) -> Vec<Pose> {
+    fn moved(&self, step: &DVector<f64>) -> Vec<Pose> {
         let moved = |(keyframe, pose)| match System::row(keyframe) {
-            Some(row) => {
-                let step = [step[(row, 0)], step[(row + 1, 0)], step[(row + 2, 0)]];
-                corrected(pose, &Vector3::from(step))
-            }
+            Some(row) => corrected(pose, &step.fixed_rows::<3>(row).into_owned()),
             None => *pose,
         };
         self.poses.iter().enumerate().map(moved).collect()

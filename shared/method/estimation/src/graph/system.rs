@@ -1,62 +1,50 @@
-//! The normal equations of a pose graph, and their sparse Cholesky factorisation.
+//! The normal equations of a pose graph.
 
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::perm::PermRef;
-use faer::sparse::linalg::amd;
-use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering,
-    factorize_symbolic_cholesky,
-};
-use faer::sparse::{FaerError, SparseColMatRef, SymbolicSparseColMatRef};
-use faer::{Conj, Mat, Par, Side};
+use std::collections::TryReserveError;
 
+use nalgebra::{DVector, Matrix3};
+
+use super::cholesky::Cholesky;
 use super::edge::{Ends, Linear};
 
 /// A symmetric system of equations with three rows a pose and a block for each pair of poses that
 /// share an edge, of which the lower triangle is stored. Pose 0 is fixed and has no rows.
 pub(super) struct System {
-    /// Of each edge in the order given: the block below the diagonal, as its column and its number
-    /// within the column. `None` for an edge of pose 0.
-    slots: Vec<Option<[usize; 2]>>,
-    columns: Vec<usize>,
-    rows: Vec<usize>,
-    values: Vec<f64>,
-    symbolic: SymbolicCholesky<usize>,
-    factor: Vec<f64>,
-    memory: MemBuffer,
+    /// Of each edge in the order given: the number of the block below the diagonal. `None` for an
+    /// edge of pose 0.
+    numbers: Vec<Option<usize>>,
+    /// Column and row of each block below the diagonal.
+    pairs: Vec<[usize; 2]>,
+    below: Vec<Matrix3<f64>>,
+    diagonal: Vec<Matrix3<f64>>,
+    factor: Cholesky,
 }
 
 impl System {
     /// Finds the structure of the matrix and of its factor.
-    pub fn new(poses: usize, edges: &[Ends]) -> Result<Self, FaerError> {
+    ///
+    /// # Errors
+    /// The factor does not fit into memory.
+    pub fn new(poses: usize, edges: &[Ends]) -> Result<Self, TryReserveError> {
         let blocks = poses - 1;
-        let below: Vec<_> = edges.iter().map(below).collect();
-        let pattern = Pattern::new(blocks, &below);
-        let [order, place] = pattern.elimination_order()?;
-        let (columns, rows) = pattern.scalars();
-        let size = 3 * blocks;
-        let symbolic = factorize_symbolic_cholesky(
-            SymbolicSparseColMatRef::new_checked(size, size, &columns, None, &rows),
-            Side::Lower,
-            SymmetricOrdering::Custom(PermRef::new_checked(&order, &place, size)),
-            CholeskySymbolicParams::default(),
-        )?;
-        let scratch = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
-        let slot = |block: Option<[usize; 2]>| block.map(|block| pattern.slot(block));
+        let of_edges: Vec<_> = edges.iter().map(pair).collect();
+        let mut pairs: Vec<_> = of_edges.iter().flatten().copied().collect();
+        pairs.sort_unstable();
+        pairs.dedup();
+        let number = |pair| pairs.partition_point(|other| *other < pair);
+        let numbers = of_edges.into_iter().map(|pair| pair.map(number));
         Ok(Self {
-            slots: below.into_iter().map(slot).collect(),
-            values: vec![0.0; rows.len()],
-            columns,
-            rows,
-            factor: vec![0.0; symbolic.len_val()],
-            memory: MemBuffer::try_new(scratch).map_err(|_| FaerError::OutOfMemory)?,
-            symbolic,
+            numbers: numbers.collect(),
+            below: vec![Matrix3::zeros(); pairs.len()],
+            diagonal: vec![Matrix3::zeros(); blocks],
+            factor: Cholesky::new(blocks, &pairs)?,
+            pairs,
         })
     }
 
-    /// Returns a right-hand side of zeros with `columns` columns.
-    pub fn right_hand_side(&self, columns: usize) -> Mat<f64> {
-        Mat::zeros(self.columns.len() - 1, columns)
+    /// Returns a right-hand side of zeros.
+    pub fn right_hand_side(&self) -> DVector<f64> {
+        DVector::zeros(3 * self.diagonal.len())
     }
 
     /// Returns the first row of a pose; `None` for pose 0.
@@ -66,7 +54,8 @@ impl System {
 
     /// Sets the matrix to zero.
     pub fn clear(&mut self) {
-        self.values.fill(0.0);
+        self.below.fill(Matrix3::zeros());
+        self.diagonal.fill(Matrix3::zeros());
     }
 
     /// Adds what an edge adds to the equations, times `weight`.
@@ -76,152 +65,45 @@ impl System {
         ends: Ends,
         linear: &Linear,
         weight: f64,
-        sides: &mut Mat<f64>,
+        side: &mut DVector<f64>,
     ) {
-        let rows = ends.map(Self::row);
-        for (end, row) in rows.into_iter().enumerate() {
-            let Some(row) = row else { continue };
-            for axis in 0..3 {
-                sides[(row + axis, 0)] += weight * linear.sides[end][axis];
-                let from = self.columns[row + axis];
-                for below in axis..3 {
-                    self.values[from + below - axis] += weight * linear.blocks[end][(below, axis)];
-                }
-            }
+        for (end, pose) in ends.into_iter().enumerate() {
+            let Some(row) = Self::row(pose) else { continue };
+            let mut side = side.fixed_rows_mut::<3>(row);
+            side += weight * linear.sides[end];
+            self.diagonal[pose - 1] += weight * linear.blocks[end];
         }
-        let Some([column, number]) = self.slots[edge] else {
-            return;
-        };
-        let first_is_column = rows[0] == Some(3 * column);
-        for axis in 0..3 {
-            let from = self.columns[3 * column + axis] + 3 - axis + 3 * number;
-            for row in 0..3 {
-                let at = if first_is_column {
-                    (axis, row)
-                } else {
-                    (row, axis)
-                };
-                self.values[from + row] += weight * linear.between[at];
-            }
+        if let Some(number) = self.numbers[edge] {
+            self.below[number] += match ends[0] < ends[1] {
+                true => weight * linear.between.transpose(),
+                false => weight * linear.between,
+            };
         }
     }
 
     /// Factorises the matrix. Returns whether it is positive definite.
     pub fn factorise(&mut self) -> bool {
-        let size = self.columns.len() - 1;
-        let pattern =
-            SymbolicSparseColMatRef::new_checked(size, size, &self.columns, None, &self.rows);
-        let done = self.symbolic.factorize_numeric_llt(
-            &mut self.factor,
-            SparseColMatRef::new(pattern, &self.values),
-            Side::Lower,
-            Default::default(),
-            Par::Seq,
-            MemStack::new(&mut self.memory),
-            Default::default(),
-        );
-        done.is_ok()
+        self.factor.factorise(&self.diagonal, &self.below)
     }
 
     /// Returns v' H v of a vector v and the matrix H.
-    pub fn quadratic_form(&self, vector: &Mat<f64>) -> f64 {
-        let size = self.columns.len() - 1;
-        let of_column = |column: usize| {
-            let entries = self.columns[column] + 1..self.columns[column + 1];
-            let below = entries.map(|at| self.values[at] * vector[(self.rows[at], 0)]);
-            let diagonal = self.values[self.columns[column]] * vector[(column, 0)];
-            vector[(column, 0)] * (diagonal + 2.0 * below.sum::<f64>())
-        };
-        (0..size).map(of_column).sum()
+    pub fn quadratic_form(&self, vector: &DVector<f64>) -> f64 {
+        let of = |block: usize| vector.fixed_rows::<3>(3 * block);
+        let diagonal = self.diagonal.iter().enumerate();
+        let diagonal = diagonal.map(|(block, value)| of(block).dot(&(value * of(block))));
+        let below = self.pairs.iter().zip(&self.below);
+        let below = below.map(|(&[column, row], value)| of(row).dot(&(value * of(column))));
+        diagonal.sum::<f64>() + 2.0 * below.sum::<f64>()
     }
 
     /// Solves the factorised equations in place.
-    pub fn solve(&self, sides: &mut Mat<f64>) {
-        let scratch = self
-            .symbolic
-            .solve_in_place_scratch::<f64>(sides.ncols(), Par::Seq);
-        LltRef::new(&self.symbolic, &self.factor).solve_in_place_with_conj(
-            Conj::No,
-            sides.as_mut(),
-            Par::Seq,
-            MemStack::new(&mut MemBuffer::new(scratch)),
-        );
+    pub fn solve(&self, side: &mut DVector<f64>) {
+        self.factor.solve(side);
     }
 }
 
 /// Returns the column and the row of the block of an edge below the diagonal; `None` for an edge of
 /// pose 0.
-fn below(&[a, b]: &Ends) -> Option<[usize; 2]> {
+fn pair(&[a, b]: &Ends) -> Option<[usize; 2]> {
     Some([a.min(b).checked_sub(1)?, a.max(b) - 1])
-}
-
-/// The blocks below the diagonal, by columns.
-struct Pattern {
-    columns: Vec<usize>,
-    rows: Vec<usize>,
-}
-
-impl Pattern {
-    fn new(blocks: usize, below: &[Option<[usize; 2]>]) -> Self {
-        let mut below: Vec<_> = below.iter().flatten().copied().collect();
-        below.sort_unstable();
-        below.dedup();
-        let mut columns = vec![0; blocks + 1];
-        for [column, _] in &below {
-            columns[column + 1] += 1;
-        }
-        for column in 0..blocks {
-            columns[column + 1] += columns[column];
-        }
-        let rows = below.into_iter().map(|[_, row]| row).collect();
-        Self { columns, rows }
-    }
-
-    fn column(&self, column: usize) -> &[usize] {
-        &self.rows[self.columns[column]..self.columns[column + 1]]
-    }
-
-    /// Returns the column of a block and its number within the column.
-    fn slot(&self, [column, row]: [usize; 2]) -> [usize; 2] {
-        [column, self.column(column).partition_point(|&r| r < row)]
-    }
-
-    /// Returns an order of elimination of the single rows that keeps the factor sparse (approximate
-    /// minimum degree of the blocks), and its inverse.
-    fn elimination_order(&self) -> Result<[Vec<usize>; 2], FaerError> {
-        let blocks = self.columns.len() - 1;
-        let (columns, rows) = (&self.columns, &self.rows);
-        let pattern = SymbolicSparseColMatRef::new_checked(blocks, blocks, columns, None, rows);
-        let (mut order, mut place) = (vec![0; blocks], vec![0; blocks]);
-        let scratch = amd::order_scratch::<usize>(blocks, rows.len());
-        let mut memory = MemBuffer::try_new(scratch).map_err(|_| FaerError::OutOfMemory)?;
-        let stack = MemStack::new(&mut memory);
-        amd::order(
-            &mut order,
-            &mut place,
-            pattern,
-            amd::Control::default(),
-            stack,
-        )?;
-        let single =
-            |blocks: Vec<usize>| blocks.into_iter().flat_map(|b| 3 * b..3 * b + 3).collect();
-        Ok([single(order), single(place)])
-    }
-
-    /// Returns the pattern of the single values, with the lower triangles of the diagonal blocks.
-    fn scalars(&self) -> (Vec<usize>, Vec<usize>) {
-        let (mut columns, mut rows) = (vec![0], Vec::new());
-        for column in 0..self.columns.len() - 1 {
-            for axis in 0..3 {
-                rows.extend(3 * column + axis..3 * column + 3);
-                rows.extend(
-                    self.column(column)
-                        .iter()
-                        .flat_map(|row| 3 * row..3 * row + 3),
-                );
-                columns.push(rows.len());
-            }
-        }
-        (columns, rows)
-    }
 }
