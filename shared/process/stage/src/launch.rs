@@ -19,6 +19,7 @@ use rustix::{
 };
 use serde::de::DeserializeOwned;
 use tracing::span::EnteredSpan;
+use tracing_subscriber::{filter::Targets, prelude::*};
 
 use crate::{
     Manifest, StageCounters, StageError, counters,
@@ -243,11 +244,24 @@ fn leave_last_words(stage: &str, sentence: &str) {
     }
 }
 
+/// Returns the filter of the log: `GYRE_LOG`, or `FILTER` without it.
+///
+/// # Errors
+/// `GYRE_LOG` is no filter.
+fn log_filter() -> Result<Targets, StageError> {
+    let filter = std::env::var("GYRE_LOG").unwrap_or_else(|_| FILTER.into());
+    filter.parse().map_err(|error| {
+        StageError::Configuration(format!(
+            "GYRE_LOG is `{filter}` ({error}): say `debug`, or `info,zenoh=debug`"
+        ))
+    })
+}
+
 /// Starts logging to `log.jsonl`, to which all processes append one line per event. While the
 /// returned span lives, each line carries the name of the stage.
 ///
 /// # Errors
-/// The log cannot be opened.
+/// The log cannot be opened, or `GYRE_LOG` is no filter.
 pub fn start_log(manifest: &Manifest, name: &str) -> Result<EnteredSpan, StageError> {
     let path = manifest.events();
     let file = OpenOptions::new()
@@ -256,15 +270,13 @@ pub fn start_log(manifest: &Manifest, name: &str) -> Result<EnteredSpan, StageEr
         .mode(0o600)
         .open(&path)
         .map_err(|source| StageError::File { path, source })?;
-    let filter =
-        tracing_subscriber::EnvFilter::try_from_env("GYRE_LOG").unwrap_or_else(|_| FILTER.into());
-    let log = tracing_subscriber::fmt()
+    let lines = tracing_subscriber::fmt::layer()
         .json()
-        .with_env_filter(filter)
         // They would be printed to standard error, and panic if that cannot be written either.
         .log_internal_errors(false)
-        .with_writer(Mutex::new(file));
+        .with_writer(Mutex::new(file))
+        .with_filter(log_filter()?);
     // A second call in one process (tests) keeps the first log.
-    let _ = log.try_init();
+    let _ = tracing_subscriber::registry().with(lines).try_init();
     Ok(tracing::error_span!("process", stage = name).entered())
 }
