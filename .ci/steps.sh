@@ -67,7 +67,7 @@ state_of_training() {
 }
 
 test_package() {
-    GYRE_PROGRAM="$target/debug/gyre" "$GYRE_PYTHON" -m pytest -q python
+    GYRE_PROGRAM="$target/debug/gyre" "$GYRE_PYTHON" -m pytest -q python lab
 }
 
 demo() {

@@ -27,8 +27,6 @@ pub enum Command {
     /// Measure what each step from the paper's form to a configuration gives, or what single
     /// changes of it do.
     Ablation(AblationArguments),
-    /// Measure how close simulated scans are to real ones.
-    Realism(RealismArguments),
     /// Write a copy of a recording in which some scans are corrupted, to see what an odometry makes
     /// of them.
     Corrupt(CorruptArguments),
@@ -80,41 +78,6 @@ pub struct AblationArguments {
     /// whether a choice holds among its neighbours; may be repeated.
     #[arg(long, value_name = "KEY=VALUE,...")]
     pub vary: Vec<String>,
-}
-
-#[derive(Debug, Args)]
-pub struct RealismArguments {
-    /// The simulated recording's folder.
-    pub sim: PathBuf,
-    /// The real recording's folder.
-    pub real: PathBuf,
-    /// Another real recording: says of each statistic whether SIM is closer to REAL than this one
-    /// is.
-    #[arg(long, value_name = "OTHER")]
-    pub between: Option<PathBuf>,
-    /// The folder of the configurations, `oxford.toml` and so on: each recording is read by the one
-    /// of its format.
-    #[arg(long, default_value = "configs")]
-    pub configs: PathBuf,
-    /// SIM's configuration instead.
-    #[arg(long, value_name = "FILE")]
-    pub sim_config: Option<PathBuf>,
-    /// REAL's configuration instead.
-    #[arg(long, value_name = "FILE")]
-    pub real_config: Option<PathBuf>,
-    /// OTHER's configuration instead.
-    #[arg(long, value_name = "FILE", requires = "between")]
-    pub between_config: Option<PathBuf>,
-    /// The folder of realism.md, realism.json and the runs of the searches.
-    #[arg(long, default_value = "out/realism")]
-    pub out: PathBuf,
-    /// Scans whose statistics are taken, at most: runs of consecutive ones, evenly spread over the
-    /// recording.
-    #[arg(long, default_value = "64")]
-    pub scans: NonZeroUsize,
-    /// Scans that the odometries are run on, at most, from the first on; 0: run none.
-    #[arg(long, default_value = "512")]
-    pub search_scans: usize,
 }
 
 #[derive(Debug, Args)]

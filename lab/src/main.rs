@@ -1,5 +1,4 @@
-//! `gyre-lab`: tables of the papers, ablations, realism of simulated scans, corrupted recordings,
-//! training pairs.
+//! `gyre-lab`: tables of the papers, ablations, corrupted recordings, training pairs.
 
 mod ablation;
 mod cli;
@@ -9,7 +8,6 @@ mod export_pairs;
 mod localisation;
 mod models;
 mod places;
-mod realism;
 mod recording;
 mod report;
 mod sequence;
@@ -28,7 +26,6 @@ fn main() -> ExitCode {
     let result = match command {
         Command::Tables(arguments) => tables::tables(&arguments),
         Command::Ablation(arguments) => ablation::ablation(&arguments),
-        Command::Realism(arguments) => realism::realism(&arguments),
         Command::Corrupt(arguments) => corrupt::corrupt(&arguments),
         Command::ExportPairs(arguments) => export_pairs::export_pairs(&arguments),
         Command::Places(arguments) => places::places(&arguments),

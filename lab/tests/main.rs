@@ -7,7 +7,6 @@ mod common;
 
 mod corrupt;
 mod export_pairs;
-mod realism;
 mod tables;
 
 /// The program that is measured, beside the laboratory: `cargo build -p gyre` makes it, as do all

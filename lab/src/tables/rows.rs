@@ -44,6 +44,7 @@ impl Rows {
     }
 
     /// The row of a name.
+    #[cfg(test)]
     pub fn named(&self, name: &str) -> Option<&Row> {
         self.row.iter().find(|row| row.name == name)
     }

@@ -58,7 +58,7 @@ pub use kitti::{Kitti, kitti};
 pub use matched::{MatchedPoses, path_m};
 pub use motions::{MatchedMotions, Part, TimedMotion};
 pub use nees::{Nees, NeesFigure, NeesFigures, NeesLength, NeesOptions, nees};
-pub use plot::{PlotError, plot_bands, plot_errors, plot_trajectory};
+pub use plot::PlotError;
 pub use report::{Evaluation, Options, evaluate};
 pub use rpe::{PairError, Rpe, rpe};
 pub use seg::{Seg, seg};

@@ -72,6 +72,16 @@ pub struct Wall {
 }
 
 impl Scatterer {
+    /// A scatterer that reflects in all directions.
+    pub fn all_round(position: Point2<f64>, cross_section_m2: f64, body: u32) -> Self {
+        Self {
+            position,
+            cross_section_m2,
+            aspect: Aspect::AllRound,
+            body,
+        }
+    }
+
     /// The same scatterer on a body that stands at `pose`.
     pub fn moved(&self, pose: &Pose) -> Self {
         let aspect = match self.aspect {
@@ -90,6 +100,17 @@ impl Scatterer {
 }
 
 impl Wall {
+    /// A wall that mirrors nothing.
+    pub fn rough(from: Point2<f64>, to: Point2<f64>, transmission: f64, body: u32) -> Self {
+        Self {
+            from,
+            to,
+            transmission,
+            mirror: 0.0,
+            body,
+        }
+    }
+
     /// The same wall on a body that stands at `pose`.
     pub fn moved(&self, pose: &Pose) -> Self {
         Self {
@@ -110,6 +131,14 @@ pub struct Body {
 }
 
 impl Body {
+    /// Scatterers without walls.
+    pub fn of(scatterers: Vec<Scatterer>) -> Self {
+        Self {
+            scatterers,
+            walls: vec![],
+        }
+    }
+
     /// Adds all of another body.
     pub fn extend(&mut self, other: Body) {
         self.scatterers.extend(other.scatterers);

@@ -230,13 +230,7 @@ mod tests {
             let from = point(rng);
             let to =
                 from + Vector2::new(rng.random_range(-15.0..15.0), rng.random_range(-15.0..15.0));
-            Wall {
-                from,
-                to,
-                transmission: 0.5,
-                mirror: 0.0,
-                body: i % 7,
-            }
+            Wall::rough(from, to, 0.5, i % 7)
         };
         let walls: Vec<Wall> = (0..120).map(|i| wall(i, &mut rng)).collect();
         let grid = WallGrid::new(walls.clone());
@@ -261,13 +255,7 @@ mod tests {
             for (from, to) in [((at, -15.0), (at, 15.0)), ((-15.0, at), (15.0, at))]
                 .map(|(a, b)| (point_at(a), point_at(b)))
             {
-                let grid = WallGrid::new(vec![Wall {
-                    from,
-                    to,
-                    transmission: 0.5,
-                    mirror: 0.0,
-                    body: 1,
-                }]);
+                let grid = WallGrid::new(vec![Wall::rough(from, to, 0.5, 1)]);
                 let across = Vector2::new((to - from).y, (to - from).x) + Vector2::new(0.7, 0.7);
                 let middle = nalgebra::center(&from, &to);
                 for line in [across, -across] {

@@ -112,24 +112,16 @@ impl World {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::{Aspect, NO_BODY};
+    use crate::body::NO_BODY;
 
     #[test]
     fn around_includes_all_that_is_near() {
         let at = |i: i32, j: i32| Point2::new(f64::from(i) * 7.3 - 90.0, f64::from(j) * 9.1 - 40.0);
-        let scatterer = |position| Scatterer {
-            position,
-            cross_section_m2: 1.0,
-            aspect: Aspect::AllRound,
-            body: NO_BODY,
-        };
+        let scatterer = |position| Scatterer::all_round(position, 1.0, NO_BODY);
         let scatterers = (0..40)
             .flat_map(|i| (0..20).map(move |j| scatterer(at(i, j))))
             .collect();
-        let world = World::new(Body {
-            scatterers,
-            walls: vec![],
-        });
+        let world = World::new(Body::of(scatterers));
         assert_eq!(world.scatterers().len(), 800);
         for (place, reach_m) in [
             ((0.0, 0.0), 30.0),

@@ -72,6 +72,13 @@ fn each_format_is_detected_and_read_back_as_it_was_rendered() {
                 drive.simulator().render_scan(index).scan,
             );
             assert_same_measurement(&drive, &read, &rendered);
+            if format == OutputFormat::Oxford {
+                let of = |scan: &OwnedScan| {
+                    let geometry = scan.geometry;
+                    (geometry.stamp_ns / 1000, geometry.range_resolution_m)
+                };
+                assert_eq!(of(&read), of(&rendered));
+            }
             assert!(
                 (read.geometry.stamp_ns - drive.stamp_ns(index)).abs() <= 1000,
                 "{format:?}"

@@ -2,15 +2,14 @@
 
 use std::f64::consts::TAU;
 
-use gyre_geometry::Twist;
-use gyre_radar::{DatasetOptions, OwnedScan, ScanLimits};
-use gyre_simulator::body::{Aspect, NO_BODY, Scatterer, Wall};
-use gyre_simulator::profile::{METADATA_BYTES, Profile, Sampling};
-use gyre_simulator::weather::WeatherConfig;
-use gyre_simulator::{
-    Body, Effects, Path, Scene, Sensor, SensorConfig, SimulationConfig, Simulator, SweepTime, World,
-};
+use gyre_geometry::{Pose, Twist};
+use gyre_radar::{DatasetOptions, OwnedScan};
+use gyre_simulator::body::{NO_BODY, Scatterer, Wall};
+use gyre_simulator::profile::{Profile, Sampling};
+use gyre_simulator::{Body, Effects, Path, SensorConfig, SimulationConfig, Simulator};
 use nalgebra::Point2;
+
+use crate::effects::scene::Setup;
 
 /// Ringing fills the first bins; no point is placed there.
 const FIRST_FREE_BIN: usize = 80;
@@ -20,78 +19,46 @@ fn sampling() -> Sampling {
     Profile::Cts350xOxford.sampling()
 }
 
-fn azimuth_rad(azimuth: usize) -> f64 {
-    sampling().azimuth_rad(azimuth)
+fn point(x: f64, y: f64) -> Body {
+    let scatterer = Scatterer::all_round(Point2::new(x, y), 30.0, NO_BODY);
+    Body::of(vec![scatterer])
 }
 
-fn point(x: f64, y: f64) -> Scatterer {
-    Scatterer {
-        position: Point2::new(x, y),
-        cross_section_m2: 30.0,
-        aspect: Aspect::AllRound,
-        body: NO_BODY,
+/// A path whose time 0 is the start of the sweep instead of its middle.
+struct FromStart<'a>(&'a dyn Path);
+
+impl Path for FromStart<'_> {
+    fn pose(&self, time_s: f64) -> Pose {
+        self.0.pose(time_s + 0.124_687)
     }
 }
 
-/// Without the effects that move or hide a single point; see `sweep_with`.
-fn quiet() -> Effects {
-    Effects {
+/// Measures with all effects but those that move or hide a single point.
+fn sweep(body: Body, path: &dyn Path, doppler_s: f64) -> OwnedScan {
+    let effects = Effects {
         encoder_wobble: false,
         dropped_azimuths: false,
         interference: false,
         ..Effects::ALL
-    }
-}
-
-fn sweep(content: Body, path: &dyn Path, doppler_s: f64) -> OwnedScan {
-    let config = SensorConfig {
+    };
+    let sensor = SensorConfig {
         doppler_s: Some(doppler_s),
         ..SensorConfig::default()
     };
-    sweep_with(content, path, &config, &quiet(), WeatherConfig::default())
-}
-
-fn sweep_with(
-    content: Body,
-    path: &dyn Path,
-    config: &SensorConfig,
-    effects: &Effects,
-    weather: WeatherConfig,
-) -> OwnedScan {
-    let Sampling {
-        azimuths,
-        period_us,
-        ..
-    } = config.sampling();
-    let time = SweepTime {
-        start_us: 1_500_000_000_000_000,
-        period_us,
-        azimuths,
-        epoch_us: 1_500_000_000_000_000,
+    let setup = Setup {
+        body,
+        path: &FromStart(path),
+        sensor,
+        effects,
+        ..Setup::default()
     };
-    let mut scan = OwnedScan::with_limits(ScanLimits {
-        bytes: azimuths * config.sampling().stride(),
-        azimuths,
-    });
-    let scene = Scene {
-        world: &World::new(content),
-        movers: &(),
-        path,
-        weather,
-    };
-    scan.geometry = Sensor::new(config, effects, 7).sweep(scene, time, 0, &mut scan.slot());
-    scan
-}
-
-fn row(scan: &OwnedScan, azimuth: usize) -> &[u8] {
-    let stride = scan.geometry.stride;
-    &scan.bytes[azimuth * stride + METADATA_BYTES..(azimuth + 1) * stride]
+    setup.scan()
 }
 
 /// Azimuth and bin of the maximum power, each the middle of the plateau caused by rounding.
 fn brightest(scan: &OwnedScan) -> (usize, f64, u8) {
     let best = |azimuth: usize| {
-        row(scan, azimuth)[FIRST_FREE_BIN..]
+        scan.view().row(azimuth)[FIRST_FREE_BIN..]
             .iter()
             .copied()
             .max()
@@ -100,7 +67,7 @@ fn brightest(scan: &OwnedScan) -> (usize, f64, u8) {
     let azimuth = (0..AZIMUTHS).max_by_key(|&azimuth| best(azimuth)).unwrap();
     let top = best(azimuth);
     let bins: Vec<usize> = (FIRST_FREE_BIN..sampling().bins)
-        .filter(|&bin| row(scan, azimuth)[bin] == top)
+        .filter(|&bin| scan.view().row(azimuth)[bin] == top)
         .collect();
     (
         azimuth,
@@ -115,7 +82,7 @@ fn expected(path: &dyn Path, target: Point2<f64>) -> (usize, f64) {
     let seen = |azimuth: usize| {
         let time_s = (250_000 * azimuth as i64 / AZIMUTHS as i64) as f64 * 1e-6;
         let local = path.pose(time_s).inverse_transform_point(&target);
-        let off = (-local.y).atan2(local.x) - azimuth_rad(azimuth);
+        let off = (-local.y).atan2(local.x) - sampling().azimuth_rad(azimuth);
         (off - TAU * (off / TAU).round(), local.coords.norm())
     };
     let azimuth = (0..AZIMUTHS)
@@ -149,14 +116,7 @@ fn point_appears_where_the_moving_sensor_passed_it() {
             (60.0, -20.0),
             (3.0, 90.0),
         ] {
-            let scan = sweep(
-                Body {
-                    scatterers: vec![point(x, y)],
-                    walls: vec![],
-                },
-                &motion,
-                0.0,
-            );
+            let scan = sweep(point(x, y), &motion, 0.0);
             let (azimuth, bin, _) = brightest(&scan);
             let (wanted, range_m) = expected(&motion, Point2::new(x, y));
             let apart = (azimuth as i64 - wanted as i64).rem_euclid(AZIMUTHS as i64);
@@ -175,14 +135,7 @@ fn point_appears_where_the_moving_sensor_passed_it() {
 
 #[test]
 fn point_to_the_right_lies_at_a_quarter_turn() {
-    let scan = sweep(
-        Body {
-            scatterers: vec![point(0.0, -20.0)],
-            walls: vec![],
-        },
-        &Twist::default(),
-        0.0,
-    );
+    let scan = sweep(point(0.0, -20.0), &Twist::default(), 0.0);
     let (azimuth, _, _) = brightest(&scan);
     assert!(
         (99..=100).contains(&azimuth),
@@ -198,17 +151,7 @@ fn closing_speed_shortens_the_range_ahead_and_lengthens_it_behind() {
         yaw_rate_radps: 0.0,
     };
     for (x, sign) in [(30.0, -1.0), (-30.0, 1.0)] {
-        let at = |shift: f64| {
-            brightest(&sweep(
-                Body {
-                    scatterers: vec![point(x, 6.0)],
-                    walls: vec![],
-                },
-                &motion,
-                shift,
-            ))
-            .1
-        };
+        let at = |shift: f64| brightest(&sweep(point(x, 6.0), &motion, shift)).1;
         let moved_m = (at(0.049) - at(0.0)) * sampling().range_resolution_m;
         assert!((moved_m - sign * 0.48).abs() < 0.06, "{x}: {moved_m} m");
     }
@@ -216,18 +159,12 @@ fn closing_speed_shortens_the_range_ahead_and_lengthens_it_behind() {
 
 #[test]
 fn wall_attenuates_what_is_behind_it_and_nothing_in_front() {
-    let wall = |x: f64| Wall {
-        from: Point2::new(x, -5.0),
-        to: Point2::new(x, 5.0),
-        transmission: 0.01,
-        mirror: 0.0,
-        body: 1,
-    };
+    let wall = |x: f64| Wall::rough(Point2::new(x, -5.0), Point2::new(x, 5.0), 0.01, 1);
     let power = |walls: Vec<Wall>| {
         let scan = sweep(
             Body {
-                scatterers: vec![point(30.0, 0.0)],
                 walls,
+                ..point(30.0, 0.0)
             },
             &Twist::default(),
             0.0,
@@ -235,7 +172,7 @@ fn wall_attenuates_what_is_behind_it_and_nothing_in_front() {
         let bin = sampling().bin(30.0) as usize;
         [0, 399]
             .into_iter()
-            .flat_map(|azimuth| row(&scan, azimuth)[bin - 5..bin + 6].to_vec())
+            .flat_map(|azimuth| scan.view().row(azimuth)[bin - 5..bin + 6].to_vec())
             .max()
             .unwrap()
     };
@@ -250,12 +187,12 @@ fn wall_attenuates_what_is_behind_it_and_nothing_in_front() {
 fn empty_world_gives_noise_and_ringing_only() {
     let scan = sweep(Body::default(), &Twist::default(), 0.0);
     let far = (0..AZIMUTHS)
-        .flat_map(|azimuth| &row(&scan, azimuth)[2800..])
+        .flat_map(|azimuth| &scan.view().row(azimuth)[2800..])
         .map(|&power| f64::from(power));
     let mean = far.clone().sum::<f64>() / far.clone().count() as f64;
     assert!((3.0..8.0).contains(&mean), "mean {mean}");
     assert!(far.fold(0.0, f64::max) < 40.0);
-    let ringing = row(&scan, 0)[..30]
+    let ringing = scan.view().row(0)[..30]
         .iter()
         .map(|&power| f64::from(power))
         .sum::<f64>()

@@ -137,12 +137,7 @@ fn draw_panel(
     time_s: Range<f64>,
     with_time_axis: bool,
 ) -> Result<(), PlotError> {
-    let mut builder = ChartBuilder::on(area);
-    builder
-        .margin_left(px(20.0))
-        .margin_right(px(20.0))
-        .margin_bottom(px(16.0))
-        .set_label_area_size(LabelAreaPosition::Left, px(84.0));
+    let mut builder = within_margins(area, 16.0);
     if with_time_axis {
         builder.set_label_area_size(LabelAreaPosition::Bottom, px(f64::from(TIME_AXIS)));
     }
@@ -152,43 +147,15 @@ fn draw_panel(
     for chain in &panel.chains {
         chart.draw_series([band(chain)]).map_err(drawing)?;
     }
-    draw_mesh(&mut chart, panel.y_desc, with_time_axis)?;
-    chart
-        .draw_series(LineSeries::new(
-            [(time_s.start, 0.0), (time_s.end, 0.0)],
-            line(TRUTH, 1.0),
-        ))
-        .map_err(drawing)?;
+    let x_desc = with_time_axis.then_some("time (s)");
+    axes(&mut chart, [10, 5], x_desc, panel.y_desc)?;
+    let ends = [(time_s.start, 0.0), (time_s.end, 0.0)];
+    curve(&mut chart, ends, line(TRUTH, 1.0))?;
     for chain in &panel.chains {
         let errors = chain.iter().map(|p| (p.time_s, p.error));
-        chart
-            .draw_series(LineSeries::new(errors, line(ESTIMATE, 2.0)))
-            .map_err(drawing)?;
+        curve(&mut chart, errors, line(ESTIMATE, 2.0))?;
     }
     Ok(())
-}
-
-fn draw_mesh(
-    chart: &mut Chart<'_, '_>,
-    y_desc: &str,
-    with_time_axis: bool,
-) -> Result<(), PlotError> {
-    let mut mesh = chart.configure_mesh();
-    mesh.max_light_lines(0)
-        .bold_line_style(line(GRID, 1.0))
-        .axis_style(line(QUIET, 1.0))
-        .set_all_tick_mark_size(px(5.0))
-        .x_label_formatter(&number)
-        .y_label_formatter(&number)
-        .x_labels(10)
-        .y_labels(5)
-        .label_style(font(14.0, INK))
-        .axis_desc_style(font(15.0, INK))
-        .y_desc(y_desc);
-    if with_time_axis {
-        mesh.x_desc("time (s)");
-    }
-    mesh.draw().map_err(drawing)
 }
 
 /// Returns the area between both limits.

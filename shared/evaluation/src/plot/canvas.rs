@@ -65,31 +65,67 @@ pub fn chart<'a, 'b>(
     y: Range<f64>,
     [x_desc, y_desc]: [&str; 2],
 ) -> Result<Chart<'a, 'b>, PlotError> {
-    let mut chart = ChartBuilder::on(area)
-        .margin_left(px(20.0))
-        .margin_right(px(20.0))
-        .margin_bottom(px(16.0))
-        .set_label_area_size(LabelAreaPosition::Left, px(84.0))
+    let mut chart = within_margins(area, 16.0)
         .set_label_area_size(LabelAreaPosition::Bottom, px(46.0))
         .build_cartesian_2d(x, y)
         .map_err(drawing)?;
-    chart
-        .configure_mesh()
-        .max_light_lines(0)
+    axes(&mut chart, [10, 5], Some(x_desc), y_desc)?;
+    Ok(chart)
+}
+
+/// Returns a diagram to be built with margins, `bottom` px the lowest, and labels on the left.
+pub fn within_margins<'a, 'b>(
+    area: &'a Area<'b>,
+    bottom: f64,
+) -> ChartBuilder<'a, 'b, SVGBackend<'b>> {
+    let mut builder = ChartBuilder::on(area);
+    builder
+        .margin_left(px(20.0))
+        .margin_right(px(20.0))
+        .margin_bottom(px(bottom))
+        .set_label_area_size(LabelAreaPosition::Left, px(84.0));
+    builder
+}
+
+/// Draws the grid and both axes with about so many ticks, and their descriptions.
+///
+/// # Errors
+/// [`PlotError::Draw`].
+pub fn axes(
+    chart: &mut Chart<'_, '_>,
+    [x_ticks, y_ticks]: [usize; 2],
+    x_desc: Option<&str>,
+    y_desc: &str,
+) -> Result<(), PlotError> {
+    let mut mesh = chart.configure_mesh();
+    mesh.max_light_lines(0)
         .bold_line_style(line(GRID, 1.0))
         .axis_style(line(QUIET, 1.0))
         .set_all_tick_mark_size(px(5.0))
         .x_label_formatter(&number)
         .y_label_formatter(&number)
-        .x_labels(10)
-        .y_labels(5)
+        .x_labels(x_ticks)
+        .y_labels(y_ticks)
         .label_style(font(14.0, INK))
         .axis_desc_style(font(15.0, INK))
-        .x_desc(x_desc)
-        .y_desc(y_desc)
-        .draw()
-        .map_err(drawing)?;
-    Ok(chart)
+        .y_desc(y_desc);
+    if let Some(x_desc) = x_desc {
+        mesh.x_desc(x_desc);
+    }
+    mesh.draw().map_err(drawing)
+}
+
+/// Draws a line through points.
+///
+/// # Errors
+/// [`PlotError::Draw`].
+pub fn curve(
+    chart: &mut Chart<'_, '_>,
+    points: impl IntoIterator<Item = (f64, f64)>,
+    style: ShapeStyle,
+) -> Result<(), PlotError> {
+    let series = LineSeries::new(points, style);
+    chart.draw_series(series).map(drop).map_err(drawing)
 }
 
 /// Returns a white document of `size` px with what `draw` draws.

@@ -143,12 +143,8 @@ fn draw_panel(area: &Area<'_>, panel: &Panel) -> Result<(), PlotError> {
             ))
             .map_err(drawing)?;
     }
-    chart
-        .draw_series(LineSeries::new(
-            panel.values.iter().copied(),
-            line(ESTIMATE, 2.0),
-        ))
-        .map_err(drawing)?;
+    let values = panel.values.iter().copied();
+    curve(&mut chart, values, line(ESTIMATE, 2.0))?;
     // Dots as long as they do not overlap.
     if panel.values.len() <= 60 {
         let dot = |&at: &(f64, f64)| Circle::new(at, px(4.0), ESTIMATE.filled());

@@ -161,43 +161,18 @@ impl View {
 
 fn draw(area: &Area<'_>, scene: &Scene, view: &View) -> Result<(), PlotError> {
     let below_header = area.split_vertically(px(f64::from(HEADER))).1;
-    let mut chart = ChartBuilder::on(&below_header)
-        .margin_left(px(f64::from(MARGIN)))
-        .margin_right(px(f64::from(MARGIN)))
-        .margin_bottom(px(f64::from(MARGIN)))
-        .set_label_area_size(LabelAreaPosition::Left, px(f64::from(LEFT)))
+    let mut chart = within_margins(&below_header, f64::from(MARGIN))
         .set_label_area_size(LabelAreaPosition::Bottom, px(f64::from(BELOW)))
         .build_cartesian_2d(view.x_m.0..view.x_m.1, view.y_m.0..view.y_m.1)
         .map_err(drawing)?;
     // One tick in about 90 px on both axes.
-    let ticks = |px: u32| (px / 90).max(2) as usize;
-    chart
-        .configure_mesh()
-        .max_light_lines(0)
-        .bold_line_style(line(GRID, 1.0))
-        .axis_style(line(QUIET, 1.0))
-        .set_all_tick_mark_size(px(5.0))
-        .x_labels(ticks(view.width_px))
-        .y_labels(ticks(view.height_px))
-        .x_label_formatter(&number)
-        .y_label_formatter(&number)
-        .label_style(font(14.0, INK))
-        .axis_desc_style(font(15.0, INK))
-        .x_desc("x (m)")
-        .y_desc("y (m)")
-        .draw()
-        .map_err(drawing)?;
+    let ticks = [view.width_px, view.height_px].map(|px| (px / 90).max(2) as usize);
+    axes(&mut chart, ticks, Some("x (m)"), "y (m)")?;
     if let Some(truth) = &scene.truth {
-        chart
-            .draw_series(LineSeries::new(truth.iter().copied(), line(TRUTH, 4.0)))
-            .map_err(drawing)?;
+        curve(&mut chart, truth.iter().copied(), line(TRUTH, 4.0))?;
     }
-    chart
-        .draw_series(LineSeries::new(
-            scene.estimate.iter().copied(),
-            line(ESTIMATE, 2.0),
-        ))
-        .map_err(drawing)?;
+    let estimate = scene.estimate.iter().copied();
+    curve(&mut chart, estimate, line(ESTIMATE, 2.0))?;
     if let Some(&start) = scene.estimate.first() {
         chart.draw_series([dot(start)]).map_err(drawing)?;
     }

@@ -84,43 +84,19 @@ impl PointsConfig {
                 bounds,
             }),
         };
-        setting(
-            (0.0..=45.0).contains(&self.beam_deg),
-            "beam_deg",
-            self.beam_deg,
-            "0 to 45",
-        )?;
-        setting(
-            (1e-3..=10.0).contains(&self.range_cell_m),
-            "range_cell_m",
-            self.range_cell_m,
-            "0.001 to 10",
-        )?;
-        setting(
-            (0.0..=1e4).contains(&self.min_range_m),
-            "min_range_m",
-            self.min_range_m,
-            "0 to 10000",
-        )?;
-        let beyond = self.max_range_m > self.min_range_m && self.max_range_m <= 1e4;
-        setting(
-            beyond,
-            "max_range_m",
-            self.max_range_m,
-            "more than min_range_m, at most 10000",
-        )?;
-        setting(
-            (1.0..=255.0).contains(&self.weight_cap),
-            "weight_cap",
-            self.weight_cap,
-            "1 to 255",
-        )?;
-        setting(
-            self.capacity <= MAX_POINTS,
-            "capacity",
-            self.capacity as f32,
-            "at most 65536",
-        )
+        let fits = (0.0..=45.0).contains(&self.beam_deg);
+        setting(fits, "beam_deg", self.beam_deg, "0 to 45")?;
+        let fits = (1e-3..=10.0).contains(&self.range_cell_m);
+        setting(fits, "range_cell_m", self.range_cell_m, "0.001 to 10")?;
+        let fits = (0.0..=1e4).contains(&self.min_range_m);
+        setting(fits, "min_range_m", self.min_range_m, "0 to 10000")?;
+        let fits = self.max_range_m > self.min_range_m && self.max_range_m <= 1e4;
+        let bounds = "more than min_range_m, at most 10000";
+        setting(fits, "max_range_m", self.max_range_m, bounds)?;
+        let fits = (1.0..=255.0).contains(&self.weight_cap);
+        setting(fits, "weight_cap", self.weight_cap, "1 to 255")?;
+        let fits = self.capacity <= MAX_POINTS;
+        setting(fits, "capacity", self.capacity as f32, "at most 65536")
     }
 }
 

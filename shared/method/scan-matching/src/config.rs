@@ -1,6 +1,8 @@
 //! Configuration of the searches. Every key has a default; an error names the key of an invalid
 //! value.
 
+use std::ops::RangeInclusive;
+
 use serde::{Deserialize, Serialize};
 
 /// An invalid value of a search.
@@ -217,47 +219,23 @@ impl RotationConfig {
     /// # Errors
     /// The first key that is out of its bounds.
     pub fn validate(&self) -> Result<(), ConfigError> {
-        let check = |good, key, actual: &dyn ToString, expected| {
-            accept(good, "rotation", key, actual, expected)
-        };
-        check(
+        let section = Section("rotation");
+        section.require(
             self.band_low >= 0.0 && self.band_low < self.band_high,
             "band_low",
             &self.band_low,
             "at least 0 and below band_high",
         )?;
-        check(
-            self.band_high < 0.5,
-            "band_high",
-            &self.band_high,
-            "cycles per cell, below 0.5",
-        )?;
-        check(
-            (16..=1 << 14).contains(&self.angles),
-            "angles",
-            &self.angles,
-            "16 to 16384",
-        )?;
+        let fits = self.band_high < 0.5;
+        let bounds = "cycles per cell, below 0.5";
+        section.require(fits, "band_high", &self.band_high, bounds)?;
+        section.within("angles", self.angles, 16..=1 << 14, "16 to 16384")?;
         let radii = self.radii.unwrap_or(2);
-        check((2..=1 << 13).contains(&radii), "radii", &radii, "2 to 8192")?;
-        check(
-            self.reach_deg > 0.0 && self.reach_deg <= 90.0,
-            "reach_deg",
-            &self.reach_deg,
-            "above 0, at most 90",
-        )?;
-        check(
-            positive(self.variance_scale),
-            "variance_scale",
-            &self.variance_scale,
-            "a positive number",
-        )?;
-        check(
-            self.peak.is_valid(),
-            "peak.soft_argmax.temperature",
-            &self.peak.temperature(),
-            "a positive number",
-        )
+        section.within("radii", radii, 2..=1 << 13, "2 to 8192")?;
+        let fits = self.reach_deg > 0.0 && self.reach_deg <= 90.0;
+        section.require(fits, "reach_deg", &self.reach_deg, "above 0, at most 90")?;
+        section.positive("variance_scale", self.variance_scale)?;
+        section.positive("peak.soft_argmax.temperature", self.peak.temperature())
     }
 }
 
@@ -284,27 +262,11 @@ impl TranslationConfig {
     /// # Errors
     /// The first key that is out of its bounds.
     pub fn validate(&self) -> Result<(), ConfigError> {
-        let check = |good, key, actual: &dyn ToString, expected| {
-            accept(good, "translation", key, actual, expected)
-        };
-        check(
-            positive(self.reach_m),
-            "reach_m",
-            &self.reach_m,
-            "metres, above 0",
-        )?;
-        check(
-            positive(self.variance_scale),
-            "variance_scale",
-            &self.variance_scale,
-            "a positive number",
-        )?;
-        check(
-            self.peak.is_valid(),
-            "peak.soft_argmax.temperature",
-            &self.peak.temperature(),
-            "a positive number",
-        )
+        let section = Section("translation");
+        let fits = positive(self.reach_m);
+        section.require(fits, "reach_m", &self.reach_m, "metres, above 0")?;
+        section.positive("variance_scale", self.variance_scale)?;
+        section.positive("peak.soft_argmax.temperature", self.peak.temperature())
     }
 }
 
@@ -316,33 +278,50 @@ impl Peak {
             _ => 1.0,
         }
     }
-
-    fn is_valid(&self) -> bool {
-        positive(self.temperature())
-    }
 }
 
 pub(crate) fn positive(value: f64) -> bool {
     value.is_finite() && value > 0.0
 }
 
-/// Rejects `actual` unless it is `good`.
-pub(crate) fn accept(
-    good: bool,
-    section: &'static str,
-    key: &'static str,
-    actual: &dyn ToString,
-    expected: &'static str,
-) -> Result<(), ConfigError> {
-    if good {
-        Ok(())
-    } else {
-        Err(ConfigError {
-            section,
-            key,
-            actual: actual.to_string(),
-            expected,
-        })
+/// A section of a configuration, whose keys are checked.
+#[derive(Clone, Copy)]
+pub(crate) struct Section(pub &'static str);
+
+impl Section {
+    /// Rejects `actual` unless it `fits`.
+    pub fn require(
+        self,
+        fits: bool,
+        key: &'static str,
+        actual: &dyn ToString,
+        expected: &'static str,
+    ) -> Result<(), ConfigError> {
+        match fits {
+            true => Ok(()),
+            false => Err(ConfigError {
+                section: self.0,
+                key,
+                actual: actual.to_string(),
+                expected,
+            }),
+        }
+    }
+
+    /// Rejects a value that is not within bounds, which `expected` names.
+    pub fn within<T: PartialOrd + ToString>(
+        self,
+        key: &'static str,
+        value: T,
+        bounds: RangeInclusive<T>,
+        expected: &'static str,
+    ) -> Result<(), ConfigError> {
+        self.require(bounds.contains(&value), key, &value, expected)
+    }
+
+    /// Rejects what is not a positive number.
+    pub fn positive(self, key: &'static str, value: f64) -> Result<(), ConfigError> {
+        self.require(positive(value), key, &value, "a positive number")
     }
 }
 

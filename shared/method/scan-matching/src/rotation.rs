@@ -8,10 +8,11 @@ use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 use rustfft::num_complex::Complex32;
 use serde::{Deserialize, Serialize};
 
-use crate::config::{ConfigError, Peak, RotationConfig, RotationForm, accept};
+use crate::config::{ConfigError, Peak, RotationConfig, RotationForm};
 use crate::fft::{RealLines, RealSpectrum, fast_size};
 use crate::peak::{line_peak, soft_argmax};
 use crate::polar::PolarGrid;
+use crate::scores::check_side;
 use crate::spectrum::PolarSpectrum;
 use crate::whiten::Whitening;
 use crate::{ShapeError, cells, kernels, taper};
@@ -74,13 +75,7 @@ impl RotationSearch {
     /// a side.
     pub fn new(n: usize, config: &RotationConfig) -> Result<Self, ConfigError> {
         config.validate()?;
-        accept(
-            (16..=8192).contains(&n),
-            "raster",
-            "n",
-            &n,
-            "16 to 8192 cells a side",
-        )?;
+        check_side(n)?;
         let size = fast_size(n);
         let (angles, harmonics) = (config.angles, config.angles / 2 + 1);
         let grid = PolarGrid::new(n, size, config);

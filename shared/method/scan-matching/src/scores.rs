@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::Vector2;
 
-use crate::config::{ConfigError, Overlap, Peak, accept};
+use crate::config::{ConfigError, Overlap, Peak, Section, positive};
 use crate::kernels::{self, MIN_SHARE};
 use crate::overlap::OverlapEnergy;
 use crate::peak::{PlanePeak, SUPPORT, plane_peak, soft_argmax};
@@ -157,22 +157,15 @@ impl Scores {
     }
 }
 
+/// Checks the side of rasters of `n` x `n` cells.
+pub(crate) fn check_side(n: usize) -> Result<(), ConfigError> {
+    Section("raster").within("n", n, 16..=8192, "16 to 8192 cells a side")
+}
+
 /// Checks the size of rasters of `n` x `n` cells of `cell_m` metres.
 pub(crate) fn check_raster(n: usize, cell_m: f64) -> Result<(), ConfigError> {
-    accept(
-        (16..=8192).contains(&n),
-        "raster",
-        "n",
-        &n,
-        "16 to 8192 cells a side",
-    )?;
-    accept(
-        cell_m.is_finite() && cell_m > 0.0,
-        "raster",
-        "cell_m",
-        &cell_m,
-        "metres, above 0",
-    )
+    check_side(n)?;
+    Section("raster").require(positive(cell_m), "cell_m", &cell_m, "metres, above 0")
 }
 
 /// The largest shift of a search over rasters of `n` x `n` cells of `cell_m` metres, cells.
@@ -185,13 +178,8 @@ pub(crate) fn reach_cells(
     check_raster(n, cell_m)?;
     let reach = (reach_m / cell_m + 1e-9).floor();
     let fits = reach >= 1.0 && reach <= (n / 2 - SUPPORT) as f64;
-    accept(
-        fits,
-        section,
-        "reach_m",
-        &reach_m,
-        "at least one cell, less than half the raster",
-    )?;
+    let bounds = "at least one cell, less than half the raster";
+    Section(section).require(fits, "reach_m", &reach_m, bounds)?;
     Ok(reach as usize)
 }
 

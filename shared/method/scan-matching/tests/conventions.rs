@@ -1,6 +1,6 @@
 //! Signs and frames, pinned by three points and no transform, and by single scatterers.
 
-use crate::common::{Motion, draw, search};
+use crate::common::{Motion, draw, scene_aside, search};
 use gyre_scan_matching::{RotationMatch, TranslationConfig, TranslationSearch};
 use ndarray::Array2;
 
@@ -118,11 +118,7 @@ fn scatterers_do_not_wrap_around_the_edges() {
 fn the_scene_behind_the_lever_moves_with_the_angle() {
     // All structure 20 m ahead: an angle that is wrong by e moves it to the side, and the shift
     // compensates.
-    let scene: Vec<_> = crate::common::scatterers(40, 6.0, 3)
-        .iter()
-        .map(|&([x, y], s)| ([x + 15.0, y + 4.0], s))
-        .collect();
-    let raster = draw(scene.iter().copied(), N, CELL_M, 1.2);
+    let raster = draw(scene_aside().into_iter(), N, CELL_M, 1.2);
     let mut translation = TranslationSearch::new(N, CELL_M, &TranslationConfig::default()).unwrap();
     let mut at = |e: f64| {
         translation

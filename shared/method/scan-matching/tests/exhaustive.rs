@@ -1,6 +1,6 @@
 //! The exhaustive search against direct sums and known motions, and the inputs that it rejects.
 
-use crate::common::{Motion, Numbers, draw, pair};
+use crate::common::{Motion, Numbers, draw, pair, scene_aside};
 use gyre_scan_matching::{ExhaustiveConfig, ExhaustiveSearch, JointMatch, Overlap, Peak};
 use ndarray::{Array2, ArrayView2};
 use proptest::prelude::*;
@@ -260,11 +260,7 @@ fn an_angle_at_the_end_of_the_grid_is_uncertain() {
 #[test]
 fn the_covariance_couples_shift_and_angle_by_the_lever() {
     // All structure 15 m ahead and 4 m to the left: x and y follow the angle by -J centre.
-    let scene: Vec<_> = crate::common::scatterers(40, 6.0, 3)
-        .iter()
-        .map(|&([x, y], s)| ([x + 15.0, y + 4.0], s))
-        .collect();
-    let raster = draw(scene.iter().copied(), 101, 0.5, 1.2);
+    let raster = draw(scene_aside().into_iter(), 101, 0.5, 1.2);
     let covariance = search(101, 0.5, &ExhaustiveConfig::default(), &raster, &raster)
         .motion
         .covariance;
@@ -315,15 +311,7 @@ fn rasters_without_a_match_give_no_motion_and_a_wide_covariance() {
 #[test]
 fn no_value_of_a_cell_makes_a_result_that_is_not_finite() {
     let (earlier, later) = pair(65, 0.8, Motion::degrees(1.0, 0.0, 2.0), 1);
-    for bad in [
-        f32::NAN,
-        f32::INFINITY,
-        f32::NEG_INFINITY,
-        f32::MAX,
-        f32::MIN,
-        1e-45,
-        -3.0,
-    ] {
+    for bad in crate::common::BAD_VALUES {
         for count in [1, 7, 65 * 65] {
             let mut raster = later.clone();
             raster

@@ -27,15 +27,7 @@ fn empty_rasters_give_no_motion_and_a_wide_covariance() {
 #[test]
 fn no_value_of_a_cell_makes_a_result_that_is_not_finite() {
     let (earlier, later) = pair(N, CELL_M, Motion::degrees(1.0, 0.0, 2.0), 1);
-    for bad in [
-        f32::NAN,
-        f32::INFINITY,
-        f32::NEG_INFINITY,
-        f32::MAX,
-        f32::MIN,
-        1e-45,
-        -3.0,
-    ] {
+    for bad in crate::common::BAD_VALUES {
         for count in [1, 7, N * N] {
             let mut raster = later.clone();
             raster
@@ -113,45 +105,18 @@ fn rasters_of_another_shape_or_layout_are_rejected() {
 
 #[test]
 fn impossible_configurations_name_the_key() {
-    let rotation =
-        |config: RotationConfig| RotationSearch::new(N, &config).err().unwrap().to_string();
-    let default = RotationConfig::default;
-    assert!(
-        rotation(RotationConfig {
-            band_high: 0.5,
-            ..default()
-        })
-        .starts_with("rotation.band_high = 0.5: expected")
-    );
-    assert!(
-        rotation(RotationConfig {
-            band_low: f64::NAN,
-            ..default()
-        })
-        .contains("band_low")
-    );
-    assert!(
-        rotation(RotationConfig {
-            reach_deg: 91.0,
-            ..default()
-        })
-        .contains("reach_deg")
-    );
-    assert!(
-        rotation(RotationConfig {
-            angles: 0,
-            ..default()
-        })
-        .contains("angles")
-    );
-    let cold = Peak::SoftArgmax { temperature: 0.0 };
-    assert!(
-        rotation(RotationConfig {
-            peak: cold,
-            ..default()
-        })
-        .contains("temperature")
-    );
+    let refused = |change: fn(&mut RotationConfig)| {
+        let mut config = RotationConfig::default();
+        change(&mut config);
+        RotationSearch::new(N, &config).err().unwrap().to_string()
+    };
+    let band_high = refused(|c| c.band_high = 0.5);
+    assert!(band_high.starts_with("rotation.band_high = 0.5: expected"));
+    assert!(refused(|c| c.band_low = f64::NAN).contains("band_low"));
+    assert!(refused(|c| c.reach_deg = 91.0).contains("reach_deg"));
+    assert!(refused(|c| c.angles = 0).contains("angles"));
+    let cold = refused(|c| c.peak = Peak::SoftArgmax { temperature: 0.0 });
+    assert!(cold.contains("temperature"));
     let far = TranslationConfig {
         reach_m: 30.0,
         ..TranslationConfig::default()

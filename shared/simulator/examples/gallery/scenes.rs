@@ -13,12 +13,7 @@ use rand_chacha::ChaCha8Rng;
 
 /// A scatterer that reflects in all directions.
 pub fn post(x: f64, y: f64, cross_section_m2: f64) -> Scatterer {
-    Scatterer {
-        position: Point2::new(x, y),
-        cross_section_m2,
-        aspect: Aspect::AllRound,
-        body: NO_BODY,
-    }
+    Scatterer::all_round(Point2::new(x, y), cross_section_m2, NO_BODY)
 }
 
 /// Posts at ranges and azimuths (clockwise from ahead, radians).
@@ -30,10 +25,7 @@ pub fn posts_at(places: impl IntoIterator<Item = (f64, f64)>, cross_section_m2: 
             cross_section_m2,
         )
     });
-    Body {
-        scatterers: posts.collect(),
-        walls: vec![],
-    }
+    Body::of(posts.collect())
 }
 
 /// A square lattice of posts around the sensor.
@@ -44,10 +36,7 @@ pub fn lattice(spacing_m: f64, half_m: f64, cross_section_m2: f64) -> Body {
     let posts = places
         .filter(|place| *place != (0.0, 0.0))
         .map(|(i, j)| post(i * spacing_m, j * spacing_m, cross_section_m2));
-    Body {
-        scatterers: posts.collect(),
-        walls: vec![],
-    }
+    Body::of(posts.collect())
 }
 
 /// A rough wall between two points, with many scatterers in each resolution cell.
@@ -59,10 +48,7 @@ pub fn rough_wall(from: (f64, f64), to: (f64, f64), m2_per_m: f64) -> Body {
     let scatterers = (0..count)
         .map(|i| post(place(i).x, place(i).y, cross_section_m2))
         .collect();
-    Body {
-        scatterers,
-        walls: vec![],
-    }
+    Body::of(scatterers)
 }
 
 /// The four sides of a courtyard around the sensor.
@@ -171,10 +157,7 @@ impl Passing {
             .flat_map(|x| [post(x, 0.9, 1.0), post(x, -0.9, 1.0)])
             .collect();
         Self {
-            car: Body {
-                scatterers,
-                walls: vec![],
-            },
+            car: Body::of(scatterers),
             speed_mps,
         }
     }

@@ -118,10 +118,7 @@ fn scintillation() -> Exhibit {
     // Of nearly equal power.
     let post = |y: f64| scenes::post(8.75, y, 0.02 * y * y);
     let posts = [6.0, 10.0, 14.0, 18.0, 22.0].map(post).to_vec();
-    let body = Body {
-        scatterers: posts,
-        walls: vec![],
-    };
+    let body = Body::of(posts);
     let shot = Shot::drawn(body).driving(0.5, 0.0);
     Exhibit::off_and_on("Scintillation", |on| {
         let shot = shot.with_effects(|effects| effects.scintillation = on);

@@ -10,7 +10,6 @@ use crate::body::{Movers, Wall};
 use crate::drive::DriveConfig;
 use crate::path::TownDrive;
 use crate::town::TownConfig;
-use crate::traffic::TrafficConfig;
 
 /// Writes a drive of some 80 s and the way back in the other lane: `out.tum`, `back.tum`.
 fn trajectories(folder: &FilePath) -> Vec<PathBuf> {
@@ -56,6 +55,13 @@ fn through(files: &[PathBuf], driven: usize) -> SimulationConfig {
     }
 }
 
+/// A simulator of the default configuration with changes.
+fn with(change: impl FnOnce(&mut SimulationConfig)) -> Simulator {
+    let mut config = SimulationConfig::default();
+    change(&mut config);
+    Simulator::new(&config).unwrap()
+}
+
 /// The ends of the walls that let a share of power within a range pass.
 fn walls(
     simulator: &Simulator,
@@ -91,16 +97,12 @@ fn others(simulator: &Simulator) -> Vec<Point2<f64>> {
 fn two_drives_with_one_town_seed_pass_the_same_buildings_in_other_traffic() {
     let folder = tempfile::tempdir().unwrap();
     let files = trajectories(folder.path());
-    let out = Simulator::new(&SimulationConfig {
-        seed: 1,
-        ..through(&files, 0)
-    })
-    .unwrap();
-    let back = Simulator::new(&SimulationConfig {
-        seed: 2,
-        ..through(&files, 1)
-    })
-    .unwrap();
+    let driven = |seed, driven, town_seed| {
+        let mut config = through(&files, driven);
+        (config.seed, config.town.seed) = (seed, Some(town_seed));
+        Simulator::new(&config).unwrap()
+    };
+    let (out, back) = (driven(1, 0, 5), driven(2, 1, 5));
     assert!(buildings(&out).len() > 500, "{}", buildings(&out).len());
     assert_eq!(buildings(&out), buildings(&back));
     assert_eq!(out.world.scatterers(), back.world.scatterers());
@@ -119,57 +121,24 @@ fn two_drives_with_one_town_seed_pass_the_same_buildings_in_other_traffic() {
         "the world begins with the first file"
     );
 
-    let elsewhere = through(&files, 0);
-    let elsewhere = SimulationConfig {
-        town: TownConfig {
-            seed: Some(6),
-            ..elsewhere.town.clone()
-        },
-        ..elsewhere
-    };
-    assert_ne!(
-        buildings(&Simulator::new(&elsewhere).unwrap()),
-        buildings(&out)
-    );
+    assert_ne!(buildings(&driven(1, 0, 6)), buildings(&out));
 }
 
 #[test]
 fn the_seed_of_the_town_is_that_of_the_simulation_unless_given() {
-    let seeded = |seed, town_seed| {
-        let town = TownConfig {
-            seed: town_seed,
-            ..TownConfig::default()
-        };
-        Simulator::new(&SimulationConfig {
-            seed,
-            town,
-            ..SimulationConfig::default()
-        })
-        .unwrap()
+    let town = |seed, town_seed| {
+        let simulator = with(|c| (c.seed, c.town.seed) = (seed, town_seed));
+        simulator.world.scatterers().to_vec()
     };
-    let town = |seed, town_seed| seeded(seed, town_seed).world.scatterers().to_vec();
     assert_eq!(town(3, None), town(4, Some(3)));
     assert_ne!(town(3, None), town(4, None));
 }
 
 #[test]
 fn seeds_of_traffic_and_noise_are_apart() {
-    let config = |traffic, sensor| {
-        let mut config = SimulationConfig {
-            traffic: TrafficConfig {
-                seed: traffic,
-                ..TrafficConfig::default()
-            },
-            ..SimulationConfig::default()
-        };
-        config.sensor.seed = sensor;
-        Simulator::new(&config).unwrap()
-    };
-    let (usual, traffic, noise) = (
-        config(None, None),
-        config(Some(9), None),
-        config(None, Some(9)),
-    );
+    let usual = with(|_| ());
+    let traffic = with(|c| c.traffic.seed = Some(9));
+    let noise = with(|c| c.sensor.seed = Some(9));
     assert_ne!(others(&usual), others(&traffic));
     assert_eq!(others(&usual), others(&noise));
     assert_ne!(
@@ -181,19 +150,10 @@ fn seeds_of_traffic_and_noise_are_apart() {
 
 #[test]
 fn parked_cars_and_building_sites_change_and_all_else_stays() {
-    let with = |changes_seed, building_sites| {
-        let town = TownConfig {
-            changes_seed,
-            building_sites,
-            ..TownConfig::default()
-        };
-        Simulator::new(&SimulationConfig {
-            town,
-            ..SimulationConfig::default()
-        })
-        .unwrap()
+    let changed = |changes_seed, building_sites| {
+        with(|c| (c.town.changes_seed, c.town.building_sites) = (changes_seed, building_sites))
     };
-    let (first, second) = (with(None, 0.0), with(Some(2), 0.0));
+    let (first, second) = (changed(None, 0.0), changed(Some(2), 0.0));
     assert_eq!(buildings(&first), buildings(&second));
     let cars = [&first, &second].map(parked_cars);
     let stayed = cars[1].iter().filter(|car| cars[0].contains(car)).count();
@@ -207,7 +167,7 @@ fn parked_cars_and_building_sites_change_and_all_else_stays() {
         "{stayed} of {before} cars stand as before"
     );
 
-    let sites = with(Some(2), 0.15);
+    let sites = changed(Some(2), 0.15);
     let (all, left) = (buildings(&second), buildings(&sites));
     let houses = left.iter().filter(|wall| all.contains(wall)).count();
     let share = houses as f64 / all.len() as f64;
@@ -217,25 +177,14 @@ fn parked_cars_and_building_sites_change_and_all_else_stays() {
     );
     assert_ne!(
         left,
-        buildings(&with(Some(3), 0.15)),
+        buildings(&changed(Some(3), 0.15)),
         "other sites on the next drive"
     );
 }
 
 #[test]
 fn trees_without_leaves_reflect_less_and_hide_nothing() {
-    let with = |leaves| {
-        let town = TownConfig {
-            leaves,
-            ..TownConfig::default()
-        };
-        Simulator::new(&SimulationConfig {
-            town,
-            ..SimulationConfig::default()
-        })
-        .unwrap()
-    };
-    let (summer, winter) = (with(1.0), with(0.0));
+    let [summer, winter] = [1.0, 0.0].map(|leaves| with(|c| c.town.leaves = leaves));
     assert_eq!(buildings(&summer), buildings(&winter));
     let sum_m2 = |simulator: &Simulator| -> f64 {
         simulator
@@ -273,12 +222,7 @@ fn a_recording_ends_with_its_trajectory() {
         error.contains(&format!("ends after {} scans", whole.scans())),
         "{error}"
     );
-    assert_eq!(
-        Simulator::new(&SimulationConfig::default())
-            .unwrap()
-            .scans(),
-        ENDLESS_SCANS
-    );
+    assert_eq!(with(|_| ()).scans(), ENDLESS_SCANS);
 }
 
 #[test]

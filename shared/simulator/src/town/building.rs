@@ -43,6 +43,16 @@ pub(super) struct Building {
 const BEHIND: f64 = 0.4;
 
 impl Room {
+    /// The space with a corner at x and y, of a width and a depth, metres.
+    pub fn at([x, y]: [f64; 2], [width_m, depth_m]: [f64; 2]) -> Self {
+        Self {
+            x,
+            y,
+            width_m,
+            depth_m,
+        }
+    }
+
     /// The corners of a ground plan in this space, counter-clockwise from the front's left. `share`
     /// says where it is divided.
     fn outline(&self, form: Form, share: f64) -> Vec<Point2<f64>> {

@@ -122,12 +122,10 @@ impl Plot<'_, '_> {
             .site
             .between(9.0, 13.0)
             .min(self.depth_m - style.setback_m);
-        let room = Room {
-            x: PARTY_M,
-            y: style.setback_m,
-            width_m: self.width_m - 2.0 * PARTY_M,
-            depth_m,
-        };
+        let room = Room::at(
+            [PARTY_M, style.setback_m],
+            [self.width_m - 2.0 * PARTY_M, depth_m],
+        );
         let form = match self.site.between(0.0, 1.0) {
             ..0.6 => Form::Plain,
             ..0.75 => Form::Stepped,
@@ -145,20 +143,11 @@ impl Plot<'_, '_> {
         if self.depth_m - y < 3.0 {
             return;
         }
-        let kind = if self.site.chance(0.6) {
-            Boundary::Wall
-        } else {
-            Boundary::Fence
-        };
+        let kind = self.site.either(0.6, Boundary::Wall, Boundary::Fence);
         self.aside(kind, y);
         self.across(kind, self.depth_m - 0.3);
         if self.depth_m - y > 5.0 && self.site.chance(0.4) {
-            let room = Room {
-                x: 0.5,
-                y: self.depth_m - 3.2,
-                width_m: 2.5,
-                depth_m: 2.0,
-            };
+            let room = Room::at([0.5, self.depth_m - 3.2], [2.5, 2.0]);
             self.house(room, Form::Plain, Material::Timber, Material::Timber);
         }
         self.trees(y, 2.0);
@@ -179,18 +168,9 @@ impl Plot<'_, '_> {
         }
         let width_m = self.site.between(6.5, 10.5).min(self.width_m - 4.4);
         let depth_m = self.site.between(7.0, 10.0);
-        let form = if self.site.chance(0.5) {
-            Form::Stepped
-        } else {
-            Form::Angle
-        };
+        let form = self.site.either(0.5, Form::Stepped, Form::Angle);
         self.house(
-            Room {
-                x: 1.0,
-                y: garden_m,
-                width_m,
-                depth_m,
-            },
+            Room::at([1.0, garden_m], [width_m, depth_m]),
             form,
             Material::Brick,
             Material::Brick,
@@ -207,12 +187,7 @@ impl Plot<'_, '_> {
         let y = garden_m + self.site.between(1.0, 3.0);
         if self.site.chance(0.6) {
             self.house(
-                Room {
-                    x,
-                    y,
-                    width_m: 2.8,
-                    depth_m: 5.5,
-                },
+                Room::at([x, y], [2.8, 5.5]),
                 Form::Plain,
                 Material::Metal,
                 Material::Brick,
@@ -231,17 +206,8 @@ impl Plot<'_, '_> {
     fn flats(&mut self) {
         let setback_m = self.site.between(3.0, 7.0);
         let depth_m = self.site.between(11.0, 15.0).min(self.depth_m - setback_m);
-        let room = Room {
-            x: 1.5,
-            y: setback_m,
-            width_m: self.width_m - 3.0,
-            depth_m,
-        };
-        let form = if self.site.chance(0.5) {
-            Form::Plain
-        } else {
-            Form::Stepped
-        };
+        let room = Room::at([1.5, setback_m], [self.width_m - 3.0, depth_m]);
+        let form = self.site.either(0.5, Form::Plain, Form::Stepped);
         let (front, rest, detail) = (Material::Concrete, Material::Concrete, self.detail);
         self.site.building(&Building {
             room,
@@ -251,11 +217,7 @@ impl Plot<'_, '_> {
             detail,
             balconies_m: 3.6,
         });
-        let front = if self.site.chance(0.5) {
-            Boundary::Railing
-        } else {
-            Boundary::Hedge
-        };
+        let front = self.site.either(0.5, Boundary::Railing, Boundary::Hedge);
         self.across(front, 0.6);
         self.parking(setback_m + depth_m + 4.0);
         self.clutter(0.5, 0.02, 0.03);
@@ -264,12 +226,7 @@ impl Plot<'_, '_> {
     fn hall(&mut self) {
         let setback_m = self.site.between(4.0, (0.4 * self.depth_m).max(4.5));
         let depth_m = (self.depth_m - setback_m) * self.site.between(0.6, 0.95);
-        let room = Room {
-            x: 2.0,
-            y: setback_m,
-            width_m: self.width_m - 4.0,
-            depth_m,
-        };
+        let room = Room::at([2.0, setback_m], [self.width_m - 4.0, depth_m]);
         let form = match self.site.between(0.0, 1.0) {
             ..0.35 => Form::Plain,
             ..0.7 => Form::Angle,
@@ -288,18 +245,12 @@ impl Plot<'_, '_> {
     }
 
     fn church(&mut self) {
-        let room = Room {
-            x: 5.0,
-            y: 5.0,
-            width_m: self.width_m - 10.0,
-            depth_m: (self.depth_m - 6.0).min(34.0),
-        };
+        let room = Room::at(
+            [5.0, 5.0],
+            [self.width_m - 10.0, (self.depth_m - 6.0).min(34.0)],
+        );
         self.house(room, Form::Church, Material::Brick, Material::Brick);
-        let front = if self.site.chance(0.5) {
-            Boundary::Railing
-        } else {
-            Boundary::Wall
-        };
+        let front = self.site.either(0.5, Boundary::Railing, Boundary::Wall);
         self.across(front, 0.4);
         // Gravestones.
         self.clutter(1.0, 0.05, 0.15);
@@ -361,11 +312,7 @@ impl Plot<'_, '_> {
             _ => {}
         }
         if self.site.chance(0.4) {
-            let kind = if self.site.chance(0.6) {
-                Boundary::Hedge
-            } else {
-                Boundary::Wire
-            };
+            let kind = self.site.either(0.6, Boundary::Hedge, Boundary::Wire);
             self.aside(kind, 2.0);
         }
         let wooded = if self.site.chance(0.2) { 12.0 } else { 1.5 };
@@ -375,19 +322,9 @@ impl Plot<'_, '_> {
 
     fn farm(&mut self) {
         let wide_m = self.width_m - 20.0;
-        let house = Room {
-            x: 3.0,
-            y: 6.0,
-            width_m: 11.0,
-            depth_m: 9.0,
-        };
+        let house = Room::at([3.0, 6.0], [11.0, 9.0]);
         self.house(house, Form::Angle, Material::Brick, Material::Brick);
-        let barn = Room {
-            x: 18.0,
-            y: 9.0,
-            width_m: wide_m,
-            depth_m: (self.depth_m - 12.0).min(20.0),
-        };
+        let barn = Room::at([18.0, 9.0], [wide_m, (self.depth_m - 12.0).min(20.0)]);
         self.house(barn, Form::Plain, Material::Metal, Material::Metal);
         self.across(Boundary::Wall, 0.6);
         let place = self.at(15.0, 4.0);

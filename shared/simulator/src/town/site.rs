@@ -72,6 +72,11 @@ impl Site<'_> {
         self.rng.random_bool(share.clamp(0.0, 1.0))
     }
 
+    /// Draws one value with a probability, or else the other.
+    pub(super) fn either<T>(&mut self, probability: f64, one: T, other: T) -> T {
+        if self.chance(probability) { one } else { other }
+    }
+
     pub(super) fn between(&mut self, min: f64, max: f64) -> f64 {
         if min < max {
             self.rng.random_range(min..max)

@@ -31,12 +31,8 @@ pub(crate) fn car(body: u32, rng: &mut impl Rng) -> Body {
     for side in 0..4 {
         let (from, to) = (corners[side], corners[(side + 1) % 4]);
         let corner = spread(rng, 2.0, 4.0);
-        car.scatterers.push(Scatterer {
-            position: from,
-            cross_section_m2: corner,
-            aspect: Aspect::AllRound,
-            body,
-        });
+        car.scatterers
+            .push(Scatterer::all_round(from, corner, body));
         let direction = to - from;
         let outward = Vector2::new(-direction.y, direction.x).normalize();
         for share in random_positions(rng, 1.0, 0.1, 0.4) {
@@ -55,13 +51,8 @@ pub(crate) fn car(body: u32, rng: &mut impl Rng) -> Body {
         }
     }
     // The diagonals stand for the outline: a line through the car crosses at least one of them.
-    let diagonal = |from: Point2<f64>, to: Point2<f64>| Wall {
-        from,
-        to,
-        transmission: CAR_TRANSMISSION.sqrt(),
-        mirror: 0.0,
-        body,
-    };
+    let diagonal =
+        |from: Point2<f64>, to: Point2<f64>| Wall::rough(from, to, CAR_TRANSMISSION.sqrt(), body);
     car.walls = vec![
         diagonal(corners[0], corners[2]),
         diagonal(corners[1], corners[3]),

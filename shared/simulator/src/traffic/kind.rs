@@ -63,29 +63,17 @@ impl Kind {
     /// Draws a body of this kind around its own origin, x ahead.
     pub fn body(self, number: u32, rng: &mut ChaCha8Rng) -> Body {
         let half_m = self.half_m();
+        let on_wheels = |edge_m2, panel_m2, transmission| Shape {
+            half_m,
+            edge_m2,
+            panel_m2,
+            transmission,
+        };
         match self {
             Self::Car => town::car(number, rng),
-            Self::Van => Shape {
-                half_m,
-                edge_m2: 3.0,
-                panel_m2: 15.0,
-                transmission: 0.2,
-            }
-            .body(number, rng),
-            Self::Lorry => Shape {
-                half_m,
-                edge_m2: 6.0,
-                panel_m2: 40.0,
-                transmission: 0.05,
-            }
-            .body(number, rng),
-            Self::Bus => Shape {
-                half_m,
-                edge_m2: 5.0,
-                panel_m2: 40.0,
-                transmission: 0.05,
-            }
-            .body(number, rng),
+            Self::Van => on_wheels(3.0, 15.0, 0.2).body(number, rng),
+            Self::Lorry => on_wheels(6.0, 40.0, 0.05).body(number, rng),
+            Self::Bus => on_wheels(5.0, 40.0, 0.05).body(number, rng),
             Self::Cyclist => cloud(number, half_m, 5, 0.2, rng),
             Self::Pedestrian => cloud(number, half_m, 2, 0.1, rng),
         }
@@ -106,23 +94,14 @@ impl Shape {
         for side in 0..4 {
             let (from, to) = (corners[side], corners[(side + 1) % 4]);
             let cross_section_m2 = spread(rng, self.edge_m2, 4.0);
-            body.scatterers.push(Scatterer {
-                position: from,
-                cross_section_m2,
-                aspect: Aspect::AllRound,
-                body: number,
-            });
+            body.scatterers
+                .push(Scatterer::all_round(from, cross_section_m2, number));
             self.panels(&mut body, from, to, number, rng);
         }
         let transmission = self.transmission.sqrt();
         // A line through the outline crosses at least one diagonal, half of the lines both.
-        let diagonal = |a: usize, b: usize| Wall {
-            from: corners[a],
-            to: corners[b],
-            transmission,
-            mirror: 0.0,
-            body: number,
-        };
+        let diagonal =
+            |a: usize, b: usize| Wall::rough(corners[a], corners[b], transmission, number);
         body.walls = vec![diagonal(0, 2), diagonal(1, 3)];
         body
     }
@@ -174,12 +153,8 @@ fn cloud(
             rng.random_range(-half_m.1..half_m.1),
         );
         let cross_section_m2 = spread(rng, median_m2, 3.0);
-        body.scatterers.push(Scatterer {
-            position,
-            cross_section_m2,
-            aspect: Aspect::AllRound,
-            body: number,
-        });
+        body.scatterers
+            .push(Scatterer::all_round(position, cross_section_m2, number));
     }
     body
 }

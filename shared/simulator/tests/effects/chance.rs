@@ -4,7 +4,7 @@ use gyre_radar::OwnedScan;
 use gyre_simulator::profile::{METADATA_BYTES, Profile};
 use gyre_simulator::{Effects, SimulationConfig, Simulator};
 
-use super::scene::{Setup, only, power, powers};
+use super::scene::{Setup, changed, only, power, powers};
 
 fn k2pi(effects: Effects) -> Setup<'static> {
     Setup {
@@ -89,24 +89,13 @@ fn same_beyond_10_m(a: &OwnedScan, b: &OwnedScan) -> f64 {
 
 #[test]
 fn switching_one_effect_keeps_the_random_numbers_of_all_others() {
-    let without = [
-        Effects {
-            ringing: false,
-            ..Effects::ALL
-        },
-        Effects {
-            own_vehicle: false,
-            ..Effects::ALL
-        },
-        Effects {
-            interference: false,
-            ..Effects::ALL
-        },
-        Effects {
-            dropped_azimuths: false,
-            ..Effects::ALL
-        },
+    let switches: [fn(&mut Effects) -> &mut bool; 4] = [
+        |e| &mut e.ringing,
+        |e| &mut e.own_vehicle,
+        |e| &mut e.interference,
+        |e| &mut e.dropped_azimuths,
     ];
+    let without = switches.map(|switch| changed(Effects::ALL, switch, false));
     let simulator = |effects| {
         Simulator::new(&SimulationConfig {
             effects,

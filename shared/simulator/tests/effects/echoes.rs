@@ -65,13 +65,7 @@ fn a_wall_attenuates_by_its_transmission() {
             only(|e| &mut e.occlusion, occlusion),
         );
         let across = |x| Point2::new(x, -20.0);
-        let wall = |transmission| Wall {
-            from: across(-5.0),
-            to: across(5.0),
-            transmission,
-            mirror: 0.0,
-            body: 1,
-        };
+        let wall = |transmission| Wall::rough(across(-5.0), across(5.0), transmission, 1);
         setup.body.walls.extend(transmission.map(wall));
         peak_db(&setup.scan(), 100, setup.bins(29.0..31.0))
     };

@@ -43,13 +43,7 @@ fn an_opaque_wall_hides_the_ground_behind_it_and_not_in_front() {
             ..GROUND
         });
         let corner = |x| Point2::new(x, -8.0);
-        let wall = Wall {
-            from: corner(-20.0),
-            to: corner(20.0),
-            transmission: 1e-6,
-            mirror: 0.0,
-            body: 1,
-        };
+        let wall = Wall::rough(corner(-20.0), corner(20.0), 1e-6, 1);
         setup.body.walls.extend(walled.then_some(wall));
         setup.scan()
     };

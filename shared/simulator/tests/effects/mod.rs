@@ -8,6 +8,6 @@ mod ground;
 mod highlights;
 mod motion;
 mod noise;
-mod scene;
+pub mod scene;
 mod scintillation;
 mod weather;

@@ -78,10 +78,7 @@ impl Movers for Leaving {
 
 #[test]
 fn a_moving_object_appears_where_it_is_when_the_beam_passes() {
-    let leaving = Leaving(Body {
-        scatterers: vec![post(20.0, 100.0, 3.0)],
-        walls: vec![],
-    });
+    let leaving = Leaving(Body::of(vec![post(20.0, 100.0, 3.0)]));
     for (sweep_motion, expected_m) in [(true, [19.375, 24.375]), (false, [20.0, 25.0])] {
         let setup = Setup {
             movers: &leaving,

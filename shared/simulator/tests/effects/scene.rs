@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use gyre_geometry::Twist;
 use gyre_radar::{OwnedScan, ScanLimits};
-use gyre_simulator::body::{Aspect, NO_BODY, Scatterer};
+use gyre_simulator::body::{NO_BODY, Scatterer};
 use gyre_simulator::profile::{Profile, Receiver, Sampling};
 use gyre_simulator::weather::WeatherConfig;
 use gyre_simulator::{Body, Effects, Movers, Path, Scene, Sensor, SensorConfig, SweepTime, World};
@@ -42,10 +42,7 @@ impl Default for Setup<'_> {
 impl Setup<'_> {
     pub fn of(scatterers: Vec<Scatterer>, effects: Effects) -> Self {
         Self {
-            body: Body {
-                scatterers,
-                walls: vec![],
-            },
+            body: Body::of(scatterers),
             effects,
             ..Self::default()
         }
@@ -117,19 +114,18 @@ impl Setup<'_> {
 pub fn post(range_m: f64, azimuth: f64, cross_section_m2: f64) -> Scatterer {
     let angle = Profile::Cts350xOxford.sampling().azimuth_rad(0) + azimuth * TAU / 400.0;
     let position = Point2::new(range_m * angle.cos(), -range_m * angle.sin());
-    Scatterer {
-        position,
-        cross_section_m2,
-        aspect: Aspect::AllRound,
-        body: NO_BODY,
-    }
+    Scatterer::all_round(position, cross_section_m2, NO_BODY)
 }
 
 /// Returns this effect alone, or none.
 pub fn only(switch: fn(&mut Effects) -> &mut bool, on: bool) -> Effects {
-    let mut effects = Effects::NONE;
-    *switch(&mut effects) = on;
-    effects
+    changed(Effects::NONE, switch, on)
+}
+
+/// Returns effects with this one on or off.
+pub fn changed(mut of: Effects, switch: fn(&mut Effects) -> &mut bool, on: bool) -> Effects {
+    *switch(&mut of) = on;
+    of
 }
 
 /// Returns whether nothing is received.

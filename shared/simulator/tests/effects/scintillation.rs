@@ -2,7 +2,7 @@
 
 use gyre_geometry::Twist;
 use gyre_radar::OwnedScan;
-use gyre_simulator::body::{Aspect, NO_BODY, Scatterer};
+use gyre_simulator::body::{NO_BODY, Scatterer};
 use nalgebra::Point2;
 
 use super::scene::{Setup, only, peak_db};
@@ -13,12 +13,7 @@ const TURN_RADPS: f64 = std::f64::consts::TAU / (0.25 * SCANS as f64);
 
 /// Scans of a post that stays 20 m to the left: the radar circles around it.
 fn scans(count: u64, scintillation: bool, yaw_rate_radps: f64) -> Vec<OwnedScan> {
-    let post = Scatterer {
-        position: Point2::new(0.0, 20.0),
-        cross_section_m2: 3.0,
-        aspect: Aspect::AllRound,
-        body: NO_BODY,
-    };
+    let post = Scatterer::all_round(Point2::new(0.0, 20.0), 3.0, NO_BODY);
     let round = Twist {
         vx_mps: 20.0 * yaw_rate_radps,
         vy_mps: 0.0,

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use gyre_radar::{AzimuthSource, DatasetOptions, Format, OpenError, open};
 
-use super::{first_scan, folder, opened, rejected};
+use super::{first_scan, first_scan_with, folder, opened, options, rejected};
 use crate::common::{PERIOD_US, START_US, Sweep, read, write_png, write_radiate};
 
 /// Writes three scans to `folder`, named by the stamp of row `named`; a microsecond has `unit`
@@ -164,10 +164,7 @@ fn a_row_that_is_a_year_off_makes_its_scan_alone_unreadable_in_every_format_with
                 40,
                 &pixels,
             );
-            let options = DatasetOptions {
-                format: Some(format),
-                ..DatasetOptions::default()
-            };
+            let options = options(|o| o.format = Some(format));
             let mut dataset = open(root.path(), &options).unwrap();
             let error = read(dataset.as_mut(), 1).unwrap_err().to_string();
             assert!(error.contains("row 20: stamp is 3153"), "{format}: {error}");
@@ -256,53 +253,27 @@ fn folders_without_a_dataset_are_rejected() {
 fn options_out_of_bounds_are_rejected() {
     let root = folder();
     write_radiate(root.path(), 2);
-    let none = DatasetOptions::default();
-    let cases = [
-        DatasetOptions {
-            range_resolution_m: Some(0.0),
-            ..none
-        },
-        DatasetOptions {
-            range_resolution_m: Some(f32::NAN),
-            ..none
-        },
-        DatasetOptions {
-            range_offset_m: Some(f32::INFINITY),
-            ..none
-        },
-        DatasetOptions {
-            doppler_s: Some(f32::NAN),
-            ..none
-        },
-        DatasetOptions {
-            encoder_counts: Some(0),
-            ..none
-        },
-        DatasetOptions {
-            encoder_counts: Some(5600),
-            ..none
-        },
-        DatasetOptions {
-            azimuth_source: Some(AzimuthSource::Encoder),
-            ..none
-        },
+    let edits: [fn(&mut DatasetOptions); 7] = [
+        |o| o.range_resolution_m = Some(0.0),
+        |o| o.range_resolution_m = Some(f32::NAN),
+        |o| o.range_offset_m = Some(f32::INFINITY),
+        |o| o.doppler_s = Some(f32::NAN),
+        |o| o.encoder_counts = Some(0),
+        |o| o.encoder_counts = Some(5600),
+        |o| o.azimuth_source = Some(AzimuthSource::Encoder),
     ];
-    for options in cases {
+    for options in edits.map(options) {
+        let refused = open(root.path(), &options);
         assert!(
-            matches!(
-                open(root.path(), &options),
-                Err(OpenError::BadOption { .. })
-            ),
+            matches!(refused, Err(OpenError::BadOption { .. })),
             "{options:?}"
         );
     }
-    let options = DatasetOptions {
-        range_resolution_m: Some(1.5),
-        range_offset_m: Some(-0.5),
-        doppler_s: Some(0.04),
-        ..none
-    };
-    let scan = read(open(root.path(), &options).unwrap().as_mut(), 0).unwrap();
+    let scan = first_scan_with(root.path(), |o| {
+        o.range_resolution_m = Some(1.5);
+        o.range_offset_m = Some(-0.5);
+        o.doppler_s = Some(0.04);
+    });
     assert_eq!(
         (
             scan.geometry.range_resolution_m,

@@ -26,3 +26,15 @@ fn rejected(root: &Path) -> OpenError {
 fn first_scan(root: &Path) -> Result<OwnedScan, ReadError> {
     read(opened(root).as_mut(), 0)
 }
+
+/// The default options with a change.
+fn options(change: impl FnOnce(&mut DatasetOptions)) -> DatasetOptions {
+    let mut options = DatasetOptions::default();
+    change(&mut options);
+    options
+}
+
+/// The first scan, read with a change of the default options.
+fn first_scan_with(root: &Path, change: impl FnOnce(&mut DatasetOptions)) -> OwnedScan {
+    read(open(root, &options(change)).unwrap().as_mut(), 0).unwrap()
+}

@@ -3,51 +3,24 @@
 use std::f32::consts::TAU;
 
 use gyre_radar::scan::flag;
-use gyre_radar::{AzimuthSource, DatasetOptions, Format, ReadError, open};
+use gyre_radar::{AzimuthSource, Format, ReadError};
 
-use super::{first_scan, folder};
-use crate::common::{START_US, Sweep, read, write_oxford, write_png};
+use super::{first_scan, first_scan_with, folder};
+use crate::common::{START_US, Sweep, write_oxford, write_png};
 
 #[test]
 fn rows_that_are_not_one_sweep_are_rejected() {
-    let cases: [(Sweep, &str); 5] = [
-        (
-            Sweep {
-                step: 0,
-                ..Sweep::default()
-            },
-            "azimuth does not increase",
-        ),
-        (
-            Sweep {
-                step: 5500,
-                ..Sweep::default()
-            },
-            "azimuth does not increase",
-        ),
-        (
-            Sweep {
-                start: 1_000,
-                ..Sweep::default()
-            },
-            "years 2015 to 2040",
-        ),
-        (
-            Sweep {
-                start: 2_300_000_000_000_000,
-                ..Sweep::default()
-            },
-            "years 2015 to 2040",
-        ),
-        (
-            Sweep {
-                row_interval: 10_000_000,
-                ..Sweep::default()
-            },
-            "not one sweep",
-        ),
+    type Edit = fn(&mut Sweep);
+    let cases: [(Edit, &str); 5] = [
+        (|s| s.step = 0, "azimuth does not increase"),
+        (|s| s.step = 5500, "azimuth does not increase"),
+        (|s| s.start = 1_000, "years 2015 to 2040"),
+        (|s| s.start = 2_300_000_000_000_000, "years 2015 to 2040"),
+        (|s| s.row_interval = 10_000_000, "not one sweep"),
     ];
-    for (sweep, words) in cases {
+    for (edit, words) in cases {
+        let mut sweep = Sweep::default();
+        edit(&mut sweep);
         let root = folder();
         let files = write_oxford(root.path(), 1);
         sweep.write(&files[0]);
@@ -79,17 +52,11 @@ fn an_encoder_of_another_size_is_reported_and_can_be_configured() {
         ),
         "{error}"
     );
-    let options = DatasetOptions {
-        encoder_counts: Some(16400),
-        ..DatasetOptions::default()
-    };
-    let scan = read(open(root.path(), &options).unwrap().as_mut(), 0).unwrap();
+    let scan = first_scan_with(root.path(), |o| o.encoder_counts = Some(16400));
     assert!((scan.azimuth_rad[10] - 0.25 * TAU).abs() < 1e-6);
-    let options = DatasetOptions {
-        azimuth_source: Some(AzimuthSource::Uniform),
-        ..DatasetOptions::default()
-    };
-    let scan = read(open(root.path(), &options).unwrap().as_mut(), 0).unwrap();
+    let scan = first_scan_with(root.path(), |o| {
+        o.azimuth_source = Some(AzimuthSource::Uniform)
+    });
     assert!((scan.azimuth_rad[10] - 0.25 * TAU).abs() < 1e-6);
 }
 
@@ -102,11 +69,7 @@ fn byte_ten_is_validity_in_oxford_and_unused_in_boreas() {
     };
     sweep.write(&root.path().join(format!("radar/{START_US}.png")));
     for (format, expected) in [(Format::Oxford, 0), (Format::Boreas, flag::MEASURED)] {
-        let options = DatasetOptions {
-            format: Some(format),
-            ..DatasetOptions::default()
-        };
-        let scan = read(open(root.path(), &options).unwrap().as_mut(), 0).unwrap();
+        let scan = first_scan_with(root.path(), |o| o.format = Some(format));
         assert_eq!(
             (scan.flags[4], scan.flags[5]),
             (flag::MEASURED, expected),
@@ -123,11 +86,7 @@ fn alternating_chirps_are_not_invalid_rows() {
         ..Sweep::default()
     };
     sweep.write(&root.path().join(format!("radar/{START_US}.png")));
-    let options = DatasetOptions {
-        format: Some(Format::Oxford),
-        ..DatasetOptions::default()
-    };
-    let scan = read(open(root.path(), &options).unwrap().as_mut(), 0).unwrap();
+    let scan = first_scan_with(root.path(), |o| o.format = Some(Format::Oxford));
     assert!(
         scan.flags
             .iter()

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use serde::{Deserialize, Serialize};
 
-use crate::config::{ConfigError, Overlap, Peak, accept, positive};
+use crate::config::{ConfigError, Overlap, Peak, Section, positive};
 
 /// Configuration of [`ExhaustiveSearch`](crate::ExhaustiveSearch): section `[exhaustive]`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -55,35 +55,16 @@ impl ExhaustiveConfig {
     /// # Errors
     /// The first key that is out of its bounds.
     pub fn validate(&self) -> Result<(), ConfigError> {
-        let check = |good, key, actual: &dyn ToString, expected| {
-            accept(good, "exhaustive", key, actual, expected)
-        };
-        check(
-            self.reach_deg > 0.0 && self.reach_deg <= 180.0,
-            "reach_deg",
-            &self.reach_deg,
-            "above 0, at most 180",
-        )?;
-        check(
-            self.step_deg >= 0.01 && self.step_deg <= self.reach_deg,
-            "step_deg",
-            &self.step_deg,
-            "0.01 to reach_deg",
-        )?;
-        check(
-            positive(self.reach_m),
-            "reach_m",
-            &self.reach_m,
-            "metres, above 0",
-        )?;
-        let fitted = !matches!(self.peak, Peak::SoftArgmax { .. });
-        check(fitted, "peak", &"soft_argmax", "gaussian or parabola")?;
-        check(
-            positive(self.variance_scale),
-            "variance_scale",
-            &self.variance_scale,
-            "a positive number",
-        )
+        let section = Section("exhaustive");
+        let fits = self.reach_deg > 0.0 && self.reach_deg <= 180.0;
+        section.require(fits, "reach_deg", &self.reach_deg, "above 0, at most 180")?;
+        let steps = 0.01..=self.reach_deg;
+        section.within("step_deg", self.step_deg, steps, "0.01 to reach_deg")?;
+        let fits = positive(self.reach_m);
+        section.require(fits, "reach_m", &self.reach_m, "metres, above 0")?;
+        let fits = !matches!(self.peak, Peak::SoftArgmax { .. });
+        section.require(fits, "peak", &"soft_argmax", "gaussian or parabola")?;
+        section.positive("variance_scale", self.variance_scale)
     }
 
     /// Returns the number of angles tried.
@@ -185,44 +166,17 @@ mod tests {
 
     #[test]
     fn impossible_values_name_their_key() {
-        let refused = |config: ExhaustiveConfig| config.validate().unwrap_err().to_string();
-        let default = ExhaustiveConfig::default;
-        assert!(
-            refused(ExhaustiveConfig {
-                reach_deg: 181.0,
-                ..default()
-            })
-            .starts_with("exhaustive.reach_deg = 181")
-        );
-        assert!(
-            refused(ExhaustiveConfig {
-                step_deg: f64::NAN,
-                ..default()
-            })
-            .contains("step_deg")
-        );
-        assert!(
-            refused(ExhaustiveConfig {
-                step_deg: 16.0,
-                ..default()
-            })
-            .contains("step_deg")
-        );
-        assert!(
-            refused(ExhaustiveConfig {
-                reach_m: 0.0,
-                ..default()
-            })
-            .contains("reach_m")
-        );
-        let soft = Peak::SoftArgmax { temperature: 1.0 };
-        assert!(
-            refused(ExhaustiveConfig {
-                peak: soft,
-                ..default()
-            })
-            .contains("gaussian or parabola")
-        );
+        let refused = |change: fn(&mut ExhaustiveConfig)| {
+            let mut config = ExhaustiveConfig::default();
+            change(&mut config);
+            config.validate().unwrap_err().to_string()
+        };
+        assert!(refused(|c| c.reach_deg = 181.0).starts_with("exhaustive.reach_deg = 181"));
+        assert!(refused(|c| c.step_deg = f64::NAN).contains("step_deg"));
+        assert!(refused(|c| c.step_deg = 16.0).contains("step_deg"));
+        assert!(refused(|c| c.reach_m = 0.0).contains("reach_m"));
+        let soft = refused(|c| c.peak = Peak::SoftArgmax { temperature: 1.0 });
+        assert!(soft.contains("gaussian or parabola"));
         ExhaustiveConfig::mbym().validate().unwrap();
         let written = toml::to_string(&ExhaustiveConfig::mbym()).unwrap();
         assert_eq!(

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::config::{ConfigError, accept, positive};
+use crate::config::{ConfigError, Section};
 
 /// Configuration of [`Refiner`](crate::Refiner): section `[refinement]`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -111,78 +111,27 @@ impl RefinementConfig {
     /// # Errors
     /// The first key that is out of its bounds.
     pub fn validate(&self) -> Result<(), ConfigError> {
-        let check = |good, key, actual: &dyn ToString, expected| {
-            accept(good, "refinement", key, actual, expected)
-        };
-        check(
-            (1..=64).contains(&self.keyframes),
-            "keyframes",
-            &self.keyframes,
-            "1 to 64",
-        )?;
-        check(
-            (0.05..=10.0).contains(&self.cell_m),
-            "cell_m",
-            &self.cell_m,
-            "metres, 0.05 to 10",
-        )?;
-        let cells = self.reach_m / self.cell_m;
-        check(
-            (8.0..=1000.0).contains(&cells),
-            "reach_m",
-            &self.reach_m,
-            "8 to 1000 cells of cell_m",
-        )?;
-        check(
-            (1.0..=8.0).contains(&self.coarse),
-            "coarse",
-            &self.coarse,
-            "1 to 8",
-        )?;
-        let share = "a share, 0 to 1";
-        check(
-            (0.0..=1.0).contains(&self.min_overlap),
-            "min_overlap",
-            &self.min_overlap,
-            share,
-        )?;
-        check(
-            (0.0..=1.0).contains(&self.firm_overlap),
-            "firm_overlap",
-            &self.firm_overlap,
-            share,
-        )?;
-        check(
-            (0.0..=1.0).contains(&self.min_support),
-            "min_support",
-            &self.min_support,
-            share,
-        )?;
-        for (key, value) in [
-            ("keyframe_distance_m", self.keyframe_distance_m),
-            ("keyframe_angle_deg", self.keyframe_angle_deg),
-            ("acceleration_mps2", self.acceleration_mps2),
-            ("yaw_acceleration_degps2", self.yaw_acceleration_degps2),
-            ("search_agrees_m", self.search_agrees_m),
-            ("search_agrees_deg", self.search_agrees_deg),
-            ("jitter_m", self.jitter_m),
-            ("jitter_deg", self.jitter_deg),
-            ("variance_scale", self.variance_scale),
-            ("drift_scale", self.drift_scale),
-        ] {
-            check(positive(value), key, &value, "a positive number")?;
-        }
-        check(
-            (0.0..=90.0).contains(&self.yaw_sigma_deg),
-            "yaw_sigma_deg",
-            &self.yaw_sigma_deg,
-            "0 to 90",
-        )?;
-        check(
-            (0.0..=1.0).contains(&self.scale_sigma),
-            "scale_sigma",
-            &self.scale_sigma,
-            share,
-        )
+        let section = Section("refinement");
+        section.within("keyframes", self.keyframes, 1..=64, "1 to 64")?;
+        section.within("cell_m", self.cell_m, 0.05..=10.0, "metres, 0.05 to 10")?;
+        let fits = (8.0..=1000.0).contains(&(self.reach_m / self.cell_m));
+        section.require(fits, "reach_m", &self.reach_m, "8 to 1000 cells of cell_m")?;
+        section.within("coarse", self.coarse, 1.0..=8.0, "1 to 8")?;
+        let share = |key, value| section.within(key, value, 0.0..=1.0, "a share, 0 to 1");
+        share("min_overlap", self.min_overlap)?;
+        share("firm_overlap", self.firm_overlap)?;
+        share("min_support", self.min_support)?;
+        section.positive("keyframe_distance_m", self.keyframe_distance_m)?;
+        section.positive("keyframe_angle_deg", self.keyframe_angle_deg)?;
+        section.positive("acceleration_mps2", self.acceleration_mps2)?;
+        section.positive("yaw_acceleration_degps2", self.yaw_acceleration_degps2)?;
+        section.positive("search_agrees_m", self.search_agrees_m)?;
+        section.positive("search_agrees_deg", self.search_agrees_deg)?;
+        section.positive("jitter_m", self.jitter_m)?;
+        section.positive("jitter_deg", self.jitter_deg)?;
+        section.positive("variance_scale", self.variance_scale)?;
+        section.positive("drift_scale", self.drift_scale)?;
+        section.within("yaw_sigma_deg", self.yaw_sigma_deg, 0.0..=90.0, "0 to 90")?;
+        share("scale_sigma", self.scale_sigma)
     }
 }

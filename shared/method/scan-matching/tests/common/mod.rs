@@ -9,6 +9,17 @@ use gyre_scan_matching::{
 };
 use ndarray::Array2;
 
+/// Values of a cell that no sensor gives.
+pub const BAD_VALUES: [f32; 7] = [
+    f32::NAN,
+    f32::INFINITY,
+    f32::NEG_INFINITY,
+    f32::MAX,
+    f32::MIN,
+    1e-45,
+    -3.0,
+];
+
 /// Pose of the later scan's frame in the earlier scan's frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion {
@@ -60,6 +71,12 @@ pub fn scatterers(count: usize, radius_m: f64, seed: u64) -> Vec<([f64; 2], f64)
         }
     };
     (0..count).map(|_| place()).collect()
+}
+
+/// Scatterers around a place 15 m ahead and 4 m to the left.
+pub fn scene_aside() -> Vec<([f64; 2], f64)> {
+    let scene = scatterers(40, 6.0, 3).into_iter();
+    scene.map(|([x, y], s)| ([x + 15.0, y + 4.0], s)).collect()
 }
 
 /// Draws scatterers as Gaussians of `blur` cells, row 0 far ahead, column 0 far left.
