@@ -7,7 +7,7 @@ use serde_json::Value;
 use tempfile::TempDir;
 
 use crate::{
-    common::{Ended, folder, recording, runtime_is_installed},
+    common::{Ended, folder, gyre, recording, runtime_is_installed},
     gyre_lab,
 };
 
@@ -293,7 +293,7 @@ fn single_changes_are_run_alone() {
 fn repeats(folder: &Path, line: &Value) {
     let words: Vec<&str> = line["command"].as_str().unwrap().split(' ').collect();
     let out = words[1 + words.iter().position(|word| *word == "--out").unwrap()];
-    let mut again = gyre_lab();
+    let mut again = gyre();
     let elsewhere = words[1..]
         .iter()
         .map(|word| if *word == out { "again" } else { word });
