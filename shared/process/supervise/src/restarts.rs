@@ -13,7 +13,7 @@ impl Supervisor<'_> {
     /// Restarts dead stages, or all stages if that alone would not help.
     pub(crate) fn recover(&mut self, dead: &[usize]) -> Result<(), SuperviseError> {
         let died_ns = clock::now_ns();
-        let failure = self.may_restart(dead)?;
+        let failure = self.count_deaths(dead)?;
         let blamed = failure.map_or_else(Vec::new, |failure| self.blame_trial(dead, &failure));
         let newest = self.poses.newest_seq();
         let died_without_progress = |i: usize| self.processes[i].died_without_progress(newest);
@@ -33,7 +33,7 @@ impl Supervisor<'_> {
 
     /// Counts deaths against the restart policies, and waits for the longest backoff. Returns a
     /// sentence about one that was a failure of a program which is not on trial.
-    fn may_restart(&mut self, dead: &[usize]) -> Result<Option<String>, SuperviseError> {
+    fn count_deaths(&mut self, dead: &[usize]) -> Result<Option<String>, SuperviseError> {
         let (mut backoff, mut failure) = (Duration::ZERO, None);
         for i in dead {
             let child = &mut self.processes[*i];
@@ -199,7 +199,7 @@ impl Supervisor<'_> {
 
     fn recover_follower(&mut self, dead: usize) -> Result<(), SuperviseError> {
         let died_ns = clock::now_ns();
-        self.may_restart(&[dead])?;
+        self.count_deaths(&[dead])?;
         self.replace(&[dead], died_ns, None)?;
         self.say_restarted(&[dead]);
         Ok(())
