@@ -4,6 +4,7 @@ mod boreas;
 mod kitti;
 mod mulran;
 mod oxford;
+mod plane;
 mod tum;
 
 use std::io;
@@ -82,12 +83,13 @@ pub enum TrajectoryFormat {
     MulranCsv,
     /// `seconds x y z qx qy qz qw`.
     Tum,
-    /// Row-major 3 x 4 matrices without times; the plane is x-y.
+    /// Row-major 3 x 4 matrices without times; Boreas' odometry: with times, inverted.
     Kitti,
 }
 
 /// Reads a trajectory of any known format, detected from its first line, and converts it to
-/// REP-103.
+/// REP-103. TUM and KITTI files may be of a vehicle (z up or down) or of a camera (z forward): the
+/// plane in which they move is found.
 ///
 /// # Errors
 /// A file that cannot be read, or is not of a known format.

@@ -82,18 +82,17 @@ impl Trajectory {
     }
 }
 
-/// Returns the planar pose of a row-major 3 x 4 matrix; the heading is that of the x axis.
+/// Returns the planar pose of x, y, and the cosine and sine of its heading.
 ///
 /// Cosine and sine are taken without normalisation if their norm is near 1: published KITTI results
 /// come from matrices rounded to six decimals, and normalising them changes the fifth decimal of
 /// the result.
-pub(crate) fn planar(matrix: &[f64; 12]) -> Pose {
-    let (cos, sin) = (matrix[0], matrix[4]);
+pub(crate) fn planar([x, y, cos, sin]: [f64; 4]) -> Pose {
     let rotation = match (cos.hypot(sin) - 1.0).abs() < 1e-4 {
         true => Unit::new_unchecked(Complex::new(cos, sin)),
         false => UnitComplex::new(sin.atan2(cos)),
     };
-    Pose::from_parts(Translation2::new(matrix[3], matrix[7]), rotation)
+    Pose::from_parts(Translation2::new(x, y), rotation)
 }
 
 #[cfg(test)]

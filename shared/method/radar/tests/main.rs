@@ -4,6 +4,7 @@
 
 mod common;
 
+mod frames;
 mod inspect;
 mod real_scans;
 mod trajectories;

@@ -1,13 +1,23 @@
 //! KITTI: twelve numbers per line, a row-major 3 x 4 pose, after an optional index. Also Boreas
 //! odometry files, whose 13 columns are a stamp and the inverse of the pose.
+//!
+//! Poses have roll and pitch: they are inverted in space, and projected to the plane at last.
 
 use std::io::{self, Write};
 
-use gyre_geometry::mirrored;
+use gyre_geometry::{Pose, mirrored};
+use nalgebra::{Matrix3, Vector3};
 
-use super::{LineError, check_increasing, lines, numbers};
+use super::{
+    LineError, check_increasing, lines, numbers,
+    plane::{Matrix, Plane},
+};
 use crate::dataset::stamp;
 use crate::trajectory::{Trajectory, planar};
+
+/// A first pose that is nearer to the identity than this, m and in each element of the rotation, is
+/// the world.
+const NEAR_IDENTITY: f64 = 0.1;
 
 pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
     let stamped = lines(text)
@@ -15,30 +25,52 @@ pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
         .and_then(|(_, row)| leading_stamp(row))
         .is_some();
     let mut stamps = stamped.then(Vec::new);
-    let mut poses = Vec::new();
+    let mut matrices = Vec::new();
     for (line, row) in lines(text) {
         let leading = usize::from(row.split_whitespace().count() == 13);
-        let pose = planar(&numbers::<12>(line, row.split_whitespace().skip(leading))?);
-        match &mut stamps {
-            None => poses.push(pose),
-            Some(stamps) => {
-                let stamp = leading_stamp(row);
-                let stamp = stamp.ok_or_else(|| LineError {
-                    line,
-                    reason: "the first column is not a time, as in the first line".to_owned(),
-                })?;
-                check_increasing(line, stamps, stamp)?;
-                stamps.push(stamp);
-                // The first frame in the current sensor frame, y right: invert, then mirror to y
-                // left.
-                poses.push(mirrored(&pose.inverse()));
-            }
-        }
+        let matrix = numbers::<12>(line, row.split_whitespace().skip(leading))?;
+        let Some(stamps) = &mut stamps else {
+            matrices.push(matrix);
+            continue;
+        };
+        let stamp = leading_stamp(row).ok_or_else(|| LineError {
+            line,
+            reason: "the first column is not a time, as in the first line".to_owned(),
+        })?;
+        check_increasing(line, stamps, stamp)?;
+        stamps.push(stamp);
+        matrices.push(inverse(&matrix));
+    }
+    let mut poses = projected(&matrices)?;
+    // Boreas' sensors have y to the right where the world is their first frame, not a map.
+    if stamped && matrices.first().is_some_and(is_near_identity) {
+        poses.iter_mut().for_each(|pose| *pose = mirrored(pose));
     }
     Ok(Trajectory {
         stamp_ns: stamps,
         poses,
     })
+}
+
+fn projected(matrices: &[Matrix]) -> Result<Vec<Pose>, LineError> {
+    let plane = Plane::of(matrices).map_err(|reason| LineError { line: 1, reason })?;
+    let project = |matrix| planar(plane.project(matrix));
+    Ok(matrices.iter().map(project).collect())
+}
+
+/// Returns the inverse of a rigid motion.
+fn inverse(m: &Matrix) -> Matrix {
+    let back = Matrix3::new(m[0], m[4], m[8], m[1], m[5], m[9], m[2], m[6], m[10]);
+    let t = back * Vector3::new(-m[3], -m[7], -m[11]);
+    [
+        m[0], m[4], m[8], t.x, m[1], m[5], m[9], t.y, m[2], m[6], m[10], t.z,
+    ]
+}
+
+fn is_near_identity(m: &Matrix) -> bool {
+    let identity = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+    let mut pairs = m.iter().zip(identity);
+    pairs.all(|(a, b)| (a - b).abs() < NEAR_IDENTITY)
 }
 
 fn leading_stamp(row: &str) -> Option<i64> {

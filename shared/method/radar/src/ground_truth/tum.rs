@@ -4,13 +4,16 @@ use std::io::{self, Write};
 
 use gyre_geometry::{Pose, pose};
 
-use super::{LineError, check_increasing, lines, numbers};
+use super::{
+    LineError, check_increasing, lines, numbers,
+    plane::{Matrix, Plane},
+};
 use crate::dataset::stamp;
 use crate::quoted::quoted;
 use crate::trajectory::Trajectory;
 
 pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
-    let (mut stamps, mut poses) = (Vec::new(), Vec::new());
+    let (mut stamps, mut matrices) = (Vec::new(), Vec::new());
     for (line, row) in lines(text) {
         let seconds = row.split_whitespace().next().unwrap_or_default();
         let stamp = stamp::parse_seconds(seconds).ok_or_else(|| LineError {
@@ -18,7 +21,7 @@ pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
             reason: format!("time {} is not a number of seconds", quoted(seconds)),
         })?;
         check_increasing(line, &stamps, stamp)?;
-        let [_, x, y, _, qx, qy, qz, qw] = numbers(line, row.split_whitespace())?;
+        let [_, x, y, z, qx, qy, qz, qw] = numbers(line, row.split_whitespace())?;
         let norm = qx * qx + qy * qy + qz * qz + qw * qw;
         if norm < 1e-12 {
             return Err(LineError {
@@ -27,15 +30,38 @@ pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
             });
         }
         stamps.push(stamp);
-        // Direction of the x axis in the plane: correct for any roll and pitch, and for quaternions
-        // that are not exactly normalised.
-        let yaw = (2.0 * (qw * qz + qx * qy)).atan2(qw * qw + qx * qx - qy * qy - qz * qz);
-        poses.push(pose(x, y, yaw));
+        matrices.push(matrix([x, y, z], [qx, qy, qz, qw]));
     }
+    let plane = Plane::of(&matrices).map_err(|reason| LineError { line: 1, reason })?;
+    // Direction ahead in the plane: correct for any roll and pitch, and for quaternions that are
+    // not exactly normalised.
+    let projected = matrices.iter().map(|matrix| {
+        let [x, y, cos, sin] = plane.project(matrix);
+        pose(x, y, sin.atan2(cos))
+    });
     Ok(Trajectory {
         stamp_ns: Some(stamps),
-        poses,
+        poses: projected.collect(),
     })
+}
+
+/// Returns the matrix of a position and a quaternion; its rotation has the scale of the quaternion.
+fn matrix([x, y, z]: [f64; 3], [qx, qy, qz, qw]: [f64; 4]) -> Matrix {
+    let (ww, xx, yy, zz) = (qw * qw, qx * qx, qy * qy, qz * qz);
+    [
+        ww + xx - yy - zz,
+        2.0 * (qx * qy - qw * qz),
+        2.0 * (qx * qz + qw * qy),
+        x,
+        2.0 * (qw * qz + qx * qy),
+        ww - xx + yy - zz,
+        2.0 * (qy * qz - qw * qx),
+        y,
+        2.0 * (qx * qz - qw * qy),
+        2.0 * (qy * qz + qw * qx),
+        ww - xx - yy + zz,
+        z,
+    ]
 }
 
 /// Writes TUM poses with stamps in ns.
