@@ -14,8 +14,9 @@ use gyre_radar::{
 use gyre_results::SIMULATED_TRUTH;
 use gyre_terminal::{Failure, print};
 
-/// A trajectory is not interpolated across wider gaps, as in `gyre evaluate`.
-const MAX_GAP_NS: u64 = 1_000_000_000;
+/// A trajectory is not interpolated across wider gaps, as in `gyre evaluate`, but for those that
+/// all its steps are.
+const MAX_GAP_NS: i64 = 1_000_000_000;
 
 /// A recording or a simulation, open.
 pub struct Recording {
@@ -34,6 +35,7 @@ pub struct Track {
     /// The file; of a simulation, the one that it would leave in the results of a run.
     pub path: PathBuf,
     trajectory: Trajectory,
+    max_gap_ns: u64,
 }
 
 impl Recording {
@@ -80,8 +82,7 @@ impl Recording {
 impl Track {
     /// Reads a trajectory.
     pub fn read(path: &Path) -> Result<Self, Failure> {
-        let (path, trajectory) = (path.to_owned(), read_trajectory(path)?);
-        Ok(Self { path, trajectory })
+        Ok(Self::new(path.to_owned(), read_trajectory(path)?))
     }
 
     /// The truth about a simulation: what `gyre simulate` writes, so that it does not matter
@@ -89,7 +90,17 @@ impl Track {
     fn simulated(tum: &[u8]) -> Result<Self, Failure> {
         let path = PathBuf::from(SIMULATED_TRUTH);
         let trajectory = parse_trajectory(&String::from_utf8_lossy(tum), &path)?;
-        Ok(Self { path, trajectory })
+        Ok(Self::new(path, trajectory))
+    }
+
+    fn new(path: PathBuf, trajectory: Trajectory) -> Self {
+        let stamps = trajectory.stamp_ns.as_deref().unwrap_or_default();
+        let max_gap_ns = gyre_evaluation::max_gap_ns(stamps, MAX_GAP_NS).unsigned_abs();
+        Self {
+            path,
+            trajectory,
+            max_gap_ns,
+        }
     }
 
     /// Returns what it lacks to give poses at given times: `times` or `headings`.
@@ -106,7 +117,7 @@ impl Track {
     pub fn pose(&self, stamp_ns: i64) -> Option<Pose> {
         let gap_ns = self.trajectory.gap_ns(stamp_ns);
         let pose = self.trajectory.near(stamp_ns, Trajectory::ROUNDING_NS);
-        pose.filter(|_| gap_ns.is_none_or(|gap_ns| gap_ns <= MAX_GAP_NS))
+        pose.filter(|_| gap_ns.is_none_or(|gap_ns| gap_ns <= self.max_gap_ns))
     }
 }
 
@@ -126,24 +137,21 @@ mod tests {
 
     #[test]
     fn poses_are_known_up_to_rounding_and_not_in_gaps() {
-        let stamp_ns = Some(vec![1_000_000_000, 2_000_000_000, 3_000_000_001]);
-        let poses = [1.0, 2.0, 3.0].map(|x| pose(x, 0.0, 0.0)).to_vec();
-        let truth = Track {
-            path: PathBuf::new(),
-            trajectory: Trajectory { stamp_ns, poses },
-        };
+        let stamp_ns = Some(vec![1, 1_000_000_001, 2_500_000_002, 3_500_000_002]);
+        let poses = [0.0, 1.0, 2.0, 3.0].map(|x| pose(x, 0.0, 0.0)).to_vec();
+        let truth = Track::new(PathBuf::new(), Trajectory { stamp_ns, poses });
         let x = |stamp_ns| truth.pose(stamp_ns).map(|pose| pose.translation.x);
-        assert_eq!([x(999_000_000), x(1_500_000_000)], [Some(1.0), Some(1.5)]);
+        assert_eq!([x(-999_999), x(500_000_001)], [Some(0.0), Some(0.5)]);
         assert_eq!(
-            [x(2_000_000_000), x(3_000_000_001), x(3_001_000_001)],
-            [Some(2.0), Some(3.0), Some(3.0)]
+            [x(1_000_000_001), x(2_500_000_002), x(3_501_000_002)],
+            [Some(1.0), Some(2.0), Some(3.0)]
         );
         assert_eq!(
             [
-                x(998_999_999),
+                x(-1_000_000),
+                x(1_000_000_002),
                 x(2_000_000_001),
-                x(2_500_000_000),
-                x(3_001_000_002)
+                x(3_501_000_003)
             ],
             [None; 4]
         );

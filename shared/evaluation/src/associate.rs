@@ -3,7 +3,7 @@
 use gyre_geometry::{Pose, interpolate};
 use serde::Serialize;
 
-use crate::{EvaluationError, MatchedPoses, Side, matched::require_poses};
+use crate::{EvaluationError, MatchedPoses, Side, gaps::max_gap_ns, matched::require_poses};
 
 /// A trajectory: poses, and their stamps where they have any.
 #[derive(Debug, Clone, Copy)]
@@ -36,7 +36,8 @@ pub enum Association {
     /// The ground truth is interpolated at the stamps of the estimate: positions linearly, yaw the
     /// shorter way round.
     Time {
-        /// The widest gap between two stamps of the ground truth that is interpolated across, ns.
+        /// The widest gap between two stamps of the ground truth that is interpolated across, ns;
+        /// wider if its own steps are: see [`max_gap_ns`](crate::max_gap_ns).
         max_gap_ns: i64,
     },
     /// Pose `k` belongs to pose `k`; the longer list is cut to the shorter.
@@ -146,10 +147,11 @@ fn by_index(
 fn by_time(
     estimate: TimedPoses<'_>,
     truth: TimedPoses<'_>,
-    max_gap_ns: i64,
+    least_gap_ns: i64,
 ) -> Result<(MatchedPoses, Coverage), EvaluationError> {
     let estimate_ns = require_stamps(Side::Estimate, &estimate)?;
     let truth_ns = require_stamps(Side::Truth, &truth)?;
+    let max_gap_ns = max_gap_ns(truth.stamps_ns, least_gap_ns);
     let (mut kept, mut true_poses) = (Vec::new(), Vec::new());
     let (mut outside_span, mut in_gaps) = (0, 0);
     for (&stamp_ns, pose) in estimate.stamps_ns.iter().zip(estimate.poses) {
@@ -294,12 +296,12 @@ mod tests {
     #[test]
     fn poses_outside_the_span_and_in_gaps_are_left_out_and_counted() {
         let (matched, coverage) = associate(
-            TimedPoses::new(&seconds(&[-0.5, 0.0, 0.5, 1.0, 2.5, 4.0, 4.1]), &line(7)),
-            TimedPoses::new(&seconds(&[0.0, 1.0, 4.0]), &line(3)),
+            TimedPoses::new(&seconds(&[-0.5, 0.0, 0.5, 1.0, 2.5, 4.0, 5.1]), &line(7)),
+            TimedPoses::new(&seconds(&[0.0, 1.0, 4.0, 5.0]), &line(4)),
             Association::default(),
         )
         .unwrap();
-        let max_gap_ns = SECOND;
+        let max_gap_ns = 3 * SECOND / 2;
         assert_eq!(
             coverage,
             Coverage::Time {
@@ -312,6 +314,21 @@ mod tests {
         assert_eq!((coverage.matched(), coverage.left_out()), (4, 3));
         let used: Vec<f64> = matched.estimate().iter().map(|p| p.translation.x).collect();
         assert_eq!(used, [1.0, 2.0, 3.0, 5.0]);
+    }
+
+    #[test]
+    fn a_slow_ground_truth_that_jitters_has_no_gaps() {
+        let truth_s: Vec<f64> = (0..60)
+            .map(|k| f64::from(k) + 0.002 * f64::from(k % 3))
+            .collect();
+        let estimate_s: Vec<f64> = (0..200).map(|k| 0.25 * f64::from(k)).collect();
+        let (_, coverage) = associate(
+            TimedPoses::new(&seconds(&estimate_s), &line(200)),
+            TimedPoses::new(&seconds(&truth_s), &line(60)),
+            Association::default(),
+        )
+        .unwrap();
+        assert_eq!((coverage.matched(), coverage.left_out()), (200, 0));
     }
 
     #[test]
