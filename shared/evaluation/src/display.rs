@@ -10,10 +10,23 @@ impl fmt::Display for Evaluation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "association   {}", self.coverage)?;
         writeln!(f, "axes          {}", self.axes)?;
+        if let Some(degrees) = self.heading_offset_deg {
+            writeln!(
+                f,
+                "{:14}the heading of the estimate differs by {degrees:.1} deg throughout, as of a sensor that is mounted otherwise: \
+                 KITTI, end point and RPE do not hold",
+                ""
+            )?;
+        }
         writeln!(
             f,
-            "path length   {:.2} m, estimate {:.2} m",
-            self.path_m, self.estimated_path_m
+            "path length   {:.2} m, estimate {:.2} m{}",
+            self.path_m,
+            self.estimated_path_m,
+            match self.truth_stands {
+                true => "; the ground truth stands still: is it of this drive?",
+                false => "",
+            }
         )?;
         match &self.kitti {
             Some(kitti) => writeln!(f, "KITTI         {kitti}")?,

@@ -41,6 +41,7 @@ pub mod handedness;
 pub mod kitti;
 mod matched;
 pub mod motions;
+mod mounting;
 pub mod nees;
 pub mod plot;
 pub mod report;

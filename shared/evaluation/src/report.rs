@@ -2,11 +2,13 @@
 
 use std::num::NonZeroUsize;
 
+use gyre_geometry::Pose;
 use serde::Serialize;
 
 use crate::{
     Association, Ate, Axes, Coverage, EndError, EvaluationError, Kitti, MatchedPoses, Rpe, Seg,
-    TimedPoses, associate, ate, end_error, handedness::resolve_axes, kitti, rpe, seg,
+    TimedPoses, associate, ate, end_error, handedness::resolve_axes, kitti,
+    mounting::heading_offset_rad, rpe, seg,
 };
 
 /// The options of an evaluation.
@@ -37,10 +39,16 @@ pub struct Evaluation {
     pub coverage: Coverage,
     /// The axes that were negated in the estimate.
     pub axes: Axes,
+    /// Heading of the estimate minus that of the ground truth, degrees, where all differ by one
+    /// large angle: the sensors are mounted otherwise, and metrics that use headings do not hold.
+    pub heading_offset_deg: Option<f64>,
     /// Path length of the ground truth over the matched poses, m.
     pub path_m: f64,
     /// Path length of the estimate over the matched poses, m. Noise makes it longer.
     pub estimated_path_m: f64,
+    /// The ground truth stays in one place although the estimate moves: it is empty, or of another
+    /// drive.
+    pub truth_stands: bool,
     /// KITTI odometry errors; `None` for a path up to 100 m or a ground truth without heading.
     pub kitti: Option<Kitti>,
     /// Absolute trajectory error.
@@ -69,16 +77,70 @@ pub fn evaluate(
     let (matched, coverage) = associate(estimate, truth, options.association)?;
     let (matched, axes) = resolve_axes(matched);
     let has_heading = !axes.truth_lacks_heading;
+    let ate = ate(&matched);
+    let (moved_m, travelled_m) = (extent_m(matched.truth()), extent_m(matched.estimate()));
+    let offset_rad = heading_offset_rad(&matched, &ate.truth_from_estimate)
+        .filter(|_| has_heading && moved_m.min(travelled_m) > ALIGNED_M);
     Ok(Evaluation {
         coverage,
         axes,
+        heading_offset_deg: offset_rad.map(f64::to_degrees),
         path_m: crate::matched::path_m(matched.truth()),
         estimated_path_m: crate::matched::path_m(matched.estimate()),
+        truth_stands: moved_m < STANDING_M && travelled_m > MOVING_M,
         kitti: has_heading.then(|| kitti(&matched, options.step)).flatten(),
-        ate: ate(&matched),
+        ate,
         seg: seg(&matched, options.step),
         end: has_heading.then(|| end_error(&matched)),
         rpe: has_heading.then(|| rpe(&matched)),
         matched,
     })
+}
+
+/// Positions within this distance of the first are in one place, m.
+const STANDING_M: f64 = 0.1;
+/// An estimate that leaves this distance moves, m.
+const MOVING_M: f64 = 0.5;
+/// Paths that are longer define the rotation of their alignment, m.
+const ALIGNED_M: f64 = 5.0;
+
+/// Returns the largest distance from the first position, m.
+fn extent_m(poses: &[Pose]) -> f64 {
+    let Some(first) = poses.first() else {
+        return 0.0;
+    };
+    let distance = |pose: &Pose| (pose.translation.vector - first.translation.vector).norm();
+    poses.iter().map(distance).fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use gyre_geometry::pose;
+
+    fn evaluated(estimate: &[Pose], truth: &[Pose]) -> Evaluation {
+        let options = Options {
+            association: Association::Index,
+            ..Options::default()
+        };
+        evaluate(
+            TimedPoses::untimed(estimate),
+            TimedPoses::untimed(truth),
+            &options,
+        )
+        .unwrap()
+    }
+
+    #[test]
+    fn a_ground_truth_that_stands_still_is_named() {
+        let drive: Vec<_> = (0..40).map(|k| pose(f64::from(k), 0.0, 0.0)).collect();
+        let zeros = vec![pose(0.0, 0.0, 0.0); 40];
+        let found = evaluated(&drive, &zeros);
+        assert!(found.truth_stands && found.to_string().contains("stands still"));
+        for (estimate, truth) in [(&drive, &drive), (&zeros, &zeros), (&zeros, &drive)] {
+            let found = evaluated(estimate, truth);
+            assert!(!found.truth_stands && !found.to_string().contains("stands still"));
+        }
+    }
 }
