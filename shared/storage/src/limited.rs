@@ -10,14 +10,29 @@ use std::{
 /// The largest file of settings, bytes.
 pub const SETTINGS: u64 = 16 << 20;
 
-/// Reads a text of at most `limit` bytes.
+/// The mark that editors and spreadsheets of Windows put before UTF-8.
+const MARK: &str = "\u{feff}";
+/// The marks before UTF-16, of both byte orders.
+const UTF_16: [&[u8]; 2] = [&[0xff, 0xfe], &[0xfe, 0xff]];
+
+/// Reads a text of at most `limit` bytes, without a byte order mark before it.
 ///
 /// # Errors
 /// A file that cannot be read, is larger, or is not UTF-8.
 pub fn read_text(path: &Path, limit: u64) -> io::Result<String> {
     let bytes = read_bytes(path, limit)?;
-    String::from_utf8(bytes)
-        .map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "it is not UTF-8"))
+    let mut text = String::from_utf8(bytes).map_err(|error| {
+        let is_utf_16 = UTF_16.iter().any(|mark| error.as_bytes().starts_with(mark));
+        let reason = match is_utf_16 {
+            true => "it is UTF-16: save it as UTF-8",
+            false => "it is not UTF-8",
+        };
+        io::Error::new(io::ErrorKind::InvalidData, reason)
+    })?;
+    if text.starts_with(MARK) {
+        text.drain(..MARK.len());
+    }
+    Ok(text)
 }
 
 /// Reads a file of at most `limit` bytes.
@@ -64,5 +79,24 @@ mod tests {
         fs::write(&file, [0xff]).unwrap();
         let error = read_text(&file, limit as u64).unwrap_err().to_string();
         assert_eq!(error, "it is not UTF-8");
+        for mark in UTF_16 {
+            fs::write(&file, [mark, b"a\0"].concat()).unwrap();
+            let error = read_text(&file, limit as u64).unwrap_err().to_string();
+            assert_eq!(error, "it is UTF-16: save it as UTF-8");
+        }
+    }
+
+    #[test]
+    fn a_byte_order_mark_is_no_part_of_the_text() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("text");
+        for (written, read) in [
+            ("\u{feff}a\u{feff}", "a\u{feff}"),
+            ("\u{feff}", ""),
+            ("a", "a"),
+        ] {
+            fs::write(&file, written).unwrap();
+            assert_eq!(read_text(&file, SETTINGS).unwrap(), read);
+        }
     }
 }

@@ -146,6 +146,7 @@ fn detect(text: &str) -> Result<TrajectoryFormat, String> {
     let (_, first) = lines(text).next().ok_or("it is empty")?;
     let commas = first.split(',').count();
     let words = first.split_whitespace().count();
+    check_separators(first, commas, words)?;
     match (commas, words) {
         _ if first.contains("destination_timestamp") => Ok(TrajectoryFormat::OxfordCsv),
         _ if first.contains("GPSTime") => Ok(TrajectoryFormat::BoreasCsv),
@@ -153,6 +154,36 @@ fn detect(text: &str) -> Result<TrajectoryFormat, String> {
         (1, 8) => Ok(TrajectoryFormat::Tum),
         (1, 12 | 13) => Ok(TrajectoryFormat::Kitti),
         _ => Err(format!("its first line has {} columns", commas.max(words))),
+    }
+}
+
+/// Rejects what spreadsheets write in countries with decimal commas, and columns that are parted as
+/// those of other formats.
+fn check_separators(first: &str, commas: usize, words: usize) -> Result<(), String> {
+    let is_decimal = |word: &str| match word.split_once(',') {
+        Some((whole, _)) => {
+            whole.parse::<i64>().is_ok() && word.replace(',', ".").parse::<f64>().is_ok()
+        }
+        None => false,
+    };
+    let columns = |count| match count {
+        8 => "8 columns (TUM)",
+        _ => "columns (KITTI)",
+    };
+    match first.split(';').count() {
+        1 if matches!(words, 8 | 12 | 13) && first.split_whitespace().any(is_decimal) => Err(format!(
+            "the numbers in its {} have decimal commas, and need decimal points: `sed 's/,/./g'` makes them",
+            columns(words)
+        )),
+        1 if matches!(commas, 8 | 12) && first.split(',').all(|word| word.trim().parse::<f64>().is_ok()) => {
+            Err(format!("its {} are parted by commas, and need spaces: `sed 's/,/ /g'` makes them", columns(commas)))
+        }
+        1 => Ok(()),
+        count @ (8 | 12) => Err(format!(
+            "its {} are parted by semicolons, and need spaces, and decimal points: `sed 's/,/./g; s/;/ /g'` makes them",
+            columns(count)
+        )),
+        _ => Err("its columns are parted by semicolons, and need commas, and decimal points: `sed 's/,/./g; s/;/,/g'` makes them".to_owned()),
     }
 }
 

@@ -205,6 +205,52 @@ fn invalid_files_are_rejected_with_their_line() {
 }
 
 #[test]
+fn what_spreadsheets_write_is_refused_with_what_to_do() {
+    let columns = |separator: &str, number: &str, count: usize| vec![number; count].join(separator);
+    let cases = [
+        (
+            columns(" ", "1,5", 8),
+            "8 columns (TUM) have decimal commas",
+        ),
+        (
+            columns("\t", "1,5", 12),
+            "columns (KITTI) have decimal commas",
+        ),
+        (
+            columns(";", "1,5", 8),
+            "8 columns (TUM) are parted by semicolons, and need spaces",
+        ),
+        (
+            columns(";", "1.5", 12),
+            "columns (KITTI) are parted by semicolons, and need spaces",
+        ),
+        (
+            columns(", ", "1.5", 8),
+            "8 columns (TUM) are parted by commas, and need spaces",
+        ),
+        (
+            "GPSTime;easting;northing\n".to_owned(),
+            "parted by semicolons, and need commas",
+        ),
+    ];
+    for (text, words) in cases {
+        let error = from_text("a.txt", &text).unwrap_err().to_string();
+        assert!(error.contains(words), "{text:?}: {error}");
+    }
+}
+
+#[test]
+fn a_byte_order_mark_is_no_part_of_a_trajectory() {
+    let tum = "1.5 1 2 0 0 0 0 1\n";
+    let boreas = "GPSTime,easting,northing,roll,pitch,heading\n1630597331060160,3,4,0,0,0.5\n";
+    let oxford = [HEADER, &row(0, 250, 2.0, 0.0, 0.1)].concat();
+    for text in [tum, boreas, &oxford] {
+        let marked = from_text("a.txt", &format!("\u{feff}{text}")).unwrap();
+        assert_eq!(marked, from_text("a.txt", text).unwrap());
+    }
+}
+
+#[test]
 fn a_word_of_a_damaged_file_is_quoted_in_part() {
     let long = "9".repeat(5000);
     for text in [
