@@ -27,7 +27,7 @@ pub(crate) fn described(form: Form, message: &Message) -> Result<Described, Stri
         Form::Numbers => {
             let message: RadarConfigurationMsg = of(message)?;
             Ok(Described {
-                radar: message.configuration(),
+                radar: message.configuration().map_err(|e| e.to_string())?,
                 azimuth_offset: message.azimuth_offset,
             })
         }

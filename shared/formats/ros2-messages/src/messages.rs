@@ -1,5 +1,5 @@
 //! `messages`: the package of Navtech's driver until 2024, in which numbers are arrays of their
-//! bytes, most significant first.
+//! bytes, most significant first but for `bin_size`.
 
 use serde::{Deserialize, Serialize};
 
@@ -52,7 +52,8 @@ pub struct RadarConfigurationMessage {
     /// Encoder counts per turn, two bytes.
     #[serde(with = "serde_bytes")]
     pub encoder_size: Vec<u8>,
-    /// Depth of a range bin, 1e-4 m, an integer of eight bytes.
+    /// Depth of a range bin, 1e-4 m (of the oldest drivers m), a double of eight bytes, least
+    /// significant first.
     #[serde(with = "serde_bytes")]
     pub bin_size: Vec<u8>,
     /// Range bins per azimuth, two bytes.

@@ -80,7 +80,7 @@ pub struct RadarBScanMsg {
     /// Encoder count of each row.
     pub encoder_values: Vec<u16>,
     /// Time of each row, ns of the radar's clock; the driver computes it in floating point, to 256
-    /// ns.
+    /// ns. FoMo's converter writes microseconds.
     pub timestamps: Vec<u64>,
 }
 message!(

@@ -93,7 +93,7 @@ fn assert_same(one: &OwnedScan, other: &OwnedScan) {
 #[test]
 fn scans_come_back_to_the_bit() {
     let messages = ScanMessages::new(radar(), "radar");
-    let described = messages.configuration(START_NS).configuration();
+    let described = messages.configuration(START_NS).configuration().unwrap();
     assert_eq!(described.range_resolution_m(), 0.173_611);
     let turns: Vec<_> = (0..3)
         .map(|turn| messages.b_scan(scan(turn).view()))
@@ -215,7 +215,7 @@ fn configurations_of_both_forms_are_the_same() {
     let older = RadarConfigurationMessage {
         azimuth_samples: 400_u16.to_be_bytes().to_vec(),
         encoder_size: 5600_u16.to_be_bytes().to_vec(),
-        bin_size: 438_u64.to_be_bytes().to_vec(),
+        bin_size: 438.0_f64.to_le_bytes().to_vec(),
         range_in_bins: 3768_u16.to_be_bytes().to_vec(),
         expected_rotation_rate: 4_u16.to_be_bytes().to_vec(),
         ..RadarConfigurationMessage::default()
@@ -229,7 +229,7 @@ fn configurations_of_both_forms_are_the_same() {
         expected_rotation_rate: 4000,
         ..RadarConfigurationMsg::default()
     };
-    let newer = newer.configuration();
+    let newer = newer.configuration().unwrap();
     assert_eq!(older.range_resolution_m(), 0.0438);
     assert_eq!(newer.range_resolution_m(), 0.0438);
     assert_eq!((older.rotation_mhz, newer.rotation_mhz), (4000, 4000));
@@ -252,7 +252,71 @@ fn depths_of_bins_come_back_to_the_bit() {
             ..radar()
         };
         let message = RadarConfigurationMsg::of(&radar, Header::default());
-        assert_eq!(message.configuration().range_resolution_m(), resolution_m);
+        let described = message.configuration().unwrap();
+        assert_eq!(described.range_resolution_m(), resolution_m);
+    }
+}
+
+#[test]
+fn depths_of_bins_are_in_tenths_of_millimetres_or_in_metres_and_others_are_refused() {
+    let older = |bytes: [u8; 8]| {
+        let message = RadarConfigurationMessage {
+            azimuth_samples: 400_u16.to_be_bytes().to_vec(),
+            encoder_size: 5600_u16.to_be_bytes().to_vec(),
+            bin_size: bytes.to_vec(),
+            range_in_bins: 3768_u16.to_be_bytes().to_vec(),
+            expected_rotation_rate: 4_u16.to_be_bytes().to_vec(),
+            ..RadarConfigurationMessage::default()
+        };
+        message.configuration().map_err(|error| error.to_string())
+    };
+    let newer = |bin_size: f32| {
+        let message = RadarConfigurationMsg {
+            bin_size,
+            ..RadarConfigurationMsg::default()
+        };
+        message.configuration().map_err(|error| error.to_string())
+    };
+    for (size, depth_m) in [
+        (438.0, 0.0438),
+        (0.0438, 0.0438),
+        (596.0, 0.0596),
+        (0.6, 0.6),
+    ] {
+        let found = older(f64::to_le_bytes(size)).unwrap();
+        assert_eq!(found.range_resolution_m(), depth_m as f32, "{size}");
+        let found = newer(size as f32).unwrap();
+        assert!(
+            (found.range_resolution_m() - depth_m as f32).abs() < 1e-9,
+            "{size}"
+        );
+    }
+    for size in [0.0, -438.0, 7.0, 1e6, f64::NAN, f64::INFINITY] {
+        let refused = older(size.to_le_bytes()).unwrap_err();
+        assert!(refused.contains("no radar has bins"), "{refused}");
+        assert!(newer(size as f32).is_err(), "{size}");
+    }
+    // As an integer, most significant byte first, of which the driver knows nothing.
+    assert!(older(438_u64.to_be_bytes()).is_err());
+}
+
+#[test]
+fn times_of_rows_are_in_the_unit_in_which_the_radar_turns() {
+    let message = ScanMessages::new(radar(), "radar").b_scan(scan(0).view());
+    let split = |message: &RadarBScanMsg| -> Vec<_> {
+        let rows = message.rows(&radar(), 0, START_NS).unwrap();
+        rows.map(|row| (row.azimuth.seconds, row.azimuth.split_seconds))
+            .collect()
+    };
+    for unit in [1, 1_000, 1_000_000] {
+        let (mut coarse, mut rounded) = (message.clone(), message.clone());
+        for stamp in &mut coarse.timestamps {
+            *stamp /= unit;
+        }
+        for stamp in &mut rounded.timestamps {
+            *stamp = *stamp / unit * unit;
+        }
+        assert_eq!(split(&coarse), split(&rounded), "{unit}");
     }
 }
 

@@ -228,7 +228,7 @@ impl Driver {
             && self.is_described_as(RadarConfigurationMsg::DEFINITION)
         {
             return Ok(Some(DescribedRadar {
-                radar: message.configuration(),
+                radar: message.configuration()?,
                 azimuth_offset: message.azimuth_offset,
             }));
         }

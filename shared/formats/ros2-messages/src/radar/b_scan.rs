@@ -31,7 +31,9 @@ pub enum BadScan {
         width: u32,
     },
     /// Values beside the image that do not fit it.
-    #[error("it has {rows} rows, {encoders} encoder values and {stamps} times")]
+    #[error(
+        "it has {rows} rows of powers, but {encoders} encoder values and {stamps} times, and needs one of each for a row"
+    )]
     Rows {
         /// Rows of the image.
         rows: usize,
@@ -76,6 +78,7 @@ impl RadarBScanMsg {
             });
         }
         let time = TurnTime::new(radar, arrived_ns);
+        let unit_ns = unit_ns(radar, encoders, stamps);
         let has_clock = stamps.iter().any(|stamp| *stamp != 0);
         let mut last = None;
         let written = move |(row, encoder, stamp): &(usize, u16, u64)| {
@@ -95,10 +98,28 @@ impl RadarBScanMsg {
         Ok(places
             .filter(written)
             .map(move |(row, encoder, stamp)| Row {
-                azimuth: azimuth(encoder, stamp, image.row(row)),
+                azimuth: azimuth(encoder, stamp.saturating_mul(unit_ns), image.row(row)),
                 arrived_ns: time.arrived_ns(encoder),
             }))
     }
+}
+
+/// Returns the unit of the times of rows: the one in which they advance most nearly as the radar
+/// turns.
+fn unit_ns(radar: &Configuration, encoders: &[u16], stamps: &[u64]) -> u64 {
+    let mut written = encoders.iter().zip(stamps).filter(|(_, stamp)| **stamp > 0);
+    let (Some(first), Some(last)) = (written.next(), written.next_back()) else {
+        return 1;
+    };
+    let turned = f64::from(last.0.saturating_sub(*first.0)) / f64::from(radar.encoder_size.max(1));
+    let expected_ns = turned * radar.period_ns() as f64;
+    let advance = last.1.saturating_sub(*first.1) as f64;
+    let apart = |unit: &u64| (advance * *unit as f64 / expected_ns).ln().abs();
+    // Of times that do not advance all are equally far: they are as they should be.
+    let units = [1, 1_000, 1_000_000].into_iter();
+    units
+        .min_by(|a, b| apart(a).total_cmp(&apart(b)))
+        .unwrap_or(1)
 }
 
 impl Image {

@@ -1,34 +1,39 @@
 //! The radar's description of itself.
 
+use std::ops::RangeInclusive;
+
 use gyre_colossus::Configuration;
 
 use super::azimuths::number;
 use crate::{
-    BadMessage, messages::RadarConfigurationMessage, navtech_msgs::RadarConfigurationMsg,
-    std_msgs::Header,
+    BadMessage, Ros2Message, messages::RadarConfigurationMessage,
+    navtech_msgs::RadarConfigurationMsg, std_msgs::Header,
 };
 
 /// Bins per metre of `bin_size`.
 const BIN_SIZES: f64 = 1e4;
+/// Depths of a bin that a radar can have, m. Their ratio is less than [`BIN_SIZES`], so that no
+/// number is one of them in both units.
+const DEPTHS_M: RangeInclusive<f64> = 1e-3..=5.0;
 /// The largest rate that is in turns per second: no radar turns as slowly as this in turns per 1000
 /// s, or as quickly.
 const MAX_TURNS_PER_S: u16 = 50;
 
 impl RadarConfigurationMsg {
     /// Returns the radar's description of itself.
-    pub fn configuration(&self) -> Configuration {
-        let resolution_m = (f64::from(self.bin_size) / BIN_SIZES) as f32;
-        Configuration {
+    ///
+    /// # Errors
+    /// A depth of a bin that no radar has.
+    pub fn configuration(&self) -> Result<Configuration, BadMessage> {
+        Ok(Configuration {
             azimuth_samples: self.azimuth_samples,
-            bin_size: self.bin_size.round() as u16,
             range_in_bins: self.range_in_bins,
             encoder_size: self.encoder_size,
             rotation_mhz: rotation_mhz(self.expected_rotation_rate),
-            packet_rate: 0,
             range_gain: self.range_gain,
             range_offset: self.range_offset,
-            range_resolution_m: Some(resolution_m),
-        }
+            ..of_depth(resolution_m::<Self>(self.bin_size.into())?)
+        })
     }
 
     /// Returns the message of a configuration. The depth of a bin is exact if a number of 32 bits
@@ -52,21 +57,43 @@ impl RadarConfigurationMessage {
     /// Returns the radar's description of itself.
     ///
     /// # Errors
-    /// A number that has not the bytes of its type.
+    /// A number that has not the bytes of its type, or a depth of a bin that no radar has.
     pub fn configuration(&self) -> Result<Configuration, BadMessage> {
         let short = |field, bytes: &[u8]| {
             Ok::<u16, BadMessage>(u16::from_be_bytes(number::<Self, 2>(field, bytes)?))
         };
-        let bin_size = u64::from_be_bytes(number::<Self, 8>("bin_size", &self.bin_size)?);
+        // Unlike the others: the driver copies the double as its computer has it.
+        let bin_size = f64::from_le_bytes(number::<Self, 8>("bin_size", &self.bin_size)?);
         let rate = short("expected_rotation_rate", &self.expected_rotation_rate)?;
         Ok(Configuration {
             azimuth_samples: short("azimuth_samples", &self.azimuth_samples)?,
-            bin_size: bin_size.try_into().unwrap_or(u16::MAX),
             range_in_bins: short("range_in_bins", &self.range_in_bins)?,
             encoder_size: short("encoder_size", &self.encoder_size)?,
             rotation_mhz: rotation_mhz(rate),
-            ..Configuration::default()
+            ..of_depth(resolution_m::<Self>(bin_size)?)
         })
+    }
+}
+
+/// Returns the depth of a bin, m, of a `bin_size` in 1e-4 m, or of the oldest drivers in m.
+fn resolution_m<T: Ros2Message>(bin_size: f64) -> Result<f32, BadMessage> {
+    let candidates = [bin_size / BIN_SIZES, bin_size];
+    let depth_m = candidates.into_iter().find(|m| DEPTHS_M.contains(m));
+    depth_m.map(|m| m as f32).ok_or_else(|| BadMessage::Field {
+        type_name: T::DEFINITION.type_name(),
+        reason: format!(
+            "`bin_size` is {bin_size:e}, and no radar has bins of that many 0.1 mm or m: {} to {} m are known",
+            DEPTHS_M.start(),
+            DEPTHS_M.end()
+        ),
+    })
+}
+
+fn of_depth(resolution_m: f32) -> Configuration {
+    Configuration {
+        bin_size: (f64::from(resolution_m) * BIN_SIZES).round() as u16,
+        range_resolution_m: Some(resolution_m),
+        ..Configuration::default()
     }
 }
 
