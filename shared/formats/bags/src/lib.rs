@@ -2,11 +2,12 @@
 //! `ros2 bag play` takes.
 //!
 //! A bag is a file of the MCAP profile `ros2`, or a folder of such files with a `metadata.yaml`.
-//! Reading order: `files` (what is a bag), [`damaged`] (MCAP records from damaged files), `spans`
-//! (where messages are), `topics` (which of them are a radar's), `azimuths` (messages as azimuths),
-//! `scans` (azimuths as scans), [`BagWriter`].
+//! Reading order: `files` (what is a bag), [`damaged`] (MCAP records from
+//! damaged files), `spans` (where messages are), `topics` (which of them are a radar's), `azimuths`
+//! (messages as azimuths), `bag` (its files as one), `scans` (azimuths as scans), [`BagWriter`].
 
 mod azimuths;
+mod bag;
 pub mod damaged;
 mod error;
 mod files;

@@ -4,7 +4,6 @@ mod index;
 
 use std::path::{Path, PathBuf};
 
-use crate::damaged::Span;
 use gyre_colossus::{Constants, SweepAssembler};
 use gyre_radar::{
     AzimuthSource, DEFAULT_TURN_NS, Dataset, DatasetOptions, FileList, Format, ImageSize,
@@ -13,11 +12,11 @@ use gyre_radar::{
 
 use crate::{
     BagError,
-    azimuths::{Described, azimuths, described},
+    azimuths::{Described, azimuths},
+    bag::{Bag, Origin},
     files::files,
-    radar::Survey,
-    reading::{BagFile, Channel, Message},
-    topics::{Kind, Topics},
+    reading::Message,
+    topics::Topics,
 };
 use index::{Entry, Index};
 
@@ -61,96 +60,6 @@ fn open_files(
     Ok(Box::new(Scans::open(path, paths, options)?))
 }
 
-/// The files of a bag, and the spans of the messages in them.
-struct Bag {
-    path: PathBuf,
-    files: Vec<BagFile>,
-    /// The number of the file of each span, and the span.
-    spans: Vec<(usize, Span)>,
-}
-
-impl Bag {
-    fn open(path: &Path, paths: &[PathBuf]) -> Result<Self, BagError> {
-        let mut bag = Self {
-            path: path.to_owned(),
-            files: Vec::new(),
-            spans: Vec::new(),
-        };
-        for (number, path) in paths.iter().enumerate() {
-            let (file, spans) = BagFile::open(path)?;
-            bag.files.push(file);
-            bag.spans
-                .extend(spans.into_iter().map(|span| (number, span)));
-        }
-        Ok(bag)
-    }
-
-    /// Returns the messages of a span that are wanted.
-    fn read(
-        &mut self,
-        span: usize,
-        wanted: impl Fn(&Channel) -> bool,
-    ) -> Result<Vec<Message>, BagError> {
-        let Some(&(file, span)) = self.spans.get(span) else {
-            return Ok(Vec::new());
-        };
-        self.files[file].read(span, wanted)
-    }
-
-    fn channels(&self) -> Vec<&Channel> {
-        let files = self.files.iter();
-        files.flat_map(|file| file.channels.values()).collect()
-    }
-
-    /// Learns all channels. A file without a list of them is read as a whole.
-    fn learn_channels(&mut self) {
-        for span in 0..self.spans.len() {
-            let (file, _) = self.spans[span];
-            if !self.files[file].has_summary {
-                // What is damaged has no channels.
-                let _ = self.read(span, |_| false);
-            }
-        }
-    }
-
-    /// Describes the radar: by its first configuration, otherwise by what its azimuths and the
-    /// options show. Also returns whether it has described itself.
-    fn describe(
-        &mut self,
-        topics: &Topics,
-        options: &DatasetOptions,
-    ) -> Result<(Described, bool), BagError> {
-        let mut survey = Survey::new(topics.scans.kind);
-        for span in 0..self.spans.len() {
-            let messages = self.read(span, |channel| topics.has(channel));
-            for message in messages.unwrap_or_default() {
-                match self.configuration(self.spans[span].0, topics, &message) {
-                    Some(described) => return Ok((described, true)),
-                    None if !survey.is_done() => survey.add(&message),
-                    None => {}
-                }
-            }
-            if survey.is_done() && topics.configuration.is_none() {
-                break;
-            }
-        }
-        Ok((survey.describe(&self.path, options)?, false))
-    }
-
-    /// Returns what a message says of the radar, if it is of that topic and can be used.
-    fn configuration(&self, file: usize, topics: &Topics, message: &Message) -> Option<Described> {
-        let topic = topics.configuration.as_ref()?;
-        let channel = self.files[file].channels.get(&message.channel)?;
-        match topic.kind {
-            Kind::Configuration(form) if channel.topic == topic.name => {
-                let described = described(form, message).ok()?;
-                described.radar.check().is_ok().then_some(described)
-            }
-            _ => None,
-        }
-    }
-}
-
 /// The scans of a bag.
 struct Scans {
     bag: Bag,
@@ -171,7 +80,7 @@ impl Scans {
         bag.learn_channels();
         let wished = options.topic.as_ref().map(|topic| topic.as_str());
         let topics = Topics::choose(path, &bag.channels(), wished)?;
-        let (mut described, is_own) = bag.describe(&topics, options)?;
+        let (mut described, origin) = bag.describe(&topics, options)?;
         if let Some(counts) = options.encoder_counts {
             described.radar.encoder_size = counts;
         }
@@ -180,14 +89,13 @@ impl Scans {
         let assembler = assembler
             .map_err(|error| BagError::unreadable(path, format!("cannot be read: {error}")))?;
         let index = Index::of(&mut bag, &topics, &described, assembler)?;
-        if index.entries.is_empty() {
-            let reason = format!("has no complete turn of the radar on {}", topics.scans.name);
+        if let Some(reason) = index.why_none_can_be_read(&topics.scans.name) {
             return Err(BagError::unreadable(path, reason));
         }
         let stamps = index.entries.iter().map(|entry| entry.stamp_ns);
         Ok(Self {
             period_ns: turn_ns(stamps).unwrap_or(DEFAULT_TURN_NS),
-            notes: notes(&bag, &topics, &described, is_own, &index),
+            notes: notes(&bag, &topics, &described, &origin, &index),
             files: paths.iter().cloned().collect(),
             bag,
             topics,
@@ -211,6 +119,16 @@ impl Scans {
         let topic = &self.topics.scans.name;
         self.bag
             .read(span as usize, |channel| channel.topic == *topic)
+    }
+
+    /// Returns why the message of a scan cannot be decoded.
+    fn damage(&mut self, entry: Entry) -> String {
+        let messages = self.messages(entry.start.span).unwrap_or_default();
+        let message = messages.get(entry.start.message as usize);
+        let decoded = message
+            .map(|message| azimuths(self.topics.scans.kind, message, &self.described, |_, _| {}));
+        let reason = decoded.and_then(Result::err);
+        reason.unwrap_or_else(|| "it is not as it was when the bag was opened".to_owned())
     }
 
     /// Assembles a scan from the azimuths from its entry's start on.
@@ -283,17 +201,23 @@ fn notes(
     bag: &Bag,
     topics: &Topics,
     described: &Described,
-    is_own: bool,
+    origin: &Origin,
     index: &Index,
 ) -> Vec<String> {
     let radar = &described.radar;
-    let mut notes = vec![match is_own {
-        true => format!(
+    let own = match origin {
+        Origin::Scans {
+            refused: Some(reason),
+        } => format!("what the radar says of itself cannot be used ({reason})"),
+        _ => "the radar does not describe itself in the bag".to_owned(),
+    };
+    let mut notes = vec![match origin {
+        Origin::Radar => format!(
             "Scans are on {}, {} azimuths of {} bins, {} encoder counts per turn, as the radar says of itself.",
             topics.scans.name, radar.azimuth_samples, radar.range_in_bins, radar.encoder_size
         ),
-        false => format!(
-            "Scans are on {}; the radar does not describe itself in the bag: {} azimuths of {} bins are as found, {} encoder counts per \
+        Origin::Scans { .. } => format!(
+            "Scans are on {}; {own}: {} azimuths of {} bins are as found, {} encoder counts per \
              turn as configured (default: 5600).",
             topics.scans.name, radar.azimuth_samples, radar.range_in_bins, radar.encoder_size
         ),
@@ -375,8 +299,12 @@ impl Dataset for Scans {
         check_capacity(&self.limits(), &slot)?;
         let path = self.file(index).to_owned();
         if entry.is_damaged {
-            let reason = format!("the message of scan {index} cannot be decoded");
-            return Err(ReadError::Damaged { path, reason });
+            let reason = self.damage(entry);
+            return Err(ReadError::Message {
+                path,
+                index,
+                reason,
+            });
         }
         match self.assemble(index, entry, slot) {
             Ok(Some(geometry)) => Ok(geometry),

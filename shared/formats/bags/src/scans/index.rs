@@ -3,10 +3,10 @@
 use gyre_colossus::{Counters, FoundClock, RadarClock, SweepAssembler};
 use gyre_radar::{OwnedScan, ScanLimits};
 
-use super::Bag;
 use crate::{
     BagError,
     azimuths::{Described, azimuths},
+    bag::Bag,
     reading::Message,
     topics::{Kind, Topics},
 };
@@ -44,6 +44,10 @@ pub(super) struct Index {
     /// Messages that cannot be decoded, and spans that cannot be read.
     damaged_messages: u64,
     damaged_spans: u64,
+    /// Why the first of these messages cannot be decoded.
+    first_damage: Option<String>,
+    /// Azimuths in those that can be.
+    azimuths: u64,
 }
 
 impl Index {
@@ -72,20 +76,47 @@ impl Index {
         clock.clone()
     }
 
+    /// Returns why no scan on a topic can be read; `None` if one can be.
+    pub fn why_none_can_be_read(&self, topic: &str) -> Option<String> {
+        if self.entries.iter().any(|entry| !entry.is_damaged) {
+            return None;
+        }
+        let (lost, azimuths) = (&self.counters, self.azimuths);
+        let broken = lost.broken_sweeps;
+        Some(match &self.first_damage {
+            Some(reason) if azimuths == 0 => {
+                format!("has messages on {topic}, of which none can be decoded: {reason}")
+            }
+            _ if azimuths == 0 => format!("has no messages on {topic} that can be read"),
+            _ if broken > 0 => format!(
+                "has {azimuths} azimuths on {topic}, but their times do not advance as the radar turns, by its encoder and its rotation"
+            ),
+            _ if lost.invalid_azimuths > 0 => format!(
+                "has {azimuths} azimuths on {topic}, of which {} have encoder values beyond a turn: set dataset.encoder_counts",
+                lost.invalid_azimuths
+            ),
+            _ => format!(
+                "has no complete turn of the radar on {topic}: {azimuths} azimuths, {} turns of which more than half is missing",
+                lost.incomplete_sweeps
+            ),
+        })
+    }
+
     /// Returns what was found of the times, and what is missing: whole sentences.
     pub fn notes(&self) -> Vec<String> {
         let found = self.clocks.iter().filter_map(|(_, clock)| clock.found());
         let mut notes: Vec<String> = found.map(|found| found.to_string()).collect();
         let lost = &self.counters;
-        for (count, what) in [
+        let damaged = format!(
+            "messages with scans cannot be decoded, and are skipped (the first: {}).",
+            self.first_damage.as_deref().unwrap_or_default()
+        );
+        let losses: [(u64, &str); 6] = [
             (
                 self.damaged_spans,
                 "damaged parts of the bag are skipped, with all that is in them.",
             ),
-            (
-                self.damaged_messages,
-                "messages with scans cannot be decoded, and are skipped.",
-            ),
+            (self.damaged_messages, &damaged),
             (
                 lost.missing_azimuths,
                 "azimuths are missing; their powers are zero.",
@@ -102,7 +133,8 @@ impl Index {
                 lost.cut_rows,
                 "azimuths have more bins than the radar says, and are cut.",
             ),
-        ] {
+        ];
+        for (count, what) in losses {
             if count > 0 {
                 notes.push(format!("{count} {what}"));
             }
@@ -146,6 +178,8 @@ impl Indexing {
                 counters: Counters::default(),
                 damaged_messages: 0,
                 damaged_spans: 0,
+                first_damage: None,
+                azimuths: 0,
             },
             clock,
         }
@@ -163,7 +197,8 @@ impl Indexing {
                 self.add_azimuth(place, azimuth, received_ns, message.log_ns);
                 place.row += 1;
             });
-            if added.is_err() {
+            if let Err(reason) = added {
+                self.index.first_damage.get_or_insert(reason);
                 self.add_damaged(place, message.log_ns);
             }
         }
@@ -176,6 +211,7 @@ impl Indexing {
         received_ns: i64,
         logged_ns: i64,
     ) {
+        self.index.azimuths += 1;
         self.held.push(place);
         let mut released = self.held.iter();
         for (azimuth, stamp_ns) in self.clock.stamp(azimuth, received_ns) {

@@ -242,6 +242,16 @@ pub enum ReadError {
         /// Time of the scan minus that by its name, s.
         apart_s: f64,
     },
+    /// A message that is not of its type, or not of powers.
+    #[error("the message of scan {index} in {path} cannot be decoded: {reason}")]
+    Message {
+        /// The file.
+        path: PathBuf,
+        /// The scan, from 0.
+        index: usize,
+        /// The problem.
+        reason: String,
+    },
 }
 
 impl ReadError {
