@@ -13,7 +13,7 @@ use mcap::{
 };
 use serde::Deserialize;
 
-use crate::BagError;
+use crate::{BagError, order::by_time};
 
 /// The description of a bag in its folder.
 pub(crate) const METADATA: &str = "metadata.yaml";
@@ -82,10 +82,10 @@ struct Information {
     compression_mode: String,
 }
 
-/// Returns the files of a bag in order.
+/// Returns the files of a bag in order: of its description, or without one of their times.
 ///
 /// # Errors
-/// A bag that is not of MCAP files, or that is compressed as a whole.
+/// A bag that is not of MCAP files, or that is compressed as a whole; files of several bags.
 pub(crate) fn files(path: &Path) -> Result<Vec<PathBuf>, BagError> {
     let files = match path.is_dir() {
         true if has_metadata(path) => described(path)?,
@@ -98,12 +98,14 @@ pub(crate) fn files(path: &Path) -> Result<Vec<PathBuf>, BagError> {
     if let Some(file) = files.iter().find(|file| extension(file) == "db3") {
         return Err(database(file));
     }
-    match files.is_empty() {
-        true => Err(BagError::unreadable(
+    match files.len() {
+        0 => Err(BagError::unreadable(
             path,
             "lists no files: there is nothing to read",
         )),
-        false => Ok(files),
+        1 => Ok(files),
+        _ if has_metadata(path) => Ok(files),
+        _ => by_time(path, files),
     }
 }
 
@@ -166,20 +168,13 @@ fn within(folder: &Path, file: &Path) -> Result<PathBuf, BagError> {
     })
 }
 
-/// Returns the files of a folder that has no description, in the order of their numbers.
+/// Returns the files of a folder that has no description, by name.
 fn listed(folder: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let paths = entries.map(|entry| entry.path());
     let mut files: Vec<PathBuf> = paths.filter(|path| is_bag_file(path)).collect();
-    files.sort_by_key(|path| (number(path), path.clone()));
+    files.sort();
     files
-}
-
-/// Returns the number at the end of a name: that of the file in its bag.
-fn number(path: &Path) -> Option<u64> {
-    let stem = path.file_stem()?.to_str()?;
-    let (_, digits) = stem.rsplit_once('_')?;
-    digits.parse().ok()
 }
 
 fn compressed(path: &Path) -> BagError {

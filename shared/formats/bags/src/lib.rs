@@ -2,7 +2,7 @@
 //! `ros2 bag play` takes.
 //!
 //! A bag is a file of the MCAP profile `ros2`, or a folder of such files with a `metadata.yaml`.
-//! Reading order: `files` (what is a bag), [`damaged`] (MCAP records from
+//! Reading order: `files` (what is a bag), `order` (of its files), [`damaged`] (MCAP records from
 //! damaged files), `spans` (where messages are), `topics` (which of them are a radar's), `azimuths`
 //! (messages as azimuths), `bag` (its files as one), `scans` (azimuths as scans), [`BagWriter`].
 
@@ -11,6 +11,7 @@ mod bag;
 pub mod damaged;
 mod error;
 mod files;
+mod order;
 mod radar;
 mod reading;
 mod scans;

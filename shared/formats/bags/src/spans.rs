@@ -1,6 +1,6 @@
 //! The places of messages in a file: its chunks, and the records outside of chunks.
 
-use std::{fs::File, path::Path};
+use std::{fs::File, io, ops::Range, path::Path};
 
 use crate::damaged::{Span, Walk};
 use mcap::records::op;
@@ -19,6 +19,33 @@ pub(crate) struct Spans {
     pub summary: Vec<Span>,
     /// True if the file goes on to its end.
     pub is_complete: bool,
+    /// The first and last time at which a message was received, ns; `None` without messages.
+    pub times_ns: Option<(u64, u64)>,
+}
+
+/// The place of its times in a chunk, and of its time in a message, behind opcode and length.
+const CHUNK_TIMES: Range<usize> = 9..25;
+const MESSAGE_TIME: Range<usize> = 15..23;
+
+impl Spans {
+    /// Adds the times that are in a record.
+    fn add_times(&mut self, file: &File, opcode: u8, span: Span) -> io::Result<()> {
+        let place = match opcode {
+            op::CHUNK => CHUNK_TIMES,
+            op::MESSAGE => MESSAGE_TIME,
+            _ => return Ok(()),
+        };
+        let bytes = span.bytes.min(place.end as u64);
+        let head = crate::damaged::read(file, Span { bytes, ..span })?;
+        let (numbers, _) = head.get(place).unwrap_or_default().as_chunks::<8>();
+        // A chunk without messages has zeros.
+        let times = numbers.iter().map(|bytes| u64::from_le_bytes(*bytes));
+        for time in times.filter(|time| *time > 0) {
+            let (first, last) = self.times_ns.unwrap_or((time, time));
+            self.times_ns = Some((first.min(time), last.max(time)));
+        }
+        Ok(())
+    }
 }
 
 /// Finds the spans of a file.
@@ -33,6 +60,7 @@ pub(crate) fn spans(path: &Path, file: &File) -> Result<Spans, BagError> {
     // Records outside of chunks.
     let mut plain: Option<Span> = None;
     while let Some((opcode, span)) = walk.next().map_err(failed)? {
+        found.add_times(file, opcode, span).map_err(failed)?;
         match opcode {
             op::SCHEMA | op::CHANNEL if found.is_complete => found.summary.push(span),
             op::SCHEMA | op::CHANNEL | op::MESSAGE => {

@@ -3,6 +3,7 @@
 
 mod damage;
 mod drivers;
+mod order;
 
 use std::{
     collections::BTreeMap,
