@@ -1,6 +1,5 @@
 //! Summary of a dataset and of its faults: `gyre inspect`.
 
-mod clock;
 mod display;
 mod findings;
 mod ground_truth;
@@ -11,7 +10,6 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-pub use clock::ClockOffset;
 pub use ground_truth::GroundTruthReport;
 pub use rows::{Chirps, RowsReport};
 pub use timing::{Gap, Stall, TimingReport};

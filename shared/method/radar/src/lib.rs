@@ -10,6 +10,7 @@
 //! - [`mod@inspect`]: a summary of a recording and of its faults.
 
 mod chain;
+mod clock;
 pub mod dataset;
 pub mod fingerprint;
 pub mod ground_truth;
@@ -22,6 +23,7 @@ pub mod scan;
 pub mod trajectory;
 
 pub use chain::{MAX_INTERVAL_NS, continues};
+pub use clock::{ClockOffset, MAX_OFFSET_S, clock_offset};
 pub use dataset::{
     AzimuthSource, DEFAULT_TURN_NS, Dataset, DatasetOptions, FileList, Format, ImageSize,
     ImageSource, OpenError, ReadError, correct_eccentricity, middle_ns, open, open_resolved,

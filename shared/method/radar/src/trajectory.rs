@@ -48,6 +48,14 @@ impl Trajectory {
         Some((*stamps.first()?, *stamps.last()?))
     }
 
+    /// Returns the trajectory with all its times earlier by `ns`.
+    pub fn earlier_by(mut self, ns: i64) -> Self {
+        for stamp in self.stamp_ns.iter_mut().flatten() {
+            *stamp = stamp.saturating_sub(ns);
+        }
+        self
+    }
+
     /// Returns the pose at a time, linearly interpolated. `None` outside the time span.
     pub fn at(&self, stamp_ns: i64) -> Option<Pose> {
         let stamps = self.stamp_ns.as_ref()?;

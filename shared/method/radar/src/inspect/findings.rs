@@ -1,10 +1,13 @@
 //! Faults of a dataset, in sentences.
 
 use super::{Chirps, GroundTruthReport, Report, TimingReport};
+use crate::clock::MAX_OFFSET_S;
 use crate::dataset::{DatasetOptions, Format};
 
 /// Maximum number of scans that are listed; more are counted.
 const MAX_LISTED: usize = 8;
+/// A shorter path is that of a trajectory that stands, m.
+const STANDING_M: f64 = 0.1;
 
 pub(super) fn list(report: &Report, notes: &[String], options: &DatasetOptions) -> Vec<String> {
     let mut found = notes.to_vec();
@@ -135,6 +138,8 @@ fn ground_truth_findings(truth: &GroundTruthReport, report: &Report) -> Vec<Stri
     }
     let heading = (!truth.has_heading && truth.poses > 1)
         .then(|| format!("{name} has positions only, no headings."));
+    let stands = (truth.poses > 1 && truth.path_length_m < STANDING_M)
+        .then(|| format!("{name} stands still: all its poses are in one place."));
     let unstamped = truth
         .span_ns
         .is_none()
@@ -143,17 +148,23 @@ fn ground_truth_findings(truth: &GroundTruthReport, report: &Report) -> Vec<Stri
         .scans_covered
         .filter(|n| *n < report.scans)
         .map(|n| format!("{name} covers {n} of {} scans.", report.scans));
-    [heading, unstamped, covered, clock_finding(truth, &name)]
-        .into_iter()
-        .flatten()
-        .collect()
+    [
+        heading,
+        stands,
+        unstamped,
+        covered,
+        clock_finding(truth, &name),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
 }
 
 fn clock_finding(truth: &GroundTruthReport, name: &str) -> Option<String> {
     let clock = truth.clock.as_ref()?;
     if !clock.is_reliable() {
         return Some(format!(
-            "{name} does not correlate with the given trajectory at any offset within 10 s: its clock cannot be compared."
+            "{name} does not correlate with the given trajectory at any offset within {MAX_OFFSET_S} s: its clock cannot be compared."
         ));
     }
     let mirrored = if clock.mirrored {
@@ -161,16 +172,12 @@ fn clock_finding(truth: &GroundTruthReport, name: &str) -> Option<String> {
     } else {
         ""
     };
-    match (clock.agrees(), clock.late_s > 0.0) {
-        (true, _) if clock.mirrored => Some(format!("The clock of {name} agrees{mirrored}.")),
-        (true, _) => None,
-        (false, late) => {
-            let word = if late { "late" } else { "early" };
-            Some(format!(
-                "{name} is {:.2} s {word} relative to the given trajectory{mirrored}.",
-                clock.late_s.abs()
-            ))
-        }
+    match clock.agrees() {
+        true if clock.mirrored => Some(format!("The clock of {name} agrees{mirrored}.")),
+        true => None,
+        false => Some(format!(
+            "{name} is {clock} relative to the given trajectory{mirrored}."
+        )),
     }
 }
 

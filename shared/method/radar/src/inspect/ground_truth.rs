@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::clock::{self, ClockOffset};
+use crate::clock::{ClockOffset, clock_offset};
 use crate::dataset::Dataset;
 use crate::ground_truth::{find_ground_truth, read_trajectory};
 use crate::median::median;
@@ -84,7 +84,7 @@ fn examine_file(
         span_ns: truth.span_ns(),
         scans_covered: truth.span_ns().map(within).filter(|_| !scans_ns.is_empty()),
         nearest_pose_s: nearest_pose_s(&truth, scans_ns),
-        clock: trajectory.and_then(|given| clock::offset(given, &truth)),
+        clock: trajectory.and_then(|given| clock_offset(given, &truth)),
     }
 }
 

@@ -1,12 +1,23 @@
 //! Time offset between two trajectories, from their speeds and yaw rates.
 
+use std::fmt;
+
 use serde::Serialize;
 
+use crate::dataset::stamp::SECOND_NS;
 use crate::trajectory::Trajectory;
 
-/// Range and step of the offsets that are evaluated, ns.
-const MAX_OFFSET_NS: i64 = 10_000_000_000;
+/// Range of the offsets that are evaluated, s: UTC and GPS time are 18 s apart, UTC and TAI 37 s.
+pub const MAX_OFFSET_S: i64 = 60;
+/// An offset beyond this one must fit better by a margin of the score, since some stretch of a long
+/// drive resembles another.
+const NEAR_NS: i64 = 10_000_000_000;
+const FAR_MARGIN: f64 = 0.02;
+/// Steps of the offsets, ns: first over the range, then around the best.
+const COARSE_NS: i64 = 250_000_000;
 const STEP_NS: i64 = 50_000_000;
+/// Motions that are compared at most; of more, every so manieth.
+const MAX_MOTIONS: usize = 2000;
 /// Duration of the motions that are compared, ns: longer than a scan, to average the noise of
 /// positions.
 const BASELINE_NS: i64 = 1_000_000_000;
@@ -45,6 +56,13 @@ impl ClockOffset {
     }
 }
 
+impl fmt::Display for ClockOffset {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let word = if self.late_s > 0.0 { "late" } else { "early" };
+        write!(f, "{:.2} s {word}", self.late_s.abs())
+    }
+}
+
 /// A motion of the reference.
 struct Motion {
     from_ns: i64,
@@ -54,42 +72,56 @@ struct Motion {
 }
 
 /// Returns the offset of `other` with the highest correlation of speeds and yaw rates; `None`
-/// without sufficient overlap.
-pub(super) fn offset(reference: &Trajectory, other: &Trajectory) -> Option<ClockOffset> {
+/// without sufficient overlap, or without times.
+pub fn clock_offset(reference: &Trajectory, other: &Trajectory) -> Option<ClockOffset> {
     let motions = motions(reference);
     let turns = reference.has_heading() && other.has_heading();
-    let steps = MAX_OFFSET_NS / STEP_NS;
-    let tried: Vec<Option<Fit>> = (-steps..=steps)
-        .map(|k| fit(&motions, other, k * STEP_NS, turns))
-        .collect();
-    let max_count = tried.iter().flatten().map(|f| f.count).max()?;
-    let is_sufficient =
-        |f: &Fit| f.count >= MIN_MOTIONS && f.count as f64 >= MIN_SHARE * max_count as f64;
-    let score = |k: usize| {
-        tried
-            .get(k)
-            .and_then(Option::as_ref)
-            .filter(|f| is_sufficient(f))
-            .map(Fit::score)
+    let fits = |offsets: Vec<i64>| -> Vec<Fit> {
+        let fits = offsets.into_iter();
+        fits.filter_map(|late_ns| fit(&motions, other, late_ns, turns))
+            .collect()
     };
-    let best = (0..tried.len())
-        .filter(|k| score(*k).is_some())
-        .max_by(|a, b| {
-            score(*a)
-                .partial_cmp(&score(*b))
-                .unwrap_or(std::cmp::Ordering::Equal)
-        })?;
-    let fine = match (score(best.wrapping_sub(1)), score(best), score(best + 1)) {
-        (Some(a), Some(b), Some(c)) if a - 2.0 * b + c < 0.0 => 0.5 * (a - c) / (a - 2.0 * b + c),
-        _ => 0.0,
+    let steps = MAX_OFFSET_S * SECOND_NS / COARSE_NS;
+    let coarse = fits((-steps..=steps).map(|k| k * COARSE_NS).collect());
+    let max_count = coarse.iter().map(|fit| fit.count).max()?;
+    let sufficient = |fits: Vec<Fit>| -> Vec<Fit> {
+        let enough = |fit: &Fit| {
+            fit.count >= MIN_MOTIONS && fit.count as f64 >= MIN_SHARE * max_count as f64
+        };
+        fits.into_iter().filter(enough).collect()
     };
-    let found = tried[best].as_ref()?;
+    let coarse = sufficient(coarse);
+    let score = |fit: &Fit| match fit.late_ns.abs() > NEAR_NS {
+        true => fit.score() - FAR_MARGIN,
+        false => fit.score(),
+    };
+    let around = coarse.iter().max_by(|a, b| score(a).total_cmp(&score(b)))?;
+    let around = around.late_ns;
+    let steps = COARSE_NS / STEP_NS;
+    let fine = sufficient(fits(
+        (-steps..=steps).map(|k| around + k * STEP_NS).collect(),
+    ));
+    let scores: Vec<f64> = fine.iter().map(Fit::score).collect();
+    let best = (0..fine.len()).max_by(|a, b| scores[*a].total_cmp(&scores[*b]))?;
+    let found = &fine[best];
     Some(ClockOffset {
-        late_s: (best as f64 - steps as f64 + fine) * STEP_NS as f64 * 1e-9,
+        late_s: found.late_ns as f64 * 1e-9 + peak(&scores, best) * STEP_NS as f64 * 1e-9,
         speed_correlation: found.speed,
         turn_correlation: found.turn,
         mirrored: found.turn.is_some_and(|t| t < -MIN_CORRELATION),
     })
+}
+
+/// Returns the place of the peak of the parabola through a maximum and its neighbours, in steps
+/// from the maximum.
+fn peak(scores: &[f64], best: usize) -> f64 {
+    let around = best
+        .checked_sub(1)
+        .and_then(|from| scores.get(from..=best + 1));
+    match around {
+        Some(&[a, b, c]) if a - 2.0 * b + c < 0.0 => 0.5 * (a - c) / (a - 2.0 * b + c),
+        _ => 0.0,
+    }
 }
 
 fn motions(reference: &Trajectory) -> Vec<Motion> {
@@ -110,11 +142,14 @@ fn motions(reference: &Trajectory) -> Vec<Motion> {
             turn_rad,
         })
     };
-    (0..stamps.len()).map_while(over_baseline).collect()
+    let every = stamps.len().div_ceil(MAX_MOTIONS).max(1);
+    let starts = (0..stamps.len()).step_by(every);
+    starts.map_while(over_baseline).collect()
 }
 
 /// Correlation at one offset.
 struct Fit {
+    late_ns: i64,
     count: usize,
     speed: f64,
     turn: Option<f64>,
@@ -146,6 +181,7 @@ fn fit(motions: &[Motion], other: &Trajectory, late_ns: i64, turns: bool) -> Opt
         );
     }
     (speed.n > 0.0).then(|| Fit {
+        late_ns,
         count: speed.n as usize,
         speed: speed.value(),
         turn: turns.then(|| turn.value()),
@@ -209,8 +245,8 @@ mod tests {
 
     #[test]
     fn a_late_clock_is_measured() {
-        for late_ms in [-3_210, -20, 0, 777, 1_600] {
-            let found = offset(&drive(0, 1.0), &drive(late_ms * 1_000_000, 1.0)).unwrap();
+        for late_ms in [-3_210, -20, 0, 777, 1_600, 18_000, -37_000] {
+            let found = clock_offset(&drive(0, 1.0), &drive(late_ms * 1_000_000, 1.0)).unwrap();
             assert!(
                 (found.late_s - late_ms as f64 * 1e-3).abs() < 0.01,
                 "{late_ms} ms: {found:?}"
@@ -222,7 +258,7 @@ mod tests {
 
     #[test]
     fn a_mirrored_ground_truth_is_detected() {
-        let found = offset(&drive(0, 1.0), &drive(500_000_000, -1.0)).unwrap();
+        let found = clock_offset(&drive(0, 1.0), &drive(500_000_000, -1.0)).unwrap();
         assert!(
             found.mirrored && (found.late_s - 0.5).abs() < 0.01,
             "{found:?}"
@@ -231,7 +267,7 @@ mod tests {
 
     #[test]
     fn trajectories_of_different_days_have_no_offset() {
-        assert!(offset(&drive(0, 1.0), &drive(86_400_000_000_000, 1.0)).is_none());
-        assert!(offset(&drive(0, 1.0), &Trajectory::default()).is_none());
+        assert!(clock_offset(&drive(0, 1.0), &drive(86_400_000_000_000, 1.0)).is_none());
+        assert!(clock_offset(&drive(0, 1.0), &Trajectory::default()).is_none());
     }
 }
