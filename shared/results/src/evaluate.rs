@@ -9,7 +9,7 @@ use gyre_radar::{Trajectory, ground_truth::read_trajectory};
 use gyre_terminal::{Failure, print};
 
 use crate::{
-    judgement::{Judgement, judge, judge_motions},
+    judgement::{Judgement, judge, judge_motions, note_time_offset, without_time_offset},
     odometry,
 };
 
@@ -22,6 +22,15 @@ pub use arguments::EvaluateArguments;
 pub fn evaluate(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> {
     let estimate = read_trajectory(&arguments.estimate)?;
     let truth = read_trajectory(&arguments.ground_truth)?;
+    let (truth, offset) = match arguments.find_time_offset {
+        true => {
+            without_time_offset(&estimate, truth).map(|(truth, offset)| (truth, Some(offset)))?
+        }
+        false => {
+            note_time_offset(&estimate, &truth);
+            (truth, None)
+        }
+    };
     let evaluation = judge(
         &estimate,
         &truth,
@@ -31,7 +40,8 @@ pub fn evaluate(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> {
         },
     )?;
     let motions = judged_motions(arguments, &estimate, &truth, &evaluation)?;
-    let judgement = Judgement::new(evaluation, motions.as_ref(), &nees_options(arguments));
+    let judgement = Judgement::new(evaluation, motions.as_ref(), &nees_options(arguments))
+        .with_time_offset(offset);
     match arguments.json {
         true => print::line(serde_json::to_string_pretty(&judgement)?)?,
         false => print::line(format_args!("{judgement:#}"))?,

@@ -8,14 +8,17 @@ use gyre_evaluation::{
     Options, TimedMotion, bands, nees,
     plot::{bands_svg, errors_svg, trajectory_svg},
 };
-use gyre_radar::Trajectory;
-use gyre_terminal::Failure;
+use gyre_radar::{ClockOffset, MAX_OFFSET_S, Trajectory, clock_offset};
+use gyre_terminal::{Failure, print};
 use serde::Serialize;
 
 /// The evaluation with the NEES of its covariances. `Display` is a table, the alternate form a
 /// longer one.
 #[derive(Debug, Serialize)]
 pub struct Judgement {
+    /// Time by which the clock of the ground truth was late, s, and which was taken out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    time_offset_s: Option<f64>,
     #[serde(flatten)]
     evaluation: Evaluation,
     /// `None`: there are no covariances, or the truth cannot judge them.
@@ -40,11 +43,18 @@ impl Judgement {
         let bands = motions.map(|motions| bands(motions, options.truth_sigma));
         let within_3_sigma_percent = bands.as_ref().map(|bands| bands.inside_percent(3.0));
         Self {
+            time_offset_s: None,
             evaluation,
             nees,
             within_3_sigma_percent,
             bands,
         }
+    }
+
+    /// Adds the time offset of the ground truth that was taken out.
+    pub fn with_time_offset(mut self, offset: Option<ClockOffset>) -> Self {
+        self.time_offset_s = offset.map(|offset| offset.late_s);
+        self
     }
 
     /// Draws the trajectory, errors where the truth has heading, and bands where there are
@@ -70,6 +80,14 @@ impl Judgement {
 
 impl fmt::Display for Judgement {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(late_s) = self.time_offset_s {
+            let word = if late_s > 0.0 { "late" } else { "early" };
+            let by_s = late_s.abs();
+            writeln!(
+                f,
+                "time offset   the ground truth was {by_s:.2} s {word}: taken out"
+            )?;
+        }
         self.evaluation.fmt(f)?;
         if let Some([x, y, yaw]) = self.within_3_sigma_percent {
             write!(
@@ -83,6 +101,36 @@ impl fmt::Display for Judgement {
         write!(f, "\n\n")?;
         nees.fmt(f)
     }
+}
+
+/// Says so if the clock of the ground truth differs from the estimate's.
+pub fn note_time_offset(estimate: &Trajectory, truth: &Trajectory) {
+    let differs = |offset: &ClockOffset| offset.is_reliable() && !offset.agrees();
+    if let Some(offset) = clock_offset(estimate, truth).filter(differs) {
+        print::note(format_args!(
+            "the motions of the ground truth are {offset}: its clock differs (UTC and GPS time: 18 s, UTC and TAI: 37 s), or it is of \
+             another drive; `gyre evaluate --find-time-offset` takes that out"
+        ));
+    }
+}
+
+/// Returns the ground truth with the clock of the estimate, and the offset that was taken out.
+///
+/// # Errors
+/// The motions do not show an offset.
+pub fn without_time_offset(
+    estimate: &Trajectory,
+    truth: Trajectory,
+) -> Result<(Trajectory, ClockOffset), Failure> {
+    let found = clock_offset(estimate, &truth).filter(ClockOffset::is_reliable);
+    let found = found.ok_or_else(|| {
+        format!(
+            "cannot find the time offset: the motions of the estimate and of the ground truth do not agree at any offset within \
+             {MAX_OFFSET_S} s, or one of them has no times"
+        )
+    })?;
+    let late_ns = (found.late_s * 1e9).round() as i64;
+    Ok((truth.earlier_by(late_ns), found))
 }
 
 /// Evaluates by time where both have stamps, else pose by pose.
@@ -138,4 +186,82 @@ fn timed(trajectory: &Trajectory) -> gyre_evaluation::TimedPoses<'_> {
 
 fn untimed(trajectory: &Trajectory) -> gyre_evaluation::TimedPoses<'_> {
     gyre_evaluation::TimedPoses::untimed(&trajectory.poses)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::path::PathBuf;
+
+    use gyre_geometry::{Pose, pose};
+    use gyre_radar::read_trajectory;
+
+    use super::*;
+
+    const START_NS: i64 = 1_549_986_607_000_000_000;
+
+    /// A drive of 100 s through bends, at `rate` Hz, by a clock that is late.
+    fn drive(rate: f64, late_s: f64) -> Trajectory {
+        let (mut now, mut poses, mut stamps) = (Pose::identity(), Vec::new(), Vec::new());
+        let steps = (100.0 * rate) as i64;
+        for k in 0..steps {
+            // Fine steps, so that the path does not depend on the rate.
+            stamps.push(START_NS + ((k as f64 / rate + late_s) * 1e9).round() as i64);
+            poses.push(now);
+            let fine = (1000.0 / rate) as i64;
+            for part in 0..fine {
+                let t = (k * fine + part) as f64 * 1e-3;
+                let speed = 8.0 + 3.0 * (0.37 * t).sin() + 2.0 * (1.1 * t).cos();
+                now *= pose(1e-3 * speed, 0.0, 1e-3 * 0.3 * (0.53 * t).sin());
+            }
+        }
+        Trajectory {
+            stamp_ns: Some(stamps),
+            poses,
+        }
+    }
+
+    fn ate_m(estimate: &Trajectory, truth: &Trajectory) -> f64 {
+        judge(estimate, truth, Options::default())
+            .unwrap()
+            .ate
+            .rmse_m
+    }
+
+    #[test]
+    fn clocks_that_differ_are_found_and_the_offset_is_taken_out() {
+        let estimate = drive(4.0, 0.0);
+        for late_s in [18.0, 37.0, -18.0, 1.6] {
+            let truth = drive(10.0, late_s);
+            assert!(ate_m(&estimate, &truth) > 0.5);
+            let (truth, offset) = without_time_offset(&estimate, truth).unwrap();
+            assert!((offset.late_s - late_s).abs() < 0.02, "{offset:?}");
+            assert!(ate_m(&estimate, &truth) < 0.1, "{late_s}");
+        }
+        let standing = Trajectory {
+            poses: vec![Pose::identity(); estimate.len()],
+            ..estimate.clone()
+        };
+        let refused = without_time_offset(&estimate, standing).unwrap_err();
+        assert!(refused.to_string().contains("do not agree at any offset"));
+    }
+
+    /// A lidar's odometry of a drive of Boreas, in UTM, with roll and pitch.
+    #[test]
+    fn boreas_odometry_agrees_with_its_ground_truth() {
+        let Some(root) = std::env::var_os("GYRE_DATA").map(PathBuf::from) else {
+            println!("skipped: GYRE_DATA is not set");
+            return;
+        };
+        let read = |name| read_trajectory(&root.join("cases/boreas-truth").join(name)).unwrap();
+        let (truth, odometry) = (read("gps_poses.csv"), read("odometry.txt"));
+        let evaluation = judge(&odometry, &truth, Options::default()).unwrap();
+        let (ate_m, path_m) = (evaluation.ate.rmse_m, evaluation.path_m);
+        assert!((0.030..0.035).contains(&ate_m), "{ate_m}");
+        assert!((7_900.0..8_000.0).contains(&path_m), "{path_m}");
+        assert!(!evaluation.axes.y_negated, "{}", evaluation.axes);
+        // The lidar's x axis points to the right.
+        let offset_deg = evaluation.heading_offset_deg.unwrap();
+        assert!((-95.0..-85.0).contains(&offset_deg), "{offset_deg}");
+    }
 }

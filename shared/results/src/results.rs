@@ -24,7 +24,7 @@ use gyre_radar::{
 use gyre_terminal::{Failure, print};
 
 use crate::{
-    judgement::{Judgement, judge, judge_motions},
+    judgement::{Judgement, judge, judge_motions, note_time_offset},
     out::Out,
     summary::{Session, SlamSummary, Summary},
 };
@@ -177,6 +177,7 @@ fn judged(path: &Path, estimate: &Estimate) -> Option<Judgement> {
         return None;
     }
     let by = |truth: Trajectory| -> Result<Judgement, Failure> {
+        note_time_offset(estimate.trajectory(), &truth);
         let evaluation = judge(estimate.trajectory(), &truth, Options::default())?;
         let motions = judge_motions(estimate.motions(), &truth, &evaluation)
             .inspect_err(|reason| print::note(format_args!("no NEES and no bands.svg: {reason}")));

@@ -15,6 +15,10 @@ pub struct EvaluateArguments {
     /// global_pose.csv.
     #[arg(long)]
     pub ground_truth: PathBuf,
+    /// Find the time by which the clock of the ground truth differs, from the speeds and yaw rates
+    /// of both, and take it out (UTC and GPS time: 18 s, UTC and TAI: 37 s).
+    #[arg(long)]
+    pub find_time_offset: bool,
     /// Poses between the starts of the segments that are measured.
     #[arg(long, default_value = "10")]
     pub step: NonZeroUsize,
