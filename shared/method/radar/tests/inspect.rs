@@ -129,7 +129,7 @@ fn boreas_rt_and_fomo_are_reported() {
     assert_mentions(&fomo, &["only one scan"]);
     assert_mentions(&fomo, &["Byte 10 is 0"]);
     assert_mentions(&fomo, &["gt.txt", "positions only"]);
-    assert_mentions(&fomo, &["encoder_counts = 5600"]);
+    assert!(!mentions(&fomo, &["encoder"]), "{:?}", fomo.findings);
 }
 
 #[test]

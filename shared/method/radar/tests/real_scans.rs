@@ -205,7 +205,7 @@ fn fomo_is_detected_by_its_name_and_keeps_all_rows() {
     };
     assert_eq!(
         (scans.format(), scans.len(), scans.encoder_counts()),
-        (Format::Fomo, 1, Some(5595))
+        (Format::Fomo, 1, Some(5600))
     );
     let scan = read(scans.as_mut(), 0).unwrap();
     assert_sweep(&scan);
@@ -215,9 +215,9 @@ fn fomo_is_detected_by_its_name_and_keeps_all_rows() {
             scan.geometry.range_resolution_m,
             scan.geometry.range_offset_m
         ),
-        (0.0438, 0.0)
+        (0.0438, -0.32)
     );
-    assert!((scan.azimuth_rad[0] - 7.0 / 5595.0 * TAU).abs() < 1e-6);
+    assert!((scan.azimuth_rad[0] - 7.0 / 5600.0 * TAU).abs() < 1e-6);
     let nominal = scans.nominal_stamp_ns(0).unwrap();
     assert!(
         (nominal - scan.geometry.stamp_ns).abs() < 1_000_000,

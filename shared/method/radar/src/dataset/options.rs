@@ -33,7 +33,7 @@ pub struct DatasetOptions {
     /// 2021-09-21), Boreas-RT 0.04381, MulRan 200/3360, RADIATE 100/576.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub range_resolution_m: Option<f32>,
-    /// Offset of the ranges, m. Default: Boreas and Boreas-RT -0.31, all others 0.
+    /// Offset of the ranges, m. Default: Boreas and Boreas-RT -0.31, FoMo -0.32, all others 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub range_offset_m: Option<f32>,
     /// Doppler coefficient, s: metres to add to a range for each m/s of closing speed, see
@@ -52,7 +52,7 @@ pub struct DatasetOptions {
     /// encoder.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub azimuth_source: Option<AzimuthSource>,
-    /// Encoder counts per turn. Default: FoMo 5595, all others 5600.
+    /// Encoder counts per turn. Default: 5600.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub encoder_counts: Option<u16>,
     /// The topic of the scans in a bag of ROS 2. Default: the one whose type is of Navtech's
