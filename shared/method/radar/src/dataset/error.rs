@@ -56,10 +56,32 @@ pub enum OpenError {
     Text {
         /// The file.
         path: PathBuf,
-        /// The line, from 1; 0 for the file as a whole.
+        /// The line, from 1.
         line: usize,
         /// The problem, and what is expected.
         reason: String,
+    },
+    /// The list of the times of images that have none of their own is missing.
+    #[error(
+        "there is no {path}: it lists the times of the images, which have none of their own; copy it from the dataset"
+    )]
+    NoTimes {
+        /// The list.
+        path: PathBuf,
+    },
+    /// Images that the list of times does not have.
+    #[error(
+        "{path} has no times of {missing} of {images} images, {first} first; every image needs a line `Frame: <number> Time: <seconds>.<nanoseconds>`: copy the whole list, or take these images away"
+    )]
+    MissingTimes {
+        /// The list.
+        path: PathBuf,
+        /// Images without a time.
+        missing: usize,
+        /// Number of images.
+        images: usize,
+        /// The name of the first image without a time.
+        first: String,
     },
     /// A file or folder that cannot be read.
     #[error("cannot read {path}: {source}")]

@@ -5,7 +5,8 @@
 //! times of receipt at the host: after a stall they are late by up to 1.4 s while the antenna turns
 //! uniformly. The sensor clock is reconstructed.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::io::ErrorKind;
 use std::path::Path;
 
 use super::detect::Found;
@@ -30,14 +31,10 @@ const STAMPS: &str = "Logged stamps are times of receipt at the host; the sensor
 
 pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<TransposedScans, OpenError> {
     let list = found.folder.with_extension("txt");
-    let io_error = |source| OpenError::Io {
-        path: list.clone(),
-        source,
+    let text = match &found.stamps {
+        Some(text) => text.clone(),
+        None => read_list(&list)?,
     };
-    let text = found.stamps.clone().map_or_else(
-        || gyre_storage::read_text(&list, MAX_LIST_BYTES).map_err(io_error),
-        Ok,
-    )?;
     let (stamps, unpadded) = parse_stamps(&list, &text)?;
     let mut scans = TransposedScans::open(found, options, STAMPS, |bins| RANGE_M / bins as f32)?;
     add_turns(&mut scans, &stamps, &list)?;
@@ -58,6 +55,14 @@ pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<TransposedS
         ));
     }
     Ok(scans)
+}
+
+fn read_list(list: &Path) -> Result<String, OpenError> {
+    let path = list.to_owned();
+    gyre_storage::read_text(list, MAX_LIST_BYTES).map_err(|source| match source.kind() {
+        ErrorKind::NotFound => OpenError::NoTimes { path },
+        _ => OpenError::Io { path, source },
+    })
 }
 
 /// A frame number and a time of receipt, ns.
@@ -105,42 +110,72 @@ fn add_turns(
     stamps: &BTreeMap<i64, i64>,
     list: &Path,
 ) -> Result<(), OpenError> {
-    let received = (0..scans.images.len())
-        .map(|index| receipt(&scans.images, index, stamps, list))
-        .collect::<Result<Vec<_>, _>>()?;
+    let received = receipts(&scans.images, stamps, list)?;
     let segments = segments(&received);
-    let clock = |segment: &Segment| {
-        SensorClock::below(&segment.receipts, PERIOD_NS).map(|clock| (segment.first, clock))
-    };
-    let clocks: Vec<_> = segments.iter().filter_map(clock).collect();
+    let mut used: BTreeSet<i64> = BTreeSet::new();
+    let (mut clocks, mut early) = (Vec::new(), Vec::new());
+    for Segment { first, receipts } in &segments {
+        let Some((clock, ignored)) = SensorClock::below_most(receipts, PERIOD_NS) else {
+            continue;
+        };
+        used.extend(
+            receipts
+                .iter()
+                .filter(|receipt| !ignored.contains(receipt))
+                .map(|r| r.0),
+        );
+        early.extend(
+            ignored
+                .into_iter()
+                .map(|receipt| (receipt.0, -clock.after_ns(receipt) * 1e-9)),
+        );
+        clocks.push((*first, clock));
+    }
     let turn = |&(frame, logged_ns): &Receipt| {
         let later = clocks.partition_point(|(first, _)| *first <= frame);
         let (_, clock) = clocks.get(later.checked_sub(1)?)?;
+        let start_ns = clock.start_ns(frame);
         Some(Turn {
-            start_ns: clock.start_ns(frame),
+            start_ns,
             period_ns: clock.period.round() as i64,
-            logged_ns,
+            logged_ns: if used.contains(&frame) {
+                logged_ns
+            } else {
+                start_ns
+            },
         })
     };
     scans.turns = received.iter().filter_map(turn).collect();
     scans.period_ns = scans.turns.first().map_or(0, |turn| turn.period_ns);
-    let used: usize = segments.iter().map(|segment| segment.receipts.len()).sum();
+    let far: Vec<String> = received
+        .iter()
+        .filter(|(frame, _)| !used.contains(frame) && early.iter().all(|(other, _)| other != frame))
+        .map(|(frame, _)| frame.to_string())
+        .collect();
     scans
         .notes
-        .extend(note_times(received.len() - used, segments.len(), list));
+        .extend(note_times(&far, &early, segments.len(), list));
     Ok(())
 }
 
-fn note_times(unused: usize, segments: usize, list: &Path) -> Vec<String> {
+/// Returns sentences on the frames whose times are far off, on those whose times are early by some
+/// seconds, and on breaks.
+fn note_times(far: &[String], early: &[(i64, f64)], segments: usize, list: &Path) -> Vec<String> {
     let (list, limit_s) = (file_name(list), MAX_INTERVAL_NS / SECOND_NS);
-    let single = (unused > 0).then(|| {
-        format!("{unused} times in {list} are more than {limit_s} s from those before and after: the frame number is used instead.")
+    let far = (!far.is_empty()).then(|| {
+        let frames = far.join(", ");
+        format!("{} times in {list} are more than {limit_s} s from those before and after (frames {frames}): the frame number is used instead.", far.len())
+    });
+    let early = (!early.is_empty()).then(|| {
+        let frames = early.iter().map(|(frame, s)| format!("{frame} by {s:.2} s"));
+        let frames = frames.collect::<Vec<_>>().join(", ");
+        format!("{} times in {list} are before their scans were measured, by all others (frames {frames}): the frame number is used instead.", early.len())
     });
     let breaks = (segments > 1).then(|| {
         let breaks = segments - 1;
         format!("The times in {list} break {breaks} times by more than {limit_s} s: the sensor clock starts anew there.")
     });
-    single.into_iter().chain(breaks).collect()
+    [far, early, breaks].into_iter().flatten().collect()
 }
 
 fn file_name(path: &Path) -> String {
@@ -149,30 +184,27 @@ fn file_name(path: &Path) -> String {
         .unwrap_or_default()
 }
 
-/// Returns the receipt of an image.
-fn receipt(
+/// Returns the receipts of all images.
+fn receipts(
     images: &Images,
-    index: usize,
     stamps: &BTreeMap<i64, i64>,
     list: &Path,
-) -> Result<Receipt, OpenError> {
-    let image = images.file(index);
-    let missing = || {
-        let reason = format!(
-            "no time for {}; every image requires a line `Frame: <number> Time: <seconds>.<nanoseconds>`",
-            file_name(image)
-        );
-        OpenError::Text {
-            path: list.to_owned(),
-            line: 0,
-            reason,
-        }
+) -> Result<Vec<Receipt>, OpenError> {
+    let receipt = |index| {
+        let frame = images.number(index)?;
+        Some((frame, *stamps.get(&frame)?))
     };
-    let frame = images.number(index).ok_or_else(missing)?;
-    stamps
-        .get(&frame)
-        .map(|ns| (frame, *ns))
-        .ok_or_else(missing)
+    let found: Vec<Option<Receipt>> = (0..images.len()).map(receipt).collect();
+    let missing = || (0..found.len()).filter(|index| found[*index].is_none());
+    match missing().next() {
+        Some(first) => Err(OpenError::MissingTimes {
+            path: list.to_owned(),
+            missing: missing().count(),
+            images: images.len(),
+            first: file_name(images.file(first)),
+        }),
+        None => Ok(found.into_iter().flatten().collect()),
+    }
 }
 
 /// Returns times by frame number, and how many of them lack leading zeros.

@@ -3,6 +3,19 @@
 /// Maximum time from the first scan, ns: a century. It prevents overflow for absurd frame numbers.
 const MAX_NS: i64 = 3_155_760_000_000_000_000;
 
+/// A time that lies further below the series of the others is wrong, ns. In recordings a time that
+/// is left out lies up to 0.018 s below.
+const EARLY_NS: f64 = 30_000_000.0;
+/// A time that lies less above a series is one that it is fitted to, ns: rounding.
+const TOUCHING_NS: f64 = 1_000.0;
+/// Minimum share of times that lie as closely above a series that leaves out early ones.
+const PROMPT_SHARE: f64 = 0.25;
+/// Minimum number of times of which one can be told to be early.
+const MIN_TIMES: usize = 8;
+
+/// The number of a scan, and when it was received, ns.
+type Receipt = (i64, i64);
+
 /// Scan `number` starts at `start_ns + period_ns * number`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct SensorClock {
@@ -48,6 +61,69 @@ impl SensorClock {
             start: start - slope * first_number as f64,
             period: slope,
         })
+    }
+
+    /// Fits as [`SensorClock::below`], but without times that are early, of which a few may be: one
+    /// would bend the whole series. Returns these too.
+    pub(crate) fn below_most(
+        received: &[Receipt],
+        period: std::ops::RangeInclusive<f64>,
+    ) -> Option<(Self, Vec<Receipt>)> {
+        let all = Self::below(received, period.clone())?;
+        let most = 1 + received.len() / 100;
+        let (mut clock, mut rest) = (all, received.to_vec());
+        for _ in 0..=most {
+            let (near, others) = clock.split_touching(&rest, most);
+            let Some(next) = Self::below(&others, period.clone()) else {
+                break;
+            };
+            if others.len() < MIN_TIMES || !near.iter().any(|time| next.is_early(*time)) {
+                break;
+            }
+            (clock, rest) = (next, others);
+        }
+        let (early, times): (Vec<_>, Vec<_>) = received
+            .iter()
+            .copied()
+            .partition(|time| clock.is_early(*time));
+        let prompt = times
+            .iter()
+            .filter(|time| clock.after_ns(**time) <= EARLY_NS)
+            .count();
+        match prompt as f64 >= PROMPT_SHARE * times.len() as f64 && early.len() <= most {
+            true => Some((Self::below(&times, period)?, early)),
+            false => Some((all, Vec::new())),
+        }
+    }
+
+    /// Divides times into those that the series touches, with as many beside them as may be early
+    /// together, and the others.
+    fn split_touching(&self, times: &[Receipt], most: usize) -> (Vec<Receipt>, Vec<Receipt>) {
+        let beside = most.min(3) - 1;
+        let mut is_near = vec![false; times.len()];
+        for (index, time) in times.iter().enumerate() {
+            if self.after_ns(*time) < TOUCHING_NS {
+                let end = (index + beside + 1).min(times.len());
+                is_near[index.saturating_sub(beside)..end].fill(true);
+            }
+        }
+        let of = |near: bool| {
+            let times = times.iter().zip(&is_near);
+            times
+                .filter(|(_, is_near)| **is_near == near)
+                .map(|(time, _)| *time)
+                .collect()
+        };
+        (of(true), of(false))
+    }
+
+    /// Time of receipt after the start of the sweep, ns.
+    pub(crate) fn after_ns(&self, (number, ns): (i64, i64)) -> f64 {
+        (ns - self.start_ns(number)) as f64
+    }
+
+    fn is_early(&self, time: (i64, i64)) -> bool {
+        self.after_ns(time) < -EARLY_NS
     }
 
     /// Start of the sweep of a scan, ns since 1970.
@@ -144,5 +220,62 @@ mod tests {
     fn one_scan_gives_the_middle_of_the_bounds() {
         let clock = SensorClock::below(&[(7, 1_000)], BOUNDS).unwrap();
         assert_eq!((clock.start_ns(7), clock.period), (1_000, 0.25e9));
+    }
+
+    /// Times of 100 scans of a host that is 0 to 20 ms late, and stalls once.
+    fn times() -> Vec<(i64, i64)> {
+        let late_ms = |k: i64| {
+            if (60..66).contains(&k) {
+                1_400 - (k - 60) * 230
+            } else {
+                k * 7 % 21
+            }
+        };
+        let time = |k| {
+            (
+                k,
+                1_549_986_607_000_000_000 + k * 250_020_000 + late_ms(k) * 1_000_000,
+            )
+        };
+        (0..100).map(time).collect()
+    }
+
+    #[test]
+    fn times_that_are_early_bend_nothing_and_are_returned() {
+        let (good, none) = SensorClock::below_most(&times(), BOUNDS).unwrap();
+        assert_eq!(
+            (good, none),
+            (SensorClock::below(&times(), BOUNDS).unwrap(), Vec::new())
+        );
+        for early in [&[0][..], &[50], &[99], &[20, 80], &[40, 41], &[63]] {
+            for by_ms in [60, 700, 5_000] {
+                let mut received = times();
+                // Of a scan that is received late, a time that is early by so much.
+                early
+                    .iter()
+                    .for_each(|k| received[*k].1 = good.start_ns(*k as i64) - by_ms * 1_000_000);
+                let expected: Vec<_> = early.iter().map(|k| received[*k]).collect();
+                let (clock, found) = SensorClock::below_most(&received, BOUNDS).unwrap();
+                assert_eq!(found, expected, "{early:?} by {by_ms} ms");
+                let error = (0..100)
+                    .map(|k| (clock.start_ns(k) - good.start_ns(k)).abs())
+                    .max();
+                assert!(
+                    error < Some(2_000_000),
+                    "{early:?} by {by_ms} ms: {error:?} ns"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn a_host_that_is_late_most_of_the_time_makes_no_time_early() {
+        let mut received = times();
+        received
+            .iter_mut()
+            .skip(20)
+            .for_each(|(k, ns)| *ns += 300_000_000 + *k * 37 % 11 * 50_000_000);
+        let (_, early) = SensorClock::below_most(&received, BOUNDS).unwrap();
+        assert!(early.is_empty(), "{early:?}");
     }
 }

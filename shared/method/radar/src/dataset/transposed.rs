@@ -22,7 +22,7 @@ const BLOCK: usize = 64;
 pub(crate) struct Turn {
     pub(crate) start_ns: i64,
     pub(crate) period_ns: i64,
-    /// The stamp as logged.
+    /// The stamp as logged; if that is wrong, of a host that is never late.
     pub(crate) logged_ns: i64,
 }
 

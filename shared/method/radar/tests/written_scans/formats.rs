@@ -174,53 +174,6 @@ fn a_row_that_is_a_year_off_makes_its_scan_alone_unreadable_in_every_format_with
 }
 
 #[test]
-fn radiate_times_that_are_off_do_not_move_the_other_scans() {
-    let root = folder();
-    write_radiate(root.path(), 12);
-    let stamps = || -> Vec<_> {
-        let dataset = opened(root.path());
-        (0..12)
-            .map(|index| dataset.nominal_stamp_ns(index))
-            .collect()
-    };
-    let expected = stamps();
-    let list = root.path().join("Navtech_Polar.txt");
-    let text = fs::read_to_string(&list).unwrap();
-    let year_before = text.replace(
-        "Frame: 000011 Time: 1549986608",
-        "Frame: 000011 Time: 1518450608",
-    );
-    assert_ne!(year_before, text);
-    fs::write(&list, year_before).unwrap();
-    assert_eq!(stamps(), expected);
-    let notes = opened(root.path()).notes().join(" ");
-    assert!(
-        notes.contains("1 times in Navtech_Polar.txt are more than 10 s"),
-        "{notes}"
-    );
-}
-
-#[test]
-fn radiate_without_stamps_names_the_file() {
-    let root = folder();
-    write_radiate(root.path(), 2);
-    let list = root.path().join("Navtech_Polar.txt");
-    fs::write(&list, "Frame: 000007 Time: 1549986607.5\n").unwrap();
-    let error = rejected(root.path()).to_string();
-    assert!(
-        error.contains("Navtech_Polar.txt") && error.contains("000008.png"),
-        "{error}"
-    );
-    fs::write(&list, "Frame: 000007 Time: 1549986607.5\nnonsense\n").unwrap();
-    let error = rejected(root.path()).to_string();
-    assert!(error.contains("line 2"), "{error}");
-    fs::remove_file(&list).unwrap();
-    assert!(
-        matches!(rejected(root.path()), OpenError::Io { path, .. } if path.ends_with("Navtech_Polar.txt"))
-    );
-}
-
-#[test]
 fn folders_without_a_dataset_are_rejected() {
     let root = folder();
     assert!(matches!(

@@ -3,6 +3,7 @@
 
 mod formats;
 mod images;
+mod radiate;
 mod rows;
 
 use std::path::Path;
