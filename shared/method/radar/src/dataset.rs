@@ -8,6 +8,7 @@ mod error;
 mod file_list;
 mod first_image;
 mod fomo;
+mod foreign;
 mod format;
 mod image_size;
 mod image_source;

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use super::error::OpenError;
 use super::file_list::FileList;
 use super::first_image::{FirstImage, NamedBy};
+use super::foreign;
 use super::format::Format;
 use super::image_source::ImageSource;
 use super::images::{Images, has_png};
@@ -79,8 +80,12 @@ const LAYOUTS: [(Format, &[&str]); 8] = [
 /// Locates the images at `root`, in the format `forced` or as detected.
 pub(crate) fn locate(root: &Path, forced: Option<Format>) -> Result<Found, OpenError> {
     check_folder(root)?;
-    let folder = find_folder(root, forced)?;
+    let folder = find_folder(root, forced);
+    let folder = folder.map_err(|error| other_format(root, forced).unwrap_or(error))?;
     let mut images = Images::open(&folder)?;
+    if forced.is_some_and(|format| is_other_form(format, &mut images)) {
+        other_format(root, forced).map_or(Ok(()), Err)?;
+    }
     let (format, notes) = match forced.or_else(|| by_layout(root, &folder)) {
         Some(format) => (format, Vec::new()),
         None => by_image(root, &folder, &mut images)?,
@@ -94,12 +99,30 @@ pub(crate) fn locate(root: &Path, forced: Option<Format>) -> Result<Found, OpenE
     })
 }
 
+/// Returns whether images have times in their rows where those of the format have none, or none
+/// where they have.
+fn is_other_form(format: Format, images: &mut Images) -> bool {
+    let has_stamps = !matches!(format, Format::Mulran | Format::Radiate);
+    let first = FirstImage::read(images).ok().flatten();
+    first.is_some_and(|image| image.has_stamps() != has_stamps)
+}
+
+/// Returns an error if a folder is a dataset of another format than is configured.
+fn other_format(root: &Path, configured: Option<Format>) -> Option<OpenError> {
+    let (configured, found) = (configured?, locate(root, None).ok()?.format);
+    (found != configured).then(|| OpenError::OtherFormat {
+        path: root.to_owned(),
+        found,
+        configured,
+    })
+}
+
 fn check_folder(root: &Path) -> Result<(), OpenError> {
     match fs::metadata(root) {
         Ok(entry) if entry.is_dir() => Ok(()),
-        Ok(_) => Err(OpenError::NotAFolder {
+        Ok(_) => Err(foreign::foreign(root).unwrap_or(OpenError::NotAFolder {
             path: root.to_owned(),
-        }),
+        })),
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => Err(OpenError::Missing {
             path: root.to_owned(),
         }),
@@ -134,6 +157,9 @@ fn find_folder(root: &Path, forced: Option<Format>) -> Result<PathBuf, OpenError
         return Err(OpenError::NoImages {
             path: root.to_owned(),
         });
+    }
+    if let Some(error) = foreign::foreign_in(root) {
+        return Err(error);
     }
     let mut folders: Vec<&str> = known().copied().collect();
     folders.dedup();

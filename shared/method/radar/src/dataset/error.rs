@@ -17,11 +17,33 @@ pub enum OpenError {
     },
     /// The path is a file.
     #[error(
-        "{path} is a file: give the folder of the dataset, which holds the radar images or their folder"
+        "{path} is a file: give the folder of the dataset, which holds the radar images or their folder, or a recording or bag of ROS 2 as MCAP"
     )]
     NotAFolder {
         /// The path.
         path: PathBuf,
+    },
+    /// A file that is to be unpacked or converted first.
+    #[error("{path} is {kind}: {remedy}")]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+        /// The kind of the file.
+        kind: &'static str,
+        /// The command or the step that is needed.
+        remedy: &'static str,
+    },
+    /// A dataset of another format than the configuration says.
+    #[error(
+        "{path} looks like {found}, but the configuration says `format = \"{configured}\"`: use a configuration of {found}, or none"
+    )]
+    OtherFormat {
+        /// The dataset's root.
+        path: PathBuf,
+        /// The format that it looks like.
+        found: Format,
+        /// The format that is configured.
+        configured: Format,
     },
     /// A folder without radar images.
     #[error(
@@ -32,7 +54,10 @@ pub enum OpenError {
         path: PathBuf,
     },
     /// A layout of folders and images that no reader knows.
-    #[error("{path} is not a known dataset: {reason}; if it is one, set its `format`")]
+    #[error(
+        "{path} is not a known dataset: {reason}; known are {}: if it is one, set its `format`",
+        known()
+    )]
     UnknownLayout {
         /// The dataset's root.
         path: PathBuf,
@@ -283,6 +308,12 @@ impl ReadError {
     pub fn is_io(&self) -> bool {
         matches!(self, Self::Io { .. })
     }
+}
+
+/// Returns what can be read.
+fn known() -> String {
+    let formats = Format::ALL.map(Format::name).join(", ");
+    format!("{formats}, and as MCAP recordings of runs and bags of ROS 2")
 }
 
 fn transposed(actual: &ImageSize, expected: &ImageSize) -> &'static str {

@@ -3,6 +3,7 @@
 
 mod formats;
 mod images;
+mod packed;
 mod radiate;
 mod rows;
 

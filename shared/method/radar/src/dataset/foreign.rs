@@ -1,0 +1,80 @@
+//! Files that people have of a recording before it is unpacked or converted, by their first bytes.
+
+use std::fs::{self, File};
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use super::error::OpenError;
+
+/// Bytes that tell what a file is: the signature of a tar archive is the last of them.
+const HEAD_BYTES: u64 = 512;
+
+/// Where a signature begins, the signature, the kind of the file, and what to do with it.
+type Kind = (usize, &'static [u8], &'static str, &'static str);
+
+const UNPACK: &str = "unpack it, and name the folder that it held";
+const KINDS: [Kind; 10] = [
+    (
+        0,
+        b"#ROSBAG V",
+        "a bag of ROS 1",
+        "convert it with `rosbags-convert --src FILE --dst FOLDER --dst-storage mcap` (pip install rosbags), and name that folder",
+    ),
+    (
+        0,
+        b"SQLite format 3\0",
+        "an SQLite database, as bags of ROS 2 may be",
+        "convert it with `ros2 bag convert` and `storage_id: mcap`",
+    ),
+    (0, b"PK\x03\x04", "a ZIP archive", UNPACK),
+    (257, b"ustar", "a tar archive", UNPACK),
+    (
+        0,
+        b"\x1f\x8b",
+        "compressed by gzip, as a .tar.gz is",
+        UNPACK,
+    ),
+    (0, b"BZh", "compressed by bzip2, as a .tar.bz2 is", UNPACK),
+    (
+        0,
+        b"\xfd7zXZ\0",
+        "compressed by xz, as a .tar.xz is",
+        UNPACK,
+    ),
+    (
+        0,
+        b"\x28\xb5\x2f\xfd",
+        "compressed by Zstandard, as a .tar.zst is",
+        UNPACK,
+    ),
+    (0, b"7z\xbc\xaf\x27\x1c", "a 7z archive", UNPACK),
+    (0, b"Rar!\x1a\x07", "a RAR archive", UNPACK),
+];
+
+/// Returns an error that says what a file is, if it is one of these.
+pub(crate) fn foreign(path: &Path) -> Option<OpenError> {
+    if !fs::metadata(path).ok()?.is_file() {
+        return None;
+    }
+    let mut head = Vec::new();
+    let file = File::open(path).ok()?;
+    file.take(HEAD_BYTES).read_to_end(&mut head).ok()?;
+    let has = |(at, signature, ..): &&Kind| {
+        head.get(*at..)
+            .is_some_and(|bytes| bytes.starts_with(signature))
+    };
+    let (_, _, kind, remedy) = KINDS.iter().find(has)?;
+    Some(OpenError::Foreign {
+        path: path.to_owned(),
+        kind,
+        remedy,
+    })
+}
+
+/// Returns the same for the first of these files in a folder, by name.
+pub(crate) fn foreign_in(folder: &Path) -> Option<OpenError> {
+    let entries = fs::read_dir(folder).ok()?.flatten();
+    let mut files: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
+    files.sort_unstable();
+    files.iter().find_map(|file| foreign(file))
+}
