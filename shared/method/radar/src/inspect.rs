@@ -39,7 +39,7 @@ pub struct Report {
     pub image: ImageSize,
     /// True if images are stored as range x azimuth.
     pub transposed: bool,
-    /// Azimuths per scan.
+    /// Azimuths of the scan with most of them.
     pub azimuths: usize,
     /// Range bins per azimuth.
     pub bins: usize,
@@ -159,7 +159,7 @@ fn assemble(
         scans_read: read.scans_read,
         image: dataset.image_size(),
         transposed: dataset.is_transposed(),
-        azimuths: geometry.azimuths,
+        azimuths: read.rows.in_scan.1,
         bins: geometry.bins,
         range_resolution_m: geometry.range_resolution_m,
         range_offset_m: geometry.range_offset_m,

@@ -8,8 +8,9 @@ use super::file_list::FileList;
 use super::first_image::{FirstImage, NamedBy};
 use super::foreign;
 use super::format::Format;
+use super::image_list::has_png;
 use super::image_source::ImageSource;
-use super::images::{Images, has_png};
+use super::images::Images;
 
 /// A located dataset, the input of the readers.
 #[derive(Debug)]
@@ -18,7 +19,8 @@ pub(crate) struct Found {
     /// The folder of images.
     pub(crate) folder: PathBuf,
     pub(crate) images: Images,
-    /// The reason for the format, if it was detected from the first image.
+    /// Sentences on files that are left out, and on the format, if it was detected from the first
+    /// image.
     pub(crate) notes: Vec<String>,
     /// The list of stamps, if it is not in a file.
     pub(crate) stamps: Option<String>,
@@ -82,13 +84,17 @@ pub(crate) fn locate(root: &Path, forced: Option<Format>) -> Result<Found, OpenE
     check_folder(root)?;
     let folder = find_folder(root, forced);
     let folder = folder.map_err(|error| other_format(root, forced).unwrap_or(error))?;
-    let mut images = Images::open(&folder)?;
+    let (mut images, mut notes) = Images::open(&folder)?;
     if forced.is_some_and(|format| is_other_form(format, &mut images)) {
         other_format(root, forced).map_or(Ok(()), Err)?;
     }
-    let (format, notes) = match forced.or_else(|| by_layout(root, &folder)) {
-        Some(format) => (format, Vec::new()),
-        None => by_image(root, &folder, &mut images)?,
+    let format = match forced.or_else(|| by_layout(root, &folder)) {
+        Some(format) => format,
+        None => {
+            let (format, note) = by_image(root, &folder, &mut images)?;
+            notes.push(note);
+            format
+        }
     };
     Ok(Found {
         format,
@@ -200,10 +206,11 @@ fn by_image(
     root: &Path,
     folder: &Path,
     images: &mut Images,
-) -> Result<(Format, Vec<String>), OpenError> {
+) -> Result<(Format, String), OpenError> {
+    let size = images.size;
     let unknown = |reason: &str| OpenError::UnknownLayout {
         path: folder.to_owned(),
-        reason: format!("its images ({}) {reason}", images_size(folder)),
+        reason: format!("its images ({size}) {reason}"),
     };
     let Some(image) = FirstImage::read(images)?.filter(FirstImage::has_stamps) else {
         let without_metadata =
@@ -211,7 +218,7 @@ fn by_image(
         return match without_metadata {
             true => Ok((
                 Format::Mulran,
-                vec![decided(Format::Mulran, "transposed images, named by times")],
+                decided(Format::Mulran, "transposed images, named by times"),
             )),
             false => Err(unknown(
                 "have no stamps in their first 8 columns, have no list of stamps beside them, and are not named by times",
@@ -239,13 +246,7 @@ fn by_image(
             equal[0]
         );
     }
-    Ok((format, vec![note]))
-}
-
-fn images_size(folder: &Path) -> String {
-    Images::open(folder)
-        .map(|images| images.size.to_string())
-        .unwrap_or_default()
+    Ok((format, note))
 }
 
 fn decided(format: Format, evidence: &str) -> String {

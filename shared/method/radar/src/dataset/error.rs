@@ -201,14 +201,14 @@ pub enum ReadError {
         /// Bit depth and colour type.
         actual: String,
     },
-    /// An image of another size than the first.
-    #[error("{path} is {actual}, but the first image of the dataset is {expected}{}", transposed(.actual, .expected))]
+    /// An image of another size than the others.
+    #[error("{path} is {actual}, but most images of the dataset are {expected}{}", transposed(.actual, .expected))]
     WrongSize {
         /// The file.
         path: PathBuf,
         /// The size.
         actual: ImageSize,
-        /// The size of the first image.
+        /// The size of most images.
         expected: ImageSize,
     },
     /// An image or file that is larger than any radar scan.
@@ -258,6 +258,18 @@ pub enum ReadError {
         count: u16,
         /// The encoder count of the previous row.
         previous: u16,
+    },
+    /// Rows that are only a part of a turn.
+    #[error(
+        "{path}: no row is in {gap_deg:.0} degrees of the turn, for an encoder of {counts} counts per turn: the image holds a part of a turn, or `encoder_counts` is another number"
+    )]
+    NotATurn {
+        /// The file.
+        path: PathBuf,
+        /// The widest angle without a row, degrees.
+        gap_deg: f64,
+        /// Counts per turn.
+        counts: u16,
     },
     /// A stamp outside the years of radar recordings.
     #[error(

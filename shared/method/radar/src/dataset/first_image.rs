@@ -50,11 +50,16 @@ impl FirstImage {
             return Ok(None);
         }
         let found = images.first_readable()?;
-        Ok(found.map(|(index, pixels)| Self {
+        Ok(found.map(|(index, size, pixels)| Self {
             size,
             rows: rows(&pixels, size).collect(),
             name_ns: images.name_stamp_ns(index),
         }))
+    }
+
+    /// Time in the name of the file, ns.
+    pub(crate) fn name_ns(&self) -> Option<i64> {
+        self.name_ns
     }
 
     /// Range bins.
@@ -125,15 +130,14 @@ impl FirstImage {
         Some((intervals().min()?, intervals().max()?, mean))
     }
 
-    /// Encoder step between rows, if it is constant, and the step from the last row to the first.
-    pub(crate) fn encoder_step(&self, counts: u16) -> Option<(u16, u16)> {
-        let step = self.rows[1].count.checked_sub(self.rows[0].count)?;
-        let is_constant = self
-            .rows
-            .windows(2)
-            .all(|w| w[1].count.checked_sub(w[0].count) == Some(step));
-        let (first, last) = (self.rows[0].count, self.rows[self.rows.len() - 1].count);
-        let seam = first.checked_add(counts)?.checked_sub(last)?;
-        is_constant.then_some((step, seam))
+    /// Duration of a turn by the stamps of its rows, ns.
+    pub(crate) fn turn_ns(&self) -> Option<i64> {
+        let (rows, last) = (self.rows.len() as i64, self.rows.len() - 1);
+        Some((self.row_ns(last)? - self.start_ns()?) * rows / (rows - 1))
+    }
+
+    /// Encoder counts of the rows.
+    pub(crate) fn counts(&self) -> Vec<u16> {
+        self.rows.iter().map(|row| row.count).collect()
     }
 }

@@ -1,26 +1,31 @@
 //! The images of a dataset: their files, order and size.
 
-use std::ffi::OsString;
 use std::fmt;
-use std::fs::{self, DirEntry};
-use std::io;
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 use super::error::{OpenError, ReadError};
 use super::file_list::FileList;
+use super::image_list::{self, ImageList, file_number};
 use super::image_size::ImageSize;
 use super::image_source::ImageSource;
 use super::png_image::{self, ImageReader};
 use super::stamp;
+use crate::scan::MAX_AZIMUTHS;
 
 /// Number of images tried until one can be read.
 const FIRST_TRIES: usize = 8;
+/// Number of images, spread over all of them, whose sizes are looked at.
+const SIZES: usize = 32;
 
-/// Images ordered by number, all of the size of the first one.
+/// Images in order, of one width.
 #[derive(Debug)]
 pub(crate) struct Images {
     files: FileList,
+    /// The size of most images.
     pub(crate) size: ImageSize,
+    /// Rows of the tallest image of that width that is expected.
+    pub(crate) max_rows: usize,
     origin: Origin,
 }
 
@@ -41,27 +46,24 @@ impl fmt::Debug for Origin {
 }
 
 impl Images {
-    /// Lists `folder` and reads the size from the first image with a valid header.
-    pub(crate) fn open(folder: &Path) -> Result<Self, OpenError> {
-        Self::listed(folder, list_png(folder)?)
+    /// Lists `folder`, and returns its images with sentences on what is left out.
+    pub(crate) fn open(folder: &Path) -> Result<(Self, Vec<String>), OpenError> {
+        let ImageList { files, note } = image_list::list(folder)?;
+        Ok((Self::listed(folder, files)?, note.into_iter().collect()))
     }
 
-    /// Reads the size from the first image of `files`, those of `folder`, with a valid header.
+    /// Reads the sizes of some of `files`, those of `folder`.
     pub(crate) fn listed(folder: &Path, files: FileList) -> Result<Self, OpenError> {
-        let Some(first) = files.get(0) else {
+        if files.is_empty() {
             return Err(OpenError::NoImages {
                 path: folder.to_owned(),
             });
-        };
-        let size = png_image::read_size(first).or_else(|error| {
-            (0..FIRST_TRIES)
-                .filter_map(|index| files.get(index))
-                .find_map(|f| png_image::read_size(f).ok())
-                .ok_or(error)
-        })?;
+        }
+        let (size, max_rows) = sizes(&files)?;
         Ok(Self {
             files,
             size,
+            max_rows,
             origin: Origin::Files(ImageReader::default()),
         })
     }
@@ -76,6 +78,7 @@ impl Images {
             false => Ok(Self {
                 files,
                 size,
+                max_rows: size.height,
                 origin: Origin::Source(source),
             }),
         }
@@ -104,38 +107,72 @@ impl Images {
         self.number(index).and_then(stamp::to_ns)
     }
 
+    /// Decodes an image of the usual size.
     pub(crate) fn decode(&mut self, index: usize, pixels: &mut [u8]) -> Result<(), ReadError> {
+        let rows = self.size.height;
+        self.decode_rows(index, rows..=rows, pixels).map(|_| ())
+    }
+
+    /// Decodes an image of the usual width with as many rows as are accepted, and returns its size.
+    pub(crate) fn decode_rows(
+        &mut self,
+        index: usize,
+        rows: RangeInclusive<usize>,
+        pixels: &mut [u8],
+    ) -> Result<ImageSize, ReadError> {
         let len = self.files.len();
         let path = self
             .files
             .get(index)
             .ok_or(ReadError::NoSuchScan { index, len })?;
-        let (actual, needed) = (pixels.len(), self.size.bytes());
+        let (actual, needed) = (pixels.len(), self.size.width * rows.end());
         let pixels = pixels.get_mut(..needed).ok_or(ReadError::SlotTooSmall {
             what: "bytes",
             needed,
             actual,
         })?;
         match &mut self.origin {
-            Origin::Files(reader) => reader.decode(path, self.size, pixels),
+            Origin::Files(reader) => reader.decode(path, self.size, rows, pixels),
             Origin::Source(source) => {
                 source.draw(index, pixels);
-                Ok(())
+                Ok(self.size)
             }
         }
     }
 
-    /// Returns the first image that can be decoded, with its index; `None` if the first ones are
-    /// damaged.
+    /// Returns the rows that a turn may have: azimuths may have been lost.
+    pub(crate) fn accepted_rows(&self) -> RangeInclusive<usize> {
+        2..=self.max_rows
+    }
+
+    /// Returns the first bytes of an image's first row, without reading all of it; `None` if it
+    /// cannot be read, or is not on disk.
+    pub(crate) fn first_bytes<const N: usize>(&self, index: usize) -> Option<[u8; N]> {
+        match self.origin {
+            Origin::Files(_) => png_image::first_bytes(self.file(index)),
+            Origin::Source(_) => None,
+        }
+    }
+
+    /// Keeps the images at these indices, in this order.
+    pub(crate) fn keep(&mut self, indices: &[usize]) {
+        let paths = indices.iter().map(|index| self.file(*index).to_owned());
+        self.files = paths.collect();
+    }
+
+    /// Returns the first image with rows of azimuths that can be decoded, its index and its size;
+    /// `None` if the first ones are damaged.
     ///
     /// # Errors
     /// One of the first ones cannot be read, and none can be decoded.
-    pub(crate) fn first_readable(&mut self) -> Result<Option<(usize, Vec<u8>)>, ReadError> {
-        let mut pixels = vec![0; self.size.bytes()];
-        let mut failed = None;
+    pub(crate) fn first_readable(
+        &mut self,
+    ) -> Result<Option<(usize, ImageSize, Vec<u8>)>, ReadError> {
+        let (rows, mut failed) = (self.accepted_rows(), None);
+        let mut pixels = vec![0; self.size.width * rows.end()];
         for index in 0..self.len().min(FIRST_TRIES) {
-            match self.decode(index, &mut pixels) {
-                Ok(()) => return Ok(Some((index, pixels))),
+            match self.decode_rows(index, rows.clone(), &mut pixels) {
+                Ok(size) => return Ok(Some((index, size, pixels))),
                 Err(error) => failed = failed.or(error.is_io().then_some(error)),
             }
         }
@@ -143,43 +180,33 @@ impl Images {
     }
 }
 
-/// Returns the PNG files of a folder: numbered ones by number, then the others by name.
-fn list_png(folder: &Path) -> Result<FileList, OpenError> {
-    let io_error = |source| OpenError::Io {
-        path: folder.to_owned(),
-        source,
-    };
-    let mut names: Vec<(i64, OsString)> = Vec::new();
-    for entry in fs::read_dir(folder).map_err(io_error)? {
-        if let Some(name) = png_name(&entry.map_err(io_error)?).map_err(io_error)? {
-            names.push((file_number(Path::new(&name)).unwrap_or(i64::MAX), name));
+/// Returns the size of most images among some, and the rows of the tallest of that width. Where
+/// they differ, images between may have a few more.
+fn sizes(files: &FileList) -> Result<(ImageSize, usize), ReadError> {
+    let (mut counts, mut failed) = (Vec::<(ImageSize, usize)>::new(), None);
+    let spread = (0..files.len()).step_by(files.len().div_ceil(SIZES));
+    for path in (0..FIRST_TRIES)
+        .chain(spread)
+        .filter_map(|index| files.get(index))
+    {
+        match png_image::read_size(path) {
+            Ok(size) => match counts.iter_mut().find(|(known, _)| *known == size) {
+                Some((_, count)) => *count += 1,
+                None => counts.push((size, 1)),
+            },
+            Err(error) => failed = failed.or(Some(error)),
         }
     }
-    names.sort_unstable();
-    Ok(names.iter().map(|(_, name)| folder.join(name)).collect())
-}
-
-/// Returns whether a folder exists and holds a PNG.
-pub(crate) fn has_png(folder: &Path) -> bool {
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    entries
-        .map(|entry| png_name(&entry))
-        .any(|name| matches!(name, Ok(Some(_))))
-}
-
-/// Returns the name of an entry if it is a PNG file, or a link to one.
-fn png_name(entry: &DirEntry) -> io::Result<Option<OsString>> {
-    let name = entry.file_name();
-    let extension = Path::new(&name).extension();
-    if !extension.is_some_and(|extension| extension.eq_ignore_ascii_case("png")) {
-        return Ok(None);
-    }
-    // The listing says what an entry is. Only a link must be followed, which costs a system call.
-    let kind = entry.file_type()?;
-    let is_file = kind.is_file() || (kind.is_symlink() && entry.path().is_file());
-    Ok(is_file.then_some(name))
-}
-
-fn file_number(path: &Path) -> Option<i64> {
-    path.file_stem()?.to_str()?.parse().ok()
+    // The last of equal ones is the first that was found.
+    let most = counts.iter().rev().max_by_key(|(_, count)| *count);
+    let Some((size, _)) = most.copied() else {
+        return Err(failed.unwrap_or(ReadError::NoSuchScan { index: 0, len: 0 }));
+    };
+    let most_rows = MAX_AZIMUTHS.max(size.height);
+    let is_turn = |other: &ImageSize| other.width == size.width && other.height <= most_rows;
+    let of_width = counts.iter().filter(|(other, _)| is_turn(other));
+    let rows: Vec<usize> = of_width.map(|(other, _)| other.height).collect();
+    let tallest = rows.iter().copied().max().unwrap_or(size.height);
+    let more = if rows.len() > 1 { tallest / 20 } else { 0 };
+    Ok((size, (tallest + more).min(most_rows)))
 }

@@ -13,6 +13,10 @@ use crate::scan::{check_sweep, flag};
 pub(crate) const METADATA_BYTES: usize = 11;
 /// Minimum share of consecutive rows that differ in byte 10 if it is the direction of the chirp.
 const ALTERNATING_SHARE: f64 = 0.9;
+/// Maximum share of a turn that no row is in: more is a part of a turn, or the encoder has another
+/// size.
+const MAX_GAP_SHARE: f64 = 0.25;
+
 /// The metadata of a row.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RowMetadata {
@@ -25,7 +29,8 @@ pub(crate) struct RowMetadata {
 }
 
 impl RowMetadata {
-    fn parse(row: &[u8]) -> Self {
+    /// Reads the first [`METADATA_BYTES`] of a row.
+    pub(crate) fn parse(row: &[u8]) -> Self {
         let mut stamp = [0; 8];
         stamp.copy_from_slice(&row[..8]);
         Self {
@@ -37,7 +42,10 @@ impl RowMetadata {
 }
 
 /// Returns the metadata of each row of an image wider than [`METADATA_BYTES`].
-pub(crate) fn rows(pixels: &[u8], size: ImageSize) -> impl Iterator<Item = RowMetadata> + '_ {
+pub(crate) fn rows(
+    pixels: &[u8],
+    size: ImageSize,
+) -> impl Iterator<Item = RowMetadata> + Clone + '_ {
     pixels
         .chunks_exact(size.width)
         .take(size.height)
@@ -96,6 +104,7 @@ pub(crate) fn fill_azimuths(
         return Ok(());
     }
     check_order(path, rows(pixels, size).map(|row| row.count), counts)?;
+    check_turn(path, rows(pixels, size).map(|row| row.count), counts)?;
     let step = std::f64::consts::TAU / f64::from(counts);
     for (row, into) in rows(pixels, size).zip(azimuth_rad) {
         *into = (f64::from(row.count % counts) * step) as f32;
@@ -146,6 +155,31 @@ fn check_order(
         }
     }
     Ok(())
+}
+
+/// Checks that counts in order leave out no more than [`MAX_GAP_SHARE`] of a turn in one place.
+fn check_turn(
+    path: &Path,
+    row_counts: impl Iterator<Item = u16> + Clone,
+    counts: u16,
+) -> Result<(), ReadError> {
+    let Some(first) = row_counts.clone().next() else {
+        return Ok(());
+    };
+    let next = row_counts.clone().skip(1).chain([first]);
+    let step = |(count, next): (u16, u16)| {
+        (i32::from(next) - i32::from(count)).rem_euclid(i32::from(counts))
+    };
+    let widest = row_counts.zip(next).map(step).max().unwrap_or(0);
+    let gap = f64::from(widest) / f64::from(counts);
+    match gap <= MAX_GAP_SHARE {
+        true => Ok(()),
+        false => Err(ReadError::NotATurn {
+            path: path.to_owned(),
+            gap_deg: 360.0 * gap,
+            counts,
+        }),
+    }
 }
 
 /// Writes the logged time of each row, ns. Rejects invalid times, and times that are not of one

@@ -4,17 +4,21 @@
 use super::Dataset;
 use super::detect::Found;
 use super::eccentricity;
+use super::encoder::encoder_counts;
 use super::error::{OpenError, ReadError};
 use super::file_list::FileList;
 use super::first_image::{FirstImage, NamedBy};
 use super::format::Format;
 use super::image_size::ImageSize;
 use super::images::Images;
+use super::navtech_notes::{note_encoder, observations};
 use super::navtech_png::{self, ByteTen, METADATA_BYTES};
 use super::options::{AzimuthSource, DatasetOptions};
+use super::row_order::{self, RowOrder};
 use super::stamp;
 use crate::chain::MAX_INTERVAL_NS;
 use crate::scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, Sense, SweepGeometry};
+use std::ops::RangeInclusive;
 
 /// The definition of the time of a scan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,6 +27,18 @@ pub(crate) enum ScanTime {
     Halfway,
     /// The stamp of row `n / 2 - 1`.
     MiddleRow,
+}
+
+impl ScanTime {
+    /// The definition of the stamps where files are not named by them.
+    fn of_rows(self) -> &'static str {
+        match self {
+            Self::Halfway => {
+                "Rows have stamps; the time of a scan is the mean of its first and last row's stamps."
+            }
+            Self::MiddleRow => "Rows have stamps; the time of a scan is that of row n/2 - 1.",
+        }
+    }
 }
 
 /// The parameters of a format.
@@ -70,6 +86,8 @@ pub(crate) struct NavtechScans {
     max_sweep_ns: i64,
     /// True if the names of the files are times of their sweeps.
     named_by_time: bool,
+    /// Times of the first rows, ns, if the names of the files are not times of their sweeps.
+    starts_ns: Option<Vec<i64>>,
     notes: Vec<String>,
 }
 
@@ -77,6 +95,10 @@ pub(crate) struct NavtechScans {
 const MAX_SWEEP_NS: i64 = 5 * stamp::SECOND_NS;
 /// Longest sweep in periods: the stamps of rows come late where the host was busy.
 const MAX_SWEEP_PERIODS: i64 = 2;
+/// Times that the rows of a turn take, periods.
+const TURN_SHARES: RangeInclusive<f64> = 0.75..=1.25;
+/// Number of images that show the size of the encoder.
+const FIRST_TURNS: usize = 8;
 
 impl NavtechScans {
     /// `profile` returns the defaults of the format, which may depend on the first image; `options`
@@ -93,26 +115,99 @@ impl NavtechScans {
             ..
         } = found;
         check_shape(&images, format)?;
-        let first_image = FirstImage::read(&mut images)?;
-        let profile = profile(first_image.as_ref()).with(options);
-        notes.extend(
-            first_image
-                .iter()
-                .flat_map(|image| observations(image, &profile)),
-        );
-        let period_ns = stamp::turn_ns((0..images.len()).filter_map(|i| images.name_stamp_ns(i)));
-        Ok(Self {
+        let mut first_image = FirstImage::read(&mut images)?;
+        let order = first_image
+            .as_ref()
+            .and_then(|image| row_order::order(&mut images, image));
+        let mut starts_ns = None;
+        if let Some(RowOrder {
+            starts_ns: starts,
+            notes: sentences,
+        }) = order
+        {
+            first_image = FirstImage::read(&mut images)?;
+            starts_ns = Some(starts);
+            notes.extend(sentences);
+        }
+        let mut scans = Self {
+            profile: profile(first_image.as_ref()).with(options),
+            period_ns: stamp::DEFAULT_TURN_NS,
+            max_sweep_ns: MAX_SWEEP_NS,
+            named_by_time: first_image
+                .as_ref()
+                .is_some_and(|image| image.named_by().is_some()),
+            starts_ns,
             images,
-            profile,
-            period_ns: period_ns.unwrap_or(stamp::DEFAULT_TURN_NS),
-            max_sweep_ns: period_ns.map_or(MAX_SWEEP_NS, |turn_ns| MAX_SWEEP_PERIODS * turn_ns),
-            named_by_time: first_image.is_some_and(|image| image.named_by().is_some()),
             notes,
-        })
+        };
+        let logged = (0..scans.images.len()).filter_map(|index| scans.logged_stamp_ns(index));
+        let turn_ns = stamp::turn_ns(logged);
+        if let Some(turn_ns) = turn_ns {
+            scans.period_ns = turn_ns;
+            scans.max_sweep_ns = MAX_SWEEP_PERIODS * turn_ns;
+        }
+        if let Some(image) = &first_image {
+            match options.encoder_counts {
+                _ if !scans.has_encoder() => {}
+                Some(_) => scans.notes.extend(note_encoder(image, &scans.profile)),
+                None => scans.find_encoder(image, turn_ns),
+            }
+            scans.notes.extend(observations(image, &scans.profile));
+        }
+        Ok(scans)
+    }
+
+    /// Takes the size of the encoder that the first images show, unless it is the usual one, or
+    /// the first image took much less or more than a turn.
+    fn find_encoder(&mut self, first_image: &FirstImage, turn_ns: Option<i64>) {
+        let usual = self.profile.encoder_counts;
+        let is_found = |turns: &[Vec<u16>]| {
+            let found = encoder_counts(turns.iter().map(Vec::as_slice), usual);
+            found.filter(|found| *found != usual)
+        };
+        let share = |turn_ns| first_image.turn_ns().map(|ns| ns as f64 / turn_ns as f64);
+        let is_turn = turn_ns
+            .and_then(share)
+            .is_none_or(|share| TURN_SHARES.contains(&share));
+        if !is_turn || is_found(&[first_image.counts()]).is_none() {
+            return;
+        }
+        if let Some(found) = is_found(&self.first_turns()) {
+            self.profile.encoder_counts = found;
+            self.notes.push(format!(
+                "The encoder has {found} counts per turn, not {usual}: with these the step from the last row to the first is as the others."
+            ));
+        }
+    }
+
+    /// Encoder counts of the first images.
+    fn first_turns(&mut self) -> Vec<Vec<u16>> {
+        let rows = self.images.accepted_rows();
+        let mut pixels = vec![0; self.images.size.width * rows.end()];
+        let turn = |index| {
+            let decoded = self.images.decode_rows(index, rows.clone(), &mut pixels);
+            let rows = navtech_png::rows(&pixels, decoded.ok()?);
+            Some(rows.map(|row| row.count).collect())
+        };
+        (0..FIRST_TURNS).filter_map(turn).collect()
+    }
+
+    /// The numbers of rows that are read: azimuths may have been lost. Where azimuths are taken as
+    /// even, only a few may.
+    fn accepted_rows(&self) -> RangeInclusive<usize> {
+        let (rows, usual) = (self.images.accepted_rows(), self.images.size.height);
+        match self.has_encoder() {
+            true => rows,
+            false => usual - usual / 16..=*rows.end(),
+        }
+    }
+
+    fn has_encoder(&self) -> bool {
+        self.profile.azimuth_source == AzimuthSource::Encoder
     }
 
     fn check_slot(&self, slot: &ScanSlot<'_>) -> Result<(), ReadError> {
-        let rows = self.images.size.height;
+        let rows = self.images.max_rows;
         check_capacity("azimuths", rows, slot.azimuth_rad.len())?;
         check_capacity("stamps", rows, slot.stamp_ns.len())?;
         check_capacity("flags", rows, slot.flags.len())
@@ -140,10 +235,10 @@ impl NavtechScans {
         }
     }
 
-    /// Time between the names of this file and the next, ns, if that can be one turn; otherwise the
-    /// period.
+    /// Time between the logged times of this file and the next, ns, if that can be one turn;
+    /// otherwise the period.
     fn interval_ns(&self, index: usize) -> i64 {
-        let name = |i: usize| self.images.name_stamp_ns(i);
+        let name = |i: usize| self.logged_stamp_ns(i);
         let next = index
             .checked_add(1)
             .and_then(name)
@@ -186,71 +281,6 @@ fn check_shape(images: &Images, format: Format) -> Result<(), OpenError> {
     })
 }
 
-/// Observations on the first image.
-fn observations(image: &FirstImage, profile: &Profile) -> Vec<String> {
-    let named = image.named_by().filter(|by| *by != profile.named_by).map(|by| {
-        let (format, expected) = (profile.format, profile.named_by.description());
-        format!(
-            "The files are named by {}, but {format} files by {expected}: the format may be another one.",
-            by.description()
-        )
-    });
-    [
-        note_bursts(image, profile),
-        note_byte_ten(image, profile),
-        note_encoder(image, profile),
-        named,
-    ]
-    .into_iter()
-    .flatten()
-    .collect()
-}
-
-fn note_bursts(image: &FirstImage, profile: &Profile) -> Option<String> {
-    let (min, max, mean) = image.row_intervals_ns()?;
-    let handling = if profile.smooth_stamps {
-        "replaced by a linear fit over the azimuth"
-    } else {
-        "used as they are"
-    };
-    (max > 4 * mean.max(1)).then(|| {
-        format!(
-            "Row stamps come in bursts ({} to {} us apart, {} us on average), as packets are received: they are {handling}.",
-            min / 1000,
-            max / 1000,
-            mean / 1000
-        )
-    })
-}
-
-fn note_byte_ten(image: &FirstImage, profile: &Profile) -> Option<String> {
-    if image.chirps_alternate() {
-        return Some("Byte 10 alternates from row to row: it is the direction of the chirp (255 up, 0 down), not validity; no row is dropped.".to_owned());
-    }
-    (image.byte_ten_is_zero() && profile.byte_ten == ByteTen::Unused).then(|| {
-        "Byte 10 is 0 in every row: it gives neither validity nor chirps, and all rows count as measured."
-            .to_owned()
-    })
-}
-
-fn note_encoder(image: &FirstImage, profile: &Profile) -> Option<String> {
-    if profile.azimuth_source == AzimuthSource::Uniform {
-        return Some(
-            "Azimuths are taken as uniformly spaced from straight ahead; the encoder columns are not used.".to_owned(),
-        );
-    }
-    let counts = profile.encoder_counts;
-    let (step, seam) = image.encoder_step(counts)?;
-    (step != seam).then(|| {
-        let uniform = i32::from(counts) + i32::from(step) - i32::from(seam);
-        format!(
-            "The encoder steps by {step} counts per row and by {seam} from the last row to the first, with {counts} counts per \
-             turn: `encoder_counts = {uniform}` would make the steps equal, and change azimuths by up to {:.2} deg.",
-            360.0 * (f64::from(uniform) / f64::from(counts) - 1.0).abs()
-        )
-    })
-}
-
 impl Dataset for NavtechScans {
     fn format(&self) -> Format {
         self.profile.format
@@ -262,8 +292,8 @@ impl Dataset for NavtechScans {
 
     fn limits(&self) -> ScanLimits {
         ScanLimits {
-            bytes: self.images.size.bytes(),
-            azimuths: self.images.size.height,
+            bytes: self.images.size.width * self.images.max_rows,
+            azimuths: self.images.max_rows,
         }
     }
 
@@ -276,13 +306,13 @@ impl Dataset for NavtechScans {
     }
 
     fn nominal_stamp_ns(&self, index: usize) -> Option<i64> {
-        let name = self.images.name_stamp_ns(index)?;
+        let logged_ns = self.logged_stamp_ns(index)?;
         let rows = self.images.size.height as i64;
         let half_sweep = self.interval_ns(index) * (rows - 1) / (2 * rows);
-        Some(match self.profile.named_by {
-            NamedBy::Start => name + half_sweep,
-            NamedBy::Middle => name,
-            NamedBy::End => name - half_sweep,
+        Some(match (&self.starts_ns, self.profile.named_by) {
+            (Some(_), _) | (None, NamedBy::Start) => logged_ns + half_sweep,
+            (None, NamedBy::Middle) => logged_ns,
+            (None, NamedBy::End) => logged_ns - half_sweep,
         })
     }
 
@@ -291,16 +321,21 @@ impl Dataset for NavtechScans {
     }
 
     fn logged_stamp_ns(&self, index: usize) -> Option<i64> {
-        self.images.name_stamp_ns(index)
+        match &self.starts_ns {
+            Some(starts_ns) => starts_ns.get(index).copied(),
+            None => self.images.name_stamp_ns(index),
+        }
     }
 
     fn stamp_meaning(&self) -> &'static str {
-        self.profile.stamp_meaning
+        match self.starts_ns {
+            Some(_) => self.profile.scan_time.of_rows(),
+            None => self.profile.stamp_meaning,
+        }
     }
 
     fn encoder_counts(&self) -> Option<u16> {
-        (self.profile.azimuth_source == AzimuthSource::Encoder)
-            .then_some(self.profile.encoder_counts)
+        self.has_encoder().then_some(self.profile.encoder_counts)
     }
 
     fn notes(&self) -> &[String] {
@@ -309,8 +344,10 @@ impl Dataset for NavtechScans {
 
     fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError> {
         self.check_slot(&slot)?;
-        self.images.decode(index, slot.bytes)?;
-        let (size, path, profile) = (self.images.size, self.images.file(index), &self.profile);
+        let size = self
+            .images
+            .decode_rows(index, self.accepted_rows(), slot.bytes)?;
+        let (path, profile) = (self.images.file(index), &self.profile);
         let (azimuth_rad, stamp_ns) = (
             &mut slot.azimuth_rad[..size.height],
             &mut slot.stamp_ns[..size.height],

@@ -1,7 +1,8 @@
 //! Grey PNG images, decoded into the caller's memory.
 
 use std::fs::File;
-use std::io::{self, Cursor, Read};
+use std::io::{self, BufRead, BufReader, Cursor, Read, Seek};
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 use super::error::ReadError;
@@ -29,6 +30,30 @@ pub(crate) fn read_size(path: &Path) -> Result<ImageSize, ReadError> {
         }
     }
     parse_header(path, &header[..filled])
+}
+
+/// Reads the first bytes of the first row of a PNG, and no more of the file than that needs; `None`
+/// if it cannot be read, or has no such row.
+pub(crate) fn first_bytes<const N: usize>(path: &Path) -> Option<[u8; N]> {
+    read_size(path).ok()?;
+    let file = BufReader::new(File::open(path).ok()?);
+    let mut reader = decoder(file).read_info().ok()?;
+    // The first row of an interlaced image is that of its first pass.
+    if reader.info().interlaced {
+        return None;
+    }
+    let row = reader.next_row().ok()??;
+    row.data().first_chunk().copied()
+}
+
+fn decoder<R: BufRead + Seek>(file: R) -> png::Decoder<R> {
+    let limits = png::Limits {
+        bytes: DECODER_BYTES,
+    };
+    let mut decoder = png::Decoder::new_with_limits(file, limits);
+    decoder.set_ignore_text_chunk(true);
+    decoder.set_ignore_iccp_chunk(true);
+    decoder
 }
 
 /// Parses the header chunk. Rejects pixels other than 8-bit grey and images too large for a radar
@@ -104,24 +129,27 @@ pub(crate) struct ImageReader {
 }
 
 impl ImageReader {
-    /// Decodes `path`, an image of size `expected`, into `expected.bytes()` pixels, row-major.
+    /// Decodes `path`, an image of the width of `expected` with as many rows as are accepted, into
+    /// `pixels`, row-major, which have room for most rows. Returns its size.
     pub(crate) fn decode(
         &mut self,
         path: &Path,
         expected: ImageSize,
+        rows: RangeInclusive<usize>,
         pixels: &mut [u8],
-    ) -> Result<(), ReadError> {
+    ) -> Result<ImageSize, ReadError> {
         self.load(path)?;
         let actual = parse_header(path, &self.file[..self.file.len().min(HEADER_BYTES)])?;
-        if actual != expected {
+        if actual.width != expected.width || !rows.contains(&actual.height) {
             return Err(ReadError::WrongSize {
                 path: path.to_owned(),
                 actual,
                 expected,
             });
         }
-        self.inflate(pixels)
-            .map_err(|e| self.decoding_error(path, e))
+        self.inflate(&mut pixels[..actual.bytes()])
+            .map_err(|e| self.decoding_error(path, e))?;
+        Ok(actual)
     }
 
     fn load(&mut self, path: &Path) -> Result<(), ReadError> {
@@ -143,13 +171,8 @@ impl ImageReader {
     }
 
     fn inflate(&self, pixels: &mut [u8]) -> Result<(), png::DecodingError> {
-        let limits = png::Limits {
-            bytes: DECODER_BYTES,
-        };
-        let mut decoder = png::Decoder::new_with_limits(Cursor::new(self.file.as_slice()), limits);
-        decoder.set_ignore_text_chunk(true);
-        decoder.set_ignore_iccp_chunk(true);
-        decoder.read_info()?.next_frame(pixels).map(|_| ())
+        let mut reader = decoder(Cursor::new(self.file.as_slice())).read_info()?;
+        reader.next_frame(pixels).map(|_| ())
     }
 
     fn decoding_error(&self, path: &Path, error: png::DecodingError) -> ReadError {

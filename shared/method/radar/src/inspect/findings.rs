@@ -95,6 +95,10 @@ fn rows(report: &Report) -> impl Iterator<Item = String> {
             percent(rows.not_measured)
         )
     });
+    let (fewest, most) = rows.in_scan;
+    let fewer = (fewest < most).then(|| {
+        format!("Scans have {fewest} to {most} rows: some have lost azimuths, and are read with those that there are.")
+    });
     let lost = (rows.lost > 0).then(|| format!("{} rows are lost: the azimuth jumps.", rows.lost));
     let chirps = (rows.chirps == Chirps::Mixed)
         .then(|| "The directions of the chirps are known in some scans only.".to_owned());
@@ -105,7 +109,9 @@ fn rows(report: &Report) -> impl Iterator<Item = String> {
             rows.ringing_bins as f32 * report.range_resolution_m + report.range_offset_m
         )
     });
-    [interpolated, lost, chirps, ringing].into_iter().flatten()
+    [interpolated, fewer, lost, chirps, ringing]
+        .into_iter()
+        .flatten()
 }
 
 fn scans(report: &Report) -> impl Iterator<Item = String> {

@@ -49,7 +49,12 @@ pub(super) fn examine(
         .flatten()
         .map(|entry| entry.path())
         .collect();
-    files.retain(|path| path.extension().is_some_and(|e| e == "tum") && path.is_file());
+    let is_hidden = |path: &Path| {
+        let name = path.file_name().unwrap_or_default();
+        name.as_encoded_bytes().starts_with(b".")
+    };
+    let is_tum = |path: &Path| path.extension().is_some_and(|e| e == "tum") && path.is_file();
+    files.retain(|path| is_tum(path) && !is_hidden(path));
     files.extend(find_ground_truth(root));
     files.sort();
     files.dedup();

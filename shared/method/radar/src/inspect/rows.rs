@@ -32,6 +32,8 @@ pub enum Chirps {
 pub struct RowsReport {
     /// Number of rows.
     pub rows: u64,
+    /// Minimum and maximum number of rows in a scan.
+    pub in_scan: (usize, usize),
     /// Rows that were interpolated from their neighbours.
     pub not_measured: u64,
     /// Missing rows, where the azimuth makes more than one step.
@@ -52,6 +54,7 @@ pub(super) struct Survey {
     scans: usize,
     with_chirps: usize,
     rows: u64,
+    in_scan: Option<(usize, usize)>,
     not_measured: u64,
     lost: u64,
     steps_rad: Vec<f64>,
@@ -64,7 +67,10 @@ pub(super) struct Survey {
 impl Survey {
     pub(super) fn add(&mut self, scan: &PolarScan<'_>) {
         self.scans += 1;
-        self.rows += scan.flags.len() as u64;
+        let rows = scan.flags.len();
+        self.rows += rows as u64;
+        let (min, max) = self.in_scan.unwrap_or((rows, rows));
+        self.in_scan = Some((min.min(rows), max.max(rows)));
         self.not_measured += scan
             .flags
             .iter()
@@ -109,6 +115,7 @@ impl Survey {
         let (min, max) = self.first_rad.unwrap_or_default();
         RowsReport {
             rows: self.rows,
+            in_scan: self.in_scan.unwrap_or_default(),
             not_measured: self.not_measured,
             lost: self.lost,
             chirps: match self.with_chirps {

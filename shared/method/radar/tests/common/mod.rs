@@ -41,6 +41,8 @@ pub struct Sweep {
     pub bins: usize,
     pub first_count: u16,
     pub step: u16,
+    /// Encoder counts per turn.
+    pub counts: usize,
     /// Stamp of the first row, and interval of the rows, in the unit of the file.
     pub start: i64,
     pub row_interval: i64,
@@ -54,6 +56,7 @@ impl Default for Sweep {
             bins: 60,
             first_count: 13,
             step: 140,
+            counts: 5600,
             start: START_US,
             row_interval: PERIOD_US / 40,
             byte_ten: |_| 255,
@@ -76,7 +79,8 @@ impl Sweep {
         for row in 0..self.rows {
             pixels.extend((self.start + row as i64 * self.row_interval).to_le_bytes());
             pixels.extend(
-                (((usize::from(self.first_count) + row * usize::from(self.step)) % 5600) as u16)
+                (((usize::from(self.first_count) + row * usize::from(self.step)) % self.counts)
+                    as u16)
                     .to_le_bytes(),
             );
             pixels.push((self.byte_ten)(row));

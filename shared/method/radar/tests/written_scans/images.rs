@@ -37,20 +37,19 @@ fn written_powers_are_read_back() {
 fn only_files_are_listed_and_links_to_them() {
     let root = folder();
     let files = write_oxford(root.path(), 3);
-    fs::create_dir(root.path().join("radar/1.png")).unwrap();
-    fs::write(root.path().join("radar/2.txt"), "").unwrap();
-    std::os::unix::fs::symlink("nowhere", root.path().join("radar/3.png")).unwrap();
-    std::os::unix::fs::symlink(&files[1], root.path().join("radar/4.PNG")).unwrap();
+    let name = |us: i64, extension: &str| {
+        root.path()
+            .join(format!("radar/{}.{extension}", START_US - us))
+    };
+    fs::create_dir(name(1, "png")).unwrap();
+    fs::write(name(2, "txt"), "").unwrap();
+    std::os::unix::fs::symlink("nowhere", name(3, "png")).unwrap();
+    std::os::unix::fs::symlink(&files[1], name(4, "PNG")).unwrap();
     let dataset = opened(root.path());
     let listed: Vec<_> = (0..dataset.len())
         .map(|index| dataset.file(index))
         .collect();
-    let expected = [
-        &root.path().join("radar/4.PNG"),
-        &files[0],
-        &files[1],
-        &files[2],
-    ];
+    let expected = [&name(4, "PNG"), &files[0], &files[1], &files[2]];
     assert_eq!(listed, expected);
 }
 
@@ -165,16 +164,14 @@ fn a_corrupt_image_in_the_middle_leaves_the_others_readable() {
     let mut dataset = opened(root.path());
     let mut error = |index| read(dataset.as_mut(), index).err();
     assert!(matches!(error(1), Some(ReadError::Truncated { .. })));
-    let (rotated, short) = (error(2).unwrap().to_string(), error(3).unwrap().to_string());
+    let rotated = error(2).unwrap().to_string();
     assert!(
         rotated.contains("40 columns x 71 rows")
             && rotated.ends_with("it is rotated by 90 degrees"),
         "{rotated}"
     );
-    assert!(
-        short.ends_with("first image of the dataset is 71 columns x 40 rows"),
-        "{short}"
-    );
+    // It has lost its last row.
+    assert!(error(3).is_none());
     assert!(matches!(error(4), Some(ReadError::NotPng { .. })));
     assert!(matches!(
         error(5),
@@ -185,6 +182,18 @@ fn a_corrupt_image_in_the_middle_leaves_the_others_readable() {
         Some(ReadError::NoSuchScan { index: 7, len: 7 })
     ));
     assert!(error(0).is_none() && error(6).is_none());
+    Sweep {
+        bins: 59,
+        ..Sweep::default()
+    }
+    .write(&files[1]);
+    let narrow = read(dataset.as_mut(), 1).unwrap_err().to_string();
+    assert!(
+        narrow.ends_with(
+            "70 columns x 40 rows, but most images of the dataset are 71 columns x 40 rows"
+        ),
+        "{narrow}"
+    );
 }
 
 #[test]

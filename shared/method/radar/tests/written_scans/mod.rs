@@ -1,11 +1,13 @@
-//! Readers on small generated datasets, valid and invalid: images, the rows of a sweep, formats and
-//! options.
+//! Readers on small generated datasets, valid and invalid: images and their series, the rows of a
+//! sweep, formats and options.
 
+mod encoders;
 mod formats;
 mod images;
 mod packed;
 mod radiate;
 mod rows;
+mod series;
 
 use std::path::Path;
 

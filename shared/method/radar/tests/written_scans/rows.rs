@@ -3,10 +3,10 @@
 use std::f32::consts::TAU;
 
 use gyre_radar::scan::flag;
-use gyre_radar::{AzimuthSource, Format, ReadError};
+use gyre_radar::{AzimuthSource, Format, ReadError, open};
 
-use super::{first_scan, first_scan_with, folder};
-use crate::common::{START_US, Sweep, write_oxford, write_png};
+use super::{first_scan, first_scan_with, folder, options};
+use crate::common::{START_US, Sweep, read, write_oxford};
 
 #[test]
 fn rows_that_are_not_one_sweep_are_rejected() {
@@ -30,16 +30,21 @@ fn rows_that_are_not_one_sweep_are_rejected() {
 }
 
 #[test]
-fn an_encoder_of_another_size_is_reported_and_can_be_configured() {
+fn an_encoder_of_another_size_than_configured_is_reported() {
     let root = folder();
     let files = write_oxford(root.path(), 1);
-    let sweep = Sweep::default();
-    let mut pixels = sweep.pixels();
-    for row in 0..40 {
-        pixels[row * sweep.width() + 8..][..2].copy_from_slice(&(row as u16 * 410).to_le_bytes());
-    }
-    write_png(&files[0], sweep.width(), 40, &pixels);
-    let error = first_scan(root.path()).unwrap_err();
+    let sweep = Sweep {
+        first_count: 0,
+        step: 410,
+        counts: 16_400,
+        ..Sweep::default()
+    };
+    sweep.write(&files[0]);
+    let configured = |counts| {
+        let options = options(|o| o.encoder_counts = Some(counts));
+        read(open(root.path(), &options).unwrap().as_mut(), 0)
+    };
+    let error = configured(5600).unwrap_err();
     assert!(
         matches!(
             error,
@@ -52,7 +57,12 @@ fn an_encoder_of_another_size_is_reported_and_can_be_configured() {
         ),
         "{error}"
     );
-    let scan = first_scan_with(root.path(), |o| o.encoder_counts = Some(16400));
+    let error = configured(25_000).unwrap_err();
+    assert!(
+        matches!(error, ReadError::NotATurn { gap_deg, counts: 25_000, .. } if (gap_deg - 129.744).abs() < 1e-3),
+        "{error}"
+    );
+    let scan = configured(16_400).unwrap();
     assert!((scan.azimuth_rad[10] - 0.25 * TAU).abs() < 1e-6);
     let scan = first_scan_with(root.path(), |o| {
         o.azimuth_source = Some(AzimuthSource::Uniform)

@@ -1,0 +1,270 @@
+//! The image files of a folder: which of them are scans of one series, and in which order.
+
+use std::cmp::Ordering;
+use std::collections::HashSet;
+use std::ffi::OsString;
+use std::fs::{self, DirEntry};
+use std::io;
+use std::path::Path;
+
+use super::error::OpenError;
+use super::file_list::FileList;
+use super::stamp;
+
+/// Files that are named at most where several are left out.
+const MAX_NAMED: usize = 4;
+
+/// The scans of a folder, and a sentence on the images in it that are none.
+#[derive(Debug, Default)]
+pub(crate) struct ImageList {
+    pub(crate) files: FileList,
+    pub(crate) note: Option<String>,
+}
+
+/// The place of an image in its series.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Place {
+    /// ns since 1970.
+    Time(i64),
+    Number(i64),
+    /// Named by words.
+    Name,
+}
+
+impl Place {
+    fn of(name: &Path) -> Self {
+        match file_number(name) {
+            Some(number) => stamp::to_ns(number).map_or(Self::Number(number), Self::Time),
+            None => Self::Name,
+        }
+    }
+}
+
+/// Lists the images of a folder that are one series: ordered by the times or the numbers that they
+/// are named by, otherwise by name.
+///
+/// Left out are hidden files, copies of a numbered image, whatever is named otherwise than at least
+/// half of the images, and a second file of the same number.
+pub(crate) fn list(folder: &Path) -> Result<ImageList, OpenError> {
+    let io_error = |source| OpenError::Io {
+        path: folder.to_owned(),
+        source,
+    };
+    let mut names: Vec<OsString> = Vec::new();
+    for entry in fs::read_dir(folder).map_err(io_error)? {
+        names.extend(png_name(&entry.map_err(io_error)?).map_err(io_error)?);
+    }
+    let (names, mut others) = series(names);
+    others.sort_unstable();
+    Ok(ImageList {
+        files: names.iter().map(|name| folder.join(name)).collect(),
+        note: note(&others, "not of the series by name"),
+    })
+}
+
+/// Returns a sentence on files that are left out.
+pub(crate) fn note(left_out: &[OsString], because: &str) -> Option<String> {
+    let named: Vec<String> = left_out
+        .iter()
+        .take(MAX_NAMED)
+        .map(|name| format!("`{}`", name.to_string_lossy()))
+        .collect();
+    let (named, more) = (named.join(", "), left_out.len().saturating_sub(MAX_NAMED));
+    let rest = match more {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    match left_out.len() {
+        0 => None,
+        1 => Some(format!("1 image is left out, {because}: {named}.")),
+        n => Some(format!(
+            "{n} images are left out, {because}: {named}{rest}."
+        )),
+    }
+}
+
+/// Divides names into those of the series, in order, and the others.
+fn series(names: Vec<OsString>) -> (Vec<OsString>, Vec<OsString>) {
+    let (hidden, shown): (Vec<_>, Vec<_>) = names.into_iter().partition(is_hidden);
+    let numbers: HashSet<i64> = shown
+        .iter()
+        .filter_map(|n| file_number(Path::new(n)))
+        .collect();
+    let (copies, shown): (Vec<_>, Vec<_>) = shown
+        .into_iter()
+        .partition(|name| copied_number(name).is_some_and(|number| numbers.contains(&number)));
+    let placed = shown
+        .into_iter()
+        .map(|name| (Place::of(Path::new(&name)), name));
+    let (mut placed, strangers) = most(placed.collect());
+    placed.sort_unstable_by(|(a, one), (b, other)| a.cmp(b).then_with(|| natural(one, other)));
+    let (mut kept, mut others) = (Vec::<OsString>::new(), [hidden, copies, strangers].concat());
+    let mut last = None;
+    for (place, name) in placed {
+        match place != Place::Name && last.replace(place) == Some(place) {
+            true => others.push(name),
+            false => kept.push(name),
+        }
+    }
+    (kept, others)
+}
+
+/// Returns the images that are named as at least half of them are: by times, else by numbers, else
+/// all of them; and the others.
+fn most(placed: Vec<(Place, OsString)>) -> (Vec<(Place, OsString)>, Vec<OsString>) {
+    let half = |is_one: fn(&Place) -> bool| {
+        let count = placed.iter().filter(|(place, _)| is_one(place)).count();
+        2 * count >= placed.len()
+    };
+    let by_time: fn(&Place) -> bool = |place| matches!(place, Place::Time(_));
+    let by_number: fn(&Place) -> bool = |place| *place != Place::Name;
+    let is_one: fn(&Place) -> bool = match (half(by_time), half(by_number)) {
+        (true, _) => by_time,
+        (false, true) => by_number,
+        (false, false) => |_| true,
+    };
+    let (kept, others): (Vec<_>, Vec<_>) = placed.into_iter().partition(|(place, _)| is_one(place));
+    (kept, others.into_iter().map(|(_, name)| name).collect())
+}
+
+/// `._NAME.png` is what macOS stores of a file beside it on file systems of others.
+fn is_hidden(name: &OsString) -> bool {
+    name.as_encoded_bytes().starts_with(b".")
+}
+
+/// Returns the number that a name begins with, where a word follows it: `12 (1).png`,
+/// `12-copy.png`.
+fn copied_number(name: &OsString) -> Option<i64> {
+    let stem = Path::new(name).file_stem()?.to_str()?;
+    let digits = stem.find(|c: char| !c.is_ascii_digit())?;
+    stem[..digits].parse().ok()
+}
+
+/// Compares names, and numbers in them as numbers: `scan2` is before `scan10`.
+fn natural(one: &OsString, other: &OsString) -> Ordering {
+    let stem = |name| {
+        Path::new(name)
+            .file_stem()
+            .unwrap_or_default()
+            .as_encoded_bytes()
+    };
+    let (mut a, mut b) = (stem(one), stem(other));
+    while let (Some(first), Some(second)) = (a.first(), b.first()) {
+        let order = match (number_in(a), number_in(b)) {
+            (Some((m, rest_a)), Some((n, rest_b))) => {
+                (a, b) = (rest_a, rest_b);
+                m.len().cmp(&n.len()).then_with(|| m.cmp(n))
+            }
+            _ => {
+                (a, b) = (&a[1..], &b[1..]);
+                first.cmp(second)
+            }
+        };
+        if order != Ordering::Equal {
+            return order;
+        }
+    }
+    a.len().cmp(&b.len()).then_with(|| one.cmp(other))
+}
+
+/// Splits the digits off the start of a text, without leading zeros.
+fn number_in(text: &[u8]) -> Option<(&[u8], &[u8])> {
+    let end = text
+        .iter()
+        .position(|b| !b.is_ascii_digit())
+        .unwrap_or(text.len());
+    let (digits, rest) = text.split_at(end);
+    let zeros = digits.iter().take_while(|b| **b == b'0').count();
+    (end > 0).then(|| (&digits[zeros..], rest))
+}
+
+/// Returns whether a folder exists and holds a PNG that is not hidden.
+pub(crate) fn has_png(folder: &Path) -> bool {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    entries
+        .map(|entry| png_name(&entry))
+        .any(|name| matches!(name, Ok(Some(name)) if !is_hidden(&name)))
+}
+
+/// Returns the name of an entry if it is a PNG file, or a link to one.
+fn png_name(entry: &DirEntry) -> io::Result<Option<OsString>> {
+    let name = entry.file_name();
+    let extension = Path::new(&name).extension();
+    if !extension.is_some_and(|extension| extension.eq_ignore_ascii_case("png")) {
+        return Ok(None);
+    }
+    // The listing says what an entry is. Only a link must be followed, which costs a system call.
+    let kind = entry.file_type()?;
+    let is_file = kind.is_file() || (kind.is_symlink() && entry.path().is_file());
+    Ok(is_file.then_some(name))
+}
+
+/// Returns the number that a file is named by.
+pub(crate) fn file_number(path: &Path) -> Option<i64> {
+    path.file_stem()?.to_str()?.parse().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn divided(names: &[&str]) -> (Vec<String>, Vec<String>) {
+        let text = |names: Vec<OsString>| -> Vec<String> {
+            let names = names.iter().map(|name| name.to_string_lossy());
+            names
+                .map(|name| name.trim_end_matches(".png").to_owned())
+                .collect()
+        };
+        let names = names.iter().map(|name| format!("{name}.png").into());
+        let (kept, others) = series(names.collect());
+        (text(kept), text(others))
+    }
+
+    #[test]
+    fn images_are_in_the_order_of_their_times_or_numbers() {
+        let (kept, others) = divided(&["scan10", "scan2", "scan1", "scan02"]);
+        assert_eq!(kept, ["scan1", "scan02", "scan2", "scan10"]);
+        assert!(others.is_empty());
+        assert_eq!(divided(&["10", "000009", "-1"]).0, ["-1", "000009", "10"]);
+        // One time in ns among those in us.
+        let times = [
+            "1547131046600000",
+            "1547131046350000000",
+            "1547131046100000",
+        ];
+        assert_eq!(divided(&times).0, [times[2], times[1], times[0]]);
+    }
+
+    #[test]
+    fn copies_hidden_files_and_strangers_are_no_scans_of_a_series() {
+        let (a, b) = ("1547131046100000", "1547131046350000");
+        let hidden = format!("._{a}");
+        let copies = [
+            format!("{a} (1)"),
+            format!("{b} - Kopie"),
+            format!("{b}_copy"),
+        ];
+        let names = [
+            a, &hidden, &copies[0], &copies[1], &copies[2], b, "7", "map",
+        ];
+        let (kept, mut others) = divided(&names);
+        assert_eq!(kept, [a, b]);
+        others.sort_unstable();
+        let mut expected = vec![
+            hidden.as_str(),
+            &copies[0],
+            &copies[1],
+            &copies[2],
+            "7",
+            "map",
+        ];
+        expected.sort_unstable();
+        assert_eq!(others, expected);
+        // Two files of one frame.
+        assert_eq!(
+            divided(&["000001", "1", "2"]),
+            (vec!["000001".into(), "2".into()], vec!["1".into()])
+        );
+        assert_eq!(divided(&["001", "002", "overview"]).1, ["overview"]);
+    }
+}
