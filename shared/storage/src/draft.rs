@@ -14,11 +14,14 @@ use crate::{File, StorageError, folder::sync_folder};
 /// The name of a draft is that of its file between these.
 const AHEAD: &str = ".";
 const BEHIND: &str = ".tmp";
+/// Processes that write drafts of one file at once.
+const WRITERS: usize = 64;
 /// Bytes that are collected before they are written.
 const BUFFER: usize = 1 << 18;
 
-/// The next content of a file, written aside as `.NAME.tmp`. It takes the place of the file when it
-/// is committed; dropped before that, it is removed.
+/// The next content of a file, written aside as `.NAME.tmp`; where another process is writing that,
+/// as `.NAME.1.tmp` and so on. It takes the place of the file when it is committed; dropped before
+/// that, it is removed.
 #[derive(Debug)]
 pub struct Draft {
     path: PathBuf,
@@ -54,18 +57,20 @@ impl Draft {
     /// # Errors
     /// A file that cannot be created.
     pub fn create(path: &Path) -> Result<Self, StorageError> {
-        let mut name = OsString::from(AHEAD);
-        name.push(path.file_name().unwrap_or_default());
-        name.push(BEHIND);
-        let aside = path.with_file_name(name);
-        let file =
-            File::create(&aside).map_err(|error| StorageError::at("write", path)(error.source))?;
-        Ok(Self {
-            path: path.to_owned(),
-            aside,
-            writer: BufWriter::with_capacity(BUFFER, Appended { file, length: 0 }),
-            committed: false,
-        })
+        let failed = StorageError::at("write", path);
+        for writer in 0..WRITERS {
+            let aside = aside(path, writer);
+            if let Some(file) = File::create(&aside).map_err(|error| failed(error.source))? {
+                return Ok(Self {
+                    path: path.to_owned(),
+                    aside,
+                    writer: BufWriter::with_capacity(BUFFER, Appended { file, length: 0 }),
+                    committed: false,
+                });
+            }
+        }
+        let reason = format!("{WRITERS} other processes are writing it");
+        Err(failed(io::Error::new(io::ErrorKind::ResourceBusy, reason)))
     }
 
     /// Returns the path of the file whose next content this is.
@@ -113,6 +118,16 @@ impl Drop for Draft {
     }
 }
 
+fn aside(path: &Path, writer: usize) -> PathBuf {
+    let mut name = OsString::from(AHEAD);
+    name.push(path.file_name().unwrap_or_default());
+    if writer > 0 {
+        name.push(format!(".{writer}"));
+    }
+    name.push(BEHIND);
+    path.with_file_name(name)
+}
+
 /// Returns whether a file of this name is a draft, as a killed process leaves it.
 pub fn is_draft(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().as_encoded_bytes();
@@ -154,6 +169,25 @@ mod tests {
         draft.commit().unwrap();
         assert_eq!(fs::read_to_string(&path).unwrap(), "new");
         assert_eq!(names(folder.path()), ["summary.json"]);
+    }
+
+    #[test]
+    fn drafts_of_one_file_at_once_are_apart_and_what_a_killed_process_left_is_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("fixes.csv");
+        fs::write(folder.path().join(".fixes.csv.tmp"), "half of").unwrap();
+        let [mut first, mut second] = [(); 2].map(|()| Draft::create(&path).unwrap());
+        assert!(is_draft(&first.aside) && is_draft(&second.aside));
+        first.append("first").unwrap();
+        second.append("second, which is longer").unwrap();
+        second.commit().unwrap();
+        assert_eq!(
+            fs::read_to_string(&path).unwrap(),
+            "second, which is longer"
+        );
+        first.commit().unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "first");
+        assert_eq!(names(folder.path()), ["fixes.csv"]);
     }
 
     #[test]

@@ -11,7 +11,11 @@ use std::{
 
 #[cfg(feature = "record")]
 use crate::record::{self, Operation};
-use crate::{StorageError, folder::sync_folder};
+use crate::{
+    StorageError,
+    folder::sync_folder,
+    lock::{self, Attempt, try_lock_existing},
+};
 
 /// Time for which a lock is tried, and between two attempts.
 const LOCK_WAIT: Duration = Duration::from_secs(1);
@@ -54,21 +58,31 @@ impl File {
         })
     }
 
-    /// Creates an empty file, in place of any other of this name.
-    pub(crate) fn create(path: &Path) -> Result<Self, StorageError> {
+    /// Creates an empty file and locks it, in place of any other of this name; `None` if that is
+    /// locked.
+    pub(crate) fn create(path: &Path) -> Result<Option<Self>, StorageError> {
+        let left_over = try_lock_existing(path);
+        if let Ok(Attempt::Held(_)) = left_over {
+            return Ok(None);
+        }
         // Not truncated: another name may lead to the same content.
         crate::remove(path)?;
-        let file = OpenOptions::new()
-            .create_new(true)
-            .write(true)
-            .open(path)
-            .map_err(StorageError::at("write", path))?;
+        let created = OpenOptions::new().create_new(true).write(true).open(path);
+        let file = match created {
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => return Ok(None),
+            created => created.map_err(StorageError::at("write", path))?,
+        };
+        // Until now another process might take it for one that was left over. A file system without
+        // locks has none.
+        if let Ok(Attempt::Held(_)) = lock::attempt(&file, path) {
+            return Ok(None);
+        }
         #[cfg(feature = "record")]
         record::push(path, || Operation::Create(path.to_owned()));
-        Ok(Self {
+        Ok(Some(Self {
             path: path.to_owned(),
             file,
-        })
+        }))
     }
 
     /// Returns the path.

@@ -48,11 +48,16 @@ fn lock(path: &Path, create: bool) -> io::Result<Attempt> {
         .mode(0o600)
         .custom_flags(OFlags::NOFOLLOW.bits() as i32)
         .open(path)?;
-    match flock(&file, FlockOperation::NonBlockingLockExclusive) {
-        Ok(()) if is_at(&file, path)? => Ok(Attempt::Locked(file)),
+    attempt(&file, path)
+}
+
+/// Locks an open file, without waiting.
+pub(crate) fn attempt(file: &File, path: &Path) -> io::Result<Attempt> {
+    match flock(file, FlockOperation::NonBlockingLockExclusive) {
+        Ok(()) if is_at(file, path)? => Ok(Attempt::Locked(file.try_clone()?)),
         // Its last owner has removed it meanwhile.
         Ok(()) => Ok(Attempt::Held(None)),
-        Err(Errno::WOULDBLOCK) => Ok(Attempt::Held(holder(&file))),
+        Err(Errno::WOULDBLOCK) => Ok(Attempt::Held(holder(file))),
         Err(error) => Err(error.into()),
     }
 }
