@@ -9,7 +9,8 @@
 //!   each with a [`Checksum`].
 //! - [`Log`] is a file of records that grows at its end; [`LogReader`] reads it meanwhile.
 //! - [`lock`]: locks of files.
-//! - [`read_text`] and [`read_bytes`] read files that may come from elsewhere, up to a size.
+//! - [`open()`], [`read_text`] and [`read_bytes`] read files that may come from elsewhere: no
+//!   pipes or devices, and up to a size.
 //!
 //! A file and its name are two things: the name of a new or renamed file is safe once its folder is
 //! synchronised. Everything that must survive is written through this crate, so that a test can
@@ -38,7 +39,7 @@ pub use durable::{Busy, Checksum, DurableFile, Slots};
 pub use file::File;
 pub use folder::{create_folder, remove, sync_folder};
 pub use group_sync::GroupSync;
-pub use limited::{SETTINGS, read_bytes, read_text};
+pub use limited::{SETTINGS, open, read_bytes, read_text};
 pub use log::{Log, LogError, LogMagic, LogReader};
 
 /// A file or folder that cannot be read or written.

@@ -1,11 +1,14 @@
-//! Files of limited size. A file from elsewhere may be made to exhaust the memory, or be a link to
-//! a device that never ends.
+//! Files that may come from elsewhere. One may be made to exhaust the memory, or be a pipe or a
+//! device, which never ends or never begins.
 
 use std::{
-    fs::File,
+    fs::{File, FileType, OpenOptions},
     io::{self, Read},
+    os::unix::fs::{FileTypeExt, OpenOptionsExt},
     path::Path,
 };
+
+use rustix::fs::OFlags;
 
 /// The largest file of settings, bytes.
 pub const SETTINGS: u64 = 16 << 20;
@@ -14,6 +17,34 @@ pub const SETTINGS: u64 = 16 << 20;
 const MARK: &str = "\u{feff}";
 /// The marks before UTF-16, of both byte orders.
 const UTF_16: [&[u8]; 2] = [&[0xff, 0xfe], &[0xfe, 0xff]];
+
+/// Opens a file to read it.
+///
+/// # Errors
+/// A file that cannot be read; a folder, a pipe or a device.
+pub fn open(path: &Path) -> io::Result<File> {
+    // Without waiting: a pipe that nobody writes to would never be opened.
+    let file = OpenOptions::new()
+        .read(true)
+        .custom_flags(OFlags::NONBLOCK.bits() as i32)
+        .open(path)?;
+    let kind = file.metadata()?.file_type();
+    match kind.is_file() {
+        true => Ok(file),
+        false => {
+            let reason = format!("it is {}, not a file", name(kind));
+            Err(io::Error::new(io::ErrorKind::InvalidInput, reason))
+        }
+    }
+}
+
+fn name(kind: FileType) -> &'static str {
+    match kind.is_dir() {
+        true => "a folder",
+        false if kind.is_fifo() => "a pipe",
+        false => "a device",
+    }
+}
 
 /// Reads a text of at most `limit` bytes, without a byte order mark before it.
 ///
@@ -38,14 +69,14 @@ pub fn read_text(path: &Path, limit: u64) -> io::Result<String> {
 /// Reads a file of at most `limit` bytes.
 ///
 /// # Errors
-/// A file that cannot be read, or is larger.
+/// A file that cannot be read, or is larger, or is [no file](open).
 pub fn read_bytes(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
-    let file = File::open(path)?;
+    let file = open(path)?;
     let too_large = || {
         let reason = format!("it is larger than {} MB", limit >> 20);
         io::Error::new(io::ErrorKind::FileTooLarge, reason)
     };
-    // Known at once of a file, and only at the end of a device or a pipe.
+    // Known at once, but of a file that grows, or one of the system, which claims to be empty.
     if file.metadata()?.len() > limit {
         return Err(too_large());
     }
@@ -74,7 +105,7 @@ mod tests {
         fs::write(&file, vec![b'a'; limit + 1]).unwrap();
         let error = read_text(&file, limit as u64).unwrap_err().to_string();
         assert_eq!(error, "it is larger than 1 MB");
-        let error = read_bytes(Path::new("/dev/zero"), limit as u64).unwrap_err();
+        let error = read_bytes(Path::new("/proc/self/maps"), 1).unwrap_err();
         assert_eq!(error.kind(), io::ErrorKind::FileTooLarge);
         fs::write(&file, [0xff]).unwrap();
         let error = read_text(&file, limit as u64).unwrap_err().to_string();
@@ -97,6 +128,26 @@ mod tests {
         ] {
             fs::write(&file, written).unwrap();
             assert_eq!(read_text(&file, SETTINGS).unwrap(), read);
+        }
+    }
+
+    #[test]
+    fn what_is_no_file_is_refused_at_once_with_what_it_is() {
+        let folder = tempfile::tempdir().unwrap();
+        let pipe = folder.path().join("pipe");
+        let (kind, mode) = (rustix::fs::FileType::Fifo, rustix::fs::Mode::RWXU);
+        rustix::fs::mknodat(rustix::fs::CWD, &pipe, kind, mode, 0).unwrap();
+        let link = folder.path().join("link");
+        std::os::unix::fs::symlink(&pipe, &link).unwrap();
+        for (path, expected) in [
+            (folder.path(), "it is a folder, not a file"),
+            (&pipe, "it is a pipe, not a file"),
+            (&link, "it is a pipe, not a file"),
+            (Path::new("/dev/zero"), "it is a device, not a file"),
+        ] {
+            let refused = open(path).unwrap_err().to_string();
+            assert_eq!(refused, expected);
+            assert_eq!(read_text(path, 1).unwrap_err().to_string(), expected);
         }
     }
 }

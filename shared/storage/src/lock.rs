@@ -46,7 +46,8 @@ fn lock(path: &Path, create: bool) -> io::Result<Attempt> {
         .truncate(false)
         .write(true)
         .mode(0o600)
-        .custom_flags(OFlags::NOFOLLOW.bits() as i32)
+        // A pipe in its place would be waited for.
+        .custom_flags((OFlags::NOFOLLOW | OFlags::NONBLOCK).bits() as i32)
         .open(path)?;
     attempt(&file, path)
 }

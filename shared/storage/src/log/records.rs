@@ -182,7 +182,7 @@ impl Records {
     /// does not exist.
     fn open(&mut self) -> Result<Option<u64>, LogError> {
         let failed = StorageError::at("read", &self.path);
-        let file = match self.file.take().map_or_else(|| File::open(&self.path), Ok) {
+        let file = match self.file.take().map_or_else(|| crate::open(&self.path), Ok) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
             opened => self.file.insert(opened.map_err(&failed)?),
         };
