@@ -113,7 +113,9 @@ fn a_run_without_truth_leaves_no_judgement_of_an_earlier_one() {
     judged.complete();
     let copy = recording::copy(recording::SCANS);
     fs::remove_dir_all(copy.path().join("gt")).unwrap();
-    let unjudged = Run::of_recording_named(copy.path().to_str().unwrap()).into(judged.out());
+    let unjudged = Run::of_recording_named(copy.path().to_str().unwrap())
+        .option("--fresh")
+        .into(judged.out());
     unjudged.complete();
     assert!(unjudged.summary()["evaluation"].is_null());
     for plot in ["errors.svg", "bands.svg"] {
@@ -293,7 +295,7 @@ fn an_unfinished_run_of_another_configuration_is_refused() {
     ]);
     assert_ne!(other.option("--fresh").complete(), undisturbed());
     assert_eq!(
-        run.complete(),
+        run.option("--fresh").complete(),
         undisturbed(),
         "a complete run is begun anew"
     );

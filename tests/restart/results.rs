@@ -66,6 +66,95 @@ fn a_run_whose_results_are_written_is_begun_anew() {
 }
 
 #[test]
+fn complete_results_are_replaced_by_others_only_if_that_is_asked_for() {
+    let run = Run::of_recording();
+    run.complete();
+    let other = run.clone().set("masking.threshold=70");
+    other.finish().refused_with(&[
+        "holds the results of a complete run of another configuration",
+        "masking.threshold was",
+        "and is now 70",
+        "another --out",
+        "--fresh",
+    ]);
+    assert_eq!(run.odometry(), undisturbed());
+    assert!(run.out().join("journal/complete").exists());
+    assert_ne!(other.option("--fresh").complete(), undisturbed());
+    fs::remove_dir_all(run.out().join("journal")).unwrap();
+    run.finish()
+        .refused_with(&["summary.json", "journal is missing", "--fresh"]);
+}
+
+#[test]
+fn results_of_another_recording_or_program_are_kept() {
+    let recording = recording::copy(recording::SCANS);
+    let run = Run::of_recording_named(recording.path().to_str().unwrap());
+    let odometry = run.complete();
+    let images = recording::images(recording.path());
+    fs::remove_file(&images[recording::SCANS - 1]).unwrap();
+    run.finish().refused_with(&[
+        "complete run of another recording",
+        "it had 24 scans and now has 23",
+    ]);
+    run.clone()
+        .stage_script("masking", "exec '{gyre}' stage masking")
+        .finish()
+        .refused_with(&["complete run of another program", "masking"]);
+    assert_eq!(run.odometry(), odometry);
+}
+
+#[test]
+fn what_a_live_run_has_computed_is_never_computed_again_unasked() {
+    let run = Run::of_recording().set("run.mode=live").rate("20");
+    run.complete();
+    let odometry = run.odometry();
+    run.finish()
+        .refused_with(&["complete live run", "another --out", "--fresh"]);
+    assert_eq!(run.odometry(), odometry);
+}
+
+/// A run that begins in the folder of a complete one and computes nothing.
+fn futile(run: &Run, masking: &str) -> Run {
+    run.clone()
+        .stage_script("masking", masking)
+        .set("masking.threshold=70")
+        .option("--fresh")
+}
+
+#[test]
+fn a_complete_run_stays_until_another_one_has_results() {
+    let run = Run::of_recording();
+    run.complete();
+    let config = fs::read(run.out().join("config.toml")).unwrap();
+    let is_there = || {
+        assert_eq!(run.odometry(), undisturbed());
+        assert_eq!(run.summary()["processed"], recording::SCANS);
+        assert_eq!(fs::read(run.out().join("config.toml")).unwrap(), config);
+        assert!(run.out().join("journal/complete").exists());
+        assert!(!run.out().join("journal.replaced").exists());
+    };
+    let ended = futile(&run, "exit 7").finish();
+    ended.failed_with(&["masking"]);
+    let note = "has the results of the complete run before";
+    assert!(ended.stderr.contains(note), "{}", ended.stderr);
+    is_there();
+
+    // The supervisor is killed: the next command gives back what has not been replaced.
+    let mut running = futile(&run, "exec sleep 60").start();
+    running.await_stage("radar-replay");
+    running.kill_supervisor();
+    assert_eq!(run.odometry(), undisturbed());
+    assert!(!run.out().join("journal/complete").exists());
+    let other = run.clone().set("masking.threshold=71");
+    other
+        .finish()
+        .failed_with(&["complete run of another configuration"]);
+    is_there();
+    run.complete();
+    is_there();
+}
+
+#[test]
 fn no_draft_of_a_result_is_left() {
     let run = interrupted();
     run.complete();
@@ -218,7 +307,7 @@ fn a_file_that_was_added_to_a_recording_is_never_removed() {
     run.complete();
     let notes = run.out().join("recording/notes.txt");
     fs::write(&notes, "rain").unwrap();
-    let other = run.clone().set("simulation.seed=4");
+    let other = run.clone().set("simulation.seed=4").option("--fresh");
     other.finish().failed_with(&["recording", "notes.txt"]);
     assert_eq!(fs::read(&notes).unwrap(), b"rain");
     assert_eq!(names(&run.out().join("recording/radar")).len(), 6);

@@ -80,7 +80,7 @@ fn a_run_without_refinement_logs_keyframes_too() {
 fn a_run_without_slam_logs_no_keyframes_and_removes_those_of_an_earlier_run() {
     let with = run();
     with.complete();
-    let without = Run::of_recording().into(with.out());
+    let without = Run::of_recording().option("--fresh").into(with.out());
     assert_eq!(without.complete(), undisturbed());
     assert!(!records_path::<Keyframe>(with.out()).exists());
 }

@@ -168,7 +168,8 @@ pub struct RunArguments {
     /// Override a key, as in masking.kind=none; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub set: Vec<String>,
-    /// Discard an unfinished run in --out instead of resuming it.
+    /// Begin anew: discard an unfinished run in --out, replace the results of another or of a live
+    /// run.
     #[arg(long)]
     pub fresh: bool,
 }

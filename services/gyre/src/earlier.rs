@@ -1,6 +1,8 @@
 //! The state of an earlier run in the folder of the results: nothing, a journal to resume, or one
 //! whose results are to be written.
 
+mod replaced;
+
 use std::{
     fs, io,
     path::{Path, PathBuf},
@@ -13,8 +15,8 @@ use gyre_journal::{
     keyframes::{KeyframesError, complete_poses},
 };
 use gyre_messages::StageId;
-use gyre_results::{Identity, Out, Programs};
-use gyre_run::COMPLETE;
+use gyre_results::{Holds, Identity, Out, Programs, SIMULATED_TRUTH, SUMMARY};
+use gyre_run::{BEGUN_WITH, COMPLETE, Mode, Side};
 use gyre_scan_matching::Refiner;
 use gyre_slam::{Keyframe, Place, Query, RecordReader, records_path};
 use gyre_storage::{self as storage, GroupSync, LogError};
@@ -32,6 +34,8 @@ pub enum Earlier {
     Unfinished(Begun),
     /// A journal with its end, of which results have not been written.
     Ended(Begun),
+    /// The results of a complete run, which the same run may replace.
+    Complete(Identity),
 }
 
 /// A run that was begun.
@@ -46,10 +50,12 @@ pub struct Begun {
 }
 
 impl Earlier {
-    /// Looks at the folder and changes nothing. A `fresh` run goes on from nothing.
+    /// Looks at the folder, and finishes what a kill has left of a replacement. A `fresh` run goes
+    /// on from nothing.
     ///
     /// # Errors
-    /// Files that cannot be read, a damaged journal, or a run of another configuration.
+    /// Files that cannot be read, a damaged journal, a run of another configuration, or results
+    /// that only a `fresh` run may replace.
     pub fn of(
         out: &Out,
         configuration: &Configuration,
@@ -59,16 +65,24 @@ impl Earlier {
         let path = journal::path(out.path());
         // A file of another program is refused in any case.
         let there = journal::records(&path)?.is_some();
-        if fresh || !there || out.join(COMPLETE).exists() {
+        replaced::settle(out)?;
+        if fresh {
             return Ok(Self::Nothing);
         }
+        if is_complete(out.path()) {
+            return complete(out, configuration, programs);
+        }
+        if !there {
+            return require_no_results(out).map(|()| Self::Nothing);
+        }
         let content = journal::check(&path).map_err(|error| kept(error, &path))?;
+        let holds = Holds::Unfinished(content.poses);
         let is_empty = content.poses == 0 && !content.ended;
         let identity = match is_empty {
             true => return Ok(Self::Nothing),
-            false => Identity::read(out, content.poses)?,
+            false => Identity::read(out, holds)?,
         };
-        identity.require(configuration, programs, out.path(), content.poses)?;
+        identity.require(configuration, programs, out.path(), holds)?;
         let poses = match content.ended {
             true => content.poses,
             false => known_poses(out, configuration, &content)?,
@@ -85,6 +99,61 @@ impl Earlier {
             (false, 0) => Self::Nothing,
             (false, _) => Self::Unfinished(begun),
         })
+    }
+}
+
+impl Earlier {
+    /// The run that is resumed.
+    pub fn unfinished(&self) -> Option<&Begun> {
+        match self {
+            Self::Unfinished(begun) => Some(begun),
+            _ => None,
+        }
+    }
+
+    /// The identity of the run in the folder, which the new one must have too.
+    pub fn identity(&self) -> Option<(&Identity, Holds)> {
+        match self {
+            Self::Nothing => None,
+            Self::Complete(identity) => Some((identity, Holds::Complete)),
+            Self::Unfinished(begun) | Self::Ended(begun) => {
+                Some((&begun.identity, Holds::Unfinished(begun.poses)))
+            }
+        }
+    }
+}
+
+/// Checks that a complete run may be replaced by this one without being asked for it: by the same
+/// results.
+fn complete(
+    out: &Out,
+    configuration: &Configuration,
+    programs: &Programs,
+) -> Result<Earlier, Failure> {
+    let identity = Identity::read(out, Holds::Complete)?;
+    identity.require(configuration, programs, out.path(), Holds::Complete)?;
+    // What is dropped in live mode depends on the load, and the base has the scans of its robot.
+    let is_live = configuration.is_radar() || configuration.run.mode == Mode::Live;
+    if is_live || configuration.is_side(Side::Base) {
+        return Err(format!(
+            "{} holds the results of a complete live run, which cannot be computed again: choose another --out, or replace them with --fresh",
+            out.path().display()
+        )
+        .into());
+    }
+    Ok(Earlier::Complete(identity))
+}
+
+/// Checks that there are no results without the journal that tells what they are of.
+fn require_no_results(out: &Out) -> Result<(), Failure> {
+    let summary = out.join(SUMMARY);
+    match summary.exists() && !out.join(BEGUN_WITH).exists() {
+        false => Ok(()),
+        true => Err(format!(
+            "{} is of a run whose journal is missing, so it is not known of which: choose another --out, or replace the results with --fresh",
+            summary.display()
+        )
+        .into()),
     }
 }
 
@@ -184,45 +253,60 @@ fn damaged(error: KeyframesError) -> Failure {
     }
 }
 
-/// Removes the results and the state of an earlier run, and says what the new one begins with. The
-/// journal goes first: without it nothing else is taken for part of a run.
+/// The files of a run's state.
+fn state(out: &Path) -> [PathBuf; 7] {
+    [
+        journal::path(out),
+        checkpoint::path(out),
+        records_path::<Keyframe>(out),
+        records_path::<Place>(out),
+        records_path::<Query>(out),
+        out.join(BEGUN_WITH),
+        out.join(COMPLETE),
+    ]
+}
+
+/// Removes the state of an unfinished run, puts that of a complete one aside, and says what the new
+/// one begins with. The journal goes first: without it nothing else is taken for part of a run.
+/// Results stay until the new run has its own.
 ///
 /// # Errors
 /// A file that cannot be removed or written.
 pub fn begin(out: &Out, identity: &Identity, resolved: &str) -> Result<(), Failure> {
+    replaced::put_aside(out)?;
     let folder = out.join("journal");
     storage::create_folder(&folder)?;
     storage::remove(&journal::path(out.path()))?;
     storage::sync_folder(&folder)?;
-    let state = [
-        checkpoint::path(out.path()),
-        records_path::<Keyframe>(out.path()),
-        records_path::<Place>(out.path()),
-        records_path::<Query>(out.path()),
-        out.join(COMPLETE),
-    ];
-    // A new run may not write all of them: none of the earlier ones must be taken for its own.
-    let results = gyre_results::FILES
-        .iter()
-        .chain(&LOGS)
-        .map(|name| out.join(name));
-    state
+    // The truth of a simulation is no result: it is there when the run begins.
+    let others = LOGS.into_iter().chain([SIMULATED_TRUTH]);
+    state(out.path())
         .into_iter()
-        .chain(results)
+        .chain(others.map(|name| out.join(name)))
         .try_for_each(|path: PathBuf| storage::remove(&path))?;
     identity.write(out)?;
     Ok(storage::write(&out.join(CONFIGURATION), resolved)?)
 }
 
-/// Says that all results have been written. They survive a power failure by now.
+/// Returns whether results of so many poses may take the place of those in the folder: a run
+/// without a motion does not replace a complete one.
+pub fn replaces(out: &Out, poses: usize) -> bool {
+    poses >= replaced::WITH_MOTION || !replaced::is_kept(out)
+}
+
+/// Ends a run whose results are in place, and survive a power failure by now. If it is complete,
+/// that is said.
 ///
 /// # Errors
-/// A file that cannot be written.
-pub fn mark_complete(out: &Out, poses: usize) -> Result<(), Failure> {
-    Ok(storage::write(
-        &out.join(COMPLETE),
-        format!("poses = {poses}\n"),
-    )?)
+/// A file that cannot be written or removed.
+pub fn end(out: &Out, poses: usize, is_complete: bool) -> Result<(), Failure> {
+    if !replaces(out, poses) {
+        return Ok(replaced::give_back(out)?);
+    }
+    if is_complete {
+        storage::write(&out.join(COMPLETE), format!("poses = {poses}\n"))?;
+    }
+    Ok(replaced::remove(out)?)
 }
 
 /// Makes the folder ready for the run to go on: cuts off what a power failure has left of the last

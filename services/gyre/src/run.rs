@@ -70,9 +70,8 @@ pub(crate) fn compute(
     place_recording(&mut configuration, &out);
     let programs = program::now(&configuration)?;
     match Earlier::of(&out, &configuration, &programs, fresh)? {
-        Earlier::Nothing => play(&configuration, &programs, out, None),
-        Earlier::Unfinished(begun) => play(&configuration, &programs, out, Some(begun)),
         Earlier::Ended(begun) => write_missing_results(&configuration, &out, &begun),
+        earlier => play(&configuration, &programs, out, &earlier),
     }
 }
 
@@ -120,8 +119,9 @@ fn make_ready(
     configuration: &Configuration,
     programs: &Programs,
     out: &Out,
-    unfinished: Option<&Begun>,
+    earlier: &Earlier,
 ) -> Result<Ready, Failure> {
+    let unfinished = earlier.unfinished();
     if let Some(simulation) = configuration.stored() {
         // A run that goes on needs the recording that it was begun with.
         let replace = unfinished.is_none();
@@ -141,16 +141,16 @@ fn make_ready(
         checked.scans,
         checked.recording.as_ref().map(|it| &it.fingerprint),
     )?;
-    if let Some(begun) = unfinished {
-        let (earlier, poses) = (&begun.identity, begun.poses);
-        earlier.require_recording(&identity, out.path(), poses)?;
-        if begun.lost > 0 {
-            print::note(format_args!(
-                "gyre: a power failure took the last {} poses of {}: going on after {poses}",
-                begun.lost,
-                out.path().display()
-            ));
-        }
+    if let Some((begun_with, holds)) = earlier.identity() {
+        begun_with.require_recording(&identity, out.path(), holds)?;
+    }
+    if let Some(begun) = unfinished.filter(|begun| begun.lost > 0) {
+        print::note(format_args!(
+            "gyre: a power failure took the last {} poses of {}: going on after {}",
+            begun.lost,
+            out.path().display(),
+            begun.poses
+        ));
     }
     Ok(Ready {
         resolved,
@@ -159,26 +159,26 @@ fn make_ready(
     })
 }
 
-/// Starts all processes, resumes `unfinished` or begins anew, and writes the results.
+/// Starts all processes, resumes an unfinished run or begins anew, and writes the results.
 fn play(
     configuration: &Configuration,
     programs: &Programs,
     out: Out,
-    unfinished: Option<Begun>,
+    earlier: &Earlier,
 ) -> Result<ExitCode, Failure> {
     let Ready {
         resolved,
         checked,
         identity,
-    } = make_ready(configuration, programs, &out, unfinished.as_ref())?;
+    } = make_ready(configuration, programs, &out, earlier)?;
+    let unfinished = earlier.unfinished();
     let signals = Signals::install()?;
     let root = match RunRoot::acquire(out.path(), &signals) {
         Err(RootError::Interrupted) => return Ok(ExitCode::from(INTERRUPTED)),
         root => root?,
     };
     preflight::check_shared_memory(&checked.footprint)?;
-    let earlier = unfinished.as_ref();
-    prepare(configuration, &identity, &out, &checked, earlier)?;
+    prepare(configuration, &identity, &out, &checked, unfinished)?;
     let plan = plan_of(
         &resolved,
         manifest(&resolved, programs, &out, &checked, &root),
@@ -311,11 +311,14 @@ fn finish(
     out: &Out,
     session: &Session<'_>,
 ) -> Result<Results, Failure> {
-    let written = gyre_results::write(configuration, out, session)?;
+    let replaces = |poses| earlier::replaces(out, poses);
+    let mut written = gyre_results::write(configuration, out, session, &replaces)?;
+    let has_replaced = replaces(written.poses);
     // With all poses there may still be loops to find.
     let has_followed = session.ending == Some(Ending::Complete) || !configuration.slam.is_on();
-    if written.ended && has_followed {
-        earlier::mark_complete(out, written.poses)?;
+    earlier::end(out, written.poses, written.ended && has_followed)?;
+    if !has_replaced {
+        written.poses = 0;
     }
     Ok(written)
 }

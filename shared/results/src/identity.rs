@@ -35,6 +35,15 @@ pub struct Identity {
     pub configuration: toml::Table,
 }
 
+/// The state of the run in a folder, which an [`Identity`] is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Holds {
+    /// An unfinished run with so many poses, which is resumed.
+    Unfinished(u64),
+    /// The results of a complete run, which the same run may replace by the same.
+    Complete,
+}
+
 /// The programs of a run.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -110,19 +119,26 @@ impl Identity {
         )?)
     }
 
-    /// Reads that of the run whose journal holds `poses` poses.
+    /// Reads that of the run which the folder holds.
     ///
     /// # Errors
     /// One sentence that says what is wrong with the file. It is written as a whole before the
     /// first pose, so the run did not leave it like that.
-    pub fn read(out: &Out, poses: u64) -> Result<Self, Failure> {
+    pub fn read(out: &Out, holds: Holds) -> Result<Self, Failure> {
         let path = out.join(BEGUN_WITH);
         Self::read_file(&path).map_err(|state| {
-            format!(
-                "{} {state}: it says what the {poses} poses in the journal beside it were computed from, so the run cannot be resumed \
-                 without it; restore it from a backup, or choose another --out (--fresh would discard the poses)",
-                path.display()
-            )
+            let path = path.display();
+            match holds {
+                Holds::Unfinished(poses) => format!(
+                    "{path} {state}: it says what the {poses} poses in the journal beside it were computed from, so the run cannot be \
+                     resumed without it; restore it from a backup, or choose another --out (--fresh would discard the poses)"
+                ),
+                Holds::Complete => format!(
+                    "{path} {state}: it says what the results of the complete run in {} were computed from; restore it from a backup, \
+                     choose another --out, or replace the results with --fresh",
+                    out.path().display()
+                ),
+            }
             .into()
         })
     }
@@ -156,14 +172,14 @@ impl Identity {
         configuration: &Configuration,
         programs: &Programs,
         out: &Path,
-        poses: u64,
+        holds: Holds,
     ) -> Result<(), Failure> {
         if let Some(difference) = configuration.difference(&self.configuration)? {
-            return Err(other(out, poses, "configuration", &difference));
+            return Err(other(out, holds, "configuration", &difference));
         }
         match self.programs.difference(programs) {
             None => Ok(()),
-            Some(difference) => Err(other(out, poses, "program", &difference)),
+            Some(difference) => Err(other(out, holds, "program", &difference)),
         }
     }
 
@@ -172,18 +188,18 @@ impl Identity {
     ///
     /// # Errors
     /// One sentence that says what differs.
-    pub fn require_recording(&self, now: &Self, out: &Path, poses: u64) -> Result<(), Failure> {
+    pub fn require_recording(&self, now: &Self, out: &Path, holds: Holds) -> Result<(), Failure> {
         let options = |of: &Self| toml::Table::try_from(of.dataset);
         if let Some(difference) = difference::first(&options(self)?, &options(now)?) {
             let difference = format!("dataset.{difference}");
-            return Err(other(out, poses, "configuration", &difference));
+            return Err(other(out, holds, "configuration", &difference));
         }
         let difference = match (&self.recording, &now.recording) {
             (Some(begun), Some(now)) => begun.difference(now),
             _ => None,
         };
         difference.map_or(Ok(()), |difference| {
-            Err(other(out, poses, "recording", &difference))
+            Err(other(out, holds, "recording", &difference))
         })
     }
 
@@ -209,11 +225,16 @@ impl Identity {
     }
 }
 
-fn other(out: &Path, poses: u64, what: &str, difference: &str) -> Failure {
-    format!(
-        "{} holds an unfinished run of another {what} ({poses} poses; {difference}): choose another --out, or discard it with --fresh",
-        out.display()
-    )
+fn other(out: &Path, holds: Holds, what: &str, difference: &str) -> Failure {
+    let out = out.display();
+    match holds {
+        Holds::Unfinished(poses) => format!(
+            "{out} holds an unfinished run of another {what} ({poses} poses; {difference}): choose another --out, or discard it with --fresh"
+        ),
+        Holds::Complete => format!(
+            "{out} holds the results of a complete run of another {what} ({difference}): choose another --out, or replace them with --fresh"
+        ),
+    }
     .into()
 }
 

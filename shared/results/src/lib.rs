@@ -16,7 +16,7 @@ mod out;
 mod results;
 mod summary;
 
-pub use identity::{Identity, Programs};
+pub use identity::{Holds, Identity, Programs};
 pub use out::{Out, OutError, absolute};
 pub use results::{FILES, Results, SIMULATED_TRUTH, SUMMARY, map_options, write};
 pub use summary::{Counter, Counts, MotionCounts, Problem, Session, SlamSummary, Summary};

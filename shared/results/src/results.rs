@@ -61,7 +61,7 @@ pub const FILES: [&str; 13] = [
 /// The files that were written.
 #[derive(Debug)]
 pub struct Results {
-    /// Poses in the journal.
+    /// Poses in the journal of which there are results.
     pub poses: usize,
     /// True if the journal has its end.
     pub ended: bool,
@@ -71,7 +71,8 @@ pub struct Results {
 
 /// Writes all files from the journal. Each is written aside first, and none takes its place before
 /// all are complete; a result of an earlier session that cannot be made any more is removed. They
-/// survive a power failure when this returns.
+/// survive a power failure when this returns. Those in place stay if `replaces` says that results
+/// of so many poses do not replace them.
 ///
 /// # Errors
 /// A journal that cannot be read, a file that cannot be written.
@@ -79,6 +80,7 @@ pub fn write(
     configuration: &Configuration,
     out: &Out,
     session: &Session<'_>,
+    replaces: &dyn Fn(usize) -> bool,
 ) -> Result<Results, Failure> {
     let truth = truth_of(configuration, out);
     let mut slam = slam_of(configuration, out);
@@ -120,9 +122,12 @@ pub fn write(
         corrected,
     );
     files.add(SUMMARY, serde_json::to_string_pretty(&summary)?)?;
-    files.commit()?;
+    let poses = counts.processed as usize;
+    if replaces(poses) {
+        files.commit()?;
+    }
     Ok(Results {
-        poses: counts.processed as usize,
+        poses,
         ended: read.end.is_some(),
         summary,
     })

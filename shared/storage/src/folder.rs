@@ -62,6 +62,24 @@ pub fn remove(path: &Path) -> Result<(), StorageError> {
     Ok(())
 }
 
+/// Gives a file or a folder another name in the same file system. [`sync_folder`] makes that
+/// survive a power failure. False: there is nothing of that name.
+///
+/// # Errors
+/// It cannot be renamed.
+pub fn rename(from: &Path, to: &Path) -> Result<bool, StorageError> {
+    match fs::rename(from, to) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(false),
+        result => result.map_err(StorageError::at("rename", from))?,
+    }
+    #[cfg(feature = "record")]
+    record::push(from, || Operation::Rename {
+        from: from.to_owned(),
+        to: to.to_owned(),
+    });
+    Ok(true)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

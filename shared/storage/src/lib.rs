@@ -37,7 +37,7 @@ use thiserror::Error;
 pub use draft::{Draft, is_draft, write};
 pub use durable::{Busy, Checksum, DurableFile, Slots};
 pub use file::File;
-pub use folder::{create_folder, remove, sync_folder};
+pub use folder::{create_folder, remove, rename, sync_folder};
 pub use group_sync::GroupSync;
 pub use limited::{SETTINGS, open, read_bytes, read_text};
 pub use log::{Log, LogError, LogMagic, LogReader};
@@ -46,7 +46,7 @@ pub use log::{Log, LogError, LogMagic, LogReader};
 #[derive(Debug, Error)]
 #[error("cannot {action} {}: {source}", path.display())]
 pub struct StorageError {
-    /// The operation: `read`, `write`, `synchronise`, `remove`.
+    /// The operation: `read`, `write`, `synchronise`, `rename`, `remove`.
     pub action: &'static str,
     /// The file or folder.
     pub path: PathBuf,

@@ -106,8 +106,7 @@ impl Disk {
                 self.rename(vec![(path.clone(), Some(self.files.len() - 1))]);
             }
             Operation::Rename { from, to } => {
-                let file = self.names.get(from).copied();
-                self.rename(vec![(from.clone(), None), (to.clone(), file)]);
+                self.rename_all(from, to);
             }
             Operation::Remove(path) => self.rename(vec![(path.clone(), None)]),
             Operation::Write {
@@ -128,6 +127,25 @@ impl Disk {
             Operation::SyncEnds { path, id } => self.sync(path, self.syncs[id]),
             Operation::SyncFolder(folder) => self.sync_folder(folder),
         }
+    }
+
+    /// Renames a file, or a folder with all files in it.
+    fn rename_all(&mut self, from: &Path, to: &Path) {
+        if self.folders.contains(from) {
+            self.folders.insert(to.to_owned());
+        }
+        let moved = self.names.iter().filter_map(|(name, file)| {
+            let rest = name.strip_prefix(from).ok()?;
+            let new = match rest.as_os_str().is_empty() {
+                true => to.to_owned(),
+                false => to.join(rest),
+            };
+            Some([(name.clone(), None), (new, Some(*file))])
+        });
+        let names: Vec<_> = moved.flatten().collect();
+        let folder = from.parent().unwrap().to_owned();
+        apply_names(&mut self.names, &names);
+        self.namings.push(Naming { folder, names });
     }
 
     fn rename(&mut self, names: Vec<(PathBuf, Option<usize>)>) {

@@ -93,7 +93,7 @@ impl Machine {
         let resumed = match Earlier::of(&out, &self.configuration, &self.programs, false)? {
             Earlier::Ended(begun) => begun.poses,
             Earlier::Unfinished(begun) => self.go_on(&out, Some(begun))?,
-            Earlier::Nothing => self.go_on(&out, None)?,
+            Earlier::Nothing | Earlier::Complete(_) => self.go_on(&out, None)?,
         };
         let session = Session {
             scans: Some(SCANS as usize),
@@ -103,9 +103,10 @@ impl Machine {
             ending: Some(Ending::Complete),
             report: None,
         };
-        let written = gyre_results::write(&self.configuration, &out, &session)?;
+        let replaces = |poses| earlier::replaces(&out, poses);
+        let written = gyre_results::write(&self.configuration, &out, &session, &replaces)?;
         assert!(written.ended);
-        earlier::mark_complete(&out, written.poses)
+        earlier::end(&out, written.poses, true)
     }
 
     /// Returns whether the run in this folder is complete. A new run removes the journal first:

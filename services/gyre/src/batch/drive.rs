@@ -12,7 +12,7 @@ use gyre_batch::DriveOutcome;
 use gyre_configuration::{AutomaticError, Configuration, ConfigurationError, SourceError};
 use gyre_masking::MaskerError;
 use gyre_radar::OpenError;
-use gyre_results::{Identity, Out, OutError, Problem, SUMMARY};
+use gyre_results::{Holds, Identity, Out, OutError, Problem, SUMMARY};
 use gyre_simulator::SimulatorError;
 use gyre_stage::run::end_with;
 use gyre_terminal::{Failure, INTERRUPTED, print};
@@ -105,7 +105,7 @@ fn is_finished(out: &Out, configuration: &Configuration) -> bool {
     // Where it is not known what the results are of, the run says what cannot be read.
     let is_same =
         |begun: Identity| begun.has_inputs_of(configuration, &program::replaced(configuration)?);
-    is_complete && Identity::read(out, 0).and_then(is_same).unwrap_or(false)
+    is_complete && Identity::read(out, Holds::Complete).and_then(is_same).unwrap_or(false)
 }
 
 /// Returns how a finished drive has ended, and says again what is wrong with it.
@@ -125,11 +125,11 @@ fn finished(out: &Out) -> Result<DriveOutcome, Failure> {
 /// configuration. One of another configuration or build is discarded: nobody has seen results of
 /// it.
 fn continues(out: &Out, configuration: &Configuration) -> Result<bool, Failure> {
-    let Ok(begun) = Identity::read(out, 0) else {
+    let Ok(begun) = Identity::read(out, Holds::Unfinished(0)) else {
         return Ok(true);
     };
     let programs = program::now(configuration)?;
-    let goes_on = begun.require(configuration, &programs, out.path(), 0);
+    let goes_on = begun.require(configuration, &programs, out.path(), Holds::Unfinished(0));
     // What cannot be read the run itself reports, and keeps what it has.
     let is_same = program::replaced(configuration)
         .map_err(Failure::from)

@@ -1,0 +1,113 @@
+//! A complete run whose place another one takes. Its results stay until those of the new run are
+//! in place, and its journal lies aside until then: a new run that fails before it has a motion
+//! gives all of it back.
+
+use std::{ffi::OsStr, fs, path::Path};
+
+use gyre_journal as journal;
+use gyre_messages::flag;
+use gyre_results::{Out, SIMULATED_TRUTH};
+use gyre_run::COMPLETE;
+use gyre_storage::{self as storage, StorageError};
+use gyre_terminal::{Failure, print};
+
+use super::{CONFIGURATION, is_complete, state};
+
+const JOURNAL: &str = "journal";
+/// The journal of the complete run, and what the new run overwrites before it has results.
+const ASIDE: &str = "journal.replaced";
+const BESIDE: [&str; 2] = [CONFIGURATION, SIMULATED_TRUTH];
+/// Poses with which a run has a motion, and so results of its own.
+pub(super) const WITH_MOTION: usize = 2;
+
+/// Returns whether the results in the folder are those of a complete run that is being replaced.
+pub(super) fn is_kept(out: &Out) -> bool {
+    out.join(ASIDE).exists()
+}
+
+/// Puts the journal of a complete run aside, if the folder has one.
+pub(super) fn put_aside(out: &Out) -> Result<(), StorageError> {
+    let aside = out.join(ASIDE);
+    if !is_complete(out.path()) || !storage::rename(&out.join(JOURNAL), &aside)? {
+        return Ok(());
+    }
+    storage::sync_folder(out.path())?;
+    for name in BESIDE {
+        storage::rename(&out.join(name), &aside.join(name))?;
+    }
+    storage::sync_folder(&aside)?;
+    storage::sync_folder(out.path())
+}
+
+/// Finishes what a kill has interrupted: the complete run is removed if the new one has its
+/// results, and given back if that has computed nothing.
+pub(super) fn settle(out: &Out) -> Result<(), Failure> {
+    let is_whole = out.join(ASIDE).join(mark()).exists();
+    if is_complete(out.path()) || !is_whole {
+        return Ok(remove(out)?);
+    }
+    let records = journal::records(&journal::path(out.path()))?;
+    let poses = records.into_iter().flatten().filter(|record| {
+        let is_end = record.as_ref().is_ok_and(|pose| pose.item.is(flag::END));
+        !is_end
+    });
+    match poses.take(WITH_MOTION).count() < WITH_MOTION {
+        true => Ok(give_back(out)?),
+        false => Ok(()),
+    }
+}
+
+/// Removes a complete run, of which no results are left.
+pub(super) fn remove(out: &Out) -> Result<(), StorageError> {
+    match is_kept(out) {
+        true => empty(&out.join(ASIDE), &out.join(JOURNAL)),
+        false => Ok(()),
+    }
+}
+
+/// Gives a complete run back, whose results are still in place, and removes the new one.
+pub(super) fn give_back(out: &Out) -> Result<(), StorageError> {
+    let (journal, aside) = (out.join(JOURNAL), out.join(ASIDE));
+    for name in BESIDE {
+        storage::rename(&aside.join(name), &out.join(name))?;
+    }
+    storage::sync_folder(out.path())?;
+    if journal.exists() {
+        empty(&journal, &aside)?;
+    }
+    storage::rename(&aside, &journal)?;
+    storage::sync_folder(out.path())?;
+    print::note(format_args!(
+        "gyre: {} has the results of the complete run before, as the new one had none",
+        out.path().display()
+    ));
+    Ok(())
+}
+
+/// The file without which a journal is not that of a complete run.
+fn mark() -> &'static OsStr {
+    Path::new(COMPLETE).file_name().unwrap_or_default()
+}
+
+/// Removes a folder and the files of a run in it. The files of others go to `others`.
+fn empty(folder: &Path, others: &Path) -> Result<(), StorageError> {
+    // First: without it nothing is given back.
+    storage::remove(&folder.join(mark()))?;
+    storage::sync_folder(folder)?;
+    let of_run: Vec<_> = state(Path::new(""))
+        .into_iter()
+        .filter_map(|path| Some(path.file_name()?.to_owned()))
+        .chain(BESIDE.map(Into::into))
+        .collect();
+    let listed = fs::read_dir(folder).map_err(StorageError::at("read", folder))?;
+    for entry in listed {
+        let path = entry.map_err(StorageError::at("read", folder))?.path();
+        let name = path.file_name().unwrap_or_default();
+        let is_of_run = of_run.iter().any(|own| own == name) || storage::is_draft(&path);
+        match is_of_run || others.join(name).exists() {
+            true => storage::remove(&path)?,
+            false => drop(storage::rename(&path, &others.join(name))?),
+        }
+    }
+    fs::remove_dir(folder).map_err(StorageError::at("remove", folder))
+}
