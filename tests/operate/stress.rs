@@ -4,7 +4,7 @@ use std::{
     fs,
     io::{BufRead, BufReader},
     path::{Path, PathBuf},
-    process::{Child, Output, Stdio},
+    process::{Child, Command, Output, Stdio},
     thread,
     time::{Duration, Instant},
 };
@@ -14,7 +14,7 @@ use rustix::process::Signal;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::common::{assert_nothing_left, gyre, send};
+use crate::common::{assert_nothing_left, gyre, leftovers, send};
 
 /// Time between two scans of a simulated radar, s.
 const PERIOD_S: f64 = 0.25;
@@ -337,4 +337,32 @@ fn the_memory_that_is_taken_is_reported() {
         available_mb > 0.0 && taken_mb <= 0.02 * available_mb + 34.0,
         "{taken}"
     );
+}
+
+/// No supervisor removes the shared memory of the sender.
+#[test]
+fn a_hand_over_whose_stress_test_is_killed_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = serde_json::json!({"send": {
+        "medium": "shared-memory", "place": folder.path(), "bytes": 1_000_000, "messages": 100_000, "readers": 1
+    }});
+    // The shell stands for `gyre stress`.
+    let mut test = Command::new("sh")
+        .args([
+            "-c",
+            "\"$0\" stress-helper $$ \"$1\" & wait",
+            crate::PROGRAM,
+        ])
+        .arg(plan.to_string())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut lines = BufReader::new(test.stdout.take().unwrap()).lines();
+    assert_eq!(lines.next().unwrap().unwrap(), "ready");
+    assert!(leftovers::bytes(folder.path()) > 1_000_000);
+    test.kill().unwrap();
+    test.wait().unwrap();
+    // Its output ends with it.
+    assert!(lines.next().is_none());
+    assert_nothing_left(folder.path());
 }

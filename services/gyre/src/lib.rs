@@ -94,18 +94,23 @@ fn doctor(arguments: &DoctorArguments) -> Result<ExitCode, Failure> {
 }
 
 /// Returns whether the files of a command are its user's alone: those of a run and of its
-/// observers.
+/// observers, and of what they start. The umask of that may be the one that the transport sets for
+/// a moment.
 fn is_private(command: &Command) -> bool {
     matches!(
         command,
         Command::Run(_)
+            | Command::Stage { .. }
+            | Command::Guard
             | Command::Up(_)
             | Command::Echo(_)
             | Command::Watch(_)
             | Command::Ros2(_)
             | Command::Shadow(_)
             | Command::Batch(_)
+            | Command::BatchDrive(_)
             | Command::Stress(_)
+            | Command::StressHelper { .. }
             | Command::Record(_)
             | Command::Link(_)
             | Command::Conformance(_)

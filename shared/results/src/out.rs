@@ -1,12 +1,15 @@
 //! The folder of the results, which one run at a time may change.
 
 use std::{
-    fs::{self, File},
+    fs::File,
     io,
     path::{Path, PathBuf},
 };
 
-use gyre_storage::lock::{Attempt, try_lock};
+use gyre_storage::{
+    create_folder,
+    lock::{Attempt, try_lock},
+};
 use thiserror::Error;
 
 /// The lock of the folder. It lies beside the results and not in shared memory, which two runs need
@@ -59,7 +62,7 @@ impl Out {
             path: path.to_owned(),
             source,
         };
-        fs::create_dir_all(path).map_err(unwritable)?;
+        create_folder(path).map_err(|error| unwritable(error.source))?;
         let path = path.canonicalize().map_err(unwritable)?;
         match try_lock(&path.join(LOCK)).map_err(unwritable)? {
             Attempt::Locked(lock) => Ok(Self { path, _lock: lock }),

@@ -1,6 +1,6 @@
 //! Folders: the names of files.
 
-use std::{fs, io, path::Path};
+use std::{fs, io, os::unix::fs::PermissionsExt, path::Path};
 
 use crate::StorageError;
 #[cfg(feature = "record")]
@@ -40,11 +40,26 @@ pub fn create_folder(folder: &Path) -> Result<(), StorageError> {
         Err(error) if error.kind() != io::ErrorKind::AlreadyExists => {
             Err(StorageError::at("write", folder)(error))
         }
-        _ => {
+        created => {
+            if created.is_ok() {
+                open_to_owner(folder).map_err(StorageError::at("write", folder))?;
+            }
             #[cfg(feature = "record")]
             record::push(folder, || Operation::CreateFolder(folder.to_owned()));
             sync_folder(above)
         }
+    }
+}
+
+/// Gives the owner all rights in a new folder. The umask may have taken one: another thread of this
+/// process can have changed it for a moment.
+fn open_to_owner(folder: &Path) -> io::Result<()> {
+    const OWNER: u32 = 0o700;
+    let handle = fs::File::open(folder)?;
+    let mode = handle.metadata()?.permissions().mode();
+    match mode & OWNER == OWNER {
+        true => Ok(()),
+        false => handle.set_permissions(fs::Permissions::from_mode(mode | OWNER)),
     }
 }
 

@@ -105,7 +105,10 @@ fn is_finished(out: &Out, configuration: &Configuration) -> bool {
     // Where it is not known what the results are of, the run says what cannot be read.
     let is_same =
         |begun: Identity| begun.has_inputs_of(configuration, &program::replaced(configuration)?);
-    is_complete && Identity::read(out, Holds::Complete).and_then(is_same).unwrap_or(false)
+    is_complete
+        && Identity::read(out, Holds::Complete)
+            .and_then(is_same)
+            .unwrap_or(false)
 }
 
 /// Returns how a finished drive has ended, and says again what is wrong with it.

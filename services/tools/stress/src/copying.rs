@@ -14,6 +14,7 @@ mod socket;
 use std::fs;
 
 use gyre_latency::Durations;
+use gyre_storage::create_folder;
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -123,7 +124,7 @@ fn measure(
     plan: &HandOver,
 ) -> Result<HandOverCost, StressError> {
     let _ = fs::remove_dir_all(&plan.place);
-    fs::create_dir_all(&plan.place).map_err(StressError::file(&plan.place))?;
+    create_folder(&plan.place).map_err(|error| StressError::file(&plan.place)(error.source))?;
     let start = |work: fn(HandOver) -> Work| Helper::start(&tested.program, work(plan.clone()));
     let mut sender = start(Work::Send)?;
     let readers: Result<Vec<_>, _> = (0..plan.readers).map(|_| start(Work::Read)).collect();

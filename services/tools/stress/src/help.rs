@@ -5,7 +5,13 @@ use std::{os::unix::process::CommandExt, path::Path, process::Command};
 use gyre_stage::run::end_with;
 use rustix::process::Signal;
 
-use crate::{StressError, copying, helper::COMMAND, load, work::Work};
+use crate::{
+    StressError,
+    copying::{self, Medium},
+    helper::COMMAND,
+    load,
+    work::Work,
+};
 
 /// Does the work of a helper: its arguments are the process that has started it, and the work.
 ///
@@ -18,8 +24,10 @@ pub fn help(program: &Path, arguments: &[String]) -> Result<(), StressError> {
     };
     let parent = parent.parse().map_err(|_| usage())?;
     let work: Work = serde_json::from_str(work).map_err(|_| usage())?;
-    let signal = match work {
+    // What has shared memory of its own ends by itself, and leaves nothing of it.
+    let signal = match &work {
         Work::Run(_) => Signal::TERM,
+        Work::Send(plan) if plan.medium == Medium::SharedMemory => Signal::TERM,
         _ => Signal::KILL,
     };
     let refused = |error: rustix::io::Errno| StressError::Usage(error.to_string());

@@ -26,6 +26,8 @@ use crate::{Manifest, StageError};
 use sealed::Sealed;
 
 pub use event::Listener;
+#[cfg(test)]
+pub(crate) use event::bind_alone;
 pub(crate) use event::{Event, EventSizes, Notifier};
 pub(crate) use publisher::{Loan, Publisher};
 pub use service::Service;

@@ -1,8 +1,6 @@
 //! The sender of a hand-over.
 
-use std::thread;
-
-use gyre_stage::{clock, hand_over};
+use gyre_stage::{clock, hand_over, wake::Signals};
 use rustix::time::{ClockId, clock_gettime};
 
 use super::{HandOver, Medium, RATE_HZ, Sent, WARM_UP, own_bytes, sending::Send, socket};
@@ -13,22 +11,22 @@ use crate::{
 
 /// Sends the messages of a hand-over.
 pub(crate) fn send(plan: &HandOver) -> Result<(), StressError> {
+    let signals = Signals::install()?;
     match plan.medium {
-        Medium::SharedMemory => send_by(plan, Loaned::create(plan)?),
-        Medium::Sockets => send_by(plan, socket::Sender::create(plan)?),
+        Medium::SharedMemory => send_by(plan, Loaned::create(plan)?, &signals),
+        Medium::Sockets => send_by(plan, socket::Sender::create(plan)?, &signals),
     }
 }
 
-fn send_by(plan: &HandOver, mut medium: impl Send) -> Result<(), StressError> {
+fn send_by(plan: &HandOver, mut medium: impl Send, signals: &Signals) -> Result<(), StressError> {
     say_ready();
-    let mut go = String::new();
-    let _ = std::io::stdin().read_line(&mut go);
+    await_line();
     medium.begin()?;
     let mut sent = Sent::default();
     let began_ns = clock::now_ns();
     let period_ns = (1e9 / RATE_HZ) as i64;
     for number in 0..WARM_UP + plan.messages {
-        thread::sleep(clock::until(began_ns + number as i64 * period_ns));
+        sleep_until(signals, began_ns + number as i64 * period_ns)?;
         medium.write(number)?;
         let before_ns = cpu_ns();
         medium.send()?;
@@ -40,8 +38,26 @@ fn send_by(plan: &HandOver, mut medium: impl Send) -> Result<(), StressError> {
     sent.shared_bytes = medium.shared_bytes();
     say_result(&sent)?;
     // Readers may still read.
-    let _ = std::io::stdin().read_line(&mut go);
+    await_line();
     Ok(())
+}
+
+/// Waits for a line, or until the process that has started this one has ended.
+fn await_line() {
+    let _ = std::io::stdin().read_line(&mut String::new());
+}
+
+/// Sleeps until a time, unless a signal requests a stop before.
+fn sleep_until(signals: &Signals, due_ns: i64) -> Result<(), StressError> {
+    loop {
+        let left = clock::until(due_ns);
+        if left.is_zero() {
+            return Ok(());
+        }
+        if signals.sleep(left)? {
+            return Err(StressError::Interrupted);
+        }
+    }
 }
 
 /// Processor time of this thread, ns.

@@ -17,6 +17,7 @@ use gyre_stage::{
     observer::{ObservedRun, Observer},
     run::sweep,
 };
+use gyre_storage::create_folder;
 use gyre_supervise::last_line;
 use rustix::process::{Pid, Signal, kill_process};
 
@@ -51,7 +52,7 @@ pub(super) struct Running<'a> {
 impl<'a> Running<'a> {
     pub fn start(tested: &TestedPipeline, setup: &'a Setup) -> Result<Self, StressError> {
         let runs = tested.out.join("runs");
-        fs::create_dir_all(&runs).map_err(StressError::file(&runs))?;
+        create_folder(&runs).map_err(|error| StressError::file(&runs)(error.source))?;
         let (out, log) = (
             runs.join(&setup.name),
             runs.join(format!("{}.txt", setup.name)),

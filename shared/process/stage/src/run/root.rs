@@ -9,7 +9,10 @@ use std::{
     collections::BTreeSet,
     fs::{self, DirBuilder, File, Metadata, Permissions},
     io,
-    os::unix::fs::{DirBuilderExt, MetadataExt, PermissionsExt},
+    os::{
+        fd::{AsFd, AsRawFd, OwnedFd},
+        unix::fs::{DirBuilderExt, MetadataExt, PermissionsExt},
+    },
     path::{Path, PathBuf},
     time::{Duration, Instant},
 };
@@ -25,6 +28,8 @@ use thiserror::Error;
 use crate::{StageError, clock, shared_memory::SHARED_MEMORY, wake::Signals};
 
 const OWNER_ONLY: u32 = 0o700;
+/// Modes of a directory in which others could have put something, or that is a special one.
+const NOT_OWN: u32 = 0o7022;
 /// Hexadecimal digits in the name of a run.
 const DIGITS: usize = 10;
 /// Time for which a lock is tried. Another supervisor holds the lock of a dead run for some
@@ -173,44 +178,57 @@ fn lock_of(root: &Path) -> PathBuf {
 }
 
 /// Returns the directory of the user's runs, which is created if there is none. `/dev/shm` is open
-/// to all users, so what is there is used only if it is a directory of this user that no other can
-/// enter.
+/// to all users, so what is there is used only if it is a directory of this user in which no other
+/// can write.
 fn user_directory() -> Result<PathBuf, RootError> {
     let path = path_of(geteuid());
-    let unusable = |source| RootError::Unusable {
+    make_directory(&path).map_err(|source| RootError::Unusable {
         path: path.clone(),
         source,
-    };
-    make_directory(&path).map_err(unusable)?;
-    check_owner_only(&path)?;
+    })?;
+    make_owner_only(&path)?;
     Ok(path)
 }
 
-/// Checks that a path is a directory of this user, and closed to all others.
-fn check_owner_only(path: &Path) -> Result<(), RootError> {
+/// Opens a directory without following a link. It need not be readable.
+fn open_directory(path: &Path) -> Result<OwnedFd, Errno> {
+    let flags = OFlags::PATH | OFlags::DIRECTORY | OFlags::NOFOLLOW | OFlags::CLOEXEC;
+    rustix::fs::open(path, flags, Mode::empty())
+}
+
+/// Sets the mode of the directory that is open, whatever its name is by now.
+fn set_owner_only(directory: &impl AsFd) -> io::Result<()> {
+    // A descriptor of this kind has no other way to its mode.
+    let path = format!("/proc/self/fd/{}", directory.as_fd().as_raw_fd());
+    fs::set_permissions(path, Permissions::from_mode(OWNER_ONLY))
+}
+
+/// Checks that a path is a directory of this user in which no other could write, and closes it to
+/// all others. A process with another umask may have created it, as the transport does in a process
+/// whose run has been removed.
+fn make_owner_only(path: &Path) -> Result<(), RootError> {
     let unsafe_ = |state: String, remedy: String| RootError::Unsafe {
         path: path.to_owned(),
         state,
         remedy,
     };
-    let flags = OFlags::DIRECTORY | OFlags::NOFOLLOW | OFlags::CLOEXEC;
-    let status = rustix::fs::open(path, flags, Mode::empty()).and_then(rustix::fs::fstat);
-    let status = match status {
-        Ok(status) => status,
+    let unusable = |source| RootError::Unusable {
+        path: path.to_owned(),
+        source,
+    };
+    let directory = match open_directory(path) {
+        Ok(directory) => directory,
         Err(Errno::NOTDIR | Errno::LOOP) => {
             let remedy = "remove it, or ask its owner to".to_owned();
             return Err(unsafe_("is not a directory".to_owned(), remedy));
         }
-        Err(error) => {
-            return Err(RootError::Unusable {
-                path: path.to_owned(),
-                source: error.into(),
-            });
-        }
+        Err(error) => return Err(unusable(error.into())),
     };
+    let status = rustix::fs::fstat(&directory).map_err(|error| unusable(error.into()))?;
     let (owner, mode) = (status.st_uid, status.st_mode & 0o7777);
     match (owner == geteuid().as_raw(), mode) {
         (true, OWNER_ONLY) => Ok(()),
+        (true, mode) if mode & NOT_OWN == 0 => set_owner_only(&directory).map_err(unusable),
         (true, _) => {
             let remedy = format!("remove it, or `chmod 700 {}`", path.display());
             Err(unsafe_(
@@ -225,18 +243,20 @@ fn check_owner_only(path: &Path) -> Result<(), RootError> {
     }
 }
 
-/// Creates a directory that is the owner's alone, unless there is one.
+/// Creates a directory that is the owner's alone, unless there is one. The mode does not depend on
+/// the umask, which the transport changes now and then in a process of several threads.
 fn make_directory(path: &Path) -> io::Result<()> {
     match DirBuilder::new().mode(OWNER_ONLY).create(path) {
-        Err(error) if error.kind() != io::ErrorKind::AlreadyExists => Err(error),
-        _ => Ok(()),
+        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => Ok(()),
+        Err(error) => Err(error),
+        Ok(()) => set_owner_only(&open_directory(path)?),
     }
 }
 
 /// Removes what dead runs of this user left in shared memory. [`RunRoot::acquire`] does this too.
 pub fn sweep() {
     let runs = path_of(geteuid());
-    if check_owner_only(&runs).is_ok() {
+    if make_owner_only(&runs).is_ok() {
         remove_dead_runs(&runs);
     }
 }
@@ -249,7 +269,7 @@ pub(crate) fn is_alive(root: &Path) -> bool {
 /// Returns the roots of this user's runs, dead ones too.
 pub(crate) fn roots() -> Vec<PathBuf> {
     let runs = path_of(geteuid());
-    match check_owner_only(&runs) {
+    match make_owner_only(&runs) {
         Ok(()) => roots_in(&runs).collect(),
         Err(_) => Vec::new(),
     }

@@ -8,8 +8,8 @@ use std::{
 
 use gyre_messages::Pose;
 
-use super::{Run, reader, send, writer};
-use crate::wake::Signals;
+use super::{Run, WINDOW, reader, send, writer};
+use crate::{transport::bind_alone, wake::Signals};
 
 const LONG: Duration = Duration::from_secs(5);
 
@@ -56,4 +56,30 @@ fn a_handshake_is_answered_once() {
     // A second answer without a handshake would let wake-ups circulate for ever.
     poses.accept_readers().unwrap();
     assert_eq!(woken(), 0);
+}
+#[test]
+fn listeners_of_many_threads_leave_the_umask_of_the_process_as_it_was() {
+    let umask = || {
+        let status = std::fs::read_to_string("/proc/self/status").unwrap();
+        let line = status.lines().find(|line| line.starts_with("Umask:"));
+        line.unwrap().to_owned()
+    };
+    let before = {
+        // Other tests of this process open listeners too.
+        let _alone = bind_alone();
+        umask()
+    };
+    let run = Run::new();
+    let manifest = &run.manifest;
+    thread::scope(|scope| {
+        for _ in 0..WINDOW.observers {
+            scope.spawn(move || {
+                for _ in 0..300 {
+                    drop(reader::<Pose>(manifest, None));
+                }
+            });
+        }
+    });
+    let _alone = bind_alone();
+    assert_eq!(umask(), before);
 }

@@ -3,6 +3,7 @@
 use std::{
     fmt::Arguments,
     os::fd::{AsFd, BorrowedFd},
+    sync::{Mutex, MutexGuard, PoisonError},
 };
 
 use iceoryx2::{
@@ -17,6 +18,16 @@ use crate::StageError;
 /// Spare ports of an event: a listener that is killed during its creation can occupy one until the
 /// run ends.
 const HEADROOM: usize = 6;
+
+/// Held while a listener is created. The transport binds its socket under a umask of 0177, which it
+/// sets for the whole process and puts back: of two threads that do so at once, one puts back the
+/// umask of the other.
+static BINDING: Mutex<()> = Mutex::new(());
+
+/// Waits until no listener is being created by another thread of this process, and keeps it so.
+pub(crate) fn bind_alone() -> MutexGuard<'static, ()> {
+    BINDING.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// Numbers of ports that an event has room for, without the spare ones.
 #[derive(Clone, Copy)]
@@ -61,10 +72,10 @@ impl Event {
 
 impl Listener {
     pub(crate) fn open(node: &Node, event: &str) -> Result<Self, StageError> {
-        Event::open(node, event)?
-            .0
-            .listener_builder()
-            .create()
+        let event_service = Event::open(node, event)?;
+        let _alone = bind_alone();
+        let created = event_service.0.listener_builder().create();
+        created
             .map(|listener| Self(Sealed::new(listener)))
             .map_err(|e| StageError::transport(format!("listen to {event}"), e))
     }

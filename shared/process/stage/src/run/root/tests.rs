@@ -72,16 +72,53 @@ fn nothing_but_runs_is_removed() {
     }
 }
 
+fn mode_of(path: &Path) -> u32 {
+    fs::metadata(path).unwrap().mode() & 0o7777
+}
+
 #[test]
-fn a_directory_that_others_can_enter_is_refused() {
-    assert!(check_owner_only(directory(0o700).path()).is_ok());
-    for mode in [0o755, 0o701, 0o1700, 0o500] {
-        let refused = check_owner_only(directory(mode).path()).unwrap_err();
+fn a_directory_in_which_others_could_write_is_refused() {
+    for mode in [0o777, 0o775, 0o702, 0o720, 0o1700, 0o2700] {
+        let directory = directory(mode);
+        let refused = make_owner_only(directory.path()).unwrap_err();
         let sentence = refused.to_string();
         assert!(
             sentence.contains(&format!("has mode {mode:04o}")),
             "{sentence}"
         );
+        assert_eq!(mode_of(directory.path()), mode, "it is left as it is");
+    }
+}
+
+#[test]
+fn a_directory_of_the_user_in_which_no_other_could_write_is_put_right() {
+    for mode in [0o700, 0o600, 0o500, 0o000, 0o755, 0o701] {
+        let directory = directory(mode);
+        make_owner_only(directory.path()).unwrap();
+        assert_eq!(mode_of(directory.path()), 0o700, "of {mode:04o}");
+    }
+}
+
+/// The umask is of the whole process, so a process of its own has it.
+#[test]
+fn directories_do_not_depend_on_the_umask() {
+    const FOLDER: &str = "GYRE_TEST_FOLDER";
+    if let Some(folder) = std::env::var_os(FOLDER) {
+        rustix::process::umask(Mode::from_bits_retain(0o177));
+        make_directory(&Path::new(&folder).join("made")).unwrap();
+        gyre_storage::create_folder(&Path::new(&folder).join("out/log")).unwrap();
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let (_, module) = module_path!().split_once("::").unwrap();
+    let name = format!("{module}::directories_do_not_depend_on_the_umask");
+    let ended = std::process::Command::new(std::env::current_exe().unwrap())
+        .args(["--exact", &name])
+        .env(FOLDER, folder.path())
+        .status();
+    assert!(ended.unwrap().success());
+    for made in ["made", "out", "out/log"] {
+        assert_eq!(mode_of(&folder.path().join(made)), 0o700, "{made}");
     }
 }
 
@@ -92,7 +129,7 @@ fn a_link_or_a_file_in_place_of_the_directory_is_refused() {
     symlink(directory.path(), &link).unwrap();
     fs::write(&file, b"").unwrap();
     for path in [link, file] {
-        let refused = check_owner_only(&path).unwrap_err();
+        let refused = make_owner_only(&path).unwrap_err();
         assert!(
             refused.to_string().contains("is not a directory"),
             "{refused}"
@@ -107,7 +144,7 @@ fn a_directory_of_another_user_is_refused() {
         println!("skipped: only root can give a directory away");
         return;
     }
-    let refused = check_owner_only(directory.path()).unwrap_err();
+    let refused = make_owner_only(directory.path()).unwrap_err();
     assert!(
         refused.to_string().contains("belongs to user 65534"),
         "{refused}"
