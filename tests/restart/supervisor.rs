@@ -5,7 +5,7 @@ use std::{fs, thread, time::Duration};
 
 use rustix::process::Signal;
 
-use crate::common::{OtherUser, Run, leftovers, send, undisturbed};
+use crate::common::{OtherUser, Run, leftovers, recording, send, undisturbed};
 
 /// A stage under a shell that has started another program, which knows nothing of the run.
 const SHELL: &str = "sleep 600 &\n{gyre} stage masking";
@@ -34,6 +34,17 @@ fn a_killed_guardian_is_replaced_and_knows_all_stages() {
 fn what_a_stage_has_started_ends_with_the_run() {
     let run = Run::of_recording().stage_script("masking", SHELL);
     assert_eq!(run.complete(), undisturbed());
+}
+
+/// As one whose last synchronisation fails, when all poses have been seen.
+#[test]
+fn a_stage_that_fails_while_it_is_ended_fails_the_run() {
+    let script = "trap 'echo the disk is gone >&2; exit 2' TERM\n{gyre} stage refinement & wait";
+    let run = Run::of_recording().stage_script("refinement", script);
+    let all = format!("{} poses are kept", recording::SCANS);
+    run.finish().failed_with(&["the disk is gone", &all]);
+    assert!(!run.out().join("journal/complete").exists());
+    assert_eq!(run.odometry(), undisturbed(), "what it had is written");
 }
 
 #[test]

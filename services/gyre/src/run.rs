@@ -314,8 +314,12 @@ fn finish(
     let replaces = |poses| earlier::replaces(out, poses);
     let mut written = gyre_results::write(configuration, out, session, &replaces)?;
     let has_replaced = replaces(written.poses);
-    // With all poses there may still be loops to find.
-    let has_followed = session.ending == Some(Ending::Complete) || !configuration.slam.is_on();
+    // With all poses there may be loops to find, and a run that failed may not have kept them.
+    let has_followed = match session.ending {
+        Some(Ending::Complete) => true,
+        Some(_) => !configuration.slam.is_on(),
+        None => false,
+    };
     earlier::end(out, written.poses, written.ended && has_followed)?;
     if !has_replaced {
         written.poses = 0;

@@ -76,6 +76,14 @@ impl DurableFile {
         self.sync.changed()
     }
 
+    /// Waits until all changes that were counted survive a power failure.
+    ///
+    /// # Errors
+    /// A synchronisation has failed: changes may be lost.
+    pub fn finish(&self) -> Result<(), StorageError> {
+        self.sync.finish()
+    }
+
     /// Returns the number of changes that survive a power failure; `None` until the first
     /// synchronisation has ended.
     pub fn safe(&self) -> Option<u64> {

@@ -31,6 +31,8 @@ struct Shared {
 struct Progress {
     made: u64,
     safe: u64,
+    /// The number of changes that somebody waits for.
+    awaited: u64,
     ending: bool,
     /// Why a synchronisation has failed. There is none after it.
     failure: Option<(io::ErrorKind, String)>,
@@ -68,7 +70,8 @@ impl Shared {
             }
             let elapsed = last.map_or(GroupSync::INTERVAL, |last| last.elapsed());
             let left = GroupSync::INTERVAL.saturating_sub(elapsed);
-            if left.is_zero() || progress.ending || pending >= GroupSync::LIMIT / 2 {
+            let is_urgent = progress.ending || progress.awaited > progress.safe;
+            if left.is_zero() || is_urgent || pending >= GroupSync::LIMIT / 2 {
                 return Some(progress.made);
             }
             let waited = self.changed.wait_timeout(progress, left);
@@ -139,6 +142,25 @@ impl GroupSync {
         while progress.made - progress.safe > Self::LIMIT && progress.failure.is_none() {
             progress = self.shared.wait(progress);
         }
+        self.result(&progress)
+    }
+
+    /// Waits until all changes are safe. Dropped without that, nobody learns of a failure.
+    ///
+    /// # Errors
+    /// A synchronisation has failed: changes may be lost.
+    pub fn finish(&self) -> Result<(), StorageError> {
+        let mut progress = self.shared.lock();
+        let made = progress.made;
+        progress.awaited = made;
+        self.shared.changed.notify_all();
+        while progress.safe < made && progress.failure.is_none() {
+            progress = self.shared.wait(progress);
+        }
+        self.result(&progress)
+    }
+
+    fn result(&self, progress: &Progress) -> Result<(), StorageError> {
         match &progress.failure {
             None => Ok(()),
             Some((kind, reason)) => Err(StorageError::at("synchronise", &self.path)(
@@ -180,9 +202,26 @@ mod tests {
             let safe = group.safe().unwrap_or(0);
             assert!(change - safe <= GroupSync::LIMIT, "{safe} of {change}");
         }
+        group.finish().unwrap();
+        assert_eq!(group.safe(), Some(10 * GroupSync::LIMIT));
         let shared = Arc::clone(&group.shared);
         drop(group);
         let progress = shared.lock();
         assert_eq!(progress.safe, progress.made);
+    }
+
+    /// The system does not synchronise a device that forgets all.
+    #[test]
+    fn a_failure_of_the_last_synchronisation_is_reported() {
+        let file = File::open_or_create(std::path::Path::new("/dev/null")).unwrap();
+        let group = GroupSync::start(&file).unwrap();
+        for _ in 0..2 {
+            let failed = group.finish().unwrap_err().to_string();
+            assert!(
+                failed.starts_with("cannot synchronise /dev/null: "),
+                "{failed}"
+            );
+        }
+        assert_eq!(group.safe(), None);
     }
 }

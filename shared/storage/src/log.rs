@@ -163,7 +163,7 @@ impl Log {
     /// # Errors
     /// A file that cannot be synchronised.
     pub fn sync(&self) -> Result<(), LogError> {
-        Ok(self.file.file().sync()?)
+        Ok(self.file.finish()?)
     }
 
     /// Reads a record, which replaces the content of `bytes`.

@@ -43,10 +43,12 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     if integration.slam.is_on() {
         integration.growth = Some(Growth::of(launch, LogId::Keyframes)?);
     }
-    match launch.manifest.refines {
+    let counters = match launch.manifest.refines {
         true => sink::run::<Refined, _>(launch, &mut integration),
         false => sink::run::<Motion, _>(launch, &mut integration),
-    }
+    }?;
+    integration.sync()?;
+    Ok(counters)
 }
 
 struct Integration {
@@ -114,11 +116,23 @@ impl Sink for Integration {
                 ..*item
             },
             ..PoseHeader::default()
-        })
+        })?;
+        // Once the end is published, the run is complete.
+        self.sync()
     }
 }
 
 impl Integration {
+    /// Waits until all that was written survives a power failure: a failure is found by nobody
+    /// after this process.
+    fn sync(&self) -> Result<(), StageError> {
+        let keyframes = self.keyframes.as_ref();
+        keyframes
+            .map_or(Ok(()), Keyframes::sync)
+            .map_err(unusable_keyframes)?;
+        self.journal.sync().map_err(unusable)
+    }
+
     fn wake_followers(&self) -> Result<(), StageError> {
         self.growth.as_ref().map_or(Ok(()), Growth::notify)
     }

@@ -125,6 +125,14 @@ impl<R: Record> RecordLog<R> {
             self.log.append(&[])?;
             self.ended = true;
         }
+        self.sync()
+    }
+
+    /// Makes all records survive a power failure.
+    ///
+    /// # Errors
+    /// A file that cannot be synchronised.
+    pub fn sync(&self) -> Result<(), LogError> {
         self.log.sync()
     }
 

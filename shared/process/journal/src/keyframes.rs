@@ -110,6 +110,14 @@ impl Keyframes {
     pub fn end(&mut self) -> Result<(), KeyframesError> {
         Ok(self.log.end()?)
     }
+
+    /// Waits until all keyframes so far survive a power failure.
+    ///
+    /// # Errors
+    /// A file that cannot be synchronised.
+    pub fn sync(&self) -> Result<(), KeyframesError> {
+        Ok(self.log.sync()?)
+    }
 }
 
 /// Returns how many of the first `poses` poses of the journal have all their keyframes. After a

@@ -118,4 +118,12 @@ impl Journal {
         self.records += 1;
         Ok(self.file.changed()?)
     }
+
+    /// Waits until all that was appended survives a power failure.
+    ///
+    /// # Errors
+    /// A file that cannot be synchronised.
+    pub fn sync(&self) -> Result<(), JournalError> {
+        Ok(self.file.finish()?)
+    }
 }

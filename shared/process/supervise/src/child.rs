@@ -28,6 +28,7 @@ use crate::{
 /// Time for a killed process to end. The kernel holds one that waits for a device, as for a network
 /// folder.
 const KILL_TIMEOUT: Duration = Duration::from_secs(10);
+const PERMANENT: i32 = StageError::PERMANENT as i32;
 
 pub(crate) struct Child {
     plan: StagePlan,
@@ -229,11 +230,7 @@ impl Child {
     /// # Errors
     /// A permanent failure, or more deaths than the policy allows.
     pub(crate) fn may_restart(&mut self, death: &Death) -> Result<(), SuperviseError> {
-        if death.code == Some(i32::from(StageError::PERMANENT)) {
-            let message = death
-                .last_output
-                .clone()
-                .unwrap_or_else(|| format!("{}: {}", self.name(), death.cause));
+        if let Some(message) = self.message_if_permanent(death) {
             return Err(SuperviseError::Permanent { message });
         }
         let policy = self.plan.restart;
@@ -253,6 +250,22 @@ impl Child {
                 .as_ref()
                 .map_or(String::new(), |line| format!(" ({line})")),
         })
+    }
+
+    /// Returns what it has failed by if it has ended, and a restart would repeat that.
+    pub(crate) fn permanent_failure(&mut self) -> Option<String> {
+        let status = self.status?;
+        if status.code() != Some(PERMANENT) {
+            return None;
+        }
+        let death = self.death();
+        self.message_if_permanent(&death)
+    }
+
+    fn message_if_permanent(&self, death: &Death) -> Option<String> {
+        let message = || format!("{}: {}", self.name(), death.cause);
+        let is_permanent = death.code == Some(PERMANENT);
+        is_permanent.then(|| death.last_output.clone().unwrap_or_else(message))
     }
 
     pub(crate) fn death(&mut self) -> Death {

@@ -160,4 +160,13 @@ impl Processes {
         let all: Vec<usize> = (0..self.len()).collect();
         self.kill(&all, &run.guardian)
     }
+
+    /// Checks that no process has failed at its end, as one that cannot keep what it has written.
+    ///
+    /// # Errors
+    /// The failure of one that says so by its exit code.
+    pub fn require_good_ends(&mut self) -> Result<(), SuperviseError> {
+        let failed = self.children.iter_mut().find_map(Child::permanent_failure);
+        failed.map_or(Ok(()), |message| Err(SuperviseError::Permanent { message }))
+    }
 }

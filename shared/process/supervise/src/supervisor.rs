@@ -197,7 +197,11 @@ impl<'a> Supervisor<'a> {
         }
         self.processes.stop(&mut self.run)?;
         self.logs.bound();
-        Ok(())
+        // The failure that the run ends by is the first one.
+        match ending {
+            Some(_) => self.processes.require_good_ends(),
+            None => Ok(()),
+        }
     }
 
     fn report(self, ending: Ending) -> Report {
