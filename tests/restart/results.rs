@@ -248,6 +248,27 @@ fn a_journal_that_was_damaged_on_the_disk_is_refused_and_kept() {
     assert_eq!(fs::read(kept).unwrap(), bytes);
 }
 
+#[test]
+fn a_journal_that_is_removed_during_the_run_ends_it_and_is_named() {
+    for replace in [
+        |path: &Path| fs::remove_file(path),
+        |path: &Path| {
+            fs::write(path.with_extension("new"), "")
+                .and_then(|()| fs::rename(path.with_extension("new"), path))
+        },
+    ] {
+        let run = Run::of_recording().rate(MODERATE);
+        let mut running = run.start();
+        running.await_poses(MIDDLE);
+        let journal = run.out().join("journal/poses.journal");
+        replace(&journal).unwrap();
+        running
+            .finish()
+            .failed_with(&["cannot keep", "poses.journal", "removed or replaced"]);
+        assert!(!run.out().join("journal/complete").exists());
+    }
+}
+
 /// The command with a `/dev/shm` of its own, as a container has it; `None` where the system does
 /// not permit that.
 fn in_container(run: &Run) -> Option<Command> {

@@ -173,3 +173,31 @@ fn last_keyframe(run: &Run) -> u64 {
     let last = keyframes.len() - 1;
     keyframes.read(last).unwrap().seq
 }
+
+#[test]
+fn keyframes_that_are_removed_during_the_run_end_it_in_a_sentence() {
+    let run = run().rate("6");
+    let mut running = run.start();
+    running.await_poses(recording::SCANS / 3);
+    fs::remove_file(records_path::<Keyframe>(run.out())).unwrap();
+    running
+        .finish()
+        .failed_with(&["keyframes.log", "removed or replaced", "poses are kept"]);
+    assert!(!run.out().join("journal/complete").exists());
+    run.complete();
+    require_undisturbed(&run, "removed keyframes");
+}
+
+/// The run has ended, and its results are still to be written.
+#[test]
+fn results_without_keyframes_say_so() {
+    let run = run();
+    run.complete();
+    fs::remove_file(records_path::<Keyframe>(run.out())).unwrap();
+    fs::remove_file(run.out().join("journal/complete")).unwrap();
+    let ended = run.finish();
+    let note = "no corrected trajectory: ";
+    let said = ended.stderr.lines().find(|line| line.contains(note));
+    let said = said.unwrap_or_else(|| panic!("{}", ended.stderr));
+    assert!(said.contains("keyframes.log has no keyframes"), "{said}");
+}

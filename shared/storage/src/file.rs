@@ -3,7 +3,7 @@
 use std::{
     fs::{self, OpenOptions, TryLockError},
     io,
-    os::unix::fs::FileExt,
+    os::unix::fs::{FileExt, MetadataExt},
     path::{Path, PathBuf},
     thread,
     time::{Duration, Instant},
@@ -127,6 +127,23 @@ impl File {
         }
     }
 
+    /// Checks that the file still has its name. Without it nobody else finds what is written.
+    ///
+    /// # Errors
+    /// Another program has removed the file, or put another one in its place.
+    pub fn require_name(&self) -> Result<(), StorageError> {
+        let failed = StorageError::at("keep", &self.path);
+        let id = |metadata: fs::Metadata| (metadata.dev(), metadata.ino());
+        let own = self.file.metadata().map(id).map_err(&failed)?;
+        match fs::metadata(&self.path).map(id) {
+            Ok(named) if named == own => Ok(()),
+            Err(error) if error.kind() != io::ErrorKind::NotFound => Err(failed(error)),
+            _ => Err(failed(io::Error::other(
+                "another program has removed or replaced it while it was written, and what it held is lost",
+            ))),
+        }
+    }
+
     /// Returns the length, bytes.
     ///
     /// # Errors
@@ -220,6 +237,25 @@ impl File {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+
+    #[test]
+    fn a_file_that_has_lost_its_name_is_noticed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("file");
+        let file = File::open_or_create(&path).unwrap();
+        file.require_name().unwrap();
+        let lost = || {
+            let sentence = file.require_name().unwrap_err().to_string();
+            let begin = format!("cannot keep {}: another program", path.display());
+            assert!(sentence.starts_with(&begin), "{sentence}");
+        };
+        fs::rename(&path, folder.path().join("away")).unwrap();
+        lost();
+        fs::write(&path, "another").unwrap();
+        lost();
+        fs::rename(folder.path().join("away"), &path).unwrap();
+        file.require_name().unwrap();
+    }
 
     #[test]
     fn a_lock_is_waited_for_while_its_owner_goes_and_refused_while_it_stays() {

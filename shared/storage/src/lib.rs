@@ -46,7 +46,7 @@ pub use log::{Log, LogError, LogMagic, LogReader};
 #[derive(Debug, Error)]
 #[error("cannot {action} {}: {source}", path.display())]
 pub struct StorageError {
-    /// The operation: `read`, `write`, `synchronise`, `rename`, `remove`.
+    /// The operation: `read`, `write`, `keep`, `synchronise`, `rename`, `remove`.
     pub action: &'static str,
     /// The file or folder.
     pub path: PathBuf,

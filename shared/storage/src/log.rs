@@ -126,7 +126,8 @@ impl Log {
     /// Appends a record. A reader sees it when this returns.
     ///
     /// # Errors
-    /// A file that cannot be written or synchronised, or a record of more than 16 MiB.
+    /// A file that cannot be written or synchronised or that another program has removed, or a
+    /// record of more than 16 MiB.
     pub fn append(&mut self, record: &[u8]) -> Result<(), LogError> {
         if record.len() > MAX_BYTES {
             let too_long = io::ErrorKind::FileTooLarge.into();
@@ -136,6 +137,7 @@ impl Log {
         self.file
             .file()
             .write_at(&self.buffer, self.records.end())?;
+        self.file.file().require_name()?;
         self.records.push(header);
         self.count()
     }
@@ -161,8 +163,9 @@ impl Log {
     /// Makes all records survive a power failure.
     ///
     /// # Errors
-    /// A file that cannot be synchronised.
+    /// A file that cannot be synchronised, or that another program has removed.
     pub fn sync(&self) -> Result<(), LogError> {
+        self.file.file().require_name()?;
         Ok(self.file.finish()?)
     }
 

@@ -106,7 +106,7 @@ impl Journal {
     /// Appends a pose, or the end of the stream.
     ///
     /// # Errors
-    /// A file that cannot be written or synchronised.
+    /// A file that cannot be written or synchronised, or that another program has removed.
     pub fn append(&mut self, pose: &PoseHeader) -> Result<(), JournalError> {
         let safe = self.file.safe().map_or(0, |appended| self.found + appended);
         let record = Record {
@@ -115,6 +115,7 @@ impl Journal {
         };
         record.encode(&mut self.buffer);
         self.file.write(&RECORDS, self.records, &self.buffer)?;
+        self.file.file().require_name()?;
         self.records += 1;
         Ok(self.file.changed()?)
     }
@@ -122,8 +123,9 @@ impl Journal {
     /// Waits until all that was appended survives a power failure.
     ///
     /// # Errors
-    /// A file that cannot be synchronised.
+    /// A file that cannot be synchronised, or that another program has removed.
     pub fn sync(&self) -> Result<(), JournalError> {
+        self.file.file().require_name()?;
         Ok(self.file.finish()?)
     }
 }

@@ -7,10 +7,12 @@ use gyre_configuration::Configuration;
 use gyre_estimation::{Constraint, EstimationError, G2o};
 use gyre_evaluation::{BandSample, Bands, TruthSigma};
 use gyre_geometry::{Pose, xy_yaw};
+use gyre_journal as journal;
+use gyre_messages::flag;
 use gyre_radar::Trajectory;
 use gyre_slam::{
     Correction, Keyframe, LoopOutcome, LoopVerdict, Query, RecordReader, TrajectoryEstimator,
-    TrajectoryOptions,
+    TrajectoryOptions, records_path,
 };
 use gyre_terminal::Failure;
 
@@ -30,6 +32,20 @@ pub struct Slam {
     keyframes: Vec<(u64, i64)>,
 }
 
+/// Checks that a run without keyframes has no poses either: the first one has a keyframe.
+fn require_no_poses(out: &Out) -> Result<(), Failure> {
+    let mut records = journal::records(&journal::path(out.path()))?;
+    let first = records.as_mut().and_then(Iterator::next).transpose()?;
+    match first.is_some_and(|pose| !pose.item.is(flag::END)) {
+        false => Ok(()),
+        true => Err(format!(
+            "{} has no keyframes, although the journal beside it has poses: restore it from a backup, or begin anew with --fresh",
+            records_path::<Keyframe>(out.path()).display()
+        )
+        .into()),
+    }
+}
+
 impl Slam {
     /// Corrects the poses of the keyframes of a run by its loops; `None` without SLAM, and before
     /// the first keyframe. Of a run that goes on, the loops so far are left out.
@@ -42,7 +58,7 @@ impl Slam {
         };
         let mut keyframes = RecordReader::<Keyframe>::open(out.path())?;
         if keyframes.is_empty() {
-            return Ok(None);
+            return require_no_poses(out).map(|()| None);
         }
         let queries = queries(out)?;
         let mut estimator = TrajectoryEstimator::new(TrajectoryOptions {
