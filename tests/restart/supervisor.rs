@@ -15,8 +15,12 @@ fn what_a_stage_has_started_ends_with_a_killed_supervisor() {
     let run = Run::of_recording().rate("2").stage_script("masking", SHELL);
     let mut running = run.start();
     running.await_poses(2);
+    let before = running.shared_memory_bytes();
+    assert!(before > 1_000_000, "{before}");
     running.kill_supervisor();
-    leftovers::remove(run.out());
+    // The guardian is there for a moment more.
+    leftovers::await_nothing(run.out());
+    assert_eq!(run.complete(), undisturbed());
 }
 
 #[test]
@@ -27,7 +31,7 @@ fn a_killed_guardian_is_replaced_and_knows_all_stages() {
     send(guardian, Signal::KILL);
     running.await_guardian(Some(guardian));
     running.kill_supervisor();
-    leftovers::remove(run.out());
+    leftovers::await_nothing(run.out());
 }
 
 #[test]

@@ -27,7 +27,7 @@ pub mod stage;
 pub mod stress;
 pub mod watch;
 
-use std::process::ExitCode;
+use std::{path::PathBuf, process::ExitCode};
 
 use gyre_configuration::{Configuration, schema};
 use gyre_doctor::DoctorArguments;
@@ -49,7 +49,8 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
     match command {
         Command::Stage { name } => Ok(stage::run(&name)),
         Command::Guard => {
-            gyre_supervise::guard(std::io::stdin().lock());
+            let root = std::env::var_os(gyre_stage::run::ENVIRONMENT).map(PathBuf::from);
+            gyre_supervise::guard(std::io::stdin().lock(), root.as_deref());
             Ok(ExitCode::SUCCESS)
         }
         Command::Run(arguments) => run::run(&arguments),

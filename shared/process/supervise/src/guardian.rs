@@ -1,4 +1,5 @@
-//! A process that outlives a killed supervisor, to end what the stages have started.
+//! A process that outlives a killed supervisor, to end what the stages have started and to remove
+//! what the run has in shared memory.
 //!
 //! The system ends a stage together with its supervisor, but not the stage's own children, as a
 //! shell has them. Each stage leads a process group, and the guardian knows them all: it reads them
@@ -11,8 +12,10 @@ use std::{
         fd::{AsRawFd, BorrowedFd, RawFd},
         unix::process::CommandExt,
     },
+    path::Path,
     process::{Child, ChildStdin, Command, Stdio},
-    time::Duration,
+    thread,
+    time::{Duration, Instant},
 };
 
 use gyre_stage::{Manifest, run, wake::Signals};
@@ -26,6 +29,8 @@ use crate::{SuperviseError, end::ends_within};
 
 /// Time for the guardian to end with the run.
 const STOP_TIMEOUT: Duration = Duration::from_secs(1);
+/// Time between two looks at processes that were killed.
+const PERIOD: Duration = Duration::from_millis(10);
 
 /// The running guardian.
 pub(crate) struct Guardian {
@@ -108,10 +113,11 @@ pub(crate) fn join(pipe: RawFd) {
     let _ = rustix::io::write(pipe, &getpid().as_raw_nonzero().get().to_ne_bytes());
 }
 
-/// Reads process groups until the supervisor ends, then kills those that it has left.
+/// Reads process groups until the supervisor ends, then kills those that it has left, and removes
+/// the shared memory of the run with this root.
 ///
 /// A message is a process group, or a negative one that is to be forgotten.
-pub fn guard(mut messages: impl Read) {
+pub fn guard(mut messages: impl Read, root: Option<&Path>) {
     // A request to stop that reaches all processes of a service is the supervisor's alone.
     let _caught = Signals::install();
     let mut groups = BTreeMap::new();
@@ -123,14 +129,33 @@ pub fn guard(mut messages: impl Read) {
             false => groups.remove(&group.saturating_neg()),
         };
     }
+    let mut killed = Vec::new();
     for (group, since) in groups {
         // A number can be given anew. While a group has processes left, no other process gets its
         // number.
         let is_another = started(group).is_some_and(|now| Some(now) != since);
         if let Some(group) = Pid::from_raw(group).filter(|_| !is_another) {
             let _ = kill_process_group(group, Signal::KILL);
+            killed.push(group);
         }
     }
+    // What still lives could make files anew.
+    let deadline = Instant::now() + STOP_TIMEOUT;
+    while killed.iter().any(|group| lives(*group)) && Instant::now() < deadline {
+        thread::sleep(PERIOD);
+    }
+    if let Some(root) = root {
+        run::sweep_run(root);
+    }
+}
+
+/// Returns whether a group has a process that has not ended. One that nobody waits for stays as a
+/// zombie.
+fn lives(group: Pid) -> bool {
+    let processes = procfs::process::all_processes().into_iter().flatten();
+    let stats = processes.filter_map(|process| process.ok()?.stat().ok());
+    let mut of_group = stats.filter(|stat| stat.pgrp == group.as_raw_pid());
+    of_group.any(|stat| !matches!(stat.state, 'Z' | 'X'))
 }
 
 /// Returns when a process was started, in the system's ticks; `None` if there is none.
@@ -156,7 +181,7 @@ mod tests {
         let (mut kept, mut forgotten) = (sleeper(), sleeper());
         let (kept_id, forgotten_id) = (kept.id() as RawPid, forgotten.id() as RawPid);
         let messages = [kept_id, forgotten_id, -forgotten_id].map(RawPid::to_ne_bytes);
-        guard(messages.as_flattened());
+        guard(messages.as_flattened(), None);
         assert_eq!(kept.wait().unwrap().signal(), Some(9));
         assert!(!ends_within(&forgotten, Duration::from_millis(50)));
         forgotten.kill().unwrap();

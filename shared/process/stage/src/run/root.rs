@@ -261,6 +261,16 @@ pub fn sweep() {
     }
 }
 
+/// Removes what the run with this root has left in shared memory, if its supervisor is dead and no
+/// other run has its place.
+pub fn sweep_run(root: &Path) {
+    let is_run = root.file_name().and_then(|name| name.to_str());
+    let of_user = root.parent() == Some(path_of(geteuid()).as_path());
+    if of_user && is_run.is_some_and(is_name) {
+        remove_if_dead(root);
+    }
+}
+
 /// Returns whether the supervisor of a run lives: it holds the lock.
 pub(crate) fn is_alive(root: &Path) -> bool {
     matches!(try_lock_existing(&lock_of(root)), Ok(Attempt::Held(_)))
@@ -290,18 +300,20 @@ fn roots_in(runs: &Path) -> impl Iterator<Item = PathBuf> {
 
 /// Removes runs whose supervisor was killed: their locks are free.
 fn remove_dead_runs(runs: &Path) {
-    for root in roots_in(runs) {
-        // A run that has just ended has removed its lock last. Created again, that would stay if
-        // this process were killed here.
-        let lock = match try_lock_existing(&lock_of(&root)) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound && root.exists() => {
-                try_lock(&lock_of(&root))
-            }
-            lock => lock,
-        };
-        if let Ok(Attempt::Locked(_lock)) = lock {
-            remove(&root);
+    roots_in(runs).for_each(|root| remove_if_dead(&root));
+}
+
+fn remove_if_dead(root: &Path) {
+    // A run that has just ended has removed its lock last. Created again, that would stay if this
+    // process were killed here.
+    let lock = match try_lock_existing(&lock_of(root)) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound && root.exists() => {
+            try_lock(&lock_of(root))
         }
+        lock => lock,
+    };
+    if let Ok(Attempt::Locked(_lock)) = lock {
+        remove(root);
     }
 }
 

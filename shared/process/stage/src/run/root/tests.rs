@@ -48,6 +48,23 @@ fn a_dead_run_is_removed_by_the_next_one() {
 }
 
 #[test]
+fn one_dead_run_is_removed_and_no_living_one() {
+    let out = tempfile::tempdir().unwrap();
+    let living = acquire(out.path()).unwrap();
+    let name = format!("gyre{:010x}", (1 << 32) + u64::from(std::process::id()));
+    let dead = user_directory().unwrap().join(&name);
+    let segment = Path::new(SHARED_MEMORY).join(format!("{name}_leftover"));
+    drop(try_lock(&lock_of(&dead)).unwrap());
+    fs::create_dir(&dead).unwrap();
+    fs::write(&segment, b"").unwrap();
+    sweep_run(living.path());
+    sweep_run(out.path());
+    assert!(living.path().exists() && out.path().exists() && segment.exists());
+    sweep_run(&dead);
+    assert!(!segment.exists() && !dead.exists() && !lock_of(&dead).exists());
+}
+
+#[test]
 fn nothing_but_runs_is_removed() {
     let (out, other) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     // Keeps the user's directory.
