@@ -3,9 +3,12 @@
 use std::{
     fs,
     os::unix::fs::PermissionsExt,
+    process::{Child, Stdio},
     thread,
     time::{Duration, Instant},
 };
+
+use rustix::process::Signal;
 
 use crate::{
     PROGRAM,
@@ -203,6 +206,60 @@ fn a_swap_that_is_interrupted_leaves_nobody_standing_by() {
     }
     running.finish().succeeded();
     assert_eq!(run.odometry(), undisturbed());
+}
+
+/// A swap command that has been started.
+fn swapping(run: &Run, options: &[&str]) -> Child {
+    let mut words = gyre();
+    words
+        .args(["swap", "masking", "--command", "sleep 60", "--out"])
+        .arg(run.out())
+        .args(options);
+    words.stderr(Stdio::piped()).spawn().unwrap()
+}
+
+fn said(client: Child) -> String {
+    let output = client.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    String::from_utf8(output.stderr).unwrap()
+}
+
+#[test]
+fn a_supervisor_that_hangs_is_not_waited_for_and_does_nothing_of_that_later() {
+    let run = Run::of_recording().rate("0.3");
+    let mut running = run.start();
+    running.await_poses(2).signal(Signal::STOP);
+    let swapping = [&[][..], &["--cold"]].map(|options| swapping(&run, options));
+    let mut restart = gyre();
+    restart.args(["restart", "masking", "--out"]).arg(run.out());
+    let restarting = restart.stderr(Stdio::piped()).spawn().unwrap();
+    let since = Instant::now();
+    for client in swapping.into_iter().chain([restarting]) {
+        let said = said(client);
+        assert!(said.contains("does not answer"), "{said}");
+        assert!(said.contains("not carried out later"), "{said}");
+    }
+    assert!(since.elapsed().as_secs() < 40, "{:?}", since.elapsed());
+    running.signal(Signal::CONT);
+    running.finish().succeeded();
+    assert_eq!(run.odometry(), undisturbed());
+    let summary = run.summary();
+    assert_eq!(summary["swaps"], serde_json::Value::Null);
+    assert_eq!(summary["restarts"], serde_json::json!({}));
+}
+
+#[test]
+fn a_program_that_never_stands_by_is_said_to_be_waited_for_and_how_long() {
+    let run = Run::of_recording().rate("0.3").set("run.start_timeout_s=8");
+    let mut running = run.start();
+    running.await_poses(2);
+    let said = said(swapping(&run, &[]));
+    let note = "masking goes on as before: waiting for 8 s at most (run.start_timeout_s) for `";
+    assert!(said.contains(note), "{said}");
+    assert!(said.contains("it did not get ready"), "{said}");
+    assert_eq!(status(&run).unwrap()["swap"], serde_json::Value::Null);
+    ask(&run, &["down"]).succeeded();
+    running.end();
 }
 
 #[test]

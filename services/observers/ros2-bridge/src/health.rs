@@ -190,6 +190,7 @@ mod tests {
             poses: 8,
             dropped,
             last_pose_s: Some(0.1),
+            swap: None,
             processes: vec![
                 process("masking", Activity::Working),
                 process("refinement", Activity::Silent),

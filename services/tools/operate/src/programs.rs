@@ -2,7 +2,7 @@
 
 use std::{env, process::ExitCode};
 
-use gyre_stage::control::Swap;
+use gyre_stage::control::{PendingSwap, Swap};
 use gyre_supervise::Program;
 use gyre_terminal::{Failure, print, words};
 
@@ -20,6 +20,44 @@ pub fn restart(arguments: &RestartArguments) -> Result<ExitCode, Failure> {
     run.restart(&arguments.process)?;
     print::line(format_args!("{} is started again", arguments.process))?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Time after which what is waited for is said.
+const EXPLAIN_AFTER_S: f64 = 5.0;
+
+/// The progress of a swap that a person has been told of.
+#[derive(Default)]
+struct Waiting {
+    /// True if the program had taken over then.
+    told: Option<bool>,
+}
+
+impl Waiting {
+    /// Says once for each step of a swap what is waited for.
+    fn explain(&mut self, pending: &PendingSwap) {
+        if pending.waited_s > EXPLAIN_AFTER_S && self.told != Some(pending.has_taken_over) {
+            self.told = Some(pending.has_taken_over);
+            print::note(format_args!("gyre: {}", sentence(pending)));
+        }
+    }
+}
+
+/// Says what a swap waits for and how long, and what can be done about it.
+fn sentence(pending: &PendingSwap) -> String {
+    let (process, command) = (&pending.process, pending.command.join(" "));
+    let limit = match pending.limit_s {
+        Some(limit_s) => format!("for {limit_s} s at most"),
+        None => "without a limit".to_owned(),
+    };
+    match pending.has_taken_over {
+        true => format!(
+            "`{command}` has taken over from {process}: waiting {limit} for a first scan to go through it"
+        ),
+        false => format!(
+            "{process} goes on as before: waiting {limit} (run.start_timeout_s) for `{command}` to say that it is ready to take over; \
+             interrupt this to give it up, and start a program that cannot stand by with --cold"
+        ),
+    }
 }
 
 /// The exit code of a swap to a program that nothing is known against, and nothing for.
@@ -53,7 +91,8 @@ pub fn swap(arguments: &SwapArguments) -> Result<ExitCode, Failure> {
         directory,
         cold: arguments.cold,
     };
-    if let Some(untried) = run.swap(swap)? {
+    let mut waiting = Waiting::default();
+    if let Some(untried) = run.swap(swap, &mut |pending| waiting.explain(pending))? {
         print::note(format_args!("gyre: {untried}"));
         return Ok(ExitCode::from(UNTRIED));
     }

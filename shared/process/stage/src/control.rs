@@ -3,10 +3,11 @@
 //! The supervisor answers at a socket in the run's root, which is the user's alone: one request on
 //! one line of JSON, one answer on another, and the connection is closed.
 
+mod exchange;
+
 use std::{
-    fs,
-    io::{self, BufRead, BufReader, Write},
-    os::unix::{fs::MetadataExt, net::UnixStream},
+    fs, io,
+    os::unix::fs::MetadataExt,
     path::{Path, PathBuf},
     time::Duration,
 };
@@ -14,11 +15,14 @@ use std::{
 use serde::{Deserialize, Serialize};
 
 use crate::{Manifest, StageError, run, source::Received};
+use exchange::Sent;
 
 /// The name of the socket in the run's root.
 pub const SOCKET: &str = "control.sock";
 /// Time for the supervisor to answer. It is busy while it ends a process that the kernel holds.
 const ANSWER: Duration = Duration::from_secs(15);
+/// Time between two looks at a swap that is waited for.
+const LOOK: Duration = Duration::from_secs(1);
 
 /// A request to the supervisor of a run.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -86,8 +90,26 @@ pub struct Status {
     pub dropped: u64,
     /// Time since the newest pose was seen, s; `None` before the first one.
     pub last_pose_s: Option<f64>,
+    /// The swap that is not done yet.
+    pub swap: Option<PendingSwap>,
     /// The processes: the stages in the order of the stream, the followers, the recorder.
     pub processes: Vec<ProcessStatus>,
+}
+
+/// A swap that is not done yet.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PendingSwap {
+    /// The name of the stage or follower.
+    pub process: String,
+    /// Program and arguments.
+    pub command: Vec<String>,
+    /// True if the program has taken over, and no scan has gone through it yet; false if it has not
+    /// said that it is ready to take over.
+    pub has_taken_over: bool,
+    /// Time for which that has been waited for, s.
+    pub waited_s: f64,
+    /// The most time for which it is waited for, s; `None`: there is no limit.
+    pub limit_s: Option<f64>,
 }
 
 /// Where a run is between its start and its end.
@@ -223,7 +245,7 @@ impl Control {
     /// # Errors
     /// The run has ended, or its supervisor does not answer.
     pub fn status(&self) -> Result<Status, StageError> {
-        match self.ask(&Request::Status, Some(ANSWER))? {
+        match self.ask(&Request::Status)? {
             Answer::Status(status) => Ok(status),
             answer => Err(self.silent(format!("its answer is {answer:?}"))),
         }
@@ -234,7 +256,7 @@ impl Control {
     /// # Errors
     /// The run has ended, or its supervisor does not answer.
     pub fn stop(&self) -> Result<(), StageError> {
-        self.order(&Request::Stop, Some(ANSWER))
+        self.order(&Request::Stop)
     }
 
     /// Starts a process of the run again.
@@ -243,18 +265,30 @@ impl Control {
     /// There is no such process, the run has ended, or its supervisor does not answer.
     pub fn restart(&self, process: &str) -> Result<(), StageError> {
         let process = process.to_owned();
-        self.order(&Request::Restart { process }, Some(ANSWER))
+        self.order(&Request::Restart { process })
     }
 
     /// Goes on with another program in the place of a stage. Returns when that has worked on a
     /// first pose; or, with a sentence, when it has taken over and no scan came for it to work on.
+    /// Each second meanwhile `observe` gets what is waited for.
     ///
     /// # Errors
-    /// The program did not come to take over, or has failed, and the one before goes on; or the run
-    /// has ended.
-    pub fn swap(&self, swap: Swap) -> Result<Option<String>, StageError> {
-        // The supervisor has the limits: `run.start_timeout_s`, and that of the trial.
-        match self.ask(&Request::Swap(swap), None)? {
+    /// The program did not come to take over, or has failed, and the one before goes on; the run
+    /// has ended, or its supervisor does not answer.
+    pub fn swap(
+        &self,
+        swap: Swap,
+        observe: &mut dyn FnMut(&PendingSwap),
+    ) -> Result<Option<String>, StageError> {
+        let sent = self.send(&Request::Swap(swap))?;
+        // The supervisor has the limits: `run.start_timeout_s`, and that of the trial. But it may
+        // hang.
+        let answer = self.wait(sent, LOOK, |run| {
+            let status = run.status()?;
+            status.swap.iter().for_each(&mut *observe);
+            Ok(())
+        });
+        match answer? {
             Answer::Untried(sentence) => Ok(Some(sentence)),
             answer => self.is_done(answer).map(|()| None),
         }
@@ -267,8 +301,8 @@ impl Control {
         id_of(&self.root) == Some(self.id) && run::is_alive(&self.root)
     }
 
-    fn order(&self, request: &Request, limit: Option<Duration>) -> Result<(), StageError> {
-        let answer = self.ask(request, limit)?;
+    fn order(&self, request: &Request) -> Result<(), StageError> {
+        let answer = self.ask(request)?;
         self.is_done(answer)
     }
 
@@ -280,34 +314,40 @@ impl Control {
         }
     }
 
-    fn ask(&self, request: &Request, limit: Option<Duration>) -> Result<Answer, StageError> {
-        let line = self.exchange(request, limit).map_err(|error| {
-            let is_gone = matches!(
-                error.kind(),
-                io::ErrorKind::NotFound
-                    | io::ErrorKind::ConnectionRefused
-                    | io::ErrorKind::ConnectionReset
-                    | io::ErrorKind::UnexpectedEof
-            );
-            match is_gone {
-                true => StageError::NotRunning(self.out.clone()),
-                false => self.silent(reason(&error)),
-            }
-        })?;
-        serde_json::from_str(&line).map_err(|error| self.silent(error.to_string()))
+    fn ask(&self, request: &Request) -> Result<Answer, StageError> {
+        self.wait(self.send(request)?, ANSWER, |_| {
+            Err(self.silent(format!("there was no answer within {ANSWER:?}")))
+        })
     }
 
-    fn exchange(&self, request: &Request, limit: Option<Duration>) -> io::Result<String> {
-        let mut connection = UnixStream::connect(self.root.join(SOCKET))?;
-        connection.set_read_timeout(limit)?;
-        connection.set_write_timeout(limit)?;
-        let mut line = serde_json::to_string(request)?;
-        line.push('\n');
-        connection.write_all(line.as_bytes())?;
-        let mut answer = String::new();
-        match BufReader::new(connection).read_line(&mut answer)? {
-            0 => Err(io::ErrorKind::UnexpectedEof.into()),
-            _ => Ok(answer),
+    fn send(&self, request: &Request) -> Result<Sent, StageError> {
+        let sent = Sent::to(&self.root.join(SOCKET), request, ANSWER);
+        sent.map_err(|error| self.failed(&error))
+    }
+
+    /// Waits for the answer; calls `look` each time that there is none for another `period`.
+    fn wait(
+        &self,
+        mut sent: Sent,
+        period: Duration,
+        mut look: impl FnMut(&Self) -> Result<(), StageError>,
+    ) -> Result<Answer, StageError> {
+        loop {
+            let answer = sent.answer(period).map_err(|error| self.failed(&error))?;
+            if let Some(line) = answer {
+                return serde_json::from_str(&line).map_err(|error| self.silent(error.to_string()));
+            }
+            look(self)?;
+        }
+    }
+
+    fn failed(&self, error: &io::Error) -> StageError {
+        match error.kind() {
+            io::ErrorKind::NotFound
+            | io::ErrorKind::ConnectionRefused
+            | io::ErrorKind::ConnectionReset
+            | io::ErrorKind::UnexpectedEof => StageError::NotRunning(self.out.clone()),
+            _ => self.silent(error.to_string()),
         }
     }
 
@@ -322,13 +362,4 @@ impl Control {
 fn id_of(root: &Path) -> Option<(u64, u64)> {
     let root = fs::metadata(root).ok()?;
     Some((root.dev(), root.ino()))
-}
-
-fn reason(error: &io::Error) -> String {
-    match error.kind() {
-        io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut => {
-            format!("there was no answer within {ANSWER:?}")
-        }
-        _ => error.to_string(),
-    }
 }

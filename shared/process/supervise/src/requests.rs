@@ -213,6 +213,7 @@ impl Supervisor<'_> {
             poses: self.poses.count(),
             dropped: self.poses.dropped(),
             last_pose_s: self.poses.age_s(),
+            swap: self.swaps.pending(&self.processes, &self.run),
             processes,
         }
     }

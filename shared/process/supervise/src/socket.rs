@@ -44,7 +44,7 @@ impl ControlSocket {
     }
 
     /// Returns the next request, and where its answer goes. One that cannot be read is refused
-    /// here.
+    /// here, and one whose client has gone is left: that has been told that nobody answers.
     pub fn next(&self) -> Option<(Request, Client)> {
         loop {
             let (stream, _) = self.0.accept().ok()?;
@@ -52,6 +52,7 @@ impl ControlSocket {
                 continue;
             };
             match client.request() {
+                Ok(_) if client.has_gone() => {}
                 Ok(request) => return Some((request, client)),
                 Err(error) => client.answer(&Answer::Refused(format!(
                     "the request cannot be read: {error}"

@@ -15,13 +15,13 @@ use std::{
 
 use gyre_stage::{
     Manifest,
-    control::{Answer, Swap},
+    control::{Answer, PendingSwap, Swap},
     run,
 };
 
 use crate::{
-    StagePlan, SuperviseError, Swapped, child::Child, program::Program, run::Run, socket::Client,
-    start::Place,
+    StagePlan, SuperviseError, Swapped, child::Child, processes::Processes, program::Program,
+    run::Run, socket::Client, start::Place,
 };
 use trial::Trial;
 
@@ -127,6 +127,21 @@ impl Swaps {
                 Step::Wait
             }
         }
+    }
+
+    /// Returns the swap that is not done yet.
+    pub fn pending(&self, processes: &Processes, run: &Run<'_>) -> Option<PendingSwap> {
+        let Some(standby) = &self.standby else {
+            return self.pending_trial(processes);
+        };
+        let plan = standby.child.plan();
+        Some(PendingSwap {
+            process: plan.name.clone(),
+            command: plan.command.clone(),
+            has_taken_over: false,
+            waited_s: standby.since.elapsed().as_secs_f64(),
+            limit_s: run.plan.start_timeout.map(|limit| limit.as_secs_f64()),
+        })
     }
 
     /// Takes back the program that stands by, since the stream has ended.

@@ -3,7 +3,7 @@
 
 use std::time::{Duration, Instant};
 
-use gyre_stage::control::Answer;
+use gyre_stage::control::{Answer, PendingSwap};
 
 use super::Swaps;
 use crate::{child::Child, processes::Processes, run::Run, socket::Client};
@@ -56,6 +56,19 @@ impl Swaps {
             () if trial.client.has_gone() => {}
             () => self.trial = Some(trial),
         }
+    }
+
+    /// Returns the swap whose program is on trial.
+    pub(super) fn pending_trial(&self, processes: &Processes) -> Option<PendingSwap> {
+        let trial = self.trial.as_ref()?;
+        let plan = processes[trial.process].plan();
+        Some(PendingSwap {
+            process: plan.name.clone(),
+            command: plan.command.clone(),
+            has_taken_over: true,
+            waited_s: trial.since.elapsed().as_secs_f64(),
+            limit_s: Some(LIMIT.as_secs_f64()),
+        })
     }
 
     /// Tells the client that the program has failed, and the one before is started again.
