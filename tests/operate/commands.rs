@@ -4,7 +4,7 @@
 use std::{
     fs,
     os::unix::net::UnixDatagram,
-    process::Command,
+    process::{Command, Stdio},
     thread,
     time::{Duration, Instant},
 };
@@ -50,6 +50,53 @@ fn up(run: &Run) -> Command {
     let mut up = gyre();
     up.arg("up").args(run.command().get_args().skip(1));
     up
+}
+
+/// With a `/dev/shm` of their own no other run is there.
+#[test]
+fn a_run_from_elsewhere_is_not_changed_without_its_name() {
+    let permitted = Command::new("unshare").args(["--mount", "true"]).output();
+    if !permitted.is_ok_and(|output| output.status.success()) {
+        println!("skipped: a mount namespace of its own is not permitted here");
+        return;
+    }
+    let run = Run::of_recording().rate(SLOW);
+    let script = "mount -t tmpfs tmpfs /dev/shm || exit 9
+        here=$1; shift
+        cd \"$here\" && \"$0\" up \"$@\" >/dev/null || exit 8
+        cd /
+        \"$0\" swap masking --command nope; echo swap $?
+        \"$0\" restart masking; echo restart $?
+        \"$0\" down; echo down $?
+        \"$0\" logs >/dev/null; echo logs $?
+        cd \"$here\"
+        \"$0\" down; echo down $?";
+    let mut shell = Command::new("unshare");
+    shell
+        .args([
+            "--mount",
+            "sh",
+            "-c",
+            &format!("exec 2>&1; {script}"),
+            PROGRAM,
+        ])
+        .arg(run.folder())
+        .args(run.command().get_args().skip(1))
+        .stdin(Stdio::null());
+    let ended = Ended::of(shell);
+    let lines: Vec<&str> = ended.succeeded().stdout.lines().collect();
+    let out = run.out().canonicalize().unwrap().display().to_string();
+    let refusal = format!("name it with --out {out}");
+    let named = format!("gyre: of the run in {out}");
+    assert_eq!(lines.len(), 11, "{lines:?}");
+    for (at, code) in [(1, "swap 1"), (3, "restart 1"), (5, "down 1")] {
+        assert!(lines[at - 1].ends_with(&refusal), "{lines:?}");
+        assert_eq!(lines[at], code, "{lines:?}");
+    }
+    assert_eq!(lines[6..9], [&named, "logs 0", &named], "{lines:?}");
+    assert!(lines[9].contains("has ended after"), "{lines:?}");
+    assert_eq!(lines[10], "down 0");
+    assert_eq!(run.summary()["swaps"], Value::Null);
 }
 
 /// Waits until the run's state is as wanted.

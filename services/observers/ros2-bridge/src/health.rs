@@ -183,6 +183,7 @@ mod tests {
         Status {
             pid: 1,
             out: "out".into(),
+            started_in: "/".into(),
             live: true,
             phase: Phase::Running,
             uptime_s: 2.0,

@@ -7,7 +7,8 @@ use clap::Args;
 /// The run that a command is about.
 #[derive(Debug, Args)]
 pub struct RunChoice {
-    /// The folder of the run's results, its --out. Default: the only run there is.
+    /// The folder of the run's results, its --out. Default: the only run there is; a command that
+    /// changes a run asks first if that was not started from the current folder.
     #[arg(long)]
     pub out: Option<PathBuf>,
 }

@@ -20,7 +20,7 @@ use gyre_supervise::last_line;
 use gyre_terminal::{Failure, own, print};
 use rustix::process::{Pid, Signal, kill_process};
 
-use crate::{arguments::RunChoice, choice::chosen};
+use crate::{arguments::RunChoice, choice::chosen_to_change};
 
 /// The environment variable of a run that is to leave the terminal that started it.
 const DETACHED: &str = "GYRE_DETACHED";
@@ -134,7 +134,7 @@ fn ended(
 /// # Errors
 /// There is no such run, its supervisor does not answer, or it has ended without results.
 pub fn down(choice: &RunChoice) -> Result<ExitCode, Failure> {
-    let run = chosen(choice)?;
+    let run = chosen_to_change(choice, "end it")?;
     let status = run.status()?;
     let signals = Signals::install()?;
     let before = version_of_results(&status.out);

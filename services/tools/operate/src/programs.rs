@@ -8,7 +8,7 @@ use gyre_terminal::{Failure, print, words};
 
 use crate::{
     arguments::{RestartArguments, SwapArguments},
-    choice::chosen,
+    choice::chosen_to_change,
 };
 
 /// Starts a process of a running run again.
@@ -16,7 +16,8 @@ use crate::{
 /// # Errors
 /// There is no such run or process, or the supervisor does not answer.
 pub fn restart(arguments: &RestartArguments) -> Result<ExitCode, Failure> {
-    let run = chosen(&arguments.run)?;
+    let what = format!("restart its {}", arguments.process);
+    let run = chosen_to_change(&arguments.run, &what)?;
     run.restart(&arguments.process)?;
     print::line(format_args!("{} is started again", arguments.process))?;
     Ok(ExitCode::SUCCESS)
@@ -69,7 +70,8 @@ const UNTRIED: u8 = 2;
 /// There is no such run or process, or the program does not come to take over, or fails at its
 /// first scan: the one before goes on.
 pub fn swap(arguments: &SwapArguments) -> Result<ExitCode, Failure> {
-    let run = chosen(&arguments.run)?;
+    let what = format!("swap its {}", arguments.process);
+    let run = chosen_to_change(&arguments.run, &what)?;
     let command = arguments.command.as_deref().map(words);
     let command = command.transpose()?;
     // Found as in this terminal: the supervisor may have been started with another PATH.

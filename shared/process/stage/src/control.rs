@@ -76,6 +76,8 @@ pub struct Status {
     pub pid: u32,
     /// The folder of the results.
     pub out: PathBuf,
+    /// The current folder of the command that has started the run.
+    pub started_in: PathBuf,
     /// True in live mode.
     pub live: bool,
     /// Where the run is between its start and its end.

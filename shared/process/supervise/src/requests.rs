@@ -1,6 +1,6 @@
 //! Requests from other processes: what is asked at the control socket, and the answers.
 
-use std::process;
+use std::{env, process};
 
 use gyre_stage::{
     clock,
@@ -206,6 +206,7 @@ impl Supervisor<'_> {
         Status {
             pid: process::id(),
             out: manifest.out.clone(),
+            started_in: env::current_dir().unwrap_or_default(),
             live: manifest.live,
             phase,
             uptime_s: self.run.since.elapsed().as_secs_f64(),
