@@ -65,7 +65,9 @@ pub fn file(kind: &'static str, content: &'static str) -> Response {
     ([(header::CONTENT_TYPE, kind)], content).into_response()
 }
 
-/// Returns a refusal of one sentence.
+/// Returns a refusal of one sentence, after which the connection is closed: who may not read does
+/// not stay.
 pub fn refusal(status: StatusCode, sentence: &'static str) -> Response {
-    (status, format!("{sentence}\n")).into_response()
+    let close = [(header::CONNECTION, "close")];
+    (status, close, format!("{sentence}\n")).into_response()
 }

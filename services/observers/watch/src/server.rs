@@ -26,7 +26,7 @@ use tokio::{runtime, sync::watch, time};
 
 use crate::{
     access::{Access, Token, Verdict},
-    connections::{self, Limits},
+    connections::{self, Limits, Peer},
     foxglove::{self, Hub},
     metrics,
     observing::{self, Followed},
@@ -86,6 +86,18 @@ struct Shared {
     hub: Arc<Hub>,
     access: Arc<Access>,
     readers: Arc<AtomicUsize>,
+}
+
+impl Shared {
+    /// Judges a request. The connection of one that may read keeps its place.
+    fn judge(&self, request: &Request) -> Verdict {
+        let verdict = self.access.judge(request.uri(), request.headers());
+        let may_read = matches!(verdict, Verdict::Granted | Verdict::GrantedByAddress);
+        if let Some(peer) = request.extensions().get::<Peer>().filter(|_| may_read) {
+            peer.keep_place();
+        }
+        verdict
+    }
 }
 
 /// One of the places for readers. Dropped, it is free again.
@@ -253,7 +265,7 @@ fn foxglove_router(shared: Shared) -> Router {
 
 /// Answers only viewers that may read.
 async fn guard_viewers(State(shared): State<Shared>, request: Request, next: Next) -> Response {
-    match shared.access.judge(request.uri(), request.headers()) {
+    match shared.judge(&request) {
         Verdict::Granted | Verdict::GrantedByAddress => next.run(request).await,
         Verdict::NoToken => page::refusal(
             StatusCode::UNAUTHORIZED,
@@ -292,7 +304,7 @@ async fn view(
 
 /// Answers only requests that may read, whatever the path.
 async fn guard(State(shared): State<Shared>, request: Request, next: Next) -> Response {
-    let mut response = match shared.access.judge(request.uri(), request.headers()) {
+    let mut response = match shared.judge(&request) {
         Verdict::Granted => next.run(request).await,
         Verdict::GrantedByAddress if request.uri().path() == "/" => {
             // The token does not stay in the address, where others may see it.
