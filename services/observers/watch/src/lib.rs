@@ -18,6 +18,7 @@ mod delays;
 mod foxglove;
 mod frame;
 mod histograms;
+mod journal_track;
 mod messages;
 mod metrics;
 mod observing;

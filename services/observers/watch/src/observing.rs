@@ -7,7 +7,6 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_journal as journal;
 use gyre_messages::{Masked, Message, Pose, Scan};
 use gyre_stage::{
     StageError,
@@ -16,6 +15,7 @@ use gyre_stage::{
 };
 
 use crate::{
+    journal_track::JournalTrack,
     messages::{Layer, RunState},
     pictures,
     processes::ProcessMeter,
@@ -79,8 +79,9 @@ fn follow_runs(followed: &Followed) {
 fn follow_run(followed: &Followed, run: &ObservedRun) {
     let view = &followed.view;
     view.begin(run.manifest());
+    let mut track = JournalTrack::of(&run.manifest().out);
     while !view.is_stopping() && !run.has_ended() {
-        match follow_poses(followed, run) {
+        match follow_poses(followed, run, &mut track) {
             Ok(()) if view.is_stopping() => return,
             Ok(()) => {
                 view.set_state(RunState::Finishing);
@@ -108,18 +109,25 @@ fn await_end(view: &RunView, run: &ObservedRun) {
     }
 }
 
-/// Follows the poses to their end. Those of the journal come first.
-fn follow_poses(followed: &Followed, run: &ObservedRun) -> Result<(), StageError> {
+/// Follows the poses to their end. The track is that of the journal, and goes on with them.
+fn follow_poses(
+    followed: &Followed,
+    run: &ObservedRun,
+    track: &mut JournalTrack,
+) -> Result<(), StageError> {
     let view = &followed.view;
     let mut poses = run.observe::<Pose>()?;
     view.set_notice(None);
-    let journalled = add_journal(view, &run.manifest().out);
     while !view.is_stopping() {
-        match poses.next(POLL_INTERVAL)? {
+        let limit = match track.catch_up(|pose| view.add_to_track(pose)) {
+            true => Duration::ZERO,
+            false => POLL_INTERVAL,
+        };
+        match poses.next(limit)? {
             Next::Message(message, _) => {
                 let pose = message.header();
-                let is_new = journalled.is_none_or(|last| pose.item.seq > last);
-                view.add_pose(pose, is_new);
+                view.add_pose(pose);
+                track.see(pose, |pose| view.add_to_track(pose));
                 if let Some(traces) = &followed.traces {
                     traces.add(&run.manifest().prefix, pose);
                 }
@@ -130,18 +138,6 @@ fn follow_poses(followed: &Followed, run: &ObservedRun) -> Result<(), StageError
         view.set_missed(|missed| missed.pose = poses.missed());
     }
     Ok(())
-}
-
-/// Adds the poses of the journal, if it can be read; returns the number of the last one.
-fn add_journal(view: &RunView, out: &Path) -> Option<u64> {
-    view.clear_track();
-    let records = journal::records(&journal::path(out)).ok()??;
-    let poses = records.map_while(Result::ok);
-    let add = |pose| {
-        view.add_journalled(&pose);
-        pose.item.seq
-    };
-    poses.map(add).last()
 }
 
 /// Follows a topic as long as a browser wants one of these layers.

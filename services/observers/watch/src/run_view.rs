@@ -148,11 +148,6 @@ impl RunView {
         self.report();
     }
 
-    /// Removes the trajectory, which is about to be read from the journal.
-    pub fn clear_track(&self) {
-        self.state().track.clear();
-    }
-
     /// Changes the state of the run.
     pub fn set_state(&self, state: RunState) {
         self.update_run(|run| run.state = state);
@@ -165,14 +160,14 @@ impl RunView {
         send_json(&self.updates.run, &state.run);
     }
 
-    /// Adds a pose of the journal.
-    pub fn add_journalled(&self, pose: &PoseHeader) {
+    /// Adds the next pose of the trajectory.
+    pub fn add_to_track(&self, pose: &PoseHeader) {
         self.state().track.add(pose);
     }
 
-    /// Adds a pose, unless it was added before: an observer that attaches again receives the last
-    /// ones again. `is_new` is false for one that was in the journal.
-    pub fn add_pose(&self, pose: &PoseHeader, is_new: bool) {
+    /// Shows a pose, unless it was shown before: an observer that attaches again receives the last
+    /// ones again.
+    pub fn add_pose(&self, pose: &PoseHeader) {
         let mut state = self.state();
         let state = &mut *state;
         let has_pose = |latest: CurrentPose| latest.seq >= pose.item.seq;
@@ -180,9 +175,6 @@ impl RunView {
             return;
         }
         self.histograms.add(&pose.item);
-        if is_new {
-            state.track.add(pose);
-        }
         state.delays.add(&pose.item);
         state.latest = Some(CurrentPose::of(pose));
         state.counts.poses = pose.item.seq + 1;
@@ -372,10 +364,10 @@ mod tests {
             let message = view.updates.points.borrow().clone();
             frame::decode(&message).map(|(header, _)| header["pose"][0].as_f64())
         };
-        view.add_pose(&pose(3), true);
+        view.add_pose(&pose(3));
         view.add_points(points(), 4);
         assert_eq!(sent(), None);
-        view.add_pose(&pose(4), true);
+        view.add_pose(&pose(4));
         assert_eq!(sent(), Some(Some(4.0)));
         view.add_points(points(), 3);
         assert_eq!(sent(), Some(Some(3.0)));
@@ -395,8 +387,9 @@ mod tests {
             (&"poses".into(), &Value::Null)
         );
         assert_eq!(next(), None);
-        view.add_journalled(&pose(0));
-        view.add_pose(&pose(1), true);
+        view.add_to_track(&pose(0));
+        view.add_to_track(&pose(1));
+        view.add_pose(&pose(1));
         let second = next().unwrap();
         assert_eq!(second["vertices"].as_array().unwrap().len(), 2);
         assert_eq!(
@@ -409,7 +402,7 @@ mod tests {
     #[test]
     fn reports_have_counts_delays_and_processes_at_one_level() {
         let view = RunView::new("out");
-        view.add_pose(&pose(6), true);
+        view.add_pose(&pose(6));
         view.report();
         let health: Value = serde_json::from_str(&view.updates.health.borrow()).unwrap();
         assert_eq!(
