@@ -16,8 +16,6 @@ use crate::ShadowError;
 
 /// Messages that are taken at once of a program that may send without end.
 const AT_ONCE: usize = 64;
-/// Time between two checks of the size of its log.
-const LOG_PERIOD: Duration = Duration::from_secs(1);
 /// Time to exit after SIGTERM, as in a run.
 const STOP_TIMEOUT: Duration = Duration::from_secs(2);
 /// Time between two polls of a process that is to exit.
@@ -38,7 +36,6 @@ pub(crate) struct Life<'a> {
     pub harness: Harness<'a>,
     began: Instant,
     is_open: bool,
-    log_due: Instant,
 }
 
 impl<'a> Life<'a> {
@@ -50,14 +47,13 @@ impl<'a> Life<'a> {
         program: &ShadowProgram,
         signals: &'a Signals,
     ) -> Result<Self, ShadowError> {
-        let (candidate, now) = (&program.candidate, Instant::now());
+        let candidate = &program.candidate;
         let mut harness = Harness::open(program.rig(signals)?, candidate.stage)?;
         harness.start(&candidate.command, &candidate.scheduling)?;
         Ok(Self {
             harness,
-            began: now,
+            began: Instant::now(),
             is_open: false,
-            log_due: now,
         })
     }
 
@@ -70,10 +66,6 @@ impl<'a> Life<'a> {
         if !self.is_open && self.harness.has_publisher() {
             self.is_open = true;
             self.harness.connect()?;
-        }
-        if Instant::now() >= self.log_due {
-            self.log_due = Instant::now() + LOG_PERIOD;
-            self.harness.bound_log();
         }
         Ok(self.is_open)
     }

@@ -179,11 +179,6 @@ impl<'a> Harness<'a> {
         self.process.as_mut().is_some_and(|it| it.death().is_none())
     }
 
-    /// Keeps the log of the process short, as the supervisor does.
-    pub fn bound_log(&self) {
-        self.rig.bound_log(self.stage.name());
-    }
-
     /// Sends SIGTERM.
     pub fn terminate(&self) {
         self.process.iter().for_each(Process::terminate);
@@ -203,7 +198,6 @@ pub fn start_of_trajectory() -> Recorded {
     let start = PoseHeader {
         item: Item {
             flags: flag::BASE | flag::SYNC,
-            pid: std::process::id(),
             ..Item::default()
         },
         ..PoseHeader::default()

@@ -59,7 +59,7 @@ impl Child {
         place: Place,
     ) -> Result<Self, SuperviseError> {
         let log = Log::open(manifest, &plan.name)?;
-        let process = starter.start(plan, manifest, log.file(), place)?;
+        let process = starter.start(plan, manifest, log.output(), place)?;
         Ok(Self {
             plan: plan.clone(),
             process,
@@ -89,7 +89,7 @@ impl Child {
             });
         }
         self.last_words = last_words(manifest, &self.plan.name, Place::Free);
-        self.process = starter.start(&self.plan, manifest, self.log.file(), Place::Free)?;
+        self.process = starter.start(&self.plan, manifest, self.log.output(), Place::Free)?;
         self.started = Instant::now();
         self.status = None;
         self.pose_at_restart = Some(newest_pose);

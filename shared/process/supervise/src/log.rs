@@ -2,13 +2,20 @@
 
 use std::{
     fs::{self, File, OpenOptions},
-    io::{self, Seek, SeekFrom},
-    os::unix::fs::{FileExt, OpenOptionsExt},
+    io::{self, PipeReader, PipeWriter, Seek, SeekFrom, Write},
+    mem,
+    os::unix::fs::OpenOptionsExt,
     path::{Path, PathBuf},
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    thread,
     time::{Duration, Instant},
 };
 
 use gyre_stage::{Manifest, StageError};
+use rustix::{
+    event::{PollFd, PollFlags, poll},
+    io::{Errno, ioctl_fionbio},
+};
 
 use crate::Plan;
 
@@ -21,45 +28,130 @@ const PERIOD: Duration = Duration::from_secs(1);
 const BACKGROUND: &str = "gyre";
 
 /// The longest last line that is looked for, bytes.
-const TAIL: u64 = 4096;
+const TAIL: usize = 4096;
 
-/// The log `<out>/log/<stage>.txt`, to which the stage appends.
+/// The most that is taken from a pipe at once, bytes: as much as it holds.
+const BUFFER: usize = 1 << 16;
+/// Times in a row that so much is taken.
+const ROUNDS: usize = 64;
+/// The stack of a thread that writes a log, bytes.
+const STACK: usize = 1 << 18;
+
+/// The log `<out>/log/<stage>.txt`. The output of the stage comes through a pipe, so that the file
+/// is bounded before anything is written that is too much: a stage that floods waits.
 pub(crate) struct Log {
+    output: PipeWriter,
+    collected: Arc<Mutex<Collected>>,
+}
+
+/// The end of the pipe, and the file.
+struct Collected {
+    input: PipeReader,
     file: File,
-    /// The beginning of what has not been looked at.
-    unread: u64,
+    path: PathBuf,
+    /// The end of what was written since the last look.
+    tail: Vec<u8>,
+    buffer: Box<[u8]>,
 }
 
 impl Log {
     pub fn open(manifest: &Manifest, stage: &str) -> Result<Self, StageError> {
         let path = path_of(manifest, stage);
-        let opened = OpenOptions::new()
-            .create(true)
-            .append(true)
-            .read(true)
-            .mode(0o600)
-            .open(&path);
-        let file = opened.map_err(|source| StageError::File { path, source })?;
-        let unread = length(&file);
-        Ok(Self { file, unread })
+        Self::at(&path).map_err(|source| StageError::File { path, source })
     }
 
-    /// Returns the file to which the stage writes.
-    pub fn file(&self) -> &File {
-        &self.file
+    fn at(path: &Path) -> io::Result<Self> {
+        let file = OpenOptions::new()
+            .create(true)
+            .append(true)
+            .mode(0o600)
+            .open(path)?;
+        let (input, output) = io::pipe()?;
+        // Whoever reads takes what is there, and does not wait with the lock.
+        ioctl_fionbio(&input, true)?;
+        let readable = input.try_clone()?;
+        let collected = Arc::new(Mutex::new(Collected {
+            input,
+            file,
+            path: path.to_owned(),
+            tail: Vec::new(),
+            buffer: vec![0; BUFFER].into(),
+        }));
+        let collecting = Arc::clone(&collected);
+        let thread = thread::Builder::new().name("log".to_owned());
+        thread
+            .stack_size(STACK)
+            .spawn(move || collect(&readable, &collecting))?;
+        Ok(Self { output, collected })
+    }
+
+    /// Returns the pipe to which the stage writes.
+    pub fn output(&self) -> &PipeWriter {
+        &self.output
     }
 
     /// Returns the last line since the last call, as far as its end is.
     pub fn last_line(&mut self) -> Option<String> {
-        let end = length(&self.file);
-        // The log may have been moved away.
-        let unread = if self.unread > end { 0 } else { self.unread };
-        let begin = unread.max(end.saturating_sub(TAIL));
-        self.unread = end;
-        let mut bytes = vec![0; end.saturating_sub(begin) as usize];
-        self.file.read_exact_at(&mut bytes, begin).ok()?;
-        let text = String::from_utf8_lossy(&bytes);
-        last_line(&text).map(str::to_owned)
+        let collected = &mut *lock(&self.collected);
+        collected.take();
+        let tail = mem::take(&mut collected.tail);
+        last_line(&String::from_utf8_lossy(&tail)).map(str::to_owned)
+    }
+}
+
+impl Drop for Log {
+    /// Writes what is left of a stage that has ended.
+    fn drop(&mut self) {
+        lock(&self.collected).take();
+    }
+}
+
+/// Writes what comes through a pipe, until all who can write to it have ended.
+fn collect(readable: &PipeReader, collected: &Mutex<Collected>) {
+    loop {
+        let mut readable = [PollFd::new(readable, PollFlags::IN)];
+        match poll(&mut readable, None) {
+            Ok(_) | Err(Errno::INTR) => {}
+            Err(_) => return,
+        }
+        if !lock(collected).take() {
+            return;
+        }
+    }
+}
+
+fn lock(collected: &Mutex<Collected>) -> MutexGuard<'_, Collected> {
+    collected.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Collected {
+    /// Writes what is in the pipe; returns whether more can come. A stage that floods is left for
+    /// others to look at after a while.
+    fn take(&mut self) -> bool {
+        for _ in 0..ROUNDS {
+            match rustix::io::read(&self.input, &mut self.buffer[..]) {
+                Ok(0) => return false,
+                Ok(bytes) => self.write(bytes),
+                Err(Errno::AGAIN) => return true,
+                Err(Errno::INTR) => {}
+                Err(_) => return false,
+            }
+        }
+        true
+    }
+
+    /// Writes the first bytes of the buffer.
+    fn write(&mut self, bytes: usize) {
+        let bytes = &self.buffer[..bytes];
+        // On a full disk it is lost but for its end.
+        let _ = self.file.write_all(bytes);
+        if length(&self.file) > MAX {
+            bound(&self.path);
+        }
+        let newest = &bytes[bytes.len().saturating_sub(TAIL)..];
+        self.tail.extend_from_slice(newest);
+        let old = self.tail.len().saturating_sub(TAIL);
+        self.tail.drain(..old);
     }
 }
 
@@ -68,7 +160,7 @@ pub fn last_line(text: &str) -> Option<&str> {
     text.lines().rfind(|line| !line.trim().is_empty())
 }
 
-/// All logs of a run, which are kept short.
+/// The logs of a run to which processes append by themselves, and which are kept short.
 pub(crate) struct Logs {
     files: Vec<PathBuf>,
     due: Instant,
@@ -76,11 +168,9 @@ pub(crate) struct Logs {
 
 impl Logs {
     pub fn of(plan: &Plan) -> Self {
-        let stages = plan.stages.iter();
-        let outputs = stages.map(|stage| path_of(&plan.manifest, &stage.name));
-        let others = [plan.manifest.events(), path_of(&plan.manifest, BACKGROUND)];
+        let background = path_of(&plan.manifest, BACKGROUND);
         Self {
-            files: outputs.chain(others).collect(),
+            files: vec![plan.manifest.events(), background],
             due: Instant::now(),
         }
     }
@@ -101,13 +191,13 @@ impl Logs {
 }
 
 /// Returns the log of a process.
-pub(crate) fn path_of(manifest: &Manifest, stage: &str) -> PathBuf {
+fn path_of(manifest: &Manifest, stage: &str) -> PathBuf {
     manifest.out.join("log").join(format!("{stage}.txt"))
 }
 
 /// Moves the end of a log that is too long to its `.old`, and empties it. The processes that append
 /// to it do not notice.
-pub(crate) fn bound(path: &Path) {
+fn bound(path: &Path) {
     let too_long = fs::symlink_metadata(path).is_ok_and(|log| log.is_file() && log.len() > MAX);
     if !too_long {
         return;
@@ -142,8 +232,6 @@ fn length(file: &File) -> u64 {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use std::io::Write;
-
     use super::*;
 
     #[test]
@@ -167,31 +255,60 @@ mod tests {
         assert_eq!(fs::read(&path).unwrap(), b"and on");
     }
 
-    fn log() -> Log {
-        Log {
-            file: tempfile::tempfile().unwrap(),
-            unread: 0,
-        }
+    fn log(folder: &tempfile::TempDir) -> (Log, PathBuf) {
+        let path = folder.path().join("stage.txt");
+        (Log::at(&path).unwrap(), path)
     }
 
     #[test]
     fn the_last_line_is_of_what_was_written_since() {
-        let mut log = log();
-        log.file().write_all(b"first\nsecond\n\n").unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let (mut log, path) = log(&folder);
+        log.output().write_all(b"first\nsecond\n\n").unwrap();
         assert_eq!(log.last_line().as_deref(), Some("second"));
         assert_eq!(log.last_line(), None);
-        log.file().write_all(b"third").unwrap();
+        log.output().write_all(b"third").unwrap();
         assert_eq!(log.last_line().as_deref(), Some("third"));
+        log.output().write_all(b" and last").unwrap();
+        drop(log);
+        let written = fs::read_to_string(path).unwrap();
+        assert_eq!(written, "first\nsecond\n\nthird and last");
     }
 
     #[test]
-    fn only_the_end_of_a_long_log_is_read_whatever_its_bytes() {
-        let mut log = log();
-        log.file().write_all(&vec![0xff; 1 << 20]).unwrap();
-        log.file().write_all(b"\nthe end\n").unwrap();
+    fn only_the_end_of_a_long_output_is_looked_at_whatever_its_bytes() {
+        let folder = tempfile::tempdir().unwrap();
+        let (mut log, _) = log(&folder);
+        log.output().write_all(&vec![0xff; 1 << 20]).unwrap();
+        log.output().write_all(b"\nthe end\n").unwrap();
         assert_eq!(log.last_line().as_deref(), Some("the end"));
-        log.file().write_all(&vec![0xff; 1 << 20]).unwrap();
+        log.output().write_all(&vec![0xff; 1 << 20]).unwrap();
         let line = log.last_line().unwrap();
-        assert_eq!(line.chars().count() as u64, TAIL);
+        assert_eq!(line.chars().count(), TAIL);
+    }
+
+    #[test]
+    fn a_flood_is_bounded_whoever_looks_and_its_end_is_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let (mut log, path) = log(&folder);
+        let flooding = log.output().try_clone().unwrap();
+        let flood = thread::spawn(move || {
+            let mut flooding = flooding;
+            let line = [b'x'; 1023];
+            for _ in 0..10 * MAX / 1024 {
+                flooding.write_all(&line).unwrap();
+                flooding.write_all(b"\n").unwrap();
+            }
+            flooding.write_all(b"the end\n").unwrap();
+        });
+        let size = || fs::metadata(&path).unwrap().len();
+        while !flood.is_finished() {
+            assert!(size() <= MAX + BUFFER as u64, "{}", size());
+        }
+        flood.join().unwrap();
+        assert_eq!(log.last_line().as_deref(), Some("the end"));
+        let old = fs::read(path.with_extension("txt.old")).unwrap();
+        let all = [old, fs::read(&path).unwrap()].concat();
+        assert!(all.ends_with(b"x\nthe end\n"));
     }
 }

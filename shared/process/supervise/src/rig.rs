@@ -28,7 +28,6 @@ use crate::{
     child::Child,
     clean,
     guardian::Guardian,
-    log,
     start::{Place, Starter},
 };
 
@@ -169,11 +168,6 @@ impl<'a> Rig<'a> {
             child: Child::spawn(&plan, &self.manifest, &starter, Place::Free)?,
             death: None,
         })
-    }
-
-    /// Keeps the log of a process short, as the supervisor does.
-    pub fn bound_log(&self, name: &str) {
-        log::bound(&log::path_of(&self.manifest, name));
     }
 
     /// Removes what a killed process has left, as the supervisor does before it starts another one.

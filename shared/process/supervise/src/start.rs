@@ -1,7 +1,6 @@
 //! Starts the processes of stages.
 
 use std::{
-    fs::File,
     io::{self, PipeWriter, Read},
     os::unix::process::CommandExt,
     process::{Child, Command, Stdio},
@@ -48,7 +47,7 @@ impl<'a> Starter<'a> {
         &self,
         plan: &StagePlan,
         manifest: &Manifest,
-        log: &File,
+        log: &PipeWriter,
         place: Place,
     ) -> Result<Child, SuperviseError> {
         let failed = |source| SuperviseError::Spawn {
@@ -90,7 +89,7 @@ impl<'a> Starter<'a> {
         &self,
         plan: &StagePlan,
         manifest: &Manifest,
-        log: &File,
+        log: &PipeWriter,
         refusals: PipeWriter,
     ) -> io::Result<Command> {
         let (program, arguments) = plan
