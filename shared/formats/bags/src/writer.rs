@@ -183,14 +183,24 @@ impl BagWriter {
         let path = self.path.clone();
         let failed = |error: &dyn std::fmt::Display| unwritable(&path, error.to_string());
         self.mcap.finish().map_err(|error| failed(&error))?;
+        let mut files = Vec::new();
         if let Some(file) = &self.file_name {
             let topics: Vec<&Described> = self.topics.iter().map(|t| &t.described).collect();
             let text = metadata::text(file, &topics, self.times);
-            fs::write(self.aside.join(METADATA), text).map_err(|error| failed(&error))?;
+            let description = self.aside.join(METADATA);
+            fs::write(&description, text).map_err(|error| failed(&error))?;
+            files.extend([self.aside.join(file), description]);
+        }
+        // A power failure leaves no name of a bag without its content.
+        files.push(self.aside.clone());
+        for file in files {
+            let synchronised = File::open(file).and_then(|file| file.sync_all());
+            synchronised.map_err(|error| failed(&error))?;
         }
         fs::rename(&self.aside, &self.path).map_err(|error| failed(&error))?;
         self.committed = true;
-        Ok(())
+        let folder = self.path.parent().map_or(Ok(()), gyre_storage::sync_folder);
+        folder.map_err(|error| failed(&error))
     }
 }
 
