@@ -4,16 +4,11 @@ use std::{
     fs,
     os::unix::fs::MetadataExt,
     path::{Path, PathBuf},
-    thread,
-    time::{Duration, Instant},
 };
 
 use gyre_stage::run::{SHARED_MEMORY, root_of};
 
 use super::processes;
-
-/// Time for a guardian, far more than it takes.
-const LIMIT: Duration = Duration::from_secs(10);
 
 /// The run's place in shared memory, which is named after its results.
 pub fn root(out: &Path) -> PathBuf {
@@ -24,18 +19,6 @@ pub fn root(out: &Path) -> PathBuf {
 /// there.
 pub fn assert_nothing_left(out: &Path) {
     assert_nothing_left_of(&root(out));
-}
-
-/// The same after some time: the guardian of a killed supervisor removes what it has left.
-pub fn await_nothing(out: &Path) {
-    let since = Instant::now();
-    let root = root(out);
-    while (root.exists() || root.with_extension("lock").exists() || !shared_memory(out).is_empty())
-        && since.elapsed() < LIMIT
-    {
-        thread::sleep(Duration::from_millis(5));
-    }
-    assert_nothing_left_of(&root);
 }
 
 /// The same of the run with this root.

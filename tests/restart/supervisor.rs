@@ -18,8 +18,8 @@ fn what_a_stage_has_started_ends_with_a_killed_supervisor() {
     let before = running.shared_memory_bytes();
     assert!(before > 1_000_000, "{before}");
     running.kill_supervisor();
-    // The guardian is there for a moment more.
-    leftovers::await_nothing(run.out());
+    // Its guardian has ended too.
+    leftovers::assert_nothing_left(run.out());
     assert_eq!(run.complete(), undisturbed());
 }
 
@@ -31,7 +31,7 @@ fn a_killed_guardian_is_replaced_and_knows_all_stages() {
     send(guardian, Signal::KILL);
     running.await_guardian(Some(guardian));
     running.kill_supervisor();
-    leftovers::await_nothing(run.out());
+    leftovers::assert_nothing_left(run.out());
 }
 
 #[test]
