@@ -42,7 +42,11 @@ fn sparse(file: &Path, gigabytes: u64) {
 
 #[test]
 fn a_configuration_without_end_is_refused() {
-    limited(&["run", "/dev/zero"]).refused_with(&["/dev/zero", "16 MB"]);
+    limited(&["run", "/dev/zero"]).refused_with(&["/dev/zero", "it is a device, not a file"]);
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("run.toml");
+    sparse(&file, 100);
+    limited(&["run", path(&file)]).refused_with(&["run.toml", "16 MB"]);
 }
 
 #[test]
@@ -66,7 +70,26 @@ fn options_of_a_recording_without_end_are_refused() {
     let file = copy.path().join("dataset.toml");
     let _ = fs::remove_file(&file);
     symlink("/dev/zero", &file).unwrap();
+    limited(&["inspect", path(copy.path())]).refused_with(&["dataset.toml", "a device"]);
+    fs::remove_file(&file).unwrap();
+    sparse(&file, 100);
     limited(&["inspect", path(copy.path())]).refused_with(&["dataset.toml", "16 MB"]);
+}
+
+/// Nobody writes to these pipes, so that to open one waits for ever.
+#[test]
+fn a_pipe_in_place_of_a_list_or_of_options_is_refused_at_once() {
+    for name in ["dataset.toml", "radar.timestamps"] {
+        let copy = recording::copy(2);
+        let file = copy.path().join(name);
+        let _ = fs::remove_file(&file);
+        let made = Command::new("mkfifo").arg(&file).status();
+        assert!(made.unwrap().success(), "{name}");
+        let mut command = Command::new(crate::PROGRAM);
+        command.args(["inspect", path(copy.path())]);
+        let ended = Ended::of(wrapped(&["timeout", "20"], &command));
+        ended.refused_with(&[name, "it is a pipe, not a file"]);
+    }
 }
 
 #[test]
@@ -75,7 +98,7 @@ fn the_configuration_of_a_simulated_recording_without_end_is_refused() {
     symlink("/dev/zero", folder.path().join("simulation.toml")).unwrap();
     let out = path(folder.path());
     let ended = limited(&["simulate", "--scans", "2", "--out", out]);
-    ended.failed_with(&["simulation.toml", "16 MB"]);
+    ended.failed_with(&["simulation.toml", "a device"]);
 }
 
 #[test]
@@ -132,7 +155,7 @@ fn a_model_and_a_card_without_end_are_refused() {
         limited(&arguments)
     };
     fs::write(folder.path().join("run.toml"), "").unwrap();
-    run(Path::new("/dev/zero")).failed_with(&["/dev/zero", "16 MB"]);
+    run(Path::new("/dev/zero")).failed_with(&["/dev/zero", "a device"]);
     let card = folder.path().join("single-127.toml");
     fs::copy(models.join("single-127.toml"), &card).unwrap();
     sparse(&folder.path().join("single-127.onnx"), 100);
