@@ -250,7 +250,8 @@ fn a_supervisor_that_hangs_is_not_waited_for_and_does_nothing_of_that_later() {
 
 #[test]
 fn a_program_that_never_stands_by_is_said_to_be_waited_for_and_how_long() {
-    let run = Run::of_recording().rate("0.3").set("run.start_timeout_s=8");
+    // A minute, of which the swap takes eight seconds and more where the machine is busy.
+    let run = Run::of_recording().rate("0.1").set("run.start_timeout_s=8");
     let mut running = run.start();
     running.await_poses(2);
     let said = said(swapping(&run, &[]));
