@@ -76,20 +76,18 @@ fn options_of_a_recording_without_end_are_refused() {
     limited(&["inspect", path(copy.path())]).refused_with(&["dataset.toml", "16 MB"]);
 }
 
-/// Nobody writes to these pipes, so that to open one waits for ever.
+/// Nobody writes to the pipe, so that to open it would wait for ever.
 #[test]
-fn a_pipe_in_place_of_a_list_or_of_options_is_refused_at_once() {
-    for name in ["dataset.toml", "radar.timestamps"] {
-        let copy = recording::copy(2);
-        let file = copy.path().join(name);
-        let _ = fs::remove_file(&file);
-        let made = Command::new("mkfifo").arg(&file).status();
-        assert!(made.unwrap().success(), "{name}");
-        let mut command = Command::new(crate::PROGRAM);
-        command.args(["inspect", path(copy.path())]);
-        let ended = Ended::of(wrapped(&["timeout", "20"], &command));
-        ended.refused_with(&[name, "it is a pipe, not a file"]);
-    }
+fn a_pipe_in_place_of_options_is_refused_at_once() {
+    let copy = recording::copy(2);
+    let file = copy.path().join("dataset.toml");
+    let _ = fs::remove_file(&file);
+    let made = Command::new("mkfifo").arg(&file).status();
+    assert!(made.unwrap().success());
+    let mut command = Command::new(crate::PROGRAM);
+    command.args(["inspect", path(copy.path())]);
+    let ended = Ended::of(wrapped(&["timeout", "20"], &command));
+    ended.refused_with(&["dataset.toml", "it is a pipe, not a file"]);
 }
 
 #[test]
