@@ -22,7 +22,9 @@ sys.path.insert(0, str(ROOT / "lab"))
 
 import gyre  # noqa: E402
 import realism  # noqa: E402
-from realism import Measured, Sample  # noqa: E402
+import scan_statistics  # noqa: E402
+from realism import Measured  # noqa: E402
+from scan_statistics import Sample  # noqa: E402
 
 AZIMUTHS, BINS, RESOLUTION_M, PERIOD_NS = 400, 250, float(np.float32(0.2)), 250_000_000
 AZIMUTH, BIN = np.indices((AZIMUTHS, BINS))
@@ -43,7 +45,7 @@ def noise(seed, most):
 
 
 def measured(*scans):
-    return realism.statistics([Sample(scan) for scan in scans], realism.histogram(scans), RESOLUTION_M)
+    return scan_statistics.statistics([Sample(scan) for scan in scans], scan_statistics.histogram(scans), RESOLUTION_M)
 
 
 def counts(powers):
@@ -55,8 +57,8 @@ def counts(powers):
 
 def test_a_histogram_knows_its_percentiles_and_share_above():
     known = counts([0, 0, 10, 20, 60, 61, 100, 200, 200, 255])
-    assert [realism.percentile(known, share) for share in (0.0, 0.2, 0.21, 0.5, 0.9, 1.0)] == [0, 0, 10, 60, 200, 255]
-    assert (realism.share_above(known, 60), realism.share_above(known, 255)) == (0.5, 0.0)
+    assert [scan_statistics.percentile(known, share) for share in (0.0, 0.2, 0.21, 0.5, 0.9, 1.0)] == [0, 0, 10, 60, 200, 255]
+    assert (scan_statistics.share_above(known, 60), scan_statistics.share_above(known, 255)) == (0.5, 0.0)
 
 
 @pytest.mark.parametrize("seed", range(50))
@@ -64,18 +66,18 @@ def test_wasserstein_is_the_mean_difference_of_sorted_powers(seed):
     random = np.random.default_rng(seed)
     a, b = np.sort(random.integers(0, 256, (2, random.integers(1, 50))))
     direct = np.mean(np.abs(a - b))
-    assert abs(realism.wasserstein(counts(a), counts(b)) - direct) < 1e-9
+    assert abs(scan_statistics.wasserstein(counts(a), counts(b)) - direct) < 1e-9
     # As often as you like: shares count, not numbers.
-    assert abs(realism.wasserstein(counts(np.tile(a, 2)), counts(b)) - direct) < 1e-9
+    assert abs(scan_statistics.wasserstein(counts(np.tile(a, 2)), counts(b)) - direct) < 1e-9
     shift = random.integers(0, 56)
-    assert abs(realism.wasserstein(counts(a * 199 // 255), counts(a * 199 // 255 + shift)) - shift) < 1e-9
+    assert abs(scan_statistics.wasserstein(counts(a * 199 // 255), counts(a * 199 // 255 + shift)) - shift) < 1e-9
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_a_cell_is_the_mean_over_the_range_that_it_covers(seed):
     random = np.random.default_rng(seed)
     row, resolution_m = random.integers(0, 256, 40), float(np.float32(random.uniform(1.0, 6.0) * RESOLUTION_M))
-    cells = realism.resample(drawn(row[None]), resolution_m, 6).power[0]
+    cells = scan_statistics.resample(drawn(row[None]), resolution_m, 6).power[0]
     # By small steps instead of sums.
     steps = (np.arange(60_000) + 0.5) / 10_000 * resolution_m / RESOLUTION_M
     direct = row[steps.astype(int)].reshape(6, -1).mean(axis=1)
@@ -84,15 +86,15 @@ def test_a_cell_is_the_mean_over_the_range_that_it_covers(seed):
 
 def test_the_common_grid_is_the_coarsest_over_the_shortest_range():
     fine, coarse = drawn(np.zeros((1, 3768)), resolution_m=0.0438), drawn(np.zeros((1, 576)), resolution_m=100.0 / 576.0)
-    assert realism.common_grid([fine, coarse]) == (float(np.float32(100.0 / 576.0)), 576)
-    assert realism.common_grid([fine])[1] == 3768
-    with pytest.raises(realism.Failure, match="no range in common"):
-        realism.common_grid([fine, drawn(np.zeros((1, 1)), resolution_m=0.04)])
+    assert scan_statistics.common_grid([fine, coarse]) == (float(np.float32(100.0 / 576.0)), 576)
+    assert scan_statistics.common_grid([fine])[1] == 3768
+    with pytest.raises(scan_statistics.Failure, match="no range in common"):
+        scan_statistics.common_grid([fine, drawn(np.zeros((1, 1)), resolution_m=0.04)])
 
 
 def test_azimuths_and_times_survive_the_common_grid():
     scan = drawn(BIN, 3)
-    resampled = realism.resample(scan, 2.0 * RESOLUTION_M, BINS // 2)
+    resampled = scan_statistics.resample(scan, 2.0 * RESOLUTION_M, BINS // 2)
     assert np.array_equal(resampled.azimuth_rad, scan.azimuth_rad)
     assert np.array_equal(resampled.azimuth_stamp_ns, scan.azimuth_stamp_ns)
     assert resampled.stamp_ns == scan.stamp_ns
@@ -115,7 +117,7 @@ def test_saturated_bins_are_those_that_pile_up_at_the_top():
     power = np.full((AZIMUTHS, BINS), 20)
     power[0:4, :25], power[4:8, :25], power[8:12, :25] = 160, 157, 156
     assert measured(drawn(power))["saturated_share"] == 200.0 / power.size
-    assert realism.saturated_share(counts([3, 0])) == 0.0
+    assert scan_statistics.saturated_share(counts([3, 0])) == 0.0
 
 
 # Texture.
@@ -129,8 +131,8 @@ def smoothed(seed, azimuths, bins):
 
 def correlations(*scans):
     samples = [Sample(scan) for scan in scans]
-    means = realism.mean_power(samples)
-    return realism.correlation_in_range(samples, means, RESOLUTION_M), realism.correlation_in_azimuth(samples, means)
+    means = scan_statistics.mean_power(samples)
+    return scan_statistics.correlation_in_range(samples, means, RESOLUTION_M), scan_statistics.correlation_in_azimuth(samples, means)
 
 
 # Autocorrelation of noise through a box of m: 1 - lag / m.
@@ -166,7 +168,7 @@ def test_the_autocorrelation_is_the_direct_sum(seed):
 
 @pytest.mark.parametrize(("curve", "lag"), [([1.0, 0.75, 0.25], 1.5), ([1.0, 0.5], 1.0), ([1.0, 0.9, 0.8], None), ([], None)])
 def test_a_length_lies_between_the_lags_and_is_none_where_the_curve_stays_high(curve, lag):
-    assert realism.lag_at_half(curve) == lag
+    assert scan_statistics.lag_at_half(curve) == lag
 
 
 # The change from a scan to the next.
@@ -196,7 +198,7 @@ def town(seed):
 
 def between(earlier, later, motion=STANDING):
     """The pairs, the correlation and the share without counterpart of two scans, the later one 0.25 s after the earlier."""
-    return realism.change([Sample(earlier), Sample(later, motion)], BINS * RESOLUTION_M, 60)
+    return scan_statistics.change([Sample(earlier), Sample(later, motion)], BINS * RESOLUTION_M, 60)
 
 
 def test_the_same_scan_twice_has_not_changed():
@@ -226,7 +228,7 @@ def test_a_drive_is_undone_by_its_motion_and_by_no_other():
 def test_a_motion_that_no_sensor_makes_is_not_compared():
     motions = [STANDING, (complex(math.nan, 0.0), 0.0), STANDING, None, (1e6 + 0j, 0.0)]
     samples = [Sample(posts(town(3), index), motion) for index, motion in enumerate(motions)]
-    assert realism.change(samples, BINS * RESOLUTION_M, 60)[0] == 1
+    assert scan_statistics.change(samples, BINS * RESOLUTION_M, 60)[0] == 1
 
 
 def test_a_post_that_is_gone_is_one_of_many_without_counterpart():

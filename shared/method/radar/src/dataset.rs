@@ -18,6 +18,7 @@ mod images;
 mod mulran;
 mod navtech_notes;
 mod navtech_png;
+mod navtech_profile;
 mod navtech_scans;
 mod options;
 mod oxford;

@@ -143,7 +143,7 @@ impl<'a> Rig<'a> {
     }
 
     /// Starts a process with the environment and the process group that a stage of this name has.
-    /// Its output is appended to its log.
+    /// The output is appended to the log of the process.
     ///
     /// # Errors
     /// A command that cannot be started, or not with this priority.

@@ -12,7 +12,7 @@ pub const HEADER: &str = "scan,stamp_ns,status,x_m,y_m,yaw_rad,\
     cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw,correlation,place\n";
 
 /// Writes the row of a scan to `text`, in fixed decimals, so that equal fixes give equal bytes.
-/// What is not known is empty.
+/// Unknown values are empty.
 pub fn write_row(scan: &RegisteredScan<'_>, found: &Localisation, map: &Map, text: &mut String) {
     let (number, stamp_ns) = (scan.number, scan.observation.stamp_ns);
     let status = status_name(found.status);

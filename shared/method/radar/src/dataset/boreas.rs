@@ -10,7 +10,8 @@ use super::error::OpenError;
 use super::first_image::{FirstImage, NamedBy};
 use super::format::Format;
 use super::navtech_png::ByteTen;
-use super::navtech_scans::{NavtechScans, Profile, ScanTime};
+use super::navtech_profile::{Profile, ScanTime};
+use super::navtech_scans::NavtechScans;
 use super::options::{AzimuthSource, DatasetOptions};
 use super::stamp::SECOND_NS;
 

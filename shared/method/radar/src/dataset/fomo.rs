@@ -11,7 +11,8 @@ use super::error::OpenError;
 use super::first_image::NamedBy;
 use super::format::Format;
 use super::navtech_png::ByteTen;
-use super::navtech_scans::{NavtechScans, Profile, ScanTime};
+use super::navtech_profile::{Profile, ScanTime};
+use super::navtech_scans::NavtechScans;
 use super::options::{AzimuthSource, DatasetOptions};
 
 /// Depth of a range bin, m.

@@ -3,7 +3,7 @@
 use super::encoder::EncoderStep;
 use super::first_image::FirstImage;
 use super::navtech_png::ByteTen;
-use super::navtech_scans::Profile;
+use super::navtech_profile::Profile;
 use super::options::AzimuthSource;
 
 /// Observations on the first image.

@@ -9,7 +9,8 @@ use super::error::OpenError;
 use super::first_image::NamedBy;
 use super::format::Format;
 use super::navtech_png::ByteTen;
-use super::navtech_scans::{NavtechScans, Profile, ScanTime};
+use super::navtech_profile::{Profile, ScanTime};
+use super::navtech_scans::NavtechScans;
 use super::options::{AzimuthSource, DatasetOptions};
 
 /// Depth of a range bin, m. The development kit of the dataset gives 0.0432, with which paths are
