@@ -4,7 +4,7 @@ It does what Gyre's own threshold mask does, in numpy: powers above a floor, ave
 of a Cartesian raster as seen at the scan's stamp, and the sparse points of the scan. `gyre_stage.py` joins the run, `messages.py` has
 the wire types.
 
-    gyre run configs/demo.toml --set masking.kind='"threshold"' \\
+    gyre run configs/demo.toml --fresh --set masking.kind='"threshold"' \\
         --set 'stages.masking.command=["python3", "examples/python-masking/masking.py"]'
 """
 
