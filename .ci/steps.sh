@@ -51,6 +51,21 @@ install_deny() {
         cargo install --quiet --locked --debug --version 0.20.2 cargo-deny
 }
 
+# What `.ci/run` checks only where it has changed since it has passed: a note of the state in `.ci/NAME.passed`.
+state_of() {
+    git ls-files -z "$@" | xargs -0 sha256sum | sha256sum
+}
+has_passed() {
+    [ "$(cat ".ci/$1.passed" 2> /dev/null)" = "$(state_of "${@:2}")" ]
+}
+
+check_dependencies() {
+    install_deny
+    cargo fetch --quiet --locked
+    cargo deny check bans licenses sources
+    state_of Cargo.lock deny.toml > .ci/dependencies.passed
+}
+
 install_training() {
     python3 -m venv "$target/training"
     install "$target/training/bin/python" -r training/requirements.txt -e training
@@ -60,10 +75,7 @@ install_training() {
 test_training() {
     GYRE_LAB="$target/debug/gyre-lab" "$target/training/bin/python" -m pytest -q training
     rm -rf "$target/training"
-    state_of_training > .ci/training.passed
-}
-state_of_training() {
-    git ls-files -z training models | xargs -0 sha256sum | sha256sum
+    state_of training models > .ci/training.passed
 }
 
 test_package() {

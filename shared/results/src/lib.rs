@@ -18,5 +18,5 @@ mod summary;
 
 pub use identity::{Holds, Identity, Programs};
 pub use out::{Out, OutError, absolute};
-pub use results::{FILES, Results, SIMULATED_TRUTH, SUMMARY, map_options, write};
+pub use results::{Results, SIMULATED_TRUTH, SUMMARY, map_options, write};
 pub use summary::{Counter, Counts, MotionCounts, Problem, Session, SlamSummary, Summary};

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use gyre_ros2_messages::frames::Frames;
+use gyre_export::FrameArguments;
 
 /// The arguments of `gyre ros2`.
 #[derive(Debug, Args)]
@@ -21,21 +21,9 @@ pub struct Ros2Arguments {
     /// The namespace of the topics odom and map.
     #[arg(long, value_name = "NAME", default_value = "/")]
     pub namespace: String,
-    /// Names of the frames: of the map, of odometry, of the vehicle and of the radar.
-    #[arg(
-        long,
-        value_name = "MAP,ODOM,BASE,RADAR",
-        default_value = "map,odom,base_link,radar"
-    )]
-    pub frames: Frames,
-    /// Where the radar is on the vehicle: m forward, m to the left, degrees counter-clockwise.
-    #[arg(
-        long,
-        value_name = "X,Y,YAW",
-        default_value = "0,0,0",
-        allow_hyphen_values = true
-    )]
-    pub mounting: String,
+    /// The frames.
+    #[command(flatten)]
+    pub frames: FrameArguments,
     /// Publish no transforms of odometry and map, where another program does, such as
     /// robot_localization. That of the radar stays.
     #[arg(long)]

@@ -31,8 +31,8 @@ pub fn publish(arguments: &Ros2Arguments) -> Result<ExitCode, Failure> {
         out: absolute(&arguments.out)?,
         domain,
         namespace: arguments.namespace.clone(),
-        frames: arguments.frames.clone(),
-        mounting: arguments.mounting.parse()?,
+        frames: arguments.frames.frames.clone(),
+        mounting: arguments.frames.mounting.parse()?,
         transforms: !arguments.no_tf,
         map: (!arguments.no_map).then_some(map_settings),
     })?;

@@ -17,6 +17,14 @@ pub struct ExportArguments {
     /// not.
     #[arg(long, value_enum, value_delimiter = ',', default_value = "b-scan")]
     pub scans: Vec<ScanForm>,
+    /// The frames.
+    #[command(flatten)]
+    pub frames: FrameArguments,
+}
+
+/// The names of the frames, and where the radar is.
+#[derive(Debug, Args)]
+pub struct FrameArguments {
     /// Names of the frames: of the map, of odometry, of the vehicle and of the radar.
     #[arg(
         long,

@@ -16,7 +16,7 @@ use gyre_ros2_messages::{
 };
 use gyre_terminal::{Failure, print};
 
-pub use arguments::{ExportArguments, ScanForm};
+pub use arguments::{ExportArguments, FrameArguments, ScanForm};
 use places::Place;
 use scans::ScanWriter;
 use source::Source;
@@ -28,14 +28,11 @@ use source::Source;
 pub fn export(arguments: &ExportArguments) -> Result<ExitCode, Failure> {
     let mut source = Source::open(&arguments.source)?;
     let mut bag = BagWriter::create(&arguments.mcap)?;
-    let frames = arguments.frames.clone();
+    let frames = arguments.frames.frames.clone();
+    let mounting = arguments.frames.mounting.parse()?;
     let mut places = source.places()?.peekable();
     let mut trajectory = match places.peek() {
-        Some(_) => Some(Trajectory::begin(
-            &mut bag,
-            &frames,
-            arguments.mounting.parse()?,
-        )?),
+        Some(_) => Some(Trajectory::begin(&mut bag, &frames, mounting)?),
         None => None,
     };
     let mut scans = ScanWriter::begin(&mut bag, &mut source, &arguments.scans, &frames.radar)?;
@@ -51,7 +48,7 @@ pub fn export(arguments: &ExportArguments) -> Result<ExitCode, Failure> {
         last_ns = last_ns.max(place.stamp_ns);
         write_place(&mut bag, trajectory.as_mut(), place)?;
     }
-    source.write_map(&mut bag, &frames, last_ns, &arguments.mounting.parse()?)?;
+    source.write_map(&mut bag, &frames, last_ns, &mounting)?;
     let counts: Vec<String> = bag
         .counts()
         .map(|(topic, count)| format!("{topic} {count}"))

@@ -1,5 +1,6 @@
 //! The report: `report.json`, `report.md`, a plot of all scenarios and one of each.
 
+mod figures;
 mod markdown;
 mod outcome;
 mod plots;
@@ -14,7 +15,8 @@ use crate::{
     record::{RunLatency, Sample},
 };
 
-pub use outcome::{Figures, ScenarioOutcome, Verdict};
+pub use figures::Figures;
+pub use outcome::{ScenarioOutcome, Verdict};
 pub use step::Step;
 
 /// The version of `report.json`. A key that changes its meaning or goes raises it; one that is

@@ -38,15 +38,17 @@
 
 mod compensation;
 mod config;
-mod decoupled;
+mod mask;
 mod odometry;
 mod pair;
 mod parts;
 mod registered;
+mod search;
 
 pub use config::{OdometryConfig, SearchConfig, SearchKind};
-pub use decoupled::DecoupledSearch;
+pub use mask::{Mask, Rasters};
 pub use odometry::Odometry;
 pub use pair::Pair;
-pub use parts::{Mask, Parts, Rasters, Refine, Search};
+pub use parts::{Parts, Refine};
 pub use registered::{OdometryError, Outcome, Registered, SetupError};
+pub use search::{DecoupledSearch, Search};

@@ -1,70 +1,10 @@
 //! The replaceable parts of the method: mask, search and refinement.
 
-use gyre_geometry::{Pose, SparsePoint, Twist};
-use gyre_masking::{Masker, Sweep};
-use gyre_radar::PolarScan;
-use gyre_scan_matching::{ExhaustiveSearch, JointMatch, Refined, RefinementKind, Refiner};
-use ndarray::{ArrayView2, ArrayViewMut2};
+use gyre_geometry::Pose;
+use gyre_masking::Masker;
+use gyre_scan_matching::{ExhaustiveSearch, Refined, RefinementKind, Refiner};
 
-use crate::{DecoupledSearch, OdometryConfig, OdometryError, Pair, SearchKind, SetupError};
-
-/// Masks scans: makes a raster and sparse points of each.
-pub trait Mask: Send + Sync {
-    /// Returns the number of scans that the mask takes and of rasters that it fills in: 1, or 2
-    /// (the scan and the one before).
-    fn scans(&self) -> usize {
-        1
-    }
-
-    /// Rasterises and masks a scan. Returns the velocity that was used for motion compensation.
-    ///
-    /// # Errors
-    /// A scan that cannot be masked; it is left out.
-    fn mask(
-        &mut self,
-        sweep: &Sweep<'_>,
-        rasters: &mut Rasters<'_>,
-    ) -> Result<Option<Twist>, OdometryError>;
-
-    /// Writes the scan's points to the start of `out` and returns their number. `twist` is what
-    /// [`Mask::mask`] returned.
-    ///
-    /// # Errors
-    /// A scan that cannot be used; it is left out.
-    fn points(
-        &mut self,
-        scan: &PolarScan<'_>,
-        twist: Option<Twist>,
-        out: &mut [SparsePoint],
-    ) -> Result<usize, OdometryError>;
-
-    /// Returns the factors from 0 to 1, n x n, of the last masked scan (0) or of the one before
-    /// (1). `None` if there are none.
-    fn factors(&self, _scan: usize) -> Option<ArrayView2<'_, f32>> {
-        None
-    }
-}
-
-/// The rasters that a mask fills in: n x n, row 0 far ahead.
-pub struct Rasters<'a> {
-    /// The raster of the scan.
-    pub later: ArrayViewMut2<'a, f32>,
-    /// The raster of the scan before, masked for this pair, if the mask takes two scans.
-    pub earlier: Option<ArrayViewMut2<'a, f32>>,
-    /// The number of the scan before; `None` where the chain of motions starts: the scan is then
-    /// its own scan before.
-    pub follows: Option<u64>,
-}
-
-/// Searches the motion between two scans.
-pub trait Search: Send + Sync {
-    /// Finds the pose of the later scan's frame in the earlier one's; `None` where the chain of
-    /// motions starts.
-    ///
-    /// # Errors
-    /// A pair that cannot be searched; its later scan is left out.
-    fn search(&mut self, pair: &Pair) -> Result<Option<JointMatch>, OdometryError>;
-}
+use crate::{DecoupledSearch, Mask, OdometryConfig, Pair, Search, SearchKind, SetupError};
 
 /// Refines searched motions.
 pub trait Refine: Send + Sync {
@@ -182,42 +122,6 @@ fn refiner(config: &OdometryConfig) -> Result<Option<Box<dyn Refine>>, SetupErro
             let refiner = Refiner::new(&config.refinement, capacity)?;
             Ok(Some(Box::new(refiner)))
         }
-    }
-}
-
-impl Mask for Masker {
-    fn scans(&self) -> usize {
-        Masker::scans(self)
-    }
-
-    fn mask(
-        &mut self,
-        sweep: &Sweep<'_>,
-        rasters: &mut Rasters<'_>,
-    ) -> Result<Option<Twist>, OdometryError> {
-        let earlier = rasters.earlier.as_mut().map(|raster| raster.view_mut());
-        let later = rasters.later.view_mut();
-        Ok(Masker::mask(self, sweep, rasters.follows, later, earlier)?)
-    }
-
-    fn points(
-        &mut self,
-        scan: &PolarScan<'_>,
-        twist: Option<Twist>,
-        out: &mut [SparsePoint],
-    ) -> Result<usize, OdometryError> {
-        Ok(Masker::points(self, scan, twist, out)?)
-    }
-
-    fn factors(&self, scan: usize) -> Option<ArrayView2<'_, f32>> {
-        Masker::factors(self, scan)
-    }
-}
-
-impl Search for ExhaustiveSearch {
-    fn search(&mut self, pair: &Pair) -> Result<Option<JointMatch>, OdometryError> {
-        let search = |earlier| ExhaustiveSearch::search(self, pair.later(), earlier);
-        Ok(pair.earlier().map(search).transpose()?)
     }
 }
 

@@ -6,7 +6,7 @@
 //! - [`Report`] is what the supervisor reports, with the [`StageCounters`] of each process.
 //!
 //! It is light, so that a stage which reads its own section, and a program which only writes
-//! configurations, need neither the method nor the transport.
+//! configurations, need neither the mathematics nor the transport.
 
 mod budget;
 mod link;
@@ -18,6 +18,7 @@ mod report;
 mod scenario;
 mod scheduling;
 mod source;
+mod unset;
 
 pub use budget::{Budget, Limits};
 pub use link::{LinkConfig, Side};

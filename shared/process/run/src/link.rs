@@ -37,26 +37,18 @@ pub struct LinkConfig {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub connect: Vec<String>,
     /// Certificate of the authority that has signed those of both sides, PEM.
-    #[serde(skip_serializing_if = "is_empty")]
+    #[serde(skip_serializing_if = "crate::unset::is_empty")]
     pub ca: PathBuf,
     /// Certificate of this side, PEM.
-    #[serde(skip_serializing_if = "is_empty")]
+    #[serde(skip_serializing_if = "crate::unset::is_empty")]
     pub certificate: PathBuf,
     /// Private key of the certificate, PEM.
-    #[serde(skip_serializing_if = "is_empty")]
+    #[serde(skip_serializing_if = "crate::unset::is_empty")]
     pub key: PathBuf,
     /// True if a robot sends masked scans beside a later cut: the keyframes of SLAM need them. Set
     /// by `slam.kind`.
-    #[serde(skip_serializing_if = "is_false")]
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub keyframes: bool,
-}
-
-fn is_empty(path: &std::path::Path) -> bool {
-    path.as_os_str().is_empty()
-}
-
-fn is_false(value: &bool) -> bool {
-    !value
 }
 
 impl Default for LinkConfig {

@@ -68,7 +68,7 @@ pub struct StageConfig {
     pub scheduling: Scheduling,
     /// Delay for each scan, ms, to test behaviour under load. Source and `pose-integration` have
     /// none.
-    #[serde(skip_serializing_if = "is_zero")]
+    #[serde(skip_serializing_if = "crate::unset::is_zero")]
     pub delay_ms: u64,
 }
 
@@ -97,10 +97,6 @@ impl Default for RestartPolicy {
 
 fn is_default(scheduling: &Scheduling) -> bool {
     *scheduling == Scheduling::default()
-}
-
-fn is_zero(value: &u64) -> bool {
-    *value == 0
 }
 
 impl Default for RunConfig {

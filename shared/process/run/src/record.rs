@@ -1,6 +1,6 @@
 //! The section `[record]`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
@@ -12,7 +12,7 @@ use crate::RestartPolicy;
 pub struct RecordConfig {
     /// The file to which the run is recorded, `NAME.mcap`; `--record` on the command line. Default:
     /// none.
-    #[serde(skip_serializing_if = "is_empty")]
+    #[serde(skip_serializing_if = "crate::unset::is_empty")]
     pub file: PathBuf,
     /// The topics that are recorded: `scan`, `masked`, `rotation`, `motion`, `refined`, `pose`,
     /// `loop`, `correction`, `fix`, `log`, `health`. Default: what the run has of these but
@@ -21,7 +21,7 @@ pub struct RecordConfig {
     pub topics: Vec<String>,
     /// Size from which on the recording goes on in the next file, MB (rosbag2: `max_bagfile_size`,
     /// in bytes); 0: any.
-    #[serde(skip_serializing_if = "is_zero")]
+    #[serde(skip_serializing_if = "crate::unset::is_zero")]
     pub split_mb: u64,
     /// Time of the sensor after which the recording goes on in the next file, s (rosbag2:
     /// `max_bagfile_duration`); 0: any.
@@ -31,21 +31,13 @@ pub struct RecordConfig {
     pub restart: RestartPolicy,
 }
 
-fn is_zero(value: &u64) -> bool {
-    *value == 0
-}
-
 fn is_none(seconds: &f64) -> bool {
     *seconds == 0.0
-}
-
-fn is_empty(path: &Path) -> bool {
-    path.as_os_str().is_empty()
 }
 
 impl RecordConfig {
     /// Returns whether the run is recorded.
     pub fn is_on(&self) -> bool {
-        !is_empty(&self.file)
+        !crate::unset::is_empty(&self.file)
     }
 }

@@ -76,7 +76,7 @@ pub struct SourceConfig {
     pub scans: Option<usize>,
     /// Play the recording again and again, with times that go on: `gyre stress`. `scans` then
     /// counts those of all turns; without it the run has no end.
-    #[serde(skip_serializing_if = "is_false")]
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub repeat: bool,
     /// Number of scans that become due at once, as from a network that holds them back; the mean
     /// rate stays. They follow each other as fast as they are decoded. Only with a `run.rate` other
@@ -89,10 +89,6 @@ pub struct SourceConfig {
     /// Number of damaged scans in a row that are skipped; one more ends the run. Over ten scans at
     /// four per second a car drives farther than the search reaches.
     pub max_unreadable: usize,
-}
-
-fn is_false(value: &bool) -> bool {
-    !value
 }
 
 fn is_one(value: &NonZeroUsize) -> bool {

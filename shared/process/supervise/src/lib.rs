@@ -45,7 +45,7 @@ mod watchdog;
 
 pub use death::Death;
 pub use guardian::guard;
-pub use gyre_run::{Ending, Report, RestartPolicy, Scheduling, Swapped};
+pub use gyre_run::{Ending, Scheduling, Swapped};
 pub use log::last_line;
 pub use plan::{Event, Plan, StagePlan, Stall, SuperviseError};
 pub use program::Program;

@@ -12,6 +12,7 @@ use std::{collections::BTreeSet, fs, os::fd::BorrowedFd, path::PathBuf, time::Du
 use gyre_messages::{
     Correction, Fix, Loop, Masked, Message, Motion, Pose, Refined, Rotation, Scan, StageId, Topic,
 };
+use gyre_run::RestartPolicy;
 use gyre_stage::{
     Launch, Manifest, StageError,
     reader::Port,
@@ -24,7 +25,7 @@ use gyre_stage::{
 use rustix::process::{Pid, getpgid};
 
 use crate::{
-    Death, RestartPolicy, Scheduling, StagePlan, SuperviseError,
+    Death, Scheduling, StagePlan, SuperviseError,
     child::Child,
     clean,
     guardian::Guardian,

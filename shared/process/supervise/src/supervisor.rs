@@ -8,8 +8,10 @@ use gyre_stage::{
     wake::{self, Signals},
 };
 
+use gyre_run::Report;
+
 use crate::{
-    Ending, Event, Plan, Report, SuperviseError,
+    Ending, Event, Plan, SuperviseError,
     child::Child,
     followers::Followers,
     log::Logs,

@@ -8,7 +8,9 @@ use std::{
 use gyre_messages::{FollowerId, Limits, StageId, Window};
 use gyre_stage::Manifest;
 
-use crate::{Plan, RestartPolicy, Scheduling, StagePlan};
+use gyre_run::RestartPolicy;
+
+use crate::{Plan, Scheduling, StagePlan};
 
 /// The processes of [`plan`].
 pub(crate) const SOURCE: usize = 0;

@@ -1,19 +1,12 @@
 //! The outcome of a scenario: figures and the verdict.
 
-use std::{collections::BTreeMap, fmt::Write, time::Duration};
+use std::{fmt::Write, time::Duration};
 
 use gyre_run::{Judged, Scenario};
 use serde::Serialize;
 
-use super::Step;
-use crate::{
-    check::Check,
-    copying::HandOverCost,
-    fault::Fault,
-    memory::Taken,
-    processes::Cost,
-    record::{Counts, RunLatency},
-};
+use super::{Figures, Step};
+use crate::{check::Check, copying::HandOverCost};
 
 /// The verdict on a scenario.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -38,61 +31,6 @@ impl Verdict {
             Self::NotJudged => "not judged",
             Self::NotCarriedOut => "NOT CARRIED OUT",
         }
-    }
-}
-
-/// The figures of a run.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Figures {
-    /// The latency.
-    #[serde(flatten)]
-    pub latency: RunLatency,
-    /// Faults and recoveries.
-    pub faults: Vec<Fault>,
-    /// Restarts by stage.
-    pub restarts: BTreeMap<String, usize>,
-    /// Lost wake-ups by stage, each found after up to 200 ms.
-    pub wakes_caught_late: BTreeMap<String, u64>,
-    /// The resources of each process.
-    pub processes: Vec<Cost>,
-    /// Shared memory, bytes.
-    pub shared_bytes: u64,
-    /// Memory that a load has taken beside it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub taken: Option<Taken>,
-}
-
-impl Figures {
-    /// Returns the share of the scans that were due and have no pose, %.
-    pub fn drops_percent(&self) -> Option<f64> {
-        let Counts { due, dropped, .. } = self.latency.counts;
-        (due > 0).then(|| 100.0 * dropped as f64 / due as f64)
-    }
-
-    /// Returns `p50 4.5, p99 7.0 of 480, max 7.2 ms; 0 of 480 scans dropped`.
-    fn sentence(&self) -> String {
-        let latency = &self.latency.sensor_to_pose;
-        let ms = |ms: Option<f64>| ms.map_or("-".to_owned(), |ms| format!("{ms:.1}"));
-        let Counts { due, dropped, .. } = self.latency.counts;
-        let (p50, max) = (ms(latency.p50_ms), ms(latency.max_ms));
-        let p99 = ms(latency.p99_ms) + &latency.mark(latency.p99_ms, 0.99);
-        let faults = match self.faults.len() {
-            0 => String::new(),
-            1 => "; 1 fault".to_owned(),
-            faults => format!("; {faults} faults"),
-        };
-        format!("p50 {p50}, p99 {p99}, max {max} ms; {dropped} of {due} scans dropped{faults}")
-    }
-
-    /// Returns the processor time of all processes, % of one processor.
-    pub fn cpu_percent(&self) -> f64 {
-        self.processes.iter().map(|cost| cost.cpu_percent).sum()
-    }
-
-    /// Returns own memory of all processes and shared memory, MB.
-    pub fn memory_mb(&self) -> f64 {
-        let own: f64 = self.processes.iter().map(|cost| cost.own_mb).sum();
-        own + self.shared_bytes as f64 * 1e-6
     }
 }
 
@@ -209,7 +147,10 @@ impl ScenarioOutcome {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{fault::FaultKind, report::Report};
+    use crate::{
+        fault::{Fault, FaultKind},
+        report::Report,
+    };
 
     fn outcome(scenario: Scenario) -> ScenarioOutcome {
         ScenarioOutcome::new(scenario, Duration::from_secs(1))

@@ -1,11 +1,21 @@
-//! The decoupled search: the rotation, then the translation.
+//! Searches: the rotation and then the translation, or both together.
 
 use gyre_scan_matching::{
-    ConfigError, JointMatch, RotationConfig, SequentialRotation, TranslationConfig,
-    TranslationSearch,
+    ConfigError, ExhaustiveSearch, JointMatch, RotationConfig, SequentialRotation,
+    TranslationConfig, TranslationSearch,
 };
 
-use crate::{OdometryError, Pair, Search};
+use crate::{OdometryError, Pair};
+
+/// Searches the motion between two scans.
+pub trait Search: Send + Sync {
+    /// Finds the pose of the later scan's frame in the earlier one's; `None` where the chain of
+    /// motions starts.
+    ///
+    /// # Errors
+    /// A pair that cannot be searched; its later scan is left out.
+    fn search(&mut self, pair: &Pair) -> Result<Option<JointMatch>, OdometryError>;
+}
 
 /// Finds the rotation between two scans from their Fourier magnitudes, and then the translation by
 /// one correlation (Weston et al., Sec. III-C).
@@ -42,5 +52,12 @@ impl Search for DecoupledSearch {
         };
         let motion = self.translation.search(later, earlier, &rotation)?; // Eq. 8
         Ok(Some(JointMatch { rotation, motion }))
+    }
+}
+
+impl Search for ExhaustiveSearch {
+    fn search(&mut self, pair: &Pair) -> Result<Option<JointMatch>, OdometryError> {
+        let search = |earlier| ExhaustiveSearch::search(self, pair.later(), earlier);
+        Ok(pair.earlier().map(search).transpose()?)
     }
 }
