@@ -9,7 +9,7 @@ use clap::Args;
 use gyre_configuration::Configuration;
 use gyre_geometry::{Pose, SparsePoint};
 use gyre_localisation::{Fix, Localiser, Status};
-use gyre_maps::localise::{Scans, known};
+use gyre_maps::localise::{Scans, searched_map};
 use gyre_terminal::Failure;
 use rustix::time::{ClockId, clock_gettime};
 
@@ -61,7 +61,7 @@ pub struct LocalisationArguments {
 pub fn localisation(arguments: &LocalisationArguments) -> Result<ExitCode, Failure> {
     let configuration = Configuration::read(&arguments.configuration, &arguments.set)?;
     let configuration = configuration.streaming(Some(&arguments.data));
-    let mut localiser = known::open(&arguments.map, &configuration)?;
+    let mut localiser = searched_map::open(&arguments.map, &configuration)?;
     let truth = Truth::read(arguments, &localiser)?;
     let mut scans = Scans::open(&configuration)?;
     make_folder(&arguments.out)?;

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use gyre_configuration::{Configuration, Played, open};
 use gyre_live_radar::Settings;
-use gyre_maps::localise::known;
+use gyre_maps::localise::searched_map;
 use gyre_masking::Masker;
 use gyre_messages::{Footprint, Limits, StageId, Window};
 use gyre_radar::{DEFAULT_TURN_NS, Fingerprint, turn_ns};
@@ -106,7 +106,7 @@ pub fn check(configuration: &Configuration) -> Result<Preflight, Failure> {
         &configuration.odometry.masking,
     )?;
     if configuration.slam.is_localised() {
-        known::open(&configuration.slam.map, configuration)?;
+        searched_map::open(&configuration.slam.map, configuration)?;
     }
     let period = Duration::from_nanos(scans.period_ns.max(0) as u64);
     let window = configuration.window(Some(period), masker.scans());

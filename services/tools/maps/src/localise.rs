@@ -7,8 +7,8 @@
 
 mod counts;
 pub mod fixes;
-pub mod known;
 mod scans;
+pub mod searched_map;
 
 use std::{
     io::IsTerminal,
@@ -59,7 +59,7 @@ pub struct LocaliseArguments {
 pub fn localise(arguments: &LocaliseArguments) -> Result<ExitCode, Failure> {
     let configuration = Configuration::read(&arguments.configuration, &arguments.set)?;
     let configuration = configuration.streaming(arguments.data.as_deref());
-    let mut localiser = known::open(&arguments.map, &configuration)?;
+    let mut localiser = searched_map::open(&arguments.map, &configuration)?;
     let mut scans = Scans::open(&configuration)?;
     let out = &arguments.out;
     storage::create_folder(out)?;

@@ -1,7 +1,7 @@
 //! `gyre top`: rates, latencies and processes of a running run in the terminal.
 
-mod look;
 mod screen;
+mod snapshot;
 
 use std::{
     process::ExitCode,
@@ -19,9 +19,9 @@ use ratatui::{
 };
 
 use crate::{arguments::TopArguments, choice::chosen};
-use look::{Look, Looks};
+use snapshot::{Snapshot, Snapshots};
 
-/// Time between two looks at the queue of poses, which has room for nine.
+/// Time between two snapshots at the queue of poses, which has room for nine.
 const PERIOD: Duration = Duration::from_millis(50);
 
 /// Shows a run until it ends, or until `q` is pressed.
@@ -36,18 +36,18 @@ pub fn top(arguments: &TopArguments) -> Result<ExitCode, Failure> {
     let control = chosen(&arguments.run)?;
     let run = ObservedRun::writing_to(control.out())?;
     let poses = run.observe()?;
-    let mut looks = Looks::of(control, poses);
+    let mut snapshots = Snapshots::of(control, poses);
     if arguments.once {
-        // Shares and rates are over the time between two looks.
+        // Shares and rates are over the time between two snapshots.
         let signals = Signals::install()?;
-        looks.look()?;
-        wait(&mut looks, every, || Ok(signals.sleep(PERIOD)?))?;
-        print::line(screen::text(&looks.look()?))?;
+        snapshots.take()?;
+        wait(&mut snapshots, every, || Ok(signals.sleep(PERIOD)?))?;
+        print::line(screen::text(&snapshots.take()?))?;
         return Ok(ExitCode::SUCCESS);
     }
     let mut terminal = ratatui::try_init()
         .map_err(|error| format!("the terminal cannot be used: {error}; --once prints text"))?;
-    let shown = show(&mut terminal, &mut looks, every);
+    let shown = show(&mut terminal, &mut snapshots, every);
     ratatui::restore();
     let last = shown?;
     if let Some(last) = last {
@@ -57,19 +57,19 @@ pub fn top(arguments: &TopArguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Returns the last look at a run that has ended; `None` if the person ended it.
+/// Returns the last snapshot at a run that has ended; `None` if the person ended it.
 fn show(
     terminal: &mut DefaultTerminal,
-    looks: &mut Looks<'_>,
+    snapshots: &mut Snapshots<'_>,
     every: Duration,
-) -> Result<Option<Look>, Failure> {
+) -> Result<Option<Snapshot>, Failure> {
     loop {
-        let look = match looks.look() {
-            Ok(look) => look,
-            Err(_) if looks.has_ended() => return Ok(looks.last()),
+        let snapshot = match snapshots.take() {
+            Ok(snapshot) => snapshot,
+            Err(_) if snapshots.has_ended() => return Ok(snapshots.last()),
             Err(error) => return Err(error),
         };
-        terminal.draw(|frame| screen::draw(frame, &look))?;
+        terminal.draw(|frame| screen::draw(frame, &snapshot))?;
         let mut resized = false;
         let quit = || match next_key()? {
             Key::Quit => Ok(true),
@@ -79,7 +79,7 @@ fn show(
             }
             Key::None => Ok(false),
         };
-        if wait(looks, every, quit)? {
+        if wait(snapshots, every, quit)? {
             return Ok(None);
         }
         if resized {
@@ -90,7 +90,7 @@ fn show(
 
 /// Takes the poses that come within `time`; true if `quit` says so.
 fn wait(
-    looks: &mut Looks<'_>,
+    snapshots: &mut Snapshots<'_>,
     time: Duration,
     mut quit: impl FnMut() -> Result<bool, Failure>,
 ) -> Result<bool, Failure> {
@@ -99,7 +99,7 @@ fn wait(
         if quit()? {
             return Ok(true);
         }
-        looks.take_poses()?;
+        snapshots.take_poses()?;
     }
     Ok(false)
 }
@@ -130,5 +130,5 @@ fn next_key() -> Result<Key, Failure> {
     })
 }
 
-/// The poses of a run, for [`Looks`].
+/// The poses of a run, for [`Snapshots`].
 type Poses<'run> = Observer<'run, gyre_messages::Pose>;

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::found::Found;
+use crate::findings::Found;
 
 /// Returns the file's text.
 pub fn toml(found: &Found) -> String {

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use gyre_messages::Item;
 use gyre_stage::{
-    Manifest, elsewhere,
+    Manifest, remote_progress,
     schedule::{self, Schedule},
 };
 
@@ -67,7 +67,7 @@ impl Watchdog {
         }
         let limit = self.stall_timeout?;
         let poses = self.newest.map_or(0, |newest| newest.saturating_add(1));
-        let owed = match elsewhere::owes(manifest, poses) {
+        let owed = match remote_progress::owes(manifest, poses) {
             true => None,
             false => self.owed_by(schedule::read(manifest), limit),
         };

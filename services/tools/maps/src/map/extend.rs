@@ -17,7 +17,7 @@ use gyre_terminal::{Failure, print};
 use nalgebra::{Matrix3, Vector3};
 
 use super::{Lines, MapArguments, MapFormat, folder};
-use crate::localise::known;
+use crate::localise::searched_map;
 
 /// Corrected keyframes, and the constraints between them.
 const GRAPH: &str = "graph.g2o";
@@ -60,7 +60,7 @@ pub fn extend(arguments: &MapArguments, map: &Path) -> Result<Drawing, Failure> 
     let mut keyframes = super::open(run)?;
     let graph = read_graph(run, keyframes.len())?;
     let earlier = gyre_mapping::Map::open(map)?;
-    let mut localiser = known::open(map, &super::configuration(run)?)?;
+    let mut localiser = searched_map::open(map, &super::configuration(run)?)?;
     let search = find(&mut localiser, &mut keyframes)?;
     let Some(start) = most_agreed(&graph, &search.found) else {
         return Err(format!(

@@ -1,4 +1,4 @@
-//! A look at a run as a screen, or as text.
+//! A snapshot at a run as a screen, or as text.
 
 use gyre_latency::{HopLatency, Percentiles};
 use gyre_stage::control::{Activity, ProcessStatus, Status};
@@ -10,7 +10,7 @@ use ratatui::{
     widgets::{Block, Cell, Row, Sparkline, Table},
 };
 
-use super::look::{Look, Use};
+use super::snapshot::{Snapshot, Use};
 use crate::processes::{duration, lacks, summary};
 
 /// The columns of the table: title and width.
@@ -29,9 +29,9 @@ const COLUMNS: [(&str, u16); 12] = [
     ("restarts", 8),
 ];
 
-/// Draws a look.
-pub fn draw(frame: &mut Frame<'_>, look: &Look) {
-    let rows = look.status.processes.len() as u16;
+/// Draws a snapshot.
+pub fn draw(frame: &mut Frame<'_>, snapshot: &Snapshot) {
+    let rows = snapshot.status.processes.len() as u16;
     let [head, latency, table, foot] = Layout::vertical([
         Constraint::Length(4),
         Constraint::Max(12),
@@ -39,41 +39,41 @@ pub fn draw(frame: &mut Frame<'_>, look: &Look) {
         Constraint::Length(1),
     ])
     .areas(frame.area());
-    let lines: Vec<Line<'_>> = head_lines(look).into_iter().map(Line::from).collect();
+    let lines: Vec<Line<'_>> = head_lines(snapshot).into_iter().map(Line::from).collect();
     let mut title = lines;
     title[0] = title[0].clone().bold();
     frame.render_widget(ratatui::text::Text::from(title), head);
-    draw_latency(frame, look, latency);
-    draw_processes(frame, look, table);
+    draw_latency(frame, snapshot, latency);
+    draw_processes(frame, snapshot, table);
     frame.render_widget(Line::from(" q quit").dim(), foot);
 }
 
-fn draw_latency(frame: &mut Frame<'_>, look: &Look, area: Rect) {
-    let longest = look.history.iter().max().copied().unwrap_or_default();
+fn draw_latency(frame: &mut Frame<'_>, snapshot: &Snapshot, area: Rect) {
+    let longest = snapshot.history.iter().max().copied().unwrap_or_default();
     let title = format!(
-        " sensor to pose: the longest of each look, up to {} ",
+        " sensor to pose: the longest of each snapshot, up to {} ",
         duration(longest as f64 * 1e-6)
     );
     let block = Block::bordered().title(title);
     let width = usize::from(block.inner(area).width);
-    let first = look.history.len().saturating_sub(width);
+    let first = snapshot.history.len().saturating_sub(width);
     let sparkline = Sparkline::default()
         .block(block)
-        .data(&look.history[first..])
+        .data(&snapshot.history[first..])
         .style(Style::new().fg(Color::Cyan));
     frame.render_widget(sparkline, area);
 }
 
-fn draw_processes(frame: &mut Frame<'_>, look: &Look, area: Rect) {
+fn draw_processes(frame: &mut Frame<'_>, snapshot: &Snapshot, area: Rect) {
     let style = |process: &ProcessStatus| match process.activity {
         Activity::Silent | Activity::Ended => Style::new().fg(Color::Red),
         Activity::Starting => Style::new().fg(Color::Yellow),
         _ if process.restarts > 0 => Style::new().fg(Color::Yellow),
         _ => Style::new(),
     };
-    let rows = look.status.processes.iter().zip(&look.processes);
+    let rows = snapshot.status.processes.iter().zip(&snapshot.processes);
     let rows = rows.map(|(process, used)| {
-        let cells = cells(look, process, used).map(Cell::from);
+        let cells = cells(snapshot, process, used).map(Cell::from);
         Row::new(cells).style(style(process))
     });
     let header = Row::new(COLUMNS.map(|(title, _)| title));
@@ -84,24 +84,24 @@ fn draw_processes(frame: &mut Frame<'_>, look: &Look, area: Rect) {
     frame.render_widget(table, area);
 }
 
-/// Returns a look as text.
-pub fn text(look: &Look) -> String {
-    let mut lines = head_lines(look).to_vec();
+/// Returns a snapshot as text.
+pub fn text(snapshot: &Snapshot) -> String {
+    let mut lines = head_lines(snapshot).to_vec();
     let line = |cells: [String; COLUMNS.len()]| {
         let cells = cells.iter().zip(COLUMNS);
         let cells = cells.map(|(cell, (_, width))| format!("{cell:width$}", width = width.into()));
         cells.collect::<Vec<_>>().join(" ").trim_end().to_owned()
     };
     lines.push(line(COLUMNS.map(|(title, _)| title.to_owned())));
-    for (process, used) in look.status.processes.iter().zip(&look.processes) {
-        lines.push(line(cells(look, process, used)));
+    for (process, used) in snapshot.status.processes.iter().zip(&snapshot.processes) {
+        lines.push(line(cells(snapshot, process, used)));
     }
     lines.join("\n")
 }
 
-fn head_lines(look: &Look) -> [String; 4] {
-    let status = &look.status;
-    let in_flight = look
+fn head_lines(snapshot: &Snapshot) -> [String; 4] {
+    let status = &snapshot.status;
+    let in_flight = snapshot
         .in_flight
         .map_or_else(|| "unknown".to_owned(), |count| count.to_string());
     let Percentiles {
@@ -109,13 +109,13 @@ fn head_lines(look: &Look) -> [String; 4] {
         p99_us,
         max_us,
         ..
-    } = look.latency.sensor_to_pose;
+    } = snapshot.latency.sensor_to_pose;
     [
         status.out.display().to_string(),
         summary(status),
         format!(
             "{:.1} scans/s, {in_flight} in flight, {} dropped{}{}",
-            look.rate,
+            snapshot.rate,
             status.dropped,
             missed_by_recorder(status),
             status
@@ -130,7 +130,7 @@ fn head_lines(look: &Look) -> [String; 4] {
             us(p50_us),
             us(p99_us),
             us(max_us),
-            look.latency.scans
+            snapshot.latency.scans
         ),
     ]
 }
@@ -144,8 +144,8 @@ fn missed_by_recorder(status: &Status) -> String {
     }
 }
 
-fn cells(look: &Look, process: &ProcessStatus, used: &Use) -> [String; COLUMNS.len()] {
-    let latency = look.latency.stages.get(process.name.as_str());
+fn cells(snapshot: &Snapshot, process: &ProcessStatus, used: &Use) -> [String; COLUMNS.len()] {
+    let latency = snapshot.latency.stages.get(process.name.as_str());
     let of = |value: fn(&HopLatency) -> Option<f64>| latency.and_then(value).map(us);
     [
         process.name.clone(),

@@ -8,8 +8,8 @@ use gyre_messages::{
 };
 
 use crate::{
-    Launch, StageCounters, StageError, elsewhere::ElsewhereWriter, outlet::RecordedMessage,
-    reader::Reader, sink, transport::Listener, wake, writer::Writer,
+    Launch, StageCounters, StageError, outlet::RecordedMessage, reader::Reader,
+    remote_progress::ProgressWriter, sink, transport::Listener, wake, writer::Writer,
 };
 
 /// Reads what the last stages read, which are on another machine, and publishes the poses that come
@@ -20,7 +20,7 @@ pub struct LastStages<'a> {
     /// For masking, if the searches are on the other machine.
     motions: Option<Writer<Motion>>,
     inlets: Vec<Box<dyn Inlet>>,
-    elsewhere: ElsewhereWriter,
+    progress: ProgressWriter,
     counters: StageCounters,
 }
 
@@ -34,7 +34,7 @@ impl<'a> LastStages<'a> {
         let motions = publishes_motions.then(|| Writer::open(node, manifest));
         Ok(Self {
             launch,
-            elsewhere: ElsewhereWriter::create(manifest)?,
+            progress: ProgressWriter::create(manifest)?,
             motions: motions.transpose()?,
             poses: Writer::open(node, manifest)?,
             inlets: Vec::new(),
@@ -81,7 +81,7 @@ impl<'a> LastStages<'a> {
     /// # Errors
     /// A file of the run that cannot be written.
     pub fn has_handed_over(&self, items: u64) -> Result<(), StageError> {
-        self.elsewhere.has_published(items)
+        self.progress.has_published(items)
     }
 
     /// Publishes a new pose, the credit for one more scan.

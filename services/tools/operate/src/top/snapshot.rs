@@ -19,12 +19,12 @@ use super::Poses;
 
 /// The time over which latencies are measured.
 const SPAN: Duration = Duration::from_secs(10);
-/// Number of looks whose latency is drawn.
+/// Number of snapshots whose latency is drawn.
 const HISTORY: usize = 300;
 
 /// A run at a moment.
 #[derive(Clone)]
-pub struct Look {
+pub struct Snapshot {
     pub status: Status,
     /// Scans with a pose, 1/s.
     pub rate: f64,
@@ -34,23 +34,23 @@ pub struct Look {
     pub latency: Latency,
     /// The usage of each process, in the order of the status.
     pub processes: Vec<Use>,
-    /// The longest sensor-to-pose time between two looks, us, oldest first.
+    /// The longest sensor-to-pose time between two snapshots, us, oldest first.
     pub history: Vec<u64>,
 }
 
 /// The usage of a process.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Use {
-    /// Share of one processor since the last look.
+    /// Share of one processor since the last snapshot.
     pub cpu: f64,
     /// Memory of its own, bytes.
     pub own_bytes: u64,
-    /// Wake-ups since the last look, 1/s.
+    /// Wake-ups since the last snapshot, 1/s.
     pub wake_ups: f64,
 }
 
-/// Looks at a run again and again.
-pub struct Looks<'run> {
+/// Takes snapshots of a run.
+pub struct Snapshots<'run> {
     control: Control,
     poses: Poses<'run>,
     recent: VecDeque<PoseHeader>,
@@ -60,17 +60,17 @@ pub struct Looks<'run> {
     has_new: bool,
     history: VecDeque<u64>,
     earlier: Option<Earlier>,
-    last: Option<Look>,
+    last: Option<Snapshot>,
 }
 
-/// The counts at the look before.
+/// The counts at the snapshot before.
 struct Earlier {
     at: Instant,
     poses: u64,
     usage: BTreeMap<u32, Usage>,
 }
 
-impl<'run> Looks<'run> {
+impl<'run> Snapshots<'run> {
     pub fn of(control: Control, poses: Poses<'run>) -> Self {
         Self {
             control,
@@ -90,8 +90,8 @@ impl<'run> Looks<'run> {
         !self.control.is_there() || self.control.status().is_err()
     }
 
-    /// Returns the newest look.
-    pub fn last(&mut self) -> Option<Look> {
+    /// Returns the newest snapshot.
+    pub fn last(&mut self) -> Option<Snapshot> {
         self.last.take()
     }
 
@@ -108,8 +108,8 @@ impl<'run> Looks<'run> {
         Ok(())
     }
 
-    /// Looks at the run.
-    pub fn look(&mut self) -> Result<Look, Failure> {
+    /// Snapshots at the run.
+    pub fn take(&mut self) -> Result<Snapshot, Failure> {
         let status = self.control.status()?;
         let now = Instant::now();
         self.take_poses()?;
@@ -142,7 +142,7 @@ impl<'run> Looks<'run> {
             let before = earlier.as_ref().and_then(|it| it.usage.get(&pid).copied());
             Use::between(before.unwrap_or(now), now, elapsed)
         };
-        let look = Look {
+        let snapshot = Snapshot {
             rate,
             in_flight,
             latency: meter.latency(),
@@ -150,12 +150,12 @@ impl<'run> Looks<'run> {
             history: self.history.iter().copied().collect(),
             status,
         };
-        self.last = Some(look.clone());
-        Ok(look)
+        self.last = Some(snapshot.clone());
+        Ok(snapshot)
     }
 
-    /// Adds the longest time since the last look to what is drawn: where poses are owed and none
-    /// comes, the time for which that lasts.
+    /// Adds the longest time since the last snapshot to what is drawn: where poses are owed and
+    /// none comes, the time for which that lasts.
     fn draw(&mut self, now: Instant, in_flight: Option<u64>) {
         let is_owed =
             !std::mem::take(&mut self.has_new) && in_flight.is_some_and(|scans| scans > 0);

@@ -16,12 +16,12 @@ const FILE: &str = "elsewhere";
 const UNKNOWN: u64 = u64::MAX;
 
 /// Writes what was handed over.
-pub(crate) struct ElsewhereWriter {
+pub(crate) struct ProgressWriter {
     path: PathBuf,
     file: File,
 }
 
-impl ElsewhereWriter {
+impl ProgressWriter {
     /// Begins without the other machine.
     pub fn create(manifest: &Manifest) -> Result<Self, StageError> {
         let path = manifest.root.join(FILE);
