@@ -154,6 +154,20 @@ fn a_complete_run_stays_until_another_one_has_results() {
     is_there();
 }
 
+/// A run that begins anew ends, as by a kill, when it has removed what there was.
+#[test]
+fn results_of_a_run_are_not_taken_for_those_of_an_unknown_one_while_another_begins() {
+    let run = interrupted();
+    let log = run.out().join("log.jsonl.old");
+    fs::create_dir(&log).unwrap();
+    let ended = run.clone().option("--fresh").finish();
+    ended.failed_with(&["cannot remove", "log.jsonl.old"]);
+    assert!(run.out().join("summary.json").exists());
+    assert!(!run.out().join("journal/poses.journal").exists());
+    fs::remove_dir(&log).unwrap();
+    assert_eq!(run.complete(), undisturbed());
+}
+
 #[test]
 fn no_draft_of_a_result_is_left() {
     let run = interrupted();

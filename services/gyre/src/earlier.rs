@@ -278,10 +278,13 @@ pub fn begin(out: &Out, identity: &Identity, resolved: &str) -> Result<(), Failu
     storage::create_folder(&folder)?;
     storage::remove(&journal::path(out.path()))?;
     storage::sync_folder(&folder)?;
+    // Results without any are refused, so what the run was begun with is replaced as a whole below.
+    let begun_with = out.join(BEGUN_WITH);
     // The truth of a simulation is no result: it is there when the run begins.
     let others = LOGS.into_iter().chain([SIMULATED_TRUTH]);
     state(out.path())
         .into_iter()
+        .filter(|path| *path != begun_with)
         .chain(others.map(|name| out.join(name)))
         .try_for_each(|path: PathBuf| storage::remove(&path))?;
     identity.write(out)?;
