@@ -136,12 +136,13 @@ impl Batch<'_> {
     fn supervisors(&self) -> Vec<u32> {
         let names = self.drives.names.iter();
         let running = names.filter(|name| self.poses(name) > 1);
-        let supervisor = |name: &String| {
-            let root = leftovers::root(&self.results(name));
-            let stage = processes::of_run(&root).into_iter().next()?;
-            processes::parent_of(stage)
-        };
-        running.filter_map(supervisor).collect()
+        running.filter_map(|name| self.supervisor(name)).collect()
+    }
+
+    fn supervisor(&self, name: &str) -> Option<u32> {
+        let root = leftovers::root(&self.results(name));
+        let stage = processes::of_run(&root).into_iter().next()?;
+        processes::parent_of(stage)
     }
 
     fn poses(&self, name: &str) -> usize {
@@ -172,11 +173,18 @@ impl Started<'_> {
     /// Waits until there are so many rows and one more drive is being computed, and returns its
     /// supervisor.
     fn await_run_after(&mut self, rows: usize) -> u32 {
+        self.await_some(|batch| {
+            let running = batch.supervisors();
+            running.first().filter(|_| batch.rows() >= rows).copied()
+        })
+    }
+
+    /// Waits for what is there after a while.
+    fn await_some<T>(&mut self, look: impl Fn(&Batch<'_>) -> Option<T>) -> T {
         let since = Instant::now();
         loop {
-            let running = self.batch.supervisors();
-            if let (true, Some(pid)) = (self.batch.rows() >= rows, running.first()) {
-                return *pid;
+            if let Some(found) = look(self.batch) {
+                return found;
             }
             assert!(self.process.try_wait().unwrap().is_none(), "it has ended");
             assert!(since.elapsed() < LIMIT, "waited in vain for a run");
@@ -360,6 +368,37 @@ fn a_drive_is_computed_again_with_another_configuration_alone() {
         ended.stdout
     );
     assert!(changed() > first);
+}
+
+#[test]
+fn a_drive_that_was_killed_while_it_replaced_another_one_is_computed() {
+    let drives = Drives::new().recordings(&[6]);
+    let batch = drives.batch("out");
+    batch.finish().succeeded();
+    let other = batch.clone().with(&["--set", "search.kind='exhaustive'"]);
+    // No second scan for a long time.
+    let slow = other.clone().with(&["--set", "run.rate='0.001'"]);
+    let mut started = slow.start();
+    let supervisor = started.await_some(|batch| batch.supervisor("part-6"));
+    let aside = batch.results("part-6").join("journal.replaced");
+    assert!(aside.exists());
+    send(supervisor, Signal::KILL);
+    assert_eq!(started.wait(), Some(1));
+    assert!(aside.exists());
+    other.finish().succeeded();
+    assert!(!aside.exists());
+}
+
+#[test]
+fn what_a_drive_has_replaced_does_not_stay_for_ever() {
+    let drives = Drives::new().recordings(&[6]);
+    let batch = drives.batch("out");
+    batch.finish().succeeded();
+    let aside = batch.results("part-6").join("journal.replaced");
+    fs::create_dir(&aside).unwrap();
+    let again = batch.finish();
+    assert!(again.succeeded().stdout.contains("computed before"));
+    assert!(!aside.exists());
 }
 
 #[test]

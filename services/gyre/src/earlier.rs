@@ -22,6 +22,8 @@ use gyre_slam::{Keyframe, Place, Query, RecordReader, records_path};
 use gyre_storage::{self as storage, GroupSync, LogError};
 use gyre_terminal::{Failure, print};
 
+pub use replaced::settle;
+
 const CONFIGURATION: &str = "config.toml";
 const LOGS: [&str; 2] = ["log.jsonl", "log.jsonl.old"];
 
@@ -65,7 +67,7 @@ impl Earlier {
         let path = journal::path(out.path());
         // A file of another program is refused in any case.
         let there = journal::records(&path)?.is_some();
-        replaced::settle(out)?;
+        settle(out)?;
         if fresh {
             return Ok(Self::Nothing);
         }

@@ -76,6 +76,8 @@ fn computed(arguments: &RunArguments) -> Result<(DriveOutcome, bool), Failure> {
         return Err(DriveError::Endless(configuration.data()).into());
     }
     let out = locked(&run::results_folder(arguments))?;
+    // The folder is judged by the run that it is of.
+    earlier::settle(&out)?;
     run::place_recording(&mut configuration, &out);
     if is_finished(&out, &configuration) {
         return finished(&out).map(|outcome| (outcome, true));

@@ -41,7 +41,10 @@ pub(super) fn put_aside(out: &Out) -> Result<(), StorageError> {
 
 /// Finishes what a kill has interrupted: the complete run is removed if the new one has its
 /// results, and given back if that has computed nothing.
-pub(super) fn settle(out: &Out) -> Result<(), Failure> {
+///
+/// # Errors
+/// A journal that cannot be read, or a file that cannot be renamed or removed.
+pub fn settle(out: &Out) -> Result<(), Failure> {
     let is_whole = out.join(ASIDE).join(mark()).exists();
     if is_complete(out.path()) || !is_whole {
         return Ok(remove(out)?);
