@@ -178,6 +178,19 @@ fn odometry_goes_on_without_a_follower_that_always_dies_and_the_same_command_mak
 }
 
 #[test]
+fn a_run_that_goes_on_without_a_follower_can_be_interrupted() {
+    let script = "echo 'no more loops' >&2; exit 2";
+    let run = run().rate("8").stage_script(LOOP_CLOSURE, script);
+    let mut running = run.start();
+    let given_up = format!("odometry goes on without {LOOP_CLOSURE}");
+    running.await_words(&given_up).await_poses(2);
+    running.signal(Signal::INT);
+    let ended = running.finish();
+    assert_eq!(ended.code(), Some(130), "{}", ended.stderr);
+    assert_eq!(run.summary()["ending"], "interrupted");
+}
+
+#[test]
 fn a_follower_that_hangs_is_restarted_when_the_run_waits_for_it() {
     for follower in [LOOP_CLOSURE, TRAJECTORY] {
         let run = run().set("run.stall_timeout_s=3");

@@ -92,11 +92,15 @@ impl<'a> Followers<'a> {
         self.given_up.push((follower, error));
     }
 
+    /// Returns whether a process is a follower that is not restarted any more.
+    pub fn has_given_up(&self, process: usize) -> bool {
+        self.given_up.iter().any(|(it, _)| *it == process)
+    }
+
     /// Returns whether a process is a follower that has not come to its end, and may still do so.
     pub fn is_behind(&self, process: usize) -> bool {
-        let has_given_up = self.given_up.iter().any(|(it, _)| *it == process);
-        let name = self.roles.name(process);
-        self.roles.follows(process) && !has_given_up && !follower::is_done(self.manifest, name)
+        let is_done = || follower::is_done(self.manifest, self.roles.name(process));
+        self.roles.follows(process) && !self.has_given_up(process) && !is_done()
     }
 
     /// Returns the followers to wait for. None reads what one writes that is not restarted any

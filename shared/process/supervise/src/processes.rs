@@ -10,8 +10,8 @@ use gyre_messages::PoseHeader;
 use gyre_stage::wake;
 
 use crate::{
-    Event, SuperviseError, child::Child, guardian::Guardian, recovery::Recovery, roles::Roles,
-    run::Run, start::Place,
+    Event, SuperviseError, child::Child, followers::Followers, guardian::Guardian,
+    recovery::Recovery, roles::Roles, run::Run, start::Place,
 };
 
 /// Time for stages to exit by themselves before they are killed.
@@ -162,11 +162,14 @@ impl Processes {
     }
 
     /// Checks that no process has failed at its end, as one that cannot keep what it has written.
+    /// What ended the followers that were given up was said then.
     ///
     /// # Errors
     /// The failure of one that says so by its exit code.
-    pub fn require_good_ends(&mut self) -> Result<(), SuperviseError> {
-        let failed = self.children.iter_mut().find_map(Child::permanent_failure);
+    pub fn require_good_ends(&mut self, followers: &Followers<'_>) -> Result<(), SuperviseError> {
+        let children = self.children.iter_mut().enumerate();
+        let mut judged = children.filter(|(i, _)| !followers.has_given_up(*i));
+        let failed = judged.find_map(|(_, child)| child.permanent_failure());
         failed.map_or(Ok(()), |message| Err(SuperviseError::Permanent { message }))
     }
 }

@@ -201,7 +201,7 @@ impl<'a> Supervisor<'a> {
         self.logs.bound();
         // The failure that the run ends by is the first one.
         match ending {
-            Some(_) => self.processes.require_good_ends(),
+            Some(_) => self.processes.require_good_ends(&self.followers),
             None => Ok(()),
         }
     }
