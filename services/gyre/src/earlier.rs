@@ -22,7 +22,7 @@ use gyre_slam::{Keyframe, Place, Query, RecordReader, records_path};
 use gyre_storage::{self as storage, GroupSync, LogError};
 use gyre_terminal::{Failure, print};
 
-pub use replaced::settle;
+pub use replaced::{is_untouched, settle};
 
 const CONFIGURATION: &str = "config.toml";
 const LOGS: [&str; 2] = ["log.jsonl", "log.jsonl.old"];

@@ -4,6 +4,7 @@ mod resolve;
 
 use std::{
     env,
+    ffi::OsString,
     os::unix::process::CommandExt,
     path::{Path, PathBuf},
     process::{Command, ExitCode},
@@ -203,8 +204,9 @@ fn play(
     progress.finish();
     notifier.writing();
     if matches!(report, Err(SuperviseError::TransportStuck)) && !has_started_over_at(resumed) {
+        let begins_anew = earlier::is_untouched(&out)?;
         drop((root, out));
-        return start_over(resumed);
+        return start_over(resumed, begins_anew);
     }
     let session = Session {
         scans: checked.scans,
@@ -367,14 +369,39 @@ fn has_started_over_at(poses: usize) -> bool {
 }
 
 /// Executes the same command again: the transport hung on what a dead process left, which is
-/// removed now, and the run resumes from the journal.
-fn start_over(resumed: usize) -> Result<ExitCode, Failure> {
+/// removed now, and the run resumes from the journal; or, if it has computed nothing in the place
+/// of a complete run, begins anew as it was asked to.
+fn start_over(resumed: usize, begins_anew: bool) -> Result<ExitCode, Failure> {
     print::note(
-        "gyre: the transport did not finish cleaning up after a dead process; starting over from the journal",
+        "gyre: the transport did not finish cleaning up after a dead process; starting over",
     );
     let failed = Command::new(own())
-        .args(env::args_os().skip(1).filter(|a| a != "--fresh"))
+        .args(again(env::args_os(), begins_anew))
         .env(STARTED_OVER, resumed.to_string())
         .exec();
     Err(format!("cannot start over: {failed}").into())
+}
+
+/// Returns the arguments of a run that starts over. What it has computed is not discarded.
+fn again(
+    arguments: impl Iterator<Item = OsString>,
+    begins_anew: bool,
+) -> impl Iterator<Item = OsString> {
+    arguments
+        .skip(1)
+        .filter(move |argument| begins_anew || argument != "--fresh")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_a_run_that_has_computed_nothing_begins_anew_again() {
+        let given = || ["gyre", "run", "--fresh", "a.toml"].map(OsString::from);
+        let resumed: Vec<_> = again(given().into_iter(), false).collect();
+        assert_eq!(resumed, ["run", "a.toml"]);
+        let begun: Vec<_> = again(given().into_iter(), true).collect();
+        assert_eq!(begun, ["run", "--fresh", "a.toml"]);
+    }
 }

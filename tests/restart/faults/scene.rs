@@ -171,7 +171,7 @@ fn assert_complete(run: &Run, expected: &Results) {
 /// of the run.
 pub fn assert_one_sentence(ended: &Ended) {
     ended.failed_with(&[]);
-    let notice = |line: &&str| line.ends_with("starting over from the journal");
+    let notice = |line: &&str| line.ends_with("; starting over");
     let sentences = ended
         .stderr
         .lines()

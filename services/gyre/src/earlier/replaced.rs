@@ -45,19 +45,33 @@ pub(super) fn put_aside(out: &Out) -> Result<(), StorageError> {
 /// # Errors
 /// A journal that cannot be read, or a file that cannot be renamed or removed.
 pub fn settle(out: &Out) -> Result<(), Failure> {
-    let is_whole = out.join(ASIDE).join(mark()).exists();
-    if is_complete(out.path()) || !is_whole {
-        return Ok(remove(out)?);
+    match (is_whole(out), is_untouched(out)?) {
+        (false, _) => Ok(remove(out)?),
+        (true, true) => Ok(give_back(out)?),
+        (true, false) => Ok(()),
+    }
+}
+
+/// Returns whether the folder has all of a complete run, which another one was to replace.
+fn is_whole(out: &Out) -> bool {
+    !is_complete(out.path()) && out.join(ASIDE).join(mark()).exists()
+}
+
+/// Returns whether the run that is to replace a complete one has computed nothing: that is given
+/// back.
+///
+/// # Errors
+/// A journal that cannot be read.
+pub fn is_untouched(out: &Out) -> Result<bool, Failure> {
+    if !is_whole(out) {
+        return Ok(false);
     }
     let records = journal::records(&journal::path(out.path()))?;
     let poses = records.into_iter().flatten().filter(|record| {
         let is_end = record.as_ref().is_ok_and(|pose| pose.item.is(flag::END));
         !is_end
     });
-    match poses.take(WITH_MOTION).count() < WITH_MOTION {
-        true => Ok(give_back(out)?),
-        false => Ok(()),
-    }
+    Ok(poses.take(WITH_MOTION).count() < WITH_MOTION)
 }
 
 /// Removes a complete run, of which no results are left.
@@ -113,4 +127,54 @@ fn empty(folder: &Path, others: &Path) -> Result<(), StorageError> {
         }
     }
     fs::remove_dir(folder).map_err(StorageError::at("remove", folder))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::ops::Range;
+
+    use gyre_journal::Journal;
+    use gyre_messages::{Item, PoseHeader};
+    use tempfile::TempDir;
+
+    use super::*;
+
+    fn compute(out: &Out, poses: Range<u64>) {
+        let mut journal = Journal::open(&journal::path(out.path())).unwrap();
+        for seq in poses {
+            let item = Item {
+                seq,
+                ..Item::default()
+            };
+            let pose = PoseHeader {
+                item,
+                ..PoseHeader::default()
+            };
+            journal.append(&pose).unwrap();
+        }
+    }
+
+    /// The folder of a complete run, the journal of which is put aside.
+    fn being_replaced() -> (TempDir, Out) {
+        let folder = tempfile::tempdir().unwrap();
+        let out = Out::lock(folder.path()).unwrap();
+        compute(&out, 0..3);
+        storage::write(&out.join(COMPLETE), "poses = 3\n").unwrap();
+        assert!(!is_untouched(&out).unwrap());
+        put_aside(&out).unwrap();
+        (folder, out)
+    }
+
+    #[test]
+    fn a_complete_run_is_untouched_until_the_new_one_has_a_motion() {
+        let (_folder, out) = being_replaced();
+        assert!(is_untouched(&out).unwrap());
+        compute(&out, 0..1);
+        assert!(is_untouched(&out).unwrap());
+        compute(&out, 1..2);
+        assert!(!is_untouched(&out).unwrap());
+        settle(&out).unwrap();
+        assert!(is_kept(&out) && !is_complete(out.path()));
+    }
 }
