@@ -133,11 +133,19 @@ fn follow_poses(
                 }
             }
             Next::Idle => {}
-            Next::Ended => break,
+            Next::Ended => {
+                draw_the_rest(view, track);
+                break;
+            }
         }
         view.set_missed(|missed| missed.pose = poses.missed());
     }
     Ok(())
+}
+
+/// Draws what the track still lacks of the journal when no more poses come.
+fn draw_the_rest(view: &RunView, track: &mut JournalTrack) {
+    while !view.is_stopping() && track.catch_up(|pose| view.add_to_track(pose)) {}
 }
 
 /// Follows a topic as long as a browser wants one of these layers.
