@@ -147,11 +147,19 @@ impl Collected {
         let _ = self.file.write_all(bytes);
         if length(&self.file) > MAX {
             bound(&self.path);
+            self.bound_what_has_lost_its_name();
         }
         let newest = &bytes[bytes.len().saturating_sub(TAIL)..];
         self.tail.extend_from_slice(newest);
         let old = self.tail.len().saturating_sub(TAIL);
         self.tail.drain(..old);
+    }
+
+    /// Empties a file that was removed or renamed: it has no name by which it would be bounded.
+    fn bound_what_has_lost_its_name(&self) {
+        if length(&self.file) > MAX {
+            let _ = self.file.set_len(0);
+        }
     }
 }
 
@@ -310,5 +318,19 @@ mod tests {
         let old = fs::read(path.with_extension("txt.old")).unwrap();
         let all = [old, fs::read(&path).unwrap()].concat();
         assert!(all.ends_with(b"x\nthe end\n"));
+    }
+
+    #[test]
+    fn a_log_that_is_removed_is_bounded() {
+        let folder = tempfile::tempdir().unwrap();
+        let (mut log, path) = log(&folder);
+        let file = File::open(&path).unwrap();
+        fs::remove_file(&path).unwrap();
+        for _ in 0..3 * MAX / TAIL as u64 {
+            log.output().write_all(&[b'x'; TAIL]).unwrap();
+        }
+        log.output().write_all(b"\nthe end\n").unwrap();
+        assert_eq!(log.last_line().as_deref(), Some("the end"));
+        assert!(length(&file) <= MAX, "{}", length(&file));
     }
 }
