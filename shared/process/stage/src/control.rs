@@ -23,6 +23,8 @@ pub const SOCKET: &str = "control.sock";
 const ANSWER: Duration = Duration::from_secs(15);
 /// Time between two looks at a swap that is waited for.
 const LOOK: Duration = Duration::from_secs(1);
+/// Said where a request that changes something is not waited for any more.
+const NOT_LATER: &str = "; what it has not begun by now it does not begin";
 
 /// A request to the supervisor of a run.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -247,7 +249,11 @@ impl Control {
     /// # Errors
     /// The run has ended, or its supervisor does not answer.
     pub fn status(&self) -> Result<Status, StageError> {
-        match self.ask(&Request::Status)? {
+        self.status_or("")
+    }
+
+    fn status_or(&self, otherwise: &str) -> Result<Status, StageError> {
+        match self.ask(&Request::Status, otherwise)? {
             Answer::Status(status) => Ok(status),
             answer => Err(self.silent(format!("its answer is {answer:?}"))),
         }
@@ -286,7 +292,7 @@ impl Control {
         // The supervisor has the limits: `run.start_timeout_s`, and that of the trial. But it may
         // hang.
         let answer = self.wait(sent, LOOK, |run| {
-            let status = run.status()?;
+            let status = run.status_or(NOT_LATER)?;
             status.swap.iter().for_each(&mut *observe);
             Ok(())
         });
@@ -304,7 +310,7 @@ impl Control {
     }
 
     fn order(&self, request: &Request) -> Result<(), StageError> {
-        let answer = self.ask(request)?;
+        let answer = self.ask(request, NOT_LATER)?;
         self.is_done(answer)
     }
 
@@ -316,9 +322,11 @@ impl Control {
         }
     }
 
-    fn ask(&self, request: &Request) -> Result<Answer, StageError> {
+    /// Asks. The error that there is no answer ends with `otherwise`.
+    fn ask(&self, request: &Request, otherwise: &str) -> Result<Answer, StageError> {
         self.wait(self.send(request)?, ANSWER, |_| {
-            Err(self.silent(format!("there was no answer within {ANSWER:?}")))
+            let reason = format!("there was no answer within {ANSWER:?}{otherwise}");
+            Err(self.silent(reason))
         })
     }
 

@@ -30,9 +30,7 @@ pub enum StageError {
     #[error("no run is writing to {0}: `gyre run` starts one, and its --out names the folder")]
     NotRunning(PathBuf),
     /// A run does not answer.
-    #[error(
-        "the run that writes to {out} does not answer: {reason}; what was asked is not carried out later"
-    )]
+    #[error("the run that writes to {out} does not answer: {reason}")]
     Silent {
         /// The folder of the results.
         out: PathBuf,
