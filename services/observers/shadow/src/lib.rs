@@ -56,7 +56,8 @@ pub fn shadow(
     let signals = Signals::install()?;
     let in_report = |name| options.report.as_ref().map(|folder| folder.join(name));
     if let Some(folder) = &options.report {
-        fs::create_dir_all(folder).map_err(ShadowError::file(folder))?;
+        let created = gyre_storage::create_folder(folder);
+        created.map_err(|error| ShadowError::file(folder)(error.source))?;
     }
     let folder = tempfile::Builder::new().prefix("gyre-shadow-").tempdir();
     let folder = folder.map_err(ShadowError::file(&std::env::temp_dir()))?;

@@ -137,7 +137,8 @@ impl ShadowProgram {
     fn copy_state(&self, out: &Path) -> Result<(), ShadowError> {
         let from = checkpoint::path(&self.candidate.manifest.out);
         let to = checkpoint::path(out);
-        let copied = fs::create_dir_all(to.parent().unwrap_or(out));
+        let created = gyre_storage::create_folder(to.parent().unwrap_or(out));
+        let copied = created.map_err(|error| error.source);
         match copied.and_then(|()| fs::copy(&from, to)) {
             // A replaced refinement need not have one.
             Err(error) if error.kind() != io::ErrorKind::NotFound => {

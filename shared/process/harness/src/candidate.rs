@@ -1,6 +1,6 @@
 //! A program that stands in for a stage.
 
-use std::{fs, path::PathBuf};
+use std::path::PathBuf;
 
 use gyre_messages::StageId;
 use gyre_stage::{Manifest, StageError, wake::Signals};
@@ -69,7 +69,11 @@ impl Candidate {
     fn manifest_in(&self, out: PathBuf) -> Result<Manifest, StageError> {
         for folder in ["log", "journal"] {
             let path = out.join(folder);
-            fs::create_dir_all(&path).map_err(|source| StageError::File { path, source })?;
+            let created = gyre_storage::create_folder(&path);
+            created.map_err(|error| StageError::File {
+                path,
+                source: error.source,
+            })?;
         }
         Ok(Manifest {
             out,
