@@ -160,7 +160,7 @@ fn results_take_bounded_memory() {
         report: None,
     };
     let since = Instant::now();
-    let written = gyre_results::write(&configuration, &out, &session, &|_| true).unwrap();
+    let written = gyre_results::write(&configuration, &out, &session, &|_| Ok(true)).unwrap();
     assert_eq!((written.poses as u64, written.ended), (poses, true));
     let (took, peak) = (since.elapsed(), peak_mb());
     println!("{poses} poses: results in {took:?}, peak {peak:.1} MB");

@@ -299,6 +299,19 @@ pub fn replaces(out: &Out, poses: usize) -> bool {
     poses >= replaced::WITH_MOTION || !replaced::is_kept(out)
 }
 
+/// Returns the same before results take that place, where the complete run gives way to them: from
+/// then on it is not given back.
+///
+/// # Errors
+/// A file that cannot be removed.
+pub fn make_way(out: &Out, poses: usize) -> Result<bool, Failure> {
+    let replaces = replaces(out, poses);
+    if replaces {
+        replaced::invalidate(out)?;
+    }
+    Ok(replaces)
+}
+
 /// Ends a run whose results are in place, and survive a power failure by now. If it is complete,
 /// that is said.
 ///

@@ -313,9 +313,9 @@ fn finish(
     out: &Out,
     session: &Session<'_>,
 ) -> Result<Results, Failure> {
-    let replaces = |poses| earlier::replaces(out, poses);
-    let mut written = gyre_results::write(configuration, out, session, &replaces)?;
-    let has_replaced = replaces(written.poses);
+    let make_way = |poses| earlier::make_way(out, poses);
+    let mut written = gyre_results::write(configuration, out, session, &make_way)?;
+    let has_replaced = earlier::replaces(out, written.poses);
     // With all poses there may be loops to find, and a run that failed may not have kept them.
     let has_followed = match session.ending {
         Some(Ending::Complete) => true,

@@ -71,8 +71,8 @@ pub struct Results {
 
 /// Writes all files from the journal. Each is written aside first, and none takes its place before
 /// all are complete; a result of an earlier session that cannot be made any more is removed. They
-/// survive a power failure when this returns. Those in place stay if `replaces` says that results
-/// of so many poses do not replace them.
+/// survive a power failure when this returns. Those in place stay if `make_way`, which is called
+/// before the first one is replaced, says that results of so many poses do not replace them.
 ///
 /// # Errors
 /// A journal that cannot be read, a file that cannot be written.
@@ -80,7 +80,7 @@ pub fn write(
     configuration: &Configuration,
     out: &Out,
     session: &Session<'_>,
-    replaces: &dyn Fn(usize) -> bool,
+    make_way: &dyn Fn(usize) -> Result<bool, Failure>,
 ) -> Result<Results, Failure> {
     let truth = truth_of(configuration, out);
     let mut slam = slam_of(configuration, out);
@@ -123,7 +123,7 @@ pub fn write(
     );
     files.add(SUMMARY, serde_json::to_string_pretty(&summary)?)?;
     let poses = counts.processed as usize;
-    if replaces(poses) {
+    if make_way(poses)? {
         files.commit()?;
     }
     Ok(Results {

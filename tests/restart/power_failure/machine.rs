@@ -103,8 +103,8 @@ impl Machine {
             ending: Some(Ending::Complete),
             report: None,
         };
-        let replaces = |poses| earlier::replaces(&out, poses);
-        let written = gyre_results::write(&self.configuration, &out, &session, &replaces)?;
+        let make_way = |poses| earlier::make_way(&out, poses);
+        let written = gyre_results::write(&self.configuration, &out, &session, &make_way)?;
         assert!(written.ended);
         earlier::end(&out, written.poses, true)
     }

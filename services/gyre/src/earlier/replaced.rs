@@ -74,6 +74,15 @@ pub fn is_untouched(out: &Out) -> Result<bool, Failure> {
     Ok(poses.take(WITH_MOTION).count() < WITH_MOTION)
 }
 
+/// Makes sure that a complete run is never given back: its results are about to be replaced.
+pub(super) fn invalidate(out: &Out) -> Result<(), StorageError> {
+    let aside = out.join(ASIDE);
+    match is_kept(out) {
+        true => drop_mark(&aside),
+        false => Ok(()),
+    }
+}
+
 /// Removes a complete run, of which no results are left.
 pub(super) fn remove(out: &Out) -> Result<(), StorageError> {
     match is_kept(out) {
@@ -106,11 +115,15 @@ fn mark() -> &'static OsStr {
     Path::new(COMPLETE).file_name().unwrap_or_default()
 }
 
+/// Removes the mark of a complete run: without it nothing is given back.
+fn drop_mark(folder: &Path) -> Result<(), StorageError> {
+    storage::remove(&folder.join(mark()))?;
+    storage::sync_folder(folder)
+}
+
 /// Removes a folder and the files of a run in it. The files of others go to `others`.
 fn empty(folder: &Path, others: &Path) -> Result<(), StorageError> {
-    // First: without it nothing is given back.
-    storage::remove(&folder.join(mark()))?;
-    storage::sync_folder(folder)?;
+    drop_mark(folder)?;
     let of_run: Vec<_> = state(Path::new(""))
         .into_iter()
         .filter_map(|path| Some(path.file_name()?.to_owned()))
@@ -138,7 +151,7 @@ mod tests {
     use gyre_messages::{Item, PoseHeader};
     use tempfile::TempDir;
 
-    use super::*;
+    use super::{super::make_way, *};
 
     fn compute(out: &Out, poses: Range<u64>) {
         let mut journal = Journal::open(&journal::path(out.path())).unwrap();
@@ -176,5 +189,25 @@ mod tests {
         assert!(!is_untouched(&out).unwrap());
         settle(&out).unwrap();
         assert!(is_kept(&out) && !is_complete(out.path()));
+    }
+
+    #[test]
+    fn a_complete_run_is_not_given_back_beside_the_results_of_another_one() {
+        let (_folder, out) = being_replaced();
+        compute(&out, 0..3);
+        assert!(make_way(&out, 3).unwrap());
+        // It is killed there, and so is a third one when it has begun.
+        storage::remove(&journal::path(out.path())).unwrap();
+        settle(&out).unwrap();
+        assert!(!is_kept(&out) && !is_complete(out.path()));
+    }
+
+    #[test]
+    fn a_run_without_a_motion_makes_no_way_for_itself() {
+        let (_folder, out) = being_replaced();
+        compute(&out, 0..1);
+        assert!(!make_way(&out, 1).unwrap());
+        settle(&out).unwrap();
+        assert!(!is_kept(&out) && is_complete(out.path()));
     }
 }
