@@ -11,7 +11,7 @@ const YEARS_S: std::ops::Range<i64> = 1_420_070_400..2_240_611_200;
 /// Times are accepted up to 146 years from 1970, so that no difference overflows.
 const MAX_NS: i64 = i64::MAX / 2;
 /// Plausible durations of a turn, ns; others are gaps or errors.
-const TURN_NS: std::ops::Range<i64> = 10_000_000..10_000_000_000;
+pub(crate) const TURN_NS: std::ops::Range<i64> = 10_000_000..10_000_000_000;
 /// Default duration of a turn, ns: Navtech radars turn four times per second.
 pub const DEFAULT_TURN_NS: i64 = 250_000_000;
 

@@ -71,6 +71,35 @@ fn images_that_are_not_named_by_times_are_in_the_order_of_their_rows_times() {
 }
 
 #[test]
+fn a_clock_that_is_set_back_breaks_the_time_of_numbered_images_once() {
+    let root = folder();
+    let images = root.path().join("radar");
+    for k in 0..40 {
+        let back_us = if k < 20 { 0 } else { 3_100_000 };
+        let start = START_US + k * PERIOD_US - back_us;
+        let sweep = Sweep {
+            start,
+            ..Sweep::default()
+        };
+        sweep.write(&images.join(format!("scan{}.png", k + 1)));
+    }
+    let expected: Vec<_> = (1..=40).map(|k| format!("scan{k}.png")).collect();
+    for format in [Format::Oxford, Format::Boreas, Format::Fomo] {
+        let options = options(|o| o.format = Some(format));
+        let mut dataset = open(&images, &options).unwrap();
+        assert_eq!(names(dataset.as_ref()), expected, "{format}");
+        assert_eq!(dataset.period_ns(), PERIOD_US * 1000);
+        let notes = dataset.notes().join(" ");
+        assert!(notes.contains("in the order of their names"), "{notes}");
+        let again = reopen(&images, &options, format, dataset.files().clone()).unwrap();
+        let times: Vec<_> = (0..40).map(|k| again.nominal_stamp_ns(k)).collect();
+        let back: Vec<_> = (1..40).filter(|k| times[*k] < times[k - 1]).collect();
+        assert_eq!((names(again.as_ref()), back), (expected.clone(), vec![20]));
+        assert!((0..40).all(|index| read(dataset.as_mut(), index).is_ok()));
+    }
+}
+
+#[test]
 fn inspect_has_times_and_gaps_of_images_that_are_not_named_by_times() {
     let root = folder();
     let images = root.path().join("radar");
