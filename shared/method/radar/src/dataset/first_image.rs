@@ -130,10 +130,17 @@ impl FirstImage {
         Some((intervals().min()?, intervals().max()?, mean))
     }
 
-    /// Duration of a turn by the stamps of its rows, ns.
+    /// Duration of a turn by the stamps of its rows, ns. The time over the encoder's zero counts as
+    /// any other, since rows can be missing there.
     pub(crate) fn turn_ns(&self) -> Option<i64> {
-        let (rows, last) = (self.rows.len() as i64, self.rows.len() - 1);
-        Some((self.row_ns(last)? - self.start_ns()?) * rows / (rows - 1))
+        let rows = self.rows.len();
+        let zero = (1..rows).find(|row| self.rows[*row].count < self.rows[row - 1].count);
+        let (over_zero_ns, steps) = match zero {
+            Some(row) => (self.row_ns(row)? - self.row_ns(row - 1)?, rows - 2),
+            None => (0, rows - 1),
+        };
+        let steps_ns = self.row_ns(rows - 1)? - self.start_ns()? - over_zero_ns;
+        Some(steps_ns * rows as i64 / steps.max(1) as i64)
     }
 
     /// Encoder counts of the rows.

@@ -41,8 +41,9 @@ pub(crate) struct NavtechScans {
 const MAX_SWEEP_NS: i64 = 5 * stamp::SECOND_NS;
 /// Longest sweep in periods: the stamps of rows come late where the host was busy.
 const MAX_SWEEP_PERIODS: i64 = 2;
-/// Times that the rows of a turn take, periods.
-const TURN_SHARES: RangeInclusive<f64> = 0.75..=1.25;
+/// Times that the rows of a turn take, periods. A sector that is blanked over the encoder's zero
+/// makes a turn look like one of a smaller encoder, but shorter by as much.
+const TURN_SHARES: RangeInclusive<f64> = 0.95..=1.05;
 /// Number of images that show the size of the encoder.
 const FIRST_TURNS: usize = 8;
 
@@ -103,8 +104,8 @@ impl NavtechScans {
         Ok(scans)
     }
 
-    /// Takes the size of the encoder that the first images show, unless it is the usual one, or
-    /// the first image took much less or more than a turn.
+    /// Takes the size of the encoder that the first images show, unless it is the usual one. Only
+    /// says what the first image shows if that took less or more than a turn.
     fn find_encoder(&mut self, first_image: &FirstImage, turn_ns: Option<i64>) {
         let usual = self.profile.encoder_counts;
         let is_found = |turns: &[Vec<u16>]| {
@@ -115,7 +116,11 @@ impl NavtechScans {
         let is_turn = turn_ns
             .and_then(share)
             .is_none_or(|share| TURN_SHARES.contains(&share));
-        if !is_turn || is_found(&[first_image.counts()]).is_none() {
+        if !is_turn {
+            self.notes.extend(note_encoder(first_image, &self.profile));
+            return;
+        }
+        if is_found(&[first_image.counts()]).is_none() {
             return;
         }
         if let Some(found) = is_found(&self.first_turns()) {
