@@ -160,9 +160,12 @@ fn detect(text: &str) -> Result<TrajectoryFormat, String> {
 /// Rejects what spreadsheets write in countries with decimal commas, and columns that are parted as
 /// those of other formats.
 fn check_separators(first: &str, commas: usize, words: usize) -> Result<(), String> {
+    // With a fraction: a comma at the end of a word parts columns, as in `1, 2`.
     let is_decimal = |word: &str| match word.split_once(',') {
-        Some((whole, _)) => {
-            whole.parse::<i64>().is_ok() && word.replace(',', ".").parse::<f64>().is_ok()
+        Some((whole, fraction)) => {
+            whole.parse::<i64>().is_ok()
+                && fraction.starts_with(|c: char| c.is_ascii_digit())
+                && word.replace(',', ".").parse::<f64>().is_ok()
         }
         None => false,
     };

@@ -229,6 +229,10 @@ fn what_spreadsheets_write_is_refused_with_what_to_do() {
             "8 columns (TUM) are parted by commas, and need spaces",
         ),
         (
+            columns(", ", "1", 8),
+            "8 columns (TUM) are parted by commas, and need spaces",
+        ),
+        (
             "GPSTime;easting;northing\n".to_owned(),
             "parted by semicolons, and need commas",
         ),
@@ -237,6 +241,15 @@ fn what_spreadsheets_write_is_refused_with_what_to_do() {
         let error = from_text("a.txt", &text).unwrap_err().to_string();
         assert!(error.contains(words), "{text:?}: {error}");
     }
+}
+
+#[test]
+fn columns_may_have_a_space_behind_their_comma() {
+    let row = "1561000444390857630,0,-1,0,353062.125,1,0,0,4026023,0,0,1,20\n";
+    assert_eq!(
+        from_text("global_pose.csv", &row.replace(',', ", ")).unwrap(),
+        from_text("global_pose.csv", row).unwrap()
+    );
 }
 
 #[test]
