@@ -329,6 +329,8 @@ mod tests {
         )
         .unwrap();
         assert_eq!((coverage.matched(), coverage.left_out()), (200, 0));
+        // The steps are of 1.002 s.
+        assert!(coverage.to_string().ends_with("in its gaps above 1.5 s"));
     }
 
     #[test]

@@ -102,7 +102,7 @@ impl fmt::Display for Coverage {
                 f,
                 "by time: {matched} of {all} estimated poses; left out: {outside_span} outside the span of the ground truth, \
                  {in_gaps} in its gaps above {} s",
-                max_gap_ns as f64 * 1e-9
+                (max_gap_ns as f64 * 1e-7).round() / 100.0
             ),
             Coverage::Index {
                 matched,

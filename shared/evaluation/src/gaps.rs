@@ -2,10 +2,13 @@
 
 /// A gap is longer than the usual step by more than this factor: stamps jitter.
 const JITTER: f64 = 1.5;
+/// The longest pause that slow steps make no gap, ns: over a longer one a vehicle does not keep to
+/// a straight line.
+const LONGEST_NS: i64 = 3_000_000_000;
 
 /// Returns the longest pause between two stamps that is no gap, ns: `least_ns`, or one and a half
-/// of the trajectory's own steps (their median) if that is longer. Stamps that are equal are no
-/// steps.
+/// of the trajectory's own steps (their median), but no more than 3 s, if that is longer. Stamps
+/// that are equal are no steps.
 pub fn max_gap_ns(stamps_ns: &[i64], least_ns: i64) -> i64 {
     let steps = stamps_ns.windows(2).map(|w| w[1].abs_diff(w[0]));
     let mut steps: Vec<u64> = steps.filter(|step| *step > 0).collect();
@@ -14,7 +17,7 @@ pub fn max_gap_ns(stamps_ns: &[i64], least_ns: i64) -> i64 {
     }
     let middle = steps.len() / 2;
     let (_, usual, _) = steps.select_nth_unstable(middle);
-    least_ns.max((JITTER * *usual as f64) as i64)
+    least_ns.max(LONGEST_NS.min((JITTER * *usual as f64) as i64))
 }
 
 #[cfg(test)]
@@ -33,6 +36,10 @@ mod tests {
         for few in [&[][..], &[7], &[7, 7]] {
             assert_eq!(max_gap_ns(few, SECOND), SECOND);
         }
-        assert_eq!(max_gap_ns(&[i64::MIN, i64::MAX], SECOND), i64::MAX);
+        // Keyframes are too far apart to be joined by straight lines.
+        let keyframes = [0, 10, 20, 30].map(|s| s * SECOND);
+        assert_eq!(max_gap_ns(&keyframes, SECOND), 3 * SECOND);
+        assert_eq!(max_gap_ns(&keyframes, 20 * SECOND), 20 * SECOND);
+        assert_eq!(max_gap_ns(&[i64::MIN, i64::MAX], SECOND), 3 * SECOND);
     }
 }
