@@ -1,5 +1,6 @@
 //! The images of a dataset: their files, order and size.
 
+use std::collections::BTreeSet;
 use std::fmt;
 use std::ops::RangeInclusive;
 use std::path::Path;
@@ -185,10 +186,9 @@ impl Images {
 fn sizes(files: &FileList) -> Result<(ImageSize, usize), ReadError> {
     let (mut counts, mut failed) = (Vec::<(ImageSize, usize)>::new(), None);
     let spread = (0..files.len()).step_by(files.len().div_ceil(SIZES));
-    for path in (0..FIRST_TRIES)
-        .chain(spread)
-        .filter_map(|index| files.get(index))
-    {
+    // Each once: the first ones are no more of the images than others.
+    let indices: BTreeSet<usize> = (0..FIRST_TRIES).chain(spread).collect();
+    for path in indices.into_iter().filter_map(|index| files.get(index)) {
         match png_image::read_size(path) {
             Ok(size) => match counts.iter_mut().find(|(known, _)| *known == size) {
                 Some((_, count)) => *count += 1,

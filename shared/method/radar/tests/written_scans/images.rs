@@ -299,3 +299,18 @@ fn a_slot_that_is_too_small_is_rejected() {
         }
     }
 }
+
+#[test]
+fn the_first_images_count_once_among_the_sizes() {
+    let root = folder();
+    for k in 0..20 {
+        let start = START_US + k * PERIOD_US;
+        let sweep = Sweep {
+            bins: if k < 8 { 30 } else { 60 },
+            start,
+            ..Sweep::default()
+        };
+        sweep.write(&root.path().join(format!("navtech/{start}.png")));
+    }
+    assert_eq!(opened(root.path()).image_size().width, 71);
+}
