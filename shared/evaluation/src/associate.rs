@@ -37,7 +37,7 @@ pub enum Association {
     /// shorter way round.
     Time {
         /// The widest gap between two stamps of the ground truth that is interpolated across, ns;
-        /// wider if its own steps are: see [`max_gap_ns`](crate::max_gap_ns).
+        /// wider if its own steps are: see [`max_gap_ns`].
         max_gap_ns: i64,
     },
     /// Pose `k` belongs to pose `k`; the longer list is cut to the shorter.

@@ -14,7 +14,7 @@
 //!    another machine.
 //! 8. [`usage`]: what a process uses of the machine; [`hand_over`]: one topic alone, to measure the
 //!    transport.
-//! 9. [`schedule`], [`heartbeat`], [`elsewhere`], [`services`]: what the supervisor
+//! 9. [`schedule`], [`heartbeat`], [`remote_progress`], [`services`]: what the supervisor
 //!    (`gyre-supervise`) reads and creates.
 //!
 //! The protocol in one paragraph: items carry consecutive sequence numbers. The source may have W
