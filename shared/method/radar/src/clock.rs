@@ -22,7 +22,8 @@ const MAX_MOTIONS: usize = 2000;
 /// positions.
 const BASELINE_NS: i64 = 1_000_000_000;
 /// Minimum number and share of motions within both trajectories for an offset to be considered.
-const MIN_MOTIONS: usize = 12;
+/// Among hundreds of offsets one of a dozen motions at constant speed agrees by chance.
+const MIN_MOTIONS: usize = 36;
 const MIN_SHARE: f64 = 0.6;
 /// Maximum offset of clocks that agree, s.
 const MAX_AGREEING_S: f64 = 0.15;
