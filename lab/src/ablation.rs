@@ -114,7 +114,7 @@ mod tests {
     use gyre_masking::MaskKind;
 
     use super::*;
-    use crate::{models::Model, tables::rows::Rows};
+    use crate::{models::Model, tables::rows::PaperTables};
 
     fn all_steps() -> Vec<Step> {
         toml::from_str::<Steps>(STEPS).unwrap().step
@@ -131,7 +131,7 @@ mod tests {
     fn the_steps_meet_the_rows_of_table_iii_on_their_way() {
         let radiate = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/radiate.toml");
         let with = |changes: Vec<String>| Configuration::read(&radiate, &changes).unwrap();
-        let (rows, all) = (Rows::read().unwrap(), all_steps());
+        let (rows, all) = (PaperTables::read().unwrap(), all_steps());
         let unmasked: Vec<Step> = all
             .iter()
             .filter(|step| step.mask.is_none())

@@ -17,7 +17,7 @@ use crate::{
     recording::Track,
     report::{make_folder, publish},
 };
-use figures::{First, Row, Tracking};
+use figures::{First, FixError, Tracking};
 
 /// A scan is on the map within this distance from a keyframe, m, and outside beyond the other.
 const ON_MAP_M: f64 = 5.0;
@@ -129,13 +129,13 @@ impl Truth {
     }
 
     /// Compares a fix with the truth relative to its keyframe; `None` without both.
-    fn row(&self, pose: &Pose, fix: Option<&Fix>, localiser: &Localiser) -> Option<Row> {
+    fn row(&self, pose: &Pose, fix: Option<&Fix>, localiser: &Localiser) -> Option<FixError> {
         let fix = fix?;
         let of_keyframe = self.keyframes[fix.keyframe]?;
         let expected = localiser.map().pose(fix.keyframe) * of_keyframe.inv_mul(pose);
         let error = fix.pose.error(&expected);
         let inverse = fix.pose.covariance.try_inverse()?;
-        Some(Row {
+        Some(FixError {
             away_m: error.xy().norm(),
             yaw_deg: error.z.to_degrees().abs(),
             nees: (error.transpose() * inverse * error).x / 3.0,

@@ -19,12 +19,12 @@ use crate::{
     report::{Notes, Table, make_folder, publish, record},
     sequence::Sequence,
 };
-use rows::Rows;
+use rows::PaperTables;
 
 /// Measures, prints and writes both tables.
 pub fn tables(arguments: &TablesArguments) -> Result<ExitCode, Failure> {
     let sequences = Sequence::all(&arguments.sequences)?;
-    let rows = Rows::read()?;
+    let rows = PaperTables::read()?;
     make_folder(&arguments.out)?;
     let mut tables = vec![times::times(&rows, &sequences[0], arguments)?];
     for sequence in sequences.iter().filter(|_| !arguments.times) {
@@ -37,7 +37,12 @@ pub fn tables(arguments: &TablesArguments) -> Result<ExitCode, Failure> {
 
 /// Runs every row of Table IIIb on `sequence`. Where the network of one is missing there is only
 /// what the paper says, if it does.
-fn accuracy(rows: &Rows, sequence: &Sequence, models: &Path, out: &Path) -> Result<Table, Failure> {
+fn accuracy(
+    rows: &PaperTables,
+    sequence: &Sequence,
+    models: &Path,
+    out: &Path,
+) -> Result<Table, Failure> {
     let (mut records, mut left_out) = (Vec::new(), Notes::new());
     for row in rows.run() {
         let changes = row.changes(rows);

@@ -2,7 +2,7 @@
 
 /// The place of a row in the chain of motions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Row {
+pub struct ChainRow {
     /// Number in the chain.
     pub seq: u64,
     /// The scan.
@@ -12,13 +12,13 @@ pub struct Row {
 }
 
 /// The rows below the header.
-pub fn rows(csv: &str) -> Vec<Row> {
+pub fn rows(csv: &str) -> Vec<ChainRow> {
     let row = |line: &str| {
         let mut fields = line
             .split(',')
             .map(|field| field.parse().unwrap_or(u64::MAX));
         let mut next = || fields.next().unwrap_or(u64::MAX);
-        Row {
+        ChainRow {
             seq: next(),
             scan: next(),
             previous_scan: next(),
@@ -45,7 +45,7 @@ pub fn columns(csv: &str, names: &[&str]) -> Vec<Vec<String>> {
 }
 
 /// Asserts that each motion begins where the one before ended.
-pub fn assert_unbroken(rows: &[Row]) {
+pub fn assert_unbroken(rows: &[ChainRow]) {
     for pair in rows.windows(2) {
         assert_eq!(pair[1].previous_scan, pair[0].scan, "{pair:?}");
         assert_eq!(pair[1].seq, pair[0].seq + 1, "{pair:?}");

@@ -2,7 +2,7 @@
 
 use crate::common::{
     Run,
-    odometry::{self, Row},
+    odometry::{self, ChainRow},
     recording, send,
 };
 use rustix::process::Signal;
@@ -21,7 +21,7 @@ fn live() -> Run {
 }
 
 /// Asserts that each scan is where it belongs: played, and then either in the chain or dropped.
-fn assert_exact(summary: &Value, rows: &[Row]) {
+fn assert_exact(summary: &Value, rows: &[ChainRow]) {
     let count = |key: &str| summary[key].as_u64().unwrap();
     assert_eq!(count("published"), recording::SCANS as u64, "{summary}");
     assert_eq!(count("unreadable"), 0);
@@ -41,7 +41,7 @@ fn assert_exact(summary: &Value, rows: &[Row]) {
 }
 
 /// Scans that the chain stepped over.
-fn stepped_over(rows: &[Row]) -> u64 {
+fn stepped_over(rows: &[ChainRow]) -> u64 {
     rows.iter()
         .map(|row| row.scan - row.previous_scan - 1)
         .sum::<u64>()

@@ -10,7 +10,7 @@ use crate::report::{Table, record};
 const WRONG_DEG: f64 = 5.0;
 
 /// The error of a fix.
-pub struct Row {
+pub struct FixError {
     /// Distance from the truth, m.
     pub away_m: f64,
     /// Error of the heading, degrees.
@@ -42,9 +42,9 @@ impl First {
     }
 
     /// Adds a scan `away_m` from the map, with the error of its fix.
-    pub fn add(&mut self, away_m: f64, row: Option<Row>, wrong_m: f64, spent_ns: u64) {
+    pub fn add(&mut self, away_m: f64, row: Option<FixError>, wrong_m: f64, spent_ns: u64) {
         self.spent_ns += spent_ns;
-        let is_right = |row: &Row| row.away_m <= wrong_m && row.yaw_deg <= WRONG_DEG;
+        let is_right = |row: &FixError| row.away_m <= wrong_m && row.yaw_deg <= WRONG_DEG;
         match is_on_map(away_m) {
             Some(true) => self.on_map += 1,
             Some(false) => self.outside += 1,
@@ -117,7 +117,7 @@ impl Tracking {
         stamp_ns: i64,
         away_m: f64,
         status: Status,
-        row: Option<Row>,
+        row: Option<FixError>,
         spent_ns: u64,
     ) {
         self.counts[match status {

@@ -9,9 +9,9 @@ use crate::report::Record;
 /// The rows, and the paper's figures.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Rows {
+pub struct PaperTables {
     groups: BTreeMap<String, Vec<String>>,
-    row: Vec<Row>,
+    row: Vec<TableRow>,
     /// By the paper's row and the raster's side, cells.
     paper: BTreeMap<String, BTreeMap<String, Record>>,
 }
@@ -19,7 +19,7 @@ pub struct Rows {
 /// A row: overrides of a sequence's own configuration.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Row {
+pub struct TableRow {
     /// The name in the tables.
     pub name: String,
     /// `None`: the row is the paper's alone.
@@ -37,7 +37,7 @@ pub struct Row {
     pub baseline: Option<String>,
 }
 
-impl Rows {
+impl PaperTables {
     /// Reads the rows that this program has.
     pub fn read() -> Result<Self, toml::de::Error> {
         toml::from_str(include_str!("../../rows/table-iii.toml"))
@@ -45,29 +45,29 @@ impl Rows {
 
     /// The row of a name.
     #[cfg(test)]
-    pub fn named(&self, name: &str) -> Option<&Row> {
+    pub fn named(&self, name: &str) -> Option<&TableRow> {
         self.row.iter().find(|row| row.name == name)
     }
 
     /// The rows of Table IIIa.
-    pub fn timed(&self) -> impl Iterator<Item = &Row> {
+    pub fn timed(&self) -> impl Iterator<Item = &TableRow> {
         self.row.iter().filter(|row| row.is_measured())
     }
 
     /// The rows of Table IIIb.
-    pub fn run(&self) -> impl Iterator<Item = &Row> {
+    pub fn run(&self) -> impl Iterator<Item = &TableRow> {
         self.row.iter().filter(|row| !row.mask_alone)
     }
 
     /// The paper's figures beside a row, for rasters of `n` cells a side.
-    pub fn paper(&self, row: &Row, n: usize) -> Record {
+    pub fn paper(&self, row: &TableRow, n: usize) -> Record {
         let paper = row.paper.as_ref().and_then(|row| self.paper.get(row));
         let figures = paper.and_then(|sizes| sizes.get(&n.to_string()));
         figures.cloned().unwrap_or_default()
     }
 }
 
-impl Row {
+impl TableRow {
     /// Returns whether this program measures it; the others are the paper's alone.
     pub fn is_measured(&self) -> bool {
         self.groups.is_some()
@@ -79,7 +79,7 @@ impl Row {
     }
 
     /// Returns its overrides `section.key=value`, but for those of its network.
-    pub fn changes(&self, rows: &Rows) -> Vec<String> {
+    pub fn changes(&self, rows: &PaperTables) -> Vec<String> {
         let groups = self.groups.iter().flatten();
         let shared = groups.filter_map(|group| rows.groups.get(group)).flatten();
         shared.chain(&self.set).cloned().collect()
@@ -104,7 +104,7 @@ mod tests {
 
     #[test]
     fn the_papers_rows_are_the_papers_configurations() {
-        let rows = Rows::read().unwrap();
+        let rows = PaperTables::read().unwrap();
         for (name, file) in [("raw", "mbym.toml"), ("f-raw, line 14", "fast-mbym.toml")] {
             let of_file = with(file, &[]);
             let mut radiate = with("radiate.toml", &rows.named(name).unwrap().changes(&rows));
@@ -116,7 +116,7 @@ mod tests {
 
     #[test]
     fn masked_rows_are_their_counterparts_with_a_mask() {
-        let rows = Rows::read().unwrap();
+        let rows = PaperTables::read().unwrap();
         for (plain, masked) in [
             ("f-raw, Eq. 7", "f-mbym, Eq. 7"),
             ("raw", "mbym"),
@@ -140,7 +140,7 @@ mod tests {
 
     #[test]
     fn every_row_has_a_folder_of_its_own_and_names_what_there_is() {
-        let rows = Rows::read().unwrap();
+        let rows = PaperTables::read().unwrap();
         let folders: BTreeSet<String> = rows.row.iter().map(|row| folder(&row.name)).collect();
         assert_eq!(folders.len(), rows.row.len());
         for row in &rows.row {
@@ -161,9 +161,10 @@ mod tests {
 
     #[test]
     fn each_table_has_its_rows_with_the_papers_figures_at_three_sizes() {
-        let rows = Rows::read().unwrap();
-        let names =
-            |rows: Vec<&Row>| -> Vec<String> { rows.iter().map(|row| row.name.clone()).collect() };
+        let rows = PaperTables::read().unwrap();
+        let names = |rows: Vec<&TableRow>| -> Vec<String> {
+            rows.iter().map(|row| row.name.clone()).collect()
+        };
         let (timed, run) = (names(rows.timed().collect()), names(rows.run().collect()));
         let common = ["raw", "f-raw, line 14", "f-raw, Eq. 7"];
         assert_eq!(

@@ -7,7 +7,7 @@ use serde_json::json;
 
 use super::{
     baseline::{self, BaselineTimes},
-    rows::{Row, Rows},
+    rows::{PaperTables, TableRow},
     timer::Timer,
 };
 use crate::{
@@ -34,7 +34,7 @@ const COLUMNS: [Column; 10] = [
 ];
 
 /// A row at one size; `None` without the network for it.
-type Timed<'a> = (&'a Row, Option<Timer>);
+type Timed<'a> = (&'a TableRow, Option<Timer>);
 
 /// Times all rows at all sizes on scans of `sequence`: half the passes, then the baseline, then the
 /// other half.
@@ -42,7 +42,7 @@ type Timed<'a> = (&'a Row, Option<Timer>);
 /// # Errors
 /// A row that cannot be timed at a size, or what the baseline says.
 pub fn times(
-    rows: &Rows,
+    rows: &PaperTables,
     sequence: &Sequence,
     arguments: &TablesArguments,
 ) -> Result<Table, Failure> {
@@ -84,7 +84,7 @@ fn time(timers: &mut [Timed<'_>], arguments: &TablesArguments) -> Result<(), Fai
 /// The rows at one size. Where the network of one is missing there is only what the paper and the
 /// baseline say, if they do.
 fn timers<'a>(
-    rows: &'a Rows,
+    rows: &'a PaperTables,
     sequence: &Sequence,
     n: usize,
     arguments: &TablesArguments,
@@ -115,7 +115,7 @@ fn timers<'a>(
 fn cells(
     paper: Record,
     n: usize,
-    row: &Row,
+    row: &TableRow,
     timer: Option<Timer>,
     baseline: Option<&BaselineTimes>,
 ) -> Record {
@@ -160,7 +160,7 @@ mod tests {
 
     #[test]
     fn a_row_without_its_network_has_the_baselines_and_the_papers_figures() {
-        let rows = Rows::read().unwrap();
+        let rows = PaperTables::read().unwrap();
         let text = r#"{"torch": "2.4", "rows": [{"n": 255, "row": "f-raw", "median_ms": 20.0}]}"#;
         let baseline: BaselineTimes = serde_json::from_str(text).unwrap();
         let row = rows.named("f-raw, line 14").unwrap();

@@ -67,7 +67,7 @@ pub fn build(config: &TownConfig, streets: &Streets, seed: u64) -> Body {
 }
 
 #[derive(Clone, Copy, PartialEq)]
-enum Row {
+enum HouseRow {
     First,
     Second,
 }
@@ -109,7 +109,7 @@ impl<'a> Planner<'a> {
         };
         // First rows before second ones and driven streets before others, since the most visible
         // lots have priority.
-        for row in [Row::First, Row::Second] {
+        for row in [HouseRow::First, HouseRow::Second] {
             for driven in [true, false] {
                 planner.line(&lines, row, driven);
             }
@@ -118,7 +118,7 @@ impl<'a> Planner<'a> {
     }
 
     /// Builds along all driven streets, or along all others.
-    fn line(&mut self, lines: &[Line], row: Row, driven: bool) {
+    fn line(&mut self, lines: &[Line], row: HouseRow, driven: bool) {
         for (street, line) in lines.iter().enumerate() {
             if self.streets.streets()[street].driven != driven {
                 continue;
@@ -127,7 +127,7 @@ impl<'a> Planner<'a> {
                 for number in 0..(frontage.length_m() / STRETCH_M).ceil() as u64 {
                     let stretch = self.stretch(frontage, number);
                     self.row(&stretch, row);
-                    if row == Row::First {
+                    if row == HouseRow::First {
                         self.kerb(&stretch);
                     }
                 }
@@ -166,7 +166,7 @@ impl<'a> Planner<'a> {
     }
 
     /// Divides a stretch into lots and builds on them.
-    fn row(&mut self, stretch: &Stretch<'_>, row: Row) {
+    fn row(&mut self, stretch: &Stretch<'_>, row: HouseRow) {
         let mut rng = generator(&[stretch.key, 1 + row as u64]);
         let mut at_m = stretch.from_m;
         while at_m + MIN_WIDTH_M < stretch.to_m {
@@ -188,11 +188,11 @@ impl<'a> Planner<'a> {
     fn draw(
         &mut self,
         stretch: &Stretch<'_>,
-        row: Row,
+        row: HouseRow,
         at_m: f64,
         rng: &mut ChaCha8Rng,
     ) -> Option<(Use, Lot)> {
-        let kind = stretch.district.draw(row == Row::First, rng);
+        let kind = stretch.district.draw(row == HouseRow::First, rng);
         let (min_m, max_m) = kind.width_m();
         let width_m = rng.random_range(min_m..max_m).min(stretch.to_m - at_m);
         let lot = if width_m < min_m {
@@ -207,13 +207,13 @@ impl<'a> Planner<'a> {
     fn claim(
         &mut self,
         stretch: &Stretch<'_>,
-        row: Row,
+        row: HouseRow,
         kind: Use,
         at_m: f64,
         width_m: f64,
     ) -> Option<Lot> {
         let out_m = stretch.pavement_m
-            + if row == Row::First {
+            + if row == HouseRow::First {
                 0.0
             } else {
                 stretch.depth_m
@@ -235,10 +235,10 @@ impl<'a> Planner<'a> {
             })
     }
 
-    fn plot(&mut self, lot: &Lot, kind: Use, row_key: u64, row: Row, rng: ChaCha8Rng) {
+    fn plot(&mut self, lot: &Lot, kind: Use, row_key: u64, row: HouseRow, rng: ChaCha8Rng) {
         let (works, detail) = match row {
-            Row::First => (self.changes.works(&lot.pose), 1.0),
-            Row::Second => (None, DETAIL_BEHIND),
+            HouseRow::First => (self.changes.works(&lot.pose), 1.0),
+            HouseRow::Second => (None, DETAIL_BEHIND),
         };
         let is_site = works.is_some();
         let site = Site {

@@ -88,13 +88,13 @@ fn stamps_and_encoder_increase_evenly_through_scan_and_dataset() {
 }
 
 /// One row of `gt/radar_odometry.csv`.
-struct Row {
+struct TrueMotion {
     stamps: [i64; 2],
     images: [i64; 2],
     motion: Pose,
 }
 
-fn rows(folder: &Path) -> Vec<Row> {
+fn rows(folder: &Path) -> Vec<TrueMotion> {
     let text = fs::read_to_string(folder.join("gt/radar_odometry.csv")).unwrap();
     let mut lines = text.lines();
     assert_eq!(
@@ -107,7 +107,7 @@ fn rows(folder: &Path) -> Vec<Row> {
         let real = |i: usize| fields[i].parse::<f64>().unwrap();
         // From y right, yaw clockwise to y left, yaw counter-clockwise.
         let motion = gyre_geometry::pose(real(2), -real(3), -real(7));
-        Row {
+        TrueMotion {
             stamps: [whole(0), whole(1)],
             images: [whole(8), whole(9)],
             motion,

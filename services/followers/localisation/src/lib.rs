@@ -34,7 +34,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
         return Ok(StageCounters::default());
     }
     let out = launch.manifest.out.clone();
-    let mut places = Places {
+    let mut places = Fixes {
         keyframes: RecordReader::open(&out)?,
         localiser: localiser.map_err(|error| failed(&error))?,
         read: 0,
@@ -43,7 +43,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     follower::run(launch, &mut places)
 }
 
-struct Places {
+struct Fixes {
     /// The folder of the results.
     out: PathBuf,
     keyframes: RecordReader<Keyframe>,
@@ -52,7 +52,7 @@ struct Places {
     read: usize,
 }
 
-impl Places {
+impl Fixes {
     /// Looks for new keyframes. If some of those that were read have been cut off, it begins anew.
     fn look(&mut self) -> Result<(), StageError> {
         self.keyframes.refresh()?;
@@ -78,7 +78,7 @@ impl Places {
     }
 }
 
-impl Follower for Places {
+impl Follower for Fixes {
     type Output = Fix;
     const LOGS: &'static [LogId] = &[LogId::Keyframes];
 

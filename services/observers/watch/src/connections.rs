@@ -1,8 +1,8 @@
-//! Connections: a bounded number of them, none of which keeps its place by silence, or by not
-//! reading its answer. If there is no place for another one, a connection gives way that has not
+//! Connections: a bounded number of them, none of which keeps its permit by silence, or by not
+//! reading its answer. If there is no permit for another one, a connection gives way that has not
 //! shown that it may read.
 
-mod places;
+mod permits;
 mod stream;
 #[cfg(test)]
 mod tests;
@@ -29,13 +29,13 @@ use tokio::{
     time,
 };
 
-use places::Places;
+use permits::Permits;
 use stream::Timed;
 
 /// The limits of connections.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
-    /// The most connections with requests at once. Streams have places of their own.
+    /// The most connections with requests at once. Streams have permits of their own.
     pub connections: usize,
     /// Time for the head of a request, from the connection or from the answer before.
     pub request: Duration,
@@ -58,7 +58,7 @@ impl Default for Limits {
 pub struct Peer(Arc<AtomicBool>);
 
 impl Peer {
-    /// It has shown that it may read: it keeps its place when others come.
+    /// It has shown that it may read: it keeps its permit when others come.
     pub fn keep_place(&self) {
         self.0.store(true, Ordering::Relaxed);
     }
@@ -79,21 +79,21 @@ pub async fn serve(
     limits: Limits,
     mut stop: watch::Receiver<bool>,
 ) {
-    let places = Arc::new(Places::new(limits.connections));
+    let permits = Arc::new(Permits::new(limits.connections));
     let mut http = http1::Builder::new();
     http.timer(TokioTimer::new())
         .header_read_timeout(limits.request);
     loop {
         let next = async {
-            places.wait_for_room().await;
+            permits.wait_for_room().await;
             accept(&listener).await
         };
         let (stream, address) = tokio::select! {
             next = next => next,
             () = stopped(&mut stop) => break,
         };
-        let (place, peer) = places.take(address);
-        let number = place.number();
+        let (permit, peer) = permits.take(address);
+        let number = permit.number();
         let service = TowerToHyperService::new(router.clone().layer(Extension(peer)));
         let io = TokioIo::new(Timed::new(stream, limits.answer));
         let connection = http.serve_connection(io, service).with_upgrades();
@@ -108,11 +108,11 @@ pub async fn serve(
                     let _ = connection.await;
                 }
             }
-            drop(place);
+            drop(permit);
         });
-        places.let_end(number, task.abort_handle());
+        permits.let_end(number, task.abort_handle());
     }
-    places.wait_for_end().await;
+    permits.wait_for_end().await;
 }
 
 async fn stopped(stop: &mut watch::Receiver<bool>) {

@@ -14,7 +14,7 @@ use crate::arguments::PsArguments;
 
 /// A run with what its processes use, in the order of the status.
 #[derive(Serialize)]
-struct Row {
+struct ListedRun {
     status: Status,
     usage: Vec<Option<Usage>>,
 }
@@ -32,7 +32,7 @@ pub fn ps(arguments: &PsArguments) -> Result<ExitCode, Failure> {
     };
     for run in runs {
         match run.status() {
-            Ok(status) => rows.push(Row::of(status)),
+            Ok(status) => rows.push(ListedRun::of(status)),
             // It has ended meanwhile, or it hangs.
             Err(error) => silent.push(error.to_string()),
         }
@@ -62,7 +62,7 @@ pub fn ps(arguments: &PsArguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-impl Row {
+impl ListedRun {
     fn of(status: Status) -> Self {
         let usage = status.processes.iter().map(|it| Usage::of(it.pid));
         Self {
@@ -72,7 +72,7 @@ impl Row {
     }
 }
 
-impl fmt::Display for Row {
+impl fmt::Display for ListedRun {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let status = &self.status;
         writeln!(f, "{}", status.out.display())?;

@@ -19,7 +19,7 @@ use crate::configuration::{BadConfiguration, Configuration};
 use crate::kept::KeptAzimuth;
 use crate::message::Azimuth;
 pub use counters::Counters;
-use rows::{Empty, Rows};
+use rows::{Empty, RowWriter};
 use seam::{Grid, Seam};
 
 /// The constants that the radar does not report; as [`gyre_radar::DatasetOptions`].
@@ -69,7 +69,7 @@ enum State {
 
 /// Encoder count and time of an azimuth.
 #[derive(Clone, Copy, Debug)]
-struct Place {
+struct Reading {
     encoder: u16,
     stamp_ns: i64,
 }
@@ -80,13 +80,13 @@ struct Place {
 #[derive(Clone, Debug)]
 pub struct SweepAssembler {
     grid: Grid,
-    rows: Rows,
+    rows: RowWriter,
     constants: Constants,
     range_resolution_m: f32,
     state: State,
-    last: Option<Place>,
+    last: Option<Reading>,
     /// The first azimuth of the next sweep, where the last one was returned in its place.
-    kept: Option<(Place, Seam)>,
+    kept: Option<(Reading, Seam)>,
     kept_azimuth: KeptAzimuth,
     counters: Counters,
 }
@@ -109,7 +109,7 @@ impl SweepAssembler {
         checked.check()?;
         Ok(Self {
             grid: Grid::new(configuration),
-            rows: Rows::new(configuration),
+            rows: RowWriter::new(configuration),
             constants,
             range_resolution_m: resolution_m,
             state: State::Waiting,
@@ -170,7 +170,7 @@ impl SweepAssembler {
             self.counters.invalid_azimuths += 1;
             return None;
         };
-        let here = Place { encoder, stamp_ns };
+        let here = Reading { encoder, stamp_ns };
         let Some(last) = self.last else {
             self.start(here, azimuth, slot);
             return self.completed(slot);
@@ -186,7 +186,7 @@ impl SweepAssembler {
     }
 
     /// Begins at the first azimuth of a turn; discards those of a turn that has begun before.
-    fn start(&mut self, here: Place, azimuth: &Azimuth<'_>, slot: &mut ScanSlot<'_>) {
+    fn start(&mut self, here: Reading, azimuth: &Azimuth<'_>, slot: &mut ScanSlot<'_>) {
         if f64::from(here.encoder) <= self.grid.step {
             self.begin(here, Seam::default(), azimuth, slot);
         } else {
@@ -199,8 +199,8 @@ impl SweepAssembler {
     /// Adds an azimuth of the same turn as the last.
     fn proceed(
         &mut self,
-        last: Place,
-        here: Place,
+        last: Reading,
+        here: Reading,
         azimuth: &Azimuth<'_>,
         slot: &mut ScanSlot<'_>,
     ) -> Option<Sweep> {
@@ -225,8 +225,8 @@ impl SweepAssembler {
     /// Adds the first azimuth of a turn, after the last one of another.
     fn wrap(
         &mut self,
-        last: Place,
-        here: Place,
+        last: Reading,
+        here: Reading,
         azimuth: &Azimuth<'_>,
         slot: &mut ScanSlot<'_>,
     ) -> Option<Sweep> {
@@ -253,7 +253,7 @@ impl SweepAssembler {
         }
     }
 
-    fn begin(&mut self, here: Place, seam: Seam, azimuth: &Azimuth<'_>, slot: &mut ScanSlot<'_>) {
+    fn begin(&mut self, here: Reading, seam: Seam, azimuth: &Azimuth<'_>, slot: &mut ScanSlot<'_>) {
         self.state = State::Open;
         self.last = Some(here);
         self.rows.clear();
@@ -262,7 +262,7 @@ impl SweepAssembler {
         self.write(here, azimuth, slot);
     }
 
-    fn write(&mut self, here: Place, azimuth: &Azimuth<'_>, slot: &mut ScanSlot<'_>) {
+    fn write(&mut self, here: Reading, azimuth: &Azimuth<'_>, slot: &mut ScanSlot<'_>) {
         let place = (f64::from(here.encoder), here.stamp_ns);
         self.rows
             .write_measured(place, azimuth.powers, slot, &mut self.counters);

@@ -22,7 +22,7 @@ use crate::{
     Death, StagePlan, SuperviseError,
     end::ends_within,
     log::Log,
-    start::{Place, Starter},
+    start::{Position, Starter},
 };
 
 /// Time for a killed process to end. The kernel holds one that waits for a device, as for a network
@@ -56,10 +56,10 @@ impl Child {
         plan: &StagePlan,
         manifest: &Manifest,
         starter: &Starter<'_>,
-        place: Place,
+        position: Position,
     ) -> Result<Self, SuperviseError> {
         let log = Log::open(manifest, &plan.name)?;
-        let process = starter.start(plan, manifest, log.output(), place)?;
+        let process = starter.start(plan, manifest, log.output(), position)?;
         Ok(Self {
             plan: plan.clone(),
             process,
@@ -68,7 +68,7 @@ impl Child {
             is_held: false,
             deaths: VecDeque::new(),
             pose_at_restart: None,
-            last_words: last_words(manifest, &plan.name, place),
+            last_words: last_words(manifest, &plan.name, position),
             log,
             last_death: None,
             before: None,
@@ -88,8 +88,8 @@ impl Child {
                 path: path.to_owned(),
             });
         }
-        self.last_words = last_words(manifest, &self.plan.name, Place::Free);
-        self.process = starter.start(&self.plan, manifest, self.log.output(), Place::Free)?;
+        self.last_words = last_words(manifest, &self.plan.name, Position::Free);
+        self.process = starter.start(&self.plan, manifest, self.log.output(), Position::Free)?;
         self.started = Instant::now();
         self.status = None;
         self.pose_at_restart = Some(newest_pose);
@@ -337,8 +337,8 @@ impl Child {
 
 /// Returns the file in which a process says why it ended. One that stands by has its own: the other
 /// is in use.
-fn last_words(manifest: &Manifest, name: &str, place: Place) -> PathBuf {
-    let stands_by = place == Place::Taken;
+fn last_words(manifest: &Manifest, name: &str, position: Position) -> PathBuf {
+    let stands_by = position == Position::Taken;
     manifest.root.join(launch::last_words(name, stands_by))
 }
 

@@ -11,7 +11,7 @@ use gyre_stage::wake;
 
 use crate::{
     Event, SuperviseError, child::Child, followers::Followers, guardian::Guardian,
-    recovery::Recovery, roles::Roles, run::Run, start::Place,
+    recovery::Recovery, roles::Roles, run::Run, start::Position,
 };
 
 /// Time for stages to exit by themselves before they are killed.
@@ -49,7 +49,7 @@ impl Processes {
     pub fn start(&mut self, run: &mut Run<'_>) -> Result<(), SuperviseError> {
         let plan = run.plan;
         for stage in &plan.stages {
-            let child = Child::spawn(stage, &plan.manifest, &run.starter(), Place::Free)?;
+            let child = Child::spawn(stage, &plan.manifest, &run.starter(), Position::Free)?;
             run.say(Event::Started {
                 stage: &stage.name,
                 pid: child.pid(),

@@ -15,7 +15,7 @@ use crate::{
     death::Death,
     process_status::{activity, of_child},
     run::Run,
-    start::Place,
+    start::Position,
 };
 
 /// The longest time for which the first scan waits until the recorder observes all topics.
@@ -43,7 +43,7 @@ impl Recorder {
         let Some(plan) = &run.plan.recorder else {
             return Ok(None);
         };
-        let mut child = match Child::spawn(plan, run.manifest(), &run.starter(), Place::Free) {
+        let mut child = match Child::spawn(plan, run.manifest(), &run.starter(), Position::Free) {
             Err(error) if error.is_of_one_process() => {
                 say(run, &error.to_string());
                 return Ok(None);

@@ -29,7 +29,7 @@ use crate::{
     child::Child,
     clean,
     guardian::Guardian,
-    start::{Place, Starter},
+    start::{Position, Starter},
 };
 
 pub use recorded::Recorded;
@@ -166,7 +166,7 @@ impl<'a> Rig<'a> {
         };
         let starter = Starter::new(self.signals, &self.guardian);
         Ok(Process {
-            child: Child::spawn(&plan, &self.manifest, &starter, Place::Free)?,
+            child: Child::spawn(&plan, &self.manifest, &starter, Position::Free)?,
             death: None,
         })
     }

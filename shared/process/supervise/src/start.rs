@@ -20,9 +20,9 @@ use crate::{
 /// for which it is tried.
 const PAUSES_MS: [u64; 8] = [20, 50, 100, 200, 500, 1000, 2000, 4000];
 
-/// The place of a process that is started.
+/// The position in the pipeline of a process that is started.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Place {
+pub(crate) enum Position {
     /// Nobody else has it.
     Free,
     /// Another process has it: the new one stands by until its standard input ends (see
@@ -48,7 +48,7 @@ impl<'a> Starter<'a> {
         plan: &StagePlan,
         manifest: &Manifest,
         log: &PipeWriter,
-        place: Place,
+        position: Position,
     ) -> Result<Child, SuperviseError> {
         let failed = |source| SuperviseError::Spawn {
             stage: plan.name.clone(),
@@ -62,7 +62,7 @@ impl<'a> Starter<'a> {
         if let Some(directory) = &plan.directory {
             command.current_dir(directory);
         }
-        if place == Place::Taken {
+        if position == Position::Taken {
             command.env(run::STANDBY, "1").stdin(Stdio::piped());
         }
         let pause = |pause| self.signals.sleep(pause);

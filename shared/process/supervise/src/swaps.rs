@@ -21,7 +21,7 @@ use gyre_stage::{
 
 use crate::{
     StagePlan, SuperviseError, Swapped, child::Child, processes::Processes, program::Program,
-    run::Run, socket::Client, start::Place,
+    run::Run, socket::Client, start::Position,
 };
 use trial::Trial;
 
@@ -82,7 +82,7 @@ impl Swaps {
     ) -> Result<(), SuperviseError> {
         let manifest = run.manifest();
         let _ = fs::remove_file(run::ready_file(&manifest.root, &plan.name));
-        match Child::spawn(plan, manifest, &run.starter(), Place::Taken) {
+        match Child::spawn(plan, manifest, &run.starter(), Position::Taken) {
             Ok(child) => {
                 self.standby = Some(Standby {
                     process,

@@ -28,7 +28,7 @@ const COLUMNS: [&str; 11] = [
 /// The fields of [`COLUMNS`], and how errors of motions depend on each other: not at all where that
 /// is not said.
 #[derive(Deserialize)]
-struct Row {
+struct MotionRow {
     stamp_ns: i64,
     interval_ns: i64,
     x_m: f64,
@@ -95,10 +95,13 @@ fn parse(text: impl Read) -> Result<Vec<TimedMotion>, Failure> {
     if let Some(name) = COLUMNS.iter().find(missing) {
         return Err(format!("not an odometry.csv: its header has no column {name}").into());
     }
-    reader.deserialize().map(|row| Row::motion(&row?)).collect()
+    reader
+        .deserialize()
+        .map(|row| MotionRow::motion(&row?))
+        .collect()
 }
 
-impl Row {
+impl MotionRow {
     fn motion(&self) -> Result<TimedMotion, Failure> {
         let from_ns = self.stamp_ns.checked_sub(self.interval_ns);
         let share = |value: Option<f64>, default| {

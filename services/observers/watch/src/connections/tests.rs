@@ -29,7 +29,7 @@ async fn page(Extension(peer): Extension<Peer>, headers: HeaderMap) -> Response 
     }
 }
 
-/// Runs a server of four places beside a test.
+/// Runs a server of four permits beside a test.
 fn with_server(limits: Limits, test: impl AsyncFnOnce(SocketAddr)) {
     let runtime = runtime::Builder::new_current_thread()
         .enable_all()
@@ -119,7 +119,7 @@ fn a_refusal_is_the_only_answer_on_its_connection() {
 #[test]
 fn an_answer_that_is_not_read_is_given_up() {
     with_server(limits(LONG, SHORT), async |address| {
-        // They may read, so they keep their places meanwhile.
+        // They may read, so they keep their permits meanwhile.
         let mut others = Vec::new();
         for _ in 0..4 {
             others.push(pipelining(address, GRANTED).await);
@@ -132,17 +132,17 @@ fn an_answer_that_is_not_read_is_given_up() {
 
 #[test]
 fn the_address_with_most_connections_gives_way_first() {
-    let places = Arc::new(Places::new(3));
+    let permits = Arc::new(Permits::new(3));
     let [many, one, new] = [1, 2, 3].map(|last| IpAddr::from([10, 0, 0, last]));
-    let first = places.take(one);
-    let of_many: Vec<_> = (0..2).map(|_| places.take(many)).collect();
-    let addresses = || places.addresses();
+    let first = permits.take(one);
+    let of_many: Vec<_> = (0..2).map(|_| permits.take(many)).collect();
+    let addresses = || permits.addresses();
     assert_eq!(addresses(), [one, many, many]);
-    let _third = places.take(new);
+    let _third = permits.take(new);
     assert_eq!(addresses(), [one, many, new]);
     // Of equals the oldest, unless it may read.
     first.1.keep_place();
-    let _fourth = places.take(new);
+    let _fourth = permits.take(new);
     assert_eq!(addresses(), [one, new, new]);
     drop(of_many);
     assert_eq!(addresses(), [one, new, new]);

@@ -10,7 +10,7 @@ use serde::Deserialize;
 const MAX_BYTES: u64 = 1 << 28;
 
 #[derive(Deserialize)]
-struct Row {
+struct LoopRow {
     scan: u64,
     found_scan: u64,
     verdict: String,
@@ -28,7 +28,7 @@ pub fn used_loops(path: &Path) -> Result<Vec<[u64; 2]>, Failure> {
         .map_err(|error| format!("cannot read {}: {error}", path.display()))?;
     let used_verdict = LoopVerdict::Used.to_string();
     let rows = csv::Reader::from_reader(text.as_bytes()).into_deserialize();
-    let used = rows.filter_map(|row: Result<Row, csv::Error>| match row {
+    let used = rows.filter_map(|row: Result<LoopRow, csv::Error>| match row {
         Ok(row) if row.verdict != used_verdict => None,
         row => Some(row.map(|row| [row.found_scan, row.scan])),
     });

@@ -22,7 +22,7 @@ pub(super) struct Empty {
 
 /// Writes the rows of a scan in order.
 #[derive(Clone, Debug)]
-pub(super) struct Rows {
+pub(super) struct RowWriter {
     limits: ScanLimits,
     bins: usize,
     encoder_size: f64,
@@ -31,7 +31,7 @@ pub(super) struct Rows {
     pub(super) order: PowerOrder,
 }
 
-impl Rows {
+impl RowWriter {
     pub(super) fn new(configuration: &Configuration) -> Self {
         let bins = usize::from(configuration.range_in_bins);
         let azimuths = usize::from(configuration.azimuth_samples);

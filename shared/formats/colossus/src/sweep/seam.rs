@@ -1,6 +1,6 @@
 //! Azimuths that did not arrive, from the encoder counts on both sides.
 
-use super::{Empty, Place};
+use super::{Empty, Reading};
 use crate::configuration::Configuration;
 
 /// The part of a turn by which the time between two azimuths may differ from that of the rotation.
@@ -53,23 +53,23 @@ impl Grid {
     }
 
     /// Returns whether no further azimuth fits into the turn.
-    pub(super) fn is_last(&self, last: Place) -> bool {
+    pub(super) fn is_last(&self, last: Reading) -> bool {
         f64::from(last.encoder) + self.step >= f64::from(self.encoder_size)
     }
 
     /// Returns the number of azimuths between one and the end of its turn.
-    pub(super) fn azimuths_after(&self, last: Place) -> f64 {
+    pub(super) fn azimuths_after(&self, last: Reading) -> f64 {
         (f64::from(self.encoder_size) - f64::from(last.encoder)) / self.step
     }
 
     /// Returns whether the time between two azimuths is not that of the rotation between them.
-    pub(super) fn is_break(&self, last: Place, here: Place) -> bool {
+    pub(super) fn is_break(&self, last: Reading, here: Reading) -> bool {
         let expected_ns = self.counts(last, here) * self.ns_per_count;
         let turn_ns = f64::from(self.encoder_size) * self.ns_per_count;
         (elapsed_ns(last, here) - expected_ns).abs() > BREAK_TURNS * turn_ns
     }
 
-    pub(super) fn gap(&self, last: Place, here: Place) -> Gap {
+    pub(super) fn gap(&self, last: Reading, here: Reading) -> Gap {
         let counts = self.counts(last, here);
         let rows = (counts / self.step).round().max(1.0);
         Gap {
@@ -79,7 +79,7 @@ impl Grid {
         }
     }
 
-    pub(super) fn seam(&self, last: Place, here: Place) -> Seam {
+    pub(super) fn seam(&self, last: Reading, here: Reading) -> Seam {
         let to_zero = f64::from(self.encoder_size - last.encoder);
         // Positions before zero, which zero itself is not.
         let before_zero = (to_zero / self.step).ceil() as usize - 1;
@@ -105,7 +105,7 @@ impl Grid {
     }
 
     /// Encoder counts from one azimuth to the next, of less than a turn.
-    fn counts(&self, last: Place, here: Place) -> f64 {
+    fn counts(&self, last: Reading, here: Reading) -> f64 {
         let counts = f64::from(here.encoder) - f64::from(last.encoder);
         match counts < 0.0 {
             true => counts + f64::from(self.encoder_size),
@@ -116,7 +116,7 @@ impl Grid {
 
 impl Gap {
     /// Returns the rows after `last`, at most `fits`.
-    pub(super) fn forward(&self, last: Place, fits: usize) -> Empty {
+    pub(super) fn forward(&self, last: Reading, fits: usize) -> Empty {
         Empty {
             count: self.count.min(fits),
             from: (last.encoder.into(), last.stamp_ns),
@@ -128,7 +128,7 @@ impl Gap {
 
 impl Seam {
     /// Returns the rows after `last`, at most `fits`.
-    pub(super) fn trailing(&self, last: Place, fits: usize) -> Empty {
+    pub(super) fn trailing(&self, last: Reading, fits: usize) -> Empty {
         Empty {
             count: self.trailing.min(fits),
             from: (last.encoder.into(), last.stamp_ns),
@@ -138,7 +138,7 @@ impl Seam {
     }
 
     /// Returns the rows before `here`, at most `fits`.
-    pub(super) fn leading(&self, here: Place, fits: usize) -> Empty {
+    pub(super) fn leading(&self, here: Reading, fits: usize) -> Empty {
         let count = self.leading.min(fits);
         let rows = (count + 1) as f64;
         let before_ns = (rows * self.ns).round() as i64;
@@ -154,6 +154,6 @@ impl Seam {
     }
 }
 
-fn elapsed_ns(last: Place, here: Place) -> f64 {
+fn elapsed_ns(last: Reading, here: Reading) -> f64 {
     here.stamp_ns.saturating_sub(last.stamp_ns) as f64
 }

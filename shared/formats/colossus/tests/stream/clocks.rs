@@ -102,7 +102,7 @@ fn a_clock_that_stands_still_gives_times_of_arrival() {
         let mut clock = RadarClock::new(&radar());
         let mut stamps = Vec::new();
         for row in &rows {
-            let still = crate::support::Row {
+            let still = crate::support::SentAzimuth {
                 stamp_ns: still_ns,
                 ..row.clone()
             };

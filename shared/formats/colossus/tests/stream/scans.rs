@@ -6,10 +6,15 @@ use gyre_colossus::{
 };
 use gyre_radar::middle_ns;
 
-use crate::support::{Assembly, Row, START_NS, configuration, feed, turns};
+use crate::support::{Assembly, START_NS, SentAzimuth, configuration, feed, turns};
 
 /// Sends rows as a radar does, and returns the scans that a client receives.
-fn served(radar: &Configuration, rows: &[Row], format: ClockFormat, piece: usize) -> Assembly {
+fn served(
+    radar: &Configuration,
+    rows: &[SentAzimuth],
+    format: ClockFormat,
+    piece: usize,
+) -> Assembly {
     let mut bytes = Vec::new();
     write_configuration(&mut bytes, radar);
     for (k, row) in rows.iter().enumerate() {

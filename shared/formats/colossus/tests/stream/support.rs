@@ -26,13 +26,13 @@ pub fn configuration(encoder_size: u16, bins: u16) -> Configuration {
 
 /// An azimuth that owns its powers.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Row {
+pub struct SentAzimuth {
     pub encoder: u16,
     pub stamp_ns: i64,
     pub powers: Vec<u8>,
 }
 
-impl Row {
+impl SentAzimuth {
     pub fn azimuth(&self, format: ClockFormat) -> Azimuth<'_> {
         let (seconds, split_seconds) = format.fields(self.stamp_ns);
         Azimuth {
@@ -46,9 +46,14 @@ impl Row {
 }
 
 /// The azimuths of whole turns. Rows step by 14 counts, and are 0.625 ms apart.
-pub fn turns(configuration: &Configuration, first: u16, start_ns: i64, turns: usize) -> Vec<Row> {
+pub fn turns(
+    configuration: &Configuration,
+    first: u16,
+    start_ns: i64,
+    turns: usize,
+) -> Vec<SentAzimuth> {
     let samples = usize::from(configuration.azimuth_samples);
-    let row = |k: usize| Row {
+    let row = |k: usize| SentAzimuth {
         encoder: first + 14 * (k % samples) as u16,
         stamp_ns: start_ns + 625_000 * k as i64 + (k as i64 * 37) % 11,
         powers: (0..usize::from(configuration.range_in_bins))
@@ -97,7 +102,7 @@ impl Assembly {
         sweep.is_some()
     }
 
-    pub fn add_rows<'a>(&mut self, rows: impl IntoIterator<Item = &'a Row>) {
+    pub fn add_rows<'a>(&mut self, rows: impl IntoIterator<Item = &'a SentAzimuth>) {
         for row in rows {
             self.add(&row.azimuth(ClockFormat::default()), row.stamp_ns);
         }
@@ -126,11 +131,15 @@ pub fn feed(parser: &mut Parser, bytes: &[u8], piece: usize, mut each: impl FnMu
 }
 
 /// Gives all azimuths of `rows` their times. The host is a day late, and receives all at once.
-pub fn stamped(clock: &mut RadarClock, rows: &[Row], format: ClockFormat) -> Vec<Row> {
+pub fn stamped(
+    clock: &mut RadarClock,
+    rows: &[SentAzimuth],
+    format: ClockFormat,
+) -> Vec<SentAzimuth> {
     let mut stamped = Vec::new();
     for row in rows {
         for (azimuth, stamp_ns) in clock.stamp(row.azimuth(format), START_NS + 86_400_000_000_000) {
-            stamped.push(Row {
+            stamped.push(SentAzimuth {
                 encoder: azimuth.encoder,
                 stamp_ns,
                 powers: azimuth.powers.bytes().to_vec(),

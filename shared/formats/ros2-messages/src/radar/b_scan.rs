@@ -46,7 +46,7 @@ pub enum BadScan {
 
 /// An azimuth of a turn.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Row<'a> {
+pub struct TimedAzimuth<'a> {
     /// The azimuth.
     pub azimuth: Azimuth<'a>,
     /// When it was received, ns, if the message is received when the turn has ended.
@@ -67,8 +67,8 @@ impl RadarBScanMsg {
         radar: &Configuration,
         azimuth_offset: u16,
         arrived_ns: i64,
-    ) -> Result<impl Iterator<Item = Row<'a>> + 'a, BadScan> {
-        let image = Rows::of(&self.b_scan_img, azimuth_offset)?;
+    ) -> Result<impl Iterator<Item = TimedAzimuth<'a>> + 'a, BadScan> {
+        let image = PowerImage::of(&self.b_scan_img, azimuth_offset)?;
         let (encoders, stamps) = (&self.encoder_values, &self.timestamps);
         if encoders.len() != image.height || stamps.len() != image.height {
             return Err(BadScan::Rows {
@@ -97,7 +97,7 @@ impl RadarBScanMsg {
         let places = places.map(|(row, (encoder, stamp))| (row, *encoder, *stamp));
         Ok(places
             .filter(written)
-            .map(move |(row, encoder, stamp)| Row {
+            .map(move |(row, encoder, stamp)| TimedAzimuth {
                 azimuth: azimuth(encoder, stamp.saturating_mul(unit_ns), image.row(row)),
                 arrived_ns: time.arrived_ns(encoder),
             }))
@@ -133,13 +133,13 @@ impl Image {
         radar: &Configuration,
         azimuth_offset: u16,
         arrived_ns: i64,
-    ) -> Result<impl Iterator<Item = Row<'_>>, BadScan> {
-        let image = Rows::of(self, azimuth_offset)?;
+    ) -> Result<impl Iterator<Item = TimedAzimuth<'_>>, BadScan> {
+        let image = PowerImage::of(self, azimuth_offset)?;
         let time = TurnTime::new(radar, arrived_ns);
         let encoder_size = u64::from(radar.encoder_size);
         Ok((0..image.height).map(move |row| {
             let encoder = (row as u64 * encoder_size / image.height as u64) as u16;
-            Row {
+            TimedAzimuth {
                 azimuth: azimuth(encoder, 0, image.row(row)),
                 arrived_ns: time.arrived_ns(encoder),
             }
@@ -160,7 +160,7 @@ fn azimuth(encoder: u16, stamp: u64, powers: &[u8]) -> Azimuth<'_> {
 
 /// The rows of an image of powers.
 #[derive(Clone, Copy)]
-struct Rows<'a> {
+struct PowerImage<'a> {
     data: &'a [u8],
     height: usize,
     width: usize,
@@ -169,7 +169,7 @@ struct Rows<'a> {
     offset: usize,
 }
 
-impl<'a> Rows<'a> {
+impl<'a> PowerImage<'a> {
     fn of(image: &'a Image, azimuth_offset: u16) -> Result<Self, BadScan> {
         if !matches!(image.encoding.as_str(), "8UC1" | "mono8") {
             return Err(BadScan::Encoding {

@@ -43,7 +43,7 @@ pub struct OrderError {
 
 /// The data of a place beside its descriptor.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Place {
+pub(super) struct PathPoint {
     /// Number that the caller gave it.
     pub id: u64,
     /// Path up to the place, m.
@@ -54,7 +54,7 @@ pub(super) struct Place {
 ///
 /// A query allocates nothing.
 pub struct PlaceIndex {
-    pub(super) places: Vec<Place>,
+    pub(super) places: Vec<PathPoint>,
     pub(super) sieves: Vec<u8>,
     pub(super) spectra: Vec<i8>,
     /// Norm of each spectrum.
@@ -85,7 +85,7 @@ impl PlaceIndex {
     pub const BYTES_PER_PLACE: usize = Descriptor::SIEVE_BYTES
         + SPECTRUM_BYTES
         + size_of::<f32>()
-        + size_of::<Place>()
+        + size_of::<PathPoint>()
         + size_of::<(u32, u32)>();
 
     /// Creates an empty index with memory for a number of places. More places make it grow.
@@ -113,7 +113,7 @@ impl PlaceIndex {
         if !(path_m.is_finite() && path_m >= last_m) {
             return Err(OrderError { path_m, last_m });
         }
-        self.places.push(Place { id, path_m });
+        self.places.push(PathPoint { id, path_m });
         self.sieves.extend_from_slice(&descriptor.sieve);
         self.spectra.extend_from_slice(&descriptor.spectrum);
         self.norms.push(norm(&descriptor.spectrum));

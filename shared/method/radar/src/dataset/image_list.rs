@@ -23,7 +23,7 @@ pub(crate) struct ImageList {
 
 /// The place of an image in its series.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Place {
+enum SeriesPosition {
     /// ns since 1970.
     Time(i64),
     Number(i64),
@@ -31,7 +31,7 @@ enum Place {
     Name,
 }
 
-impl Place {
+impl SeriesPosition {
     fn of(name: &Path) -> Self {
         match file_number(name) {
             Some(number) => stamp::to_ns(number).map_or(Self::Number(number), Self::Time),
@@ -95,13 +95,13 @@ fn series(names: Vec<OsString>) -> (Vec<OsString>, Vec<OsString>) {
         .partition(|name| copied_number(name).is_some_and(|number| numbers.contains(&number)));
     let placed = shown
         .into_iter()
-        .map(|name| (Place::of(Path::new(&name)), name));
+        .map(|name| (SeriesPosition::of(Path::new(&name)), name));
     let (mut placed, strangers) = most(placed.collect());
     placed.sort_unstable_by(|(a, one), (b, other)| a.cmp(b).then_with(|| natural(one, other)));
     let (mut kept, mut others) = (Vec::<OsString>::new(), [hidden, copies, strangers].concat());
     let mut last = None;
     for (place, name) in placed {
-        match place != Place::Name && last.replace(place) == Some(place) {
+        match place != SeriesPosition::Name && last.replace(place) == Some(place) {
             true => others.push(name),
             false => kept.push(name),
         }
@@ -111,14 +111,16 @@ fn series(names: Vec<OsString>) -> (Vec<OsString>, Vec<OsString>) {
 
 /// Returns the images that are named as at least half of them are: by times, else by numbers, else
 /// all of them; and the others.
-fn most(placed: Vec<(Place, OsString)>) -> (Vec<(Place, OsString)>, Vec<OsString>) {
-    let half = |is_one: fn(&Place) -> bool| {
+fn most(
+    placed: Vec<(SeriesPosition, OsString)>,
+) -> (Vec<(SeriesPosition, OsString)>, Vec<OsString>) {
+    let half = |is_one: fn(&SeriesPosition) -> bool| {
         let count = placed.iter().filter(|(place, _)| is_one(place)).count();
         2 * count >= placed.len()
     };
-    let by_time: fn(&Place) -> bool = |place| matches!(place, Place::Time(_));
-    let by_number: fn(&Place) -> bool = |place| *place != Place::Name;
-    let is_one: fn(&Place) -> bool = match (half(by_time), half(by_number)) {
+    let by_time: fn(&SeriesPosition) -> bool = |place| matches!(place, SeriesPosition::Time(_));
+    let by_number: fn(&SeriesPosition) -> bool = |place| *place != SeriesPosition::Name;
+    let is_one: fn(&SeriesPosition) -> bool = match (half(by_time), half(by_number)) {
         (true, _) => by_time,
         (false, true) => by_number,
         (false, false) => |_| true,

@@ -109,7 +109,7 @@ impl MapLevel {
         let half = (self.n / 2) as i64;
         image.corner = [pose.translation.x, pose.translation.y]
             .map(|v| (v / self.cell_m).floor() as i64 - half);
-        let place = Place {
+        let place = Drawing {
             pose: *pose,
             corner: image.corner,
             per_m: 1.0 / self.cell_m,
@@ -241,7 +241,7 @@ fn exposed(by: i64, n: usize) -> std::ops::Range<usize> {
 }
 
 /// Where points are drawn.
-struct Place {
+struct Drawing {
     /// Of the scan, in map coordinates.
     pose: Pose,
     /// The map's cell (x, y) that the drawing begins with.
@@ -254,8 +254,8 @@ struct Place {
 
 /// Shares each point between the four cells around it, and blurs them.
 #[simd]
-fn spread(points: &DeskewedPoints, place: &Place, drawing: &mut [f32], drawn: &mut [bool]) {
-    let &Place {
+fn spread(points: &DeskewedPoints, place: &Drawing, drawing: &mut [f32], drawn: &mut [bool]) {
+    let &Drawing {
         pose,
         corner,
         per_m,

@@ -35,7 +35,7 @@ pub(super) fn linearise(
 ) -> NormalEquations {
     let at = (pose.translation.vector - Vector2::from(map.origin)) * f64::from(map.per_m);
     let (sin, cos) = pose.rotation.angle().sin_cos();
-    let place = Place {
+    let place = CellPose {
         at: at.map(|v| v as f32).into(),
         sin: sin as f32,
         cos: cos as f32,
@@ -63,7 +63,7 @@ pub(super) fn linearise(
 }
 
 /// A pose on the map's array: position in cells, sine and cosine of its yaw.
-struct Place {
+struct CellPose {
     at: [f32; 2],
     sin: f32,
     cos: f32,
@@ -82,7 +82,7 @@ fn sum_block<'a>(
     x_m: &[f32],
     y_m: &[f32],
     weight: &[f32],
-    place: &Place,
+    place: &CellPose,
 ) -> [f32; SUMS] {
     let (value, slope, last) = (1.0 / map.full, map.per_m / map.full, (map.n - 2) as f32);
     let mut sums = [[0.0_f32; LANES]; SUMS];

@@ -15,21 +15,21 @@ const RASTER: usize = 96;
 
 /// The mapping of an address: file, offset and access rights.
 #[derive(Debug, PartialEq)]
-struct Place {
+struct Mapping {
     inode: u64,
     offset: u64,
     path: String,
     rights: String,
 }
 
-fn place_of<T>(values: &[T]) -> Place {
+fn place_of<T>(values: &[T]) -> Mapping {
     let address = values.as_ptr() as u64;
     let maps = fs::read_to_string("/proc/self/maps").unwrap();
     let hex = |text: &str| u64::from_str_radix(text, 16).unwrap();
     let found = maps.lines().find_map(|line| {
         let fields: Vec<&str> = line.split_whitespace().collect();
         let (start, end) = fields[0].split_once('-').unwrap();
-        (hex(start)..hex(end)).contains(&address).then(|| Place {
+        (hex(start)..hex(end)).contains(&address).then(|| Mapping {
             inode: fields[4].parse().unwrap(),
             offset: address - hex(start) + hex(fields[2]),
             path: fields.get(5).unwrap_or(&"").to_string(),

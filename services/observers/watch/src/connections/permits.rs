@@ -1,4 +1,4 @@
-//! The places of connections.
+//! The permits of connections.
 
 use std::{
     net::IpAddr,
@@ -9,11 +9,11 @@ use tokio::{sync::Notify, task::AbortHandle};
 
 use super::Peer;
 
-/// A bounded number of places.
-pub struct Places {
+/// A bounded number of permits.
+pub struct Permits {
     limit: usize,
     taken: Mutex<Taken>,
-    /// Notified when a place is free again.
+    /// Notified when a permit is free again.
     freed: Notify,
 }
 
@@ -31,14 +31,14 @@ struct Connection {
     task: Option<AbortHandle>,
 }
 
-/// A place that is taken. Dropped, it is free again.
-pub struct Place {
-    places: Arc<Places>,
+/// A permit that is taken. Dropped, it is free again.
+pub struct Permit {
+    permits: Arc<Permits>,
     number: u64,
 }
 
-impl Places {
-    /// So many places, all of them free.
+impl Permits {
+    /// So many permits, all of them free.
     pub fn new(limit: usize) -> Self {
         Self {
             limit,
@@ -62,7 +62,7 @@ impl Places {
         }
     }
 
-    /// Waits until a place is free, or a connection has one that can give way.
+    /// Waits until a permit is free, or a connection has one that can give way.
     pub async fn wait_for_room(&self) {
         let has_room = |taken: &Taken| {
             let mut connections = taken.connections.iter();
@@ -71,13 +71,13 @@ impl Places {
         self.wait_until(has_room).await;
     }
 
-    /// Waits until no place is taken.
+    /// Waits until no permit is taken.
     pub async fn wait_for_end(&self) {
         self.wait_until(|taken| taken.connections.is_empty()).await;
     }
 
-    /// Takes a place, which another connection may have to leave for it.
-    pub fn take(self: &Arc<Self>, address: IpAddr) -> (Place, Peer) {
+    /// Takes a permit, which another connection may have to leave for it.
+    pub fn take(self: &Arc<Self>, address: IpAddr) -> (Permit, Peer) {
         let (mut taken, peer) = (self.taken(), Peer::default());
         if taken.connections.len() >= self.limit
             && let Some(at) = taken.first_to_go()
@@ -95,8 +95,8 @@ impl Places {
             peer: peer.clone(),
             task: None,
         });
-        let places = Arc::clone(self);
-        (Place { places, number }, peer)
+        let permits = Arc::clone(self);
+        (Permit { permits, number }, peer)
     }
 
     /// Returns the addresses of the connections, the oldest first.
@@ -118,7 +118,7 @@ impl Places {
 
 impl Taken {
     /// Returns the connection that gives way first: of the address that has most of those which
-    /// can, the oldest. So one address cannot take the places of all others.
+    /// can, the oldest. So one address cannot take the permits of all others.
     fn first_to_go(&self) -> Option<usize> {
         let can_give_way = || {
             let connections = self.connections.iter().enumerate();
@@ -126,8 +126,8 @@ impl Taken {
         };
         let of_same = |address: IpAddr| can_give_way().filter(move |(_, it)| it.address == address);
         // Of equal numbers the last one counts, hence the oldest last.
-        let places = can_give_way().rev();
-        places
+        let permits = can_give_way().rev();
+        permits
             .max_by_key(|(_, it)| of_same(it.address).count())
             .map(|(at, _)| at)
     }
@@ -139,18 +139,18 @@ impl Connection {
     }
 }
 
-impl Place {
+impl Permit {
     /// Returns the number of the connection that has it.
     pub fn number(&self) -> u64 {
         self.number
     }
 }
 
-impl Drop for Place {
+impl Drop for Permit {
     fn drop(&mut self) {
-        let mut taken = self.places.taken();
+        let mut taken = self.permits.taken();
         taken.connections.retain(|it| it.number != self.number);
         drop(taken);
-        self.places.freed.notify_waiters();
+        self.permits.freed.notify_waiters();
     }
 }
