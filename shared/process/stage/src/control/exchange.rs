@@ -4,7 +4,7 @@ use std::{
     io::{self, BufRead, BufReader, Write},
     os::unix::net::UnixStream,
     path::Path,
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use super::Request;
@@ -19,11 +19,9 @@ pub(super) struct Sent {
 impl Sent {
     /// Sends a request to the socket.
     pub fn to(socket: &Path, request: &Request, limit: Duration) -> io::Result<Self> {
-        let mut connection = UnixStream::connect(socket)?;
-        connection.set_write_timeout(Some(limit))?;
         let mut line = serde_json::to_string(request)?;
         line.push('\n');
-        connection.write_all(line.as_bytes())?;
+        let connection = write(|| UnixStream::connect(socket), line.as_bytes(), limit)?;
         Ok(Self {
             reader: BufReader::new(connection),
             answer: Vec::new(),
@@ -46,5 +44,46 @@ impl Sent {
             Ok(_) if self.answer.is_empty() => Err(io::ErrorKind::UnexpectedEof.into()),
             Ok(_) => Ok(Some(String::from_utf8_lossy(&self.answer).into_owned())),
         }
+    }
+}
+
+/// Writes a request to a new connection, and again while the supervisor closes it unread: a process
+/// that the system does not run between the two comes too late for it. Nothing is done twice.
+fn write(
+    connect: impl Fn() -> io::Result<UnixStream>,
+    request: &[u8],
+    limit: Duration,
+) -> io::Result<UnixStream> {
+    let deadline = Instant::now() + limit;
+    loop {
+        let mut connection = connect()?;
+        connection.set_write_timeout(Some(limit))?;
+        match connection.write_all(request) {
+            Err(error)
+                if error.kind() == io::ErrorKind::BrokenPipe && Instant::now() < deadline => {}
+            written => return written.map(|()| connection),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+    use std::{cell::RefCell, io::Read, net::Shutdown};
+
+    #[test]
+    fn a_request_is_written_again_where_the_supervisor_no_longer_waited() {
+        let (late, _) = UnixStream::pair().unwrap();
+        let (in_time, mut supervisor) = UnixStream::pair().unwrap();
+        let connections = RefCell::new(vec![in_time, late]);
+        let connect = || Ok(connections.borrow_mut().pop().unwrap());
+        let limit = Duration::from_secs(10);
+        let written = write(connect, b"\"status\"\n", limit).unwrap();
+        written.shutdown(Shutdown::Write).unwrap();
+        let mut request = String::new();
+        supervisor.read_to_string(&mut request).unwrap();
+        assert_eq!(request, "\"status\"\n");
     }
 }
