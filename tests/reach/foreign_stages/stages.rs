@@ -1,6 +1,6 @@
 //! Stages that send a fault: each does what its topic needs and no more.
 
-use std::{env, path::Path};
+use std::{env, path::Path, thread, time::Duration};
 
 use bytemuck::Pod;
 use gyre_messages::{
@@ -234,6 +234,9 @@ impl Source for ForeignSource {
         header: &mut ScanHeader,
         bytes: &mut [u8],
     ) -> Result<(), Unreadable> {
+        if self.fault.field == "read_ms" {
+            thread::sleep(Duration::from_millis(self.fault.value as u64));
+        }
         let geometry = self.dataset.read(index, header.slot(bytes)).unwrap();
         header.set_geometry(&geometry);
         let fault = |field: &str| self.fault.of(field, index as u64);

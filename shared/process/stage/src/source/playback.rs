@@ -239,11 +239,12 @@ impl<S: Source> Playback<'_, S> {
     fn wait_for_admission(&mut self, seq: u64, due_ns: Option<i64>) -> Result<bool, StageError> {
         let (live, window) = (self.launch.manifest.live, self.launch.manifest.window);
         self.schedule.due_at(due_ns.unwrap_or_else(clock::now_ns))?;
+        let mut has_slept = false;
         loop {
             self.credit.update()?;
             let wait = due_ns.map_or(Duration::ZERO, clock::until);
             let has_credit = live || window.admits(seq, self.credit.newest);
-            if has_credit && wait.is_zero() {
+            if has_credit && wait.is_zero() && has_slept {
                 return Ok(true);
             }
             let limit = if has_credit {
@@ -251,9 +252,11 @@ impl<S: Source> Playback<'_, S> {
             } else {
                 wake::MAX_WAIT
             };
+            // However slowly scans are read, there is time for signals, new readers and a beat.
             if self.sleep(limit)? {
                 return Ok(false);
             }
+            has_slept = true;
         }
     }
 

@@ -143,21 +143,24 @@ impl<R: Recorded> Player<'_, R> {
     /// Waits until the window admits an item and it is due; false on a request to stop.
     fn wait_for_admission(&mut self, seq: u64, due_ns: Option<i64>) -> Result<bool, StageError> {
         self.schedule.due_at(due_ns.unwrap_or_else(clock::now_ns))?;
+        let mut has_slept = false;
         loop {
             self.credit.update()?;
             let wait = due_ns.map_or(Duration::ZERO, clock::until);
             let window = self.launch.manifest.window;
             let has_credit = window.admits(seq, self.credit.newest);
-            if has_credit && wait.is_zero() {
+            if has_credit && wait.is_zero() && has_slept {
                 return Ok(true);
             }
             let limit = match has_credit {
                 true => wait.min(wake::MAX_WAIT),
                 false => wake::MAX_WAIT,
             };
+            // As in the source of scans, there is time for signals, new readers and a beat.
             if self.sleep(limit)? {
                 return Ok(false);
             }
+            has_slept = true;
         }
     }
 
