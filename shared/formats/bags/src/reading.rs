@@ -3,6 +3,7 @@
 use std::{
     collections::BTreeMap,
     fs::File,
+    io,
     path::{Path, PathBuf},
 };
 
@@ -10,13 +11,6 @@ use crate::damaged::Span;
 use mcap::{McapError, records::Record};
 
 use crate::{BagError, spans::spans};
-
-/// The largest record that is read, bytes: several times the largest scan.
-const MAX_RECORD_BYTES: usize = 64 << 20;
-/// The largest span that is read, bytes, of messages that are wanted.
-const MAX_KEPT_BYTES: usize = 256 << 20;
-/// The largest span, bytes in the file. ROS 2's chunks have 768 kB.
-const MAX_SPAN_BYTES: u64 = 256 << 20;
 
 /// The largest number of channels and of schemas of a file, the longest name of a topic, and what
 /// is kept of a schema, bytes.
@@ -88,13 +82,12 @@ impl BagFile {
         wanted: impl Fn(&Channel) -> bool,
     ) -> Result<Vec<Message>, BagError> {
         let mut messages = Vec::new();
-        let read = match span.bytes <= MAX_SPAN_BYTES {
-            true => {
-                let bytes = crate::damaged::read(&self.file, span);
-                let bytes = bytes.map_err(|error| BagError::io(&self.path, error))?;
-                self.parse(&bytes, &wanted, &mut messages)
+        let read = match crate::damaged::read(&self.file, span) {
+            Ok(bytes) => self.parse(&bytes, &wanted, &mut messages),
+            Err(error) if error.kind() == io::ErrorKind::FileTooLarge => {
+                Err(McapError::ChunkTooLarge(span.bytes))
             }
-            false => Err(McapError::ChunkTooLarge(span.bytes)),
+            Err(error) => return Err(BagError::io(&self.path, error)),
         };
         read.map_err(|error| BagError::Damaged {
             path: self.path.clone(),
@@ -110,17 +103,12 @@ impl BagFile {
         wanted: &impl Fn(&Channel) -> bool,
         messages: &mut Vec<Message>,
     ) -> Result<(), McapError> {
-        let mut kept = 0;
-        crate::damaged::records(bytes, MAX_RECORD_BYTES, |record| {
-            let Some(message) = self.learn(record, wanted) else {
-                return Ok(());
-            };
-            kept += message.data.len();
-            if kept > MAX_KEPT_BYTES {
-                return Err(McapError::ChunkTooLarge(kept as u64));
-            }
-            messages.push(message);
-            Ok(())
+        crate::damaged::records(bytes, |record| {
+            self.learn(record, wanted).map_or(0, |message| {
+                let kept = size_of::<Message>() + message.data.len();
+                messages.push(message);
+                kept
+            })
         })
     }
 

@@ -7,8 +7,8 @@ use mcap::records::{MessageHeader, Record};
 
 use crate::RecordingError;
 
-/// The largest record that is read, bytes: ten times the largest scan.
-const MAX_RECORD_BYTES: usize = 256 << 20;
+/// The longest name of a channel, bytes.
+const MAX_NAME_BYTES: usize = 1024;
 
 /// The channels of a file: the name of each by its number.
 pub(crate) type Channels = BTreeMap<u16, String>;
@@ -36,15 +36,17 @@ pub(crate) fn read(
         source,
     })?;
     let mut messages = Vec::new();
-    let read = gyre_bags::damaged::records(&bytes, MAX_RECORD_BYTES, |record| {
-        match record {
-            Record::Channel(channel) => {
-                channels.insert(channel.id, channel.topic);
-            }
-            Record::Message { header, data } => messages.push(message(&header, &data)),
-            _ => {}
+    let read = gyre_bags::damaged::records(&bytes, |record| match record {
+        // None of Gyre's is longer.
+        Record::Channel(channel) if channel.topic.len() <= MAX_NAME_BYTES => {
+            channels.insert(channel.id, channel.topic);
+            0
         }
-        Ok(())
+        Record::Message { header, data } => {
+            messages.push(message(&header, &data));
+            size_of::<Message>() + data.len()
+        }
+        _ => 0,
     });
     match read {
         Ok(()) => Ok(messages),

@@ -59,8 +59,8 @@ struct Place {
     chunk: Span,
 }
 
-/// The messages of a part: their topic, and the chunk that they are in.
-type Places = Vec<(String, Entry, Span)>;
+/// The messages of a part by topic, and the chunk that they are in.
+type Places = Vec<(String, Vec<Entry>, Span)>;
 
 /// The messages of a chunk in memory.
 struct Kept {
@@ -99,17 +99,15 @@ impl Recording {
     fn add(&mut self, part: Part, places: Places) {
         let number = self.parts.len();
         self.parts.push(part);
-        for (topic, entry, chunk) in places {
-            let place = Place {
-                entry,
-                part: number,
-                chunk,
-            };
-            self.places
-                .entry(topic)
-                .or_default()
-                .entry(entry.seq)
-                .or_insert(place);
+        for (topic, entries, chunk) in places {
+            let places = self.places.entry(topic).or_default();
+            for entry in entries {
+                places.entry(entry.seq).or_insert(Place {
+                    entry,
+                    part: number,
+                    chunk,
+                });
+            }
         }
     }
 
@@ -249,7 +247,8 @@ impl Part {
                         (Table::of_metadata(&record), chunk.take())
                     {
                         part.missed = table.missed;
-                        places.extend(in_chunk(table.entries, chunk));
+                        let topics = table.entries.into_iter();
+                        places.extend(topics.map(|(topic, entries)| (topic, entries, chunk)));
                     }
                 }
             }
@@ -265,18 +264,6 @@ impl Part {
             reason,
         }
     }
-}
-
-fn in_chunk(
-    entries: BTreeMap<String, Vec<Entry>>,
-    chunk: Span,
-) -> impl Iterator<Item = (String, Entry, Span)> {
-    let topics = entries.into_iter();
-    topics.flat_map(move |(topic, entries)| {
-        entries
-            .into_iter()
-            .map(move |entry| (topic.clone(), entry, chunk))
-    })
 }
 
 /// Puts a message together.

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 use std::{
+    collections::BTreeMap,
     fs,
     path::{Path, PathBuf},
 };
@@ -11,6 +12,7 @@ use bytemuck::{Zeroable, bytes_of};
 use gyre_messages::{Item, PoseHeader, ScanHeader};
 use gyre_radar::{DatasetOptions, OwnedScan, ReadError};
 use gyre_recording::{Head, Incoming, LogLine, Recording, RecordingError, RecordingWriter, open};
+use mcap::records::{MessageHeader, Metadata, Record};
 
 const SCANS: u64 = 6;
 const START_NS: i64 = 1_549_986_607_000_000_000;
@@ -213,4 +215,72 @@ fn damaged_bytes_are_an_error_and_no_panic() {
             }
         }
     }
+}
+
+/// Writes a recording of one chunk, whose table is `table`, with `messages` messages of 1 MB.
+fn write_chunk(path: &Path, table: BTreeMap<String, String>, messages: u32) {
+    let head = path.with_extension("head");
+    let _ = fs::remove_file(&head);
+    RecordingWriter::create(&head, &self::head("a", 1))
+        .unwrap()
+        .finish()
+        .unwrap();
+    let head = fs::read(head).unwrap();
+    let mut records = mcap::read::LinearReader::new(&head).unwrap();
+    let head = records.find_map(|record| match record.unwrap() {
+        Record::Metadata(head) => Some(head),
+        _ => None,
+    });
+    let options = mcap::WriteOptions::new().chunk_size(None);
+    let mut writer = options.create(fs::File::create(path).unwrap()).unwrap();
+    writer.write_metadata(&head.unwrap()).unwrap();
+    let channel = writer.add_channel(0, "/gyre/scan", "gyre", &BTreeMap::new());
+    let mut header = MessageHeader {
+        channel_id: channel.unwrap(),
+        sequence: 0,
+        log_time: 0,
+        publish_time: 0,
+    };
+    for sequence in 0..messages {
+        header.sequence = sequence;
+        let message = vec![0; 1 << 20];
+        writer.write_to_known_channel(&header, &message).unwrap();
+    }
+    writer.flush().unwrap();
+    let name = "gyre.table".to_owned();
+    let metadata = Metadata {
+        name,
+        metadata: table,
+    };
+    writer.write_metadata(&metadata).unwrap();
+    writer.finish().unwrap();
+}
+
+#[test]
+fn a_chunk_of_which_a_few_bytes_are_gigabytes_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    let table = || [("scan".to_owned(), "0:0:1".to_owned())].into();
+    write_chunk(&path, table(), 4);
+    Recording::open(std::slice::from_ref(&path)).unwrap();
+    write_chunk(&path, table(), 300);
+    assert!(fs::metadata(&path).unwrap().len() < 100_000);
+    let refused = Recording::open(std::slice::from_ref(&path));
+    let refused = refused.err().unwrap().to_string();
+    assert!(
+        refused.contains("a.mcap is damaged at byte") && refused.contains("exceeds limit"),
+        "{refused}"
+    );
+}
+
+#[test]
+fn the_name_of_a_topic_is_not_kept_for_each_of_its_messages() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    // A million messages with a name of 1 MB would be a terabyte.
+    let rows: String = (0..1_000_000).map(|seq| format!("{seq}:0:1 ")).collect();
+    let topic = "t".repeat(1 << 20);
+    write_chunk(&path, [(topic.clone(), rows)].into(), 1);
+    let recording = Recording::open(std::slice::from_ref(&path)).unwrap();
+    assert_eq!(recording.entries(&topic).count(), 1_000_000);
 }

@@ -164,7 +164,7 @@ mod tests {
         longer[1] += 1;
         let bytes = [chunk(&inner), chunk(&longer)].concat();
         assert!(!chunks_hold_their_records(&bytes));
-        let read = crate::damaged::records(&bytes, 1 << 20, |_| Ok(()));
+        let read = crate::damaged::records(&bytes, |_| 0);
         assert!(matches!(read, Err(McapError::UnexpectedEoc)));
     }
 

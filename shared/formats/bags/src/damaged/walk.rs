@@ -10,6 +10,9 @@ use mcap::MAGIC;
 
 /// Bytes of opcode and length before each record.
 const PREFIX: u64 = 9;
+/// The largest place that is read, bytes. Chunks of ROS 2 have 768 kB, those of Gyre 4 MB and a
+/// scan.
+const MAX_SPAN_BYTES: u64 = 256 << 20;
 
 /// The place of records in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -88,8 +91,16 @@ impl<'a> Walk<'a> {
 /// Reads what a file has of a place. A walk over the same file goes on as before.
 ///
 /// # Errors
-/// The file cannot be read.
+/// The file cannot be read, or the place is larger than any that a writer leaves.
 pub fn read(file: &File, span: Span) -> io::Result<Vec<u8>> {
+    if span.bytes > MAX_SPAN_BYTES {
+        let reason = format!(
+            "the record at byte {} is larger than {} MB, as in no file of ROS 2 or Gyre",
+            span.offset,
+            MAX_SPAN_BYTES >> 20
+        );
+        return Err(io::Error::new(io::ErrorKind::FileTooLarge, reason));
+    }
     let left = file.metadata()?.len().saturating_sub(span.offset);
     let mut bytes = vec![0; left.min(span.bytes) as usize];
     file.read_exact_at(&mut bytes, span.offset)?;
@@ -138,6 +149,22 @@ mod tests {
         content[9..17].copy_from_slice(&u64::MAX.to_le_bytes());
         let file = file(&content);
         assert!(Walk::new(&file).unwrap().unwrap().next().unwrap().is_none());
+    }
+
+    #[test]
+    fn a_record_that_would_fill_the_memory_is_refused() {
+        let mut content = [MAGIC, &record(5, b"abc")].concat();
+        content[9..17].copy_from_slice(&(1_u64 << 29).to_le_bytes());
+        let file = file(&content);
+        // It takes no room on the disk.
+        file.set_len(1 << 30).unwrap();
+        let mut walk = Walk::new(&file).unwrap().unwrap();
+        let (_, span) = walk.next().unwrap().unwrap();
+        let refused = read(&file, span).unwrap_err().to_string();
+        assert!(
+            refused.contains("at byte 8 is larger than 256 MB"),
+            "{refused}"
+        );
     }
 
     #[test]
