@@ -321,7 +321,7 @@ fn a_second_run_into_the_same_results_is_refused() {
     let mut running = run.start();
     running.await_stages();
     let second = Run::of_recording().into(run.out());
-    Ended::of(second.command()).refused_with(&["another run is writing to", "--out"]);
+    Ended::of(second.command()).refused_with(&["another command is writing to", "--out"]);
     running.finish().succeeded();
     assert_eq!(run.odometry(), undisturbed());
 }

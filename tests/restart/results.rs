@@ -315,7 +315,7 @@ fn two_runs_without_common_shared_memory_do_not_write_to_one_journal() {
     };
     let mut running = run.start();
     running.await_poses(2);
-    Ended::of(second).refused_with(&["another run is writing to", "--out"]);
+    Ended::of(second).refused_with(&["another command is writing to", "--out"]);
     running.finish().succeeded();
     assert_eq!(run.odometry(), undisturbed());
 }
@@ -372,7 +372,7 @@ fn a_recording_is_not_replaced_while_another_run_plays_it() {
     running.await_poses(2);
     let images = names(&run.out().join("recording/radar"));
     let other = run.clone().set("simulation.seed=4").option("--fresh");
-    Ended::of(other.command()).refused_with(&["another run is writing to"]);
+    Ended::of(other.command()).refused_with(&["another command is writing to"]);
     assert_eq!(names(&run.out().join("recording/radar")), images);
     running.finish().succeeded();
 }

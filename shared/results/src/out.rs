@@ -1,4 +1,4 @@
-//! The folder of the results, which one run at a time may change.
+//! The folder of results, which one command at a time may change.
 
 use std::{
     fs::File,
@@ -27,8 +27,8 @@ pub enum OutError {
         /// The system error.
         source: io::Error,
     },
-    /// Another run is writing to it.
-    #[error("another run is writing to {path}{holder}: wait for it, or choose another --out", path = path.display())]
+    /// Another run, map or localisation is writing to it.
+    #[error("another command is writing to {path}{holder}: wait for it, or choose another --out", path = path.display())]
     Held {
         /// The folder.
         path: PathBuf,
@@ -37,7 +37,7 @@ pub enum OutError {
     },
 }
 
-/// The folder of the results, locked for this run while it lives.
+/// The folder of the results, locked for this command while it lives.
 #[derive(Debug)]
 pub struct Out {
     path: PathBuf,
@@ -56,7 +56,7 @@ impl Out {
     /// Creates and locks the folder. Nothing else in it is changed.
     ///
     /// # Errors
-    /// A folder that cannot be written, or to which another run is writing.
+    /// A folder that cannot be written, or to which another command is writing.
     pub fn lock(path: &Path) -> Result<Self, OutError> {
         let unwritable = |source| OutError::Unwritable {
             path: path.to_owned(),

@@ -91,7 +91,7 @@ pub fn second_run(scene: &mut Scene) -> Option<Outcome> {
     if came_too_late {
         return None;
     }
-    second.refused_with(&["another run is writing to", "--out"]);
+    second.refused_with(&["another command is writing to", "--out"]);
     scene.finished(&run, &running.finish());
     Some(Outcome::from(End::Refused))
 }

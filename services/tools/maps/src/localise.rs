@@ -20,6 +20,7 @@ use std::{
 use clap::Args;
 use gyre_configuration::Configuration;
 use gyre_localisation::{Localiser, Status};
+use gyre_results::Out;
 use gyre_storage::{self as storage, Draft};
 use gyre_terminal::{Failure, print};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -62,7 +63,7 @@ pub fn localise(arguments: &LocaliseArguments) -> Result<ExitCode, Failure> {
     let mut localiser = searched_map::open(&arguments.map, &configuration)?;
     let mut scans = Scans::open(&configuration)?;
     let out = &arguments.out;
-    storage::create_folder(out)?;
+    let _locked = Out::lock(out)?;
     let mut fixes = Draft::create(&out.join(FIXES))?;
     let (started, mut counts) = (Instant::now(), Counts::default());
     let ended = follow(&mut scans, &mut localiser, &mut fixes, &mut counts);

@@ -2,7 +2,6 @@
 
 mod arguments;
 mod extend;
-mod folder;
 mod keyframes;
 mod loops;
 
@@ -18,10 +17,11 @@ use gyre_mapping::{
     Drawing, Evidence, MapOptions, Origin, write_geotiff, write_pgm, write_web_tiles,
 };
 use gyre_radar::{Trajectory, ground_truth::read_trajectory};
-use gyre_results::map_options;
+use gyre_results::{Out, map_options};
 use gyre_slam::{Keyframe, RecordReader, records_path};
 use gyre_terminal::{Failure, print};
 
+use crate::folder;
 pub use arguments::{MapArguments, MapFormat};
 
 /// The corrected trajectory, and that of odometry.
@@ -56,7 +56,7 @@ fn draw_run(arguments: &MapArguments) -> Result<Drawing, Failure> {
     let poses = read_trajectory(&trajectory)?;
     let loops = loops::used_loops(&arguments.run.join(LOOPS))?;
     let configuration = configuration(&arguments.run)?;
-    gyre_storage::create_folder(&arguments.out)?;
+    let _locked = Out::lock(&arguments.out)?;
     let options = MapOptions {
         cell_m: arguments.cell_m,
         ..map_options(&configuration)
@@ -304,6 +304,24 @@ mod tests {
         assert_eq!(Map::open(&out).unwrap().keyframes(), 3);
         let kept = gyre_localisation::Map::open(&out).unwrap();
         assert_eq!(kept.keyframes().len(), 3);
+    }
+
+    #[test]
+    fn a_map_that_another_command_is_writing_is_left_to_it() {
+        let folder = tempfile::tempdir().unwrap();
+        run(folder.path());
+        let out = folder.path().join("map");
+        let other = Out::lock(&out).unwrap();
+        let refused = map(&arguments(folder.path())).unwrap_err().to_string();
+        assert!(
+            refused.starts_with("another command is writing to")
+                && refused.contains(&format!("process {}", std::process::id())),
+            "{refused}"
+        );
+        assert!(!out.join("map.toml").exists());
+        drop(other);
+        map(&arguments(folder.path())).unwrap();
+        assert_eq!(Map::open(&out).unwrap().keyframes(), 3);
     }
 
     #[test]

@@ -4,13 +4,14 @@ mod metadata;
 
 use std::{
     collections::BTreeMap,
-    fs::{self, File, OpenOptions},
-    io::BufWriter,
+    fs::{self, File},
+    io::{self, BufWriter},
     marker::PhantomData,
     path::{Path, PathBuf},
 };
 
 use gyre_ros2_messages::{Ros2Message, encode};
+use gyre_storage::lock::{Attempt, try_lock, try_lock_existing};
 use mcap::{Compression, McapError, WriteOptions, Writer, records::MessageHeader};
 
 use crate::{
@@ -71,7 +72,6 @@ impl BagWriter {
         }
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let aside = path.with_file_name(format!(".{name}.tmp"));
-        remove(&aside);
         let is_file = path
             .extension()
             .is_some_and(|extension| extension == "mcap");
@@ -84,13 +84,14 @@ impl BagWriter {
         }
         let file = match &file_name {
             None => aside.clone(),
-            Some(name) => {
-                fs::create_dir(&aside).map_err(|e| unwritable(path, e.to_string()))?;
-                aside.join(name)
-            }
+            Some(name) => aside.join(name),
         };
-        let file = OpenOptions::new().write(true).create_new(true).open(file);
-        let file = file.map_err(|error| unwritable(path, error.to_string()))?;
+        let file = create_aside(&aside, &file)
+            .map_err(|error| unwritable(path, error.to_string()))?
+            .ok_or_else(|| {
+                let reason = "another command is writing it; wait for that, or give another name";
+                unwritable(path, reason.to_owned())
+            })?;
         let options = WriteOptions::new()
             .profile(PROFILE)
             .library(concat!("gyre ", env!("CARGO_PKG_VERSION")))
@@ -211,6 +212,24 @@ impl Drop for BagWriter {
             remove(&self.aside);
         }
     }
+}
+
+/// Creates the file of a bag that is not complete, and the folder of both where `aside` is another
+/// one; `None` while another command writes the bag.
+fn create_aside(aside: &Path, file: &Path) -> io::Result<Option<File>> {
+    // Locked until it is removed, so that no other command takes it for its own.
+    let left_over = try_lock_existing(file);
+    if let Ok(Attempt::Held(_)) = left_over {
+        return Ok(None);
+    }
+    remove(aside);
+    if aside != file {
+        fs::create_dir(aside)?;
+    }
+    Ok(match try_lock(file)? {
+        Attempt::Locked(file) => Some(file),
+        Attempt::Held(_) => None,
+    })
 }
 
 /// Removes what an earlier writer left. What cannot be removed shows when it is created anew.

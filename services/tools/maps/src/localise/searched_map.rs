@@ -6,11 +6,14 @@ use gyre_configuration::Configuration;
 use gyre_localisation::{Localiser, LocaliserOptions, Map};
 use gyre_terminal::Failure;
 
+use crate::folder::finish_locked;
+
 /// Opens the map in a folder, and plans localisation in it.
 ///
 /// # Errors
 /// A folder without a whole map, a configuration that extracts no points.
 pub fn open(folder: &Path, configuration: &Configuration) -> Result<Localiser, Failure> {
+    finish_locked(folder)?;
     let drawn = gyre_mapping::Map::open(folder)?;
     let map = Map::open(folder)
         .map_err(|error| format!("{} cannot be localised in: {error}", folder.display()))?;

@@ -11,13 +11,14 @@ use gyre_estimation::{
 use gyre_geometry::{Pose, UncertainMotion};
 use gyre_localisation::{Fix, Localiser};
 use gyre_mapping::Drawing;
+use gyre_results::Out;
 use gyre_slam::{Keyframe, RecordReader};
 use gyre_storage::StorageError;
 use gyre_terminal::{Failure, print};
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Lines, MapArguments, MapFormat, folder};
-use crate::localise::searched_map;
+use super::{Lines, MapArguments, MapFormat};
+use crate::{folder, localise::searched_map};
 
 /// Corrected keyframes, and the constraints between them.
 const GRAPH: &str = "graph.g2o";
@@ -59,6 +60,7 @@ pub fn extend(arguments: &MapArguments, map: &Path) -> Result<Drawing, Failure> 
     require_another_folder(map, out)?;
     let mut keyframes = super::open(run)?;
     let graph = read_graph(run, keyframes.len())?;
+    folder::finish_locked(map)?;
     let earlier = gyre_mapping::Map::open(map)?;
     let mut localiser = searched_map::open(map, &super::configuration(run)?)?;
     let search = find(&mut localiser, &mut keyframes)?;
@@ -82,7 +84,7 @@ pub fn extend(arguments: &MapArguments, map: &Path) -> Result<Drawing, Failure> 
     let ends = |it: &Found| [known.pose(it.fix.keyframe), poses[it.keyframe]];
     let loops = agreeing.iter().map(ends).collect();
     let all = all(known.keyframes(), &mut keyframes, &poses)?;
-    gyre_storage::create_folder(out)?;
+    let _locked = Out::lock(out)?;
     let mut drawing = Drawing::new(earlier.options(), out)?;
     for keyframe in &all {
         drawing.draw(keyframe, &keyframe.pose.motion)?;

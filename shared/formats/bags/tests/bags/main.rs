@@ -275,7 +275,10 @@ fn a_written_bag_is_read_and_never_overwritten() {
         assert!(refused.contains("it exists"), "{refused}");
     }
     let dropped = folder.path("dropped");
-    drop(BagWriter::create(&dropped).unwrap());
+    let writing = BagWriter::create(&dropped).unwrap();
+    let refused = BagWriter::create(&dropped).err().unwrap().to_string();
+    assert!(refused.contains("another command is writing"), "{refused}");
+    drop(writing);
     assert_eq!(fs::read_dir(folder.0.path()).unwrap().count(), 2);
 }
 

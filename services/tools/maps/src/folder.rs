@@ -7,6 +7,7 @@ use std::{
 
 use gyre_localisation::Map;
 use gyre_mapping::{Evidence, Origin, require_tiles_only, write_map};
+use gyre_results::Out;
 use gyre_slam::{Keyframe, Record};
 use gyre_storage::{self as storage, StorageError};
 use gyre_terminal::Failure;
@@ -15,9 +16,22 @@ use gyre_terminal::Failure;
 const NEXT: &str = ".next";
 /// The earlier map while the next one takes its place.
 const EARLIER: &str = ".earlier";
-/// Without the first nothing can be localised in the folder, and without the second it is not a
-/// map: they go first and come last.
-const MARKS: [&str; 2] = [Keyframe::FILE, "map.toml"];
+/// Without it a folder is not a map. It is written last, and changes its place last.
+const MANIFEST: &str = "map.toml";
+/// Without the first nothing can be localised in the folder: they go first and come last.
+const MARKS: [&str; 2] = [Keyframe::FILE, MANIFEST];
+
+/// Lets a map that is whole take its place, if the command that drew it was killed before that.
+///
+/// # Errors
+/// A folder that cannot be written, or to which another command is writing.
+pub fn finish_locked(out: &Path) -> Result<(), Failure> {
+    if is_interrupted(out) {
+        let _locked = Out::lock(out)?;
+        finish(out)?;
+    }
+    Ok(())
+}
 
 /// Writes a map and its keyframes into `out`. A map that is there stays as it is until the new one
 /// is complete, and takes as much of the disk until then; pictures and exports stay. It survives a
@@ -32,6 +46,7 @@ pub fn write(
     origin: Option<Origin>,
 ) -> Result<(), Failure> {
     require_tiles_only(out)?;
+    finish(out)?;
     replace(out, |next| {
         keyframes.save(next)?;
         let made_by = concat!("gyre ", env!("CARGO_PKG_VERSION"));
@@ -40,26 +55,41 @@ pub fn write(
 }
 
 /// Lets `write` fill a folder, whose files and folders then take the place of those of the same
-/// names in `out`. A process that is killed between these renames leaves no map.
+/// names in `out`. A process that is killed between these renames leaves what [`finish`] needs.
 fn replace(out: &Path, write: impl FnOnce(&Path) -> Result<(), Failure>) -> Result<(), Failure> {
-    let [next, earlier] = [NEXT, EARLIER].map(|name| out.join(name));
-    // A process that was killed leaves them.
-    for folder in [&next, &earlier] {
-        remove(folder)?;
-        storage::create_folder(folder)?;
+    let next = out.join(NEXT);
+    storage::create_folder(&next)?;
+    if let Err(error) = write(&next) {
+        remove(&next)?;
+        return Err(error);
     }
-    let written = write(&next);
-    if written.is_ok() {
+    storage::sync_folder(&next)?;
+    Ok(finish(out)?)
+}
+
+/// Returns whether a process was killed when a whole map was about to take its place.
+fn is_interrupted(out: &Path) -> bool {
+    out.join(NEXT).join(MANIFEST).exists()
+}
+
+/// Finishes what a killed process has left: the next map, if it is whole, takes its place, and all
+/// else is removed.
+///
+/// # Errors
+/// A folder that cannot be written.
+fn finish(out: &Path) -> Result<(), StorageError> {
+    let [next, earlier] = [NEXT, EARLIER].map(|name| out.join(name));
+    if is_interrupted(out) {
+        storage::create_folder(&earlier)?;
         swap(out, &next, &earlier)?;
     }
     remove(&next)?;
-    remove(&earlier)?;
-    written
+    remove(&earlier)
 }
 
-/// Moves what `next` has to `out`, and what `out` has of the same names to `earlier`.
+/// Moves what `next` has to `out`, and what `out` has of the same names to `earlier`. If it is
+/// killed, it may be called again: what `next` still has is not in `out` yet.
 fn swap(out: &Path, next: &Path, earlier: &Path) -> Result<(), StorageError> {
-    storage::sync_folder(next)?;
     let names = names(next)?;
     for name in names.iter().rev().filter(|name| out.join(name).exists()) {
         rename(&out.join(name), &earlier.join(name))?;
@@ -126,6 +156,7 @@ mod tests {
         assert_eq!(names(out).unwrap().len(), 4);
         fs::create_dir(out.join(NEXT)).unwrap();
         fs::write(out.join(NEXT).join("keyframes.log"), "of a killed one").unwrap();
+        finish(out).unwrap();
         replace(out, |next| {
             assert_eq!(names(next).unwrap(), [] as [PathBuf; 0]);
             write_all(next, "later");
@@ -137,6 +168,47 @@ mod tests {
         }
         assert_eq!(content(out, "map.png"), "a picture");
         assert_eq!(names(out).unwrap().len(), 4);
+    }
+
+    /// All states in which a kill between two renames leaves the folder.
+    #[test]
+    fn an_exchange_that_was_interrupted_anywhere_is_finished() {
+        for renames in 0..=6 {
+            let folder = tempfile::tempdir().unwrap();
+            let [out, next, earlier] = ["", NEXT, EARLIER].map(|name| folder.path().join(name));
+            write_all(&out, "earlier");
+            fs::write(out.join("map.png"), "a picture").unwrap();
+            write_all(&next, "later");
+            fs::create_dir(&earlier).unwrap();
+            let names = names(&next).unwrap();
+            let away = names.iter().rev().map(|name| (&out, &earlier, name));
+            let back = names.iter().map(|name| (&next, &out, name));
+            for (from, to, name) in away.chain(back).take(renames) {
+                rename(&from.join(name), &to.join(name)).unwrap();
+            }
+            assert_eq!(is_interrupted(&out), renames < 6, "{renames}");
+            finish(&out).unwrap();
+            for name in ["tiles/0_0.png", "keyframes.log", "map.toml"] {
+                assert_eq!(content(&out, name), "later", "{renames}");
+            }
+            assert_eq!(content(&out, "map.png"), "a picture");
+            assert_eq!(self::names(&out).unwrap().len(), 4, "{renames}");
+        }
+    }
+
+    #[test]
+    fn a_map_that_was_not_written_to_its_end_is_removed_and_the_earlier_one_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path();
+        write_all(out, "earlier");
+        write_all(&out.join(NEXT), "half of");
+        fs::remove_file(out.join(NEXT).join("map.toml")).unwrap();
+        assert!(!is_interrupted(out));
+        finish(out).unwrap();
+        for name in ["tiles/0_0.png", "keyframes.log", "map.toml"] {
+            assert_eq!(content(out, name), "earlier");
+        }
+        assert_eq!(names(out).unwrap().len(), 3);
     }
 
     #[test]
