@@ -9,6 +9,7 @@ pub mod backend;
 mod compensation;
 mod config;
 mod error;
+mod external;
 mod learned;
 mod library;
 pub mod model;

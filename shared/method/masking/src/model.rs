@@ -5,12 +5,12 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use gyre_radar::{RasterConfig, Sampling};
+use gyre_radar::{RasterConfig, Sampling, quoted};
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
 use thiserror::Error;
 
-use crate::MaskingConfig;
+use crate::{MaskingConfig, external::external_file};
 
 /// The largest model: hundreds of times that of a mask.
 const MAX_BYTES: u64 = 1 << 30;
@@ -114,6 +114,18 @@ pub enum ModelError {
         expected: String,
         /// The actual checksum.
         actual: String,
+    },
+    /// The file has weights that are in another one, which no checksum covers.
+    #[error(
+        "{path} keeps weights in another file, {}, which the SHA-256 of its card does not cover: write them into it, in Python by \
+         `onnx.save(onnx.load(NAME), NAME)` of the package onnx, and its new SHA-256 into the card",
+        quoted(.file)
+    )]
+    External {
+        /// The model's file.
+        path: PathBuf,
+        /// The name of the other file.
+        file: String,
     },
     /// The card's checksum differs from that of the configuration.
     #[error(
@@ -260,7 +272,7 @@ impl Model {
     ///
     /// # Errors
     /// As [`Card::read`]; rasters of another size; a file with another checksum than its card
-    /// states.
+    /// states, or with weights in another file.
     pub fn read(config: &MaskingConfig, raster: &RasterConfig) -> Result<Self, ModelError> {
         let card = Card::read(config)?;
         let path = config.model.as_deref().ok_or(ModelError::NotNamed)?;
@@ -274,12 +286,18 @@ impl Model {
             }
         })?;
         let actual = hexadecimal(&Sha256::digest(&bytes));
-        match actual.eq_ignore_ascii_case(&card.model.sha256) {
-            true => Ok(Self { card, file, bytes }),
-            false => Err(ModelError::Checksum {
+        if !actual.eq_ignore_ascii_case(&card.model.sha256) {
+            return Err(ModelError::Checksum {
                 path: file,
                 expected: card.model.sha256,
                 actual,
+            });
+        }
+        match external_file(&bytes) {
+            None => Ok(Self { card, file, bytes }),
+            Some(other) => Err(ModelError::External {
+                path: file,
+                file: other,
             }),
         }
     }

@@ -4,6 +4,7 @@ use std::fs;
 
 use gyre_masking::{Backend, network::Network};
 use ndarray::Array3;
+use rten_onnx::onnx::{DataLocation, ModelProto, StringStringEntryProto};
 
 use super::{rejected, with_valid_checksum};
 use crate::common::{N, backends, card, learned_by, raster};
@@ -19,6 +20,33 @@ fn a_model_that_the_backend_cannot_read_is_rejected() {
             let config = learned_by(backend, card);
             rejected(&config, &raster(), &[&cannot, "single-31.onnx"]);
         }
+    }
+}
+
+/// Both runtimes would compute with whatever the other file has, and one of them takes it from the
+/// current folder.
+#[test]
+fn weights_in_another_file_are_rejected_with_the_remedy() {
+    let bytes = fs::read(card("single-31").with_extension("onnx")).unwrap();
+    let mut model = ModelProto::parse_buf(&bytes).unwrap();
+    let weights = &mut model.graph.as_mut().unwrap().initializer[0];
+    weights.raw_data = None;
+    weights.float_data.clear();
+    weights.data_location = Some(DataLocation::EXTERNAL);
+    weights.external_data = vec![StringStringEntryProto {
+        key: Some("location".to_owned()),
+        value: Some("single-31.onnx.data".to_owned()),
+    }];
+    let (folder, card) = with_valid_checksum(&model.write_buf().unwrap());
+    let beside = folder.path().join("single-31.onnx.data");
+    fs::write(beside, [0; 36]).unwrap();
+    for backend in backends() {
+        let words = [
+            "single-31.onnx keeps weights in another file, \"single-31.onnx.data\"",
+            "`onnx.save(onnx.load(NAME), NAME)`",
+            "its new SHA-256 into the card",
+        ];
+        rejected(&learned_by(backend, &card), &raster(), &words);
     }
 }
 
