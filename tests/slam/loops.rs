@@ -1,11 +1,18 @@
 //! Results of a run with SLAM: a drive that comes back to its start is corrected by loops, and the
 //! files are the same bytes whatever happens to the run.
 
-use std::fs;
+use std::{fs, process::Command};
 
 use gyre_estimation::G2o;
+use gyre_geometry::xy_yaw;
 
-use crate::common::Run;
+use crate::common::{Ended, Run, python};
+
+/// Reads a graph by GTSAM, and prints its factors, its values, and the last pose.
+const GTSAM: &str = "import gtsam, sys
+graph, poses = gtsam.readG2o(sys.argv[1], False)
+last = poses.atPose2(poses.size() - 1)
+print(graph.size(), poses.size(), last.x(), last.y(), last.theta())";
 
 const FILES: [&str; 5] = [
     "trajectory_slam.tum",
@@ -49,6 +56,42 @@ fn a_drive_that_comes_back_is_corrected_by_loops() {
         };
         assert_eq!(stamps("trajectory_slam.tum"), stamps("trajectory.tum"));
     }
+}
+
+#[test]
+fn gtsam_reads_all_of_a_graph() {
+    let can = Command::new(python()).args(["-c", "import gtsam"]).output();
+    if !can.is_ok_and(|output| output.status.success()) {
+        println!(
+            "skipped: {} has no package gtsam, or GYRE_PYTHON names another",
+            python()
+        );
+        return;
+    }
+    let run = run("graph");
+    run.complete();
+    let mut command = Command::new(python());
+    command.args(["-c", GTSAM]).arg(run.out().join("graph.g2o"));
+    let read = Ended::of(command);
+    read.succeeded();
+    let read: Vec<f64> = read
+        .stdout
+        .split_whitespace()
+        .map(|number| number.parse().unwrap())
+        .collect();
+    let graph = G2o::parse(&run.result("graph.g2o")).unwrap();
+    let [x, y, yaw] = xy_yaw(&graph.poses[graph.poses.len() - 1]);
+    let expected = [
+        graph.constraints.len() as f64,
+        graph.poses.len() as f64,
+        x,
+        y,
+        yaw,
+    ];
+    for (read, expected) in read.iter().zip(expected) {
+        assert!((read - expected).abs() < 1e-9, "{read} for {expected}");
+    }
+    assert_eq!(read.len(), expected.len());
 }
 
 #[test]

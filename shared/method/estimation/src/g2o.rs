@@ -129,7 +129,6 @@ impl G2o {
             let [x, y, yaw] = xy_yaw(pose);
             line(&mut text, format_args!("VERTEX_SE2 {id} {x} {y} {yaw}"));
         }
-        line(&mut text, format_args!("FIX 0"));
         for Constraint {
             from, to, motion, ..
         } in constraints
@@ -148,6 +147,8 @@ impl G2o {
                 ),
             );
         }
+        // GTSAM reads no edge behind a line that is neither a vertex nor an edge.
+        line(&mut text, format_args!("FIX 0"));
         text
     }
 }

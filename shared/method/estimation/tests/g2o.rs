@@ -28,6 +28,20 @@ fn a_file_written_comes_back() {
     }
 }
 
+/// GTSAM 4.3 reads edges up to the first line that it does not know, and says nothing.
+#[test]
+fn no_line_that_gtsam_does_not_know_is_before_an_edge() {
+    let drive = Drive::new(40, 20, ODOMETRY, 1);
+    let poses = vec![Pose::identity(); 40];
+    let text = G2o::write(&poses, drive.odometry.iter().copied());
+    let is_known = |line: &&str| line.starts_with("VERTEX_SE2 ") || line.starts_with("EDGE_SE2 ");
+    let read: Vec<&str> = text.lines().take_while(is_known).collect();
+    let edges = read.iter().filter(|line| line.starts_with("EDGE_SE2 "));
+    assert_eq!((edges.count(), read.len()), (39, 79));
+    let rest: Vec<&str> = text.lines().skip(79).collect();
+    assert_eq!(rest, ["FIX 0"]);
+}
+
 #[test]
 fn the_information_of_an_edge_lies_along_the_axes_of_its_end() {
     // A left turn: along the axes of the end, x is certain to 0.1 m and y to 0.2 m; along those of
