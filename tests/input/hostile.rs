@@ -76,18 +76,48 @@ fn options_of_a_recording_without_end_are_refused() {
     limited(&["inspect", path(copy.path())]).refused_with(&["dataset.toml", "16 MB"]);
 }
 
-/// Nobody writes to the pipe, so that to open it would wait for ever.
+/// Nobody writes to these pipes, so that to open one waits for ever.
 #[test]
-fn a_pipe_in_place_of_options_is_refused_at_once() {
+fn a_pipe_in_place_of_a_file_is_refused_at_once() {
+    let at_once = |arguments: &[&str]| {
+        let mut command = Command::new(crate::PROGRAM);
+        command.args(arguments);
+        Ended::of(wrapped(&["timeout", "20"], &command))
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let configuration = folder.path().join("run.toml");
+    fs::write(&configuration, "").unwrap();
+    let out = folder.path().join("out");
+    let run = |data: &str| {
+        let [configuration, out] = [&configuration, &out].map(|file| path(file));
+        at_once(&["run", configuration, "--data", data, "--out", out])
+    };
+    let is_pipe = "it is a pipe, not a file";
     let copy = recording::copy(2);
-    let file = copy.path().join("dataset.toml");
-    let _ = fs::remove_file(&file);
-    let made = Command::new("mkfifo").arg(&file).status();
-    assert!(made.unwrap().success());
-    let mut command = Command::new(crate::PROGRAM);
-    command.args(["inspect", path(copy.path())]);
-    let ended = Ended::of(wrapped(&["timeout", "20"], &command));
-    ended.refused_with(&["dataset.toml", "it is a pipe, not a file"]);
+    let data = path(copy.path());
+    replace_by_pipe(&copy.path().join("dataset.toml"));
+    at_once(&["inspect", data]).refused_with(&["dataset.toml", is_pipe]);
+    run(data).refused_with(&["dataset.toml", is_pipe]);
+    let copy = recording::copy(2);
+    for image in recording::images(copy.path()) {
+        replace_by_pipe(&image);
+    }
+    at_once(&["inspect", path(copy.path())]).refused_with(&["holds no PNG images"]);
+    let recorded = folder.path().join("drive.mcap");
+    replace_by_pipe(&recorded);
+    at_once(&["inspect", path(&recorded)]).refused_with(&["drive.mcap", is_pipe]);
+    run(path(&recorded)).refused_with(&["drive.mcap", is_pipe]);
+    fs::remove_file(&recorded).unwrap();
+    fs::create_dir(&recorded).unwrap();
+    run(path(&recorded)).refused_with(&["there is no recording", "drive.mcap"]);
+    replace_by_pipe(&configuration);
+    run(path(&recorded)).refused_with(&["run.toml", is_pipe]);
+}
+
+fn replace_by_pipe(file: &Path) {
+    let _ = fs::remove_file(file);
+    let made = Command::new("mkfifo").arg(file).status();
+    assert!(made.unwrap().success(), "{}", file.display());
 }
 
 #[test]

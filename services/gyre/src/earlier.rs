@@ -337,7 +337,7 @@ pub fn resume(out: &Out, begun: &Begun) -> Result<(), Failure> {
         journal::cut(&journal::path(out.path()), begun.poses)?;
     }
     let (path, identity) = (out.join(CONFIGURATION), &begun.identity);
-    let found = fs::read_to_string(&path).ok();
+    let found = storage::read_text(&path, storage::SETTINGS).ok();
     let found: Option<toml::Table> = found.and_then(|text| text.parse().ok());
     match found.as_ref() == Some(&identity.configuration) {
         true => Ok(()),

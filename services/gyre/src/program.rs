@@ -4,7 +4,7 @@
 //! from the file that the supervisor executes, which stays while it runs, even if another build
 //! takes its name.
 
-use std::{collections::BTreeMap, fs::File, io, path::Path};
+use std::{collections::BTreeMap, io, path::Path};
 
 use gyre_configuration::Configuration;
 use gyre_results::Programs;
@@ -20,7 +20,7 @@ use crate::plan::stage_plans;
 /// A file that cannot be read.
 pub fn sha256(path: &Path) -> io::Result<String> {
     let mut digest = Sha256::new();
-    io::copy(&mut File::open(path)?, &mut digest)?;
+    io::copy(&mut gyre_storage::open(path)?, &mut digest)?;
     Ok(format!("{:x}", digest.finalize()))
 }
 

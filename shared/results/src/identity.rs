@@ -2,7 +2,7 @@
 
 use std::{
     collections::{BTreeMap, BTreeSet},
-    fs, io,
+    io,
     path::Path,
 };
 
@@ -144,10 +144,11 @@ impl Identity {
     }
 
     fn read_file(path: &Path) -> Result<Self, String> {
-        let text = fs::read_to_string(path).map_err(|error| match error.kind() {
-            io::ErrorKind::NotFound => "is missing".to_owned(),
-            _ => format!("cannot be read ({error})"),
-        })?;
+        let text =
+            storage::read_text(path, storage::SETTINGS).map_err(|error| match error.kind() {
+                io::ErrorKind::NotFound => "is missing".to_owned(),
+                _ => format!("cannot be read ({error})"),
+            })?;
         if text.is_empty() {
             return Err("is empty".to_owned());
         }

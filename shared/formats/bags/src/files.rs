@@ -1,7 +1,7 @@
 //! The files of a bag.
 
 use std::{
-    fs::{self, File},
+    fs,
     io::Read,
     path::{Component, Path, PathBuf},
 };
@@ -57,7 +57,7 @@ fn has_metadata(folder: &Path) -> bool {
 /// Returns the profile of an MCAP file; `None` of any other.
 fn profile(path: &Path) -> Option<String> {
     let mut head = Vec::new();
-    let file = File::open(path).ok()?;
+    let file = gyre_storage::open(path).ok()?;
     file.take(MAX_HEADER_BYTES).read_to_end(&mut head).ok()?;
     let record = head.strip_prefix(MAGIC)?.strip_prefix(&[op::HEADER])?;
     let (length, body) = record.split_first_chunk::<8>()?;

@@ -1,10 +1,7 @@
 //! The order of a bag's files by the times of their messages. Names do not give it: tools number
 //! parts in several ways, and a folder may have several bags.
 
-use std::{
-    fs::File,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use crate::{BagError, spans::spans};
 
@@ -26,7 +23,7 @@ struct Timed {
 pub(crate) fn by_time(folder: &Path, paths: Vec<PathBuf>) -> Result<Vec<PathBuf>, BagError> {
     let mut files = Vec::new();
     for path in paths {
-        let file = File::open(&path).map_err(|error| BagError::io(&path, error))?;
+        let file = gyre_storage::open(&path).map_err(|error| BagError::io(&path, error))?;
         let times_ns = spans(&path, &file)?.times_ns;
         files.push(Timed { path, times_ns });
     }

@@ -55,7 +55,7 @@ pub(crate) struct BagFile {
 impl BagFile {
     /// Opens a file, and returns the spans of its messages.
     pub fn open(path: &Path) -> Result<(Self, Vec<Span>), BagError> {
-        let file = File::open(path).map_err(|error| BagError::io(path, error))?;
+        let file = gyre_storage::open(path).map_err(|error| BagError::io(path, error))?;
         let found = spans(path, &file)?;
         let mut bag = Self {
             path: path.to_owned(),

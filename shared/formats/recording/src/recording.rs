@@ -214,7 +214,7 @@ impl Recording {
 impl Part {
     /// Opens a file: its head, and where its messages are.
     fn open(path: &Path) -> Result<(Head, Self, Places), RecordingError> {
-        let file = File::open(path).map_err(|source| RecordingError::Io {
+        let file = gyre_storage::open(path).map_err(|source| RecordingError::Io {
             path: path.to_owned(),
             source,
         })?;

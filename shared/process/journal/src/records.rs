@@ -81,7 +81,7 @@ impl Iterator for Records {
 impl Places {
     pub fn open(path: &Path) -> Result<Option<Self>, JournalError> {
         let failed = StorageError::at("read", path);
-        let file = match File::open(path) {
+        let file = match gyre_storage::open(path) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
             opened => opened.map_err(&failed)?,
         };

@@ -1,7 +1,6 @@
 //! Reads `odometry.csv` back, by the names in its header: other columns may be added or removed.
 
 use std::{
-    fs::File,
     io::{self, BufReader, Read},
     path::Path,
 };
@@ -50,8 +49,8 @@ struct MotionRow {
 /// # Errors
 /// A file that cannot be read, a missing column, a row that is damaged.
 pub fn read(path: &Path) -> Result<Vec<TimedMotion>, Failure> {
-    let file =
-        File::open(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
+    let file = gyre_storage::open(path)
+        .map_err(|error| format!("cannot read {}: {error}", path.display()))?;
     let lines = ShortLines {
         text: BufReader::new(file),
         line: 0,

@@ -6,7 +6,7 @@ use std::io::ErrorKind;
 use std::path::Path;
 
 use gyre_radar::ImageSource as _;
-use gyre_storage::{SETTINGS, StorageError, read_text};
+use gyre_storage::{SETTINGS, StorageError, read_bytes, read_text};
 
 use crate::config::SimulationConfig;
 use crate::error::SimulatorError;
@@ -15,6 +15,9 @@ use crate::simulated_drive::SimulatedDrive;
 
 /// The file with the configuration that made a dataset.
 pub const MADE_BY: &str = "simulation.toml";
+
+/// The largest image that is compared, bytes: twice what a radar's image may have.
+const MAX_IMAGE_BYTES: u64 = 64 << 20;
 
 /// The file with the options to read it; see [`gyre_radar::open`].
 pub(super) const DATASET_OPTIONS: &str = "dataset.toml";
@@ -142,7 +145,7 @@ fn require_same(drive: &SimulatedDrive, index: usize, path: &Path) -> Result<(),
         path: path.to_owned(),
         source,
     })?;
-    let found = fs::read(path).map_err(SimulatorError::write(path))?;
+    let found = read_bytes(path, MAX_IMAGE_BYTES).map_err(SimulatorError::write(path))?;
     match found == encoded {
         true => Ok(()),
         false => Err(SimulatorError::OtherImage {

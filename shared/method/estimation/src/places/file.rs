@@ -119,7 +119,7 @@ impl PlaceIndex {
             path: path.to_owned(),
             source,
         };
-        let file = File::open(path).map_err(read)?;
+        let file = gyre_storage::open(path).map_err(read)?;
         let bytes = file.metadata().map_err(read)?.len();
         let mut from = Checked {
             stream: BufReader::new(file),

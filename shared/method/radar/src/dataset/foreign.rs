@@ -1,6 +1,6 @@
 //! Files that people have of a recording before it is unpacked or converted, by their first bytes.
 
-use std::fs::{self, File};
+use std::fs;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -53,11 +53,8 @@ const KINDS: [Kind; 10] = [
 
 /// Returns an error that says what a file is, if it is one of these.
 pub(crate) fn foreign(path: &Path) -> Option<OpenError> {
-    if !fs::metadata(path).ok()?.is_file() {
-        return None;
-    }
     let mut head = Vec::new();
-    let file = File::open(path).ok()?;
+    let file = gyre_storage::open(path).ok()?;
     file.take(HEAD_BYTES).read_to_end(&mut head).ok()?;
     let has = |(at, signature, ..): &&Kind| {
         head.get(*at..)

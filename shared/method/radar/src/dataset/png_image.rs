@@ -1,6 +1,5 @@
 //! Grey PNG images, decoded into the caller's memory.
 
-use std::fs::File;
 use std::io::{self, BufRead, BufReader, Cursor, Read, Seek};
 use std::ops::RangeInclusive;
 use std::path::Path;
@@ -19,7 +18,7 @@ const DECODER_BYTES: usize = 4 << 20;
 /// Reads the size of a PNG from its header.
 pub(crate) fn read_size(path: &Path) -> Result<ImageSize, ReadError> {
     let mut header = [0; HEADER_BYTES];
-    let mut file = File::open(path).map_err(|e| io_error(path, e))?;
+    let mut file = gyre_storage::open(path).map_err(|e| io_error(path, e))?;
     let mut filled = 0;
     while filled < HEADER_BYTES {
         match file.read(&mut header[filled..]) {
@@ -36,7 +35,7 @@ pub(crate) fn read_size(path: &Path) -> Result<ImageSize, ReadError> {
 /// if it cannot be read, or has no such row.
 pub(crate) fn first_bytes<const N: usize>(path: &Path) -> Option<[u8; N]> {
     read_size(path).ok()?;
-    let file = BufReader::new(File::open(path).ok()?);
+    let file = BufReader::new(gyre_storage::open(path).ok()?);
     let mut reader = decoder(file).read_info().ok()?;
     // The first row of an interlaced image is that of its first pass.
     if reader.info().interlaced {
@@ -153,7 +152,7 @@ impl ImageReader {
     }
 
     fn load(&mut self, path: &Path) -> Result<(), ReadError> {
-        let file = File::open(path).map_err(|e| io_error(path, e))?;
+        let file = gyre_storage::open(path).map_err(|e| io_error(path, e))?;
         self.file.clear();
         // One byte more than accepted distinguishes a file of exactly the maximum size from a
         // larger one.
