@@ -1,6 +1,6 @@
 //! `gyre localise` as a whole: a run is mapped, and other drives are found in its map, or are not.
 
-use std::{fs, path::Path, process::Stdio};
+use std::{fs, os::unix::fs::MetadataExt, path::Path, process::Stdio};
 
 use gyre_geometry::Pose;
 use gyre_radar::read_trajectory;
@@ -87,6 +87,13 @@ fn a_drive_on_another_day_is_found_in_the_map_of_a_run() {
     localise(&run, 3, &again).succeeded();
     let bytes = |out: &Path| fs::read(out.join("fixes.csv")).unwrap();
     assert_eq!(bytes(&out), bytes(&again));
+    // Its results are their user's alone, as those of a run.
+    let map = run.folder().join("map");
+    let fixes = out.join("fixes.csv");
+    for file in [map.join("map.toml"), map.join("keyframes.log"), fixes] {
+        let mode = fs::metadata(&file).unwrap().mode();
+        assert_eq!(mode & 0o777, 0o600, "{}: {mode:o}", file.display());
+    }
 }
 
 #[test]

@@ -94,28 +94,10 @@ fn doctor(arguments: &DoctorArguments) -> Result<ExitCode, Failure> {
     gyre_doctor::doctor(arguments, &checked.footprint, checked.window.observers)
 }
 
-/// Returns whether the files of a command are its user's alone: those of a run and of its
-/// observers, and of what they start. The umask of that may be the one that the transport sets for
-/// a moment.
+/// Returns whether the files of a command are its user's alone: all but a simulated recording. The
+/// umask of what a run starts may be the one that the transport sets for a moment.
 fn is_private(command: &Command) -> bool {
-    matches!(
-        command,
-        Command::Run(_)
-            | Command::Stage { .. }
-            | Command::Guard
-            | Command::Up(_)
-            | Command::Echo(_)
-            | Command::Watch(_)
-            | Command::Ros2(_)
-            | Command::Shadow(_)
-            | Command::Batch(_)
-            | Command::BatchDrive(_)
-            | Command::Stress(_)
-            | Command::StressHelper { .. }
-            | Command::Record(_)
-            | Command::Link(_)
-            | Command::Conformance(_)
-    )
+    !matches!(command, Command::Simulate(_))
 }
 
 /// Prints the schema of configurations, or their reference.
