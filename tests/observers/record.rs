@@ -343,7 +343,7 @@ fn a_recording_from_the_middle_of_a_drive_is_refused_where_all_messages_are_need
     record
         .arg("record")
         .arg(run.out())
-        .arg("--to")
+        .args(["--topics", "scan,masked", "--to"])
         .arg(file(&run));
     let mut recorder = record.spawn().unwrap();
     running.finish().succeeded();
@@ -356,6 +356,22 @@ fn a_recording_from_the_middle_of_a_drive_is_refused_where_all_messages_are_need
     replay
         .finish()
         .refused_with(&["lacks message 0 of topic `masked`"]);
+}
+
+#[test]
+fn a_recording_without_the_topic_that_is_played_is_refused_with_how_to_record_it() {
+    let run = recorded(&simulated());
+    run.complete();
+    let without = simulated().data(&file(&run)).argument("--from", "masked");
+    without.finish().refused_with(&[
+        "was recorded without the topic `masked`",
+        "record.topics",
+        "without --from",
+    ]);
+    // As in docs/record.md.
+    let run = recorded(&simulated()).set("record.topics=['scan','masked','pose']");
+    let odometry = run.complete();
+    assert_eq!(replay(&file(&run), &["--from", "masked"]), odometry);
 }
 
 #[test]

@@ -32,10 +32,20 @@ impl Player {
     /// Opens a recording, and checks that it has each message of each topic from the first one on.
     ///
     /// # Errors
-    /// One sentence: it cannot be read, or lacks a message.
+    /// One sentence: it cannot be read, or lacks a topic or a message.
     pub fn open(config: &SourceConfig, topics: Vec<&'static str>) -> Result<Self, String> {
         let recording = gyre_recording::open_recording(&config.data).map_err(|e| e.to_string())?;
         let path = config.data.display();
+        let recorded = &recording.head().topics;
+        if let Some(topic) = topics
+            .iter()
+            .find(|it| !recorded.iter().any(|name| name == **it))
+        {
+            return Err(format!(
+                "{path} was recorded without the topic `{topic}`, which the stages after it need: record it too, by \
+                 record.topics or gyre record --topics; the scans can be played without --from"
+            ));
+        }
         let last = |topic: &&'static str| recording.entries(topic).last().map(|entry| entry.seq);
         let end = topics
             .iter()
@@ -52,7 +62,7 @@ impl Player {
                 let missing = expected.start.saturating_sub(1);
                 return Err(format!(
                     "{path} lacks message {missing} of topic `{topic}`, which the stages after it need from the first one on: the \
-                     recorder missed it, or did not record the topic (record.topics); its scans can be played without --from"
+                     recorder missed it; its scans can be played without --from"
                 ));
             }
         }
