@@ -41,7 +41,18 @@ fn a_wrong_range_offset_is_named_and_put_right_by_the_file() {
         "{said}"
     );
     let picture = fs::read_to_string(out.path().join("calibration.svg")).unwrap();
-    assert!(picture.contains("as configured") && picture.contains("as found"));
+    assert!(picture.contains("as configured") && picture.contains("as proposed"));
+    let overlap: Vec<f64> = said
+        .lines()
+        .last()
+        .filter(|line| line.starts_with("overlap of the scans"))
+        .map(|line| {
+            line.split(' ')
+                .filter_map(|word| word.parse().ok())
+                .collect()
+        })
+        .unwrap();
+    assert!(overlap.len() == 2 && overlap[1] > overlap[0], "{said}");
 
     let file = out.path().join("calibration.toml");
     let found_m = range_offset_m(&fs::read_to_string(&file).unwrap());

@@ -61,6 +61,7 @@ pub fn calibrate(arguments: &CalibrateArguments) -> Result<ExitCode, Failure> {
         section.display(),
         picture.display()
     ))?;
+    print::line(found.overlap())?;
     Ok(ExitCode::SUCCESS)
 }
 

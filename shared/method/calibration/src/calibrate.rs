@@ -7,7 +7,7 @@ use crate::{
     CalibrationError, Drive, Estimate, Fact, FactVector, Mounting, Revisit, Track,
     drift::{self, MAX_REVISITS},
     facts::FACTS,
-    overlap::{Pair, System, along, slopes},
+    overlap::{Pair, System, along, overlaps, slopes},
     revisits,
 };
 
@@ -28,8 +28,8 @@ const USUAL_SPEED_MPS: f64 = 10.0;
 const ROW_TIME_SHARE: f64 = 0.05;
 /// Revisits needed for the drift.
 const MIN_REVISITS: usize = 5;
-/// Facts that are solved for together. The others only confirm: odometry needs no correction of
-/// them.
+/// Facts that are solved for together, as far as the drive determines them. The others only
+/// confirm: odometry needs no correction of them.
 const SOLVED: [Fact; 3] = [Fact::RangeOffset, Fact::EccentricityCos, Fact::Doppler];
 
 /// A fact with its change against the configured value.
@@ -45,6 +45,13 @@ pub struct FactEstimate {
     pub by_drift: Option<Estimate>,
 }
 
+impl FactEstimate {
+    /// Returns whether the drive says more about the fact than was known.
+    pub fn is_useful(&self) -> bool {
+        self.change.sigma < self.fact.useful_sigma()
+    }
+}
+
 /// The constants of a radar, estimated from a drive.
 #[derive(Clone, Debug)]
 pub struct Calibration {
@@ -58,9 +65,14 @@ pub struct Calibration {
     /// The last solution changed the facts by less than their standard deviations. Otherwise they
     /// are not to be trusted.
     pub has_settled: bool,
+    /// The facts that are corrected: those that the drive determines, if the scans overlap more
+    /// with all of them.
+    pub proposed: Vec<Fact>,
+    /// Mean overlap of the pairs as configured, and with the facts that the drive determines.
+    pub overlap: [f64; 2],
     /// The mounting, by the corrected track.
     pub mounting: Option<Mounting>,
-    /// The track as configured, and the one with the facts as found.
+    /// The track as configured, and the one with the proposed facts.
     pub before: Track,
     /// See [`Self::before`].
     pub after: Track,
@@ -69,12 +81,16 @@ pub struct Calibration {
 impl Calibration {
     /// Returns the changes of the facts that are corrected.
     pub fn change(&self) -> FactVector {
-        let mut change = FactVector::zeros();
-        for fact in SOLVED {
-            change[fact as usize] = self.facts[fact as usize].change.value;
-        }
-        change
+        change_of(&self.facts, &self.proposed)
     }
+}
+
+fn change_of(facts: &[FactEstimate; FACTS], corrected: &[Fact]) -> FactVector {
+    let mut change = FactVector::zeros();
+    for &fact in corrected {
+        change[fact as usize] = facts[fact as usize].change.value;
+    }
+    change
 }
 
 /// Finds the facts of a drive.
@@ -82,33 +98,85 @@ impl Calibration {
 /// # Errors
 /// A drive that does not determine them.
 pub fn calibrate(drive: &Drive) -> Result<Calibration, CalibrationError> {
-    let mut change = FactVector::zeros();
-    let before = track(drive, &change)?;
+    let none = FactVector::zeros();
+    let before = track(drive, &none)?;
     require_motion(drive, &before)?;
-    let revisits = evenly(revisits::find(drive, &before, &change)?, &before);
-    let (mut at, mut found) = (before.clone(), round(drive, &before, &revisits, &change)?);
-    for _ in 1..ROUNDS {
-        if found.has_converged() {
-            break;
+    let revisits = evenly(revisits::find(drive, &before, &none)?, &before);
+    let mut solution = Solution::find(drive, &before, &revisits, &SOLVED)?;
+    let mut facts = solution.facts;
+    let mut proposed = solution.determined();
+    // What the drive does not tell stays as configured, and what it tells is that beside it.
+    while !proposed.is_empty() && proposed.len() < solution.free.len() {
+        solution = Solution::find(drive, &before, &revisits, &proposed)?;
+        for &fact in &proposed {
+            facts[fact as usize] = solution.facts[fact as usize];
         }
-        change += found.step();
-        at = track(drive, &change)?;
-        found = round(drive, &at, &revisits, &change)?;
+        proposed = solution.determined();
     }
-    let by_drift = drift_of(drive, &at, &revisits, &change)?;
-    let facts = facts(drive, &found, &change, by_drift);
-    let mut calibration = Calibration {
+    let change = change_of(&facts, &proposed);
+    let mut after = track(drive, &change)?;
+    let pairs = pairs(&before, &revisits);
+    let overlap = overlaps(drive, &pairs, [(&before, &none), (&after, &change)]);
+    if overlap[1] < overlap[0] {
+        proposed.clear();
+        after = before.clone();
+    }
+    Ok(Calibration {
         facts,
-        pairs: found.pairs,
-        has_settled: found.has_converged(),
+        pairs: solution.round.pairs,
+        has_settled: solution.round.has_converged(),
         revisits,
-        mounting: None,
+        mounting: Mounting::of(&after.twists),
+        proposed,
+        overlap,
         before,
-        after: at,
-    };
-    calibration.after = track(drive, &calibration.change())?;
-    calibration.mounting = Mounting::of(&calibration.after.twists);
-    Ok(calibration)
+        after,
+    })
+}
+
+/// The facts that fit best while the others stay as configured.
+struct Solution {
+    free: Vec<Fact>,
+    facts: [FactEstimate; FACTS],
+    round: Round,
+}
+
+impl Solution {
+    fn find(
+        drive: &Drive,
+        before: &Track,
+        revisits: &[Revisit],
+        free: &[Fact],
+    ) -> Result<Self, CalibrationError> {
+        let (mut at, mut change) = (before.clone(), FactVector::zeros());
+        let mut found = round(drive, &at, revisits, &change, free)?;
+        for _ in 1..ROUNDS {
+            if found.has_converged() {
+                break;
+            }
+            change += found.step();
+            at = track(drive, &change)?;
+            found = round(drive, &at, revisits, &change, free)?;
+        }
+        let by_drift = match free.contains(&Fact::EccentricityCos) {
+            true => drift_of(drive, &at, revisits, &change)?,
+            false => None,
+        };
+        Ok(Self {
+            free: free.to_vec(),
+            facts: facts(drive, &found, &change, by_drift),
+            round: found,
+        })
+    }
+
+    /// Returns the facts that the drive determines; none if they have not settled.
+    fn determined(&self) -> Vec<Fact> {
+        let is_useful = |fact: &&Fact| self.facts[**fact as usize].is_useful();
+        match self.round.has_converged() {
+            true => self.free.iter().filter(is_useful).copied().collect(),
+            false => Vec::new(),
+        }
+    }
 }
 
 /// The mean of the tracks in both directions of time: errors of the processing that depend on the
@@ -131,6 +199,7 @@ fn require_motion(drive: &Drive, track: &Track) -> Result<(), CalibrationError> 
 
 /// The solution around one change of the facts.
 struct Round {
+    free: Vec<Fact>,
     solved: [Estimate; FACTS],
     checked: [Estimate; FACTS],
     pairs: usize,
@@ -139,9 +208,8 @@ struct Round {
 impl Round {
     fn has_converged(&self) -> bool {
         let small = |estimate: &Estimate| estimate.value.abs() < CONVERGED * estimate.sigma;
-        SOLVED
-            .iter()
-            .all(|fact| small(&self.solved[*fact as usize]))
+        let mut free = self.free.iter();
+        free.all(|fact| small(&self.solved[*fact as usize]))
     }
 
     fn step(&self) -> FactVector {
@@ -156,24 +224,29 @@ fn evenly(mut revisits: Vec<Revisit>, track: &Track) -> Vec<Revisit> {
     revisits.into_iter().step_by(stride).collect()
 }
 
+/// The pairs of scans along a track, and the revisits.
+fn pairs(track: &Track, revisits: &[Revisit]) -> Vec<Pair> {
+    let mut pairs = along(track);
+    pairs.extend(revisits.iter().map(Pair::from));
+    pairs
+}
+
 fn round(
     drive: &Drive,
     track: &Track,
     revisits: &[Revisit],
     change: &FactVector,
+    free: &[Fact],
 ) -> Result<Round, CalibrationError> {
-    let mut pairs = along(track);
-    pairs.extend(revisits.iter().map(Pair::from));
-    let system = System::measure(drive, track, &pairs, change);
-    let solved = system
-        .solve(&SOLVED)
-        .ok_or(CalibrationError::Undetermined)?;
+    let system = System::measure(drive, track, &pairs(track, revisits), change);
+    let solved = system.solve(free).ok_or(CalibrationError::Undetermined)?;
     let unknown = [Estimate {
         value: 0.0,
         sigma: f64::INFINITY,
     }; FACTS];
     let checked = system.solve(&Fact::ALL).unwrap_or(unknown);
     Ok(Round {
+        free: free.to_vec(),
         solved,
         checked,
         pairs: system.len(),
@@ -243,10 +316,9 @@ fn facts(
             Fact::Doppler => error_m / USUAL_SPEED_MPS,
             Fact::RowTime => ROW_TIME_SHARE,
         };
-        let solved = if SOLVED.contains(&fact) {
-            found.solved[k]
-        } else {
-            found.checked[k]
+        let solved = match found.free.contains(&fact) {
+            true => found.solved[k],
+            false => found.checked[k],
         };
         let by_overlap = Estimate {
             value: solved.value + change[k],

@@ -38,6 +38,17 @@ impl Fact {
         Self::RowTime,
     ];
 
+    /// Returns the standard deviation from which on a drive says no more about the fact than is
+    /// known of any radar. Of facts that only confirm it is 0.
+    pub fn useful_sigma(self) -> f64 {
+        match self {
+            Self::RangeOffset => 0.2,
+            Self::EccentricityCos => 0.6e-3,
+            Self::Doppler => 0.01,
+            Self::EccentricitySin | Self::RowTime => 0.0,
+        }
+    }
+
     /// Returns a small change of the fact, for derivatives.
     pub fn step(self) -> f64 {
         match self {

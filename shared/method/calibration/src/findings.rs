@@ -1,5 +1,8 @@
 //! The constants that were found, beside the configured ones, and the evidence for each.
 
+#[cfg(test)]
+mod tests;
+
 use std::fmt;
 
 use gyre_radar::{Sense, SweepGeometry};
@@ -45,6 +48,8 @@ pub struct Constant {
     pub found: Estimate,
     /// The drive says more about it than was known.
     pub is_determined: bool,
+    /// It is written into the section for the configuration.
+    pub is_proposed: bool,
     /// The data that it rests on.
     pub basis: String,
 }
@@ -63,6 +68,8 @@ pub struct Found {
     /// Length of the path, m.
     pub path_m: f64,
     has_settled: bool,
+    /// Mean overlap of scans of one place as configured, and with what the drive determines.
+    overlap: [f64; 2],
     /// The constants but for the range resolution.
     pub constants: Vec<Constant>,
     /// The range resolution, if the length of the path is given.
@@ -101,7 +108,6 @@ impl Found {
                 ("m", 1.0),
                 geometry.range_offset_m.into(),
                 fact(Fact::RangeOffset),
-                0.2,
                 calibration,
             ),
             constant(
@@ -110,7 +116,6 @@ impl Found {
                 ("mrad", 1e3),
                 configured.eccentricity_rad,
                 fact(Fact::EccentricityCos),
-                0.6e-3,
                 calibration,
             ),
             constant(
@@ -119,7 +124,6 @@ impl Found {
                 ("s", 1.0),
                 doppler_s,
                 fact(Fact::Doppler),
-                0.01,
                 calibration,
             ),
         ];
@@ -127,26 +131,38 @@ impl Found {
             scans: drive.sweeps.len(),
             path_m,
             has_settled: calibration.has_settled,
+            overlap: calibration.overlap,
             constants,
             resolution: resolution(path_m, configured)?,
             others: others(drive, calibration, configured),
         })
     }
 
-    /// Returns the constants that are written: those that the drive determines.
-    pub fn determined(&self) -> impl Iterator<Item = &Constant> {
+    /// Returns the constants that are written.
+    pub fn proposed(&self) -> impl Iterator<Item = &Constant> {
         let solved = self
             .constants
             .iter()
-            .filter(|constant| constant.is_determined);
+            .filter(|constant| constant.is_proposed);
         solved.chain(self.resolution.as_ref().ok())
     }
 
-    /// Returns the constants that it does not determine.
-    pub fn undetermined(&self) -> impl Iterator<Item = &Constant> {
+    /// Returns the constants that stay as configured.
+    pub fn kept(&self) -> impl Iterator<Item = &Constant> {
         self.constants
             .iter()
-            .filter(|constant| !constant.is_determined)
+            .filter(|constant| !constant.is_proposed)
+    }
+
+    /// Returns the sentence on the overlap of the scans before and after.
+    pub fn overlap(&self) -> String {
+        let [before, after] = self.overlap;
+        let with = match after < before {
+            true => "with what was found, which is less: it is not proposed",
+            false if self.constants.iter().any(|it| it.is_proposed) => "with what is proposed",
+            false => "after: no constant that it determines is proposed",
+        };
+        format!("overlap of the scans  {before:.4} as configured, {after:.4} {with}")
     }
 }
 
@@ -156,7 +172,6 @@ fn constant(
     (unit, scale): (&'static str, f64),
     configured: f64,
     fact: &FactEstimate,
-    useful: f64,
     calibration: &Calibration,
 ) -> Constant {
     let found = Estimate {
@@ -194,7 +209,8 @@ fn constant(
         scale,
         configured,
         found,
-        is_determined: found.sigma < useful && calibration.has_settled,
+        is_determined: fact.is_useful() && calibration.has_settled,
+        is_proposed: calibration.proposed.contains(&fact.fact),
         basis,
     }
 }
@@ -230,6 +246,7 @@ fn resolution(
             sigma: value * PATH_ERROR,
         },
         is_determined: true,
+        is_proposed: true,
         basis: format!(
             "{distance_m:.1} m given for {path_m:.1} m of path, with the constants as found"
         ),
@@ -346,10 +363,11 @@ impl fmt::Display for Found {
                 found,
                 ..
             } = constant;
-            let verdict = match (constant.is_determined, constant.is_wrong()) {
+            let verdict = match (constant.is_determined, constant.is_proposed) {
                 (false, _) => "the drive does not tell it well enough",
-                (true, true) => "CONTRADICTS the configured value",
-                (true, false) => "agrees with the configured value",
+                (true, false) => "not proposed: the scans would overlap less",
+                _ if constant.is_wrong() => "CONTRADICTS the configured value",
+                _ => "agrees with the configured value",
             };
             writeln!(
                 f,

@@ -118,6 +118,25 @@ fn slopes_of(
     slopes
 }
 
+/// Returns the mean overlap of the same pairs of scans under several tracks with their changes of
+/// the facts.
+pub(crate) fn overlaps<const N: usize>(
+    drive: &Drive,
+    pairs: &[Pair],
+    tracks: [(&Track, &FactVector); N],
+) -> [f64; N] {
+    let of = |(track, change): (&Track, &FactVector)| slopes(drive, track, pairs, change);
+    let all = tracks.map(of);
+    // A pair that one of them does not determine would count for the others alone.
+    let common: Vec<usize> = (0..pairs.len())
+        .filter(|&pair| all.iter().all(|slopes| slopes[pair].is_some()))
+        .collect();
+    all.map(|slopes| {
+        let overlaps = common.iter().filter_map(|&pair| slopes[pair]);
+        overlaps.map(|slope| slope.overlap).sum::<f64>() / common.len().max(1) as f64
+    })
+}
+
 /// The slopes of the overlap of all pairs, and how they change with each fact.
 pub(crate) struct System {
     /// For each pair the scan that it belongs to, the slopes, and their derivatives.

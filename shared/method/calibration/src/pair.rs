@@ -40,6 +40,8 @@ pub(crate) struct PairSlope {
     /// The derivative of the overlap by the facts, for points of weight 1 in all: where they are
     /// right it vanishes.
     pub slope: FactVector,
+    /// The overlap, from 0 to 1.
+    pub overlap: f64,
 }
 
 impl View {
@@ -141,6 +143,7 @@ pub(crate) fn compare(drive: &Drive, a: &View, b: &View, initial: &Pose) -> Opti
     (sums.weight > 0.0).then(|| PairSlope {
         pose,
         slope: sums.slope / sums.weight,
+        overlap: 1.0 - sums.cost / sums.weight,
     })
 }
 

@@ -28,9 +28,13 @@ pub fn svg(drive: &Drive, calibration: &Calibration) -> String {
         2.0 * REACH_M
     );
     let none = FactVector::zeros();
+    let found = match calibration.proposed.is_empty() {
+        true => "nothing is proposed: as configured",
+        false => "as proposed",
+    };
     let panels = [
         ("as configured", &calibration.before, none),
-        ("as found", &calibration.after, calibration.change()),
+        (found, &calibration.after, calibration.change()),
     ];
     for (k, (name, track, change)) in panels.into_iter().enumerate() {
         let left = 16.0 + k as f64 * (SIDE + 16.0);

@@ -10,7 +10,7 @@ pub fn toml(found: &Found) -> String {
         "# Found by gyre calibrate from {} scans, {:.0} m.\n\n[dataset]\n",
         found.scans, found.path_m
     );
-    for constant in found.determined() {
+    for constant in found.proposed() {
         let digits = digits(constant.found.sigma);
         let _ = writeln!(
             text,
@@ -18,10 +18,14 @@ pub fn toml(found: &Found) -> String {
             constant.key, constant.found.value, constant.found.sigma, constant.basis
         );
     }
-    for constant in found.undetermined() {
+    for constant in found.kept() {
+        let reason = match constant.is_determined {
+            true => "makes the scans overlap less",
+            false => "is no better",
+        };
         let _ = writeln!(
             text,
-            "# {} stays as configured: {:.5} \u{b1} {:.5} is no better",
+            "# {} stays as configured: {:.5} \u{b1} {:.5} {reason}",
             constant.key, constant.found.value, constant.found.sigma
         );
     }

@@ -42,6 +42,8 @@ fn calibrated(profile: Profile) -> Calibration {
 /// Asserts that the constants are found within their uncertainty, and called wrong.
 fn assert_found(profile: Profile) {
     let found = calibrated(profile);
+    let [before, after] = found.overlap;
+    assert!(after > before, "{before}, {after}");
     let facts = [Fact::RangeOffset, Fact::EccentricityCos, Fact::Doppler];
     for (fact, wrong_by) in facts.into_iter().zip(WRONG_BY) {
         let change = found.facts[fact as usize].change;
@@ -50,6 +52,7 @@ fn assert_found(profile: Profile) {
         assert!(sigmas.abs() < 3.0, "{fact:?}: {change:?} for {}", -wrong_by);
         let is_called_wrong = change.value.abs() > 3.0 * change.sigma;
         assert!(is_called_wrong, "{fact:?}: {change:?} for {}", -wrong_by);
+        assert_eq!(found.change()[fact as usize], change.value, "{fact:?}");
     }
 }
 

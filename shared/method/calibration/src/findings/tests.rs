@@ -1,0 +1,58 @@
+use super::*;
+use crate::toml;
+
+/// An offset that the drive determines and that contradicts the configured one.
+fn found(is_proposed: bool, overlap: [f64; 2]) -> Found {
+    let offset = Constant {
+        key: "range_offset_m",
+        name: "range offset",
+        unit: "m",
+        scale: 1.0,
+        configured: -0.1,
+        found: Estimate {
+            value: -0.5,
+            sigma: 0.02,
+        },
+        is_determined: true,
+        is_proposed,
+        basis: "overlap".to_owned(),
+    };
+    Found {
+        scans: 100,
+        path_m: 500.0,
+        has_settled: true,
+        overlap,
+        constants: vec![offset],
+        resolution: Err("as configured".to_owned()),
+        others: Vec::new(),
+    }
+}
+
+#[test]
+fn what_makes_the_scans_overlap_less_is_not_proposed() {
+    let found = found(false, [0.43, 0.42]);
+    let said = found.to_string();
+    assert!(
+        said.contains("-0.5000 \u{b1} 0.0200 m, configured -0.1000: not proposed"),
+        "{said}"
+    );
+    let text = toml(&found);
+    let stays = "# range_offset_m stays as configured: -0.50000 \u{b1} 0.02000 makes the scans overlap less\n";
+    assert!(text.ends_with(stays), "{text}");
+    assert!(text.contains("[dataset]\n# range_offset_m"), "{text}");
+    assert_eq!(
+        found.overlap(),
+        "overlap of the scans  0.4300 as configured, 0.4200 with what was found, which is less: it is not proposed"
+    );
+}
+
+#[test]
+fn what_is_said_to_contradict_is_what_is_written() {
+    let found = found(true, [0.42, 0.43]);
+    assert!(found.to_string().contains("CONTRADICTS"));
+    assert!(toml(&found).contains("\nrange_offset_m = -0.500 # "));
+    assert_eq!(
+        found.overlap(),
+        "overlap of the scans  0.4200 as configured, 0.4300 with what is proposed"
+    );
+}
