@@ -4,5 +4,6 @@ mod bags;
 pub mod breaks;
 mod hostile;
 mod lost;
+mod named;
 mod refused;
 mod simulation;

@@ -1,15 +1,11 @@
 //! `gyre simulate`: writes a simulated recording.
 
 use std::{
-    io::IsTerminal,
-    num::NonZeroUsize,
-    path::{Path, PathBuf},
-    process::ExitCode,
-    thread::available_parallelism,
-    time::Instant,
+    io::IsTerminal, num::NonZeroUsize, path::Path, process::ExitCode,
+    thread::available_parallelism, time::Instant,
 };
 
-use gyre_configuration::Configuration;
+use gyre_configuration::{Configuration, strict::path_value};
 use gyre_simulator::{SimulationConfig, SimulatorError, Summary, remove_dataset, write_dataset_on};
 use gyre_terminal::{Failure, print};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -21,7 +17,7 @@ use crate::cli::SimulateArguments;
 /// # Errors
 /// A configuration that cannot be simulated, a folder that cannot be written.
 pub fn simulate(arguments: &SimulateArguments) -> Result<ExitCode, Failure> {
-    let overrides = overrides(arguments);
+    let overrides = overrides(arguments)?;
     let configuration = match &arguments.configuration {
         Some(path) => Configuration::read(path, &overrides),
         None => Configuration::of_overrides(&overrides),
@@ -57,8 +53,10 @@ pub fn simulate(arguments: &SimulateArguments) -> Result<ExitCode, Failure> {
 }
 
 /// Returns the options of the command line as overrides `section.key=value`.
-fn overrides(arguments: &SimulateArguments) -> Vec<String> {
-    let quoted = |path: &PathBuf| toml::Value::from(path.to_string_lossy().into_owned());
+///
+/// # Errors
+/// A file whose name is not UTF-8.
+fn overrides(arguments: &SimulateArguments) -> Result<Vec<String>, Failure> {
     let scans = arguments
         .scans
         .map(|scans| format!("simulation.scans={scans}"));
@@ -68,17 +66,15 @@ fn overrides(arguments: &SimulateArguments) -> Vec<String> {
         .map(|format| format!("simulation.output.format={format}"));
     let file = arguments
         .trajectory
-        .as_ref()
-        .map(|file| format!("simulation.drive.file={}", quoted(file)));
+        .as_deref()
+        .map(path_value)
+        .transpose()?;
+    let file = file.map(|file| format!("simulation.drive.file={file}"));
     let kind = file
         .is_some()
         .then(|| "simulation.drive.kind=file".to_owned());
-    arguments
-        .set
-        .iter()
-        .cloned()
-        .chain([scans, seed, format, kind, file].into_iter().flatten())
-        .collect()
+    let options = [scans, seed, format, kind, file].into_iter().flatten();
+    Ok(arguments.set.iter().cloned().chain(options).collect())
 }
 
 /// Writes the recording of a run to `out`, or completes it. If `replace`, it takes the place of

@@ -15,6 +15,19 @@ pub enum ConfigurationError {
         /// The error of the operating system.
         source: std::io::Error,
     },
+    /// It is a folder.
+    #[error("the configuration {path} is a folder: {remedy}")]
+    Folder {
+        /// The folder.
+        path: PathBuf,
+        /// The advice, with the path to name instead.
+        remedy: String,
+    },
+    /// A path that a configuration cannot hold.
+    #[error(
+        "{0:?} has a name that is not UTF-8, which a configuration cannot hold: rename it, or name a link to it"
+    )]
+    Name(PathBuf),
     /// The file is not TOML.
     #[error("{path}: {reason}")]
     Syntax {

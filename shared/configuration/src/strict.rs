@@ -2,6 +2,7 @@
 
 use std::{collections::BTreeMap, fmt::Display, path::Path};
 
+use gyre_radar::in_plain_words;
 use serde::de::DeserializeOwned;
 use toml::{Table, Value};
 
@@ -20,12 +21,32 @@ pub fn read_table(path: &Path) -> Result<Table, ConfigurationError> {
         path: path.to_owned(),
         source,
     };
+    if path.is_dir() {
+        return Err(folder(path));
+    }
     let text = gyre_storage::read_text(path, gyre_storage::SETTINGS).map_err(unreadable)?;
     let parsed: Result<Table, _> = text.parse();
     parsed.map_err(|error| ConfigurationError::Syntax {
         path: path.to_owned(),
         reason: syntax(&text, &error),
     })
+}
+
+/// Returns the error for a folder that is named in place of a configuration: that of the results of
+/// a run, or a recording.
+fn folder(path: &Path) -> ConfigurationError {
+    let own = path.join("config.toml");
+    let remedy = match own.is_file() {
+        true => format!("name the configuration in it, {}", own.display()),
+        false => format!(
+            "name a TOML file; a recording is named by --data {}",
+            path.display()
+        ),
+    };
+    ConfigurationError::Folder {
+        path: path.to_owned(),
+        remedy,
+    }
 }
 
 /// Names the place of a mistake in a text, without the line itself.
@@ -38,6 +59,16 @@ pub fn syntax(text: &str, error: &toml::de::Error) -> String {
     };
     let reason = error.message().trim().replace('\n', "; ");
     format!("TOML parse error at line {line}, column {column}: {reason}")
+}
+
+/// Returns a path as the value of a key.
+///
+/// # Errors
+/// A name that is not UTF-8.
+pub fn path_value(path: &Path) -> Result<Value, ConfigurationError> {
+    let text = path.to_str();
+    let text = text.ok_or_else(|| ConfigurationError::Name(path.to_owned()))?;
+    Ok(text.into())
 }
 
 /// Returns the error of a value that a section cannot have.
@@ -143,9 +174,17 @@ fn read<T: DeserializeOwned>(section: &str, value: Value) -> Result<T, Configura
     value.try_into().map_err(
         |error: toml::de::Error| match unknown_field(error.message()) {
             Some((key, known)) => unknown(section, key, &known),
-            None => self::value(section, error.to_string().trim().replace('\n', " ")),
+            None => self::value(section, reason(&error)),
         },
     )
+}
+
+/// Returns the reason with its key. The library adds "in `key`" behind its sentence.
+fn reason(error: &toml::de::Error) -> String {
+    let sentence = error.to_string().trim().replace('\n', " ");
+    let place = sentence.rsplit_once(" in `");
+    let key = place.and_then(|(_, key)| key.strip_suffix('`'));
+    in_plain_words(key.unwrap_or("it"), error.message()).unwrap_or(sentence)
 }
 
 /// The key and the known ones, from serde's own words: unknown field `x`, expected one of `a`, `b`.
@@ -159,6 +198,16 @@ fn unknown_field(message: &str) -> Option<(&str, Vec<&str>)> {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+
+    #[test]
+    fn a_section_that_is_a_value_is_said_to_be_one() {
+        let mut table: Table = "masking = 3".parse().unwrap();
+        let refused = section::<BTreeMap<String, Value>>(&mut table, "masking");
+        assert_eq!(
+            refused.unwrap_err().to_string(),
+            "[masking]: it is `3`, but must be a section of keys"
+        );
+    }
 
     #[test]
     fn overrides_are_toml_values_or_plain_strings() {

@@ -2,10 +2,12 @@
 
 use std::path::PathBuf;
 
-use gyre_configuration::{Configuration, calibration};
+use gyre_configuration::{Configuration, calibration, strict::path_value};
+use gyre_results::absolute;
 use gyre_run::PlayedFrom;
 use gyre_terminal::{Failure, print};
 
+use super::results_folder;
 use crate::cli::RunArguments;
 
 /// Reads the configuration and resolves what it leaves open.
@@ -63,7 +65,10 @@ pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
         if let Ok(absolute) = path.canonicalize() {
             *path = absolute;
         }
+        path_value(path)?;
     }
+    // The run's processes are told where it is.
+    path_value(&absolute(&results_folder(arguments))?)?;
     Ok(configuration)
 }
 
@@ -73,10 +78,10 @@ pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
 /// A calibration that cannot be read.
 fn overrides(arguments: &RunArguments) -> Result<Vec<String>, Failure> {
     let calibration = arguments.calibration.as_deref().map(calibration::overrides);
-    // Quoted, because a folder may be named 2019-01-10 or 7.
-    let quoted = |data: &PathBuf| toml::Value::from(data.to_string_lossy().into_owned());
-    let data = arguments.data.iter().flat_map(|data| {
-        let data = format!("source.data={}", quoted(data));
+    // As a value, which is quoted: a folder may be named 2019-01-10 or 7.
+    let data = arguments.data.as_deref().map(path_value).transpose()?;
+    let data = data.iter().flat_map(|data| {
+        let data = format!("source.data={data}");
         [data, "source.kind='recording'".to_owned()]
     });
     let radar = arguments.radar.iter().flat_map(|address| {
@@ -105,8 +110,9 @@ fn overrides(arguments: &RunArguments) -> Result<Vec<String>, Failure> {
         .map(|topic| format!("source.from='{topic}'"));
     let record = arguments.record.iter().map(|file| {
         let file = std::path::absolute(file).unwrap_or_else(|_| file.clone());
-        format!("record.file={}", quoted(&file))
+        Ok(format!("record.file={}", path_value(&file)?))
     });
+    let record: Vec<String> = record.collect::<Result<_, Failure>>()?;
     let calibration = calibration.transpose()?.unwrap_or_default();
     let set = arguments.set.iter().cloned();
     Ok(calibration

@@ -1,6 +1,7 @@
 //! The process of a drive, from its start to its last sentence.
 
 use std::{
+    ffi::OsString,
     fs::{File, OpenOptions},
     io::{Read, Seek, SeekFrom},
     os::unix::process::ExitStatusExt,
@@ -147,24 +148,30 @@ impl Drop for Child<'_> {
 }
 
 /// The words of a drive's command: those of `gyre run`, after the process that it ends with.
-fn words(batch: &Batch<'_>, drive: &Drive) -> Vec<String> {
-    let path = batch.list.resolve(&drive.path).display().to_string();
+fn words(batch: &Batch<'_>, drive: &Drive) -> Vec<OsString> {
+    let path = batch.list.resolve(&drive.path);
     let own = drive.configuration.as_deref();
     let own = own.map(|configuration| batch.list.resolve(configuration));
     let configuration = own.or_else(|| batch.settings.configuration.clone());
-    let configuration = configuration.map(|it| it.display().to_string());
+    let configuration = configuration.map(PathBuf::into_os_string);
     let mut words = vec![
-        COMMAND.to_owned(),
-        format!("--parent={}", process::id()),
-        format!("--out={}", batch.results(drive).display()),
+        COMMAND.into(),
+        format!("--parent={}", process::id()).into(),
+        option("--out=", &batch.results(drive)),
     ];
     match is_configuration(&drive.path) {
-        true => words.push(path),
-        false => words.extend(configuration.into_iter().chain([format!("--data={path}")])),
+        true => words.push(path.into()),
+        false => words.extend(configuration.into_iter().chain([option("--data=", &path)])),
     }
     let set = batch.settings.set.iter().chain(&drive.set);
-    words.extend(set.map(|sentence| format!("--set={sentence}")));
+    words.extend(set.map(|sentence| format!("--set={sentence}").into()));
     words
+}
+
+fn option(name: &str, path: &Path) -> OsString {
+    let mut word = OsString::from(name);
+    word.push(path);
+    word
 }
 
 #[cfg(test)]

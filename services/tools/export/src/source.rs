@@ -56,11 +56,11 @@ impl Source {
     /// Finds out what a path is.
     ///
     /// # Errors
-    /// The configuration of a run that cannot be read.
+    /// A run that cannot be read.
     pub fn open(path: &Path) -> Result<Self, Failure> {
         let kind = match path {
             path if gyre_recording::is_recording(path) => Kind::Recording,
-            path if journal::path(path).is_file() => {
+            path if map::exists(&journal::path(path))? => {
                 let configuration = Configuration::read(&path.join("config.toml"), &[])?;
                 Kind::Run(Box::new(configuration))
             }

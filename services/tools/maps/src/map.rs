@@ -19,6 +19,7 @@ use gyre_mapping::{
 use gyre_radar::{Trajectory, ground_truth::read_trajectory};
 use gyre_results::{Out, map_options};
 use gyre_slam::{Keyframe, RecordReader, records_path};
+use gyre_storage::StorageError;
 use gyre_terminal::{Failure, print};
 
 use crate::folder;
@@ -108,13 +109,21 @@ fn trajectory_of(run: &Path) -> PathBuf {
     }
 }
 
+/// Returns whether a file exists. Of another user's run that may be unknown.
+///
+/// # Errors
+/// A folder that may not be read.
+pub fn exists(path: &Path) -> Result<bool, StorageError> {
+    path.try_exists().map_err(StorageError::at("read", path))
+}
+
 fn configuration(run: &Path) -> Result<Configuration, Failure> {
     Ok(Configuration::read(&run.join("config.toml"), &[])?)
 }
 
 fn open(run: &Path) -> Result<RecordReader<Keyframe>, Failure> {
     let path = records_path::<Keyframe>(run);
-    match path.is_file() {
+    match exists(&path)? {
         true => Ok(RecordReader::open(run)?),
         false => Err(format!(
             "{} does not exist: a run keeps keyframes with --set slam.kind=graph",

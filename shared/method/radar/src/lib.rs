@@ -16,6 +16,7 @@ pub mod fingerprint;
 pub mod ground_truth;
 pub mod inspect;
 mod median;
+mod plain_words;
 pub mod points;
 mod quoted;
 pub mod raster;
@@ -35,6 +36,7 @@ pub use ground_truth::{
 };
 pub use inspect::{Report, inspect, inspect_dataset};
 pub use median::median;
+pub use plain_words::in_plain_words;
 pub use points::{PointExtractor, PointsConfig, PointsError};
 pub use quoted::quoted;
 pub use raster::{RasterConfig, RasterError, Rasteriser, Sampling};

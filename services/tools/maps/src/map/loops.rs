@@ -21,7 +21,7 @@ struct LoopRow {
 /// # Errors
 /// A file that cannot be read, a missing column, a row that is damaged.
 pub fn used_loops(path: &Path) -> Result<Vec<[u64; 2]>, Failure> {
-    if !path.is_file() {
+    if !super::exists(path)? {
         return Ok(Vec::new());
     }
     let text = gyre_storage::read_text(path, MAX_BYTES)

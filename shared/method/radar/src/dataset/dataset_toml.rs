@@ -8,6 +8,7 @@ use std::io::ErrorKind;
 use std::path::Path;
 
 use super::{DatasetOptions, OpenError};
+use crate::in_plain_words;
 
 /// File name, beside the folder of images or in it.
 const FILE: &str = "dataset.toml";
@@ -27,11 +28,20 @@ pub(super) fn options(root: &Path) -> Result<DatasetOptions, OpenError> {
         };
         let invalid = |error: toml::de::Error| OpenError::DatasetToml {
             path: path.clone(),
-            reason: error.message().to_owned(),
+            reason: reason(&text, &error),
         };
         return toml::from_str(&text).map_err(invalid);
     }
     Ok(DatasetOptions::default())
+}
+
+/// Returns what is wrong, with the key of the line where it is.
+fn reason(text: &str, error: &toml::de::Error) -> String {
+    let before = error.span().and_then(|span| text.get(..span.start));
+    let line = before.and_then(|before| before.rsplit('\n').next());
+    let key = line.and_then(|line| Some(line.split_once('=')?.0.trim()));
+    let plain = key.and_then(|key| in_plain_words(key, error.message()));
+    plain.unwrap_or_else(|| error.message().to_owned())
 }
 
 #[cfg(test)]
@@ -81,5 +91,9 @@ mod tests {
             error.contains("dataset.toml") && error.contains("range_ofset_m"),
             "{error}"
         );
+        fs::write(folder.path().join(FILE), "# mine\nencoder_counts = 'many'").unwrap();
+        let error = options(folder.path()).unwrap_err().to_string();
+        let expected = "encoder_counts is \"many\", but must be a whole number from 0 to 65535";
+        assert!(error.contains(expected), "{error}");
     }
 }

@@ -1,0 +1,102 @@
+//! Wrong values of a file or an override, in the words of a person.
+
+/// Returns what a deserialiser says of the value of `key` in the words of a person; `None` if it
+/// says something else than that the value is of another kind.
+pub fn in_plain_words(key: &str, message: &str) -> Option<String> {
+    if let Some(variants) = message.strip_prefix("unknown variant ") {
+        let (found, expected) = variants.split_once(", expected ")?;
+        return Some(format!("{key} is {found}, but must be {expected}"));
+    }
+    let types = message
+        .strip_prefix("invalid type: ")
+        .or_else(|| message.strip_prefix("invalid value: "))?;
+    let (found, expected) = types.rsplit_once(", expected ")?;
+    let (kind, value) = match found.find(['"', '`']) {
+        Some(start) => (&found[..start], Some(&found[start..])),
+        None => (found, None),
+    };
+    let found = value.unwrap_or(match kind {
+        "sequence" => "a list",
+        "map" => "a section",
+        _ => "of another kind",
+    });
+    let must = must_be(expected, value.filter(|_| kind == "string "));
+    Some(format!("{key} is {found}, but must be {must}"))
+}
+
+/// Names a type of Rust, or what serde calls it. A list is shown with the text that was found.
+fn must_be(expected: &str, text: Option<&str>) -> String {
+    let fixed = match expected {
+        "u8" => "a whole number from 0 to 255",
+        "u16" => "a whole number from 0 to 65535",
+        "u32" | "u64" | "usize" => "a whole number, 0 or more",
+        "a nonzero u32" | "a nonzero u64" | "a nonzero usize" => "a whole number, 1 or more",
+        "i8" | "i16" | "i32" | "i64" | "isize" => "a whole number",
+        "f32" | "f64" => "a number",
+        "a boolean" => "true or false",
+        "a string" | "string only" | "path string" => "a text",
+        "a map" => "a section of keys",
+        "a sequence" => {
+            let example = text.unwrap_or("\"a\"");
+            return format!("a list, as in [{example}]");
+        }
+        _ if expected.starts_with("struct ") => "a section of keys",
+        _ => return expected.replace("an array of length", "a list of the length"),
+    };
+    fixed.to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_of_another_kind_is_named_with_what_it_must_be() {
+        for (message, expected) in [
+            (
+                "invalid type: string \"abc\", expected u8",
+                "threshold is \"abc\", but must be a whole number from 0 to 255",
+            ),
+            (
+                "invalid value: integer `300`, expected u8",
+                "threshold is `300`, but must be a whole number from 0 to 255",
+            ),
+            (
+                "invalid type: floating point `1.5`, expected usize",
+                "threshold is `1.5`, but must be a whole number, 0 or more",
+            ),
+            (
+                "invalid type: string \"./x\", expected a sequence",
+                "threshold is \"./x\", but must be a list, as in [\"./x\"]",
+            ),
+            (
+                "invalid type: string \"a, expected b\", expected f32",
+                "threshold is \"a, expected b\", but must be a number",
+            ),
+            (
+                "invalid type: sequence, expected a boolean",
+                "threshold is a list, but must be true or false",
+            ),
+            (
+                "invalid type: unit variant, expected string only",
+                "threshold is of another kind, but must be a text",
+            ),
+            (
+                "unknown variant `graf`, expected one of `none`, `filter`, `graph`",
+                "threshold is `graf`, but must be one of `none`, `filter`, `graph`",
+            ),
+            (
+                "invalid type: map, expected an array of length 3",
+                "threshold is a section, but must be a list of the length 3",
+            ),
+        ] {
+            assert_eq!(
+                in_plain_words("threshold", message).as_deref(),
+                Some(expected)
+            );
+        }
+        for other in ["missing field `sha256`", "rate is `abc`, but must be `max`"] {
+            assert_eq!(in_plain_words("rate", other), None);
+        }
+    }
+}

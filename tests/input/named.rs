@@ -1,0 +1,105 @@
+//! The command line: names that are not UTF-8, folders in place of files, and
+//! runs of other users.
+
+use std::{
+    ffi::{OsStr, OsString},
+    fs,
+    os::unix::{
+        ffi::OsStrExt,
+        fs::{PermissionsExt, symlink},
+    },
+    path::{Path, PathBuf},
+};
+
+use crate::common::{Ended, OtherUser, Run, folder, gyre, recording};
+
+/// A name with a byte that no UTF-8 has.
+fn unprintable(folder: &Path) -> PathBuf {
+    folder.join(OsStr::from_bytes(b"dr\xffive"))
+}
+
+fn run_of(data: impl AsRef<OsStr>, out: impl AsRef<OsStr>) -> Ended {
+    let mut command = gyre();
+    command.arg("run").arg("--data").arg(data);
+    command.arg("--out").arg(out);
+    Ended::of(command)
+}
+
+#[test]
+fn a_recording_or_results_whose_name_is_not_utf_8_are_refused_as_that() {
+    let folder = folder();
+    let named = unprintable(folder.path());
+    symlink(recording::small(), &named).unwrap();
+    let out = folder.path().join("out");
+    let sentence = ["dr\\xFFive\" has a name that is not UTF-8", "rename it"];
+    run_of(&named, &out).refused_with(&sentence);
+    let mut bare = OsString::from(&named);
+    bare.push("-results");
+    let refused = run_of(recording::small(), &bare);
+    refused.failed_with(&["dr\\xFFive-results\" has a name that is not UTF-8"]);
+    assert!(!out.exists() && !Path::new(&bare).exists());
+    // A configuration is only read.
+    let configuration = named.with_extension("toml");
+    fs::write(&configuration, "[raster]\nn = 127\ncell_m = 0.8\n").unwrap();
+    let mut command = gyre();
+    command.arg("run").arg(configuration).arg("--data");
+    command.arg(recording::small()).arg("--out").arg(&out);
+    Ended::of(command).succeeded();
+}
+
+#[test]
+fn a_folder_in_place_of_a_configuration_is_refused_with_what_to_name() {
+    let folder = folder();
+    let run = |named: &Path| {
+        let mut command = gyre();
+        command.arg("run").arg(named);
+        Ended::of(command)
+    };
+    run(recording::small()).refused_with(&[
+        "the configuration ",
+        " is a folder: name a TOML file; a recording is named by --data ",
+    ]);
+    fs::write(folder.path().join("config.toml"), "").unwrap();
+    let own = folder.path().join("config.toml");
+    run(folder.path()).refused_with(&[
+        " is a folder: name the configuration in it, ",
+        own.to_str().unwrap(),
+    ]);
+}
+
+#[test]
+fn a_value_of_another_kind_is_refused_in_plain_words() {
+    let set = |sentence: &str| Run::of_recording().set(sentence).finish();
+    set("masking.threshold=abc").refused_with(&[
+        "[masking]: threshold is \"abc\", but must be a whole number from 0 to 255",
+    ]);
+    set("masking.threshold=256").refused_with(&["threshold is `256`, but must be a whole number"]);
+    set("stages.masking.command=./x").refused_with(&[
+        "[stages.masking]: command is \"./x\", but must be a list, as in [\"./x\"]",
+    ]);
+    set("raster.cell_m=wide").refused_with(&["[raster]: cell_m is \"wide\", but must be a number"]);
+}
+
+/// Results are their user's alone, so nobody else knows whether a run has keyframes.
+#[test]
+fn a_run_of_another_user_is_said_to_be_unreadable() {
+    let folder = folder();
+    let Some(other) = OtherUser::new(folder.path()) else {
+        return;
+    };
+    let run = folder.path().join("run");
+    fs::create_dir_all(run.join("journal")).unwrap();
+    for name in ["keyframes.log", "poses.journal"] {
+        fs::write(run.join("journal").join(name), "").unwrap();
+    }
+    fs::set_permissions(&run, fs::Permissions::from_mode(0o700)).unwrap();
+    for (command, option, file) in [
+        ("map", "--out", "keyframes.log"),
+        ("export", "--mcap", "poses.journal"),
+    ] {
+        let mut gyre = other.gyre();
+        gyre.arg(command).arg(&run).arg(option);
+        gyre.arg(folder.path().join("new.mcap"));
+        Ended::of(gyre).refused_with(&["cannot read", file, "Permission denied"]);
+    }
+}
