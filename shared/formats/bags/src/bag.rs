@@ -8,7 +8,7 @@ use crate::{
     BagError,
     azimuths::{Described, described},
     damaged::Span,
-    radar::Survey,
+    radar::{ENCODER_COUNTS, Survey},
     reading::{BagFile, Channel, Message},
     topics::{Kind, Topics},
 };
@@ -73,30 +73,55 @@ impl Bag {
         topics: &Topics,
         options: &DatasetOptions,
     ) -> Result<(Described, Origin), BagError> {
-        let (mut survey, mut refused) = (Survey::new(topics.scans.kind), None);
-        for span in 0..self.spans.len() {
-            let messages = self.read(span, |channel| topics.has(channel));
-            for message in messages.unwrap_or_default() {
-                match self.configuration(self.spans[span].0, topics, &message) {
-                    Some(Ok(described)) => return Ok((described, Origin::Radar)),
-                    Some(Err(reason)) => refused = refused.or(Some(reason)),
-                    None if !survey.is_done() => survey.add(&message),
-                    None => {}
-                }
-            }
-            if survey.is_done() && topics.configuration.is_none() {
-                break;
-            }
+        let (survey, own) = self.survey(topics);
+        let usual = match &own {
+            Some(Ok(own)) => own.radar.encoder_size,
+            _ => ENCODER_COUNTS,
+        };
+        let (size, counts) = match (options.encoder_counts, survey.other_counts(usual)) {
+            (Some(size), _) => (size, CountsOrigin::Configured),
+            (None, Some(size)) => (size, CountsOrigin::Azimuths { usual }),
+            (None, None) => (usual, CountsOrigin::Usual),
+        };
+        if let Some(Ok(mut described)) = own {
+            described.radar.encoder_size = size;
+            let radar = RadarOrigin::Itself;
+            return Ok((described, Origin { radar, counts }));
         }
+        let refused = own.and_then(Result::err);
         if let (Some(reason), None) = (&refused, options.range_resolution_m) {
             let reason = format!(
                 "has a configuration of its radar that cannot be used ({reason}): give the depth of a range bin with \
-                 dataset.range_resolution_m, and dataset.encoder_counts if it is not 5600"
+                 dataset.range_resolution_m"
             );
             return Err(BagError::unreadable(&self.path, reason));
         }
-        let described = survey.describe(&self.path, options)?;
-        Ok((described, Origin::Scans { refused }))
+        let described = survey.describe(&self.path, options.range_resolution_m, size)?;
+        let radar = RadarOrigin::Scans { refused };
+        Ok((described, Origin { radar, counts }))
+    }
+
+    /// Looks at the first messages with scans, and for the first configuration that can be used, or
+    /// why the first one cannot.
+    fn survey(&mut self, topics: &Topics) -> (Survey, Option<Result<Described, String>>) {
+        let (mut survey, mut own) = (Survey::new(topics.scans.kind), None);
+        for span in 0..self.spans.len() {
+            let file = self.spans[span].0;
+            let messages = self.read(span, |channel| topics.has(channel));
+            for message in messages.unwrap_or_default() {
+                match (self.configuration(file, topics, &message), &own) {
+                    (Some(Ok(described)), None | Some(Err(_))) => own = Some(Ok(described)),
+                    (Some(Err(reason)), None) => own = Some(Err(reason)),
+                    (None, _) if !survey.is_done() => survey.add(&message),
+                    _ => {}
+                }
+            }
+            let is_known = topics.configuration.is_none() || matches!(own, Some(Ok(_)));
+            if survey.is_done() && is_known {
+                break;
+            }
+        }
+        (survey, own)
     }
 
     /// Returns what a message says of the radar, if it is of that topic, or why that cannot be
@@ -122,13 +147,30 @@ impl Bag {
     }
 }
 
-/// The source of the description of a radar.
-pub(crate) enum Origin {
-    /// The radar's own.
-    Radar,
+/// The sources of the description of a radar.
+pub(crate) struct Origin {
+    pub radar: RadarOrigin,
+    pub counts: CountsOrigin,
+}
+
+/// The source of azimuths, bins and rotation.
+pub(crate) enum RadarOrigin {
+    /// The radar's own description.
+    Itself,
     /// Found from azimuths and options.
     Scans {
         /// Why its own cannot be used, if there is one.
         refused: Option<String>,
+    },
+}
+
+/// The source of the encoder counts per turn.
+pub(crate) enum CountsOrigin {
+    Configured,
+    /// The radar's own, or those of most radars.
+    Usual,
+    /// The azimuths, which are no turn with the usual ones.
+    Azimuths {
+        usual: u16,
     },
 }

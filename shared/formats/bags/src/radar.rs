@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use gyre_colossus::Configuration;
-use gyre_radar::DatasetOptions;
+use gyre_radar::{EncoderTurn, FIRST_TURNS, encoder_counts, turn_ns};
 use gyre_ros2_messages::{
     messages::RadarFftDataMessage,
     navtech_msgs::{RadarBScanMsg, RadarFftDataMsg},
@@ -18,8 +18,8 @@ use crate::{
 };
 
 /// Encoder counts of Navtech's radars.
-const ENCODER_COUNTS: u16 = 5600;
-/// Azimuths from which the number of a turn is told: several turns.
+pub(crate) const ENCODER_COUNTS: u16 = 5600;
+/// Azimuths from which the number of a turn and the size of the encoder are told: several turns.
 pub(crate) const MAX_SAMPLES: usize = 2000;
 /// The rotation of Navtech's radars, turns per 1000 s, where the times do not show it.
 const ROTATION_MHZ: u16 = 4000;
@@ -38,13 +38,19 @@ struct Sample {
 pub(crate) struct Survey {
     kind: Kind,
     samples: Vec<Sample>,
+    /// Rows of whole turns.
+    turns: Vec<Vec<RowShown>>,
 }
+
+/// The encoder value and the time of an azimuth, in any unit.
+type RowShown = (u16, i64);
 
 impl Survey {
     pub fn new(kind: Kind) -> Self {
         Self {
             kind,
             samples: Vec::new(),
+            turns: Vec::new(),
         }
     }
 
@@ -52,7 +58,7 @@ impl Survey {
     pub fn is_done(&self) -> bool {
         let enough = match self.kind {
             Kind::Azimuths(_) => MAX_SAMPLES,
-            _ => 2,
+            _ => FIRST_TURNS,
         };
         self.samples.len() >= enough
     }
@@ -68,9 +74,10 @@ impl Survey {
                 let encoder = m.azimuth().ok()?.encoder;
                 Some((encoder, 1, m.data.len()))
             }),
-            Kind::BScans => of::<RadarBScanMsg>(message)
-                .ok()
-                .map(|m| of_image(&m.b_scan_img)),
+            Kind::BScans => of::<RadarBScanMsg>(message).ok().map(|m| {
+                self.turns.push(written(&m.encoder_values, &m.timestamps));
+                of_image(&m.b_scan_img)
+            }),
             Kind::Images => of::<Image>(message).ok().map(|image| of_image(&image)),
             Kind::Configuration(_) => None,
         };
@@ -83,19 +90,23 @@ impl Survey {
             }));
     }
 
-    /// Describes the radar with what the options say of it.
+    /// Describes a radar of this depth of a range bin, m, and these encoder counts per turn.
     ///
     /// # Errors
-    /// An option that is needed is missing, or nothing is shown.
-    pub fn describe(&self, path: &Path, options: &DatasetOptions) -> Result<Described, BagError> {
+    /// The depth of a bin is not known, or nothing is shown.
+    pub fn describe(
+        &self,
+        path: &Path,
+        range_resolution_m: Option<f32>,
+        encoder_size: u16,
+    ) -> Result<Described, BagError> {
         let refuse = |reason: &str| Err(BagError::unreadable(path, reason));
-        let Some(range_resolution_m) = options.range_resolution_m else {
+        let Some(range_resolution_m) = range_resolution_m else {
             return refuse(
                 "has no configuration of its radar (RadarConfigurationMsg): give the depth of a range bin with dataset.range_resolution_m \
-                 (Navtech: 0.0438, 0.0596 or 0.04381), and dataset.encoder_counts if it is not 5600",
+                 (Navtech: 0.0438, 0.0596 or 0.04381)",
             );
         };
-        let encoder_size = options.encoder_counts.unwrap_or(ENCODER_COUNTS);
         let Some(azimuths) = self.azimuths(encoder_size) else {
             return refuse("has no messages of its radar that can be read");
         };
@@ -112,6 +123,34 @@ impl Survey {
             },
             azimuth_offset: 0,
         })
+    }
+
+    /// Returns the encoder counts of a turn that the azimuths show, if `usual` is not them.
+    pub fn other_counts(&self, usual: u16) -> Option<u16> {
+        let rows = self
+            .samples
+            .iter()
+            .map(|sample| (sample.encoder, sample.log_ns));
+        let rows: Vec<RowShown> = rows.collect();
+        let turns: Vec<&[RowShown]> = match self.kind {
+            Kind::Azimuths(_) => rows.chunk_by(|(a, _), (b, _)| a < b).collect(),
+            _ => self.turns.iter().map(Vec::as_slice).collect(),
+        };
+        // Of azimuths the first and the last turn are parts of one.
+        let whole = match self.kind {
+            Kind::Azimuths(_) => turns.get(1..turns.len().max(2) - 1).unwrap_or_default(),
+            _ => &turns[..],
+        };
+        let (unit_ns, turn_ns) = turn_time(&turns).unzip();
+        let unit_ns = unit_ns.unwrap_or(1);
+        let turn = |rows: &&[RowShown]| {
+            let counts = rows.iter().map(|(count, _)| *count).collect();
+            EncoderTurn::new(counts, |row| rows.get(row)?.1.checked_mul(unit_ns))
+        };
+        let turns: Vec<EncoderTurn> = whole.iter().map(turn).collect();
+        // The last step of a turn may be another one.
+        let is_other = |counts: &u16| counts.abs_diff(usual) > usual / 50;
+        encoder_counts(&turns, turn_ns, usual).filter(is_other)
     }
 
     /// Returns the azimuths of a turn: rows of an image, or the encoder's counts divided by the
@@ -147,6 +186,28 @@ impl Survey {
         };
         measured().unwrap_or(ROTATION_MHZ)
     }
+}
+
+/// Returns the unit of the times of rows in which turns take the time of one, and that, ns.
+fn turn_time(turns: &[&[RowShown]]) -> Option<(i64, i64)> {
+    let starts = turns.iter().filter_map(|rows| Some(rows.first()?.1));
+    [1, 1_000, 1_000_000].into_iter().find_map(|unit_ns| {
+        let starts_ns = starts.clone().map(|start| start.saturating_mul(unit_ns));
+        Some((unit_ns, turn_ns(starts_ns)?))
+    })
+}
+
+/// Returns the rows that the driver has written.
+fn written(encoder_values: &[u16], times: &[u64]) -> Vec<RowShown> {
+    let mut written: Vec<RowShown> = Vec::with_capacity(encoder_values.len());
+    let has_clock = times.iter().any(|time| *time != 0);
+    for (value, time) in encoder_values.iter().zip(times) {
+        let is_written = *time != 0 || !has_clock;
+        if is_written && written.last().is_none_or(|(last, _)| last < value) {
+            written.push((*value, i64::try_from(*time).unwrap_or_default()));
+        }
+    }
+    written
 }
 
 #[cfg(test)]

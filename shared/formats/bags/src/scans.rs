@@ -1,6 +1,7 @@
 //! The scans of a bag as a dataset.
 
 mod index;
+mod notes;
 
 use std::path::{Path, PathBuf};
 
@@ -13,12 +14,13 @@ use gyre_radar::{
 use crate::{
     BagError,
     azimuths::{Described, azimuths},
-    bag::{Bag, Origin},
+    bag::Bag,
     files::files,
     reading::Message,
     topics::Topics,
 };
 use index::{Entry, Index};
+use notes::notes;
 
 /// Opens the scans in a bag.
 ///
@@ -80,10 +82,7 @@ impl Scans {
         bag.learn_channels();
         let wished = options.topic.as_ref().map(|topic| topic.as_str());
         let topics = Topics::choose(path, &bag.channels(), wished)?;
-        let (mut described, origin) = bag.describe(&topics, options)?;
-        if let Some(counts) = options.encoder_counts {
-            described.radar.encoder_size = counts;
-        }
+        let (described, origin) = bag.describe(&topics, options)?;
         let constants = Constants::from(options);
         let assembler = SweepAssembler::new(&described.radar, constants);
         let assembler = assembler
@@ -194,43 +193,6 @@ fn reborrow<'a>(slot: &'a mut ScanSlot<'_>) -> ScanSlot<'a> {
         stamp_ns: slot.stamp_ns,
         flags: slot.flags,
     }
-}
-
-/// Returns what is known of the radar, and what is missing: whole sentences.
-fn notes(
-    bag: &Bag,
-    topics: &Topics,
-    described: &Described,
-    origin: &Origin,
-    index: &Index,
-) -> Vec<String> {
-    let radar = &described.radar;
-    let own = match origin {
-        Origin::Scans {
-            refused: Some(reason),
-        } => format!("what the radar says of itself cannot be used ({reason})"),
-        _ => "the radar does not describe itself in the bag".to_owned(),
-    };
-    let mut notes = vec![match origin {
-        Origin::Radar => format!(
-            "Scans are on {}, {} azimuths of {} bins, {} encoder counts per turn, as the radar says of itself.",
-            topics.scans.name, radar.azimuth_samples, radar.range_in_bins, radar.encoder_size
-        ),
-        Origin::Scans { .. } => format!(
-            "Scans are on {}; {own}: {} azimuths of {} bins are as found, {} encoder counts per \
-             turn as configured (default: 5600).",
-            topics.scans.name, radar.azimuth_samples, radar.range_in_bins, radar.encoder_size
-        ),
-    }];
-    notes.extend(index.notes());
-    let cut = bag.files.iter().filter(|file| !file.is_complete);
-    notes.extend(cut.map(|file| {
-        format!(
-            "{} has no end: its recorder was killed, or it was not copied whole.",
-            file.path.display()
-        )
-    }));
-    notes
 }
 
 impl Dataset for Scans {

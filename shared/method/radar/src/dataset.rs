@@ -34,7 +34,7 @@ use std::path::Path;
 
 use crate::scan::{ScanLimits, ScanSlot, SweepGeometry};
 pub use eccentricity::correct_eccentricity;
-pub use encoder::encoder_counts;
+pub use encoder::{EncoderTurn, FIRST_TURNS, encoder_counts};
 pub use error::{OpenError, ReadError};
 pub use file_list::FileList;
 pub use format::Format;

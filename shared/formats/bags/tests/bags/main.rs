@@ -3,6 +3,7 @@
 
 mod damage;
 mod drivers;
+mod encoders;
 mod order;
 
 use std::{

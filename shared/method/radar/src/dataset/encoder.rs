@@ -1,5 +1,7 @@
 //! The counts per turn of an encoder, from the counts of the azimuths of a turn.
 
+use std::ops::RangeInclusive;
+
 use crate::median::median;
 
 /// Maximum deviation of the step over the seam from a whole number of steps, steps.
@@ -8,6 +10,58 @@ const STEP_TOLERANCE: f64 = 0.25;
 const MISSING_SHARE: f64 = 0.05;
 /// Minimum number of azimuths that show the size of an encoder.
 const MIN_AZIMUTHS: usize = 8;
+/// Times that the azimuths of a turn take, turns. A sector that is blanked over the encoder's zero
+/// makes a turn look like one of a smaller encoder, but shorter by as much.
+const TURN_SHARES: RangeInclusive<f64> = 0.95..=1.05;
+/// Number of turns that show the size of an encoder.
+pub const FIRST_TURNS: usize = 8;
+
+/// The encoder counts of the azimuths of a turn, which may begin anywhere, and the time that the
+/// turn took.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EncoderTurn {
+    counts: Vec<u16>,
+    /// ns; the time over the encoder's zero counts as any other, since azimuths can be missing
+    /// there.
+    turn_ns: Option<i64>,
+}
+
+impl EncoderTurn {
+    /// Returns the turn of azimuths with these counts and times, where they have one.
+    pub fn new(counts: Vec<u16>, time_ns: impl Fn(usize) -> Option<i64>) -> Self {
+        let turn_ns = turn_ns(&counts, time_ns);
+        Self { counts, turn_ns }
+    }
+
+    /// Returns the duration of the turn by the times of its azimuths, ns.
+    pub(crate) fn turn_ns(&self) -> Option<i64> {
+        self.turn_ns
+    }
+
+    /// Returns the steps of the encoder; `None` for counts that are of no turn.
+    pub(crate) fn step(&self) -> Option<EncoderStep> {
+        EncoderStep::of(&self.counts)
+    }
+
+    /// Returns whether it took the time of a turn, as far as both are known.
+    fn is_turn(&self, turn_ns: Option<i64>) -> bool {
+        let times = self.turn_ns.zip(turn_ns);
+        let share = times.map(|(ns, turn_ns)| ns as f64 / turn_ns as f64);
+        share.is_none_or(|share| TURN_SHARES.contains(&share))
+    }
+}
+
+fn turn_ns(counts: &[u16], time_ns: impl Fn(usize) -> Option<i64>) -> Option<i64> {
+    let rows = counts.len();
+    let duration = |from: usize, to: usize| time_ns(to)?.checked_sub(time_ns(from)?);
+    let zero = (1..rows).find(|row| counts[*row] < counts[row - 1]);
+    let (over_zero_ns, steps) = match zero {
+        Some(row) => (duration(row - 1, row)?, rows - 2),
+        None => (0, rows.checked_sub(1)?),
+    };
+    let steps_ns = duration(0, rows - 1)?.checked_sub(over_zero_ns)?;
+    Some(steps_ns.checked_mul(rows as i64)? / steps.max(1) as i64)
+}
 
 /// The step of an encoder from azimuth to azimuth in a turn.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,16 +117,16 @@ impl EncoderStep {
 }
 
 /// Returns the counts per turn of the encoder of some turns: `usual` where that fits one of them,
-/// otherwise the number that makes the step over the seam as the others. `None` if they do not show
-/// it.
-pub fn encoder_counts<'a>(turns: impl IntoIterator<Item = &'a [u16]>, usual: u16) -> Option<u16> {
-    let steps = turns.into_iter().filter_map(EncoderStep::of);
-    let steps: Vec<EncoderStep> = steps.collect();
-    match steps.iter().any(|step| step.fits(usual)) {
-        true => Some(usual),
-        // A turn that lacks azimuths at its seam shows too few.
-        false => steps.iter().filter_map(|step| step.size()).max(),
+/// otherwise the number that makes the step over the seam as the others, of those that took
+/// `turn_ns` if that is known. `None` if they do not show it.
+pub fn encoder_counts(turns: &[EncoderTurn], turn_ns: Option<i64>, usual: u16) -> Option<u16> {
+    let fits = |turn: &EncoderTurn| turn.step().is_some_and(|step| step.fits(usual));
+    if turns.iter().any(fits) {
+        return Some(usual);
     }
+    let whole = turns.iter().filter(|turn| turn.is_turn(turn_ns));
+    // A turn that lacks azimuths at its seam shows too few.
+    whole.filter_map(|turn| turn.step()?.size()).max()
 }
 
 #[cfg(test)]
@@ -84,13 +138,20 @@ mod tests {
         (0..azimuths).map(count).collect()
     }
 
+    fn found(turns: &[&[u16]]) -> Option<u16> {
+        let turns = turns
+            .iter()
+            .map(|counts| EncoderTurn::new(counts.to_vec(), |_| None));
+        encoder_counts(&turns.collect::<Vec<_>>(), None, 5600)
+    }
+
     #[test]
     fn the_size_makes_the_step_over_the_seam_as_the_others() {
         for size in [2_800, 5_595, 5_600, 16_000] {
             for first in [0, 5, size / 3] {
                 let counts = turn(400, size, first);
-                let found = encoder_counts([&counts[..]], 5600);
-                assert_eq!(found, u16::try_from(size).ok(), "{size} from {first}");
+                let expected = u16::try_from(size).ok();
+                assert_eq!(found(&[&counts]), expected, "{size} from {first}");
             }
         }
     }
@@ -99,13 +160,22 @@ mod tests {
     fn azimuths_that_are_missing_at_the_seam_make_no_smaller_encoder() {
         let whole = turn(400, 5_600, 7);
         for missing in 0..20 {
-            assert_eq!(encoder_counts([&whole[..400 - missing]], 5600), Some(5600));
+            assert_eq!(found(&[&whole[..400 - missing]]), Some(5600));
         }
         let other = turn(400, 16_000, 20);
-        assert_eq!(
-            encoder_counts([&other[3..], &other[..], &other[..390]], 5600),
-            Some(16_000)
-        );
+        let turns = [&other[3..], &other[..], &other[..390]];
+        assert_eq!(found(&turns), Some(16_000));
+    }
+
+    #[test]
+    fn a_turn_that_took_another_time_shows_no_size() {
+        let counts = turn(400, 5_600, 7)[..360].to_vec();
+        let turn = EncoderTurn::new(counts, |row| Some(row as i64 * 625_000));
+        assert_eq!(turn.turn_ns(), Some(225_000_000));
+        let turns = [turn];
+        assert_eq!(encoder_counts(&turns, Some(250_000_000), 5600), None);
+        assert_eq!(encoder_counts(&turns, Some(225_000_000), 5600), Some(5_040));
+        assert_eq!(encoder_counts(&turns, None, 5600), Some(5_040));
     }
 
     #[test]
@@ -116,7 +186,7 @@ mod tests {
             &[7; 400],
             &[9, 3, 9, 3, 9, 3, 9, 3, 9],
         ] {
-            assert_eq!(encoder_counts([counts], 5600), None, "{counts:?}");
+            assert_eq!(found(&[counts]), None, "{counts:?}");
         }
     }
 }

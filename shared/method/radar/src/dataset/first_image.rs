@@ -1,5 +1,6 @@
 //! Properties of a dataset from its first image with Navtech metadata columns.
 
+use super::encoder::EncoderTurn;
 use super::error::ReadError;
 use super::image_size::ImageSize;
 use super::images::Images;
@@ -130,21 +131,10 @@ impl FirstImage {
         Some((intervals().min()?, intervals().max()?, mean))
     }
 
-    /// Duration of a turn by the stamps of its rows, ns. The time over the encoder's zero counts as
-    /// any other, since rows can be missing there.
-    pub(crate) fn turn_ns(&self) -> Option<i64> {
-        let rows = self.rows.len();
-        let zero = (1..rows).find(|row| self.rows[*row].count < self.rows[row - 1].count);
-        let (over_zero_ns, steps) = match zero {
-            Some(row) => (self.row_ns(row)? - self.row_ns(row - 1)?, rows - 2),
-            None => (0, rows - 1),
-        };
-        let steps_ns = self.row_ns(rows - 1)? - self.start_ns()? - over_zero_ns;
-        Some(steps_ns * rows as i64 / steps.max(1) as i64)
-    }
-
-    /// Encoder counts of the rows.
-    pub(crate) fn counts(&self) -> Vec<u16> {
-        self.rows.iter().map(|row| row.count).collect()
+    /// The turn of the rows.
+    pub(crate) fn turn(&self) -> EncoderTurn {
+        EncoderTurn::new(self.rows.iter().map(|row| row.count).collect(), |row| {
+            self.row_ns(row)
+        })
     }
 }

@@ -1,6 +1,5 @@
 //! Sentences on what the first image of Navtech scans shows.
 
-use super::encoder::EncoderStep;
 use super::first_image::FirstImage;
 use super::navtech_png::ByteTen;
 use super::navtech_profile::Profile;
@@ -62,7 +61,7 @@ fn note_uniform(profile: &Profile) -> Option<String> {
 /// Returns a sentence on counts per turn that are configured, if the rows show other ones.
 pub(super) fn note_encoder(image: &FirstImage, profile: &Profile) -> Option<String> {
     let counts = profile.encoder_counts;
-    let step = EncoderStep::of(&image.counts()).filter(|step| !step.fits(counts))?;
+    let step = image.turn().step().filter(|step| !step.fits(counts))?;
     let (seam, size) = (step.seam(counts)?, step.size()?);
     Some(format!(
         "The encoder steps by {} counts per row and by {seam} from the last row to the first, with {counts} counts per turn: \

@@ -4,7 +4,7 @@
 use super::Dataset;
 use super::detect::Found;
 use super::eccentricity;
-use super::encoder::encoder_counts;
+use super::encoder::{EncoderTurn, FIRST_TURNS, encoder_counts};
 use super::error::{OpenError, ReadError};
 use super::file_list::FileList;
 use super::first_image::{FirstImage, NamedBy};
@@ -41,11 +41,6 @@ pub(crate) struct NavtechScans {
 const MAX_SWEEP_NS: i64 = 5 * stamp::SECOND_NS;
 /// Longest sweep in periods: the stamps of rows come late where the host was busy.
 const MAX_SWEEP_PERIODS: i64 = 2;
-/// Times that the rows of a turn take, periods. A sector that is blanked over the encoder's zero
-/// makes a turn look like one of a smaller encoder, but shorter by as much.
-const TURN_SHARES: RangeInclusive<f64> = 0.95..=1.05;
-/// Number of images that show the size of the encoder.
-const FIRST_TURNS: usize = 8;
 
 impl NavtechScans {
     /// `profile` returns the defaults of the format, which may depend on the first image; `options`
@@ -108,22 +103,16 @@ impl NavtechScans {
     /// says what the first image shows if that took less or more than a turn.
     fn find_encoder(&mut self, first_image: &FirstImage, turn_ns: Option<i64>) {
         let usual = self.profile.encoder_counts;
-        let is_found = |turns: &[Vec<u16>]| {
-            let found = encoder_counts(turns.iter().map(Vec::as_slice), usual);
-            found.filter(|found| *found != usual)
-        };
-        let share = |turn_ns| first_image.turn_ns().map(|ns| ns as f64 / turn_ns as f64);
-        let is_turn = turn_ns
-            .and_then(share)
-            .is_none_or(|share| TURN_SHARES.contains(&share));
-        if !is_turn {
-            self.notes.extend(note_encoder(first_image, &self.profile));
-            return;
+        match encoder_counts(&[first_image.turn()], turn_ns, usual) {
+            None => self.notes.extend(note_encoder(first_image, &self.profile)),
+            Some(found) if found == usual => {}
+            Some(_) => self.take_encoder(turn_ns, usual),
         }
-        if is_found(&[first_image.counts()]).is_none() {
-            return;
-        }
-        if let Some(found) = is_found(&self.first_turns()) {
+    }
+
+    fn take_encoder(&mut self, turn_ns: Option<i64>, usual: u16) {
+        let found = encoder_counts(&self.first_turns(), turn_ns, usual);
+        if let Some(found) = found.filter(|found| *found != usual) {
             self.profile.encoder_counts = found;
             self.notes.push(format!(
                 "The encoder has {found} counts per turn, not {usual}: with these the step from the last row to the first is as the others."
@@ -131,14 +120,17 @@ impl NavtechScans {
         }
     }
 
-    /// Encoder counts of the first images.
-    fn first_turns(&mut self) -> Vec<Vec<u16>> {
+    /// The turns of the first images.
+    fn first_turns(&mut self) -> Vec<EncoderTurn> {
         let rows = self.images.accepted_rows();
         let mut pixels = vec![0; self.images.size.width * rows.end()];
         let turn = |index| {
             let decoded = self.images.decode_rows(index, rows.clone(), &mut pixels);
-            let rows = navtech_png::rows(&pixels, decoded.ok()?);
-            Some(rows.map(|row| row.count).collect())
+            let rows: Vec<_> = navtech_png::rows(&pixels, decoded.ok()?).collect();
+            let counts = rows.iter().map(|row| row.count).collect();
+            Some(EncoderTurn::new(counts, |row| {
+                stamp::to_ns(rows.get(row)?.stamp)
+            }))
         };
         (0..FIRST_TURNS).filter_map(turn).collect()
     }

@@ -52,7 +52,8 @@ pub struct DatasetOptions {
     /// encoder.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub azimuth_source: Option<AzimuthSource>,
-    /// Encoder counts per turn. Default: 5600; where the first scans show another number, that one.
+    /// Encoder counts per turn. Default: 5600, or what the radar of a bag says; where the first
+    /// scans show another number, that one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub encoder_counts: Option<u16>,
     /// The topic of the scans in a bag of ROS 2. Default: the one whose type is of Navtech's

@@ -41,7 +41,7 @@ pub(crate) fn order(images: &mut Images, first_image: &FirstImage) -> Option<Row
         })
         .collect();
     let (by_time, by_name) = (by_time(&stamps), (0..stamps.len()).collect());
-    let is_mixed = is_mixed(&stamps, &by_time, first_image.turn_ns());
+    let is_mixed = is_mixed(&stamps, &by_time, first_image.turn().turn_ns());
     let (order, sentence) = match is_mixed {
         true => (by_name, BY_NAME),
         false => (by_time, BY_TIME),
