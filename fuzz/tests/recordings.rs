@@ -205,6 +205,10 @@ enum FolderEdit {
     Name(u8, Number),
     /// Added to the number in the name of an image.
     Shift(u8, i32),
+    /// A name of words for an image: `scanN`, a copy, a hidden file.
+    Words(u8, u8),
+    /// Rows that an image has lost.
+    Short(u8, u8),
     Remove(u8),
 }
 
@@ -238,6 +242,25 @@ fn edit_folder(recording: &mut Recording, edit: &FolderEdit) {
         FolderEdit::Shift(index, by) => {
             rename(*index, &|there| there.wrapping_add(i64::from(*by) * 1000))
         }
+        FolderEdit::Words(index, kind) if images > 0 => {
+            let name = &mut recording.images[usize::from(*index) % images].name;
+            let (folder, file) = name.rsplit_once('/').unwrap();
+            let file = match kind % 3 {
+                0 => format!("scan{kind}.png"),
+                1 => file.replace(".png", " (1).png"),
+                _ => format!("._{file}"),
+            };
+            *name = format!("{folder}/{file}");
+        }
+        FolderEdit::Short(index, rows) if images > 0 => {
+            let image = &mut recording.images[usize::from(*index) % images];
+            let left = image
+                .pixels
+                .len()
+                .saturating_sub(usize::from(*rows) * image.width);
+            image.pixels.truncate(left.max(image.width));
+        }
+        FolderEdit::Words(..) | FolderEdit::Short(..) => {}
         FolderEdit::Remove(index) if images > 0 => {
             recording.images.remove(usize::from(*index) % images);
         }

@@ -29,10 +29,16 @@ pub(crate) fn first_part_in(folder: &Path) -> Option<PathBuf> {
     let files = fs::read_dir(folder).ok()?.flatten();
     let files = files.map(|file| file.path()).filter(|path| {
         let is_recording = path.extension().is_some_and(|it| it == "mcap");
-        is_recording && !is_later_part(path)
+        is_recording && !is_hidden(path) && !is_later_part(path)
     });
     let mut first: Vec<PathBuf> = files.take(2).collect();
     first.pop().filter(|_| first.is_empty())
+}
+
+/// macOS stores `._NAME.mcap` beside NAME.mcap on file systems of others.
+fn is_hidden(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default();
+    name.as_encoded_bytes().starts_with(b".")
 }
 
 /// Returns whether a file is NAME.N.mcap beside NAME.mcap.
@@ -66,6 +72,7 @@ mod tests {
         fs::write(&second, "").unwrap();
         assert_eq!(parts(&path), [path.clone(), second]);
         assert_eq!(next_part(&path).1, 3);
+        fs::write(folder.path().join("._a.b.mcap"), "Mac OS X").unwrap();
         assert_eq!(parts(folder.path()), parts(&path), "a folder of one");
         fs::write(folder.path().join("b.mcap"), "").unwrap();
         assert!(parts(folder.path()).is_empty(), "a folder of two");
