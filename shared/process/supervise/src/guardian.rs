@@ -7,18 +7,18 @@
 
 use std::{
     collections::BTreeMap,
-    io::{self, Read},
+    io::{self, PipeWriter, Read},
     os::{
         fd::{AsRawFd, BorrowedFd, RawFd},
         unix::process::CommandExt,
     },
     path::Path,
-    process::{Child, ChildStdin, Command, Stdio},
+    process::{Child, Command, Stdio},
     thread,
     time::{Duration, Instant},
 };
 
-use gyre_stage::{Manifest, run, wake::Signals};
+use gyre_stage::{run, wake::Signals};
 use procfs::process::Process;
 use rustix::{
     io::ioctl_fionbio,
@@ -35,12 +35,18 @@ const PERIOD: Duration = Duration::from_millis(10);
 /// The running guardian.
 pub(crate) struct Guardian {
     process: Child,
-    groups: Option<ChildStdin>,
+    groups: Option<PipeWriter>,
 }
 
 impl Guardian {
-    /// Starts the guardian, a process that calls [`guard`].
-    pub fn start(command: &[String], manifest: &Manifest) -> Result<Self, SuperviseError> {
+    /// Starts the guardian of the run with this root, a process that calls [`guard`], with groups
+    /// in its care. They are in the pipe before there is a guardian: the supervisor can be killed
+    /// at any time.
+    pub fn start(
+        command: &[String],
+        root: &Path,
+        groups: impl IntoIterator<Item = u32>,
+    ) -> Result<Self, SuperviseError> {
         let failed = |source| SuperviseError::Guardian {
             command: command.join(" "),
             source,
@@ -48,22 +54,26 @@ impl Guardian {
         let (program, arguments) = command
             .split_first()
             .ok_or_else(|| failed(io::ErrorKind::InvalidInput.into()))?;
-        let mut process = Command::new(program)
+        let (messages, pipe) = io::pipe().map_err(failed)?;
+        // A guardian that hangs must not make the supervisor wait.
+        ioctl_fionbio(&pipe, true).map_err(|error| failed(error.into()))?;
+        for group in groups {
+            send(&pipe, group as RawPid);
+        }
+        let process = Command::new(program)
             .args(arguments)
-            .env(run::ENVIRONMENT, &manifest.root)
-            .stdin(Stdio::piped())
+            .env(run::ENVIRONMENT, root)
+            .stdin(messages)
             .stdout(Stdio::null())
             .stderr(Stdio::null())
             // An interrupt from the terminal must not reach it.
             .process_group(0)
             .spawn()
             .map_err(failed)?;
-        let groups = process.stdin.take();
-        if let Some(groups) = &groups {
-            // A guardian that hangs must not make the supervisor wait.
-            ioctl_fionbio(groups, true).map_err(|error| failed(error.into()))?;
-        }
-        Ok(Self { process, groups })
+        Ok(Self {
+            process,
+            groups: Some(pipe),
+        })
     }
 
     /// Returns the pipe by which a process joins: see [`join`].
@@ -75,21 +85,11 @@ impl Guardian {
         self.process.try_wait().is_ok_and(|ended| ended.is_some())
     }
 
-    /// Puts a group into the care of the guardian.
-    pub fn remember(&self, group: u32) {
-        self.send(group as RawPid);
-    }
-
     /// Takes a group from the care of the guardian: its processes are dead, and its number may be
     /// given anew.
     pub fn forget(&self, group: u32) {
-        self.send(-(group as RawPid));
-    }
-
-    fn send(&self, message: RawPid) {
         if let Some(pipe) = &self.groups {
-            // Fails if somebody has killed the guardian, which is noticed.
-            let _ = rustix::io::write(pipe, &message.to_ne_bytes());
+            send(pipe, -(group as RawPid));
         }
     }
 }
@@ -102,6 +102,11 @@ impl Drop for Guardian {
         }
         let _ = self.process.wait();
     }
+}
+
+/// Sends a message to the guardian. Fails if somebody has killed it, which is noticed.
+fn send(pipe: &PipeWriter, message: RawPid) {
+    let _ = rustix::io::write(pipe, &message.to_ne_bytes());
 }
 
 /// Puts the group that this process leads into the care of the guardian. Called between fork and
@@ -186,5 +191,18 @@ mod tests {
         assert!(!ends_within(&forgotten, Duration::from_millis(50)));
         forgotten.kill().unwrap();
         forgotten.wait().unwrap();
+    }
+
+    #[test]
+    fn a_guardian_has_the_groups_that_there_are_when_it_begins() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("messages");
+        let script = format!("cat > {}", path.display());
+        let command = ["sh", "-c", &script].map(str::to_owned);
+        let guardian = Guardian::start(&command, folder.path(), [7, 9]).unwrap();
+        guardian.forget(7);
+        drop(guardian);
+        let messages = [7, 9, -7].map(RawPid::to_ne_bytes);
+        assert_eq!(std::fs::read(path).unwrap(), messages.as_flattened());
     }
 }

@@ -130,7 +130,7 @@ impl<'a> Rig<'a> {
         Ok(Self {
             services: None,
             node: transport.join("supervisor")?,
-            guardian: Guardian::start(guardian, &manifest)?,
+            guardian: Guardian::start(guardian, &manifest.root, [])?,
             manifest,
             transport,
             signals,

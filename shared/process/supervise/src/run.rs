@@ -49,7 +49,7 @@ impl<'a> Run<'a> {
             plan,
             observe,
             since: Instant::now(),
-            guardian: Guardian::start(&plan.guardian, manifest)?,
+            guardian: Guardian::start(&plan.guardian, &manifest.root, [])?,
             _wake_limit: plan.cpu_wake_us.map(WakeLimit::hold).transpose()?,
             services,
             node,
@@ -112,10 +112,10 @@ impl<'a> Run<'a> {
     /// again at the next wake-up.
     pub fn keep_guardian(&mut self, groups: impl Iterator<Item = u32>) {
         if self.guardian.has_ended()
-            && let Ok(guardian) = Guardian::start(&self.plan.guardian, &self.plan.manifest)
+            && let Ok(guardian) =
+                Guardian::start(&self.plan.guardian, &self.plan.manifest.root, groups)
         {
             self.guardian = guardian;
-            groups.for_each(|group| self.guardian.remember(group));
         }
     }
 }
