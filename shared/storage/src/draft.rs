@@ -191,6 +191,22 @@ mod tests {
     }
 
     #[test]
+    fn writers_at_once_do_not_remove_the_drafts_of_each_other() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("results.csv");
+        let all = |of: usize| of.to_string().repeat(1000);
+        std::thread::scope(|scope| {
+            for writer in 0..8 {
+                let (path, text) = (&path, all(writer));
+                scope.spawn(move || (0..100).for_each(|_| write(path, &text).unwrap()));
+            }
+        });
+        let text = fs::read_to_string(&path).unwrap();
+        assert!((0..8).any(|writer| text == all(writer)), "{text}");
+        assert_eq!(names(folder.path()), ["results.csv"]);
+    }
+
+    #[test]
     fn a_draft_that_is_given_up_leaves_nothing() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("summary.json");

@@ -62,11 +62,13 @@ impl File {
     /// locked.
     pub(crate) fn create(path: &Path) -> Result<Option<Self>, StorageError> {
         let left_over = try_lock_existing(path);
-        if let Ok(Attempt::Held(_)) = left_over {
-            return Ok(None);
+        match &left_over {
+            Ok(Attempt::Held(_)) => return Ok(None),
+            // Another process may create it by now: it is not removed.
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+            // Not truncated: another name may lead to the same content. The lock is held meanwhile.
+            _ => crate::remove(path)?,
         }
-        // Not truncated: another name may lead to the same content.
-        crate::remove(path)?;
         let created = OpenOptions::new().create_new(true).write(true).open(path);
         let file = match created {
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => return Ok(None),
