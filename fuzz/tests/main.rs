@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod bags;
+mod captures;
 mod files;
 mod keyframes;
 mod messages;

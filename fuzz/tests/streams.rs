@@ -25,7 +25,7 @@ const LARGEST_BYTES: usize = 4 << 20;
 
 /// An edit of a radar.
 #[derive(Clone, Debug, TypeGenerator)]
-enum Edit {
+pub enum Edit {
     /// A number of the configuration.
     Configuration(u8, Number),
     /// The encoder count of an azimuth.
@@ -84,7 +84,8 @@ const NAVIGATION: [u8; 22] = [
     0, 14, 0, 0, 0, 9, 0, 0, 0, 7, 0, 1, 0, 0, 1, 0, 0, 2, 0, 0, 2, 0,
 ];
 
-fn stream(edits: &[Edit]) -> Vec<u8> {
+/// The stream of a radar that turns four times.
+pub fn stream(edits: &[Edit]) -> Vec<u8> {
     let mut configuration = Configuration {
         azimuth_samples: AZIMUTHS,
         bin_size: 438,
@@ -224,7 +225,7 @@ fn streams() {
 }
 
 /// The datagrams of a radar that turns four times.
-fn datagrams() -> Vec<Vec<u8>> {
+pub fn datagrams() -> Vec<Vec<u8>> {
     let radar = Configuration {
         azimuth_samples: AZIMUTHS,
         bin_size: 438,

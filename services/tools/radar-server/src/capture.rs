@@ -21,7 +21,9 @@ use crate::server::{Audience, Faults, Output, sleep_until};
 /// The first bytes of a capture, with its version.
 pub const MAGIC: &[u8; 8] = b"GYRERAD1";
 /// The most bytes of a record.
-const MAX_RECORD_BYTES: usize = 1 << 16;
+pub const MAX_RECORD_BYTES: usize = 1 << 16;
+/// The longest time since the start: a year. A damaged one would be waited for in vain.
+const MAX_TIME: Duration = Duration::from_secs(365 * 86_400);
 /// Time between two polls for bytes.
 const POLL: Duration = Duration::from_millis(2);
 /// Encoder counts of a description by UDP, which has none. They are not sent.
@@ -185,8 +187,12 @@ impl Capture {
         Self::open(&self.path)?.ok_or_else(no_capture)
     }
 
-    /// Reads the next record; returns the time and the number of bytes.
-    fn next(&mut self, bytes: &mut [u8]) -> Result<Option<(Duration, usize)>, CaptureError> {
+    /// Reads the next record into `bytes`, which have room for [`MAX_RECORD_BYTES`]; returns the
+    /// time and the number of bytes. `None` at the end.
+    ///
+    /// # Errors
+    /// It cannot be read, or is damaged.
+    pub fn next(&mut self, bytes: &mut [u8]) -> Result<Option<(Duration, usize)>, CaptureError> {
         let failed = &CaptureError::file(&self.path);
         let (mut time_ns, mut count) = ([0; 8], [0; 4]);
         if !read_whole(&mut self.file, &mut time_ns).map_err(failed)?
@@ -201,11 +207,18 @@ impl Capture {
         };
         let is_whole = read_whole(&mut self.file, bytes).map_err(failed)?;
         let time = Duration::from_nanos(u64::from_le_bytes(time_ns));
+        if is_whole && time > MAX_TIME {
+            let reason = "a record is of more than a year after the start";
+            return Err(CaptureError::damaged(&self.path, reason));
+        }
         Ok(is_whole.then_some((time, count)))
     }
 
     /// Reads up to the radar's first description of itself.
-    fn configuration(mut self) -> Result<Configuration, CaptureError> {
+    ///
+    /// # Errors
+    /// As [`Capture::next`]; there is none.
+    pub fn configuration(mut self) -> Result<Configuration, CaptureError> {
         let mut bytes = vec![0; MAX_RECORD_BYTES];
         let mut parser = RadarParser::new(self.is_udp, ENCODER_COUNTS);
         while let Some((_, count)) = self.next(&mut bytes)? {
@@ -258,7 +271,9 @@ pub fn play(
         let due = rate.map_or(Duration::ZERO, |rate| {
             Duration::try_from_secs_f64(time.as_secs_f64() / rate).unwrap_or(time)
         });
-        if stop() || !sleep_until(started + due, stop) {
+        // At the slowest rates a record is due in centuries.
+        let due = started.checked_add(due).unwrap_or(started + MAX_TIME);
+        if stop() || !sleep_until(due, stop) {
             return Ok(played);
         }
         output.send(&bytes[..count]);
@@ -328,6 +343,10 @@ mod tests {
         large.extend(u32::MAX.to_le_bytes());
         let error = records(file(&large).path()).unwrap_err().to_string();
         assert!(error.contains("damaged"), "{error}");
+        let mut late = capture();
+        write_record(&mut late, Duration::from_nanos(u64::MAX), b"never").unwrap();
+        let error = records(file(&late).path()).unwrap_err().to_string();
+        assert!(error.contains("more than a year"), "{error}");
         let protocol = file(&[&MAGIC[..], &[7]].concat());
         assert!(Capture::open(protocol.path()).is_err());
         let nobody = file(&capture());
