@@ -131,7 +131,22 @@ pub enum TextEdit {
     SwapLines(u16, u16),
     /// Edits the bytes; what is no UTF-8 then is replaced.
     Bytes(ByteEdit),
+    /// Writes the text as another program does: see `WAYS`.
+    Way(u8),
 }
+
+/// Exchanges as spreadsheets and editors make them: decimal commas, separators, ends of lines.
+const WAYS: [(&str, &str); 7] = [
+    (".", ","),
+    (",", ";"),
+    (" ", ";"),
+    (" ", "\t"),
+    (",", " , "),
+    (" ", "  "),
+    ("\n", "\r\n"),
+];
+/// A byte order mark, before a text.
+const MARK: char = '\u{feff}';
 
 /// Words at which parsers err.
 const WORDS: [&str; 40] = [
@@ -211,6 +226,13 @@ pub fn edit_text(text: &str, edits: &[TextEdit]) -> String {
             TextEdit::SwapLines(one, two) if !lines.is_empty() => {
                 lines.swap(place(*one), place(*two))
             }
+            TextEdit::Way(way) => match WAYS.get(usize::from(*way) % (WAYS.len() + 1)) {
+                Some((from, to)) => {
+                    let text = (lines.join("\n") + "\n").replace(from, to);
+                    lines = text.split('\n').map(str::to_owned).collect();
+                }
+                None => lines.first_mut().map_or((), |line| line.insert(0, MARK)),
+            },
             TextEdit::Bytes(edit) => {
                 let mut bytes = lines.join("\n").into_bytes();
                 edit_bytes(&mut bytes, std::slice::from_ref(edit));

@@ -209,6 +209,8 @@ enum FolderEdit {
     Words(u8, u8),
     /// Rows that an image has lost.
     Short(u8, u8),
+    /// An encoder of another size.
+    Encoder(u16),
     Remove(u8),
 }
 
@@ -260,6 +262,10 @@ fn edit_folder(recording: &mut Recording, edit: &FolderEdit) {
                 .saturating_sub(usize::from(*rows) * image.width);
             image.pixels.truncate(left.max(image.width));
         }
+        FolderEdit::Encoder(size) => {
+            let images = recording.images.iter_mut();
+            images.for_each(|image| set_encoder(&mut image.pixels, image.width, *size));
+        }
         FolderEdit::Words(..) | FolderEdit::Short(..) => {}
         FolderEdit::Remove(index) if images > 0 => {
             recording.images.remove(usize::from(*index) % images);
@@ -269,6 +275,16 @@ fn edit_folder(recording: &mut Recording, edit: &FolderEdit) {
             let texts = recording.texts.len();
             let (_, text) = &mut recording.texts[usize::from(*index) % texts];
             *text = edit_text(text, edits);
+        }
+    }
+}
+
+/// Gives rows the counts that an encoder of another size than 5600 counts has at their angles.
+fn set_encoder(pixels: &mut [u8], width: usize, size: u16) {
+    for row in pixels.chunks_exact_mut(width) {
+        if let Some([low, high]) = row.get_mut(8..10) {
+            let count = u32::from(u16::from_le_bytes([*low, *high]));
+            [*low, *high] = ((count * u32::from(size) / 5600) as u16).to_le_bytes();
         }
     }
 }
