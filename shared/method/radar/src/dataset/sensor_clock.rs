@@ -10,6 +10,8 @@ const EARLY_NS: f64 = 30_000_000.0;
 const TOUCHING_NS: f64 = 1_000.0;
 /// Minimum share of times that lie as closely above a series that leaves out early ones.
 const PROMPT_SHARE: f64 = 0.25;
+/// One time in so many may be early, and one more.
+const TIMES_PER_EARLY: usize = 30;
 /// Minimum number of times of which one can be told to be early.
 const MIN_TIMES: usize = 8;
 
@@ -70,7 +72,7 @@ impl SensorClock {
         period: std::ops::RangeInclusive<f64>,
     ) -> Option<(Self, Vec<Receipt>)> {
         let all = Self::below(received, period.clone())?;
-        let most = 1 + received.len() / 100;
+        let most = 1 + received.len() / TIMES_PER_EARLY;
         let (mut clock, mut rest) = (all, received.to_vec());
         for _ in 0..=most {
             let (near, others) = clock.split_touching(&rest, most);
@@ -247,7 +249,16 @@ mod tests {
             (good, none),
             (SensorClock::below(&times(), BOUNDS).unwrap(), Vec::new())
         );
-        for early in [&[0][..], &[50], &[99], &[20, 80], &[40, 41], &[63]] {
+        let few = [
+            &[0][..],
+            &[50],
+            &[99],
+            &[20, 80],
+            &[40, 41],
+            &[63],
+            &[9, 30, 31, 90],
+        ];
+        for early in few {
             for by_ms in [60, 700, 5_000] {
                 let mut received = times();
                 // Of a scan that is received late, a time that is early by so much.
@@ -266,6 +277,18 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn two_of_thirty_times_may_be_early() {
+        let mut received = times()[..30].to_vec();
+        let (good, _) = SensorClock::below_most(&received, BOUNDS).unwrap();
+        for early in [12, 20] {
+            received[early].1 -= 700_000_000;
+        }
+        let (clock, found) = SensorClock::below_most(&received, BOUNDS).unwrap();
+        assert_eq!(found, [received[12], received[20]]);
+        assert_eq!(clock, good);
     }
 
     #[test]
