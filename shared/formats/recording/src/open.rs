@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use gyre_bags::is_bag;
-use gyre_radar::{Dataset, DatasetOptions, FileList, Format, OpenError};
+use gyre_radar::{Dataset, DatasetOptions, FileList, Format, OpenError, foreign};
 
 use crate::{
     Recording, RecordingError,
@@ -104,7 +104,11 @@ fn recording_of(paths: &[PathBuf], root: &Path) -> Result<Recording, OpenError> 
     }
     Recording::open(paths).map_err(|error| match error {
         RecordingError::Io { path, source } => OpenError::Io { path, source },
-        error => OpenError::Recording(error.to_string()),
+        // It may be an archive that is only named as a recording.
+        error => paths
+            .first()
+            .and_then(|path| foreign(path))
+            .unwrap_or_else(|| OpenError::Recording(error.to_string())),
     })
 }
 

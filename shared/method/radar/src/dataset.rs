@@ -37,6 +37,7 @@ pub use eccentricity::correct_eccentricity;
 pub use encoder::{EncoderTurn, FIRST_TURNS, encoder_counts};
 pub use error::{OpenError, ReadError};
 pub use file_list::FileList;
+pub use foreign::foreign;
 pub use format::Format;
 pub use image_size::ImageSize;
 pub use image_source::ImageSource;

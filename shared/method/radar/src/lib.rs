@@ -28,7 +28,7 @@ pub use clock::{ClockOffset, MAX_OFFSET_S, clock_offset};
 pub use dataset::{
     AzimuthSource, DEFAULT_TURN_NS, Dataset, DatasetOptions, EncoderTurn, FIRST_TURNS, FileList,
     Format, ImageSize, ImageSource, OpenError, ReadError, correct_eccentricity, encoder_counts,
-    middle_ns, open, open_resolved, open_source, reopen, stored_options, turn_ns,
+    foreign, middle_ns, open, open_resolved, open_source, reopen, stored_options, turn_ns,
 };
 pub use fingerprint::Fingerprint;
 pub use ground_truth::{

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::error::OpenError;
 use super::file_list::FileList;
 use super::first_image::{FirstImage, NamedBy};
-use super::foreign;
+use super::foreign::{foreign, foreign_in};
 use super::format::Format;
 use super::image_list::has_png;
 use super::image_source::ImageSource;
@@ -57,6 +57,9 @@ impl Found {
     }
 }
 
+/// The remedy where a format is looked for.
+const SET_FORMAT: &str = "if it is one, set its `format`";
+
 /// The folders of images of each format, relative to the root.
 const LAYOUTS: [(Format, &[&str]); 8] = [
     (Format::Radiate, &["Navtech_Polar"]),
@@ -85,7 +88,10 @@ pub(crate) fn locate(root: &Path, forced: Option<Format>) -> Result<Found, OpenE
     let folder = find_folder(root, forced);
     let folder = folder.map_err(|error| other_format(root, forced).unwrap_or(error))?;
     let (mut images, mut notes) = Images::open(&folder)?;
-    if forced.is_some_and(|format| is_other_form(format, &mut images)) {
+    if let Some(format) = forced
+        && let Ok(Some(image)) = FirstImage::read(&mut images)
+        && (is_other_form(format, &image) || is_marked_otherwise(format, &image, root, &folder))
+    {
         other_format(root, forced).map_or(Ok(()), Err)?;
     }
     let format = match forced.or_else(|| by_layout(root, &folder)) {
@@ -107,10 +113,26 @@ pub(crate) fn locate(root: &Path, forced: Option<Format>) -> Result<Found, OpenE
 
 /// Returns whether images have times in their rows where those of the format have none, or none
 /// where they have.
-fn is_other_form(format: Format, images: &mut Images) -> bool {
+fn is_other_form(format: Format, image: &FirstImage) -> bool {
     let has_stamps = !matches!(format, Format::Mulran | Format::Radiate);
-    let first = FirstImage::read(images).ok().flatten();
-    first.is_some_and(|image| image.has_stamps() != has_stamps)
+    image.has_stamps() != has_stamps
+}
+
+/// Returns whether both the names of images and the files beside them are those of another format.
+/// A recording of one's own may differ in either.
+fn is_marked_otherwise(format: Format, image: &FirstImage, root: &Path, folder: &Path) -> bool {
+    let names = evident(format).map(|(_, named, _)| named);
+    let is_named_otherwise =
+        names.is_some() && image.named_by().is_some_and(|by| names != Some(by));
+    let is_boreas = matches!(format, Format::Boreas | Format::BoreasRt);
+    // The names of folders say less: `navtech` may hold anything.
+    let has_oxford_files = by_layout(root, folder) == Some(Format::Oxford);
+    let by_files = has_oxford_files && format != Format::Oxford;
+    is_named_otherwise && (by_files || (has_boreas_folders(root) && !is_boreas))
+}
+
+fn has_boreas_folders(root: &Path) -> bool {
+    ["applanix", "calib"].iter().any(|f| root.join(f).is_dir())
 }
 
 /// Returns an error if a folder is a dataset of another format than is configured.
@@ -126,7 +148,7 @@ fn other_format(root: &Path, configured: Option<Format>) -> Option<OpenError> {
 fn check_folder(root: &Path) -> Result<(), OpenError> {
     match fs::metadata(root) {
         Ok(entry) if entry.is_dir() => Ok(()),
-        Ok(_) => Err(foreign::foreign(root).unwrap_or(OpenError::NotAFolder {
+        Ok(_) => Err(foreign(root).unwrap_or(OpenError::NotAFolder {
             path: root.to_owned(),
         })),
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => Err(OpenError::Missing {
@@ -164,18 +186,28 @@ fn find_folder(root: &Path, forced: Option<Format>) -> Result<PathBuf, OpenError
             path: root.to_owned(),
         });
     }
-    if let Some(error) = foreign::foreign_in(root) {
+    if let Some(error) = foreign_in(root) {
         return Err(error);
     }
     let mut folders: Vec<&str> = known().copied().collect();
     folders.dedup();
-    let reason = format!(
-        "it holds no PNG images, and none of the folders {}",
-        folders.join(", ")
-    );
+    let folders = folders.join(", ");
+    let (reason, remedy) = match forced {
+        Some(format) => (
+            format!(
+                "the configuration says `format = \"{format}\"`, but it holds neither PNG images nor the folder {folders}"
+            ),
+            "is it another folder?",
+        ),
+        None => (
+            format!("it holds no PNG images, and none of the folders {folders}"),
+            SET_FORMAT,
+        ),
+    };
     Err(OpenError::UnknownLayout {
         path: root.to_owned(),
         reason,
+        remedy,
     })
 }
 
@@ -211,6 +243,7 @@ fn by_image(
     let unknown = |reason: &str| OpenError::UnknownLayout {
         path: folder.to_owned(),
         reason: format!("its images ({size}) {reason}"),
+        remedy: SET_FORMAT,
     };
     let Some(image) = FirstImage::read(images)?.filter(FirstImage::has_stamps) else {
         let without_metadata =
@@ -225,7 +258,7 @@ fn by_image(
             )),
         };
     };
-    let boreas_folders = ["applanix", "calib"].iter().any(|f| root.join(f).is_dir());
+    let boreas_folders = has_boreas_folders(root);
     let mut scores: Vec<(i32, Format)> = Format::ALL
         .iter()
         .map(|f| (score(*f, &image, boreas_folders), *f))
@@ -281,10 +314,10 @@ fn evidence(image: &FirstImage) -> String {
 /// The score of formats that cannot be detected from an image.
 const NEVER: i32 = -100;
 
-/// Scores how well a format fits the first image. Formats without metadata columns are excluded,
-/// and so is OORD, which differs from Oxford only in its folders.
-fn score(format: Format, image: &FirstImage, boreas_folders: bool) -> i32 {
-    let (bins, named, chirps): (&[usize], NamedBy, bool) = match format {
+/// Returns the range bins, the names and the chirps of the images of a format. `None`: it has no
+/// metadata columns, or, as OORD, differs from Oxford only in its folders.
+fn evident(format: Format) -> Option<(&'static [usize], NamedBy, bool)> {
+    Some(match format {
         Format::Oxford => (&[3768], NamedBy::Start, false),
         Format::Boreas => (&[3360], NamedBy::Middle, false),
         Format::BoreasRt => (&[6848], NamedBy::Middle, true),
@@ -295,9 +328,14 @@ fn score(format: Format, image: &FirstImage, boreas_folders: bool) -> i32 {
         | Format::Radiate
         | Format::Mcap
         | Format::Other
-        | Format::Ros2Bag => {
-            return NEVER;
-        }
+        | Format::Ros2Bag => return None,
+    })
+}
+
+/// Scores how well a format fits the first image.
+fn score(format: Format, image: &FirstImage, boreas_folders: bool) -> i32 {
+    let Some((bins, named, chirps)) = evident(format) else {
+        return NEVER;
     };
     let boreas = matches!(format, Format::Boreas | Format::BoreasRt);
     let by_name = image

@@ -55,7 +55,7 @@ pub enum OpenError {
     },
     /// A layout of folders and images that no reader knows.
     #[error(
-        "{path} is not a known dataset: {reason}; known are {}: if it is one, set its `format`",
+        "{path} is not a known dataset: {reason}; known are {}: {remedy}",
         known()
     )]
     UnknownLayout {
@@ -63,6 +63,8 @@ pub enum OpenError {
         path: PathBuf,
         /// The finding.
         reason: String,
+        /// The remedy.
+        remedy: &'static str,
     },
     /// An option that is out of bounds, or does not apply to the format.
     #[error("{key} = {value} is invalid for a {format} dataset: {reason}")]

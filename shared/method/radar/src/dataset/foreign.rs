@@ -52,7 +52,7 @@ const KINDS: [Kind; 10] = [
 ];
 
 /// Returns an error that says what a file is, if it is one of these.
-pub(crate) fn foreign(path: &Path) -> Option<OpenError> {
+pub fn foreign(path: &Path) -> Option<OpenError> {
     let mut head = Vec::new();
     let file = gyre_storage::open(path).ok()?;
     file.take(HEAD_BYTES).read_to_end(&mut head).ok()?;

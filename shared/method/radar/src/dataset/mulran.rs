@@ -76,5 +76,6 @@ fn end_ns(images: &Images, index: usize) -> Result<i64, OpenError> {
             path: images.file(index).to_owned(),
             reason: "a MulRan image is named by its time in ns, of the years 2015 to 2040"
                 .to_owned(),
+            remedy: "rename it, or set the `format` that it is of",
         })
 }

@@ -77,3 +77,43 @@ fn a_dataset_of_another_format_than_is_configured_is_called_by_its_own() {
         assert!(error.contains(&expected), "{error}");
     }
 }
+
+#[test]
+fn a_folder_with_the_files_and_names_of_another_dataset_is_that() {
+    let root = folder();
+    write_oxford(&root.path().join("a"), 2);
+    fs::write(root.path().join("a/radar.timestamps"), "").unwrap();
+    let opened = |format| {
+        open(
+            &root.path().join("a"),
+            &options(|o| o.format = Some(format)),
+        )
+    };
+    for format in [Format::Boreas, Format::BoreasRt] {
+        let error = opened(format).err().unwrap().to_string();
+        assert!(error.contains("looks like oxford"), "{error}");
+    }
+    // Its files alone, or its names alone, may be those of a recording of one's own.
+    assert_eq!(opened(Format::Oxford).unwrap().len(), 2);
+    fs::remove_file(root.path().join("a/radar.timestamps")).unwrap();
+    assert_eq!(opened(Format::Boreas).unwrap().len(), 2);
+    fs::create_dir(root.path().join("a/applanix")).unwrap();
+    assert_eq!(opened(Format::Boreas).unwrap().len(), 2);
+    assert_eq!(opened(Format::Oxford).unwrap().len(), 2);
+}
+
+#[test]
+fn a_folder_without_what_is_configured_says_so() {
+    let root = folder();
+    fs::write(root.path().join("points.las"), "LASF").unwrap();
+    let options = options(|o| o.format = Some(Format::Oxford));
+    let error = open(root.path(), &options).err().unwrap().to_string();
+    for words in [
+        "says `format = \"oxford\"`",
+        "the folder radar",
+        "is it another folder?",
+    ] {
+        assert!(error.contains(words), "{error}");
+    }
+    assert!(!error.contains("set its"), "{error}");
+}
