@@ -133,7 +133,8 @@ fn entries(folder: &Path) -> Result<Vec<(u64, Drive)>, BatchError> {
 
 fn is_drive(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().as_encoded_bytes();
-    !name.starts_with(b".") && (path.is_dir() || is_recorded(path))
+    // macOS puts files of its own beside those of an archive.
+    !name.starts_with(b".") && name != b"__MACOSX" && (path.is_dir() || is_recorded(path))
 }
 
 fn is_recorded(path: &Path) -> bool {
@@ -335,7 +336,7 @@ mod tests {
     #[test]
     fn a_folder_is_the_list_of_its_recordings() {
         let folder = tempfile::tempdir().unwrap();
-        for name in ["b", "a", ".hidden"] {
+        for name in ["b", "a", ".hidden", "__MACOSX"] {
             fs::create_dir(folder.path().join(name)).unwrap();
         }
         for name in ["run.mcap", "notes.txt"] {
