@@ -65,8 +65,18 @@ pub fn batch(arguments: &BatchArguments) -> Result<ExitCode, Failure> {
         print::line(sentence(&counts, earlier))?;
         return Ok(exit_code(&counts, interrupted));
     }
-    let table = written(&list, &settings, &out)?;
-    concluded(&table.counts(), earlier, &out, interrupted)
+    match written(&list, &settings, &out) {
+        Ok(table) => concluded(&table.counts(), earlier, &out, interrupted),
+        Err(error) if DriveOutcome::of_full(&error.to_string()).is_some() => {
+            print::note(format_args!("gyre: there is no table: {error}"));
+            print::line(sentence(&counts, earlier))?;
+            Ok(match interrupted {
+                true => ExitCode::from(INTERRUPTED),
+                false => ExitCode::FAILURE,
+            })
+        }
+        Err(error) => Err(error),
+    }
 }
 
 fn settings(arguments: &BatchArguments) -> Result<Settings, Failure> {

@@ -16,7 +16,7 @@ use gyre_results::{Holds, Identity, Out, OutError, Problem, SUMMARY};
 use gyre_simulator::SimulatorError;
 use gyre_stage::run::end_with;
 use gyre_terminal::{Failure, INTERRUPTED, print};
-use rustix::{io::Errno, process::Signal};
+use rustix::process::Signal;
 use thiserror::Error;
 
 use crate::{
@@ -151,8 +151,8 @@ fn of_settings(error: Failure) -> Failure {
 }
 
 fn outcome_of(failure: &Failure) -> DriveOutcome {
-    if is_of_full_disk(failure) {
-        return DriveOutcome::DiskFull;
+    if let Some(outcome) = DriveOutcome::of_full(&failure.to_string()) {
+        return outcome;
     }
     if let Some(error) = failure.downcast_ref::<DriveError>() {
         return match error {
@@ -207,14 +207,6 @@ fn outcome_of_preflight(error: &PreflightError) -> DriveOutcome {
         | PreflightError::OpenFiles { .. }
         | PreflightError::NoSharedMemory(_) => DriveOutcome::Machine,
     }
-}
-
-/// Returns whether a disk or a quota is full. The last words of a stage are a text, as the system's
-/// errors are written in Rust.
-fn is_of_full_disk(failure: &Failure) -> bool {
-    let text = failure.to_string();
-    let full = [Errno::NOSPC, Errno::DQUOT].map(|it| format!("(os error {})", it.raw_os_error()));
-    full.iter().any(|error| text.contains(error))
 }
 
 #[cfg(test)]

@@ -28,6 +28,25 @@ pub(crate) struct End {
     pub earlier: bool,
     /// The reason why it is not complete.
     pub sentence: String,
+    /// False if it could not be started.
+    pub begun: bool,
+}
+
+impl End {
+    /// Returns the end of a drive whose process cannot be started since a disk or memory is full.
+    ///
+    /// # Errors
+    /// Any other reason.
+    pub fn of_full(error: BatchError) -> Result<Self, BatchError> {
+        let sentence = error.to_string();
+        let outcome = DriveOutcome::of_full(&sentence).ok_or(error)?;
+        Ok(Self {
+            outcome,
+            earlier: false,
+            sentence,
+            begun: false,
+        })
+    }
 }
 
 /// The process of a drive. It is ended when this is dropped.
@@ -116,6 +135,7 @@ impl<'a> Child<'a> {
             outcome,
             earlier,
             sentence,
+            begun: true,
         }
     }
 
@@ -235,6 +255,23 @@ mod tests {
         let mut child = Child::start(&batch, &list.drives()[0]).unwrap();
         let status = child.process.wait().unwrap();
         child.end(status, Path::new("/batch"), false)
+    }
+
+    #[test]
+    fn a_full_disk_of_the_batch_is_the_end_of_a_drive_and_no_other_fault_is() {
+        let fault = |number| {
+            let source = std::io::Error::from_raw_os_error(number);
+            BatchError::file("rows/a.json")(source)
+        };
+        for number in [28, 122] {
+            let end = End::of_full(fault(number)).unwrap();
+            assert_eq!((end.outcome, end.begun), (DriveOutcome::DiskFull, false));
+            assert!(end.sentence.contains("rows/a.json"), "{}", end.sentence);
+        }
+        assert!(matches!(
+            End::of_full(fault(5)),
+            Err(BatchError::File { .. })
+        ));
     }
 
     #[test]

@@ -28,7 +28,8 @@ pub struct Ended {
 /// request to stop ends the runs too, whose results so far are kept.
 ///
 /// # Errors
-/// A process that cannot be started, or a row that cannot be written. The runs are ended then.
+/// A process that cannot be started, or a row that cannot be written, other than for a full disk.
+/// The runs are ended then.
 pub fn compute(
     batch: &Batch<'_>,
     signals: &Signals,
@@ -43,9 +44,13 @@ pub fn compute(
     let mut waiting = batch.drives.iter();
     let mut running: Vec<Child<'_>> = Vec::new();
     loop {
-        let free = batch.jobs.max(1).saturating_sub(running.len());
-        for drive in waiting.by_ref().take(free) {
-            running.push(Child::start(batch, drive)?);
+        while running.len() < batch.jobs.max(1)
+            && let Some(drive) = waiting.next()
+        {
+            match Child::start(batch, drive) {
+                Ok(child) => running.push(child),
+                Err(error) => progress.add(drive, End::of_full(error)?)?,
+            }
         }
         if running.is_empty() {
             return Ok(progress.ended);
@@ -87,7 +92,7 @@ impl Progress<'_> {
             ..
         } = self.batch;
         let results = self.batch.results(drive);
-        let kept = match end.outcome.leaves_results() {
+        let kept = match end.outcome.leaves_results() || !end.begun {
             true => DriveRow::of_results(out, drive, settings)?,
             false => None,
         };
@@ -102,8 +107,12 @@ impl Progress<'_> {
                 (line, row.outcome, true)
             }
             None => {
-                let row = DriveRow::of(drive, settings, end.outcome, end.sentence, &results);
-                row.write(out)?;
+                let mut row = DriveRow::of(drive, settings, end.outcome, end.sentence, &results);
+                if let Err(error) = row.write(out) {
+                    // Its results, if there are any, have a row when there is room again.
+                    let full = End::of_full(error)?;
+                    (row.outcome, row.sentence) = (full.outcome, full.sentence);
+                }
                 (line(&row, end.earlier), row.outcome, end.earlier)
             }
         };

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use gyre_stage::run::SHARED_MEMORY;
+use rustix::io::Errno;
 use serde::{Deserialize, Serialize};
 
 /// The exit codes of a drive's process begin here, one for each outcome.
@@ -70,6 +72,26 @@ impl DriveOutcome {
         matches!(self, Self::Complete | Self::Corrupt)
     }
 
+    /// Returns the outcome of a failure, by its sentence, if a disk, a quota or shared memory is
+    /// full. The last words of a stage are a text, as the system's errors are written in Rust.
+    pub fn of_full(sentence: &str) -> Option<Self> {
+        let is_full = [Errno::NOSPC, Errno::DQUOT].iter().any(|error| {
+            let error = format!("(os error {})", error.raw_os_error());
+            sentence.contains(&error)
+        });
+        // The transport names no error of the system.
+        if sentence.contains(&format!("{SHARED_MEMORY} is full")) {
+            return Some(Self::Machine);
+        }
+        // Results may lie there too.
+        let is_memory = sentence.contains("shared memory")
+            || sentence.contains(&format!("{SHARED_MEMORY}/gyre-"));
+        is_full.then_some(match is_memory {
+            true => Self::Machine,
+            false => Self::DiskFull,
+        })
+    }
+
     /// Returns whether a drive that ends so still has the results that it had: it was not begun.
     pub(crate) fn leaves_results(self) -> bool {
         matches!(
@@ -123,6 +145,31 @@ mod tests {
                 (DriveOutcome::Failed, false)
             );
         }
+    }
+
+    #[test]
+    fn a_full_disk_is_not_full_shared_memory() {
+        let sentence = |of: &str| format!("{of}: No space left on device (os error 28)");
+        let disk = Some(DriveOutcome::DiskFull);
+        let memory = Some(DriveOutcome::Machine);
+        for (of, outcome) in [
+            ("cannot write drives/a/summary.json", disk),
+            ("cannot write /dev/shm/out/drives/a/summary.json", disk),
+            ("shared memory at /dev/shm has no room for 1 MB", memory),
+            (
+                "cannot use /dev/shm/gyre-0 for the run's shared memory",
+                memory,
+            ),
+            ("/dev/shm/gyre-0/gyre0123456789/services", memory),
+        ] {
+            assert_eq!(DriveOutcome::of_full(&sentence(of)), outcome, "{of}");
+        }
+        let transport = "cannot open topic `scan`: InternalFailure; /dev/shm is full";
+        assert_eq!(DriveOutcome::of_full(transport), memory);
+        let quota = "cannot write a: Disk quota exceeded (os error 122)";
+        assert_eq!(DriveOutcome::of_full(quota), disk);
+        let other = "cannot write a: Read-only file system (os error 30)";
+        assert_eq!(DriveOutcome::of_full(other), None);
     }
 
     #[test]
