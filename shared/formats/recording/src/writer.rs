@@ -25,6 +25,8 @@ use crate::{
 /// The longest time for which a message stays in memory. At four scans a second the history of the
 /// topics covers twice as much, so that a recorder that is killed and started again misses none.
 const FLUSH_PERIOD: Duration = Duration::from_millis(500);
+/// The longest time for which a chunk is not synchronised. What a power failure takes is that.
+const SYNC_PERIOD: Duration = Duration::from_secs(1);
 /// The size of a chunk, uncompressed, from which on it is written.
 const CHUNK_BYTES: usize = 4 << 20;
 /// The fastest level with entropy coding: the noise in a scan has no repetitions, but few values.
@@ -69,6 +71,8 @@ pub struct RecordingWriter {
     first_ns: Option<i64>,
     /// Log lines that came before the first message.
     early: Vec<LogLine>,
+    /// When the oldest chunk that is not synchronised was written.
+    unsynchronised: Option<Instant>,
 }
 
 /// The times of a message: the sensor's, and when it was received.
@@ -130,8 +134,12 @@ impl RecordingWriter {
             newest_ns: None,
             first_ns: None,
             early: Vec::new(),
+            unsynchronised: None,
         };
         writer.begin(head).map_err(unwritable)?;
+        // Its name survives a power failure too.
+        let synchronised = path.parent().map_or(Ok(()), gyre_storage::sync_folder);
+        synchronised.map_err(|error| failed(error.source))?;
         Ok(writer)
     }
 
@@ -315,8 +323,8 @@ impl RecordingWriter {
         Ok(())
     }
 
-    /// Writes the messages so far as a chunk if they are many, or have waited for long. Call it
-    /// twice a second while there are none.
+    /// Writes the messages so far as a chunk if they are many, or have waited for long, and
+    /// synchronises the file once a second. Call it twice a second while there are none.
     ///
     /// # Errors
     /// As [`RecordingWriter::add`].
@@ -324,10 +332,22 @@ impl RecordingWriter {
         let (bytes, since) = self.pending;
         let is_due =
             bytes >= CHUNK_BYTES || since.is_some_and(|since| since.elapsed() >= FLUSH_PERIOD);
-        match is_due {
-            true => self.flush(),
-            false => Ok(()),
+        if is_due {
+            self.flush()?;
         }
+        let synchronised = self.synchronise_if_due();
+        self.checked(synchronised)
+    }
+
+    fn synchronise_if_due(&mut self) -> Result<(), McapError> {
+        let is_due = self
+            .unsynchronised
+            .is_some_and(|since| since.elapsed() >= SYNC_PERIOD);
+        if is_due {
+            self.file.sync_data()?;
+            self.unsynchronised = None;
+        }
+        Ok(())
     }
 
     /// Writes the messages so far as a chunk, and its table.
@@ -348,6 +368,7 @@ impl RecordingWriter {
         self.pending = (0, None);
         // The file of the library and this one have one position.
         self.complete_bytes = self.file.stream_position()?;
+        self.unsynchronised.get_or_insert_with(Instant::now);
         Ok(())
     }
 
@@ -382,7 +403,8 @@ impl RecordingWriter {
     fn end(&mut self) -> Result<(), RecordingError> {
         self.flush()?;
         let finished = self.mcap().and_then(Writer::finish).map(drop);
-        self.checked(finished)
+        let synchronised = finished.and_then(|()| Ok(self.file.sync_all()?));
+        self.checked(synchronised)
     }
 
     fn mcap(&mut self) -> Result<&mut Writer<File>, McapError> {
