@@ -38,6 +38,10 @@ impl LogTail {
         };
         self.begun.extend(appended);
         let Some(end) = self.begun.iter().rposition(|byte| *byte == b'\n') else {
+            if self.begun.len() as u64 > MAX_BYTES {
+                // Its end is none of a line of the log, and is passed over.
+                self.begun.clear();
+            }
             return Vec::new();
         };
         let rest = self.begun.split_off(end + 1);
@@ -115,6 +119,14 @@ mod tests {
             message: "skipped scan=7".to_owned(),
         };
         assert_eq!(tail.lines(7), [line]);
+        let endless = "x".repeat(MAX_BYTES as usize);
+        for _ in 0..3 {
+            append(&endless);
+            assert_eq!(tail.lines(8), []);
+            assert!(tail.begun.len() as u64 <= MAX_BYTES);
+        }
+        append("\n{\"level\":\"INFO\",\"fields\":{\"message\":\"after it\"}}\n");
+        assert_eq!(tail.lines(8)[0].message, "after it");
         std::fs::write(&path, "").unwrap();
         assert_eq!(tail.lines(8), []);
         append("{\"level\":\"INFO\",\"fields\":{}}\n");

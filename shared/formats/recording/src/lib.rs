@@ -23,6 +23,7 @@
 //! records of a file), `recording`, `scans` (a [`Dataset`](gyre_radar::Dataset)).
 
 mod chunk;
+mod early_lines;
 mod error;
 mod head;
 pub mod image;

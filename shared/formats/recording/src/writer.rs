@@ -16,7 +16,9 @@ use gyre_messages::{Item, topic};
 use mcap::{Compression, McapError, WriteOptions, Writer, records::MessageHeader};
 
 use crate::{
-    ENCODING, Entry, Head, LogLine, RecordingError, exact_channel,
+    ENCODING, Entry, Head, LogLine, RecordingError,
+    early_lines::EarlyLines,
+    exact_channel,
     image::Rows,
     table::Table,
     view::{Recent, View, image_channel, views},
@@ -70,7 +72,7 @@ pub struct RecordingWriter {
     /// The time of the first message in this file.
     first_ns: Option<i64>,
     /// Log lines that came before the first message.
-    early: Vec<LogLine>,
+    early: EarlyLines,
     /// When the oldest chunk that is not synchronised was written.
     unsynchronised: Option<Instant>,
 }
@@ -133,7 +135,7 @@ impl RecordingWriter {
             pending: (0, None),
             newest_ns: None,
             first_ns: None,
-            early: Vec::new(),
+            early: EarlyLines::default(),
             unsynchronised: None,
         };
         writer.begin(head).map_err(unwritable)?;
@@ -213,7 +215,7 @@ impl RecordingWriter {
         self.missed(topic, message.missed);
         self.newest_ns = self.newest_ns.max(Some(item.stamp_ns));
         self.first_ns.get_or_insert(item.stamp_ns);
-        for line in mem::take(&mut self.early) {
+        for line in mem::take(&mut self.early).into_lines() {
             self.try_add_log(&line)?;
         }
         Ok(())
@@ -377,7 +379,7 @@ impl RecordingWriter {
     /// # Errors
     /// As [`RecordingWriter::add`].
     pub fn finish(mut self) -> Result<BTreeMap<String, u64>, RecordingError> {
-        for line in mem::take(&mut self.early) {
+        for line in mem::take(&mut self.early).into_lines() {
             let added = self.try_add_log(&line);
             self.checked(added)?;
         }
