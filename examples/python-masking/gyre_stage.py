@@ -251,7 +251,6 @@ class Writer:
 
     def send(self, draft: "Draft", item: Item, hop: int) -> None:
         """Publishes a message about an item, and wakes the readers."""
-        item.pid = os.getpid()
         item.hops[hop].published_ns = now_ns()
         draft.header.item = item
         draft.sample.assume_init().send()

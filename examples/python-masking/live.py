@@ -4,6 +4,8 @@ Masking numbers the scans that it takes one after the other, so no later stage s
 `published`, are the dropped scans.
 """
 
+import os
+import pathlib
 from collections import deque
 from typing import Optional
 
@@ -14,6 +16,24 @@ from messages import BASE, BREAK, END, ByteBlock, Item, ScanHeader
 MAX_INTERVAL_NS = 10_000_000_000
 # Windows of scans after which masking counts as caught up all the same: a pipeline that is slower than its scans never is.
 WINDOWS_IN_ORDER = 8
+
+
+def begin_generation(out: pathlib.Path, newest: int) -> int:
+    """Returns the number of the generation of item numbers that begins: one more than those before, which a file keeps."""
+    path = out / "journal" / "generation"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    before = int(path.read_text()) if path.exists() else 0
+    number = max(before, newest) + 1
+    draft = path.with_name(".generation.tmp")
+    with open(draft, "w", opener=lambda name, flags: os.open(name, flags, 0o600)) as file:
+        file.write(str(number))
+        file.flush()
+        os.fsync(file.fileno())
+    os.replace(draft, path)
+    folder = os.open(path.parent, os.O_RDONLY)
+    os.fsync(folder)
+    os.close(folder)
+    return number
 
 
 class NewestScans(Port):
@@ -31,6 +51,9 @@ class NewestScans(Port):
         self._passed: Optional[int] = None
         # Whether the current scan has its pose already: the other stages may need its mask as their previous one.
         self._repeats = False
+        self._out = pathlib.Path(run.manifest["out"])
+        # Its number, and the first item number that it gives.
+        self._generation = (0, 0)
 
     def head(self) -> Optional[Received]:
         """Returns the scan to process next, numbered; None while there is none, or the window is full."""
@@ -86,16 +109,19 @@ class NewestScans(Port):
         if not self._queue:
             return
         front = self._queue[0].item
+        first = 0 if from_start else pose.seq + 1
+        self._generation = (begin_generation(self._out, pose.generation), first)
         if from_start:
             self._next = 0
         elif front.published == pose.published and not front.flags & END:
             self._next, self._previous, self._repeats = pose.seq, (pose.previous_scan, None), True
         else:
-            self._next = pose.seq + 1
+            self._next = first
 
     def _number(self, item: Item) -> None:
         """Writes the numbers of the chain into the header of a scan, which is a copy."""
         item.seq = self._next
+        item.generation, item.numbered_from = self._generation
         is_end = item.flags & END
         previous = self._previous
         if previous is not None and previous[1] is not None and not is_end:

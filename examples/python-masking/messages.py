@@ -45,22 +45,23 @@ class Hop(Message):
 class Item(Message):
     """The scan that a message is about; every header begins with it."""
 
-    NAME = "gyre_item_v3"
+    NAME = "gyre_item_v4"
     _fields_ = [
         ("seq", c_uint64),
         ("scan", c_uint64),
         ("previous_scan", c_uint64),
         ("published", c_uint64),
+        ("numbered_from", c_uint64),
         ("stamp_ns", c_int64),
         ("due_ns", c_int64),
-        ("pid", c_uint32),
+        ("generation", c_uint32),
         ("flags", c_uint32),
         ("hops", Hop * STAGES),
     ]
 
 
 class ScanHeader(Message):
-    NAME = "gyre_scan_header_v3"
+    NAME = "gyre_scan_header_v4"
     _fields_ = [
         ("item", Item),
         ("azimuths", c_uint32),
@@ -78,7 +79,7 @@ class ScanHeader(Message):
 
 
 class MaskedHeader(Message):
-    NAME = "gyre_masked_header_v3"
+    NAME = "gyre_masked_header_v4"
     _fields_ = [
         ("item", Item),
         ("n", c_uint32),
@@ -130,12 +131,12 @@ class MotionEstimate(Message):
 
 
 class MotionHeader(Message):
-    NAME = "gyre_motion_header_v5"
+    NAME = "gyre_motion_header_v6"
     _fields_ = [("item", Item), ("motion", MotionEstimate)]
 
 
 class PoseHeader(Message):
-    NAME = "gyre_pose_header_v5"
+    NAME = "gyre_pose_header_v6"
     _fields_ = [
         ("item", Item),
         ("motion", MotionEstimate),
@@ -167,14 +168,14 @@ POINT_FLOATS = 5  # x_m, y_m, time_s, weight, doppler_s
 
 SIZES = {
     Hop: 32,
-    Item: 280,
-    ScanHeader: 13624,
-    MaskedHeader: 320,
+    Item: 288,
+    ScanHeader: 13632,
+    MaskedHeader: 328,
     RotationEstimate: 40,
     RefinementRecord: 32,
     MotionEstimate: 208,
-    MotionHeader: 488,
-    PoseHeader: 616,
+    MotionHeader: 496,
+    PoseHeader: 624,
     ByteBlock: 64,
     FloatBlock: 64,
 }

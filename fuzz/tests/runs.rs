@@ -22,6 +22,9 @@ fn scan(seq: u64) -> Incoming {
         seq,
         scan: seq,
         stamp_ns: START_NS + seq as i64 * 250_000_000,
+        // The radar's source was started again before each.
+        generation: seq as u32 + 1,
+        numbered_from: seq,
         ..Item::default()
     };
     let mut header = ScanHeader {

@@ -3,6 +3,8 @@
 mod foxglove;
 mod page;
 mod record;
+mod record_live;
+mod record_moved;
 mod shadow;
 mod traces;
 mod undisturbed;

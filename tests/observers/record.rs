@@ -18,32 +18,32 @@ use crate::{
     operate::commands::{ask, await_status, process},
 };
 
-const SCANS: usize = 24;
+pub const SCANS: usize = 24;
 /// Every topic that a replay can begin with.
 const ALL: &str = "record.topics=['scan','masked','rotation','motion','refined','pose','log']";
 /// With so large a window the queues hold all scans of these tests: nothing is missed, however slow
 /// the machine is.
-const WINDOW: &str = "run.window=32";
+pub const WINDOW: &str = "run.window=32";
 
 /// A drive that makes a loop, through small rasters.
-fn simulated() -> Run {
+pub fn simulated() -> Run {
     Run::configured(&format!(
         "[simulation]\nscans = {SCANS}\n[raster]\nn = 127\ncell_m = 0.8\n"
     ))
     .set(WINDOW)
 }
 
-fn file(run: &Run) -> PathBuf {
+pub fn file(run: &Run) -> PathBuf {
     run.folder().join("drive.mcap")
 }
 
-fn recorded(run: &Run) -> Run {
+pub fn recorded(run: &Run) -> Run {
     let path = file(run);
     run.clone().argument("--record", path.to_str().unwrap())
 }
 
 /// A replay with the configuration that is in the recording.
-fn replay(recording: &Path, arguments: &[&str]) -> String {
+pub fn replay(recording: &Path, arguments: &[&str]) -> String {
     let run = Run::configured("");
     let mut command = gyre();
     command.arg("run").arg("--data").arg(recording);
@@ -52,12 +52,12 @@ fn replay(recording: &Path, arguments: &[&str]) -> String {
     run.odometry()
 }
 
-fn seqs(recording: &Recording, topic: &str) -> Vec<u64> {
+pub fn seqs(recording: &Recording, topic: &str) -> Vec<u64> {
     recording.entries(topic).map(|entry| entry.seq).collect()
 }
 
 /// Waits for the recorder of a run, another one than `not`.
-fn await_recorder(running: &mut Running, not: Option<u32>) -> u32 {
+pub fn await_recorder(running: &mut Running, not: Option<u32>) -> u32 {
     loop {
         let recorder = processes::child_with(running.pid(), "record");
         if let Some(pid) = recorder.filter(|pid| Some(*pid) != not) {

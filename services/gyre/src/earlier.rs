@@ -15,10 +15,12 @@ use gyre_journal::{
     keyframes::{KeyframesError, complete_poses},
 };
 use gyre_messages::StageId;
+use gyre_recorder::Ledger;
 use gyre_results::{Holds, Identity, Out, Programs, SIMULATED_TRUTH, SUMMARY};
 use gyre_run::{BEGUN_WITH, COMPLETE, Mode, Side};
 use gyre_scan_matching::Refiner;
 use gyre_slam::{Keyframe, Place, Query, RecordReader, records_path};
+use gyre_stage::Generation;
 use gyre_storage::{self as storage, GroupSync, LogError};
 use gyre_terminal::{Failure, print};
 
@@ -256,13 +258,15 @@ fn damaged(error: KeyframesError) -> Failure {
 }
 
 /// The files of a run's state.
-fn state(out: &Path) -> [PathBuf; 7] {
+fn state(out: &Path) -> [PathBuf; 9] {
     [
         journal::path(out),
         checkpoint::path(out),
         records_path::<Keyframe>(out),
         records_path::<Place>(out),
         records_path::<Query>(out),
+        Ledger::of(out).path().to_owned(),
+        Generation::path(out),
         out.join(BEGUN_WITH),
         out.join(COMPLETE),
     ]

@@ -4,7 +4,6 @@ use std::path::Path;
 
 use gyre_configuration::Configuration;
 use gyre_messages::{FollowerId, StageId};
-use gyre_recorder::RecorderError;
 use gyre_run::{Mode, RecordConfig, Scheduling, Side};
 use gyre_supervise::{Program, StagePlan};
 use gyre_terminal::Failure;
@@ -103,8 +102,8 @@ pub fn recorder(record: &RecordConfig, gyre: &Path, out: &Path) -> Option<StageP
 /// # Errors
 /// There is one.
 pub fn require_new(record: &RecordConfig) -> Result<(), Failure> {
-    match record.is_on() && record.file.exists() {
-        true => Err(RecorderError::Exists(record.file.clone()).into()),
+    match record.is_on() {
+        true => Ok(gyre_recorder::require_new(&record.file)?),
         false => Ok(()),
     }
 }

@@ -182,10 +182,7 @@ impl Broken<'_> {
             thread::sleep(HIDDEN);
             (received_ns, now_ns) = (clock::now_ns(), clock::now_ns());
         }
-        let mut item = Item {
-            pid: std::process::id(),
-            ..*item
-        };
+        let mut item = *item;
         if !self.does("stamps nothing and forgets the item") {
             *item.hop_mut(self.stage) = Hop {
                 received_ns,
@@ -242,10 +239,6 @@ impl Broken<'_> {
         if self.does("keeps the end") {
             return Ok(());
         }
-        let item = Item {
-            pid: std::process::id(),
-            ..*item
-        };
-        self.output.send(&self.output_about(item)?)
+        self.output.send(&self.output_about(*item)?)
     }
 }

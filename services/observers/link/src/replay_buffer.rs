@@ -102,6 +102,10 @@ impl ReplayBuffer for MemoryBuffer {
     fn add(&self, message: &RecordedMessage) {
         let message = Message::of(message);
         let held = &mut *lock(&self.held);
+        // Masking was started again, and gives numbers anew.
+        while let Some(void) = held.messages.pop_back_if(|last| last.seq >= message.seq) {
+            held.bytes -= void.bytes.len();
+        }
         held.bytes += message.bytes.len();
         held.messages.push_back(message);
         while held.messages.len() > 1

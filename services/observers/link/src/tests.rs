@@ -254,6 +254,18 @@ fn a_memory_buffer_keeps_the_newest_messages() {
 }
 
 #[test]
+fn a_memory_buffer_has_one_message_of_a_number_that_was_given_anew() {
+    let buffer = MemoryBuffer::of(10);
+    (0..5).for_each(|seq| add(&buffer, seq));
+    add(&buffer, 2);
+    let next = |seq| buffer.next(seq, Duration::ZERO).unwrap();
+    assert_eq!(next(2), Next::Message(message(2)));
+    assert_eq!(next(3), Next::Nothing);
+    add(&buffer, 3);
+    assert_eq!(next(3), Next::Message(message(3)));
+}
+
+#[test]
 fn poses_and_their_motions_are_sent_from_the_journal_whenever_they_are_asked_for() {
     let out = tempfile::tempdir().unwrap();
     let mut journal = Journal::open(&journal::path(out.path())).unwrap();

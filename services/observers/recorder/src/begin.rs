@@ -1,13 +1,9 @@
 //! Where a recording begins: a new one, or the next part of one that an earlier recorder of the run
 //! has begun.
 
-use std::{
-    collections::BTreeMap,
-    fs,
-    path::{Path, PathBuf},
-};
+use std::{fs, path::Path};
 
-use gyre_recording::{Head, Recording, RecordingError, next_part, parts};
+use gyre_recording::{Head, Ledger, Positions, next_part, parts};
 use gyre_stage::{Manifest, StageError, clock};
 
 use crate::{
@@ -17,67 +13,34 @@ use crate::{
 
 /// A recording that is begun, or goes on in its next part.
 pub(crate) struct Begun {
-    /// The file to write.
-    pub path: PathBuf,
-    /// The head of the file.
+    /// The head of the part to write.
     pub head: Head,
-    /// The parts of an earlier recorder of this run.
-    pub earlier: Option<EarlierParts>,
+    /// The ledger of the run that has started the recorder.
+    pub ledger: Option<Ledger>,
+    /// The positions behind the parts of earlier recorders of this run, if there were any.
+    pub earlier: Option<Positions>,
 }
 
-/// The parts that earlier recorders have written.
-pub(crate) struct EarlierParts {
-    id: String,
-    /// The number after that of the newest message of each topic.
-    next: BTreeMap<String, u64>,
-}
-
-impl EarlierParts {
-    fn read(first: &Path, topics: &[String]) -> Result<Self, RecordingError> {
-        let id = Recording::open(&[first.to_owned()])?.head().id.clone();
-        let mut next = BTreeMap::new();
-        // What is in a part that cannot be read counts as missed.
-        for part in parts(first)
-            .into_iter()
-            .flat_map(|it| Recording::open(&[it]))
-        {
-            for topic in topics {
-                let newest = part.entries(topic).last().map(|entry| entry.seq);
-                let after = newest.map_or(0, |newest| newest.saturating_add(1));
-                let next: &mut u64 = next.entry(topic.clone()).or_default();
-                *next = after.max(*next);
-            }
-        }
-        Ok(Self { id, next })
-    }
-
-    /// Returns the first message of a topic that they lack. Recording begins with the first scan,
-    /// which waits for the recorder.
-    pub fn next_of(&self, topic: &str) -> u64 {
-        self.next.get(topic).copied().unwrap_or_default()
-    }
-}
-
-/// Returns the file to write: the next part where a recorder of this run was there before.
+/// Returns the part to write: the next one where a recorder of this run was there before.
 pub(crate) fn begin(
     options: &Options,
     manifest: &Manifest,
     topics: &[String],
 ) -> Result<Begun, RecorderError> {
-    let (path, part) = next_part(&options.to);
-    if part > 1 && !options.continues {
-        return Err(RecorderError::Exists(options.to.clone()));
+    let ledger = options.continues.then(|| Ledger::of(&manifest.out));
+    let earlier = ledger.as_ref().map(|ledger| ledger.read(&options.to));
+    let earlier = earlier.transpose()?.flatten();
+    if earlier.is_none() {
+        require_new(&options.to)?;
     }
-    let earlier = (part > 1).then(|| EarlierParts::read(&options.to, topics));
-    let earlier = earlier.transpose()?;
-    let id = match &earlier {
-        None => format!(
-            "{}-{}",
-            manifest.prefix.trim_matches('_'),
-            clock::since_1970_ns()
-        ),
-        Some(earlier) => earlier.id.clone(),
-    };
+    let part = next_part(&options.to, earlier.as_ref().map_or(0, |it| it.part));
+    let id = earlier.as_ref().map_or_else(
+        || {
+            let prefix = manifest.prefix.trim_matches('_');
+            format!("{prefix}-{}", clock::since_1970_ns())
+        },
+        |earlier| earlier.id.clone(),
+    );
     let file = manifest.root.join("config.toml");
     let configuration =
         fs::read_to_string(&file).map_err(|source| StageError::File { path: file, source })?;
@@ -94,8 +57,20 @@ pub(crate) fn begin(
         mode: if manifest.live { "live" } else { "lossless" }.to_owned(),
     };
     Ok(Begun {
-        path,
         head,
-        earlier,
+        ledger,
+        earlier: earlier.map(|it| it.positions),
     })
+}
+
+/// Checks that a recording that begins writes over none, and goes on in none, also where only later
+/// parts of one are left.
+///
+/// # Errors
+/// There is one.
+pub fn require_new(file: &Path) -> Result<(), RecorderError> {
+    match parts(file).into_iter().next() {
+        Some(there) => Err(RecorderError::Exists(there)),
+        None => Ok(()),
+    }
 }

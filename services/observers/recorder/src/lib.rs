@@ -18,8 +18,9 @@ mod recorder;
 mod tap;
 mod writing;
 
+pub use begin::require_new;
 pub use error::RecorderError;
-pub use gyre_recording::Split;
+pub use gyre_recording::{Ledger, Split};
 pub use log_tail::LogTail;
 pub use options::Options;
 pub use recorder::{Recorded, record};

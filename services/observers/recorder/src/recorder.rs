@@ -8,7 +8,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::{Message, Refined, Sender as PublishedBy, topic};
+use gyre_messages::{Message, Pose, Refined, Sender as PublishedBy, topic};
 use gyre_recording::SplitWriter;
 use gyre_stage::{
     Manifest, StageError, clock, launch,
@@ -103,15 +103,19 @@ pub fn record(options: &Options) -> Result<Recorded, RecorderError> {
     let signals = Signals::install()?;
     let topics = topics(&options.topics, manifest)?;
     let Begun {
-        path,
         head,
+        ledger,
         earlier,
     } = begin(options, manifest, &topics)?;
-    let writer = SplitWriter::create(options.to.clone(), head, options.split)?;
     let taps = topics.iter().map(|topic| {
-        let expected = earlier.as_ref().map(|it| it.next_of(topic));
-        Tap::on(&run, topic, expected)
+        // Recording begins with the first scan, which waits for the recorder.
+        let expected = earlier.as_ref().map(|it| it.get(topic).copied());
+        Tap::on(&run, topic, expected.map(Option::unwrap_or_default))
     });
+    let (to, split) = (options.to.clone(), options.split);
+    let positions = earlier.clone().unwrap_or_default();
+    let writer = SplitWriter::create(to, head, split, ledger, positions)?;
+    let path = writer.path().to_owned();
     let taps: Vec<_> = taps.flat_map(Result::transpose).collect::<Result<_, _>>()?;
     if options.continues {
         run.is_ready(NAME, &signals)?;
@@ -186,7 +190,10 @@ impl Recorder<'_> {
             // Before the queues are emptied: the messages before the end are still there.
             let has_ended = self.run.has_ended();
             self.take_all()?;
-            let have_ended = self.taps.iter().all(|tap| tap.has_ended());
+            // As long as poses are to come masking may be killed, and number anew what it has sent,
+            // the end of the stream too.
+            let is_last = |tap: &Tap<'_>| tap.counts().topic == Pose::TOPIC;
+            let have_ended = self.taps.iter().any(is_last) && self.taps.iter().all(Tap::has_ended);
             if has_ended || have_ended || writing.is_finished() {
                 return Ok(());
             }

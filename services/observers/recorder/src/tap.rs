@@ -1,7 +1,7 @@
 //! The observers of the topics that are recorded.
 
 use gyre_messages::{Correction, Message};
-use gyre_recording::Incoming;
+use gyre_recording::{Incoming, Position};
 use gyre_stage::{
     Listener, StageError, clock,
     observer::{ObservedRun, TopicObserver},
@@ -33,18 +33,18 @@ pub(crate) struct Tap<'run> {
 }
 
 impl<'run> Tap<'run> {
-    /// Observes a topic by its name; `None` if there is no such topic. Messages from number
+    /// Observes a topic by its name; `None` if there is no such topic. Messages from the position
     /// `expected` on are to be recorded, if it is known: those before are in earlier parts.
     pub(crate) fn on(
         run: &'run ObservedRun,
         topic: &str,
-        expected: Option<u64>,
+        expected: Option<Position>,
     ) -> Result<Option<Self>, StageError> {
         let Some(mut observer) = run.observe_topic(topic)? else {
             return Ok(None);
         };
-        if let Some(next) = expected {
-            observer.expect(next);
+        if let Some(Position { next, generation }) = expected {
+            observer.expect(next, generation);
         }
         Ok(Some(Self {
             observer,

@@ -111,6 +111,8 @@ impl Renumbering {
                 scan: item.scan,
                 previous_scan: item.previous_scan,
                 flags: item.flags,
+                generation: 0,
+                numbered_from: 0,
                 ..input.item()
             };
             shadow.feed(topic, &input.about(&item))?;
@@ -146,6 +148,8 @@ impl Renumbering {
             let item = Item {
                 seq: number - self.lag,
                 flags: message.item().flags & !flag::SYNC,
+                generation: 0,
+                numbered_from: 0,
                 ..message.item()
             };
             shadow.feed(topic, &message.about(&item))?;

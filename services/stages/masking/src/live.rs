@@ -10,7 +10,7 @@ use std::collections::VecDeque;
 use gyre_messages::{Item, Scan, Window, flag};
 use gyre_radar::continues;
 use gyre_stage::{
-    Launch, Listener, StageError,
+    Generation, Launch, Listener, Manifest, StageError,
     inputs::Action,
     reader::{Port, Received},
 };
@@ -27,6 +27,8 @@ pub struct NewestOnly {
     /// The previous scan, if the mask takes two.
     previous: Option<Received<Scan>>,
     window: Window,
+    /// The run, in which the generation of the numbers begins with them.
+    manifest: Manifest,
     chain: Option<Chain>,
     /// Scans that may still be processed in order after a start; 0: the newest scan alone.
     in_order: usize,
@@ -36,6 +38,7 @@ pub struct NewestOnly {
 #[derive(Clone, Copy)]
 struct Chain {
     next: u64,
+    generation: Generation,
     previous_scan: Option<u64>,
     /// Time of the previous scan, ns; `None` after a restart.
     previous_ns: Option<i64>,
@@ -55,6 +58,7 @@ impl NewestOnly {
             queue: VecDeque::with_capacity(window.live_depth + 2),
             previous: None,
             window,
+            manifest: launch.manifest.clone(),
             chain: None,
             in_order: window.scans * WINDOWS_IN_ORDER,
         })
@@ -88,7 +92,11 @@ impl NewestOnly {
         resume_at: &Item,
         newest_pose: Option<u64>,
     ) -> Result<Action, StageError> {
-        let Some(chain) = self.chain.or_else(|| self.resume(resume_at)) else {
+        let chain = match self.chain {
+            None => self.resume(resume_at)?,
+            chain => chain,
+        };
+        let Some(chain) = chain else {
             return Ok(Action::Wait);
         };
         self.chain = Some(chain);
@@ -110,7 +118,7 @@ impl NewestOnly {
 
     /// Resumes the chain after a start. `None` while all received scans precede the newest pose: a
     /// restarted source repeats such scans, and the history of a running source begins with them.
-    fn resume(&mut self, newest_pose: &Item) -> Option<Chain> {
+    fn resume(&mut self, newest_pose: &Item) -> Result<Option<Chain>, StageError> {
         while self
             .queue
             .front()
@@ -124,7 +132,18 @@ impl NewestOnly {
                 self.keep(past);
             }
         }
-        Some(Chain::resume(self.queue.front()?.item(), newest_pose))
+        let Some(front) = self.queue.front() else {
+            return Ok(None);
+        };
+        let first = match newest_pose.is(flag::BASE) {
+            true => 0,
+            false => newest_pose.seq.saturating_add(1),
+        };
+        let generation = Generation::begin(&self.manifest, newest_pose, first)?;
+        Ok(Some(Chain {
+            generation,
+            ..Chain::resume(front.item(), newest_pose)
+        }))
     }
 
     /// Drops all but the newest scan; until masking has caught up after a start, all but as many as
@@ -159,6 +178,7 @@ impl NewestOnly {
                 previous_ns: Some(stamp_ns),
                 published: Some(published),
                 repeats: false,
+                ..*chain
             };
         }
         self.keep(done);
@@ -199,28 +219,20 @@ impl Chain {
 
     /// Resumes with the scan of the newest pose if the source still has it, else with a break.
     fn resume(front: &Item, newest_pose: &Item) -> Self {
+        let begin = |next, previous_scan: Option<u64>| Self {
+            next,
+            generation: Generation::default(),
+            previous_scan,
+            previous_ns: None,
+            published: None,
+            repeats: previous_scan.is_some(),
+        };
         match () {
-            () if newest_pose.is(flag::BASE) => Self {
-                next: 0,
-                previous_scan: None,
-                previous_ns: None,
-                published: None,
-                repeats: false,
-            },
-            () if front.published == newest_pose.published && !front.is(flag::END) => Self {
-                next: newest_pose.seq,
-                previous_scan: Some(newest_pose.previous_scan),
-                previous_ns: None,
-                published: None,
-                repeats: true,
-            },
-            () => Self {
-                next: newest_pose.seq.saturating_add(1),
-                previous_scan: None,
-                previous_ns: None,
-                published: None,
-                repeats: false,
-            },
+            () if newest_pose.is(flag::BASE) => begin(0, None),
+            () if front.published == newest_pose.published && !front.is(flag::END) => {
+                begin(newest_pose.seq, Some(newest_pose.previous_scan))
+            }
+            () => begin(newest_pose.seq.saturating_add(1), None),
         }
     }
 
@@ -242,12 +254,14 @@ impl Chain {
             Some(_) => 0,
             None => flag::BREAK,
         };
-        Item {
+        let mut item = Item {
             seq: self.next,
             previous_scan: previous_scan.unwrap_or(item.scan),
             flags: (item.flags & flag::END) | start,
             ..*item
-        }
+        };
+        self.generation.mark(&mut item);
+        item
     }
 }
 

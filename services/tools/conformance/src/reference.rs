@@ -225,7 +225,6 @@ impl<'a> OwnPipeline<'a> {
             pose = compose(self.last_pose.as_ref(), motion);
             pose.item.flags |= flag::SYNC;
         }
-        pose.item.pid = std::process::id();
         pose
     }
 
@@ -240,7 +239,8 @@ impl<'a> OwnPipeline<'a> {
         {
             let now_ns = clock::now_ns();
             let mut item = scan.item();
-            (item.due_ns, item.pid) = (now_ns, std::process::id());
+            // Any but 0, which a stage may write that does not copy it.
+            (item.due_ns, item.generation) = (now_ns, 1);
             *item.hop_mut(StageId::RadarReplay) = Hop {
                 received_ns: now_ns,
                 started_ns: now_ns,

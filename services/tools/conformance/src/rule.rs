@@ -47,7 +47,7 @@ rules! {
     IgnoresObservers: "contract 3", "is not disturbed by observers";
     OneForOne: "contract 4", "sends one item for each, with consecutive numbers";
     CopiesItem: "contract 4", "copies the item of its input";
-    StampsWork: "contract 4", "fills in its own time stamps and process id";
+    StampsWork: "contract 4", "fills in its own time stamps";
     LooksBack: "contract 5", "needs no earlier item but the previous one";
     Deterministic: "contract 6", "gives the same outputs for the same inputs";
     Resumes: "contract 6", "goes on without a gap after kill -9";

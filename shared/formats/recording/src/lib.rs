@@ -19,16 +19,21 @@
 //! far. So a reader finds a message without decompressing what is before it, also in a file that
 //! has no summary because its writer was killed.
 //!
-//! Reading order: `head` and `table` (the metadata), `writer`, `split` (several files), `walk` (the
-//! records of a file), `recording`, `scans` (a [`Dataset`](gyre_radar::Dataset)).
+//! Reading order: `head` and `table` (the metadata), `writer`, `split` and `ledger` (several
+//! files), `walk` (the records of a file), `recording`, `generations`, `scans` (a
+//! [`Dataset`](gyre_radar::Dataset)).
 
 mod chunk;
 mod early_lines;
 mod error;
+mod generations;
 mod head;
 pub mod image;
+mod ledger;
+mod newest;
 mod open;
 mod parts;
+mod position;
 mod recording;
 mod scans;
 mod split;
@@ -39,8 +44,10 @@ mod writer;
 
 pub use error::RecordingError;
 pub use head::Head;
+pub use ledger::{Begun, Ledger};
 pub use open::{is_recording, open, open_recording, open_resolved, reopen, stored_options};
 pub use parts::{next_part, parts};
+pub use position::{Position, Positions};
 pub use recording::{Recording, Stored};
 pub use split::{Split, SplitWriter};
 pub use table::Entry;

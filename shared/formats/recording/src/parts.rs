@@ -1,5 +1,6 @@
 //! The files of a recording: FILE.mcap, and FILE.2.mcap, FILE.3.mcap and so on, which are begun
-//! when the one before is large or long enough, and by recorders that were restarted.
+//! when the one before is large or long enough, and by recorders that were restarted. Those that
+//! are complete may be moved away: no number is given twice.
 
 use std::{
     fs,
@@ -7,32 +8,56 @@ use std::{
 };
 
 /// Returns the path of a part, from 1.
-fn part(path: &Path, number: usize) -> PathBuf {
+pub(crate) fn part(path: &Path, number: usize) -> PathBuf {
     match number {
         1 => path.to_owned(),
         _ => path.with_extension(format!("{number}.mcap")),
     }
 }
 
-/// Returns the files of a recording that exist, in order. It is named by its first file, or by a
-/// folder that holds it and no other one.
+/// Returns the files of a recording that exist, in order. It is named by its first file, which need
+/// not exist any more, or by a folder that holds it and no other one.
 pub fn parts(path: &Path) -> Vec<PathBuf> {
     if path.is_dir() {
         return first_part_in(path).map_or_else(Vec::new, |first| parts(&first));
     }
-    let paths = (1..).map(|number| part(path, number));
-    paths.take_while(|path| path.exists()).collect()
+    let numbers = numbers(path).into_iter();
+    numbers.map(|number| part(path, number)).collect()
+}
+
+/// Returns the numbers of the parts that exist, in order.
+fn numbers(path: &Path) -> Vec<usize> {
+    let folder = path.parent().filter(|it| !it.as_os_str().is_empty());
+    let Ok(files) = fs::read_dir(folder.unwrap_or(Path::new("."))) else {
+        // It may be searched all the same.
+        let exists = |number: &usize| part(path, *number).exists();
+        return (1..).take_while(exists).collect();
+    };
+    let files = files.flatten().map(|file| file.path());
+    let later = files.filter_map(|file| {
+        let (first, number) = later_part(&file)?;
+        (first.file_name() == path.file_name()).then_some(number)
+    });
+    let first = path.exists().then_some(1);
+    let mut numbers: Vec<usize> = later.chain(first).collect();
+    numbers.sort_unstable();
+    numbers
 }
 
 /// Returns the first file of the only recording in a folder.
 pub(crate) fn first_part_in(folder: &Path) -> Option<PathBuf> {
     let files = fs::read_dir(folder).ok()?.flatten();
-    let files = files.map(|file| file.path()).filter(|path| {
+    let files = files.map(|file| file.path());
+    let files = files.filter(|path| {
         let is_recording = path.extension().is_some_and(|it| it == "mcap");
-        is_recording && !is_hidden(path) && !is_later_part(path)
+        is_recording && !is_hidden(path)
     });
-    let mut first: Vec<PathBuf> = files.take(2).collect();
-    first.pop().filter(|_| first.is_empty())
+    let first = files.map(|path| later_part(&path).map_or(path, |(first, _)| first));
+    let mut first: Vec<PathBuf> = first.collect();
+    first.sort_unstable();
+    first.dedup();
+    let only = first.pop();
+    only.filter(|_| first.is_empty())
 }
 
 /// macOS stores `._NAME.mcap` beside NAME.mcap on file systems of others.
@@ -41,19 +66,19 @@ fn is_hidden(path: &Path) -> bool {
     name.as_encoded_bytes().starts_with(b".")
 }
 
-/// Returns whether a file is NAME.N.mcap beside NAME.mcap.
-fn is_later_part(path: &Path) -> bool {
-    let name = path.with_extension("");
-    let number = name
-        .extension()
-        .and_then(|it| it.to_str()?.parse::<usize>().ok());
-    number.is_some_and(|number| number > 1) && name.with_extension("mcap").exists()
+/// Returns the first file and the number of NAME.N.mcap.
+fn later_part(path: &Path) -> Option<(PathBuf, usize)> {
+    let name = path.file_name()?.to_str()?.strip_suffix(".mcap")?;
+    let (name, digits) = name.rsplit_once('.')?;
+    let number = digits.parse().ok().filter(|number| *number > 1)?;
+    // Not `007`, which no recorder writes.
+    let first = path.with_file_name(format!("{name}.mcap"));
+    (part(&first, number) == path).then_some((first, number))
 }
 
-/// Returns the path and the number of the part that does not exist yet.
-pub fn next_part(path: &Path) -> (PathBuf, usize) {
-    let number = parts(path).len() + 1;
-    (part(path, number), number)
+/// Returns the number of the next part: after those that exist, and after this one.
+pub fn next_part(path: &Path, after: usize) -> usize {
+    numbers(path).last().map_or(after, |last| after.max(*last)) + 1
 }
 
 #[cfg(test)]
@@ -62,19 +87,38 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_recording_goes_on_in_the_first_part_that_does_not_exist() {
+    fn a_recording_goes_on_behind_all_parts_that_were_ever_there() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.b.mcap");
-        assert_eq!(next_part(&path), (path.clone(), 1));
+        assert_eq!(next_part(&path, 0), 1);
         fs::write(&path, "").unwrap();
         let second = folder.path().join("a.b.2.mcap");
-        assert_eq!(next_part(&path), (second.clone(), 2));
+        assert_eq!(next_part(&path, 1), 2);
         fs::write(&second, "").unwrap();
-        assert_eq!(parts(&path), [path.clone(), second]);
-        assert_eq!(next_part(&path).1, 3);
+        assert_eq!(parts(&path), [path.clone(), second.clone()]);
+        assert_eq!(next_part(&path, 1), 3);
         fs::write(folder.path().join("._a.b.mcap"), "Mac OS X").unwrap();
         assert_eq!(parts(folder.path()), parts(&path), "a folder of one");
+        let tenth = folder.path().join("a.b.10.mcap");
+        fs::write(&tenth, "").unwrap();
+        fs::remove_file(&path).unwrap();
+        assert_eq!(parts(&path), [second.clone(), tenth.clone()]);
+        assert_eq!(parts(folder.path()), parts(&path), "the first was moved");
+        assert_eq!(next_part(&path, 2), 11);
+        fs::remove_file(&tenth).unwrap();
+        fs::remove_file(&second).unwrap();
+        assert_eq!(next_part(&path, 10), 11, "all were moved");
+        fs::write(folder.path().join("a.mcap"), "").unwrap();
         fs::write(folder.path().join("b.mcap"), "").unwrap();
         assert!(parts(folder.path()).is_empty(), "a folder of two");
+    }
+
+    #[test]
+    fn only_the_names_that_recorders_give_are_of_later_parts() {
+        let number = |name: &str| later_part(Path::new(name)).map(|(_, number)| number);
+        assert_eq!(number("x/a.2.mcap"), Some(2));
+        for other in ["a.mcap", "a.1.mcap", "a.02.mcap", "a.b.mcap", "a.2.bag"] {
+            assert_eq!(number(other), None, "{other}");
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! A recording, opened: where each message is, and the messages.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     fs::File,
     path::{Path, PathBuf},
 };
@@ -14,12 +14,15 @@ use crate::{
     Entry, Head, RecordingError,
     chunk::{self, Channels, Message},
     exact_channel,
+    generations::{Generations, NumberedBy},
     image::{Rows, read},
     table::Table,
     view::image_channel,
     walk::{Step, Walk},
 };
 
+/// Parts that are not there which are named.
+const MAX_ABSENT: usize = 8;
 /// Chunks that are kept in memory: messages of one scan can be in two.
 const KEPT: usize = 2;
 
@@ -38,12 +41,17 @@ pub struct Recording {
     parts: Vec<Part>,
     /// The messages of each topic by their sequence number.
     places: BTreeMap<String, BTreeMap<u64, Place>>,
+    generations: BTreeMap<NumberedBy, Generations>,
+    /// Files of other recordings.
+    left_out: Vec<PathBuf>,
     kept: Vec<Kept>,
 }
 
 /// A file of a recording.
 struct Part {
     path: PathBuf,
+    /// See [`Head::part`].
+    number: usize,
     file: File,
     channels: Channels,
     missed: BTreeMap<String, u64>,
@@ -82,12 +90,14 @@ impl Recording {
                 head: head.clone(),
                 parts: Vec::new(),
                 places: BTreeMap::new(),
+                generations: BTreeMap::new(),
+                left_out: Vec::new(),
                 kept: Vec::new(),
             });
-            if head.id != recording.head.id {
-                break;
+            match head.id == recording.head.id {
+                true => recording.add(part, places),
+                false => recording.left_out.push(path.clone()),
             }
-            recording.add(part, places);
         }
         recording.ok_or_else(|| RecordingError::Io {
             path: PathBuf::new(),
@@ -95,19 +105,35 @@ impl Recording {
         })
     }
 
-    /// Adds a part. A message that an earlier one has is the same.
+    /// Adds a part. A message that an earlier one has is the same, unless its number was given
+    /// anew: the first message of a generation makes earlier ones void.
     fn add(&mut self, part: Part, places: Places) {
         let number = self.parts.len();
         self.parts.push(part);
         for (topic, entries, chunk) in places {
-            let places = self.places.entry(topic).or_default();
+            let numbered_by = NumberedBy::of(&topic);
+            let generations = self.generations.entry(numbered_by).or_default();
+            let mut places = self.places.remove(&topic).unwrap_or_default();
             for entry in entries {
-                places.entry(entry.seq).or_insert(Place {
-                    entry,
-                    part: number,
-                    chunk,
-                });
+                if generations.note(&entry) {
+                    let others = self.places.iter_mut();
+                    let others = others.filter(|(name, _)| NumberedBy::of(name) == numbered_by);
+                    let others = others.map(|(_, places)| places);
+                    for places in others.chain([&mut places]) {
+                        let mut given_anew = places.split_off(&entry.numbered_from);
+                        given_anew.retain(|_, place| !generations.makes_void(&place.entry));
+                        places.extend(given_anew);
+                    }
+                }
+                if !generations.makes_void(&entry) {
+                    places.entry(entry.seq).or_insert(Place {
+                        entry,
+                        part: number,
+                        chunk,
+                    });
+                }
             }
+            self.places.insert(topic, places);
         }
     }
 
@@ -143,6 +169,20 @@ impl Recording {
         missed
     }
 
+    /// Returns the files that are of another recording, and were left out.
+    pub fn left_out(&self) -> &[PathBuf] {
+        &self.left_out
+    }
+
+    /// Returns the numbers of the parts that are not there, as far as later ones are.
+    pub fn absent_parts(&self) -> Vec<usize> {
+        let there: BTreeSet<usize> = self.parts.iter().map(|part| part.number).collect();
+        let last = there.last().copied().unwrap_or_default();
+        // A damaged head may have any number.
+        let absent = (1..last).filter(|number| !there.contains(number));
+        absent.take(MAX_ABSENT).collect()
+    }
+
     /// Returns the files whose writers were killed.
     pub fn cut(&self) -> impl Iterator<Item = &Path> {
         let cut = self.parts.iter().filter(|part| !part.is_complete);
@@ -171,7 +211,7 @@ impl Recording {
         };
         let kept = self.keep(place)?;
         let (messages, part) = (&self.kept[kept].messages, &self.parts[place.part]);
-        stored(messages, &part.channels, topic, seq).ok_or_else(|| damaged(&part.path))
+        stored(messages, &part.channels, topic, &place.entry).ok_or_else(|| damaged(&part.path))
     }
 
     /// Reads the header of a message.
@@ -220,6 +260,7 @@ impl Part {
         })?;
         let mut part = Self {
             path: path.to_owned(),
+            number: 0,
             file,
             channels: Channels::new(),
             missed: BTreeMap::new(),
@@ -253,8 +294,9 @@ impl Part {
                 }
             }
         }
-        let head =
+        let head: Head =
             head.ok_or_else(|| part.foreign("it has no metadata `gyre.recording`".to_owned()))?;
+        part.number = head.part;
         Ok((head, part, places))
     }
 
@@ -267,19 +309,22 @@ impl Part {
 }
 
 /// Puts a message together.
-fn stored(messages: &[Message], channels: &Channels, name: &str, seq: u64) -> Option<Stored> {
+fn stored(messages: &[Message], channels: &Channels, name: &str, entry: &Entry) -> Option<Stored> {
     let on = |message: &Message, channel: &str| {
         let is_named = channels
             .get(&message.channel)
             .is_some_and(|name| name == channel);
-        is_named && message.sequence == seq as u32
+        is_named && message.sequence == entry.seq as u32
     };
-    let exact = exact_channel(name);
-    let index = messages.iter().position(|message| on(message, &exact))?;
-    let (header, rest) = messages[index]
-        .data
-        .split_at_checked(topic(name)?.header.bytes)?;
-    let item: Item = read(header.get(..size_of::<Item>())?)?;
+    let (exact, bytes) = (exact_channel(name), topic(name)?.header.bytes);
+    // A number that was given anew may be twice in a chunk.
+    let is_it = |message: &Message| {
+        let item = message.data.get(..size_of::<Item>()).and_then(read::<Item>);
+        let is_it = |item: Item| (item.seq, item.generation) == (entry.seq, entry.generation);
+        on(message, &exact) && item.is_some_and(is_it)
+    };
+    let index = messages.iter().position(is_it)?;
+    let (header, rest) = messages[index].data.split_at_checked(bytes)?;
     let payload = match (image_channel(name), Rows::of(name, header)) {
         (Some(channel), Some(rows)) => {
             let image = messages[..index]
@@ -290,7 +335,7 @@ fn stored(messages: &[Message], channels: &Channels, name: &str, seq: u64) -> Op
         }
         _ => rest.to_vec(),
     };
-    (item.seq == seq).then(|| Stored {
+    Some(Stored {
         header: header.to_vec(),
         payload,
     })

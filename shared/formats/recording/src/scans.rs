@@ -124,6 +124,15 @@ fn notes(recording: &Recording, entries: &BTreeMap<usize, Entry>) -> Vec<String>
         .cut()
         .map(|path| format!("{} has no end: its recorder was killed.", path.display()))
         .collect();
+    notes.extend(recording.absent_parts().iter().map(|number| {
+        format!("Part {number} of the recording is not there: what only it holds is missing.")
+    }));
+    notes.extend(recording.left_out().iter().map(|path| {
+        format!(
+            "{} is of another recording, and is left out.",
+            path.display()
+        )
+    }));
     let (first, last) = (entries.keys().next(), entries.keys().next_back());
     if let (Some(first), Some(last)) = (first, last) {
         let lacking = last - first + 1 - entries.len();

@@ -1,9 +1,18 @@
 //! A recording in several files: a file that is large or long enough is ended, and the next part
 //! begun.
 
-use std::{collections::BTreeMap, path::PathBuf};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
 
-use crate::{Head, Incoming, LogLine, RecordingError, RecordingWriter, next_part};
+use bytemuck::pod_read_unaligned;
+use gyre_messages::Item;
+
+use crate::{
+    Entry, Head, Incoming, Ledger, LogLine, Positions, RecordingError, RecordingWriter, next_part,
+    parts::part,
+};
 
 /// When a file is ended. What it holds then is looked at before each message.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -21,25 +30,41 @@ pub struct SplitWriter {
     head: Head,
     split: Split,
     writer: RecordingWriter,
+    /// Knows the parts; none for a recording that nobody goes on with.
+    ledger: Option<Ledger>,
+    /// The positions behind all that was added.
+    positions: Positions,
     /// Messages missed in the parts that are ended, by topic.
     missed: BTreeMap<String, u64>,
 }
 
 impl SplitWriter {
-    /// Begins the part of the recording `to` that `head` says.
+    /// Begins the part of the recording `to` that `head` says, behind `positions`.
     ///
     /// # Errors
-    /// As [`RecordingWriter::create`].
-    pub fn create(to: PathBuf, head: Head, split: Split) -> Result<Self, RecordingError> {
-        let (path, part) = next_part(&to);
-        let head = Head { part, ..head };
+    /// As [`RecordingWriter::create`]; a ledger that cannot be written.
+    pub fn create(
+        to: PathBuf,
+        head: Head,
+        split: Split,
+        ledger: Option<Ledger>,
+        positions: Positions,
+    ) -> Result<Self, RecordingError> {
+        note(ledger.as_ref(), &to, &head, &positions)?;
         Ok(Self {
-            writer: RecordingWriter::create(&path, &head)?,
+            writer: RecordingWriter::create(&part(&to, head.part), &head)?,
             to,
             head,
             split,
+            ledger,
+            positions,
             missed: BTreeMap::new(),
         })
+    }
+
+    /// Returns the file that is being written.
+    pub fn path(&self) -> &Path {
+        self.writer.path()
     }
 
     /// Adds a message, to the next part if this one is full.
@@ -53,14 +78,23 @@ impl SplitWriter {
         if is_full {
             self.go_on()?;
         }
-        self.writer.add(message)
+        self.writer.add(message)?;
+        if let Some(item) = message.header.get(..size_of::<Item>()) {
+            let position = self.positions.entry(message.topic.to_owned()).or_default();
+            position.pass(&Entry::of(&pod_read_unaligned(item)));
+        }
+        Ok(())
     }
 
-    /// Ends the file and begins the next one.
+    /// Ends the file and begins the next one. The ledger has no message that is not written, and
+    /// each number before there is a file of it.
     fn go_on(&mut self) -> Result<(), RecordingError> {
-        let (path, part) = next_part(&self.to);
-        self.head.part = part;
-        let missed = self.writer.go_on(&path, &self.head)?;
+        self.writer.end()?;
+        self.head.part = next_part(&self.to, self.head.part);
+        note(self.ledger.as_ref(), &self.to, &self.head, &self.positions)?;
+        let missed = self
+            .writer
+            .go_on(&part(&self.to, self.head.part), &self.head)?;
         add(&mut self.missed, missed);
         Ok(())
     }
@@ -103,6 +137,16 @@ impl SplitWriter {
         add(&mut self.missed, missed);
         Ok(self.missed)
     }
+}
+
+/// Notes in the ledger, if there is one, that a part is begun.
+fn note(
+    ledger: Option<&Ledger>,
+    to: &Path,
+    head: &Head,
+    positions: &Positions,
+) -> Result<(), RecordingError> {
+    ledger.map_or(Ok(()), |ledger| ledger.note(to, head, positions))
 }
 
 fn add(sum: &mut BTreeMap<String, u64>, missed: BTreeMap<String, u64>) {

@@ -2,6 +2,7 @@
 
 use std::{collections::BTreeMap, fmt::Write};
 
+use gyre_messages::Item;
 use mcap::records::Metadata;
 
 /// The name of the record.
@@ -11,7 +12,7 @@ const NAME: &str = "gyre.table";
 const MISSED: &str = "missed.";
 
 /// A message of a chunk.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Entry {
     /// The sequence number.
     pub seq: u64,
@@ -19,6 +20,23 @@ pub struct Entry {
     pub scan: u64,
     /// The time of its scan, ns since 1970.
     pub stamp_ns: i64,
+    /// See [`Item::generation`].
+    pub generation: u32,
+    /// See [`Item::numbered_from`].
+    pub numbered_from: u64,
+}
+
+impl Entry {
+    /// Describes a message about an item.
+    pub(crate) fn of(item: &Item) -> Self {
+        Self {
+            seq: item.seq,
+            scan: item.scan,
+            stamp_ns: item.stamp_ns,
+            generation: item.generation,
+            numbered_from: item.numbered_from,
+        }
+    }
 }
 
 /// The messages of a chunk by topic.
@@ -37,9 +55,15 @@ impl Table {
                 seq,
                 scan,
                 stamp_ns,
+                generation,
+                numbered_from,
             } in entries
             {
-                let _ = write!(row, "{seq}:{scan}:{stamp_ns} ");
+                let _ = write!(row, "{seq}:{scan}:{stamp_ns}");
+                if *generation > 0 {
+                    let _ = write!(row, ":{generation}:{numbered_from}");
+                }
+                row.push(' ');
             }
             row
         };
@@ -80,11 +104,16 @@ impl Table {
 
 fn entry(text: &str) -> Option<Entry> {
     let mut numbers = text.split(':');
-    let entry = Entry {
+    let mut entry = Entry {
         seq: numbers.next()?.parse().ok()?,
         scan: numbers.next()?.parse().ok()?,
         stamp_ns: numbers.next()?.parse().ok()?,
+        ..Entry::default()
     };
+    if let Some(generation) = numbers.next() {
+        entry.generation = generation.parse().ok()?;
+        entry.numbered_from = numbers.next()?.parse().ok()?;
+    }
     numbers.next().is_none().then_some(entry)
 }
 
@@ -98,14 +127,21 @@ mod tests {
             seq,
             scan: seq + 5,
             stamp_ns,
+            ..Entry::default()
         };
+        let anew = Entry {
+            generation: 3,
+            numbered_from: 2,
+            ..entry(2, 7)
+        };
+        let entries = vec![entry(0, -1), entry(1, i64::MAX), anew];
         let table = Table {
-            entries: [("scan".to_owned(), vec![entry(0, -1), entry(1, i64::MAX)])].into(),
+            entries: [("scan".to_owned(), entries)].into(),
             missed: [("masked".to_owned(), 7)].into(),
         };
         let mut record = table.to_metadata();
         assert_eq!(Table::of_metadata(&record), Some(table));
-        for wrong in ["1:2", "1:2:3:4", "a:1:2", "-1:2:3"] {
+        for wrong in ["1:2", "1:2:3:4", "1:2:3:4:5:6", "a:1:2", "-1:2:3"] {
             record.metadata.insert("scan".to_owned(), wrong.to_owned());
             assert_eq!(Table::of_metadata(&record), None, "{wrong}");
         }

@@ -202,16 +202,11 @@ impl RecordingWriter {
         for view in views(topic, &message.header).iter().chain(&trajectory) {
             self.view(view, times)?;
         }
-        let entry = Entry {
-            seq: item.seq,
-            scan: item.scan,
-            stamp_ns: item.stamp_ns,
-        };
         self.table
             .entries
             .entry(topic.to_owned())
             .or_default()
-            .push(entry);
+            .push(Entry::of(&item));
         self.missed(topic, message.missed);
         self.newest_ns = self.newest_ns.max(Some(item.stamp_ns));
         self.first_ns.get_or_insert(item.stamp_ns);
@@ -274,6 +269,11 @@ impl RecordingWriter {
             }
         };
         self.write(channel, json.as_bytes(), times)
+    }
+
+    /// Returns the file.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
     }
 
     /// Returns the bytes in the file.
@@ -387,14 +387,13 @@ impl RecordingWriter {
         Ok(self.table.missed)
     }
 
-    /// Ends this file and goes on in the next part; returns the number of messages missed in this
-    /// one, by topic.
+    /// Goes on in the next part after this one has ended; returns the number of messages missed in
+    /// this one, by topic.
     pub(crate) fn go_on(
         &mut self,
         path: &Path,
         head: &Head,
     ) -> Result<BTreeMap<String, u64>, RecordingError> {
-        self.end()?;
         let next = Self::create(path, head)?;
         let before = mem::replace(self, next);
         // What viewers draw goes on.
@@ -402,7 +401,8 @@ impl RecordingWriter {
         Ok(before.table.missed)
     }
 
-    fn end(&mut self) -> Result<(), RecordingError> {
+    /// Writes what is left and the summary.
+    pub(crate) fn end(&mut self) -> Result<(), RecordingError> {
         self.flush()?;
         let finished = self.mcap().and_then(Writer::finish).map(drop);
         let synchronised = finished.and_then(|()| Ok(self.file.sync_all()?));

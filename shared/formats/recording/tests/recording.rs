@@ -9,9 +9,12 @@ use std::{
 };
 
 use bytemuck::{Zeroable, bytes_of};
-use gyre_messages::{Item, PoseHeader, ScanHeader};
+use gyre_messages::{Item, MotionHeader, PoseHeader, RotationHeader, ScanHeader};
 use gyre_radar::{DatasetOptions, OwnedScan, ReadError};
-use gyre_recording::{Head, Incoming, LogLine, Recording, RecordingError, RecordingWriter, open};
+use gyre_recording::{
+    Head, Incoming, Ledger, LogLine, Positions, Recording, RecordingError, RecordingWriter, Split,
+    SplitWriter, open,
+};
 use mcap::records::{MessageHeader, Metadata, Record};
 
 const SCANS: u64 = 6;
@@ -178,6 +181,109 @@ fn parts_of_one_recording_are_one_and_those_of_another_are_left_out() {
     let seqs: Vec<u64> = recording.entries("scan").map(|entry| entry.seq).collect();
     assert_eq!(seqs, [0, 1, 2, 3]);
     assert_eq!(read_all(&mut recording), 8);
+}
+
+#[test]
+fn a_ledger_knows_what_is_in_the_parts_that_were_moved_away() {
+    let folder = tempfile::tempdir().unwrap();
+    let to = folder.path().join("drive.mcap");
+    let ledger = Ledger::of(&folder.path().join("out"));
+    assert_eq!(ledger.read(&to).unwrap(), None);
+    // Two messages a part.
+    let split = Split {
+        bytes: None,
+        span_ns: Some(1),
+    };
+    let positions = Positions::new();
+    let mut writer = SplitWriter::create(
+        to.clone(),
+        head("a", 1),
+        split,
+        Some(ledger.clone()),
+        positions,
+    )
+    .unwrap();
+    (0..5).for_each(|seq| writer.add(&pose(seq)).unwrap());
+    writer.finish().unwrap();
+    let begun = || {
+        let begun = ledger.read(&to).unwrap().unwrap();
+        assert_eq!((begun.id.as_str(), begun.part), ("a", 3));
+        begun.positions["pose"].next
+    };
+    assert_eq!(begun(), 5);
+    for part in gyre_recording::parts(&to) {
+        fs::remove_file(part).unwrap();
+    }
+    assert_eq!(begun(), 4, "what the newest part had counts as missed");
+    assert_eq!(gyre_recording::next_part(&to, 3), 4);
+    let other = folder.path().join("other.mcap");
+    assert_eq!(ledger.read(&other).unwrap(), None);
+}
+
+/// A message of a generation that gives numbers from `numbered_from` on; `scan` tells it from
+/// others of its number.
+fn of(generation: u32, numbered_from: u64, seq: u64, scan: u64) -> Incoming {
+    let header = MotionHeader {
+        item: Item {
+            generation,
+            numbered_from,
+            scan,
+            previous_scan: scan,
+            ..item(seq)
+        },
+        ..MotionHeader::default()
+    };
+    Incoming {
+        topic: "motion",
+        header: bytes_of(&header).to_vec(),
+        payload: Vec::new(),
+        received_ns: START_NS,
+        missed: 0,
+    }
+}
+
+#[test]
+fn a_number_that_was_given_anew_has_its_newest_message() {
+    let folder = tempfile::tempdir().unwrap();
+    let paths = ["a.mcap", "a.2.mcap"].map(|name| folder.path().join(name));
+    let head = |part| Head {
+        topics: ["motion", "rotation"].map(str::to_owned).to_vec(),
+        ..head("a", part)
+    };
+    let rotation = |message: Incoming| Incoming {
+        topic: "rotation",
+        header: message.header[..size_of::<RotationHeader>()].to_vec(),
+        ..message
+    };
+    let mut first = RecordingWriter::create(&paths[0], &head(1)).unwrap();
+    // In one chunk: masking was killed when item 1 was the newest with a pose.
+    for (seq, scan) in [(0, 10), (1, 11), (2, 12), (3, 13)] {
+        first.add(&of(1, 0, seq, scan)).unwrap();
+        first.add(&rotation(of(1, 0, seq, scan))).unwrap();
+    }
+    for (seq, scan) in [(1, 11), (2, 14), (3, 15), (4, 16)] {
+        first.add(&of(2, 2, seq, scan)).unwrap();
+    }
+    first.finish().unwrap();
+    // The run was started again, when item 3 was.
+    let mut second = RecordingWriter::create(&paths[1], &head(2)).unwrap();
+    second.add(&of(3, 4, 5, 18)).unwrap();
+    second.finish().unwrap();
+    let mut recording = Recording::open(&paths).unwrap();
+    let scans = |recording: &Recording, topic| -> Vec<(u64, u64)> {
+        let entries = recording.entries(topic);
+        entries.map(|entry| (entry.seq, entry.scan)).collect()
+    };
+    assert_eq!(
+        scans(&recording, "motion"),
+        [(0, 10), (1, 11), (2, 14), (3, 15), (5, 18)]
+    );
+    // What another topic has of a void item is void too.
+    assert_eq!(scans(&recording, "rotation"), [(0, 10), (1, 11)]);
+    let stored = recording.read("motion", 2).unwrap();
+    assert_eq!(stored.header, of(2, 2, 2, 14).header);
+    let absent = recording.read("motion", 4);
+    assert!(matches!(absent, Err(RecordingError::Absent { .. })));
 }
 
 #[test]

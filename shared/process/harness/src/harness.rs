@@ -164,11 +164,6 @@ impl<'a> Harness<'a> {
         self.rig.sleep(&[self.output.as_ref()], limit)
     }
 
-    /// Returns whether a process with this id belongs to the command.
-    pub fn has_process(&self, pid: u32) -> bool {
-        self.process.as_ref().is_some_and(|it| it.has(pid))
-    }
-
     /// Returns how the process ended; `None` while it runs or before it is started.
     pub fn death(&mut self) -> Option<Death> {
         self.process.as_mut().and_then(Process::death)

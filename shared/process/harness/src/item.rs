@@ -11,6 +11,8 @@ pub fn not_copied(stage: StageId, input: &Item, output: &Item) -> Vec<&'static s
         ("scan", output.scan == input.scan),
         ("previous_scan", output.previous_scan == input.previous_scan),
         ("published", output.published == input.published),
+        ("generation", output.generation == input.generation),
+        ("numbered_from", output.numbered_from == input.numbered_from),
         ("stamp_ns", output.stamp_ns == input.stamp_ns),
         ("due_ns", output.due_ns == input.due_ns),
         ("flags", passes_flags),

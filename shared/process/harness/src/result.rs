@@ -18,7 +18,8 @@ pub fn result_bytes(topic: &str, message: &Recorded) -> Result<Vec<u8>, StageErr
     let item = message.item();
     let item = Item {
         due_ns: 0,
-        pid: 0,
+        generation: 0,
+        numbered_from: 0,
         flags: item.flags & !flag::SYNC,
         hops: Default::default(),
         ..item

@@ -127,6 +127,9 @@ mod tests {
                 ("previous_scan is 3", &|header| {
                     header.item.previous_scan = 3
                 }),
+                ("numbered_from is 2", &|header| {
+                    header.item.numbered_from = 2
+                }),
             ],
         );
     }

@@ -32,7 +32,7 @@ impl Message for Loop {
         header.check(limits)
     }
 }
-header!(LoopHeader, "gyre_loop_header_v1");
+header!(LoopHeader, "gyre_loop_header_v2");
 
 /// The pose of the later keyframe in the frame of the earlier one.
 #[repr(C)]

@@ -116,13 +116,17 @@ pub struct Item {
     /// Sequence number at the source: a gap between consecutive items counts the scans dropped in
     /// live mode.
     pub published: u64,
+    /// The first number that its generation gives. Items of earlier generations with this number or
+    /// a later one are void: nothing was computed from them that lasts.
+    pub numbered_from: u64,
     /// Time of the middle of the sweep on the sensor's clock, ns since 1970.
     pub stamp_ns: i64,
     /// Time at which the sweep was complete, or would have been at the sensor: `CLOCK_MONOTONIC`,
     /// ns. Latency is measured from here.
     pub due_ns: i64,
-    /// Process id of the publisher; it changes when a stage is restarted.
-    pub pid: u32,
+    /// Generation of the numbers: it grows when masking (live mode) or the source of a sensor is
+    /// started, which may give a number again. 0 where the numbers follow from the recording.
+    pub generation: u32,
     /// Bits of [`flag`].
     pub flags: u32,
     /// The time stamps of each stage.
@@ -147,6 +151,17 @@ impl Item {
             "previous_scan",
             previous,
             format_args!("at most {}, its scan", self.scan),
+        )?;
+        // The scan of the newest pose is sent again with its number.
+        let first = self.numbered_from;
+        require(
+            first <= self.seq.saturating_add(1),
+            "numbered_from",
+            first,
+            format_args!(
+                "at most {}, one more than its number",
+                self.seq.saturating_add(1)
+            ),
         )
     }
 
@@ -195,6 +210,6 @@ mod tests {
     #[test]
     fn sizes_are_part_of_the_wire_format() {
         assert_eq!(size_of::<Hop>(), 32);
-        assert_eq!(size_of::<Item>(), 56 + 7 * 32);
+        assert_eq!(size_of::<Item>(), 64 + 7 * 32);
     }
 }

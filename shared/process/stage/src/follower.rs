@@ -137,7 +137,7 @@ impl<M: Message> Flow<M> {
         self.next_seq = header.item().seq.saturating_add(1);
         let mut draft = self.output.loan()?;
         *draft.header() = header;
-        self.output.publish(draft)
+        self.output.send_unchanged(draft)
     }
 
     fn publish_end(&mut self) -> Result<(), StageError> {
@@ -147,6 +147,6 @@ impl<M: Message> Flow<M> {
             flags: flag::END,
             ..Item::default()
         };
-        self.output.publish(draft)
+        self.output.send_unchanged(draft)
     }
 }

@@ -9,6 +9,7 @@
 //! 4. [`wake`]: how a process sleeps until there is work.
 //! 5. [`source`], [`stage`], [`sink`]: the loops of the first, the middle and the last processes;
 //!    [`inputs`]: what a middle process waits for.
+//!    [`Generation`]: what tells a number that is given again from one that is sent again.
 //! 6. [`follower`]: the loop of a process that reads durable logs and is not in the stream.
 //! 7. [`observer`]: subscribers that the run does not depend on; [`relay`]: stand-ins for stages on
 //!    another machine.
@@ -33,6 +34,7 @@ pub mod control;
 pub mod counters;
 mod error;
 pub mod follower;
+mod generation;
 pub mod hand_over;
 pub mod heartbeat;
 pub mod inputs;
@@ -62,6 +64,7 @@ pub mod writer;
 pub use allocations::CountingAllocator;
 pub use error::StageError;
 pub use follower::Follower;
+pub use generation::Generation;
 pub use gyre_run::StageCounters;
 pub use launch::Launch;
 pub use manifest::Manifest;

@@ -8,6 +8,7 @@
 //! when it attaches, so that the publisher connects to it while it waits, and not while it sends.
 //! The supervisor frees the places of killed observers.
 
+mod sequence;
 mod topic;
 
 use std::{
@@ -17,7 +18,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::{Item, Message, Sender, Topic, flag};
+use gyre_messages::{Message, Sender, Topic};
 
 use crate::{
     Listener, Manifest, StageError,
@@ -27,6 +28,7 @@ use crate::{
     transport::{self, Node, Service, Subscriber},
     wake::{self, Signals},
 };
+use sequence::Sequence;
 
 pub use topic::TopicObserver;
 
@@ -62,7 +64,9 @@ pub struct Observer<'run, M: Message> {
 
 /// The next message of a topic.
 pub enum Next<'a, M: Message> {
-    /// A message, and the number of items that were missed directly before it.
+    /// A message, and the number of items that were missed directly before it. If masking was
+    /// started again in live mode, it may have a number that was received before: see
+    /// [`Item::generation`](gyre_messages::Item).
     Message(&'a Received<M>, u64),
     /// No message within the limit.
     Idle,
@@ -251,9 +255,11 @@ impl<M: Message> Observer<'_, M> {
     }
 
     /// Counts as missed what is between `next` and the first item that is received: all before it
-    /// is known already, as from an observer that was there earlier.
-    pub fn expect(&mut self, next: u64) {
+    /// is known already, as from an observer that was there earlier, whose newest item had this
+    /// generation.
+    pub fn expect(&mut self, next: u64, generation: u32) {
         self.sequence.expected = Some(next);
+        self.sequence.generation = generation;
     }
 
     /// Returns the number of items missed since the observer attached, or since the item that it
@@ -295,83 +301,4 @@ pub fn wait_for_any(
         return Ok(true);
     }
     signals.sleep(REST)
-}
-
-/// The position in a sequence of items that are consecutive at the publisher.
-#[derive(Debug, Default, PartialEq, Eq)]
-struct Sequence {
-    next: Option<u64>,
-    /// The item from which on a missing one counts; `None`: from the first one received.
-    expected: Option<u64>,
-    missed: u64,
-    ended: bool,
-}
-
-impl Sequence {
-    /// Returns the number of items missed directly before this one; `None` for an item without a
-    /// scan, or one that was received before: a restarted publisher sends its last items again.
-    fn advance(&mut self, item: &Item) -> Option<u64> {
-        if item.is(flag::BASE) || self.next.is_some_and(|next| item.seq < next) {
-            return None;
-        }
-        let expected = self.next.max(self.expected).unwrap_or(item.seq);
-        let missed = item.seq.saturating_sub(expected);
-        self.next = Some(item.seq.saturating_add(1));
-        self.missed += missed;
-        self.ended = item.is(flag::END);
-        (!self.ended).then_some(missed)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn item(seq: u64, flags: u32) -> Item {
-        Item {
-            seq,
-            flags,
-            ..Item::default()
-        }
-    }
-
-    #[test]
-    fn gaps_are_counted_and_repeated_items_skipped() {
-        let mut sequence = Sequence::default();
-        assert_eq!(sequence.advance(&item(0, flag::BASE | flag::SYNC)), None);
-        assert_eq!(sequence.advance(&item(5, 0)), Some(0));
-        assert_eq!(sequence.advance(&item(9, 0)), Some(3));
-        assert_eq!(sequence.advance(&item(8, 0)), None);
-        assert_eq!(sequence.advance(&item(10, flag::SYNC)), Some(0));
-        assert_eq!(sequence.missed, 3);
-        assert!(!sequence.ended);
-    }
-
-    #[test]
-    fn items_between_what_is_known_and_the_first_received_are_missed() {
-        let expecting = || Sequence {
-            expected: Some(7),
-            ..Sequence::default()
-        };
-        for (first, missed) in [(5, 0), (7, 0), (9, 2)] {
-            let mut sequence = expecting();
-            assert_eq!(sequence.advance(&item(first, 0)), Some(missed));
-            assert_eq!(sequence.advance(&item(first + 1, 0)), Some(0));
-        }
-        let mut sequence = expecting();
-        assert_eq!(sequence.advance(&item(4, 0)), Some(0), "an item again");
-        assert_eq!(sequence.advance(&item(9, 0)), Some(2));
-        let mut sequence = expecting();
-        assert_eq!(sequence.advance(&item(10, flag::END)), None);
-        assert_eq!(sequence.missed, 3);
-    }
-
-    #[test]
-    fn the_end_is_no_message_but_what_was_missed_before_it_counts() {
-        let mut sequence = Sequence::default();
-        assert_eq!(sequence.advance(&item(1, 0)), Some(0));
-        assert_eq!(sequence.advance(&item(4, flag::END)), None);
-        assert!(sequence.ended);
-        assert_eq!(sequence.missed, 2);
-    }
 }

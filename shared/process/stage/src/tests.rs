@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod followers;
+mod generations;
 mod hand_over;
 mod observers;
 mod typed;

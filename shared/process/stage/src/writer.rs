@@ -61,12 +61,7 @@ impl<M: Message> Writer<M> {
         self.untyped.send(draft.loan, hop)
     }
 
-    /// The same for a process that is not in the stream and has no hop.
-    pub(crate) fn publish(&self, draft: Draft<M>) -> Result<(), StageError> {
-        self.untyped.publish(draft.loan)
-    }
-
-    /// Publishes a message that says of itself who has sent it.
+    /// Publishes a message as it is: one of a process that is not in the stream and has no hop.
     ///
     /// # Errors
     /// A failure of the transport.
@@ -129,11 +124,6 @@ impl UntypedWriter {
 
     pub(crate) fn send(&self, mut loan: Loan, hop: StageId) -> Result<(), StageError> {
         loan.item().hop_mut(hop).published_ns = clock::now_ns();
-        self.publish(loan)
-    }
-
-    fn publish(&self, mut loan: Loan) -> Result<(), StageError> {
-        loan.item().pid = std::process::id();
         self.send_unchanged(loan)
     }
 

@@ -22,7 +22,6 @@ use gyre_stage::{
     wake::Signals,
     writer::Writer,
 };
-use rustix::process::{Pid, getpgid};
 
 use crate::{
     Death, Scheduling, StagePlan, SuperviseError,
@@ -335,12 +334,6 @@ impl Process {
     /// Returns the process id, which is also that of its group.
     pub fn pid(&self) -> u32 {
         self.child.pid()
-    }
-
-    /// Returns whether a living process is in the group.
-    pub fn has(&self, pid: u32) -> bool {
-        let group = Pid::from_raw(pid as i32).and_then(|pid| getpgid(Some(pid)).ok());
-        group.is_some_and(|group| group.as_raw_pid() as u32 == self.pid())
     }
 
     /// Returns how it ended; `None` while it runs.

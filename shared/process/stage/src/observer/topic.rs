@@ -27,7 +27,7 @@ pub trait TopicObserver {
     fn listener(&self) -> &Listener;
 
     /// See [`Observer::expect`].
-    fn expect(&mut self, next: u64);
+    fn expect(&mut self, next: u64, generation: u32);
 
     /// See [`Observer::missed`].
     fn missed(&self) -> u64;
@@ -75,16 +75,12 @@ impl<M: Message> TopicObserver for Typed<'_, M> {
     }
 
     fn take(&mut self) -> Result<Option<RecordedMessage>, StageError> {
-        if self.has_ended {
-            return Ok(None);
-        }
-        Ok(match self.observer.next(Duration::ZERO)? {
+        let next = self.observer.next(Duration::ZERO)?;
+        // After the end of the stream masking may still be killed, and number anew.
+        self.has_ended = matches!(next, Next::Ended);
+        Ok(match next {
             Next::Message(message, _) => Some(message.to_bytes()),
-            Next::Idle => None,
-            Next::Ended => {
-                self.has_ended = true;
-                None
-            }
+            Next::Idle | Next::Ended => None,
         })
     }
 
@@ -96,8 +92,8 @@ impl<M: Message> TopicObserver for Typed<'_, M> {
         self.observer.listener()
     }
 
-    fn expect(&mut self, next: u64) {
-        self.observer.expect(next);
+    fn expect(&mut self, next: u64, generation: u32) {
+        self.observer.expect(next, generation);
     }
 
     fn missed(&self) -> u64 {

@@ -120,7 +120,7 @@ impl<'a> LastStages<'a> {
         };
         let mut draft = motions.loan()?;
         *draft.header() = motion;
-        motions.publish(draft)
+        motions.send_unchanged(draft)
     }
 
     /// Sleeps until a topic has a message or the connection has something to read, and answers the

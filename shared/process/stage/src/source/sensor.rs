@@ -11,8 +11,8 @@ use super::{
     received::{self, Received, ReceivedWriter},
 };
 use crate::{
-    Launch, StageCounters, StageError, allocations, clock, schedule::ScheduleWriter, wake,
-    writer::Writer,
+    Generation, Launch, StageCounters, StageError, allocations, clock, schedule::ScheduleWriter,
+    wake, writer::Writer,
 };
 
 /// Time for which the supervisor need not intervene: this loop says again and again that it is not
@@ -126,6 +126,9 @@ impl Stream<'_> {
         mut position: Position,
         scans: Option<u64>,
     ) -> Result<(), StageError> {
+        let newest = self.credit.resume_at.unwrap_or_default();
+        // A run that is started again knows what was published up to its newest pose.
+        let generation = Generation::begin(&self.launch.manifest, &newest, position.published)?;
         while scans.is_none_or(|scans| position.published < scans) {
             let mut draft = self.scans.loan()?;
             let started_ns = loop {
@@ -158,6 +161,7 @@ impl Stream<'_> {
             };
             let header = draft.header();
             position.identify(&mut header.item);
+            generation.mark(&mut header.item);
             *header.item.hop_mut(S::HOP) = Hop {
                 received_ns: started_ns,
                 started_ns,
@@ -179,6 +183,7 @@ impl Stream<'_> {
         }
         let mut draft = self.scans.loan()?;
         draft.header().item = position.end();
+        generation.mark(&mut draft.header().item);
         self.scans.send(draft, S::HOP)?;
         self.schedule.has_published(position.published)?;
         while !self.sleep(None, wake::MAX_WAIT)? {}

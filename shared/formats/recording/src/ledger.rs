@@ -1,0 +1,111 @@
+//! The ledger of a recording: what the next recorder of its run has to know, though the parts
+//! before may have been moved away. It is kept with the journal of the run, and read instead of the
+//! parts.
+
+use std::{
+    io,
+    path::{Path, PathBuf},
+};
+
+use gyre_storage::{SETTINGS, StorageError};
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    Head, RecordingError,
+    newest::newest,
+    parts::part,
+    position::{Position, Positions},
+};
+
+/// The newest part of a recording, and what all parts before it hold.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Begun {
+    /// The first file.
+    to: PathBuf,
+    /// See [`Head::id`].
+    pub id: String,
+    /// The number of the newest part.
+    pub part: usize,
+    /// The positions behind the parts before it.
+    pub positions: Positions,
+}
+
+/// The ledger of a run.
+#[derive(Clone, Debug)]
+pub struct Ledger(PathBuf);
+
+impl Ledger {
+    /// The ledger of the run that writes its results to `out`.
+    pub fn of(out: &Path) -> Self {
+        Self(out.join("journal").join("recording.toml"))
+    }
+
+    /// Returns the file.
+    pub fn path(&self) -> &Path {
+        &self.0
+    }
+
+    /// Reads what an earlier recorder of the run has begun to write to `to`, with the positions
+    /// behind its newest part. What a part holds that cannot be read counts as missed.
+    ///
+    /// # Errors
+    /// A ledger that cannot be read.
+    pub fn read(&self, to: &Path) -> Result<Option<Begun>, RecordingError> {
+        let text = match gyre_storage::read_text(&self.0, SETTINGS) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+            read => read.map_err(|source| self.failed(source))?,
+        };
+        let mut begun: Begun = toml::from_str(&text)
+            .map_err(|error| self.failed(io::Error::other(error.message().to_owned())))?;
+        if begun.to != self.absolute(to)? {
+            return Ok(None);
+        }
+        if let Ok((head, passed)) = newest(&part(to, begun.part))
+            && head.id == begun.id
+        {
+            begun.positions = passed.into_iter().fold(begun.positions, later);
+        }
+        Ok(Some(begun))
+    }
+
+    /// Notes that a part is begun. The note survives a power failure.
+    pub(crate) fn note(
+        &self,
+        to: &Path,
+        head: &Head,
+        positions: &Positions,
+    ) -> Result<(), RecordingError> {
+        let begun = Begun {
+            to: self.absolute(to)?,
+            id: head.id.clone(),
+            part: head.part,
+            positions: positions.clone(),
+        };
+        let text = toml::to_string(&begun).map_err(|error| self.failed(io::Error::other(error)))?;
+        let folder = self.0.parent().map_or(Ok(()), gyre_storage::create_folder);
+        folder
+            .and_then(|()| gyre_storage::write(&self.0, text))
+            .map_err(|StorageError { source, .. }| self.failed(source))
+    }
+
+    /// The same for one file from each folder in which the run may be started again.
+    fn absolute(&self, to: &Path) -> Result<PathBuf, RecordingError> {
+        std::path::absolute(to).map_err(|source| self.failed(source))
+    }
+
+    fn failed(&self, source: io::Error) -> RecordingError {
+        RecordingError::Io {
+            path: self.0.clone(),
+            source,
+        }
+    }
+}
+
+/// Takes the later one of two positions of a topic.
+fn later(mut positions: Positions, (topic, position): (String, Position)) -> Positions {
+    let known = positions.entry(topic).or_default();
+    if (position.generation, position.next) > (known.generation, known.next) {
+        *known = position;
+    }
+    positions
+}

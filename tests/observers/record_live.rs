@@ -1,0 +1,138 @@
+//! Recordings of live runs: masking numbers the scans that it takes, and gives numbers anew when it
+//! is started again. The newer message of a number is the one that the run's results come from.
+
+use std::collections::BTreeMap;
+
+use gyre_recording::{open_recording, parts};
+use rustix::process::Signal;
+
+use super::record::{WINDOW, await_recorder, file, recorded, replay};
+use crate::{
+    common::{Ended, Run, gyre, recording, send},
+    live::radar::Radar,
+};
+
+const SCANS: usize = 110;
+/// Faster than the refinement of [`slow`].
+const RATE: &str = "2";
+const TOPICS: &str = "record.topics=['scan','masked','rotation','motion','refined','pose']";
+
+/// A live run that is recorded, with a refinement that is slower than the scans: whenever masking
+/// is started again, scans that it had taken are in flight.
+fn slow(run: Run) -> Run {
+    let run = run
+        .set("run.mode=live")
+        .set("stages.refinement.delay_ms=180")
+        .set(TOPICS);
+    recorded(&run)
+}
+
+/// One of a recording, which goes on where it was after a start.
+fn played() -> Run {
+    let run = Run::small().data(recording::around_a_block());
+    slow(run.rate(RATE).set(&format!("source.scans={SCANS}")))
+}
+
+/// A radar, which does not wait for a run that is down.
+fn radar() -> Radar {
+    Radar::playing(recording::around_a_block(), &["--rate", RATE, "--repeat"])
+}
+
+/// Asserts that the recording is of the results: item by item, and replayed from each topic of
+/// which it has all. Returns what it lacks.
+fn assert_is_of(run: &Run) -> BTreeMap<&'static str, usize> {
+    let recording = open_recording(&file(run)).unwrap();
+    let items = |topic| -> BTreeMap<u64, (u64, i64)> {
+        let entries = recording.entries(topic);
+        let items = entries.map(|entry| (entry.seq, (entry.scan, entry.stamp_ns)));
+        items.collect()
+    };
+    let poses = items("pose");
+    assert!(poses.len() > 20, "{}", poses.len());
+    let generations: Vec<u32> = recording.entries("pose").map(|it| it.generation).collect();
+    assert!(generations.is_sorted());
+    assert!(generations.last() > generations.first(), "{generations:?}");
+    let scans: BTreeMap<u64, i64> = items("scan").into_values().collect();
+    for (scan, stamp_ns) in poses.values() {
+        assert!(scans.get(scan).is_none_or(|it| it == stamp_ns), "{scan}");
+    }
+    let missed = recording.missed();
+    let mut lacking = BTreeMap::new();
+    for topic in ["masked", "rotation", "motion", "refined"] {
+        let recorded = items(topic);
+        for (seq, item) in &recorded {
+            assert_eq!(poses.get(seq), Some(item), "{topic} {seq}");
+        }
+        let lacks = poses.len() - recorded.len();
+        assert!(lacks as u64 <= missed.get(topic).copied().unwrap_or_default());
+        match lacks {
+            0 => assert_eq!(
+                replay(&file(run), &["--from", topic]),
+                run.odometry(),
+                "from {topic}"
+            ),
+            _ => drop(lacking.insert(topic, lacks)),
+        }
+    }
+    lacking
+}
+
+#[test]
+fn a_recording_is_of_the_results_after_masking_was_killed() {
+    let run = played();
+    let mut running = run.start();
+    for poses in [8, 14, 20] {
+        running.await_poses(poses).kill("masking");
+    }
+    running.finish().succeeded();
+    assert_eq!(assert_is_of(&run), BTreeMap::new());
+}
+
+#[test]
+fn a_recording_is_of_the_results_after_masking_was_killed_with_the_recorder() {
+    let run = played().set(WINDOW);
+    let mut running = run.start();
+    running.await_poses(12);
+    let recorder = await_recorder(&mut running, None);
+    send(recorder, Signal::KILL);
+    running.kill("masking");
+    running.finish().succeeded();
+    assert_eq!(parts(&file(&run)).len(), 2);
+    assert!(!assert_is_of(&run).contains_key("masked"));
+}
+
+#[test]
+fn a_recording_of_a_radar_is_of_the_results_after_masking_was_killed_and_swapped() {
+    let radar = radar();
+    let run = slow(radar.run(SCANS));
+    let mut running = run.start();
+    running.await_poses(8).kill("masking");
+    running.await_poses(14);
+    let mut swap = gyre();
+    swap.args(["swap", "masking", "--out"]).arg(run.out());
+    Ended::of(swap).succeeded();
+    running.finish().succeeded();
+    assert_eq!(assert_is_of(&run), BTreeMap::new());
+}
+
+#[test]
+fn a_recording_is_of_the_results_after_the_run_was_interrupted_and_after_its_supervisor_was_killed()
+{
+    assert_goes_on(&played());
+    let radar = radar();
+    assert_goes_on(&slow(radar.run(SCANS)));
+}
+
+/// A recorder that is killed with the run may lack its last half second, and says so.
+fn assert_goes_on(run: &Run) {
+    let mut running = run.start();
+    running.await_poses(8);
+    running.signal(Signal::INT);
+    running.end();
+    let mut running = run.start();
+    running.await_poses(18);
+    running.kill_supervisor();
+    run.finish().succeeded();
+    assert_eq!(parts(&file(run)).len(), 3);
+    assert!(!assert_is_of(run).contains_key("masked"));
+}

@@ -1,0 +1,62 @@
+//! Parts of a recording that are moved away while it goes on, as to another disk.
+
+use std::{fs, path::Path};
+
+use gyre_recording::{Recording, open_recording, parts};
+use rustix::process::Signal;
+
+use super::record::{SCANS, await_recorder, file, recorded, replay, seqs, simulated};
+use crate::common::{Ended, gyre, send};
+
+/// Moves all parts but the newest one; returns how many.
+fn move_away(recording: &Path, to: &Path) -> usize {
+    let mut parts = parts(recording);
+    parts.pop();
+    for part in &parts {
+        let moved = to.join(part.file_name().unwrap());
+        assert!(!moved.exists(), "{} is overwritten", moved.display());
+        fs::rename(part, moved).unwrap();
+    }
+    parts.len()
+}
+
+#[test]
+fn parts_are_moved_away_while_the_recording_goes_on_and_none_is_overwritten() {
+    let undisturbed = simulated().complete();
+    let run = recorded(&simulated()).rate("1").set("record.split_s=0.7");
+    let other_disk = run.folder().join("disk");
+    fs::create_dir(&other_disk).unwrap();
+    let mut running = run.start();
+    running.await_poses(SCANS / 3);
+    let moved = move_away(&file(&run), &other_disk);
+    assert!(moved > 0);
+    // Another recorder goes on, which does not find the first part.
+    let killed = await_recorder(&mut running, None);
+    send(killed, Signal::KILL);
+    await_recorder(&mut running, Some(killed));
+    running.await_poses(2 * SCANS / 3);
+    let moved = moved + move_away(&file(&run), &other_disk);
+    running.finish().succeeded();
+    // What is left is a recording without its first part, and says so.
+    let rest = open_recording(&file(&run)).unwrap();
+    assert!(rest.absent_parts().contains(&1));
+    let mut inspect = gyre();
+    inspect.arg("inspect").arg(file(&run));
+    let inspected = Ended::of(inspect);
+    assert!(
+        inspected.stdout.contains("Part 1 of the recording"),
+        "{}",
+        inspected.stdout
+    );
+    let left = parts(&file(&run));
+    for part in &left {
+        fs::rename(part, other_disk.join(part.file_name().unwrap())).unwrap();
+    }
+    let together = parts(&other_disk.join("drive.mcap"));
+    assert_eq!(together.len(), moved + left.len());
+    let whole = Recording::open(&together).unwrap();
+    assert!(whole.absent_parts().is_empty() && whole.left_out().is_empty());
+    assert_eq!(seqs(&whole, "scan").len(), SCANS);
+    assert_eq!(whole.missed().get("scan"), None);
+    assert_eq!(replay(&other_disk, &[]), undisturbed);
+}
