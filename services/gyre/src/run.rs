@@ -128,9 +128,7 @@ fn make_ready(
         let replace = unfinished.is_none();
         simulate::store(simulation, &configuration.source.data, replace)?;
     }
-    if unfinished.is_none() {
-        plan::require_new(&configuration.record)?;
-    }
+    plan::require_recordable(&configuration.record, out.path(), unfinished.is_some())?;
     preflight::check_open_files()?;
     // The stages read the options of dataset.toml from here: it may change while they run.
     let resolved = with_stored_options(configuration)?;

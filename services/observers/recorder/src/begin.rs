@@ -63,6 +63,17 @@ pub(crate) fn begin(
     })
 }
 
+/// Checks that a run that goes on can go on with its recording.
+///
+/// # Errors
+/// There is another recording of that name.
+pub fn require_own(file: &Path, out: &Path) -> Result<(), RecorderError> {
+    match Ledger::of(out).read(file)? {
+        Some(_) => Ok(()),
+        None => require_new(file),
+    }
+}
+
 /// Checks that a recording that begins writes over none, and goes on in none, also where only later
 /// parts of one are left.
 ///

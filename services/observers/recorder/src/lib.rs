@@ -18,7 +18,7 @@ mod recorder;
 mod tap;
 mod writing;
 
-pub use begin::require_new;
+pub use begin::{require_new, require_own};
 pub use error::RecorderError;
 pub use gyre_recording::{Ledger, Split};
 pub use log_tail::LogTail;

@@ -10,7 +10,8 @@ use gyre_messages::{Message, Scan, Sender, topic};
 
 use crate::Entry;
 
-/// The generations of the numbers that one process gives.
+/// The first numbers of the generations that one process gives. One is left out whose numbers a
+/// later one has all given anew, so that the first numbers grow with the generations.
 #[derive(Debug, Default)]
 pub(crate) struct Generations(BTreeMap<u32, u64>);
 
@@ -35,15 +36,69 @@ impl NumberedBy {
 }
 
 impl Generations {
-    /// Notes the generation of a message; returns whether it is a new one.
+    /// Notes the generation of a message; returns whether it may make others void.
     pub fn note(&mut self, entry: &Entry) -> bool {
         let (generation, first) = (entry.generation, entry.numbered_from);
-        generation > 0 && self.0.insert(generation, first).is_none()
+        let is_known = self.0.contains_key(&generation) || self.starts_later_by(generation, first);
+        if generation == 0 || is_known {
+            return false;
+        }
+        while let Some((&earlier, &number)) = self.0.range(..generation).next_back()
+            && number >= first
+        {
+            self.0.remove(&earlier);
+        }
+        self.0.insert(generation, first);
+        true
     }
 
     /// Returns whether a later generation has given the number of a message anew.
     pub fn makes_void(&self, entry: &Entry) -> bool {
-        let mut later = self.0.range((Excluded(entry.generation), Unbounded));
-        later.any(|(_, first)| *first <= entry.seq)
+        self.starts_later_by(entry.generation, entry.seq)
+    }
+
+    /// Returns whether a later generation begins with this number, or an earlier one.
+    fn starts_later_by(&self, generation: u32, number: u64) -> bool {
+        let mut later = self.0.range((Excluded(generation), Unbounded));
+        later.next().is_some_and(|(_, first)| *first <= number)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn entry(generation: u32, numbered_from: u64, seq: u64) -> Entry {
+        Entry {
+            seq,
+            generation,
+            numbered_from,
+            ..Entry::default()
+        }
+    }
+
+    #[test]
+    fn a_number_is_void_if_any_later_generation_has_given_it_anew() {
+        let mut generations = Generations::default();
+        for (generation, first) in [(1, 0), (2, 15), (5, 30), (4, 12), (3, 20)] {
+            generations.note(&entry(generation, first, first));
+        }
+        assert!(!generations.note(&entry(5, 30, 31)), "known");
+        for (generation, seq, is_void) in [
+            (1, 11, false),
+            (1, 12, true),
+            (2, 29, true),
+            (3, 12, true),
+            (4, 29, false),
+            (4, 30, true),
+            (5, 99, false),
+        ] {
+            let entry = entry(generation, 0, seq);
+            assert_eq!(
+                generations.makes_void(&entry),
+                is_void,
+                "{generation} {seq}"
+            );
+        }
     }
 }

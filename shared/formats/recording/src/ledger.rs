@@ -12,8 +12,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     Head, RecordingError,
-    newest::newest,
-    parts::part,
+    newest::{head, newest},
+    parts::{part, parts},
     position::{Position, Positions},
 };
 
@@ -57,7 +57,9 @@ impl Ledger {
         };
         let mut begun: Begun = toml::from_str(&text)
             .map_err(|error| self.failed(io::Error::other(error.message().to_owned())))?;
-        if begun.to != self.absolute(to)? {
+        let is_of_it = |path: PathBuf| head(&path).is_some_and(|head| head.id == begun.id);
+        // Under another name too: on a disk that is mounted elsewhere, by a link.
+        if begun.to != self.absolute(to)? && !parts(to).into_iter().any(is_of_it) {
             return Ok(None);
         }
         if let Ok((head, passed)) = newest(&part(to, begun.part))

@@ -1,6 +1,6 @@
 //! The newest messages of one file, without a list of all of them in memory.
 
-use std::{fs::File, path::Path};
+use std::path::Path;
 
 use crate::{
     Head, RecordingError,
@@ -11,7 +11,7 @@ use crate::{
 
 /// Reads the head of a file, and the positions behind its newest messages.
 pub(crate) fn newest(path: &Path) -> Result<(Head, Positions), RecordingError> {
-    let file = File::open(path).map_err(|source| RecordingError::Io {
+    let file = gyre_storage::open(path).map_err(|source| RecordingError::Io {
         path: path.to_owned(),
         source,
     })?;
@@ -38,4 +38,17 @@ pub(crate) fn newest(path: &Path) -> Result<(Head, Positions), RecordingError> {
         reason: "it has no metadata `gyre.recording`".to_owned(),
     })?;
     Ok((head, positions))
+}
+
+/// Returns the head of a file; `None` if it is not that of a recording, or cannot be read.
+pub(crate) fn head(path: &Path) -> Option<Head> {
+    let file = gyre_storage::open(path).ok()?;
+    let mut walk = Walk::new(path, &file).ok()?;
+    // It is before all messages.
+    while let Step::Metadata(record) = walk.next().ok()?? {
+        if let Some(head) = Head::of_metadata(&record) {
+            return head.ok();
+        }
+    }
+    None
 }

@@ -7,6 +7,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use crate::newest::head;
+
 /// Returns the path of a part, from 1.
 pub(crate) fn part(path: &Path, number: usize) -> PathBuf {
     match number {
@@ -21,8 +23,16 @@ pub fn parts(path: &Path) -> Vec<PathBuf> {
     if path.is_dir() {
         return first_part_in(path).map_or_else(Vec::new, |first| parts(&first));
     }
-    let numbers = numbers(path).into_iter();
-    numbers.map(|number| part(path, number)).collect()
+    let parts = numbers(path)
+        .into_iter()
+        .map(|number| (part(path, number), number));
+    let parts = parts.filter(|(path, number)| *number == 1 || is_part(path, *number));
+    parts.map(|(path, _)| path).collect()
+}
+
+/// Returns whether a file is this part of a recording, not another one with a number in its name.
+fn is_part(path: &Path, number: usize) -> bool {
+    head(path).is_some_and(|head| head.part == number)
 }
 
 /// Returns the numbers of the parts that exist, in order.
@@ -52,7 +62,10 @@ pub(crate) fn first_part_in(folder: &Path) -> Option<PathBuf> {
         let is_recording = path.extension().is_some_and(|it| it == "mcap");
         is_recording && !is_hidden(path)
     });
-    let first = files.map(|path| later_part(&path).map_or(path, |(first, _)| first));
+    let first = files.map(|path| match later_part(&path) {
+        Some((first, number)) if is_part(&path, number) => first,
+        _ => path,
+    });
     let mut first: Vec<PathBuf> = first.collect();
     first.sort_unstable();
     first.dedup();
@@ -85,22 +98,37 @@ pub fn next_part(path: &Path, after: usize) -> usize {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use crate::{Head, RecordingWriter};
+
+    /// Writes a part without messages.
+    fn write(path: &Path, number: usize) {
+        let head = Head {
+            id: "a".to_owned(),
+            part: number,
+            configuration: String::new(),
+            topics: Vec::new(),
+            scan_bytes: 0,
+            mode: String::new(),
+        };
+        let writer = RecordingWriter::create(path, &head).unwrap();
+        writer.finish().unwrap();
+    }
 
     #[test]
     fn a_recording_goes_on_behind_all_parts_that_were_ever_there() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.b.mcap");
         assert_eq!(next_part(&path, 0), 1);
-        fs::write(&path, "").unwrap();
+        write(&path, 1);
         let second = folder.path().join("a.b.2.mcap");
         assert_eq!(next_part(&path, 1), 2);
-        fs::write(&second, "").unwrap();
+        write(&second, 2);
         assert_eq!(parts(&path), [path.clone(), second.clone()]);
         assert_eq!(next_part(&path, 1), 3);
         fs::write(folder.path().join("._a.b.mcap"), "Mac OS X").unwrap();
         assert_eq!(parts(folder.path()), parts(&path), "a folder of one");
         let tenth = folder.path().join("a.b.10.mcap");
-        fs::write(&tenth, "").unwrap();
+        write(&tenth, 10);
         fs::remove_file(&path).unwrap();
         assert_eq!(parts(&path), [second.clone(), tenth.clone()]);
         assert_eq!(parts(folder.path()), parts(&path), "the first was moved");
@@ -108,9 +136,26 @@ mod tests {
         fs::remove_file(&tenth).unwrap();
         fs::remove_file(&second).unwrap();
         assert_eq!(next_part(&path, 10), 11, "all were moved");
-        fs::write(folder.path().join("a.mcap"), "").unwrap();
-        fs::write(folder.path().join("b.mcap"), "").unwrap();
+        write(&folder.path().join("a.mcap"), 1);
+        write(&folder.path().join("b.mcap"), 1);
         assert!(parts(folder.path()).is_empty(), "a folder of two");
+    }
+
+    #[test]
+    fn a_number_in_the_name_of_another_file_makes_it_no_part() {
+        let folder = tempfile::tempdir().unwrap();
+        let [day, second, next] = ["2024.11.26.mcap", "2024.11.26.2.mcap", "2024.11.27.mcap"]
+            .map(|name| folder.path().join(name));
+        write(&day, 1);
+        write(&second, 2);
+        assert_eq!(parts(folder.path()), [day.clone(), second.clone()]);
+        write(&next, 1);
+        assert!(parts(folder.path()).is_empty(), "two drives");
+        let drive = folder.path().join("2024.mcap");
+        fs::write(folder.path().join("2024.11.mcap"), "a bag").unwrap();
+        assert!(parts(&drive).is_empty(), "nothing of that name");
+        write(&drive, 1);
+        assert_eq!(parts(&drive), [drive]);
     }
 
     #[test]
