@@ -66,10 +66,7 @@ impl BagWriter {
     /// # Errors
     /// It exists, or cannot be written.
     pub fn create(path: &Path) -> Result<Self, BagError> {
-        if path.exists() {
-            let reason = "it exists; remove it, or give another name".to_owned();
-            return Err(unwritable(path, reason));
-        }
+        require_new(path)?;
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let aside = path.with_file_name(format!(".{name}.tmp"));
         let is_file = path
@@ -92,6 +89,8 @@ impl BagWriter {
                 let reason = "another command is writing it; wait for that, or give another name";
                 unwritable(path, reason.to_owned())
             })?;
+        // Another command may have come to its end meanwhile.
+        require_new(path)?;
         let options = WriteOptions::new()
             .profile(PROFILE)
             .library(concat!("gyre ", env!("CARGO_PKG_VERSION")))
@@ -219,10 +218,12 @@ impl Drop for BagWriter {
 fn create_aside(aside: &Path, file: &Path) -> io::Result<Option<File>> {
     // Locked until it is removed, so that no other command takes it for its own.
     let left_over = try_lock_existing(file);
-    if let Ok(Attempt::Held(_)) = left_over {
-        return Ok(None);
+    match &left_over {
+        Ok(Attempt::Held(_)) => return Ok(None),
+        // Another command may create it by now: it is not removed.
+        Err(error) if error.kind() == io::ErrorKind::NotFound && aside == file => {}
+        _ => remove(aside),
     }
-    remove(aside);
     if aside != file {
         fs::create_dir(aside)?;
     }
@@ -230,6 +231,16 @@ fn create_aside(aside: &Path, file: &Path) -> io::Result<Option<File>> {
         Attempt::Locked(file) => Some(file),
         Attempt::Held(_) => None,
     })
+}
+
+fn require_new(path: &Path) -> Result<(), BagError> {
+    match path.exists() {
+        true => Err(unwritable(
+            path,
+            "it exists; remove it, or give another name".to_owned(),
+        )),
+        false => Ok(()),
+    }
 }
 
 /// Removes what an earlier writer left. What cannot be removed shows when it is created anew.

@@ -8,8 +8,8 @@ use mcap::{
 
 use super::parse::{chunks_hold_their_records, parse};
 
-/// The largest record that is read, bytes: almost twice the largest raster, several times the
-/// largest scan.
+/// The largest record that is read, bytes: several times the largest scan, and the most that a
+/// recorder writes at once.
 const MAX_RECORD_BYTES: usize = 128 << 20;
 /// The most that is kept of a part of a file, bytes: few compressed bytes may stand for many.
 const MAX_KEPT_BYTES: usize = 256 << 20;
