@@ -22,6 +22,7 @@ const TOPICS: &str = "record.topics=['scan','masked','rotation','motion','refine
 fn slow(run: Run) -> Run {
     let run = run
         .set("run.mode=live")
+        .set(WINDOW)
         .set("stages.refinement.delay_ms=180")
         .set(TOPICS);
     recorded(&run)
@@ -77,6 +78,13 @@ fn assert_is_of(run: &Run) -> BTreeMap<&'static str, usize> {
     lacking
 }
 
+/// Asserts that a recording is of the results, but for a few messages of topics that were lost with
+/// their publisher.
+fn assert_lacks_little(run: &Run) {
+    let lacking = assert_is_of(run);
+    assert!(lacking.values().sum::<usize>() <= 4, "{lacking:?}");
+}
+
 #[test]
 fn a_recording_is_of_the_results_after_masking_was_killed() {
     let run = played();
@@ -85,12 +93,12 @@ fn a_recording_is_of_the_results_after_masking_was_killed() {
         running.await_poses(poses).kill("masking");
     }
     running.finish().succeeded();
-    assert_eq!(assert_is_of(&run), BTreeMap::new());
+    assert_lacks_little(&run);
 }
 
 #[test]
 fn a_recording_is_of_the_results_after_masking_was_killed_with_the_recorder() {
-    let run = played().set(WINDOW);
+    let run = played();
     let mut running = run.start();
     running.await_poses(12);
     let recorder = await_recorder(&mut running, None);
@@ -112,7 +120,7 @@ fn a_recording_of_a_radar_is_of_the_results_after_masking_was_killed_and_swapped
     swap.args(["swap", "masking", "--out"]).arg(run.out());
     Ended::of(swap).succeeded();
     running.finish().succeeded();
-    assert_eq!(assert_is_of(&run), BTreeMap::new());
+    assert_lacks_little(&run);
 }
 
 #[test]
