@@ -78,7 +78,8 @@ impl Bag {
             Some(Ok(own)) => own.radar.encoder_size,
             _ => ENCODER_COUNTS,
         };
-        let (size, counts) = match (options.encoder_counts, survey.other_counts(usual)) {
+        let shown = survey.other_counts(usual, matches!(own, Some(Ok(_))));
+        let (size, counts) = match (options.encoder_counts, shown) {
             (Some(size), _) => (size, CountsOrigin::Configured),
             (None, Some(size)) => (size, CountsOrigin::Azimuths { usual }),
             (None, None) => (usual, CountsOrigin::Usual),

@@ -126,7 +126,9 @@ impl Survey {
     }
 
     /// Returns the encoder counts of a turn that the azimuths show, if `usual` is not them.
-    pub fn other_counts(&self, usual: u16) -> Option<u16> {
+    /// What the radar says of itself, `is_said`, is believed where no times show that a turn is
+    /// whole: it may lack a blanked sector.
+    pub fn other_counts(&self, usual: u16, is_said: bool) -> Option<u16> {
         let rows = self
             .samples
             .iter()
@@ -142,6 +144,9 @@ impl Survey {
             _ => &turns[..],
         };
         let (unit_ns, turn_ns) = turn_time(&turns).unzip();
+        if is_said && turn_ns.is_none() {
+            return None;
+        }
         let unit_ns = unit_ns.unwrap_or(1);
         let turn = |rows: &&[RowShown]| {
             let counts = rows.iter().map(|(count, _)| *count).collect();

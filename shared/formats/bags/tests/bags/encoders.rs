@@ -107,3 +107,21 @@ fn a_blanked_sector_over_zero_makes_no_smaller_encoder() {
         }
     }
 }
+
+#[test]
+fn without_times_of_turns_the_radar_is_believed() {
+    let writer = ScanMessages::new(radar(), "radar");
+    let mut messages = Messages::default();
+    messages.add(CONFIGURATION, START_NS, &writer.configuration(START_NS));
+    for turn in 0..3 {
+        let mut message = writer.b_scan(scan(turn).view());
+        message.timestamps.fill(0);
+        for (row, value) in message.encoder_values.iter_mut().enumerate() {
+            *value = if row < 36 { (140 * row + 13) as u16 } else { 0 };
+        }
+        messages.add(B_SCANS, START_NS + TURN_NS * (turn as i64 + 1), &message);
+    }
+    let folder = Folder::new();
+    let dataset = open(&folder.bag(&messages), &with(None)).unwrap();
+    assert_eq!(dataset.encoder_counts(), Some(5600));
+}
