@@ -19,6 +19,8 @@ const SPREAD: usize = 2 * BLUR_REACH + 2;
 const CHUNK: usize = 16;
 // A row of a point's cells lies within two chunks.
 const _: () = assert!(SPREAD <= CHUNK + 1);
+/// The farthest cell from the origin: what a damaged checkpoint says may be any number.
+const FARTHEST: f64 = 1e15;
 /// The value of a fully occupied cell.
 pub(super) const FULL: f32 = 255.0;
 
@@ -108,7 +110,7 @@ impl MapLevel {
     pub fn draw(&mut self, points: &DeskewedPoints, pose: &Pose, image: &mut Image) {
         let half = (self.n / 2) as i64;
         image.corner = [pose.translation.x, pose.translation.y]
-            .map(|v| (v / self.cell_m).floor() as i64 - half);
+            .map(|v| (v / self.cell_m).floor().clamp(-FARTHEST, FARTHEST) as i64 - half);
         let place = Drawing {
             pose: *pose,
             corner: image.corner,
@@ -148,7 +150,8 @@ impl MapLevel {
         newest: &Image,
         others: impl Iterator<Item = &'a Image> + Clone,
     ) {
-        let [down, right] = [0, 1].map(|axis| newest.corner[axis] - self.corner[axis]);
+        let [down, right] =
+            [0, 1].map(|axis| newest.corner[axis].saturating_sub(self.corner[axis]));
         self.corner = newest.corner;
         for part in self.move_sum(down, right) {
             for other in others.clone() {
@@ -207,7 +210,7 @@ impl MapLevel {
         with: impl Fn(&[u8], &mut [u16]),
     ) {
         let n = self.n as i64;
-        let off = [0, 1].map(|axis| image.corner[axis] - self.corner[axis]);
+        let off = [0, 1].map(|axis| image.corner[axis].saturating_sub(self.corner[axis]));
         let [rows, columns] = [0, 1].map(|axis| {
             let (first, end) = (first[axis] as i64, end[axis] as i64);
             first.max(off[axis])..end.min(off[axis] + n)

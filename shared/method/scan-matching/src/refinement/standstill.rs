@@ -178,7 +178,7 @@ impl Standstill {
         {
             // The difference of two estimates has twice the variance of one.
             let jitter = squared / (2.0 * DEGREES_OF_FREEDOM);
-            self.jitter_scans = JITTER_SCANS.min(self.jitter_scans + 1);
+            self.jitter_scans = JITTER_SCANS.min(self.jitter_scans.saturating_add(1));
             self.jitter += (jitter - self.jitter) / f64::from(self.jitter_scans);
         }
     }

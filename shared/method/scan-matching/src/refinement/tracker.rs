@@ -142,10 +142,10 @@ impl TrackerState {
         self.doubtful = if outcome == Outcome::Refined {
             0
         } else {
-            self.doubtful + 1
+            self.doubtful.saturating_add(1)
         };
         self.unmatched = if outcome == Outcome::Predicted {
-            self.unmatched + 1
+            self.unmatched.saturating_add(1)
         } else {
             0
         };
