@@ -1,5 +1,4 @@
-//! The command line: names that are not UTF-8, folders in place of files, and
-//! runs of other users.
+//! The command line: names that are not UTF-8, folders in place of files, and runs of other users.
 
 use std::{
     ffi::{OsStr, OsString},

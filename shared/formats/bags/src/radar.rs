@@ -125,9 +125,9 @@ impl Survey {
         })
     }
 
-    /// Returns the encoder counts of a turn that the azimuths show, if `usual` is not them.
-    /// What the radar says of itself, `is_said`, is believed where no times show that a turn is
-    /// whole: it may lack a blanked sector.
+    /// Returns the encoder counts of a turn that the azimuths show, if `usual` is not them. Where
+    /// no times show that a turn is whole it may lack a blanked sector: then `usual` is believed if
+    /// the radar has said it itself, `is_said`.
     pub fn other_counts(&self, usual: u16, is_said: bool) -> Option<u16> {
         let rows = self
             .samples

@@ -162,7 +162,7 @@ impl Processes {
     }
 
     /// Checks that no process has failed at its end, as one that cannot keep what it has written.
-    /// What ended the followers that were given up was said then.
+    /// Followers that were given up are left out: their end was reported when it came.
     ///
     /// # Errors
     /// The failure of one that says so by its exit code.
