@@ -16,17 +16,20 @@ from messages import BASE, BREAK, END, ByteBlock, Item, ScanHeader
 MAX_INTERVAL_NS = 10_000_000_000
 # Windows of scans after which masking counts as caught up all the same: a pipeline that is slower than its scans never is.
 WINDOWS_IN_ORDER = 8
+# Generations that their file keeps.
+KEPT = 1000
 
 
-def begin_generation(out: pathlib.Path, newest: int) -> int:
-    """Returns the number of the generation of item numbers that begins: one more than those before, which a file keeps."""
+def begin_generation(out: pathlib.Path, newest: int, first: int) -> int:
+    """Returns the generation that begins with item `first`: one more than those before, which a file keeps."""
     path = out / "journal" / "generation"
     path.parent.mkdir(parents=True, exist_ok=True)
-    before = int(path.read_text()) if path.exists() else 0
-    number = max(before, newest) + 1
+    lines = path.read_text().splitlines()[1 - KEPT:] if path.exists() else []
+    number = max([newest] + [int(line.split()[0]) for line in lines]) + 1
+    lines.append(f"{number} {first} masking")
     draft = path.with_name(".generation.tmp")
     with open(draft, "w", opener=lambda name, flags: os.open(name, flags, 0o600)) as file:
-        file.write(str(number))
+        file.writelines(line + "\n" for line in lines)
         file.flush()
         os.fsync(file.fileno())
     os.replace(draft, path)
@@ -110,7 +113,7 @@ class NewestScans(Port):
             return
         front = self._queue[0].item
         first = 0 if from_start else pose.seq + 1
-        self._generation = (begin_generation(self._out, pose.generation), first)
+        self._generation = (begin_generation(self._out, pose.generation, first), first)
         if from_start:
             self._next = 0
         elif front.published == pose.published and not front.flags & END:

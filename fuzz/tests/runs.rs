@@ -44,6 +44,7 @@ fn scan(seq: u64) -> Incoming {
         payload: (0..40).map(|byte| byte * 5 + seq as u8).collect(),
         received_ns: START_NS,
         missed: 1,
+        skipped: None,
     }
 }
 

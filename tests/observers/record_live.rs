@@ -3,6 +3,8 @@
 
 use std::collections::BTreeMap;
 
+use gyre_journal as journal;
+use gyre_messages::flag;
 use gyre_recording::{open_recording, parts};
 use rustix::process::Signal;
 
@@ -107,6 +109,51 @@ fn a_recording_is_of_the_results_after_masking_was_killed_with_the_recorder() {
     running.finish().succeeded();
     assert_eq!(parts(&file(&run)).len(), 2);
     assert!(!assert_is_of(&run).contains_key("masked"));
+}
+
+/// The scans of the poses in the results by their numbers.
+fn scans_of_poses(run: &Run) -> BTreeMap<u64, u64> {
+    let poses = journal::records(&journal::path(run.out()))
+        .unwrap()
+        .unwrap();
+    let poses = poses.map(|pose| pose.unwrap().item);
+    let poses = poses.filter(|item| !item.is(flag::END));
+    poses.map(|item| (item.seq, item.scan)).collect()
+}
+
+#[test]
+fn a_recording_is_of_the_results_after_masking_was_killed_twice_while_no_recorder_was_there() {
+    // Without poses nothing but the recorder can know what the second masking gave anew.
+    let run = played().set("record.topics=['masked','motion']");
+    let mut running = run.start();
+    running.await_poses(8);
+    // It does nothing from here on, as if it came back only after the second kill.
+    let recorder = await_recorder(&mut running, None);
+    send(recorder, Signal::STOP);
+    let poses = running.poses();
+    running.kill("masking");
+    running.await_poses(poses + 2).kill("masking");
+    send(recorder, Signal::KILL);
+    running.finish().succeeded();
+    assert_eq!(parts(&file(&run)).len(), 2);
+    let recording = open_recording(&file(&run)).unwrap();
+    let scans = scans_of_poses(&run);
+    for topic in ["masked", "motion"] {
+        let entries: Vec<_> = recording.entries(topic).collect();
+        for entry in &entries {
+            assert_eq!(
+                scans.get(&entry.seq),
+                Some(&entry.scan),
+                "{topic} {entry:?}"
+            );
+        }
+        let lacks = (scans.len() - entries.len()) as u64;
+        assert!(
+            lacks > 0,
+            "{topic}: nothing was given anew while no recorder was there"
+        );
+        assert!(lacks <= recording.missed()[topic], "{topic} lacks {lacks}");
+    }
 }
 
 #[test]

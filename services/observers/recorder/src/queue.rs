@@ -111,6 +111,7 @@ mod tests {
             payload: vec![0; bytes],
             received_ns: 0,
             missed: 0,
+            skipped: None,
         })
     }
 

@@ -30,6 +30,8 @@ pub(crate) struct Tap<'run> {
     dropped: u64,
     /// Missed messages that the writer knows of.
     reported: u64,
+    /// The generation of the newest message that was recorded.
+    generation: u32,
 }
 
 impl<'run> Tap<'run> {
@@ -46,11 +48,13 @@ impl<'run> Tap<'run> {
         if let Some(Position { next, generation }) = expected {
             observer.expect(next, generation);
         }
+        let generation = expected.unwrap_or_default().generation;
         Ok(Some(Self {
             observer,
             recorded: 0,
             dropped: 0,
             reported: 0,
+            generation,
         }))
     }
 
@@ -68,7 +72,7 @@ impl<'run> Tap<'run> {
     pub(crate) fn drain(&mut self, queue: &Sender) -> Result<(), StageError> {
         loop {
             match self.observer.take() {
-                Ok(Some(message)) => self.put(message, queue),
+                Ok(Some(message)) => self.put(message, queue)?,
                 Ok(None) => break,
                 // The stages judge the messages of another program. The next message reports the
                 // gap.
@@ -88,19 +92,25 @@ impl<'run> Tap<'run> {
         Ok(())
     }
 
-    fn put(&mut self, message: RecordedMessage, queue: &Sender) {
+    fn put(&mut self, message: RecordedMessage, queue: &Sender) -> Result<(), StageError> {
         let missed = self.missed();
+        let item = message.item().unwrap_or_default();
         let incoming = Incoming {
             topic: self.observer.topic(),
             header: message.header,
             payload: message.payload,
             received_ns: clock::since_1970_ns(),
             missed: missed - self.reported,
+            skipped: self.observer.skipped(self.generation, &item)?,
         };
         match queue.put(Entry::Message(incoming)) {
-            true => (self.recorded, self.reported) = (self.recorded + 1, missed),
+            true => {
+                (self.recorded, self.reported) = (self.recorded + 1, missed);
+                self.generation = self.generation.max(item.generation);
+            }
             false => self.dropped += 1,
         }
+        Ok(())
     }
 
     /// Returns the listener that the publisher notifies.

@@ -7,7 +7,7 @@
 
 use std::collections::VecDeque;
 
-use gyre_messages::{Item, Scan, Window, flag};
+use gyre_messages::{Item, NumberedBy, Scan, Window, flag};
 use gyre_radar::continues;
 use gyre_stage::{
     Generation, Launch, Listener, Manifest, StageError,
@@ -139,7 +139,8 @@ impl NewestOnly {
             true => 0,
             false => newest_pose.seq.saturating_add(1),
         };
-        let generation = Generation::begin(&self.manifest, newest_pose, first)?;
+        let generation =
+            Generation::begin(&self.manifest, NumberedBy::Masking, newest_pose, first)?;
         Ok(Some(Chain {
             generation,
             ..Chain::resume(front.item(), newest_pose)

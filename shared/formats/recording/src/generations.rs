@@ -6,39 +6,22 @@ use std::{
     ops::Bound::{Excluded, Unbounded},
 };
 
-use gyre_messages::{Message, Scan, Sender, topic};
+use gyre_messages::GivenAnew;
+use mcap::records::Metadata;
 
 use crate::Entry;
+
+/// The name of the records of generations of which the recorder has seen no message.
+const NAME: &str = "gyre.generation";
 
 /// The first numbers of the generations that one process gives. One is left out whose numbers a
 /// later one has all given anew, so that the first numbers grow with the generations.
 #[derive(Debug, Default)]
 pub(crate) struct Generations(BTreeMap<u32, u64>);
 
-/// The process that numbers the messages of a topic.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum NumberedBy {
-    Source,
-    /// In live mode; otherwise it has the numbers of the source.
-    Masking,
-    /// A follower, whose numbers are those of its results.
-    Follower,
-}
-
-impl NumberedBy {
-    pub fn of(name: &str) -> Self {
-        match topic(name).map(|topic| topic.sender) {
-            _ if name == Scan::TOPIC => Self::Source,
-            Some(Sender::Stage(_)) => Self::Masking,
-            _ => Self::Follower,
-        }
-    }
-}
-
 impl Generations {
-    /// Notes the generation of a message; returns whether it may make others void.
-    pub fn note(&mut self, entry: &Entry) -> bool {
-        let (generation, first) = (entry.generation, entry.numbered_from);
+    /// Notes a generation; returns whether it may make messages void.
+    pub fn note(&mut self, GivenAnew { generation, first }: GivenAnew) -> bool {
         let is_known = self.0.contains_key(&generation) || self.starts_later_by(generation, first);
         if generation == 0 || is_known {
             return false;
@@ -64,15 +47,37 @@ impl Generations {
     }
 }
 
+/// Describes a generation that the recorder of a topic has skipped.
+pub(crate) fn to_metadata(topic: &str, skipped: GivenAnew) -> Metadata {
+    let GivenAnew { generation, first } = skipped;
+    Metadata {
+        name: NAME.to_owned(),
+        metadata: [(topic.to_owned(), format!("{generation}:{first}"))].into(),
+    }
+}
+
+/// Reads such a record; `None` if it is another one.
+pub(crate) fn of_metadata(record: &Metadata) -> Option<(String, GivenAnew)> {
+    let of = record.metadata.first_key_value()?;
+    let ((topic, value), true) = (of, record.name == NAME) else {
+        return None;
+    };
+    let (generation, first) = value.split_once(':')?;
+    let skipped = GivenAnew {
+        generation: generation.parse().ok()?,
+        first: first.parse().ok()?,
+    };
+    Some((topic.clone(), skipped))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn entry(generation: u32, numbered_from: u64, seq: u64) -> Entry {
+    fn entry(generation: u32, seq: u64) -> Entry {
         Entry {
             seq,
             generation,
-            numbered_from,
             ..Entry::default()
         }
     }
@@ -81,9 +86,13 @@ mod tests {
     fn a_number_is_void_if_any_later_generation_has_given_it_anew() {
         let mut generations = Generations::default();
         for (generation, first) in [(1, 0), (2, 15), (5, 30), (4, 12), (3, 20)] {
-            generations.note(&entry(generation, first, first));
+            generations.note(GivenAnew { generation, first });
         }
-        assert!(!generations.note(&entry(5, 30, 31)), "known");
+        let known = GivenAnew {
+            generation: 5,
+            first: 30,
+        };
+        assert!(!generations.note(known));
         for (generation, seq, is_void) in [
             (1, 11, false),
             (1, 12, true),
@@ -93,7 +102,7 @@ mod tests {
             (4, 30, true),
             (5, 99, false),
         ] {
-            let entry = entry(generation, 0, seq);
+            let entry = entry(generation, seq);
             assert_eq!(
                 generations.makes_void(&entry),
                 is_void,

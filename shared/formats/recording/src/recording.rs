@@ -8,13 +8,13 @@ use std::{
 
 use foxglove::{Decode, messages::RawImage};
 use gyre_bags::damaged::Span;
-use gyre_messages::{Item, topic};
+use gyre_messages::{GivenAnew, Item, NumberedBy, topic};
 
 use crate::{
     Entry, Head, RecordingError,
     chunk::{self, Channels, Message},
     exact_channel,
-    generations::{Generations, NumberedBy},
+    generations::{self, Generations},
     image::{Rows, read},
     table::Table,
     view::image_channel,
@@ -55,6 +55,8 @@ struct Part {
     file: File,
     channels: Channels,
     missed: BTreeMap<String, u64>,
+    /// The generations of a topic of which the recorder has seen no message.
+    skipped: Vec<(String, GivenAnew)>,
     /// True if its writer came to its end.
     is_complete: bool,
 }
@@ -109,22 +111,18 @@ impl Recording {
     /// anew: the first message of a generation makes earlier ones void.
     fn add(&mut self, part: Part, places: Places) {
         let number = self.parts.len();
+        for (topic, skipped) in &part.skipped {
+            self.note(NumberedBy::of(topic), *skipped);
+        }
         self.parts.push(part);
         for (topic, entries, chunk) in places {
-            let numbered_by = NumberedBy::of(&topic);
-            let generations = self.generations.entry(numbered_by).or_default();
-            let mut places = self.places.remove(&topic).unwrap_or_default();
+            let by = NumberedBy::of(&topic);
+            for entry in &entries {
+                self.note(by, entry.given_anew());
+            }
+            let generations = self.generations.entry(by).or_default();
+            let places = self.places.entry(topic).or_default();
             for entry in entries {
-                if generations.note(&entry) {
-                    let others = self.places.iter_mut();
-                    let others = others.filter(|(name, _)| NumberedBy::of(name) == numbered_by);
-                    let others = others.map(|(_, places)| places);
-                    for places in others.chain([&mut places]) {
-                        let mut given_anew = places.split_off(&entry.numbered_from);
-                        given_anew.retain(|_, place| !generations.makes_void(&place.entry));
-                        places.extend(given_anew);
-                    }
-                }
                 if !generations.makes_void(&entry) {
                     places.entry(entry.seq).or_insert(Place {
                         entry,
@@ -133,7 +131,20 @@ impl Recording {
                     });
                 }
             }
-            self.places.insert(topic, places);
+        }
+    }
+
+    /// Notes a generation, and removes the messages that it makes void.
+    fn note(&mut self, by: NumberedBy, given: GivenAnew) {
+        let generations = self.generations.entry(by).or_default();
+        if !generations.note(given) {
+            return;
+        }
+        let topics = self.places.iter_mut();
+        for (_, places) in topics.filter(|(name, _)| NumberedBy::of(name) == by) {
+            let mut given_anew = places.split_off(&given.first);
+            given_anew.retain(|_, place| !generations.makes_void(&place.entry));
+            places.extend(given_anew);
         }
     }
 
@@ -264,6 +275,7 @@ impl Part {
             file,
             channels: Channels::new(),
             missed: BTreeMap::new(),
+            skipped: Vec::new(),
             is_complete: false,
         };
         let (mut head, mut places, mut chunk) = (None, Vec::new(), None);
@@ -284,6 +296,8 @@ impl Part {
                 Step::Metadata(record) => {
                     if let Some(read) = Head::of_metadata(&record) {
                         head = Some(read.map_err(|reason| part.foreign(reason))?);
+                    } else if let Some(skipped) = generations::of_metadata(&record) {
+                        part.skipped.push(skipped);
                     } else if let (Some(table), Some(chunk)) =
                         (Table::of_metadata(&record), chunk.take())
                     {

@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, fmt::Write};
 
-use gyre_messages::Item;
+use gyre_messages::{GivenAnew, Item};
 use mcap::records::Metadata;
 
 /// The name of the record.
@@ -27,6 +27,14 @@ pub struct Entry {
 }
 
 impl Entry {
+    /// Returns its generation.
+    pub(crate) fn given_anew(&self) -> GivenAnew {
+        GivenAnew {
+            generation: self.generation,
+            first: self.numbered_from,
+        }
+    }
+
     /// Describes a message about an item.
     pub(crate) fn of(item: &Item) -> Self {
         Self {

@@ -12,13 +12,13 @@ use std::{
 
 use bytemuck::pod_read_unaligned;
 use foxglove::Schema;
-use gyre_messages::{Item, topic};
+use gyre_messages::{GivenAnew, Item, topic};
 use mcap::{Compression, McapError, WriteOptions, Writer, records::MessageHeader};
 
 use crate::{
     ENCODING, Entry, Head, LogLine, RecordingError,
     early_lines::EarlyLines,
-    exact_channel,
+    exact_channel, generations,
     image::Rows,
     table::Table,
     view::{Recent, View, image_channel, views},
@@ -51,6 +51,9 @@ pub struct Incoming {
     pub received_ns: i64,
     /// Messages of the topic that were missed directly before it.
     pub missed: u64,
+    /// The numbers that were given anew by generations before its own, of which the recorder has no
+    /// message.
+    pub skipped: Option<GivenAnew>,
 }
 
 /// Writes one file of a recording.
@@ -65,6 +68,8 @@ pub struct RecordingWriter {
     channels: BTreeMap<String, u16>,
     recent: Recent,
     table: Table,
+    /// The skipped generations since the last table.
+    skipped: Vec<(&'static str, GivenAnew)>,
     /// Bytes of the messages since the last table, and when the first of them came.
     pending: (usize, Option<Instant>),
     /// The newest time of the sensor, which log lines are placed at.
@@ -132,6 +137,7 @@ impl RecordingWriter {
             channels: BTreeMap::new(),
             recent: Recent::default(),
             table: Table::default(),
+            skipped: Vec::new(),
             pending: (0, None),
             newest_ns: None,
             first_ns: None,
@@ -208,6 +214,7 @@ impl RecordingWriter {
             .or_default()
             .push(Entry::of(&item));
         self.missed(topic, message.missed);
+        self.skipped.extend(message.skipped.map(|it| (topic, it)));
         self.newest_ns = self.newest_ns.max(Some(item.stamp_ns));
         self.first_ns.get_or_insert(item.stamp_ns);
         for line in mem::take(&mut self.early).into_lines() {
@@ -363,6 +370,10 @@ impl RecordingWriter {
 
     fn flush_all(&mut self) -> Result<(), McapError> {
         self.mcap()?.flush()?;
+        for (topic, skipped) in mem::take(&mut self.skipped) {
+            let record = generations::to_metadata(topic, skipped);
+            self.mcap()?.write_metadata(&record)?;
+        }
         let table = self.table.to_metadata();
         self.mcap()?.write_metadata(&table)?;
         self.mcap()?.flush()?;

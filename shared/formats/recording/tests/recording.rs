@@ -9,7 +9,7 @@ use std::{
 };
 
 use bytemuck::{Zeroable, bytes_of};
-use gyre_messages::{Item, MotionHeader, PoseHeader, RotationHeader, ScanHeader};
+use gyre_messages::{GivenAnew, Item, MotionHeader, PoseHeader, RotationHeader, ScanHeader};
 use gyre_radar::{DatasetOptions, OwnedScan, ReadError};
 use gyre_recording::{
     Head, Incoming, Ledger, LogLine, Positions, Recording, RecordingError, RecordingWriter, Split,
@@ -54,6 +54,7 @@ fn scan(seq: u64) -> Incoming {
             .collect(),
         received_ns: START_NS,
         missed: 0,
+        skipped: None,
     }
 }
 
@@ -69,6 +70,7 @@ fn pose(seq: u64) -> Incoming {
         payload: Vec::new(),
         received_ns: START_NS,
         missed: 2,
+        skipped: None,
     }
 }
 
@@ -239,6 +241,7 @@ fn of(generation: u32, numbered_from: u64, seq: u64, scan: u64) -> Incoming {
         payload: Vec::new(),
         received_ns: START_NS,
         missed: 0,
+        skipped: None,
     }
 }
 
@@ -284,6 +287,38 @@ fn a_number_that_was_given_anew_has_its_newest_message() {
     assert_eq!(stored.header, of(2, 2, 2, 14).header);
     let absent = recording.read("motion", 4);
     assert!(matches!(absent, Err(RecordingError::Absent { .. })));
+}
+
+#[test]
+fn what_a_generation_without_messages_gave_anew_is_void() {
+    let folder = tempfile::tempdir().unwrap();
+    let paths = ["a.mcap", "a.2.mcap"].map(|name| folder.path().join(name));
+    let head = |part| Head {
+        topics: vec!["motion".to_owned()],
+        ..head("a", part)
+    };
+    let mut first = RecordingWriter::create(&paths[0], &head(1)).unwrap();
+    for seq in 0..8 {
+        first.add(&of(1, 0, seq, 10 + seq)).unwrap();
+    }
+    first.finish().unwrap();
+    // Generation 2 gave 4 and 5 anew, and was gone before the second recorder was there.
+    let mut second = RecordingWriter::create(&paths[1], &head(2)).unwrap();
+    let anew = Incoming {
+        skipped: Some(GivenAnew {
+            generation: 2,
+            first: 4,
+        }),
+        missed: 2,
+        ..of(3, 6, 6, 30)
+    };
+    second.add(&anew).unwrap();
+    second.finish().unwrap();
+    let recording = Recording::open(&paths).unwrap();
+    let entries = recording.entries("motion");
+    let scans: Vec<(u64, u64)> = entries.map(|entry| (entry.seq, entry.scan)).collect();
+    assert_eq!(scans, [(0, 10), (1, 11), (2, 12), (3, 13), (6, 30)]);
+    assert_eq!(recording.missed(), [("motion", 2)].into());
 }
 
 #[test]

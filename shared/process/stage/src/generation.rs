@@ -4,69 +4,136 @@
 //! numbers behind the newest pose to other scans, and what had been sent under them is void; a
 //! sensor's source does so when the run is started again. Each such start begins a generation,
 //! which its messages carry. So whoever looks on, or reads a recording, can tell a scan that has
-//! taken the number of another one from one that is sent again.
+//! taken the number of another one from one that is sent again. The file of the generations has all
+//! of them with their first numbers, for one that has seen no message of some.
 
 use std::{
-    io,
+    fmt, io,
     path::{Path, PathBuf},
 };
 
-use gyre_messages::Item;
+use gyre_messages::{GivenAnew, Item, NumberedBy};
 use gyre_storage::StorageError;
 
 use crate::{Manifest, StageError};
 
-/// The largest file of a generation, bytes.
-const MAX_BYTES: u64 = 64;
+/// Generations in the file of a run: the newest ones. Who looks on has missed far fewer.
+const KEPT: usize = 1000;
+/// The largest such file, bytes.
+const MAX_BYTES: u64 = 64 * KEPT as u64;
 
 /// The generation of the numbers of a process.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Generation {
-    number: u32,
-    first: u64,
-}
+pub struct Generation(GivenAnew);
 
 impl Generation {
-    /// Begins a generation that gives its numbers from `first` on. The number of the generation is
-    /// kept beside the journal and survives a power failure, so that none is given twice.
+    /// Begins a generation, in which a process gives its numbers from `first` on. The generation is
+    /// kept beside the journal and survives a power failure, so that no number of one is given
+    /// twice.
     ///
     /// # Errors
-    /// The file of the generation cannot be read or written.
-    pub fn begin(manifest: &Manifest, newest_pose: &Item, first: u64) -> Result<Self, StageError> {
+    /// The file of the generations cannot be read or written.
+    pub fn begin(
+        manifest: &Manifest,
+        by: NumberedBy,
+        newest_pose: &Item,
+        first: u64,
+    ) -> Result<Self, StageError> {
         let path = Self::path(&manifest.out);
-        let before = read(&path)?.max(newest_pose.generation);
-        let number = before.saturating_add(1);
+        let mut lines = read(&path)?;
+        let newest = lines.iter().map(|line| line.generation).max();
+        let before = newest.unwrap_or_default().max(newest_pose.generation);
+        let generation = before.saturating_add(1);
+        lines.push(Line {
+            generation,
+            gives: Some((first, by)),
+        });
+        let kept = lines.iter().skip(lines.len().saturating_sub(KEPT));
+        let text: String = kept.map(Line::to_string).collect();
         let folder = path.parent().map_or(Ok(()), gyre_storage::create_folder);
         folder
-            .and_then(|()| gyre_storage::write(&path, number.to_string()))
+            .and_then(|()| gyre_storage::write(&path, text))
             .map_err(|StorageError { path, source, .. }| StageError::File { path, source })?;
-        Ok(Self { number, first })
+        Ok(Self(GivenAnew { generation, first }))
     }
 
-    /// Returns the file that keeps the number of the last generation.
+    /// Returns the file that keeps the generations of a run.
     pub fn path(out: &Path) -> PathBuf {
         out.join("journal").join("generation")
     }
 
     /// Writes it into the item of a message.
     pub fn mark(&self, item: &mut Item) {
-        (item.generation, item.numbered_from) = (self.number, self.first);
+        (item.generation, item.numbered_from) = (self.0.generation, self.0.first);
     }
 }
 
-/// Reads the number of the last generation; 0 before the first.
-fn read(path: &Path) -> Result<u32, StageError> {
-    match gyre_storage::read_text(path, MAX_BYTES) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(0),
-        Err(source) => Err(StageError::File {
-            path: path.to_owned(),
-            source,
-        }),
-        Ok(text) => text.trim().parse().map_err(|_| {
-            StageError::Input(format!(
-                "{} holds no number: remove it if nobody needs a recording of this run any more",
-                path.display()
-            ))
-        }),
+/// Returns, of the generations after `known` and before that of an item, the one that gave the
+/// smallest number anew. Without a generation before (0) nothing is known that could be void.
+pub(crate) fn skipped(
+    out: &Path,
+    by: NumberedBy,
+    known: u32,
+    item: &Item,
+) -> Result<Option<GivenAnew>, StageError> {
+    if known == 0 || item.generation <= known.saturating_add(1) {
+        return Ok(None);
     }
+    let lines = read(&Generation::path(out))?.into_iter();
+    let skipped = lines.filter_map(|Line { generation, gives }| {
+        let (first, of) = gives?;
+        let is_skipped = of == by && generation > known && generation < item.generation;
+        is_skipped.then_some(GivenAnew { generation, first })
+    });
+    Ok(skipped.min_by_key(|it| it.first))
+}
+
+/// A line of the file: a generation, its first number and who gives its numbers, which a program in
+/// the place of masking may leave out.
+struct Line {
+    generation: u32,
+    gives: Option<(u64, NumberedBy)>,
+}
+
+impl Line {
+    fn parse(text: &str) -> Option<Self> {
+        let mut words = text.split_whitespace();
+        let generation = words.next()?.parse().ok()?;
+        let gives = match (words.next(), words.next(), words.next()) {
+            (None, ..) => None,
+            (Some(first), Some(by), None) => Some((first.parse().ok()?, NumberedBy::by_name(by)?)),
+            _ => return None,
+        };
+        Some(Self { generation, gives })
+    }
+}
+
+impl fmt::Display for Line {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.gives {
+            Some((first, by)) => writeln!(f, "{} {first} {}", self.generation, by.name()),
+            None => writeln!(f, "{}", self.generation),
+        }
+    }
+}
+
+/// Reads the generations of a run; none before the first.
+fn read(path: &Path) -> Result<Vec<Line>, StageError> {
+    let text = match gyre_storage::read_text(path, MAX_BYTES) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
+        Err(source) => {
+            return Err(StageError::File {
+                path: path.to_owned(),
+                source,
+            });
+        }
+        Ok(text) => text,
+    };
+    let lines: Option<Vec<Line>> = text.lines().map(Line::parse).collect();
+    lines.filter(|lines| !lines.is_empty()).ok_or_else(|| {
+        StageError::Input(format!(
+            "{} holds no number: remove it if nobody needs a recording of this run any more",
+            path.display()
+        ))
+    })
 }

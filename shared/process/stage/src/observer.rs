@@ -18,18 +18,17 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::{Message, Sender, Topic};
+use gyre_messages::{GivenAnew, Item, Message, NumberedBy, Sender, Topic};
 
 use crate::{
-    Listener, Manifest, StageError,
+    Listener, Manifest, StageError, generation,
     heartbeat::HeartbeatWriter,
     reader::{self, Received},
     run, services,
     transport::{self, Node, Service, Subscriber},
     wake::{self, Signals},
 };
-use sequence::Sequence;
-
+pub use sequence::Sequence;
 pub use topic::TopicObserver;
 
 /// The name of the nodes and the subscribers of observers. Those of a topic are counted by it.
@@ -234,7 +233,9 @@ impl<M: Message> Observer<'_, M> {
         let since = Instant::now();
         loop {
             while let Some(message) = self.receive()? {
-                if let Some(missed) = self.sequence.advance(message.item()) {
+                let item = message.item();
+                let skipped = self.skipped(self.sequence.generation, item)?;
+                if let Some(missed) = self.sequence.advance_past(item, skipped) {
                     return Ok(Next::Message(self.current.insert(message), missed));
                 }
             }
@@ -247,6 +248,20 @@ impl<M: Message> Observer<'_, M> {
             }
             self.sleep(left.min(wake::MAX_WAIT))?;
         }
+    }
+
+    /// Returns, of the generations after `known` and before that of an item, the one that gave the
+    /// smallest number anew.
+    ///
+    /// # Errors
+    /// The file of the generations cannot be read.
+    pub fn skipped(&self, known: u32, item: &Item) -> Result<Option<GivenAnew>, StageError> {
+        generation::skipped(
+            &self.run.manifest.out,
+            NumberedBy::of(M::TOPIC),
+            known,
+            item,
+        )
     }
 
     /// Returns the listener that the publisher notifies: see [`wait_for_any`].

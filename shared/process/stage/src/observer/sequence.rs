@@ -1,17 +1,20 @@
 //! The position of an observer among the items of a topic.
 
-use gyre_messages::{Item, flag};
+use gyre_messages::{GivenAnew, Item, flag};
 
 /// The position in a sequence of items that are consecutive at the publisher, until it gives
 /// numbers anew.
 #[derive(Debug, Default, PartialEq, Eq)]
-pub(super) struct Sequence {
-    next: Option<u64>,
+pub struct Sequence {
+    /// The number behind the newest item.
+    pub next: Option<u64>,
     /// The generation of the newest item.
     pub generation: u32,
     /// The item from which on a missing one counts; `None`: from the first one received.
     pub expected: Option<u64>,
+    /// Items missed so far.
     pub missed: u64,
+    /// True if the newest item was the end of the stream.
     pub ended: bool,
 }
 
@@ -19,12 +22,19 @@ impl Sequence {
     /// Returns the number of items missed directly before this one; `None` for an item without a
     /// scan, or one that was received before: a restarted publisher sends its last items again.
     pub fn advance(&mut self, item: &Item) -> Option<u64> {
+        self.advance_past(item, None)
+    }
+
+    /// The same, where `skipped` is what was given anew by generations between that of the newest
+    /// item and this one's.
+    pub(super) fn advance_past(&mut self, item: &Item, skipped: Option<GivenAnew>) -> Option<u64> {
         if item.is(flag::BASE) {
             return None;
         }
         if item.generation > self.generation {
             // What was received of the numbers that are given anew is void.
-            let go_back = |seq: u64| seq.min(item.numbered_from);
+            let first = skipped.map_or(u64::MAX, |it| it.first);
+            let go_back = |seq: u64| seq.min(item.numbered_from).min(first);
             (self.next, self.expected) = (self.next.map(go_back), self.expected.map(go_back));
             self.generation = item.generation;
         }
@@ -137,6 +147,35 @@ mod tests {
                 ..item(9, 0)
             };
             assert_eq!(sequence.advance(&first), Some(missed));
+        }
+    }
+
+    #[test]
+    fn what_a_skipped_generation_gave_anew_is_missed() {
+        // Items up to 14 of generation 1 are there. Generation 2 gave 7 and 8 anew, and 3 begins
+        // behind its poses.
+        let skipped = |first| GivenAnew {
+            generation: 2,
+            first,
+        };
+        for (skipped, missed) in [
+            (None, 0),
+            (Some(skipped(7)), 2),
+            (Some(skipped(9)), 0),
+            (Some(skipped(12)), 0),
+        ] {
+            let mut sequence = Sequence {
+                next: Some(15),
+                generation: 1,
+                ..Sequence::default()
+            };
+            let first = Item {
+                generation: 3,
+                numbered_from: 9,
+                ..item(9, 0)
+            };
+            assert_eq!(sequence.advance_past(&first, skipped), Some(missed));
+            assert_eq!((sequence.next, sequence.missed), (Some(10), missed));
         }
     }
 

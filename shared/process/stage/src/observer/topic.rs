@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use gyre_messages::{
-    Correction, Fix, Loop, Masked, Message, Motion, Pose, Refined, Rotation, Scan,
+    Correction, Fix, GivenAnew, Item, Loop, Masked, Message, Motion, Pose, Refined, Rotation, Scan,
 };
 
 use super::{Next, ObservedRun, Observer};
@@ -31,6 +31,12 @@ pub trait TopicObserver {
 
     /// See [`Observer::missed`].
     fn missed(&self) -> u64;
+
+    /// See [`Observer::skipped`].
+    ///
+    /// # Errors
+    /// The same.
+    fn skipped(&self, known: u32, item: &Item) -> Result<Option<GivenAnew>, StageError>;
 }
 
 struct Typed<'run, M: Message> {
@@ -98,5 +104,9 @@ impl<M: Message> TopicObserver for Typed<'_, M> {
 
     fn missed(&self) -> u64 {
         self.observer.missed()
+    }
+
+    fn skipped(&self, known: u32, item: &Item) -> Result<Option<GivenAnew>, StageError> {
+        self.observer.skipped(known, item)
     }
 }

@@ -3,7 +3,7 @@
 
 use std::{os::fd::BorrowedFd, time::Duration};
 
-use gyre_messages::{Hop, Scan, ScanHeader, StageId};
+use gyre_messages::{Hop, NumberedBy, Scan, ScanHeader, StageId};
 
 use super::{
     Credit,
@@ -128,7 +128,8 @@ impl Stream<'_> {
     ) -> Result<(), StageError> {
         let newest = self.credit.resume_at.unwrap_or_default();
         // A run that is started again knows what was published up to its newest pose.
-        let generation = Generation::begin(&self.launch.manifest, &newest, position.published)?;
+        let (manifest, first) = (&self.launch.manifest, position.published);
+        let generation = Generation::begin(manifest, NumberedBy::Source, &newest, first)?;
         while scans.is_none_or(|scans| position.published < scans) {
             let mut draft = self.scans.loan()?;
             let started_ns = loop {
