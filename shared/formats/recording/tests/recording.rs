@@ -13,7 +13,7 @@ use gyre_messages::{GivenAnew, Item, MotionHeader, PoseHeader, RotationHeader, S
 use gyre_radar::{DatasetOptions, OwnedScan, ReadError};
 use gyre_recording::{
     Head, Incoming, Ledger, LogLine, Positions, Recording, RecordingError, RecordingWriter, Split,
-    SplitWriter, open,
+    SplitWriter, open, open_recording,
 };
 use mcap::records::{MessageHeader, Metadata, Record};
 
@@ -183,6 +183,29 @@ fn parts_of_one_recording_are_one_and_those_of_another_are_left_out() {
     let seqs: Vec<u64> = recording.entries("scan").map(|entry| entry.seq).collect();
     assert_eq!(seqs, [0, 1, 2, 3]);
     assert_eq!(read_all(&mut recording), 8);
+    assert_eq!(recording.left_out(), &paths[2..]);
+}
+
+#[test]
+fn a_part_of_another_recording_in_the_middle_ends_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let [first, foreign, third, fourth] =
+        ["a.mcap", "a.2.mcap", "a.3.mcap", "a.4.mcap"].map(|name| folder.path().join(name));
+    write(&first, &head("a", 1), &[0, 1]);
+    write(&foreign, &head("b", 2), &[2, 9]);
+    write(&third, &head("a", 3), &[3]);
+    write(&fourth, &head("a", 4), &[4, 5]);
+    let mut recording = open_recording(&first).unwrap();
+    let seqs: Vec<u64> = recording.entries("scan").map(|entry| entry.seq).collect();
+    assert_eq!(seqs, [0, 1, 3, 4, 5]);
+    assert_eq!(read_all(&mut recording), 10);
+    assert_eq!(recording.left_out(), [foreign]);
+    assert_eq!(recording.absent_parts(), [2]);
+    assert_eq!(
+        recording.paths().collect::<Vec<_>>(),
+        [&first, &third, &fourth]
+    );
+    assert_eq!(recording.missed(), [("pose", 10)].into());
 }
 
 #[test]
