@@ -1,13 +1,14 @@
 //! The folder of a map, which is replaced as a whole.
 
 use std::{
+    fmt::Display,
     fs, io,
     path::{Path, PathBuf},
 };
 
 use gyre_localisation::Map;
 use gyre_mapping::{Evidence, Origin, require_tiles_only, write_map};
-use gyre_results::Out;
+use gyre_results::{Out, OutError};
 use gyre_slam::{Keyframe, Record};
 use gyre_storage::{self as storage, StorageError};
 use gyre_terminal::Failure;
@@ -21,16 +22,29 @@ const MANIFEST: &str = "map.toml";
 /// Without the first nothing can be localised in the folder: they go first and come last.
 const MARKS: [&str; 2] = [Keyframe::FILE, MANIFEST];
 
-/// Lets a map that is whole take its place, if the command that drew it was killed before that.
+/// Makes a map ready to be read: if the command that drew it was killed when the map was about to
+/// take its place, it takes it now.
 ///
 /// # Errors
-/// A folder that cannot be written, or to which another command is writing.
-pub fn finish_locked(out: &Path) -> Result<(), Failure> {
-    if is_interrupted(out) {
-        let _locked = Out::lock(out)?;
-        finish(out)?;
+/// A command that is drawing it now, or a folder that this user may not write.
+pub fn settle(map: &Path) -> Result<(), Failure> {
+    if !is_interrupted(map) {
+        return Ok(());
     }
-    Ok(())
+    let path = map.display();
+    let _locked = Out::lock(map).map_err(|error| match error {
+        OutError::Held { holder, .. } => {
+            format!("the map {path} is being replaced by another command{holder}: wait for it")
+        }
+        OutError::Unwritable { source, .. } => unfinished(&path, &source),
+    })?;
+    Ok(finish(map).map_err(|error| unfinished(&path, &error.source))?)
+}
+
+fn unfinished(map: &impl Display, source: &io::Error) -> String {
+    format!(
+        "the map {map} was left half replaced by a command that was killed, and cannot be put right ({source}): let its owner read it once, with gyre localise, or draw it again"
+    )
 }
 
 /// Writes a map and its keyframes into `out`. A map that is there stays as it is until the new one
@@ -168,6 +182,28 @@ mod tests {
         }
         assert_eq!(content(out, "map.png"), "a picture");
         assert_eq!(names(out).unwrap().len(), 4);
+    }
+
+    #[test]
+    fn a_map_that_was_left_half_replaced_is_finished_by_who_reads_it_or_said_to_be() {
+        let folder = tempfile::tempdir().unwrap();
+        let map = folder.path();
+        write_all(&map.join(NEXT), "later");
+        let writing = Out::lock(map).unwrap();
+        let refused = settle(map).unwrap_err().to_string();
+        assert!(
+            refused.starts_with("the map ") && refused.contains("is being replaced by another"),
+            "{refused}"
+        );
+        drop(writing);
+        settle(map).unwrap();
+        assert_eq!(content(map, "map.toml"), "later");
+        // Something of that name that is no folder stands for what this user may not write.
+        write_all(&map.join(NEXT), "even later");
+        fs::write(map.join(EARLIER), "").unwrap();
+        let refused = settle(map).unwrap_err().to_string();
+        assert!(refused.contains("was left half replaced"), "{refused}");
+        assert_eq!(content(map, "map.toml"), "later");
     }
 
     /// All states in which a kill between two renames leaves the folder.

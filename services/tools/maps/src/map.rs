@@ -334,6 +334,35 @@ mod tests {
     }
 
     #[test]
+    fn a_folder_that_another_command_is_writing_is_known_before_the_search_for_places() {
+        let folder = tempfile::tempdir().unwrap();
+        run(folder.path());
+        map(&arguments(folder.path())).unwrap();
+        let vertices = (0..4).map(|k| format!("VERTEX_SE2 {k} {k} 0 0\n"));
+        let edges = (1..4).map(|k| format!("EDGE_SE2 {} {k} 1 0 0 1 0 0 1 0 1\n", k - 1));
+        fs::write(
+            folder.path().join("run/graph.g2o"),
+            vertices.chain(edges).collect::<String>(),
+        )
+        .unwrap();
+        let extended = folder.path().join("extended");
+        let arguments = MapArguments {
+            out: extended.clone(),
+            extend: Some(folder.path().join("map")),
+            ..arguments(folder.path())
+        };
+        let refused = || map(&arguments).unwrap_err().to_string();
+        let other = Out::lock(&extended).unwrap();
+        assert!(refused().starts_with("another command"), "{}", refused());
+        drop(other);
+        assert!(
+            refused().starts_with("no keyframe of"),
+            "the search is next: {}",
+            refused()
+        );
+    }
+
+    #[test]
     fn the_corrected_trajectory_comes_before_that_of_odometry() {
         let folder = tempfile::tempdir().unwrap();
         run(folder.path());

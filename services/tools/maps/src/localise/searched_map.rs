@@ -6,21 +6,21 @@ use gyre_configuration::Configuration;
 use gyre_localisation::{Localiser, LocaliserOptions, Map};
 use gyre_terminal::Failure;
 
-use crate::folder::finish_locked;
+use crate::folder;
 
 /// Opens the map in a folder, and plans localisation in it.
 ///
 /// # Errors
 /// A folder without a whole map, a configuration that extracts no points.
-pub fn open(folder: &Path, configuration: &Configuration) -> Result<Localiser, Failure> {
-    finish_locked(folder)?;
-    let drawn = gyre_mapping::Map::open(folder)?;
-    let map = Map::open(folder)
-        .map_err(|error| format!("{} cannot be localised in: {error}", folder.display()))?;
+pub fn open(path: &Path, configuration: &Configuration) -> Result<Localiser, Failure> {
+    folder::settle(path)?;
+    let drawn = gyre_mapping::Map::open(path)?;
+    let map = Map::open(path)
+        .map_err(|error| format!("{} cannot be localised in: {error}", path.display()))?;
     if map.keyframes().len() != drawn.keyframes() {
         return Err(format!(
             "{} was drawn from {} keyframes and keeps {}: draw the map again with gyre map",
-            folder.display(),
+            path.display(),
             drawn.keyframes(),
             map.keyframes().len()
         )

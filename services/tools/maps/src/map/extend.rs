@@ -60,9 +60,11 @@ pub fn extend(arguments: &MapArguments, map: &Path) -> Result<Drawing, Failure> 
     require_another_folder(map, out)?;
     let mut keyframes = super::open(run)?;
     let graph = read_graph(run, keyframes.len())?;
-    folder::finish_locked(map)?;
-    let earlier = gyre_mapping::Map::open(map)?;
     let mut localiser = searched_map::open(map, &super::configuration(run)?)?;
+    let earlier = gyre_mapping::Map::open(map)?;
+    // Before the search, which takes minutes for a long drive. A drive that is refused makes no
+    // folder.
+    let locked = out.exists().then(|| Out::lock(out)).transpose()?;
     let search = find(&mut localiser, &mut keyframes)?;
     let Some(start) = most_agreed(&graph, &search.found) else {
         return Err(format!(
@@ -84,7 +86,7 @@ pub fn extend(arguments: &MapArguments, map: &Path) -> Result<Drawing, Failure> 
     let ends = |it: &Found| [known.pose(it.fix.keyframe), poses[it.keyframe]];
     let loops = agreeing.iter().map(ends).collect();
     let all = all(known.keyframes(), &mut keyframes, &poses)?;
-    let _locked = Out::lock(out)?;
+    let _locked = locked.map_or_else(|| Out::lock(out), Ok)?;
     let mut drawing = Drawing::new(earlier.options(), out)?;
     for keyframe in &all {
         drawing.draw(keyframe, &keyframe.pose.motion)?;
