@@ -120,6 +120,37 @@ fn a_killed_recorder_changes_no_byte_and_another_one_goes_on_in_the_next_part() 
 }
 
 #[test]
+fn a_run_that_ended_before_its_first_pose_goes_on_with_its_recording() {
+    for (mode, rate) in [("lossless", "max"), ("live", "4")] {
+        let run = recorded(&simulated().rate(rate)).set(ALL);
+        let run = run
+            .set("source.scans=6")
+            .set(&format!("run.mode={mode}"))
+            .set("stages.refinement.delay_ms=800");
+        let mut running = run.start();
+        running.await_stages();
+        await_file(&file(&run));
+        assert_eq!(running.poses(), 0);
+        running.signal(Signal::INT);
+        running.end();
+        let other = run.clone().set("points.max_range_m=70");
+        other.finish().failed_with(&["drive.mcap exists"]);
+        run.finish().succeeded();
+        assert_eq!(parts(&file(&run)).len(), 2, "{mode}");
+        let recording = open_recording(&file(&run)).unwrap();
+        assert_eq!(seqs(&recording, "scan"), [0, 1, 2, 3, 4, 5], "{mode}");
+        let replayed = replay(&file(&run), &["--from", "masked"]);
+        assert_eq!(replayed, run.odometry(), "{mode}");
+    }
+}
+
+fn await_file(path: &Path) {
+    while !path.exists() {
+        thread::sleep(Duration::from_millis(5));
+    }
+}
+
+#[test]
 fn a_recording_in_several_files_replays_to_the_same_bytes() {
     let run = recorded(&simulated()).set(ALL).set("record.split_s=1.5");
     let odometry = run.complete();

@@ -34,6 +34,8 @@ const LOGS: [&str; 2] = ["log.jsonl", "log.jsonl.old"];
 pub enum Earlier {
     /// Nothing to go on from.
     Nothing,
+    /// The same run, begun and ended without a pose to go on from. Only its recording goes on.
+    WithoutPoses(Identity),
     /// A journal without its end, or of which the followers have not read all keyframes.
     Unfinished(Begun),
     /// A journal with its end, of which results have not been written.
@@ -77,13 +79,14 @@ impl Earlier {
             return complete(out, configuration, programs);
         }
         if !there {
-            return require_no_results(out).map(|()| Self::Nothing);
+            require_no_results(out)?;
+            return Ok(without_poses(out, configuration, programs));
         }
         let content = journal::check(&path).map_err(|error| kept(error, &path))?;
         let holds = Holds::Unfinished(content.poses);
         let is_empty = content.poses == 0 && !content.ended;
         let identity = match is_empty {
-            true => return Ok(Self::Nothing),
+            true => return Ok(without_poses(out, configuration, programs)),
             false => Identity::read(out, holds)?,
         };
         identity.require(configuration, programs, out.path(), holds)?;
@@ -100,7 +103,7 @@ impl Earlier {
         Ok(match (content.ended, poses) {
             (true, _) if is_followed => Self::Ended(begun),
             (true, _) => Self::Unfinished(begun),
-            (false, 0) => Self::Nothing,
+            (false, 0) => Self::WithoutPoses(begun.identity),
             (false, _) => Self::Unfinished(begun),
         })
     }
@@ -115,15 +118,37 @@ impl Earlier {
         }
     }
 
+    /// Returns whether a run of this identity goes on with the recording that was begun before.
+    pub fn recording_goes_on(&self, identity: &Identity, out: &Out) -> bool {
+        let holds = Holds::Unfinished(0);
+        let is_same = |begun: &Identity| begun.require_recording(identity, out.path(), holds);
+        match self {
+            Self::Unfinished(_) => true,
+            Self::WithoutPoses(begun_with) => is_same(begun_with).is_ok(),
+            Self::Nothing | Self::Ended(_) | Self::Complete(_) => false,
+        }
+    }
+
     /// The identity of the run in the folder, which the new one must have too.
     pub fn identity(&self) -> Option<(&Identity, Holds)> {
         match self {
-            Self::Nothing => None,
+            Self::Nothing | Self::WithoutPoses(_) => None,
             Self::Complete(identity) => Some((identity, Holds::Complete)),
             Self::Unfinished(begun) | Self::Ended(begun) => {
                 Some((&begun.identity, Holds::Unfinished(begun.poses)))
             }
         }
+    }
+}
+
+/// Returns the state of a folder without poses: whatever was begun there may be begun anew, and the
+/// same run may go on with its recording.
+fn without_poses(out: &Out, configuration: &Configuration, programs: &Programs) -> Earlier {
+    let holds = Holds::Unfinished(0);
+    let require = |it: &Identity| it.require(configuration, programs, out.path(), holds);
+    match Identity::read(out, holds) {
+        Ok(identity) if require(&identity).is_ok() => Earlier::WithoutPoses(identity),
+        _ => Earlier::Nothing,
     }
 }
 
@@ -259,38 +284,52 @@ fn damaged(error: KeyframesError) -> Failure {
 
 /// The files of a run's state.
 fn state(out: &Path) -> [PathBuf; 9] {
+    let [ledger, generations] = state_of_recording(out);
     [
         journal::path(out),
         checkpoint::path(out),
         records_path::<Keyframe>(out),
         records_path::<Place>(out),
         records_path::<Query>(out),
-        Ledger::of(out).path().to_owned(),
-        Generation::path(out),
+        ledger,
+        generations,
         out.join(BEGUN_WITH),
         out.join(COMPLETE),
     ]
 }
 
+/// Those that a recording needs to go on: its ledger, and the generations of the numbers in it.
+fn state_of_recording(out: &Path) -> [PathBuf; 2] {
+    [Ledger::of(out).path().to_owned(), Generation::path(out)]
+}
+
 /// Removes the state of an unfinished run, puts that of a complete one aside, and says what the new
 /// one begins with. The journal goes first: without it nothing else is taken for part of a run.
-/// Results stay until the new run has its own.
+/// Results stay until the new run has its own, and what its recording needs if that goes on.
 ///
 /// # Errors
 /// A file that cannot be removed or written.
-pub fn begin(out: &Out, identity: &Identity, resolved: &str) -> Result<(), Failure> {
+pub fn begin(
+    out: &Out,
+    identity: &Identity,
+    resolved: &str,
+    recording_goes_on: bool,
+) -> Result<(), Failure> {
     replaced::put_aside(out)?;
     let folder = out.join("journal");
     storage::create_folder(&folder)?;
     storage::remove(&journal::path(out.path()))?;
     storage::sync_folder(&folder)?;
     // Results without any are refused, so what the run was begun with is replaced as a whole below.
-    let begun_with = out.join(BEGUN_WITH);
+    let mut kept = vec![out.join(BEGUN_WITH)];
+    if recording_goes_on {
+        kept.extend(state_of_recording(out.path()));
+    }
     // The truth of a simulation is no result: it is there when the run begins.
     let others = LOGS.into_iter().chain([SIMULATED_TRUTH]);
     state(out.path())
         .into_iter()
-        .filter(|path| *path != begun_with)
+        .filter(|path| !kept.contains(path))
         .chain(others.map(|name| out.join(name)))
         .try_for_each(|path: PathBuf| storage::remove(&path))?;
     identity.write(out)?;

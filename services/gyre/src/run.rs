@@ -113,6 +113,8 @@ struct Ready {
     resolved: Configuration,
     checked: Preflight,
     identity: Identity,
+    /// True if the run goes on with the recording that it has begun before.
+    recording_goes_on: bool,
 }
 
 /// Checks all that can be checked before anything of an earlier run is changed.
@@ -128,7 +130,6 @@ fn make_ready(
         let replace = unfinished.is_none();
         simulate::store(simulation, &configuration.source.data, replace)?;
     }
-    plan::require_recordable(&configuration.record, out.path(), unfinished.is_some())?;
     preflight::check_open_files()?;
     // The stages read the options of dataset.toml from here: it may change while they run.
     let resolved = with_stored_options(configuration)?;
@@ -143,6 +144,8 @@ fn make_ready(
     if let Some((begun_with, holds)) = earlier.identity() {
         begun_with.require_recording(&identity, out.path(), holds)?;
     }
+    let recording_goes_on = earlier.recording_goes_on(&identity, out);
+    plan::require_recordable(&configuration.record, out.path(), recording_goes_on)?;
     if let Some(begun) = unfinished.filter(|begun| begun.lost > 0) {
         print::note(format_args!(
             "gyre: a power failure took the last {} poses of {}: going on after {}",
@@ -155,6 +158,7 @@ fn make_ready(
         resolved,
         checked,
         identity,
+        recording_goes_on: recording_goes_on && configuration.record.is_on(),
     })
 }
 
@@ -165,11 +169,10 @@ fn play(
     out: Out,
     earlier: &Earlier,
 ) -> Result<ExitCode, Failure> {
+    let ready = make_ready(configuration, programs, &out, earlier)?;
     let Ready {
-        resolved,
-        checked,
-        identity,
-    } = make_ready(configuration, programs, &out, earlier)?;
+        resolved, checked, ..
+    } = &ready;
     let unfinished = earlier.unfinished();
     let signals = Signals::install()?;
     let root = match RunRoot::acquire(out.path(), &signals) {
@@ -177,11 +180,8 @@ fn play(
         root => root?,
     };
     preflight::check_shared_memory(&checked.footprint)?;
-    prepare(configuration, &identity, &out, &checked, unfinished)?;
-    let plan = plan_of(
-        &resolved,
-        manifest(&resolved, programs, &out, &checked, &root),
-    );
+    prepare(configuration, &ready, &out, unfinished)?;
+    let plan = plan_of(resolved, manifest(resolved, programs, &out, checked, &root));
     plan.manifest.write(&resolved.to_toml()?)?;
     if let Some(recording) = &checked.recording {
         let path = root.path().display();
@@ -189,7 +189,7 @@ fn play(
         recording.listing.write(root.path()).map_err(failed)?;
     }
 
-    describe_masks(&resolved)?.iter().for_each(print::note);
+    describe_masks(resolved)?.iter().for_each(print::note);
     resolved.link.describe().iter().for_each(print::note);
     let resumed = unfinished.map_or(0, |begun| begun.poses as usize);
     let mut progress = Progress::new(checked.scans, resumed, &checked.footprint);
@@ -226,16 +226,18 @@ fn play(
 /// Writes into the folder of the results what the stages expect there.
 fn prepare(
     configuration: &Configuration,
-    identity: &Identity,
+    ready: &Ready,
     out: &Out,
-    checked: &Preflight,
     unfinished: Option<&Begun>,
 ) -> Result<(), Failure> {
     match unfinished {
         Some(begun) => earlier::resume(out, begun)?,
-        None => earlier::begin(out, identity, &configuration.to_toml()?)?,
+        None => {
+            let resolved = configuration.to_toml()?;
+            earlier::begin(out, &ready.identity, &resolved, ready.recording_goes_on)?;
+        }
     }
-    if let Some(truth) = &checked.truth {
+    if let Some(truth) = &ready.checked.truth {
         storage::write(&out.join(SIMULATED_TRUTH), truth)?;
     }
     Ok(storage::create_folder(&out.join("log"))?)

@@ -93,7 +93,9 @@ impl Machine {
         let resumed = match Earlier::of(&out, &self.configuration, &self.programs, false)? {
             Earlier::Ended(begun) => begun.poses,
             Earlier::Unfinished(begun) => self.go_on(&out, Some(begun))?,
-            Earlier::Nothing | Earlier::Complete(_) => self.go_on(&out, None)?,
+            Earlier::Nothing | Earlier::WithoutPoses(_) | Earlier::Complete(_) => {
+                self.go_on(&out, None)?
+            }
         };
         let session = Session {
             scans: Some(SCANS as usize),
@@ -119,7 +121,10 @@ impl Machine {
         let resumed = begun.as_ref().map_or(0, |begun| begun.poses);
         match &begun {
             Some(begun) => earlier::resume(out, begun)?,
-            None => earlier::begin(out, &self.identity(), &self.configuration.to_toml()?)?,
+            None => {
+                let resolved = self.configuration.to_toml()?;
+                earlier::begin(out, &self.identity(), &resolved, false)?;
+            }
         }
         let mut stages = Stages::start(out.path(), &self.configuration)?;
         stages.play()?;

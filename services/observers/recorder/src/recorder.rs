@@ -107,16 +107,19 @@ pub fn record(options: &Options) -> Result<Recorded, RecorderError> {
         ledger,
         earlier,
     } = begin(options, manifest, &topics)?;
-    let taps = topics.iter().map(|topic| {
+    let mut taps = Vec::new();
+    for topic in &topics {
         // Recording begins with the first scan, which waits for the recorder.
         let expected = earlier.as_ref().map(|it| it.get(topic).copied());
-        Tap::on(&run, topic, expected.map(Option::unwrap_or_default))
-    });
+        taps.extend(Tap::on(
+            &run,
+            topic,
+            expected.map(Option::unwrap_or_default),
+        )?);
+    }
     let (to, split) = (options.to.clone(), options.split);
-    let positions = earlier.clone().unwrap_or_default();
-    let writer = SplitWriter::create(to, head, split, ledger, positions)?;
+    let writer = SplitWriter::create(to, head, split, ledger, earlier.unwrap_or_default())?;
     let path = writer.path().to_owned();
-    let taps: Vec<_> = taps.flat_map(Result::transpose).collect::<Result<_, _>>()?;
     if options.continues {
         run.is_ready(NAME, &signals)?;
     }
