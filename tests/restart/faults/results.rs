@@ -123,6 +123,8 @@ pub fn read_only(scene: &mut Scene) -> Option<Outcome> {
     give_to_nobody(&run);
     let as_nobody = || wrapped(&AS_NOBODY, &run.command());
     let mut running = run.start_as(as_nobody());
+    // Killed before it has a guardian, a run of another user would stay in shared memory.
+    running.await_stages();
     scene.moment(&mut running)?;
     let root = running.root()?;
     permit(run.out(), false);
