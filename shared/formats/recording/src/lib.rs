@@ -24,6 +24,7 @@
 //! [`Dataset`](gyre_radar::Dataset)).
 
 mod chunk;
+mod disk;
 mod early_lines;
 mod error;
 mod generations;

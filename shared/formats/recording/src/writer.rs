@@ -3,7 +3,6 @@
 use std::{
     collections::BTreeMap,
     fs::{File, OpenOptions},
-    io::Seek,
     mem,
     os::unix::fs::OpenOptionsExt,
     path::{Path, PathBuf},
@@ -17,6 +16,7 @@ use mcap::{Compression, McapError, WriteOptions, Writer, records::MessageHeader}
 
 use crate::{
     ENCODING, Entry, Head, LogLine, RecordingError,
+    disk::{Disk, Synchronise},
     early_lines::EarlyLines,
     exact_channel, generations,
     image::Rows,
@@ -27,8 +27,6 @@ use crate::{
 /// The longest time for which a message stays in memory. At four scans a second the history of the
 /// topics covers twice as much, so that a recorder that is killed and started again misses none.
 const FLUSH_PERIOD: Duration = Duration::from_millis(500);
-/// The longest time for which a chunk is not synchronised. What a power failure takes is that.
-const SYNC_PERIOD: Duration = Duration::from_secs(1);
 /// The size of a chunk, uncompressed, from which on it is written.
 const CHUNK_BYTES: usize = 4 << 20;
 /// The fastest level with entropy coding: the noise in a scan has no repetitions, but few values.
@@ -61,10 +59,7 @@ pub struct RecordingWriter {
     path: PathBuf,
     /// `None` after a failure.
     mcap: Option<Writer<File>>,
-    /// The same file, to cut off what a full disk leaves incomplete.
-    file: File,
-    /// Length of the file up to the last complete table.
-    complete_bytes: u64,
+    disk: Disk,
     channels: BTreeMap<String, u16>,
     recent: Recent,
     table: Table,
@@ -78,8 +73,6 @@ pub struct RecordingWriter {
     first_ns: Option<i64>,
     /// Log lines that came before the first message.
     early: EarlyLines,
-    /// When the oldest chunk that is not synchronised was written.
-    unsynchronised: Option<Instant>,
 }
 
 /// The times of a message: the sensor's, and when it was received.
@@ -107,6 +100,14 @@ impl RecordingWriter {
     /// # Errors
     /// The file exists or cannot be written.
     pub fn create(path: &Path, head: &Head) -> Result<Self, RecordingError> {
+        Self::create_with(path, head, Disk::synchronises())
+    }
+
+    pub(crate) fn create_with(
+        path: &Path,
+        head: &Head,
+        synchronise: Synchronise,
+    ) -> Result<Self, RecordingError> {
         let failed = |source| RecordingError::Io {
             path: path.to_owned(),
             source,
@@ -132,8 +133,7 @@ impl RecordingWriter {
         let mut writer = Self {
             path: path.to_owned(),
             mcap: Some(mcap),
-            file: own,
-            complete_bytes: 0,
+            disk: Disk::of(own, synchronise),
             channels: BTreeMap::new(),
             recent: Recent::default(),
             table: Table::default(),
@@ -142,7 +142,6 @@ impl RecordingWriter {
             newest_ns: None,
             first_ns: None,
             early: EarlyLines::default(),
-            unsynchronised: None,
         };
         writer.begin(head).map_err(unwritable)?;
         // Its name survives a power failure too.
@@ -285,7 +284,7 @@ impl RecordingWriter {
 
     /// Returns the bytes in the file.
     pub(crate) fn bytes(&self) -> u64 {
-        self.complete_bytes
+        self.disk.complete_bytes()
     }
 
     /// Returns the time from the first message of the file to the newest one on the sensor's clock,
@@ -344,19 +343,8 @@ impl RecordingWriter {
         if is_due {
             self.flush()?;
         }
-        let synchronised = self.synchronise_if_due();
-        self.checked(synchronised)
-    }
-
-    fn synchronise_if_due(&mut self) -> Result<(), McapError> {
-        let is_due = self
-            .unsynchronised
-            .is_some_and(|since| since.elapsed() >= SYNC_PERIOD);
-        if is_due {
-            self.file.sync_data()?;
-            self.unsynchronised = None;
-        }
-        Ok(())
+        let synchronised = self.disk.synchronise_if_due();
+        self.checked(synchronised.map_err(McapError::Io))
     }
 
     /// Writes the messages so far as a chunk, and its table.
@@ -379,10 +367,7 @@ impl RecordingWriter {
         self.mcap()?.flush()?;
         self.table.entries.clear();
         self.pending = (0, None);
-        // The file of the library and this one have one position.
-        self.complete_bytes = self.file.stream_position()?;
-        self.unsynchronised.get_or_insert_with(Instant::now);
-        Ok(())
+        Ok(self.disk.complete()?)
     }
 
     /// Writes what is left and the summary, and returns the number of messages missed, by topic.
@@ -405,7 +390,7 @@ impl RecordingWriter {
         path: &Path,
         head: &Head,
     ) -> Result<BTreeMap<String, u64>, RecordingError> {
-        let next = Self::create(path, head)?;
+        let next = Self::create_with(path, head, self.disk.synchronise_of_next())?;
         let before = mem::replace(self, next);
         // What viewers draw goes on.
         (self.recent, self.newest_ns) = (before.recent, before.newest_ns);
@@ -416,7 +401,7 @@ impl RecordingWriter {
     pub(crate) fn end(&mut self) -> Result<(), RecordingError> {
         self.flush()?;
         let finished = self.mcap().and_then(Writer::finish).map(drop);
-        let synchronised = finished.and_then(|()| Ok(self.file.sync_all()?));
+        let synchronised = finished.and_then(|()| Ok(self.disk.synchronise()?));
         self.checked(synchronised)
     }
 
@@ -431,7 +416,7 @@ impl RecordingWriter {
         result.map_err(|source| {
             // Dropped as it is, it would write a summary.
             drop(self.mcap.take().map(Writer::into_inner));
-            let _ = self.file.set_len(self.complete_bytes);
+            let _ = self.disk.cut_back();
             RecordingError::of(&self.path, source)
         })
     }
