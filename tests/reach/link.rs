@@ -170,6 +170,35 @@ fn another_machine_sees_all_poses_of_a_run_from_its_beginning() {
 }
 
 #[test]
+fn another_machine_gets_what_is_numbered_anew_after_masking_was_killed() {
+    let run = Run::small().data(recording::around_a_block()).rate("2");
+    // Whenever masking is killed, scans that it had taken are in flight.
+    let run = run
+        .set("source.scans=60")
+        .set("run.mode=live")
+        .set("run.window=32")
+        .set("stages.refinement.delay_ms=180");
+    let mut running = run.start();
+    running.await_poses(2);
+    let link = Link::new();
+    let mut send = link.end("send", run.out());
+    send.args(["--topics", "rotation,pose"]);
+    let sending = thread::spawn(move || Ended::of(send));
+    let receiving = link.start("receive", &run.folder().join("seen"));
+    running.await_poses(20).kill("masking");
+    running.finish().succeeded();
+    let received = receiving.join().unwrap();
+    let said = &received.succeeded().stderr;
+    sending.join().unwrap().succeeded();
+    let (received, missed) = said.rsplit_once("; missed").unwrap();
+    let (_, rotations) = received.split_once("pose, ").unwrap();
+    let rotations: usize = rotations.trim_end_matches(" rotation").parse().unwrap();
+    // Each number once would be as many as poses, but for those from before the link.
+    assert!(rotations > poses(run.out()), "{said}");
+    assert!(!missed.contains("pose"), "{said}");
+}
+
+#[test]
 fn a_sender_that_begins_again_is_gone_on_with() {
     let run = Run::of_recording().rate("0.4");
     let mut running = run.start();

@@ -231,6 +231,7 @@ impl Base<'_> {
             let request = Request {
                 key: format!("{prefix}/{name}"),
                 from,
+                generation: None,
                 receiver: self.session.zid().to_string(),
                 priority: Priority::Data,
             };

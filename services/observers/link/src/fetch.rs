@@ -20,7 +20,7 @@ use zenoh::{
 
 use crate::{
     LinkError,
-    serve::{DONE, ENDED, FROM, RECEIVER, REQUEST_LIFETIME},
+    serve::{DONE, ENDED, FROM, GENERATION, RECEIVER, REQUEST_LIFETIME},
     waker::Waker,
 };
 
@@ -67,10 +67,28 @@ pub(crate) struct Request {
     pub key: String,
     /// The first message.
     pub from: u64,
+    /// The generation of the messages before, 0 without any; `None` where no number is given anew.
+    pub generation: Option<u32>,
     /// The identity of this receiver, the same after its restart.
     pub receiver: String,
     /// The priority: poses go before scans.
     pub priority: Priority,
+}
+
+impl Request {
+    fn selector(&self) -> String {
+        let Self {
+            key,
+            from,
+            receiver,
+            ..
+        } = self;
+        let selector = format!("{key}?{FROM}={from};{RECEIVER}={receiver}");
+        match self.generation {
+            Some(generation) => format!("{selector};{GENERATION}={generation}"),
+            None => selector,
+        }
+    }
 }
 
 impl Fetcher {
@@ -222,16 +240,10 @@ impl RequestLoop {
         self.state.again.store(false, Ordering::Relaxed);
         let confirmed = self.state.confirmed.load(Ordering::Relaxed);
         self.request.from = self.request.from.max(confirmed);
-        let Request {
-            key,
-            from,
-            receiver,
-            priority,
-        } = &self.request;
-        let selector = format!("{key}?{FROM}={from};{RECEIVER}={receiver}");
+        let Request { from, priority, .. } = &self.request;
         let asked = self
             .session
-            .get(selector)
+            .get(self.request.selector())
             .consolidation(ConsolidationMode::None)
             .congestion_control(CongestionControl::Block)
             .priority(*priority)
@@ -287,6 +299,9 @@ impl RequestLoop {
         // The first answer is empty.
         let item = bytes.get(..size_of::<Item>());
         let item = item.map(bytemuck::pod_read_unaligned::<Item>);
+        if let Some(item) = &item {
+            self.go_back_to(item);
+        }
         if let Some(item) = item.filter(|item| self.is_new(item)) {
             match item.is(flag::END) {
                 true => self.has_end = true,
@@ -298,6 +313,20 @@ impl RequestLoop {
             self.waker.wake();
         }
         true
+    }
+
+    /// Goes back to where a later generation than that of the messages before gives numbers anew.
+    fn go_back_to(&mut self, item: &Item) {
+        let Request {
+            from, generation, ..
+        } = &mut self.request;
+        if let Some(known) = generation
+            .as_mut()
+            .filter(|known| item.generation > **known)
+        {
+            (*known, *from) = (item.generation, item.numbered_from.min(*from));
+            self.has_end = false;
+        }
     }
 
     /// Returns whether a message is new: what was requested twice may arrive twice.

@@ -20,6 +20,8 @@ use crate::LinkError;
 pub(crate) struct Message {
     /// The number of the message in its topic.
     pub seq: u64,
+    /// See [`Item::generation`](gyre_messages::Item::generation).
+    pub generation: u32,
     /// The bytes, shared by all receivers.
     pub bytes: Arc<[u8]>,
 }
@@ -27,10 +29,35 @@ pub(crate) struct Message {
 impl Message {
     /// Creates the message to send.
     pub fn of(message: &RecordedMessage) -> Self {
+        let item = message.item().unwrap_or_default();
         Self {
-            seq: message.item().map_or(0, |item| item.seq),
+            seq: item.seq,
+            generation: item.generation,
             bytes: [&message.header[..], &message.payload].concat().into(),
         }
+    }
+}
+
+/// The place behind the messages that a receiver has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Place {
+    /// The number of the next message.
+    pub seq: u64,
+    /// The generation of the newest one: messages of a later generation are wanted whatever their
+    /// numbers. `None`: no number is given anew.
+    pub generation: Option<u32>,
+}
+
+impl Place {
+    /// Goes behind a message.
+    pub fn pass(&mut self, message: &Message) {
+        self.seq = message.seq.saturating_add(1);
+        self.generation = self.generation.map(|_| message.generation);
+    }
+
+    fn is_behind(&self, message: &Message) -> bool {
+        let is_later = |known| message.generation > known;
+        message.seq < self.seq && !self.generation.is_some_and(is_later)
     }
 }
 
@@ -47,8 +74,8 @@ pub(crate) enum Next {
 
 /// The messages of a topic.
 pub(crate) trait ReplayBuffer: Send + Sync {
-    /// Returns the first message from number `seq` on, and waits for it at most `limit`.
-    fn next(&self, seq: u64, limit: Duration) -> Result<Next, LinkError>;
+    /// Returns the first message from a place on, and waits for it at most `limit`.
+    fn next(&self, place: Place, limit: Duration) -> Result<Next, LinkError>;
 
     /// Adds a message that the run has published.
     fn add(&self, message: &RecordedMessage);
@@ -90,9 +117,10 @@ impl MemoryBuffer {
 }
 
 impl ReplayBuffer for MemoryBuffer {
-    fn next(&self, seq: u64, limit: Duration) -> Result<Next, LinkError> {
+    fn next(&self, place: Place, limit: Duration) -> Result<Next, LinkError> {
         let first = |held: &Held| {
-            let at = held.messages.partition_point(|message| message.seq < seq);
+            let has = |message: &Message| place.is_behind(message);
+            let at = held.messages.partition_point(has);
             let message = held.messages.get(at).cloned().map(Next::Message);
             message.or(held.has_ended.then_some(Next::Ended))
         };
@@ -100,10 +128,15 @@ impl ReplayBuffer for MemoryBuffer {
     }
 
     fn add(&self, message: &RecordedMessage) {
+        let item = message.item().unwrap_or_default();
         let message = Message::of(message);
         let held = &mut *lock(&self.held);
-        // Masking was started again, and gives numbers anew.
-        while let Some(void) = held.messages.pop_back_if(|last| last.seq >= message.seq) {
+        // Masking was started again, and gives numbers anew: perhaps some that did not come.
+        let is_void = |last: &mut Message| {
+            let is_earlier = last.generation < message.generation;
+            last.seq >= message.seq || is_earlier && last.seq >= item.numbered_from
+        };
+        while let Some(void) = held.messages.pop_back_if(is_void) {
             held.bytes -= void.bytes.len();
         }
         held.bytes += message.bytes.len();
@@ -220,6 +253,8 @@ impl<L: Log> LogBuffer<L> {
         let message = |logged| {
             Next::Message(Message {
                 seq,
+                // What a log has is never void.
+                generation: 0,
                 bytes: bytemuck::bytes_of(&header(logged)).into(),
             })
         };
@@ -228,8 +263,8 @@ impl<L: Log> LogBuffer<L> {
 }
 
 impl<L: Log> ReplayBuffer for LogBuffer<L> {
-    fn next(&self, seq: u64, limit: Duration) -> Result<Next, LinkError> {
-        self.next_as(seq, limit, |header| header)
+    fn next(&self, place: Place, limit: Duration) -> Result<Next, LinkError> {
+        self.next_as(place.seq, limit, |header| header)
     }
 
     fn add(&self, message: &RecordedMessage) {
@@ -256,8 +291,8 @@ impl<L: Log> ReplayBuffer for LogBuffer<L> {
 pub(crate) struct MotionBuffer(pub Arc<PoseBuffer>);
 
 impl ReplayBuffer for MotionBuffer {
-    fn next(&self, seq: u64, limit: Duration) -> Result<Next, LinkError> {
-        self.0.next_as(seq, limit, |pose| {
+    fn next(&self, place: Place, limit: Duration) -> Result<Next, LinkError> {
+        self.0.next_as(place.seq, limit, |pose| {
             let mut motion = MotionHeader {
                 item: pose.item,
                 motion: pose.motion,

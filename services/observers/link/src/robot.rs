@@ -328,6 +328,7 @@ impl Robot<'_> {
         let request = Request {
             key: format!("{}/{topic}", handshake::prefix(&self.config, Side::Base)),
             from: self.next_pose(),
+            generation: None,
             receiver: self.session.zid().to_string(),
             priority: Priority::InteractiveHigh,
         };

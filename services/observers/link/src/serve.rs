@@ -17,7 +17,7 @@ use zenoh::{
 
 use crate::{
     LinkError,
-    replay_buffer::{Next, ReplayBuffer},
+    replay_buffer::{Next, Place, ReplayBuffer},
     waker::Waker,
 };
 
@@ -34,6 +34,9 @@ const MAX_REQUESTS: usize = 64;
 pub(crate) const ENDED: &str = "ended";
 /// The parameter with the first message that is wanted.
 pub(crate) const FROM: &str = "from";
+/// The parameter with the generation of the newest message that the receiver has, where numbers may
+/// be given anew.
+pub(crate) const GENERATION: &str = "generation";
 /// The parameter with the identity of a receiver.
 pub(crate) const RECEIVER: &str = "receiver";
 /// The parameter of a receiver that has everything, or wants no more.
@@ -162,6 +165,10 @@ impl Offer {
             self.running.fetch_sub(1, Ordering::Relaxed);
             return;
         };
+        let place = Place {
+            seq: from,
+            generation: parameters.get(GENERATION).and_then(|it| it.parse().ok()),
+        };
         self.asked.fetch_max(from, Ordering::Relaxed);
         if let Some(waker) = &self.waker {
             waker.wake();
@@ -169,7 +176,7 @@ impl Offer {
         let request = self.replace(&receiver, false);
         let answering = self.clone();
         let spawned = thread::Builder::new().spawn(move || {
-            if let Err(error) = answering.answer(&query, from, &receiver, request) {
+            if let Err(error) = answering.answer(&query, place, &receiver, request) {
                 tracing::debug!("{}: {error}", answering.key);
             }
             answering.running.fetch_sub(1, Ordering::Relaxed);
@@ -182,7 +189,7 @@ impl Offer {
     fn answer(
         &self,
         query: &Query,
-        mut next: u64,
+        mut place: Place,
         receiver: &str,
         request: u64,
     ) -> Result<(), LinkError> {
@@ -191,13 +198,13 @@ impl Offer {
         let mut last_reply = Instant::now();
         let until = last_reply + REQUEST_LIFETIME;
         while Instant::now() < until && self.is_wanted(receiver, request) {
-            match self.buffer.next(next, POLL_INTERVAL)? {
+            match self.buffer.next(place, POLL_INTERVAL)? {
                 Next::Message(message) => {
                     self.reply(query, &message.bytes)?;
                     self.messages.fetch_add(1, Ordering::Relaxed);
                     let bytes = message.bytes.len() as u64;
                     self.bytes.fetch_add(bytes, Ordering::Relaxed);
-                    next = message.seq.saturating_add(1);
+                    place.pass(&message);
                     last_reply = Instant::now();
                 }
                 Next::Nothing if last_reply.elapsed() > KEEP_ALIVE => {

@@ -16,7 +16,9 @@ use zenoh::{Session, Wait, qos::Priority};
 use crate::{
     Network,
     fetch::{Fetcher, Request},
-    replay_buffer::{MemoryBuffer, Message, MotionBuffer, Next, PoseBuffer, PoseLog, ReplayBuffer},
+    replay_buffer::{
+        MemoryBuffer, Message, MotionBuffer, Next, Place, PoseBuffer, PoseLog, ReplayBuffer,
+    },
     serve::{Offer, Server},
     waker::Waker,
 };
@@ -33,15 +35,29 @@ fn item(seq: u64) -> Item {
 fn message(seq: u64) -> Message {
     Message {
         seq,
+        generation: 0,
         bytes: bytemuck::bytes_of(&item(seq)).into(),
     }
 }
 
 fn add(buffer: &MemoryBuffer, seq: u64) {
+    add_item(buffer, &item(seq));
+}
+
+fn add_item(buffer: &MemoryBuffer, item: &Item) {
     buffer.add(&RecordedMessage {
-        header: bytemuck::bytes_of(&item(seq)).to_vec(),
+        header: bytemuck::bytes_of(item).to_vec(),
         payload: Vec::new(),
     });
+}
+
+/// Returns the first message from `seq` on, whatever its generation.
+fn next_of(buffer: &dyn ReplayBuffer, seq: u64) -> Next {
+    let place = Place {
+        seq,
+        generation: None,
+    };
+    buffer.next(place, Duration::ZERO).unwrap()
 }
 
 fn seq(bytes: &[u8]) -> u64 {
@@ -81,6 +97,7 @@ fn fetcher(session: &Session, from: u64) -> Fetcher {
     let request = Request {
         key: "gyre/test/topic".to_owned(),
         from,
+        generation: Some(0),
         receiver: session.zid().to_string(),
         priority: Priority::Data,
     };
@@ -198,6 +215,69 @@ impl Ends {
     }
 }
 
+/// Waits for so many messages, and returns their generations and numbers.
+fn take_of_generations(fetcher: &Fetcher, count: usize) -> Vec<(u32, u64)> {
+    let mut taken = Vec::new();
+    until("all messages have come", || {
+        taken.extend(fetcher.next());
+        taken.len() == count
+    });
+    let items = taken
+        .iter()
+        .map(|bytes| bytemuck::pod_read_unaligned::<Item>(&bytes[..size_of::<Item>()]));
+    items.map(|item| (item.generation, item.seq)).collect()
+}
+
+#[test]
+fn a_receiver_gets_what_takes_the_place_of_messages_that_have_become_void() {
+    let ends = Ends::new();
+    let add = |generation, numbered_from, seq, flags| {
+        let item = Item {
+            generation,
+            numbered_from,
+            flags,
+            ..item(seq)
+        };
+        add_item(&ends.buffer, &item);
+    };
+    for seq in 1..8 {
+        add(1, 0, seq, 0);
+    }
+    add(1, 0, 8, flag::END);
+    let received = take_of_generations(&ends.fetcher, 8);
+    assert_eq!(received.last(), Some(&(1, 8)));
+    // Masking was killed when item 3 was the newest with a pose, and again when 5 was.
+    for (generation, first, last) in [(2, 4, 6), (3, 6, 9)] {
+        (first..=last).for_each(|seq| add(generation, first, seq, 0));
+        let expected: Vec<(u32, u64)> = (first..=last).map(|seq| (generation, seq)).collect();
+        assert_eq!(take_of_generations(&ends.fetcher, expected.len()), expected);
+    }
+    add(3, 6, 10, flag::END);
+    assert_eq!(take_of_generations(&ends.fetcher, 1), [(3, 10)]);
+    // Another session of the same receiver goes on behind what it has.
+    let request = |from, generation| Request {
+        key: "gyre/test/topic".to_owned(),
+        from,
+        generation: Some(generation),
+        receiver: "another".to_owned(),
+        priority: Priority::Data,
+    };
+    let again = |from, generation| {
+        let request = request(from, generation);
+        Fetcher::start(&ends.there, request, Waker::new().unwrap())
+    };
+    let fetcher = again(8, 3);
+    assert_eq!(
+        take_of_generations(&fetcher, 3),
+        [(3, 8), (3, 9), (3, 10)],
+        "of its own generation"
+    );
+    fetcher.leave();
+    let fetcher = again(8, 2);
+    let received = take_of_generations(&fetcher, 5);
+    assert_eq!(received, [(3, 6), (3, 7), (3, 8), (3, 9), (3, 10)]);
+}
+
 #[test]
 fn an_end_that_has_not_arrived_is_not_taken_for_known() {
     let ends = Ends::new();
@@ -238,7 +318,7 @@ fn a_router_of_zenoh_may_be_between_the_ends() {
 fn a_memory_buffer_keeps_the_newest_messages() {
     let buffer = MemoryBuffer::of(3);
     (0..5).for_each(|seq| add(&buffer, seq));
-    let next = |seq| buffer.next(seq, Duration::ZERO).unwrap();
+    let next = |seq| next_of(&buffer, seq);
     assert_eq!(next(0), Next::Message(message(2)));
     assert_eq!(next(4), Next::Message(message(4)));
     assert_eq!(next(5), Next::Nothing);
@@ -247,10 +327,7 @@ fn a_memory_buffer_keeps_the_newest_messages() {
     let bytes = message(0).bytes.len();
     let buffer = MemoryBuffer::bounded(100, 2 * bytes);
     (0..5).for_each(|seq| add(&buffer, seq));
-    assert_eq!(
-        buffer.next(0, Duration::ZERO).unwrap(),
-        Next::Message(message(3))
-    );
+    assert_eq!(next_of(&buffer, 0), Next::Message(message(3)));
 }
 
 #[test]
@@ -258,11 +335,27 @@ fn a_memory_buffer_has_one_message_of_a_number_that_was_given_anew() {
     let buffer = MemoryBuffer::of(10);
     (0..5).for_each(|seq| add(&buffer, seq));
     add(&buffer, 2);
-    let next = |seq| buffer.next(seq, Duration::ZERO).unwrap();
+    let next = |seq| next_of(&buffer, seq);
     assert_eq!(next(2), Next::Message(message(2)));
     assert_eq!(next(3), Next::Nothing);
     add(&buffer, 3);
     assert_eq!(next(3), Next::Message(message(3)));
+}
+
+#[test]
+fn a_memory_buffer_drops_void_messages_whose_successors_it_has_not_seen() {
+    let buffer = MemoryBuffer::of(10);
+    (0..5).for_each(|seq| add(&buffer, seq));
+    let anew = Item {
+        generation: 1,
+        numbered_from: 2,
+        ..item(4)
+    };
+    add_item(&buffer, &anew);
+    let Next::Message(next) = next_of(&buffer, 2) else {
+        panic!("there is no message");
+    };
+    assert_eq!((next.seq, next.generation), (4, 1));
 }
 
 #[test]
@@ -277,13 +370,17 @@ fn poses_and_their_motions_are_sent_from_the_journal_whenever_they_are_asked_for
     (0..40).for_each(|seq| journal.append(&pose(seq)).unwrap());
     let poses = Arc::new(PoseBuffer::of(PoseLog::of(out.path())));
     let motions = MotionBuffer(poses.clone());
-    let next = |buffer: &dyn ReplayBuffer, seq| buffer.next(seq, Duration::ZERO).unwrap();
+    let next = next_of;
     // Journalled before it is published, a pose is not sent before.
     assert_eq!(next(&*poses, 0), Next::Nothing);
     poses.set_published(30);
     let sent = |seq| {
         let bytes: Arc<[u8]> = bytemuck::bytes_of(&pose(seq)).into();
-        Next::Message(Message { seq, bytes })
+        Next::Message(Message {
+            seq,
+            generation: 0,
+            bytes,
+        })
     };
     assert_eq!((next(&*poses, 0), next(&*poses, 29)), (sent(0), sent(29)));
     assert_eq!(next(&*poses, 30), Next::Nothing);

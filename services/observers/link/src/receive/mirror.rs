@@ -2,7 +2,7 @@
 
 use gyre_journal::Journal;
 use gyre_messages::{Correction, Limits, Message as _, Pose, PoseHeader, flag, topic};
-use gyre_stage::{source::RecordedMessage, wake::MAX_WAIT};
+use gyre_stage::{observer::Sequence, source::RecordedMessage, wake::MAX_WAIT};
 use gyre_supervise::rig::{Feed, Recorded, Rig};
 use zenoh::{Session, qos::Priority};
 
@@ -40,7 +40,7 @@ pub(super) struct MirroredTopic {
     header_bytes: usize,
     pub fetcher: Fetcher,
     feed: Box<dyn Feed>,
-    next: Option<u64>,
+    sequence: Sequence,
     count: ReceivedCount,
 }
 
@@ -56,9 +56,9 @@ impl Mirror<'_> {
         Ok(MirroredTopic {
             name: topic.name,
             header_bytes: topic.header.bytes,
-            fetcher: self.fetch(topic.name, from, offered.is_lossless),
+            fetcher: self.fetch(topic.name, from, 0, offered.is_lossless),
             feed: self.rig.feed(topic.name)?,
-            next: None,
+            sequence: Sequence::default(),
             count: ReceivedCount {
                 is_lossless: offered.is_lossless,
                 ..ReceivedCount::default()
@@ -66,11 +66,12 @@ impl Mirror<'_> {
         })
     }
 
-    /// Requests the messages of a topic from one on.
-    fn fetch(&self, topic: &str, from: u64, is_lossless: bool) -> Fetcher {
+    /// Requests the messages of a topic from one on, and those of later generations than this one.
+    fn fetch(&self, topic: &str, from: u64, generation: u32, is_lossless: bool) -> Fetcher {
         let request = Request {
             key: format!("{}/{topic}", prefix(&self.link, &self.offer.sender)),
             from,
+            generation: Some(generation),
             receiver: self.receiver.clone(),
             // A scan takes long: poses go before it.
             priority: match is_lossless {
@@ -127,9 +128,10 @@ impl Mirror<'_> {
             }
             let from = match topic.name {
                 Pose::TOPIC => self.next_pose,
-                _ => topic.next.unwrap_or_default(),
+                _ => topic.sequence.next.unwrap_or_default(),
             };
-            self.topics[place].fetcher = self.fetch(topic.name, from, topic.count.is_lossless);
+            let (generation, is_lossless) = (topic.sequence.generation, topic.count.is_lossless);
+            self.topics[place].fetcher = self.fetch(topic.name, from, generation, is_lossless);
         }
         Ok(())
     }
@@ -143,7 +145,10 @@ impl Mirror<'_> {
         let continues = match began_ns {
             Some(_) => other.began_ns == began_ns,
             // Without a pose of the drive nothing of it may be there.
-            None => self.topics.iter().all(|topic| topic.next.is_none()),
+            None => self
+                .topics
+                .iter()
+                .all(|topic| topic.sequence.next.is_none()),
         };
         Ok(properties(&self.offer) == properties(other) && continues)
     }
@@ -206,13 +211,14 @@ impl MirroredTopic {
         let Some(message) = self.fetcher.next_with_payload(self.header_bytes)? else {
             return Ok(None);
         };
-        let seq = message.item().map_or(0, |item| item.seq);
         self.count.received += 1;
+        if let Some(item) = message.item() {
+            self.sequence.advance(&item);
+        }
         // The numbers of corrections count the poses in them, and each replaces those before.
         if self.name != Correction::TOPIC {
-            self.count.missed += seq.saturating_sub(self.next.unwrap_or(seq));
+            self.count.missed = self.sequence.missed;
         }
-        self.next = Some(seq.saturating_add(1));
         Ok(Some(message))
     }
 }
