@@ -4,8 +4,8 @@ use std::path::Path;
 
 use gyre_configuration::Configuration;
 use gyre_messages::{FollowerId, StageId};
-use gyre_run::{Mode, RecordConfig, Scheduling, Side};
-use gyre_supervise::{Program, StagePlan};
+use gyre_run::{LinkConfig, Mode, RecordConfig, Scheduling, Side};
+use gyre_supervise::{END_TIMEOUT, Program, StagePlan};
 use gyre_terminal::Failure;
 
 /// Returns the processes to start: `gyre stage NAME`, or their replacements.
@@ -13,6 +13,7 @@ pub fn stage_plans(configuration: &Configuration, gyre: &Path) -> Vec<StagePlan>
     let live = configuration.run.mode == Mode::Live;
     let plan = |name: &str| {
         let own = configuration.stages.get(name).cloned().unwrap_or_default();
+        let is_base = configuration.is_side(Side::Base) && configuration.is_link(name);
         let ours = || {
             vec![
                 gyre.to_string_lossy().into_owned(),
@@ -42,9 +43,12 @@ pub fn stage_plans(configuration: &Configuration, gyre: &Path) -> Vec<StagePlan>
                 && !configuration.is_link(name),
             // Live masking alone knows which scans it admitted, and on a base the link which of
             // them have come.
-            restarts_all: live
-                && (name == StageId::Masking.name()
-                    || (configuration.is_side(Side::Base) && configuration.is_link(name))),
+            restarts_all: live && (name == StageId::Masking.name() || is_base),
+            // The robot waits until it knows that the base has all.
+            end_timeout: match is_base {
+                true => LinkConfig::END_TIMEOUT + END_TIMEOUT,
+                false => END_TIMEOUT,
+            },
         }
     };
     let stages = StageId::ALL
@@ -94,6 +98,7 @@ pub fn recorder(record: &RecordConfig, gyre: &Path, out: &Path) -> Option<StageP
         restart: record.restart,
         outlives_restarts: true,
         restarts_all: false,
+        end_timeout: END_TIMEOUT,
     })
 }
 

@@ -33,9 +33,8 @@ use crate::{
     waker::Waker,
 };
 
-/// Time at the end for the robot to learn that this side has all of the run. After 2 s the
-/// supervisor ends this process.
-const END_TIMEOUT: Duration = Duration::from_millis(1500);
+/// Time after which it is said that the robot is waited for at the end.
+const QUIET: Duration = Duration::from_secs(1);
 /// Time to send the last answers.
 const LAST_ANSWERS: Duration = Duration::from_millis(300);
 /// Time between two checks whether the robot has confirmed the end.
@@ -148,12 +147,17 @@ impl Base<'_> {
         let next = end.seq.saturating_add(1);
         let since = Instant::now();
         let is_confirmed = |topic: &FromRobot| topic.fetcher.is_confirmed(next);
+        let mut is_said = false;
         while !topics.iter().all(is_confirmed) {
-            if since.elapsed() > END_TIMEOUT {
+            if since.elapsed() > LinkConfig::END_TIMEOUT {
                 tracing::warn!(
                     "the robot is out of reach at the end, and waits for this side: it has all poses, and ends by Ctrl-C"
                 );
                 return;
+            }
+            if since.elapsed() > QUIET && !is_said {
+                tracing::info!("the robot is out of reach at the end, and is waited for");
+                is_said = true;
             }
             self.confirm(Some(end), topics);
             thread::sleep(POLL_INTERVAL);

@@ -20,16 +20,11 @@ use zenoh::{
 
 use crate::{
     LinkError,
+    patience::Patience,
     serve::{DONE, ENDED, FROM, GENERATION, RECEIVER, REQUEST_LIFETIME},
     waker::Waker,
 };
 
-/// Time after which a request that has not ended is repeated.
-const REQUEST_TIMEOUT: Duration = REQUEST_LIFETIME.saturating_add(Duration::from_secs(10));
-/// The same for a request without an answer, and for one whose answers cease: a cut can lose a
-/// request without an end. A scan may take seconds on a slow network.
-const ANSWER_TIMEOUT: Duration = Duration::from_secs(3);
-const SILENCE_TIMEOUT: Duration = Duration::from_secs(12);
 /// Time for the answer to the message that nothing more is wanted, and the number of attempts.
 const DONE_TIMEOUT: Duration = Duration::from_secs(1);
 const DONE_ATTEMPTS: usize = 3;
@@ -111,6 +106,7 @@ impl Fetcher {
             sender,
             waker,
             has_end: false,
+            patience: Patience::default(),
             state: state.clone(),
         };
         Self {
@@ -199,6 +195,7 @@ struct RequestLoop {
     waker: Waker,
     /// True once the end of the stream has arrived.
     has_end: bool,
+    patience: Patience,
     state: Arc<State>,
 }
 
@@ -247,7 +244,8 @@ impl RequestLoop {
             .consolidation(ConsolidationMode::None)
             .congestion_control(CongestionControl::Block)
             .priority(*priority)
-            .timeout(REQUEST_TIMEOUT)
+            // The sender lets a request end between two messages.
+            .timeout(REQUEST_LIFETIME + self.patience.limit(true))
             .wait();
         let Ok(replies) = asked else {
             return false;
@@ -258,18 +256,14 @@ impl RequestLoop {
         loop {
             match replies.recv_timeout(POLL_INTERVAL) {
                 Ok(Some(reply)) => {
-                    was_answered |= self.take(reply);
+                    was_answered |= self.take(reply, last_answer.elapsed());
                     last_answer = Instant::now();
                 }
-                Ok(None) => {
-                    let limit = match was_answered {
-                        true => SILENCE_TIMEOUT,
-                        false => ANSWER_TIMEOUT,
-                    };
-                    if last_answer.elapsed() > limit {
-                        return false;
-                    }
+                Ok(None) if last_answer.elapsed() > self.patience.limit(was_answered) => {
+                    self.patience.lost();
+                    return false;
                 }
+                Ok(None) => {}
                 Err(_) => return was_answered,
             }
             if self.has_stopped() || self.state.again.load(Ordering::Relaxed) {
@@ -278,8 +272,8 @@ impl RequestLoop {
         }
     }
 
-    /// Takes an answer; false if it is an error.
-    fn take(&mut self, reply: Reply) -> bool {
+    /// Takes an answer that took so long; false if it is an error.
+    fn take(&mut self, reply: Reply, after: Duration) -> bool {
         let sample = match reply.into_result() {
             Ok(sample) => sample,
             Err(error) => {
@@ -301,6 +295,7 @@ impl RequestLoop {
         let item = item.map(bytemuck::pod_read_unaligned::<Item>);
         if let Some(item) = &item {
             self.go_back_to(item);
+            self.patience.received(after);
         }
         if let Some(item) = item.filter(|item| self.is_new(item)) {
             match item.is(flag::END) {

@@ -27,6 +27,8 @@ mod fetch;
 #[cfg(feature = "zenoh")]
 mod handshake;
 #[cfg(feature = "zenoh")]
+mod patience;
+#[cfg(feature = "zenoh")]
 mod receive;
 #[cfg(feature = "zenoh")]
 mod replay_buffer;

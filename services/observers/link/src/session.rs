@@ -13,6 +13,9 @@ use crate::{LinkError, Network, ONE_THREAD};
 
 /// Time without a sign of life after which a connection is given up, ms. Messages wait meanwhile.
 const LEASE_MS: u64 = 3000;
+/// The longest time for which a message waits for the network, us. A side that has gone is known by
+/// the lease; on a slow network the buffers of the system may take nothing for seconds.
+const MAX_BLOCKED_US: u64 = 900_000_000;
 
 impl Network {
     /// Opens the session. A side that connects tries again until the other is there, with pauses
@@ -80,7 +83,10 @@ impl Network {
                 "link": {
                     "protocols": ["tcp", "tls"],
                     "tls": self.tls(),
-                    "tx": { "lease": LEASE_MS },
+                    "tx": {
+                        "lease": LEASE_MS,
+                        "queue": { "congestion_control": { "block": { "wait_before_close": MAX_BLOCKED_US } } },
+                    },
                 },
             },
         })

@@ -2,7 +2,8 @@
 
 #![allow(clippy::unwrap_used)]
 use std::{
-    net::TcpListener,
+    io::{Read, Write},
+    net::{TcpListener, TcpStream},
     sync::Arc,
     thread,
     time::{Duration, Instant},
@@ -23,7 +24,7 @@ use crate::{
     waker::Waker,
 };
 
-const MAX_WAIT: Duration = Duration::from_secs(60);
+const MAX_WAIT: Duration = Duration::from_secs(180);
 
 fn item(seq: u64) -> Item {
     Item {
@@ -409,4 +410,51 @@ fn poses_and_their_motions_are_sent_from_the_journal_whenever_they_are_asked_for
         (next(&*poses, 40), next(&motions, 40)),
         (Next::Ended, Next::Ended)
     );
+}
+
+/// Lets bytes pass in both directions, so many a second.
+fn slow_network(to: String, bytes_per_s: usize) -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = format!("tcp/{}", listener.local_addr().unwrap());
+    let pass = move |mut from: TcpStream, mut to: TcpStream| {
+        let mut piece = vec![0; bytes_per_s / 20];
+        while let Ok(count @ 1..) = from.read(&mut piece) {
+            thread::sleep(Duration::from_secs_f64(count as f64 / bytes_per_s as f64));
+            if to.write_all(&piece[..count]).is_err() {
+                return;
+            }
+        }
+    };
+    thread::spawn(move || {
+        for here in listener.incoming().flatten() {
+            let Ok(there) = TcpStream::connect(to.trim_start_matches("tcp/")) else {
+                continue;
+            };
+            let back = (there.try_clone().unwrap(), here.try_clone().unwrap());
+            thread::spawn(move || pass(here, there));
+            thread::spawn(move || pass(back.0, back.1));
+        }
+    });
+    address
+}
+
+#[test]
+fn messages_that_take_longer_than_a_lost_request_arrive_each_once() {
+    let address = endpoint();
+    let here = open(listening(&address));
+    let there = open(connecting(&slow_network(address, 400_000)));
+    let buffer = Arc::new(MemoryBuffer::of(100));
+    // Some 15 s each.
+    for seq in 0..2 {
+        buffer.add(&RecordedMessage {
+            header: bytemuck::bytes_of(&item(seq)).to_vec(),
+            payload: vec![seq as u8; 6_000_000],
+        });
+    }
+    let mut server = Server::new(&here, "gyre/test", None);
+    let offer = server.offer("topic", buffer).unwrap();
+    let fetcher = fetcher(&there, 0);
+    assert_eq!(take(&fetcher, 2), [0, 1]);
+    // The first one was sent twice, or three times on a machine that is busy.
+    assert!((3..=6).contains(&offer.sent().0), "{:?}", offer.sent());
 }

@@ -1,6 +1,6 @@
 //! The section `[link]`.
 
-use std::path::PathBuf;
+use std::{path::PathBuf, time::Duration};
 
 use serde::{Deserialize, Serialize};
 
@@ -68,6 +68,9 @@ impl Default for LinkConfig {
 }
 
 impl LinkConfig {
+    /// Time that a base waits at the end for the robot to know that the base has all of the run.
+    pub const END_TIMEOUT: Duration = Duration::from_secs(60);
+
     /// Returns which part of a split run this is, a sentence; `None`: the run is not split.
     pub fn describe(&self) -> Option<String> {
         let (name, cut) = (&self.name, self.cut.name());

@@ -47,6 +47,6 @@ pub use death::Death;
 pub use guardian::guard;
 pub use gyre_run::{Ending, Scheduling, Swapped};
 pub use log::last_line;
-pub use plan::{Event, Plan, StagePlan, Stall, SuperviseError};
+pub use plan::{END_TIMEOUT, Event, Plan, StagePlan, Stall, SuperviseError};
 pub use program::Program;
 pub use supervisor::supervise;

@@ -56,7 +56,12 @@ pub struct StagePlan {
     /// True if its death restarts the others too: it has state that its own restart does not
     /// recover.
     pub restarts_all: bool,
+    /// Time in which it may end by itself when the run is complete, unless a stop is requested.
+    pub end_timeout: Duration,
 }
+
+/// Time for a process to end by itself before it is killed.
+pub const END_TIMEOUT: Duration = Duration::from_secs(2);
 
 impl StagePlan {
     /// Returns a file of the command that has changed since this plan was made.

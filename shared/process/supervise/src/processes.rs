@@ -10,12 +10,9 @@ use gyre_messages::PoseHeader;
 use gyre_stage::wake;
 
 use crate::{
-    Event, SuperviseError, child::Child, followers::Followers, guardian::Guardian,
-    recovery::Recovery, roles::Roles, run::Run, start::Position,
+    END_TIMEOUT, Ending, Event, SuperviseError, child::Child, followers::Followers,
+    guardian::Guardian, recovery::Recovery, roles::Roles, run::Run, start::Position,
 };
-
-/// Time for stages to exit by themselves before they are killed.
-const STOP_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// The processes, by their indices into the plan's stages.
 #[derive(Default)]
@@ -149,16 +146,35 @@ impl Processes {
         Ok(())
     }
 
-    /// Stops all processes, and kills those that do not exit in time.
-    pub fn stop(&mut self, run: &mut Run<'_>) -> Result<(), SuperviseError> {
+    /// Stops all processes, and kills those that do not exit in time. One that has more of it has
+    /// that in a complete run, unless a stop is requested.
+    pub fn stop(
+        &mut self,
+        run: &mut Run<'_>,
+        ending: Option<Ending>,
+    ) -> Result<(), SuperviseError> {
         self.children.iter().for_each(Child::terminate);
-        let deadline = Instant::now() + STOP_TIMEOUT;
-        while Instant::now() < deadline && !self.children.iter_mut().all(Child::has_exited) {
-            run.sleep(wake::MAX_WAIT)?;
+        let since = Instant::now();
+        let mut is_complete = matches!(ending, Some(Ending::Complete));
+        while let Some(timeout) = self.longest_end(is_complete)
+            && since.elapsed() < timeout
+        {
+            is_complete &= !run.sleep(wake::MAX_WAIT)?;
             run.say(Event::Watched);
         }
         let all: Vec<usize> = (0..self.len()).collect();
         self.kill(&all, &run.guardian)
+    }
+
+    /// Returns the time to end that the processes have which have not; `None` if all have.
+    fn longest_end(&mut self, is_complete: bool) -> Option<Duration> {
+        let children = self.children.iter_mut();
+        let living = children.filter_map(|child| (!child.has_exited()).then_some(&*child));
+        let timeouts = living.map(|child| match is_complete {
+            true => child.plan().end_timeout,
+            false => END_TIMEOUT,
+        });
+        timeouts.max()
     }
 
     /// Checks that no process has failed at its end, as one that cannot keep what it has written.

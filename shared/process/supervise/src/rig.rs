@@ -24,7 +24,7 @@ use gyre_stage::{
 };
 
 use crate::{
-    Death, Scheduling, StagePlan, SuperviseError,
+    Death, END_TIMEOUT, Scheduling, StagePlan, SuperviseError,
     child::Child,
     clean,
     guardian::Guardian,
@@ -162,6 +162,7 @@ impl<'a> Rig<'a> {
             restart: RestartPolicy::default(),
             outlives_restarts: false,
             restarts_all: false,
+            end_timeout: END_TIMEOUT,
         };
         let starter = Starter::new(self.signals, &self.guardian);
         Ok(Process {

@@ -197,7 +197,7 @@ impl<'a> Supervisor<'a> {
         if let Some(recorder) = &mut self.recorder {
             recorder.stop(&mut self.run, ending)?;
         }
-        self.processes.stop(&mut self.run)?;
+        self.processes.stop(&mut self.run, ending)?;
         self.logs.bound();
         // The failure that the run ends by is the first one.
         match ending {

@@ -79,5 +79,6 @@ fn stage(name: &str) -> StagePlan {
         restart: RestartPolicy::default(),
         outlives_restarts: false,
         restarts_all: false,
+        end_timeout: crate::END_TIMEOUT,
     }
 }
