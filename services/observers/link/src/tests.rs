@@ -1,6 +1,9 @@
 //! Tests of both ends of a topic over the network layer, on this machine.
 
 #![allow(clippy::unwrap_used)]
+
+mod buffers;
+
 use std::{
     io::{Read, Write},
     net::{TcpListener, TcpStream},
@@ -9,17 +12,14 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_journal::{self as journal, Journal};
-use gyre_messages::{Item, MotionHeader, PoseHeader, flag};
+use gyre_messages::{Item, flag};
 use gyre_stage::source::RecordedMessage;
 use zenoh::{Session, Wait, qos::Priority};
 
 use crate::{
     Network,
     fetch::{Fetcher, Request},
-    replay_buffer::{
-        MemoryBuffer, Message, MotionBuffer, Next, Place, PoseBuffer, PoseLog, ReplayBuffer,
-    },
+    replay_buffer::{MemoryBuffer, ReplayBuffer},
     serve::{Offer, Server},
     waker::Waker,
 };
@@ -33,14 +33,6 @@ fn item(seq: u64) -> Item {
     }
 }
 
-fn message(seq: u64) -> Message {
-    Message {
-        seq,
-        generation: 0,
-        bytes: bytemuck::bytes_of(&item(seq)).into(),
-    }
-}
-
 fn add(buffer: &MemoryBuffer, seq: u64) {
     add_item(buffer, &item(seq));
 }
@@ -50,15 +42,6 @@ fn add_item(buffer: &MemoryBuffer, item: &Item) {
         header: bytemuck::bytes_of(item).to_vec(),
         payload: Vec::new(),
     });
-}
-
-/// Returns the first message from `seq` on, whatever its generation.
-fn next_of(buffer: &dyn ReplayBuffer, seq: u64) -> Next {
-    let place = Place {
-        seq,
-        generation: None,
-    };
-    buffer.next(place, Duration::ZERO).unwrap()
 }
 
 fn seq(bytes: &[u8]) -> u64 {
@@ -313,103 +296,6 @@ fn a_router_of_zenoh_may_be_between_the_ends() {
     server.offer("topic", buffer).unwrap();
     let fetcher = fetcher(&there, 0);
     assert_eq!(take(&fetcher, 1), [0]);
-}
-
-#[test]
-fn a_memory_buffer_keeps_the_newest_messages() {
-    let buffer = MemoryBuffer::of(3);
-    (0..5).for_each(|seq| add(&buffer, seq));
-    let next = |seq| next_of(&buffer, seq);
-    assert_eq!(next(0), Next::Message(message(2)));
-    assert_eq!(next(4), Next::Message(message(4)));
-    assert_eq!(next(5), Next::Nothing);
-    buffer.end().unwrap();
-    assert_eq!(next(5), Next::Ended);
-    let bytes = message(0).bytes.len();
-    let buffer = MemoryBuffer::bounded(100, 2 * bytes);
-    (0..5).for_each(|seq| add(&buffer, seq));
-    assert_eq!(next_of(&buffer, 0), Next::Message(message(3)));
-}
-
-#[test]
-fn a_memory_buffer_has_one_message_of_a_number_that_was_given_anew() {
-    let buffer = MemoryBuffer::of(10);
-    (0..5).for_each(|seq| add(&buffer, seq));
-    add(&buffer, 2);
-    let next = |seq| next_of(&buffer, seq);
-    assert_eq!(next(2), Next::Message(message(2)));
-    assert_eq!(next(3), Next::Nothing);
-    add(&buffer, 3);
-    assert_eq!(next(3), Next::Message(message(3)));
-}
-
-#[test]
-fn a_memory_buffer_drops_void_messages_whose_successors_it_has_not_seen() {
-    let buffer = MemoryBuffer::of(10);
-    (0..5).for_each(|seq| add(&buffer, seq));
-    let anew = Item {
-        generation: 1,
-        numbered_from: 2,
-        ..item(4)
-    };
-    add_item(&buffer, &anew);
-    let Next::Message(next) = next_of(&buffer, 2) else {
-        panic!("there is no message");
-    };
-    assert_eq!((next.seq, next.generation), (4, 1));
-}
-
-#[test]
-fn poses_and_their_motions_are_sent_from_the_journal_whenever_they_are_asked_for() {
-    let out = tempfile::tempdir().unwrap();
-    let mut journal = Journal::open(&journal::path(out.path())).unwrap();
-    let pose = |seq| PoseHeader {
-        item: item(seq),
-        x_m: seq as f64,
-        ..PoseHeader::default()
-    };
-    (0..40).for_each(|seq| journal.append(&pose(seq)).unwrap());
-    let poses = Arc::new(PoseBuffer::of(PoseLog::of(out.path())));
-    let motions = MotionBuffer(poses.clone());
-    let next = next_of;
-    // Journalled before it is published, a pose is not sent before.
-    assert_eq!(next(&*poses, 0), Next::Nothing);
-    poses.set_published(30);
-    let sent = |seq| {
-        let bytes: Arc<[u8]> = bytemuck::bytes_of(&pose(seq)).into();
-        Next::Message(Message {
-            seq,
-            generation: 0,
-            bytes,
-        })
-    };
-    assert_eq!((next(&*poses, 0), next(&*poses, 29)), (sent(0), sent(29)));
-    assert_eq!(next(&*poses, 30), Next::Nothing);
-    let Next::Message(motion) = next(&motions, 7) else {
-        panic!("there is no motion");
-    };
-    assert_eq!(
-        (motion.seq, motion.bytes.len()),
-        (7, size_of::<MotionHeader>())
-    );
-    let end = PoseHeader {
-        item: Item {
-            flags: flag::END,
-            ..item(40)
-        },
-        ..PoseHeader::default()
-    };
-    journal.append(&end).unwrap();
-    poses.end().unwrap();
-    assert_eq!(
-        next(&*poses, 39),
-        sent(39),
-        "also what was not seen to come"
-    );
-    assert_eq!(
-        (next(&*poses, 40), next(&motions, 40)),
-        (Next::Ended, Next::Ended)
-    );
 }
 
 /// Lets bytes pass in both directions, so many a second.
