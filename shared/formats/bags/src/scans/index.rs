@@ -1,5 +1,7 @@
 //! Where the azimuths of each scan are.
 
+use std::mem;
+
 use gyre_colossus::{Counters, FoundClock, RadarClock, SweepAssembler};
 use gyre_radar::{OwnedScan, ScanLimits};
 
@@ -219,6 +221,7 @@ impl Indexing {
                 break;
             };
             let start = *self.start.get_or_insert(here);
+            let invalid = self.assembler.counters().invalid_azimuths;
             if let Some(sweep) = self.assembler.add(&azimuth, stamp_ns, self.scan.slot()) {
                 self.index.entries.push(Entry {
                     start,
@@ -229,7 +232,10 @@ impl Indexing {
                 });
                 self.start = Some(self.previous.unwrap_or(here));
             }
-            self.previous = Some(here);
+            // From one without a place in a turn nothing is seen of where the next one begins.
+            if self.assembler.counters().invalid_azimuths == invalid {
+                self.previous = Some(here);
+            }
         }
         if self.clock.found().is_some() {
             self.held.clear();
@@ -242,10 +248,11 @@ impl Indexing {
         if self.clock.found() == self.found {
             return;
         }
-        self.found = self.clock.found();
-        match self.index.entries.len() {
-            0 => self.index.clocks = vec![(0, self.clock.clone())],
-            scans => self.index.clocks.push((scans + 1, self.clock.clone())),
+        let before = mem::replace(&mut self.found, self.clock.found());
+        match (before, self.index.entries.len()) {
+            (None, 0) => self.index.clocks = vec![(0, self.clock.clone())],
+            // The scan that has begun is read with the clock before, which changes in it again.
+            (_, scans) => self.index.clocks.push((scans + 1, self.clock.clone())),
         }
     }
 

@@ -135,3 +135,48 @@ fn azimuths_whose_times_stand_against_the_rotation_are_named_so() {
         "{sentence}"
     );
 }
+
+/// Asserts that the scans that are read have the times that the bag lists.
+fn assert_times(dataset: &mut dyn Dataset, turns: usize) {
+    let mut scan = OwnedScan::with_limits(dataset.limits());
+    assert_eq!(dataset.len(), turns);
+    for index in (0..turns).rev() {
+        let geometry = dataset.read(index, scan.slot()).unwrap();
+        assert_eq!(dataset.nominal_stamp_ns(index), Some(geometry.stamp_ns));
+    }
+}
+
+#[test]
+fn a_radar_that_learns_the_time_in_its_first_turn_has_one_time_however_it_is_read() {
+    let boot_s = START_NS.div_euclid(1_000_000_000) as u32 - 5;
+    for learned_at in [2, 20, 60] {
+        let messages = azimuths(4, |turn, row, message| {
+            let since_boot = AZIMUTHS * turn + row < learned_at;
+            let ntp_seconds = message.ntp_seconds - if since_boot { boot_s } else { 0 };
+            Some(RadarFftDataMsg {
+                ntp_seconds,
+                ..message
+            })
+        });
+        let folder = Folder::new();
+        let mut dataset = opened(&folder.bag(&messages));
+        assert_times(dataset.as_mut(), 4);
+        assert_has_turns(dataset.as_mut(), 4);
+    }
+}
+
+#[test]
+fn a_turn_behind_an_azimuth_beyond_the_encoder_is_the_one_that_was_listed() {
+    let messages = azimuths(5, |turn, row, message| {
+        // The last one of a turn is nowhere, and the first ones of the next turn are lost.
+        let azimuth = match (turn, row + 1) {
+            (1, AZIMUTHS) => 60_000,
+            _ => message.azimuth,
+        };
+        let is_lost = turn == 2 && row < 5;
+        (!is_lost).then_some(RadarFftDataMsg { azimuth, ..message })
+    });
+    let folder = Folder::new();
+    let mut dataset = opened(&folder.bag(&messages));
+    assert_times(dataset.as_mut(), 5);
+}
