@@ -29,14 +29,12 @@ use crate::{
     fetch::{Fetcher, Request},
     handshake::{self, Agreement, StartAnswer},
     replay_buffer::{MemoryBuffer, PoseBuffer, PoseLog, ReplayBuffer},
-    serve::{Offer, Server},
+    serve::{LAST_ANSWERS, Offer, Server},
     waker::Waker,
 };
 
 /// Time after which it is said that the robot is waited for at the end.
 const QUIET: Duration = Duration::from_secs(1);
-/// Time to send the last answers.
-const LAST_ANSWERS: Duration = Duration::from_millis(300);
 /// Time between two checks whether the robot has confirmed the end.
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
 

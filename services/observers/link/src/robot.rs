@@ -4,7 +4,7 @@
 //! and continues after a restart. It begins when the base has said which items will have poses:
 //! only then does it publish the newest pose, at which the source continues.
 
-use std::{collections::VecDeque, sync::Arc};
+use std::{collections::VecDeque, sync::Arc, thread};
 
 use bytemuck::Pod;
 use gyre_journal::{self as journal, Journal};
@@ -22,7 +22,7 @@ use crate::{
     handshake::{self, Agreement, ScanSize, StartAnswer},
     replay_buffer::{MemoryBuffer, ReplayBuffer},
     request,
-    serve::{Offer, Server},
+    serve::{LAST_ANSWERS, Offer, Server},
     waker::Waker,
 };
 
@@ -214,6 +214,9 @@ impl Robot<'_> {
                 has_ended = self.end(&end, &sent, poses)?;
             }
             if self.sleep()? {
+                if has_ended {
+                    thread::sleep(LAST_ANSWERS);
+                }
                 return Ok(());
             }
         }
@@ -301,9 +304,9 @@ impl Robot<'_> {
 
     /// Ends this side once the base requests what follows the end; false before.
     fn end(&mut self, end: &Item, sent: &[SentTopic], poses: &Fetcher) -> Result<bool, LinkError> {
-        // The base ends when it knows that all poses are here.
+        // The base ends when it knows that all poses are here, and that this side knows of its end.
         poses.confirm(self.next_pose());
-        let has_end = |sent: &SentTopic| sent.offer.asked() > end.seq;
+        let has_end = |sent: &SentTopic| sent.offer.answered() > end.seq;
         if !sent.iter().all(has_end) {
             return Ok(false);
         }

@@ -25,6 +25,8 @@ use crate::{
 pub(crate) const REQUEST_LIFETIME: Duration = Duration::from_secs(20);
 /// Time without a message after which an empty one tells the receiver that this end is still there.
 const KEEP_ALIVE: Duration = Duration::from_secs(1);
+/// Time to send the last answers.
+pub(crate) const LAST_ANSWERS: Duration = Duration::from_millis(300);
 /// Time between two checks whether a request is still wanted.
 const POLL_INTERVAL: Duration = Duration::from_millis(200);
 /// The most requests of a topic that are answered at once. A receiver has one of each topic.
@@ -57,6 +59,8 @@ pub(crate) struct Offer {
     key: String,
     /// The highest number that was requested: all before it has arrived.
     asked: AtomicU64,
+    /// The same of the requests to which an answer has been sent.
+    answered: AtomicU64,
     /// The newest request of each receiver, which replaces those before.
     receivers: Mutex<BTreeMap<String, ReceiverState>>,
     running: AtomicU64,
@@ -97,6 +101,7 @@ impl Server {
             buffer,
             key: format!("{}/{topic}", self.prefix),
             asked: AtomicU64::new(0),
+            answered: AtomicU64::new(0),
             receivers: Mutex::default(),
             running: AtomicU64::new(0),
             messages: AtomicU64::new(0),
@@ -126,6 +131,11 @@ impl Offer {
     /// Returns the highest number that was requested: all messages before it have arrived.
     pub fn asked(&self) -> u64 {
         self.asked.load(Ordering::Relaxed)
+    }
+
+    /// Returns the same, as far as the receiver can know that it is known here.
+    pub fn answered(&self) -> u64 {
+        self.answered.load(Ordering::Relaxed)
     }
 
     /// Returns the messages and the bytes that were sent.
@@ -195,6 +205,10 @@ impl Offer {
     ) -> Result<(), LinkError> {
         // The receiver learns at once that this end is there.
         self.reply(query, &[])?;
+        self.answered.fetch_max(place.seq, Ordering::Relaxed);
+        if let Some(waker) = &self.waker {
+            waker.wake();
+        }
         let mut last_reply = Instant::now();
         let until = last_reply + REQUEST_LIFETIME;
         while Instant::now() < until && self.is_wanted(receiver, request) {
