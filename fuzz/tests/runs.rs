@@ -8,7 +8,7 @@ use gyre_fuzz::{
     Failure, Target,
     edit::{ByteEdit, edit_bytes},
 };
-use gyre_messages::{Item, ScanHeader};
+use gyre_messages::{GivenAnew, Item, ScanHeader};
 use gyre_radar::{DatasetOptions, OwnedScan};
 use gyre_recording::{Head, Incoming, LogLine, Recording, RecordingWriter};
 
@@ -22,8 +22,8 @@ fn scan(seq: u64) -> Incoming {
         seq,
         scan: seq,
         stamp_ns: START_NS + seq as i64 * 250_000_000,
-        // The radar's source was started again before each.
-        generation: seq as u32 + 1,
+        // The radar's source was started again twice before each.
+        generation: 2 * seq as u32 + 1,
         numbered_from: seq,
         ..Item::default()
     };
@@ -44,7 +44,10 @@ fn scan(seq: u64) -> Incoming {
         payload: (0..40).map(|byte| byte * 5 + seq as u8).collect(),
         received_ns: START_NS,
         missed: 1,
-        skipped: None,
+        skipped: (seq > 0).then_some(GivenAnew {
+            generation: 2 * seq as u32,
+            first: seq,
+        }),
     }
 }
 
