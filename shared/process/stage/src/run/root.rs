@@ -85,6 +85,18 @@ pub enum RootError {
     Signals(#[from] StageError),
 }
 
+impl RootError {
+    /// Returns whether another attempt may succeed: a run is being removed, or the last run of the
+    /// user has ended and removed the user's directory.
+    fn may_pass(&self) -> bool {
+        match self {
+            Self::Busy { .. } => true,
+            Self::Unusable { source, .. } => source.kind() == io::ErrorKind::NotFound,
+            Self::Unsafe { .. } | Self::Interrupted | Self::Signals(_) => false,
+        }
+    }
+}
+
 impl RunRoot {
     /// Creates and locks the root of the run that writes to `out`, after removing the files of the
     /// user's dead runs.
@@ -95,39 +107,43 @@ impl RunRoot {
         let name = name(out, geteuid());
         let deadline = Instant::now() + LIMIT;
         loop {
-            let runs = user_directory()?;
-            remove_dead_runs(&runs);
-            let path = runs.join(&name);
-            let unusable = |source| RootError::Unusable {
-                path: path.clone(),
-                source,
-            };
-            let holder = match try_lock(&lock_of(&path)) {
-                Ok(Attempt::Locked(lock)) => {
-                    remove_files(&path);
-                    make_directory(&path).map_err(unusable)?;
-                    return Ok(Self {
-                        // Of this start alone: a process that still has files of an earlier run
-                        // open, as an observer may, must not remove files of this one.
-                        prefix: format!("{name}_{:08x}_", clock::now_ns() as u32),
-                        path,
-                        _lock: lock,
-                    });
-                }
-                Ok(Attempt::Held(holder)) => holder,
-                // The last run of the user has ended, and removed the user's directory.
-                Err(error) if error.kind() == io::ErrorKind::NotFound => None,
-                Err(error) => return Err(unusable(error)),
+            let failed = match Self::try_acquire(out, &name) {
+                Err(failed) if failed.may_pass() => failed,
+                acquired => return acquired,
             };
             if Instant::now() > deadline {
-                return Err(RootError::Busy {
-                    out: out.to_owned(),
-                    holder: holder.map_or(String::new(), |holder| format!(", {holder}")),
-                });
+                return Err(failed);
             }
             if signals.sleep(PAUSE)? {
                 return Err(RootError::Interrupted);
             }
+        }
+    }
+
+    fn try_acquire(out: &Path, name: &str) -> Result<Self, RootError> {
+        let runs = user_directory()?;
+        remove_dead_runs(&runs);
+        let path = runs.join(name);
+        let unusable = |source| RootError::Unusable {
+            path: path.clone(),
+            source,
+        };
+        match try_lock(&lock_of(&path)).map_err(unusable)? {
+            Attempt::Locked(lock) => {
+                remove_files(&path);
+                make_directory(&path).map_err(unusable)?;
+                Ok(Self {
+                    // Of this start alone: a process that still has files of an earlier run open,
+                    // as an observer may, must not remove files of this one.
+                    prefix: format!("{name}_{:08x}_", clock::now_ns() as u32),
+                    path,
+                    _lock: lock,
+                })
+            }
+            Attempt::Held(holder) => Err(RootError::Busy {
+                out: out.to_owned(),
+                holder: holder.map_or(String::new(), |holder| format!(", {holder}")),
+            }),
         }
     }
 
