@@ -8,7 +8,7 @@ Run as a program, it prints the layouts as JSON.
 
 import ctypes
 import json
-from ctypes import c_double, c_float, c_int64, c_uint8, c_uint32, c_uint64
+from ctypes import c_double, c_float, c_int64, c_uint8, c_uint16, c_uint32, c_uint64
 
 MAX_AZIMUTHS = 1024
 STAGES = 7
@@ -45,7 +45,7 @@ class Hop(Message):
 class Item(Message):
     """The scan that a message is about; every header begins with it."""
 
-    NAME = "gyre_item_v4"
+    NAME = "gyre_item_v5"
     _fields_ = [
         ("seq", c_uint64),
         ("scan", c_uint64),
@@ -56,12 +56,14 @@ class Item(Message):
         ("due_ns", c_int64),
         ("generation", c_uint32),
         ("flags", c_uint32),
+        ("lost", c_uint16 * 2 * 7),
+        ("lost_count", c_uint32),
         ("hops", Hop * STAGES),
     ]
 
 
 class ScanHeader(Message):
-    NAME = "gyre_scan_header_v4"
+    NAME = "gyre_scan_header_v5"
     _fields_ = [
         ("item", Item),
         ("azimuths", c_uint32),
@@ -79,7 +81,7 @@ class ScanHeader(Message):
 
 
 class MaskedHeader(Message):
-    NAME = "gyre_masked_header_v4"
+    NAME = "gyre_masked_header_v5"
     _fields_ = [
         ("item", Item),
         ("n", c_uint32),
@@ -131,12 +133,12 @@ class MotionEstimate(Message):
 
 
 class MotionHeader(Message):
-    NAME = "gyre_motion_header_v6"
+    NAME = "gyre_motion_header_v7"
     _fields_ = [("item", Item), ("motion", MotionEstimate)]
 
 
 class PoseHeader(Message):
-    NAME = "gyre_pose_header_v6"
+    NAME = "gyre_pose_header_v7"
     _fields_ = [
         ("item", Item),
         ("motion", MotionEstimate),
@@ -168,14 +170,14 @@ POINT_FLOATS = 5  # x_m, y_m, time_s, weight, doppler_s
 
 SIZES = {
     Hop: 32,
-    Item: 288,
-    ScanHeader: 13632,
-    MaskedHeader: 328,
+    Item: 320,
+    ScanHeader: 13664,
+    MaskedHeader: 360,
     RotationEstimate: 40,
     RefinementRecord: 32,
     MotionEstimate: 208,
-    MotionHeader: 496,
-    PoseHeader: 624,
+    MotionHeader: 528,
+    PoseHeader: 656,
     ByteBlock: 64,
     FloatBlock: 64,
 }

@@ -66,17 +66,17 @@ fn layouts() -> [(&'static str, Layout); 9] {
             layout!(Hop: received_ns, started_ns, finished_ns, published_ns),
         ),
         (
-            "gyre_item_v4",
+            "gyre_item_v5",
             layout!(Item: seq, scan, previous_scan, published, numbered_from, stamp_ns, due_ns, generation,
-                flags, hops),
+                flags, lost, lost_count, hops),
         ),
         (
-            "gyre_scan_header_v4",
+            "gyre_scan_header_v5",
             layout!(ScanHeader: item, azimuths, bins, stride, first_byte, range_resolution_m, range_offset_m, clockwise,
                 doppler_s, azimuth_stamp_ns, azimuth_rad, azimuth_flags),
         ),
         (
-            "gyre_masked_header_v4",
+            "gyre_masked_header_v5",
             layout!(MaskedHeader: item, n, rasters, cell_m, mask, twist, compensated, points, reserved),
         ),
         (
@@ -92,9 +92,9 @@ fn layouts() -> [(&'static str, Layout); 9] {
             layout!(MotionEstimate: x_m, y_m, yaw_rad, covariance, drift_share, scale_sigma, interval_ns, score,
                 runner_up_score, rotation, searched, refinement),
         ),
-        ("gyre_motion_header_v6", layout!(MotionHeader: item, motion)),
+        ("gyre_motion_header_v7", layout!(MotionHeader: item, motion)),
         (
-            "gyre_pose_header_v6",
+            "gyre_pose_header_v7",
             layout!(PoseHeader: item, motion, x_m, y_m, yaw_rad, covariance, accumulated_covariance, trajectory_version),
         ),
     ]

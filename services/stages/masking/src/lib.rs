@@ -2,8 +2,9 @@
 //! compensation.
 //!
 //! [`gyre_masking::Masker`] does the work. `scans` and `motions` are its inputs; `lossless` and
-//! `live` are the two modes of taking scans from the queue.
+//! `live` are the two modes of taking scans from the queue; `azimuths` finds those that were lost.
 
+mod azimuths;
 mod live;
 mod lossless;
 mod motions;
@@ -11,12 +12,13 @@ mod scans;
 
 use gyre_geometry::Twist;
 use gyre_masking::{MaskError, MaskKind, Masker, MaskingConfig, Sweep};
-use gyre_messages::{Masked, MaskedHeader, Scan, SearchedMotion, StageId, mask_kind};
-use gyre_radar::{PointsConfig, RasterConfig};
+use gyre_messages::{Item, Masked, MaskedHeader, Scan, SearchedMotion, StageId, mask_kind};
+use gyre_radar::{PlacedRows, PointsConfig, RasterConfig};
 use gyre_stage::{
     Launch, Stage, StageCounters, StageError, reader::Received, stage, writer::Draft,
 };
 
+use azimuths::Azimuths;
 use scans::{ScanView, Scans};
 
 /// Runs the stage until SIGTERM.
@@ -33,6 +35,8 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
         raster,
         config,
         masker,
+        azimuths: Azimuths::default(),
+        rows: [PlacedRows::default(), PlacedRows::default()],
     };
     stage::run(launch, &mut masking)
 }
@@ -41,6 +45,9 @@ struct Masking {
     raster: RasterConfig,
     config: MaskingConfig,
     masker: Masker,
+    azimuths: Azimuths,
+    /// Of the scan and of the previous one.
+    rows: [PlacedRows; 2],
 }
 
 impl Stage for Masking {
@@ -54,11 +61,18 @@ impl Stage for Masking {
         output: &mut Draft<Masked>,
     ) -> Result<(), StageError> {
         let malformed = |error: MaskError| input.scan.malformed(error.to_string());
-        let sweep = sweep(input.scan, input.motion)?;
-        let previous = match &input.previous {
-            Some(previous) => Some(self::sweep(previous.scan, previous.motion)?),
+        let [rows, previous_rows] = &mut self.rows;
+        let mut previous = match &input.previous {
+            Some(previous) => Some(sweep(previous.scan, previous.motion)?),
             None => None,
         };
+        if let (Some(sweep), Some(input)) = (&mut previous, &input.previous) {
+            let lost = self.azimuths.lost(sweep, input.lost);
+            sweep.scan = previous_rows.place(&sweep.scan, &lost);
+        }
+        let mut sweep = sweep(input.scan, input.motion)?;
+        let lost = self.azimuths.lost(&sweep, input.lost);
+        sweep.scan = rows.place(&sweep.scan, &lost);
         if let Some(previous) = &previous
             && !self.masker.can_follow(previous.number)
         {
@@ -82,6 +96,10 @@ impl Stage for Masking {
             .map_err(|error| input.scan.malformed(error.to_string()))?;
         *header = self.header(twist, points);
         Ok(())
+    }
+
+    fn identify(&self, item: &mut Item) {
+        item.set_lost_azimuths(&self.azimuths.last());
     }
 }
 

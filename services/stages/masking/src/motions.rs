@@ -8,6 +8,7 @@
 use std::collections::VecDeque;
 
 use gyre_messages::{Item, Motion, Pose, SearchedMotion, flag};
+use gyre_radar::LostAzimuths;
 use gyre_stage::{Launch, Listener, StageError, reader::Port};
 
 /// Number of motions kept: more than any window and lag need.
@@ -18,6 +19,8 @@ pub struct Motions {
     motions: Port<Motion>,
     poses: Port<Pose>,
     known: KnownMotions,
+    /// Where azimuths of scans with poses were lost, by number; the oldest are dropped.
+    lost: VecDeque<(u64, LostAzimuths)>,
     resume_at: Option<Item>,
     newest_pose: Option<u64>,
 }
@@ -28,6 +31,7 @@ impl Motions {
             motions: Port::open(launch)?,
             poses: Port::open(launch)?,
             known: KnownMotions::default(),
+            lost: VecDeque::new(),
             resume_at: None,
             newest_pose: None,
         })
@@ -48,6 +52,10 @@ impl Motions {
                 self.known
                     .receive(&item, received.header().motion.searched());
                 self.newest_pose = self.newest_pose.max(Some(item.seq));
+                self.lost.push_back((item.seq, item.lost_azimuths()));
+                if self.lost.len() > KEPT {
+                    self.lost.pop_front();
+                }
             }
             if item.is(flag::SYNC) {
                 self.resume_at = Some(item);
@@ -65,6 +73,12 @@ impl Motions {
     /// `Some(None)` if the chain starts there or later.
     pub fn before(&self, seq: u64, lag: u64) -> Option<Option<SearchedMotion>> {
         self.known.before(seq, lag)
+    }
+
+    /// Returns where azimuths of an item were lost, if it has a pose.
+    pub fn lost(&self, seq: u64) -> Option<LostAzimuths> {
+        let known = self.lost.iter().rev().find(|(known, _)| *known == seq);
+        known.map(|(_, lost)| *lost)
     }
 
     /// Returns the item of the newest pose as the sink reported it; `None` before the first report.

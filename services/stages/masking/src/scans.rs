@@ -1,6 +1,7 @@
 //! The inputs of masking: a scan and the motion for its motion compensation.
 
 use gyre_messages::{Item, Scan, SearchedMotion, Window, flag};
+use gyre_radar::LostAzimuths;
 use gyre_stage::{
     Launch, Listener, StageError,
     inputs::{Action, Inputs},
@@ -16,6 +17,8 @@ pub struct Scans {
     window: Window,
     /// The motions for the current and for the previous scan.
     found: [Option<SearchedMotion>; 2],
+    /// Where azimuths of both were lost, if they have poses.
+    lost: [Option<LostAzimuths>; 2],
 }
 
 enum Queue {
@@ -29,6 +32,8 @@ pub struct ScanView<'a> {
     pub scan: &'a Received<Scan>,
     /// The motion of the scan `lag` scans earlier; `None` without one.
     pub motion: Option<SearchedMotion>,
+    /// Where its azimuths were lost, if it has a pose from before a restart.
+    pub lost: Option<LostAzimuths>,
     /// The previous scan, if the mask takes two; `None` where the chain starts.
     pub previous: Option<PreviousScan<'a>>,
 }
@@ -39,6 +44,8 @@ pub struct PreviousScan<'a> {
     pub scan: &'a Received<Scan>,
     /// The motion with which it was compensated.
     pub motion: Option<SearchedMotion>,
+    /// Where its azimuths were lost, if it has a pose.
+    pub lost: Option<LostAzimuths>,
 }
 
 impl Inputs for Scans {
@@ -55,6 +62,7 @@ impl Inputs for Scans {
             motions,
             window: launch.manifest.window,
             found: [None; 2],
+            lost: [None; 2],
         })
     }
 
@@ -86,13 +94,16 @@ impl Inputs for Scans {
             Queue::Live(queue) => (queue.current(), queue.previous()),
         };
         let [motion, previous_motion] = self.found;
+        let [lost, previous_lost] = self.lost;
         let previous = previous.map(|scan| PreviousScan {
             scan,
             motion: previous_motion,
+            lost: previous_lost,
         });
         Some(ScanView {
             scan: scan?,
             motion,
+            lost,
             previous,
         })
     }
@@ -139,6 +150,7 @@ impl Scans {
         let found = [Some(item.seq), previous]
             .map(|seq| seq.map_or(Some(None), |seq| self.motion_for(seq)));
         self.found = found.map(Option::flatten);
+        self.lost = [Some(item.seq), item.seq.checked_sub(1)].map(|seq| self.motions.lost(seq?));
         found.iter().all(Option::is_some)
     }
 

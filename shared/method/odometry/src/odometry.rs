@@ -1,7 +1,7 @@
 //! Odometry: from scans to motions and poses.
 
 use gyre_geometry::{ComposedMotion, OdometryMotion, SparsePoint, Twist, UncertainMotion};
-use gyre_radar::PolarScan;
+use gyre_radar::{LostAzimuthFinder, PlacedRows, PolarScan};
 use gyre_scan_matching::{JointMatch, Refined};
 use ndarray::{ArrayView2, ArrayViewMut2};
 
@@ -16,6 +16,8 @@ pub struct Odometry {
     search: Box<dyn Search>,
     refiner: Option<Box<dyn Refine>>,
     twists: LaggedTwists,
+    lost: LostAzimuthFinder,
+    rows: PlacedRows,
     /// The scan that is being registered and the one before it.
     pair: Pair,
     driven: ComposedMotion,
@@ -41,6 +43,8 @@ impl Odometry {
             search: parts.search,
             refiner: parts.refiner,
             twists: LaggedTwists::new(config.masking.feedback_lag()),
+            lost: LostAzimuthFinder::default(),
+            rows: PlacedRows::default(),
             driven: ComposedMotion::new(),
         }
     }
@@ -66,8 +70,8 @@ impl Odometry {
         Ok(registered)
     }
 
-    /// Rasterises the scan with motion compensation, masks it (Weston et al., Sec. III-E) and
-    /// extracts its points.
+    /// Places the scan's azimuths if some were lost, rasterises it with motion compensation, masks
+    /// it (Weston et al., Sec. III-E) and extracts its points.
     ///
     /// # Errors
     /// An inconsistent scan, or a network that fails.
@@ -76,7 +80,9 @@ impl Odometry {
         scan: &PolarScan<'_>,
         twist: Option<Twist>,
     ) -> Result<(), OdometryError> {
-        self.pair.mask(self.masker.as_mut(), scan, twist)
+        let lost = self.lost.find(scan, twist);
+        let scan = self.rows.place(scan, &lost);
+        self.pair.mask(self.masker.as_mut(), &scan, twist)
     }
 
     /// Searches for the rotation (Weston et al., Eq. 7), then for the translation (Eq. 8) between
@@ -127,6 +133,7 @@ impl Odometry {
     pub fn restart(&mut self) {
         self.pair.restart();
         self.twists.clear();
+        self.lost.reset();
         if let Some(refiner) = &mut self.refiner {
             refiner.reset();
         }

@@ -27,6 +27,7 @@ mod radiate;
 mod row_order;
 mod sensor_clock;
 
+mod stale;
 pub(crate) mod stamp;
 mod transposed;
 
@@ -41,7 +42,7 @@ pub use foreign::foreign;
 pub use format::Format;
 pub use image_size::ImageSize;
 pub use image_source::ImageSource;
-pub use options::{AzimuthSource, DatasetOptions};
+pub use options::{AzimuthSource, DatasetOptions, LostAzimuthOption};
 pub use stamp::{DEFAULT_TURN_NS, middle_ns, turn_ns};
 
 /// The scans of one recording, ordered by time.

@@ -4,6 +4,7 @@
 //! - [`scan`]: one sweep in the sensor's polar grid, borrowed for reading or for filling;
 //! - [`mod@dataset`]: recordings on disk behind one trait, one file per format;
 //! - [`fingerprint`]: what tells a recording from another one;
+//! - [`lost`]: where azimuths of a turn were lost that has no measured angles;
 //! - [`raster`]: from a scan to a Cartesian raster, with motion compensation;
 //! - [`points`]: from a scan to sparse points, its strongest returns;
 //! - [`mod@ground_truth`]: trajectories in the formats of datasets and tools, converted to REP-103;
@@ -15,6 +16,7 @@ pub mod dataset;
 pub mod fingerprint;
 pub mod ground_truth;
 pub mod inspect;
+pub mod lost;
 mod median;
 mod plain_words;
 pub mod points;
@@ -27,14 +29,16 @@ pub use chain::{MAX_INTERVAL_NS, continues};
 pub use clock::{ClockOffset, MAX_OFFSET_S, clock_offset};
 pub use dataset::{
     AzimuthSource, DEFAULT_TURN_NS, Dataset, DatasetOptions, EncoderTurn, FIRST_TURNS, FileList,
-    Format, ImageSize, ImageSource, OpenError, ReadError, correct_eccentricity, encoder_counts,
-    foreign, middle_ns, open, open_resolved, open_source, reopen, stored_options, turn_ns,
+    Format, ImageSize, ImageSource, LostAzimuthOption, OpenError, ReadError, correct_eccentricity,
+    encoder_counts, foreign, middle_ns, open, open_resolved, open_source, reopen, stored_options,
+    turn_ns,
 };
 pub use fingerprint::Fingerprint;
 pub use ground_truth::{
     TrajectoryError, find_ground_truth, read_trajectory, write_kitti, write_tum,
 };
 pub use inspect::{Report, inspect, inspect_dataset};
+pub use lost::{LostAzimuthFinder, LostAzimuths, PlacedRows};
 pub use median::median;
 pub use plain_words::in_plain_words;
 pub use points::{PointExtractor, PointsConfig, PointsError};

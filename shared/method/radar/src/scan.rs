@@ -29,6 +29,12 @@ pub mod flag {
     pub const CHIRP_UP: u8 = 2;
     /// The sensor reports the chirp of each azimuth in [`CHIRP_UP`].
     pub const CHIRP_KNOWN: u8 = 4;
+    /// The row still holds what the turn before had there, since that many azimuths of this one
+    /// were lost before it, at places that are not known: see [`crate::lost`]. It is not
+    /// [`MEASURED`].
+    pub const STALE: u8 = 8;
+    /// The angle is that of a uniform turn in which no azimuth was lost; it was not measured.
+    pub const ASSUMED: u8 = 16;
 }
 
 /// The layout of the powers in the bytes of a scan, and their scale.

@@ -4,6 +4,7 @@ use std::f32::consts::TAU;
 use std::path::Path;
 
 use crate::common::{read, real};
+use gyre_radar::lost::stale_rows;
 use gyre_radar::scan::flag;
 use gyre_radar::{Dataset, DatasetOptions, Format, OwnedScan, Sense, open, read_trajectory};
 
@@ -142,6 +143,32 @@ fn radiate_images_are_transposed_and_the_clock_is_uniform() {
             (found - reference).abs() < 2e-3,
             "scan {index}: {found} and {reference}"
         );
+    }
+}
+
+#[test]
+fn lost_azimuths_of_radiate_are_counted() {
+    // Scans, those with losses, and azimuths that were lost, by ../shared/reference.
+    for (folder, expected) in [
+        ("radiate-2019-02-12", [466, 214, 286]),
+        ("radiate-2019-02-12-b", [409, 196, 263]),
+        ("radiate-2019-02-12-standing", [112, 68, 100]),
+        ("radiate-tiny_foggy", [18, 0, 0]),
+    ] {
+        let Some(mut radiate) = opened(folder) else {
+            return;
+        };
+        let counts: Vec<usize> = (0..radiate.len())
+            .map(|index| stale_rows(&read(radiate.as_mut(), index).unwrap().view()))
+            .collect();
+        let lossy = counts.iter().filter(|count| **count > 0).count();
+        let found = [counts.len(), lossy, counts.iter().sum()];
+        assert_eq!(found, expected, "{folder}");
+        // Whichever scan is read first.
+        for index in [counts.len() - 1, 7, 3] {
+            let scan = read(radiate.as_mut(), index).unwrap();
+            assert_eq!(stale_rows(&scan.view()), counts[index], "{folder} {index}");
+        }
     }
 }
 

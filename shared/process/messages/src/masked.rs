@@ -52,7 +52,7 @@ impl Message for Masked {
             + (limits.points * size_of::<SparsePoint>()).div_ceil(ByteBlock::LEN)
     }
 }
-header!(MaskedHeader, "gyre_masked_header_v4");
+header!(MaskedHeader, "gyre_masked_header_v5");
 
 /// Values of [`MaskedHeader::mask`].
 pub mod mask_kind {

@@ -56,7 +56,7 @@ impl Message for Scan {
         }
     }
 }
-header!(ScanHeader, "gyre_scan_header_v4");
+header!(ScanHeader, "gyre_scan_header_v5");
 
 /// The geometry of a scan, and the measured angle and time of each azimuth.
 #[repr(C)]

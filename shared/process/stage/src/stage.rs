@@ -31,6 +31,10 @@ pub trait Stage {
         input: <Self::Inputs as Inputs>::View<'_>,
         output: &mut Draft<Self::Output>,
     ) -> Result<(), StageError>;
+
+    /// Adds what it has found in the item that was processed last to its identity, which all later
+    /// messages carry.
+    fn identify(&self, _item: &mut Item) {}
 }
 
 /// Runs a stage until SIGTERM.
@@ -121,6 +125,7 @@ impl<S: Stage> Flow<'_, S> {
             finished_ns,
             published_ns: 0,
         };
+        self.stage.identify(&mut item);
         *draft.header().item_mut() = item;
         crate::counters::record(&mut self.counters, allocated, finished_ns - started_ns);
         self.send(item.seq, draft)

@@ -18,6 +18,16 @@ pub enum AzimuthSource {
     Uniform,
 }
 
+/// The way to treat azimuths that the host of a radar has lost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum LostAzimuthOption {
+    /// Count them in each scan, and find where they were lost.
+    Find,
+    /// Take each row for the azimuth that it would be if none was lost.
+    Ignore,
+}
+
 /// The longest name of a topic, bytes.
 const TOPIC_BYTES: usize = 256;
 
@@ -56,6 +66,10 @@ pub struct DatasetOptions {
     /// scans show another number, that one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub encoder_counts: Option<u16>,
+    /// Azimuths that the host has lost, which RADIATE's images do not say: the columns behind them
+    /// have moved up, and the last columns are of the scan before. Default: `find` for RADIATE.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lost_azimuths: Option<LostAzimuthOption>,
     /// The topic of the scans in a bag of ROS 2. Default: the one whose type is of Navtech's
     /// driver.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -118,6 +132,7 @@ impl DatasetOptions {
                 .or(other.azimuth_eccentricity_rad),
             azimuth_source: self.azimuth_source.or(other.azimuth_source),
             encoder_counts: self.encoder_counts.or(other.encoder_counts),
+            lost_azimuths: self.lost_azimuths.or(other.lost_azimuths),
             topic: self.topic.or(other.topic),
         }
     }

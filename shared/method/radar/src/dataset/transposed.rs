@@ -12,6 +12,7 @@ use super::images::Images;
 use super::navtech_png::fill_uniform;
 use super::navtech_scans::check_capacity;
 use super::options::DatasetOptions;
+use super::stale::StaleRows;
 use crate::scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, Sense, SweepGeometry, flag};
 
 /// Side of the blocks of the transposition, pixels: a cache line.
@@ -55,6 +56,8 @@ pub(crate) struct TransposedScans {
     doppler_s: f32,
     azimuth_eccentricity_rad: f32,
     scratch: Vec<u8>,
+    /// The caller sets it where the host may have lost azimuths.
+    pub(crate) stale: Option<StaleRows>,
 }
 
 impl TransposedScans {
@@ -86,6 +89,7 @@ impl TransposedScans {
             doppler_s: options.doppler_s.unwrap_or(0.0),
             azimuth_eccentricity_rad: options.azimuth_eccentricity_rad.unwrap_or(0.0),
             scratch: Vec::new(),
+            stale: None,
         };
         scans.check_shape()?;
         scans.range_resolution_m = options
@@ -121,6 +125,24 @@ impl TransposedScans {
 
     fn bins(&self) -> usize {
         self.images.size.height.max(self.images.size.width)
+    }
+
+    /// Decodes an image, azimuth x range bin.
+    fn decode(&mut self, index: usize, into: &mut [u8]) -> Result<(), ReadError> {
+        if !self.is_transposed() {
+            return self.images.decode(index, into);
+        }
+        self.images.decode(index, &mut self.scratch)?;
+        transpose(&self.scratch, self.azimuths(), into);
+        Ok(())
+    }
+
+    /// Keeps the last rows of an image, or that it cannot be read.
+    fn remember(&mut self, index: usize, image: Option<&[u8]>) {
+        let bins = self.bins();
+        if let Some(stale) = &mut self.stale {
+            stale.remember(index, image.unwrap_or_default(), bins);
+        }
     }
 
     fn stamp_ns(&self, turn: &Turn) -> i64 {
@@ -190,12 +212,21 @@ impl Dataset for TransposedScans {
         check_capacity("azimuths", azimuths, slot.azimuth_rad.len())?;
         check_capacity("stamps", azimuths, slot.stamp_ns.len())?;
         check_capacity("flags", azimuths, slot.flags.len())?;
-        if self.is_transposed() {
-            self.images.decode(index, &mut self.scratch)?;
-            transpose(&self.scratch, azimuths, &mut slot.bytes[..azimuths * bins]);
-        } else {
-            self.images.decode(index, slot.bytes)?;
+        // Before the image, since it is decoded into the same scratch memory.
+        if let Some(before) = index.checked_sub(1)
+            && self.stale.as_ref().is_some_and(|stale| !stale.has(before))
+        {
+            let bytes = &mut slot.bytes[..azimuths * bins];
+            let read = self.decode(before, bytes);
+            self.remember(before, read.is_ok().then_some(&*bytes));
         }
+        let bytes = &mut slot.bytes[..azimuths * bins];
+        self.decode(index, bytes)?;
+        let lost = match &self.stale {
+            Some(stale) => stale.count(bytes, bins),
+            None => 0,
+        };
+        self.remember(index, Some(bytes));
         let azimuth_rad = &mut slot.azimuth_rad[..azimuths];
         let first = match self.first_azimuth {
             FirstAzimuth::Ahead => 0.0,
@@ -203,7 +234,13 @@ impl Dataset for TransposedScans {
         };
         fill_uniform(azimuth_rad, first);
         eccentricity::correct_eccentricity(azimuth_rad, self.azimuth_eccentricity_rad);
-        slot.flags[..azimuths].fill(flag::MEASURED);
+        let assumed = match self.stale {
+            Some(_) => flag::ASSUMED,
+            None => 0,
+        };
+        let (measured, stale) = slot.flags[..azimuths].split_at_mut(azimuths - lost);
+        measured.fill(flag::MEASURED | assumed);
+        stale.fill(flag::STALE | assumed);
         for (column, stamp) in slot.stamp_ns[..azimuths].iter_mut().enumerate() {
             *stamp = turn.start_ns + turn.period_ns * column as i64 / azimuths as i64;
         }

@@ -95,6 +95,12 @@ fn rows(report: &Report) -> impl Iterator<Item = String> {
             percent(rows.not_measured)
         )
     });
+    let stale = (rows.stale > 0).then(|| {
+        format!(
+            "{} of {} scans have lost azimuths, {} in all: the rows behind each have moved up by one, and the last rows are still those of the scan before. Odometry finds where they were lost (dataset.lost_azimuths).",
+            rows.stale_scans, report.scans_read, rows.stale
+        )
+    });
     let (fewest, most) = rows.in_scan;
     let fewer = (fewest < most).then(|| {
         format!("Scans have {fewest} to {most} rows: some have lost azimuths, and are read with those that there are.")
@@ -109,7 +115,7 @@ fn rows(report: &Report) -> impl Iterator<Item = String> {
             rows.ringing_bins as f32 * report.range_resolution_m + report.range_offset_m
         )
     });
-    [interpolated, fewer, lost, chirps, ringing]
+    [interpolated, stale, fewer, lost, chirps, ringing]
         .into_iter()
         .flatten()
 }

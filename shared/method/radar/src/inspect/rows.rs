@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use crate::lost::stale_rows;
 use crate::median::median;
 use crate::scan::{PolarScan, Sense, flag};
 
@@ -36,6 +37,10 @@ pub struct RowsReport {
     pub in_scan: (usize, usize),
     /// Rows that were interpolated from their neighbours.
     pub not_measured: u64,
+    /// Rows at the end of a scan that still hold the scan before: see [`crate::lost`].
+    pub stale: u64,
+    /// Number of scans with such rows.
+    pub stale_scans: usize,
     /// Missing rows, where the azimuth makes more than one step.
     pub lost: u64,
     /// Knowledge of the chirp directions.
@@ -56,6 +61,8 @@ pub(super) struct Survey {
     rows: u64,
     in_scan: Option<(usize, usize)>,
     not_measured: u64,
+    stale: u64,
+    stale_scans: usize,
     lost: u64,
     steps_rad: Vec<f64>,
     first_rad: Option<(f32, f32)>,
@@ -71,11 +78,11 @@ impl Survey {
         self.rows += rows as u64;
         let (min, max) = self.in_scan.unwrap_or((rows, rows));
         self.in_scan = Some((min.min(rows), max.max(rows)));
-        self.not_measured += scan
-            .flags
-            .iter()
-            .filter(|f| *f & flag::MEASURED == 0)
-            .count() as u64;
+        let stale = stale_rows(scan) as u64;
+        self.stale += stale;
+        self.stale_scans += usize::from(stale > 0);
+        let not_measured = scan.flags.iter().filter(|f| *f & flag::MEASURED == 0);
+        self.not_measured += not_measured.count() as u64 - stale;
         self.with_chirps += usize::from(scan.flags.iter().any(|f| f & flag::CHIRP_KNOWN != 0));
         self.add_azimuths(scan);
         if self.scans <= POWER_SCANS {
@@ -117,6 +124,8 @@ impl Survey {
             rows: self.rows,
             in_scan: self.in_scan.unwrap_or_default(),
             not_measured: self.not_measured,
+            stale: self.stale,
+            stale_scans: self.stale_scans,
             lost: self.lost,
             chirps: match self.with_chirps {
                 0 => Chirps::Unknown,

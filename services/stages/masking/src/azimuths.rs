@@ -1,0 +1,39 @@
+//! Where azimuths were lost: found in each scan from the one before, so that a masking that is
+//! restarted goes on from those that the poses have kept.
+
+use gyre_masking::Sweep;
+use gyre_radar::{LostAzimuthFinder, LostAzimuths};
+
+/// Finds lost azimuths of scan after scan.
+#[derive(Default)]
+pub struct Azimuths {
+    finder: LostAzimuthFinder,
+    /// The scan that it has found them in last.
+    last: Option<(u64, LostAzimuths)>,
+}
+
+impl Azimuths {
+    /// Returns where azimuths of a sweep were lost: the next one, or the last one again. `known` is
+    /// what a masking before this one has found.
+    pub fn lost(&mut self, sweep: &Sweep<'_>, known: Option<LostAzimuths>) -> LostAzimuths {
+        if let Some((number, lost)) = self.last
+            && number == sweep.number
+        {
+            return lost;
+        }
+        let lost = match known {
+            Some(known) => {
+                self.finder.set_previous(&sweep.scan, &known);
+                known
+            }
+            None => self.finder.find(&sweep.scan, sweep.twist),
+        };
+        self.last = Some((sweep.number, lost));
+        lost
+    }
+
+    /// Returns what was found last.
+    pub fn last(&self) -> LostAzimuths {
+        self.last.map(|(_, lost)| lost).unwrap_or_default()
+    }
+}

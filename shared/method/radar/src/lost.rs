@@ -1,0 +1,201 @@
+//! Lost azimuths: where the host of a radar lost azimuths of a turn.
+//!
+//! The rows behind a lost azimuth have moved up by one. The last rows of the image are *stale*:
+//! they hold what the turn before had there ([`flag::STALE`](crate::scan::flag::STALE)). So it is
+//! known how many azimuths were lost, but not where. [`LostAzimuthFinder`] finds that by aligning
+//! a scan with the one before it.
+//!
+//! Reading order: [`LostAzimuthFinder`]; [`PlacedRows`]; `echoes` (what is aligned); `prediction`
+//! (the scan before as the sensor would see it now); `alignment` (how likely each place is).
+
+mod alignment;
+mod echoes;
+mod prediction;
+#[cfg(test)]
+mod tests;
+
+use gyre_geometry::Twist;
+
+use crate::{
+    chain::continues,
+    scan::{MAX_AZIMUTHS, PolarScan, flag},
+};
+use alignment::Alignment;
+use echoes::{Echoes, Layout};
+use prediction::{Motion, Prediction};
+
+/// The largest number of lost azimuths in a turn. A turn that lost more is used as it is.
+pub const MAX_LOST: usize = 7;
+
+/// By how much faster the vehicle may have become since the motion that predicts: it brakes or
+/// accelerates by 1.2 m/s² for half a second.
+const FASTER_MPS: [f64; 3] = [0.0, -0.6, 0.6];
+
+/// Where azimuths of a turn were lost, in order: each before one of the rows between two, which are
+/// equally likely.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LostAzimuths {
+    count: usize,
+    between: [[u16; 2]; MAX_LOST],
+}
+
+impl LostAzimuths {
+    /// Creates it from the first and the last row before which each azimuth may have been lost. Of
+    /// more than [`MAX_LOST`] the first are taken.
+    pub fn between(rows: impl IntoIterator<Item = [u16; 2]>) -> Self {
+        let mut lost = Self::default();
+        for (rows, between) in rows.into_iter().zip(&mut lost.between) {
+            *between = rows;
+            lost.count += 1;
+        }
+        lost
+    }
+
+    /// Says that each may have been lost anywhere in a turn of `azimuths`.
+    pub fn anywhere(count: usize, azimuths: usize) -> Self {
+        let measured = azimuths.saturating_sub(count) as u16;
+        Self::between((0..count).map(|_| [0, measured]))
+    }
+
+    /// Returns the number of lost azimuths.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Returns, in order, the first and the last row before which each may have been lost.
+    pub fn rows(&self) -> &[[u16; 2]] {
+        &self.between[..self.count]
+    }
+
+    /// Returns the azimuth at which a row is expected to have been measured, in steps of the turn.
+    fn azimuth_of(&self, row: f32) -> f32 {
+        let lost = self.rows().iter().map(|rows| {
+            let [first, last] = rows.map(f32::from);
+            ((row - first + 1.0) / (last - first + 1.0)).clamp(0.0, 1.0)
+        });
+        row + lost.sum::<f32>()
+    }
+}
+
+/// Finds where azimuths of scans were lost.
+#[derive(Debug, Default)]
+pub struct LostAzimuthFinder {
+    /// Of the rows as they follow each other.
+    rows: Echoes,
+    /// The scan before.
+    previous: Option<Previous>,
+    prediction: Prediction,
+    alignment: Alignment,
+}
+
+#[derive(Debug)]
+struct Previous {
+    stamp_ns: i64,
+    /// Of its azimuths.
+    echoes: Echoes,
+}
+
+impl LostAzimuthFinder {
+    /// Finds where azimuths of the next scan were lost. `twist` predicts its motion from the scan
+    /// before; without it the vehicle is assumed to stand. Without a scan before each may have been
+    /// lost anywhere. The scan is to pass [`PolarScan::check`].
+    pub fn find(&mut self, scan: &PolarScan<'_>, twist: Option<Twist>) -> LostAzimuths {
+        let count = stale_rows(scan);
+        let lost = match (&self.previous, count) {
+            (_, 0) => LostAzimuths::default(),
+            (Some(previous), _)
+                if continues(previous.stamp_ns, scan.geometry.stamp_ns)
+                    && previous.echoes.layout == Layout::of(scan) =>
+            {
+                self.rows.read(scan);
+                self.alignment.begin();
+                for faster_mps in FASTER_MPS {
+                    let mut twist = twist.unwrap_or_default();
+                    twist.vx_mps += faster_mps;
+                    let motion = Motion::new(previous.stamp_ns, scan, &twist);
+                    self.prediction.make(&previous.echoes, &motion);
+                    self.alignment.add(&self.prediction, &self.rows, count);
+                }
+                self.alignment.found(scan.geometry.azimuths - count, count)
+            }
+            _ => LostAzimuths::anywhere(count, scan.geometry.azimuths),
+        };
+        self.set_previous(scan, &lost);
+        lost
+    }
+
+    /// Makes a scan the one before the next, to resume after a restart. `lost` are its lost
+    /// azimuths.
+    pub fn set_previous(&mut self, scan: &PolarScan<'_>, lost: &LostAzimuths) {
+        if scan
+            .flags
+            .first()
+            .is_none_or(|flags| flags & flag::ASSUMED == 0)
+        {
+            // The azimuths are measured, so none is lost unseen.
+            self.previous = None;
+            return;
+        }
+        let previous = self.previous.get_or_insert_with(|| Previous {
+            stamp_ns: 0,
+            echoes: Echoes::default(),
+        });
+        previous.stamp_ns = scan.geometry.stamp_ns;
+        self.rows.read(scan);
+        previous.echoes.place(&self.rows, lost);
+    }
+
+    /// Forgets the scan before.
+    pub fn reset(&mut self) {
+        self.previous = None;
+    }
+}
+
+/// Memory for the azimuths of a scan whose rows are placed.
+#[derive(Debug, Default)]
+pub struct PlacedRows {
+    azimuth_rad: Vec<f32>,
+    stamp_ns: Vec<i64>,
+}
+
+impl PlacedRows {
+    /// Returns the scan with each measured row at its azimuth, without its stale rows. A scan that
+    /// has lost none stays as it is.
+    pub fn place<'a>(&'a mut self, scan: &PolarScan<'a>, lost: &LostAzimuths) -> PolarScan<'a> {
+        let count = lost.count();
+        if count == 0 || count > stale_rows(scan) {
+            return *scan;
+        }
+        let azimuths = scan.geometry.azimuths;
+        let rows = 0..azimuths - count;
+        self.azimuth_rad.clear();
+        self.stamp_ns.clear();
+        // For any scan, so that later ones allocate nothing.
+        self.azimuth_rad.reserve(MAX_AZIMUTHS);
+        self.stamp_ns.reserve(MAX_AZIMUTHS);
+        for row in rows.clone() {
+            let azimuth = lost.azimuth_of(row as f32).min((azimuths - 1) as f32);
+            let (before, share) = (azimuth as usize, azimuth.fract());
+            let after = (before + 1).min(azimuths - 1);
+            let (start, end) = (scan.azimuth_rad[before], scan.azimuth_rad[after]);
+            self.azimuth_rad.push(start + share * (end - start));
+            let (start, end) = (scan.stamp_ns[before], scan.stamp_ns[after]);
+            let passed_ns = share as f64 * (end - start) as f64;
+            self.stamp_ns.push(start + passed_ns as i64);
+        }
+        let mut placed = *scan;
+        placed.geometry.azimuths = rows.len();
+        placed.azimuth_rad = &self.azimuth_rad;
+        placed.stamp_ns = &self.stamp_ns;
+        placed.flags = &scan.flags[rows];
+        placed
+    }
+}
+
+/// Returns the number of stale rows at the end of a scan.
+pub fn stale_rows(scan: &PolarScan<'_>) -> usize {
+    let rows = scan.flags.iter().rev();
+    let stale = rows.take_while(|flags| **flags & flag::STALE != 0).count();
+    // No radar has so few azimuths that most of them may be lost.
+    stale.min(MAX_LOST).min(scan.geometry.azimuths / 2)
+}

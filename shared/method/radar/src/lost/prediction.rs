@@ -1,0 +1,143 @@
+//! The scan before as the sensor would see it now.
+
+use std::f32::consts::TAU;
+
+use gyre_geometry::Twist;
+
+use super::echoes::{Echoes, Layout};
+use crate::scan::{PolarScan, Sense};
+
+/// Range at which the time between two looks in one direction is determined, m.
+const TYPICAL_M: f32 = 30.0;
+
+/// The motion of the sensor from one turn to the next: at a constant velocity, so between two looks
+/// at the same azimuth by the same motion.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Motion {
+    /// In the sense of the azimuths.
+    twist: Twist,
+    /// Between the middles of both turns.
+    between_s: f64,
+    /// From the first azimuth to the last one.
+    turn_s: f64,
+}
+
+impl Motion {
+    pub fn new(before_ns: i64, scan: &PolarScan<'_>, twist: &Twist) -> Self {
+        Self {
+            twist: match scan.geometry.sense {
+                Sense::Clockwise => twist.mirrored(),
+                Sense::CounterClockwise => *twist,
+            },
+            between_s: scan.geometry.stamp_ns.saturating_sub(before_ns) as f64 * 1e-9,
+            turn_s: scan.time_s(scan.geometry.azimuths - 1) - scan.time_s(0),
+        }
+    }
+
+    /// Returns the sensor at the time when it sees again what it saw in a direction.
+    fn seen_from(&self, bearing_rad: f32) -> Moved {
+        let (sin, cos) = bearing_rad.sin_cos();
+        let after = |later_s: f64| {
+            let pose = self.twist.pose_at(self.between_s + later_s);
+            Moved {
+                x_m: pose.translation.x as f32,
+                y_m: pose.translation.y as f32,
+                yaw_rad: pose.rotation.angle() as f32,
+                sin,
+                cos,
+            }
+        };
+        // Now it sees that earlier in its turn, or later.
+        let (turned_rad, _) = after(0.0).sees(TYPICAL_M);
+        after(f64::from(turned_rad / TAU) * self.turn_s)
+    }
+}
+
+/// The sensor in its frame of one turn before, and a direction of then.
+struct Moved {
+    x_m: f32,
+    y_m: f32,
+    yaw_rad: f32,
+    sin: f32,
+    cos: f32,
+}
+
+impl Moved {
+    /// Returns by how much further along the turn the sensor sees what it saw in that direction at
+    /// a range, rad, and its range, m.
+    fn sees(&self, range_m: f32) -> (f32, f32) {
+        let along = (range_m - self.x_m * self.cos - self.y_m * self.sin).max(0.1);
+        let across = self.x_m * self.sin - self.y_m * self.cos;
+        let slope = (across / along).clamp(-1.0, 1.0);
+        // The arc tangent, to 0.005 rad.
+        let turned = slope / (1.0 + 0.28 * slope * slope);
+        (turned - self.yaw_rad, along * (1.0 + slope * slope).sqrt())
+    }
+}
+
+/// The predicted powers, azimuth x cell.
+#[derive(Debug, Default)]
+pub(super) struct Prediction {
+    layout: Layout,
+    powers: Vec<f32>,
+    /// Sum of the squares of an azimuth's powers.
+    energies: Vec<f32>,
+}
+
+impl Prediction {
+    /// Draws the echoes of the scan before where the sensor sees them now.
+    pub fn make(&mut self, before: &Echoes, motion: &Motion) {
+        self.layout = before.layout;
+        let Layout {
+            azimuths,
+            cells,
+            first_m,
+            cell_m,
+            ..
+        } = self.layout;
+        let per_rad = azimuths as f32 / TAU;
+        self.powers.clear();
+        self.powers.resize(azimuths * cells, 0.0);
+        let mut from = (f32::NAN, motion.seen_from(0.0));
+        for echo in &before.echoes {
+            if from.0 != echo.at {
+                from = (echo.at, motion.seen_from(echo.at / per_rad));
+            }
+            let (turned_rad, range_m) = from.1.sees(first_m + f32::from(echo.cell) * cell_m);
+            let azimuth = echo.at + turned_rad * per_rad;
+            self.draw(azimuth, (range_m - first_m) / cell_m, echo.power);
+        }
+        self.energies.clear();
+        let rows = self.powers.chunks_exact(cells.max(1));
+        let energies = rows.map(|row| row.iter().map(|power| power * power).sum::<f32>());
+        self.energies.extend(energies);
+    }
+
+    /// Distributes a power over the azimuths and cells on both sides.
+    fn draw(&mut self, azimuth: f32, cell: f32, power: f32) {
+        let (low, near) = (azimuth.floor(), cell.floor());
+        let (share, depth) = (azimuth - low, cell - near);
+        for (azimuth, share) in [(low, 1.0 - share), (low + 1.0, share)] {
+            for (cell, depth) in [(near, 1.0 - depth), (near + 1.0, depth)] {
+                if cell >= 0.0 && cell < self.layout.cells as f32 {
+                    let first = self.within(azimuth as isize) * self.layout.cells;
+                    self.powers[first + cell as usize] += power * share * depth;
+                }
+            }
+        }
+    }
+
+    /// Returns the cells of an azimuth, which may lie beyond the turn.
+    pub fn row(&self, azimuth: isize) -> &[f32] {
+        &self.powers[self.within(azimuth) * self.layout.cells..][..self.layout.cells]
+    }
+
+    /// Returns the sum of the squares of an azimuth's powers.
+    pub fn energy(&self, azimuth: isize) -> f32 {
+        self.energies[self.within(azimuth)]
+    }
+
+    fn within(&self, azimuth: isize) -> usize {
+        azimuth.rem_euclid(self.layout.azimuths as isize) as usize
+    }
+}

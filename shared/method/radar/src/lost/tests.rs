@@ -1,0 +1,143 @@
+#![allow(clippy::unwrap_used)]
+
+use std::{collections::BTreeSet, f64::consts::TAU};
+
+use gyre_geometry::Twist;
+
+use super::*;
+use crate::scan::{OwnedScan, ScanLimits, Sense};
+
+const AZIMUTHS: usize = 400;
+const BINS: usize = 576;
+const BIN_M: f32 = 0.175;
+const TURN_S: f64 = 0.25;
+
+/// Points in the world: x, y, m.
+fn world(seed: u64) -> Vec<[f64; 2]> {
+    // Evenly and irregularly spread over the square, by a sequence of low discrepancy.
+    let at = |i: u64, step: f64| 220.0 * ((1 + seed * 431 + i) as f64 * step).fract() - 110.0;
+    (0..400)
+        .map(|i| [at(i, 0.754_877_666), at(i, 0.569_840_291)])
+        .collect()
+}
+
+/// The scan of a turn from `start_s` on, measured while moving.
+fn scan(world: &[[f64; 2]], twist: &Twist, start_s: f64) -> OwnedScan {
+    let mut scan = OwnedScan::with_limits(ScanLimits {
+        bytes: AZIMUTHS * BINS,
+        azimuths: AZIMUTHS,
+    });
+    scan.geometry.azimuths = AZIMUTHS;
+    (scan.geometry.bins, scan.geometry.stride) = (BINS, BINS);
+    scan.geometry.range_resolution_m = BIN_M;
+    scan.geometry.sense = Sense::Clockwise;
+    let time_s = |azimuth: f64| start_s + TURN_S * azimuth / AZIMUTHS as f64;
+    scan.geometry.stamp_ns = (time_s(200.0) * 1e9) as i64;
+    for azimuth in 0..AZIMUTHS {
+        scan.stamp_ns[azimuth] = (time_s(azimuth as f64) * 1e9) as i64;
+        scan.azimuth_rad[azimuth] = (azimuth as f64 / AZIMUTHS as f64 * TAU) as f32;
+        scan.flags[azimuth] = flag::MEASURED | flag::ASSUMED;
+        let sensor = twist.pose_at(time_s(azimuth as f64)).inverse();
+        for [x, y] in world {
+            let seen = sensor * nalgebra::Point2::new(*x, *y);
+            let off = (-seen.y).atan2(seen.x) / TAU * AZIMUTHS as f64 - azimuth as f64;
+            let off = (off + 200.0).rem_euclid(400.0) - 200.0;
+            let bin = (seen.coords.norm() / f64::from(BIN_M)) as usize;
+            // A beam of 1.8 degrees.
+            let power = 200.0 * (-0.7 * off * off).exp();
+            for bin in bin.saturating_sub(3)..(bin + 4).min(BINS) {
+                let power_at = &mut scan.bytes[azimuth * BINS + bin];
+                *power_at = power_at.saturating_add(power as u8);
+            }
+        }
+    }
+    scan
+}
+
+/// Loses azimuths as the host does: the rows behind move up, and the last ones are those of the
+/// scan before. Returns the rows before which they were lost.
+fn lose(scan: &mut OwnedScan, before: &OwnedScan, azimuths: &[usize]) -> Vec<u16> {
+    let kept = (0..AZIMUTHS).filter(|azimuth| !azimuths.contains(azimuth));
+    let mut bytes: Vec<u8> = kept
+        .flat_map(|azimuth| scan.bytes[azimuth * BINS..][..BINS].to_vec())
+        .collect();
+    bytes.extend_from_slice(&before.bytes[bytes.len()..]);
+    scan.bytes = bytes;
+    scan.flags[AZIMUTHS - azimuths.len()..].fill(flag::STALE | flag::ASSUMED);
+    (0..)
+        .zip(azimuths)
+        .map(|(i, azimuth)| *azimuth as u16 - i)
+        .collect()
+}
+
+/// Places of which each is known.
+fn certain(rows: &[u16]) -> LostAzimuths {
+    LostAzimuths::between(rows.iter().map(|row| [*row; 2]))
+}
+
+#[test]
+fn lost_azimuths_are_found_where_they_were_lost() {
+    let mut distances = Vec::new();
+    for case in 0..40_u64 {
+        let share = |step: f64| ((case + 1) as f64 * step).fract();
+        let twist = Twist {
+            vx_mps: 30.0 * share(0.618) - 5.0,
+            vy_mps: 0.1,
+            yaw_rate_radps: 0.8 * share(0.755) - 0.4,
+        };
+        let world = world(case);
+        // In the scan before some were lost too, at places that are known by now.
+        let mut before = scan(&world, &twist, 0.0);
+        let whole = before.clone();
+        let known = certain(&lose(&mut before, &whole, &[120, 300]));
+        let mut now = scan(&world, &twist, TURN_S);
+        // One that is lost at the seam looks like a turn of the whole scan by its width.
+        let at = |i: u64| 15 + (share(0.57) * 370.0 + i as f64 * 229.0) as usize % 370;
+        let azimuths: BTreeSet<usize> = (0..=case % 5).map(at).collect();
+        let lost = lose(&mut now, &before, &Vec::from_iter(azimuths));
+        let mut finder = LostAzimuthFinder::default();
+        finder.set_previous(&before.view(), &known);
+        let found = finder.find(&now.view(), Some(twist));
+        assert_eq!(found.count(), lost.len());
+        let middles = found.rows().iter().map(|[first, last]| (first + last) / 2);
+        distances.extend(middles.zip(&lost).map(|(a, b)| a.abs_diff(*b)));
+    }
+    let near = distances.iter().filter(|distance| **distance <= 4).count();
+    println!("{near} of {} within 4 rows", distances.len());
+    assert!(near * 100 >= distances.len() * 95, "{distances:?}");
+}
+
+#[test]
+fn rows_are_placed_at_the_azimuths_where_they_were_measured() {
+    let (world, twist) = (world(1), Twist::default());
+    let before = scan(&world, &twist, 0.0);
+    let whole = scan(&world, &twist, TURN_S);
+    let mut now = whole.clone();
+    let lost = certain(&lose(&mut now, &before, &[0, 7, 8, 399]));
+    assert_eq!(lost.rows(), [[0; 2], [6; 2], [6; 2], [396; 2]]);
+    let (view, mut rows) = (now.view(), PlacedRows::default());
+    let placed = rows.place(&view, &lost);
+    assert_eq!(placed.geometry.azimuths, 396);
+    placed.check().unwrap();
+    placed.check_times().unwrap();
+    let kept = (0..AZIMUTHS).filter(|azimuth| ![0, 7, 8, 399].contains(azimuth));
+    for (row, azimuth) in kept.enumerate() {
+        assert_eq!(placed.row(row), whole.view().row(azimuth));
+        assert_eq!(placed.azimuth_rad[row], whole.azimuth_rad[azimuth]);
+        assert_eq!(placed.stamp_ns[row], whole.stamp_ns[azimuth]);
+    }
+}
+
+#[test]
+fn without_a_scan_before_they_may_be_anywhere_and_measured_azimuths_are_never_moved() {
+    let (world, twist) = (world(2), Twist::default());
+    let before = scan(&world, &twist, 0.0);
+    let mut now = scan(&world, &twist, TURN_S);
+    lose(&mut now, &before, &[50, 51]);
+    let mut finder = LostAzimuthFinder::default();
+    assert_eq!(finder.find(&now.view(), None).rows(), [[0, 398]; 2]);
+    for flags in &mut now.flags {
+        *flags = flag::MEASURED;
+    }
+    assert_eq!(finder.find(&now.view(), None), LostAzimuths::default());
+}
