@@ -73,6 +73,30 @@ fn a_killed_pose_integration_goes_on() {
     survives_the_death_of("pose-integration");
 }
 
+/// Where azimuths were lost is found from scan to scan, so a restart is to know it of the last one.
+#[test]
+fn a_stage_killed_amid_scans_with_lost_azimuths_goes_on() {
+    let of_radiate = || {
+        let run = Run::configured("[raster]\nn = 127\ncell_m = 0.8\n[simulation]\nscans = 40\n");
+        run.rate(MODERATE)
+            .set("simulation.sensor.profile=cts350x-radiate")
+            .set("simulation.output.format=radiate")
+            .set("simulation.effects.lost_azimuths=true")
+    };
+    let undisturbed = of_radiate();
+    undisturbed.complete();
+    let ignored = of_radiate().set("dataset.lost_azimuths=ignore");
+    ignored.complete();
+    assert_ne!(undisturbed.odometry(), ignored.odometry());
+    for stage in ["radar-replay", "masking", "pose-integration"] {
+        let run = of_radiate();
+        let mut running = run.start();
+        running.await_poses(12).kill(stage);
+        running.finish().succeeded();
+        assert_eq!(run.odometry(), undisturbed.odometry(), "{stage}");
+    }
+}
+
 #[test]
 fn two_stages_killed_at_once_go_on() {
     survives(&["masking", "translation-search"], |running| {

@@ -35,6 +35,12 @@ impl SimulatedDrive {
         let output = config.output.format.unwrap_or_default();
         if output == OutputFormat::Radiate {
             radiate::check(&simulator)?;
+        } else if config.effects.lost_azimuths {
+            return Err(SimulatorError::Config {
+                key: "effects.lost_azimuths",
+                value: "true".to_owned(),
+                expected: "false but for output.format = \"radiate\": in other formats the azimuth of each row is written beside it".to_owned(),
+            });
         }
         Ok(Self {
             simulator,
@@ -153,6 +159,15 @@ impl SimulatedDrive {
             .then(|| radiate::stamps(&self.simulator, self.host, self.seed))
     }
 
+    /// Returns the azimuths of a scan that the host loses, in order: see
+    /// [`Effects::lost_azimuths`](crate::Effects::lost_azimuths).
+    pub fn lost_azimuths(&self, index: usize) -> Vec<usize> {
+        match self.output {
+            OutputFormat::Radiate => radiate::lost_azimuths(&self.simulator, self.seed, index),
+            OutputFormat::Oxford | OutputFormat::Boreas => Vec::new(),
+        }
+    }
+
     /// Returns a new renderer; several can work at the same time.
     pub fn renderer(&self) -> Renderer {
         let (sensor, scan) = (
@@ -178,6 +193,19 @@ impl Renderer {
     /// The drive that is rendered.
     pub fn drive(&self) -> &SimulatedDrive {
         &self.drive
+    }
+}
+
+impl Renderer {
+    /// Loses azimuths of an image as the host does.
+    fn lose_azimuths(&mut self, index: usize, pixels: &mut [u8]) {
+        let azimuths = self.drive.lost_azimuths(index);
+        if let Some(before) = index.checked_sub(1).filter(|_| !azimuths.is_empty()) {
+            let mut recorded_before = vec![0; pixels.len()];
+            self.draw(before, &mut recorded_before);
+            let columns = self.drive.image_size().width;
+            radiate::lose(pixels, &recorded_before, columns, &azimuths);
+        }
     }
 }
 
@@ -218,6 +246,7 @@ impl ImageSource for Renderer {
                     geometry.first_byte,
                     pixels,
                 );
+                self.lose_azimuths(index, pixels);
             }
             // An image of these formats is the sweep as it is rendered.
             OutputFormat::Oxford | OutputFormat::Boreas => {

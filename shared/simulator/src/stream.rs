@@ -17,6 +17,8 @@ pub(crate) enum Stream {
     Traffic,
     /// Host stalls, by block of scans with one stall each.
     Stall(u64),
+    /// The azimuths of a scan that the host loses, by its number.
+    Lost(u64),
     /// Pitch and roll of the vehicle.
     PitchRoll,
     /// Echoes that are fixed to the radar.
@@ -39,6 +41,7 @@ impl Stream {
             Self::Drive => 1 << 41,
             Self::Traffic => 1 << 42,
             Self::Stall(block) => (1 << 43) + block,
+            Self::Lost(index) => (1 << 44) + index,
             Self::PitchRoll => u64::MAX - 1,
             Self::FixedEchoes => u64::MAX,
         }
@@ -54,7 +57,8 @@ mod tests {
     #[test]
     fn no_two_uses_share_a_stream() {
         // 100 000 scans are the maximum of the configuration.
-        let counted = (0..100_000).flat_map(|i| [Stream::Scan(i), Stream::Stall(i)]);
+        let counted =
+            (0..100_000).flat_map(|i| [Stream::Scan(i), Stream::Stall(i), Stream::Lost(i)]);
         let single = [
             Stream::Streets,
             Stream::Drive,
@@ -63,6 +67,6 @@ mod tests {
             Stream::FixedEchoes,
         ];
         let numbers: BTreeSet<u64> = counted.chain(single).map(Stream::number).collect();
-        assert_eq!(numbers.len(), 200_005);
+        assert_eq!(numbers.len(), 300_005);
     }
 }

@@ -3,5 +3,6 @@
 #![allow(clippy::unwrap_used)]
 
 mod examples;
+mod lost_azimuths;
 mod standing_pair;
 mod stop_and_go;

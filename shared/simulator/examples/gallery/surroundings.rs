@@ -16,7 +16,14 @@ use crate::scenes;
 use crate::shot::Shot;
 
 pub fn exhibits() -> Result<Vec<Exhibit>, SimulatorError> {
-    Ok(vec![rain(), fog(), snow(), traffic(), host_stamps()?])
+    Ok(vec![
+        rain(),
+        fog(),
+        snow(),
+        traffic(),
+        host_stamps()?,
+        lost_azimuths()?,
+    ])
 }
 
 fn weather(title: &'static str, weather: WeatherConfig, shot: Shot, frame: &Frame) -> Exhibit {
@@ -132,4 +139,39 @@ fn host_stamps() -> Result<Exhibit, SimulatorError> {
         ("stalling", plot(delays_s(HostStamps::Stalling)?)),
     ];
     Ok(Exhibit::of("Host stamps", pictures))
+}
+
+/// The last azimuths of an image, down, by range.
+fn lost_azimuths() -> Result<Exhibit, SimulatorError> {
+    const AZIMUTHS: usize = 24;
+    const BINS: usize = 200;
+    let drive = |lost_azimuths| {
+        let mut config = SimulationConfig {
+            scans: Some(60),
+            ..SimulationConfig::default()
+        };
+        config.output.format = Some(OutputFormat::Radiate);
+        config.sensor.profile = Profile::Cts350xRadiate;
+        config.effects.lost_azimuths = lost_azimuths;
+        SimulatedDrive::new(&config)
+    };
+    let losing = drive(true)?;
+    let scan = (1..losing.scans()).max_by_key(|scan| losing.lost_azimuths(*scan).len());
+    let scan = scan.unwrap_or_default();
+    let lost = losing.lost_azimuths(scan).len();
+    let picture = |drive: &SimulatedDrive, stale: usize| {
+        let size = drive.image_size();
+        let mut pixels = vec![0; size.width * size.height];
+        drive.renderer().draw(scan, &mut pixels);
+        let grey = |column: usize, row: usize| {
+            let azimuth = size.width - AZIMUTHS + row / 4;
+            f64::from(pixels[column * size.width + azimuth]) / 120.0
+        };
+        Picture::of((BINS, 4 * AZIMUTHS), grey).with_margin(|row| row / 4 < AZIMUTHS - stale)
+    };
+    let pictures = vec![
+        ("off", picture(&drive(false)?, 0)),
+        ("on", picture(&losing, lost)),
+    ];
+    Ok(Exhibit::of("Lost azimuths", pictures))
 }

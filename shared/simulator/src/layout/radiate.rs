@@ -41,6 +41,34 @@ pub(crate) fn check(simulator: &Simulator) -> Result<(), SimulatorError> {
     }
 }
 
+/// Probability that the host loses an azimuth: as in a recording, where 46 % of the scans have lost
+/// one or more.
+const LOST: f64 = 0.0015;
+
+/// Returns the azimuths of a scan that the host loses, in order.
+pub(crate) fn lost_azimuths(simulator: &Simulator, seed: u64, index: usize) -> Vec<usize> {
+    if index == 0 || !simulator.config().effects.lost_azimuths {
+        return Vec::new();
+    }
+    let mut rng = Stream::Lost(index as u64).generator(seed);
+    let azimuths = 0..simulator.sampling().azimuths;
+    azimuths.filter(|_| rng.random_bool(LOST)).collect()
+}
+
+/// Loses azimuths of an image, range downwards: the columns behind each move up by one, and the
+/// last ones are those of the image before.
+pub(crate) fn lose(pixels: &mut [u8], before: &[u8], columns: usize, azimuths: &[usize]) {
+    let measured = columns - azimuths.len();
+    let rows = pixels.chunks_exact_mut(columns);
+    for (row, before) in rows.zip(before.chunks_exact(columns)) {
+        let kept = (0..columns).filter(|column| !azimuths.contains(column));
+        for (to, from) in kept.enumerate() {
+            row[to] = row[from];
+        }
+        row[measured..].copy_from_slice(&before[measured..]);
+    }
+}
+
 pub(crate) fn file_name(index: usize) -> String {
     format!("{:06}.png", index + 1)
 }

@@ -3,8 +3,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Switches for the simulated effects of real radars. All are on by default. `gallery/README.md` in
-/// the crate's folder shows each off and on, with its source.
+/// Switches for the simulated effects of real radars. All but the last are on by default.
+/// `gallery/README.md` in the crate's folder shows each off and on, with its source.
 ///
 /// Each has its own random numbers, so switching one does not change the others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -58,6 +58,9 @@ pub struct Effects {
     pub encoder_wobble: bool,
     /// Some azimuths are lost and interpolated from their neighbours.
     pub dropped_azimuths: bool,
+    /// The host loses azimuths as that of RADIATE: the columns behind them move up, and the last
+    /// ones are of the scan before. Only for `output.format = "radiate"`. Default: false.
+    pub lost_azimuths: bool,
 }
 
 impl Effects {
@@ -89,6 +92,8 @@ impl Effects {
             doppler: on,
             encoder_wobble: on,
             dropped_azimuths: on,
+            // No fault of the radar, and of one recording.
+            lost_azimuths: false,
         }
     }
 }
