@@ -86,9 +86,10 @@ fn masks_help_on_scans_of_a_kind_that_they_have_never_seen() {
     // What radiate.toml says of the sensor.
     let sensor = [
         "format='radiate'",
-        "range_offset_m=-0.15",
-        "azimuth_eccentricity_rad=0.0025",
-        "doppler_s=0.042",
+        "range_resolution_m=0.1757",
+        "range_offset_m=-0.8",
+        "azimuth_eccentricity_rad=0.0018",
+        "doppler_s=0.046",
     ];
     let papers = || {
         sensor.iter().fold(run("f-mbym.toml"), |run, fact| {

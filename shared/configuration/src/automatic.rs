@@ -274,7 +274,7 @@ mod tests {
             assert!(constants(format).is_ok(), "{format}");
         }
         let radiate = constants(Format::Radiate).unwrap();
-        assert_eq!(radiate.azimuth_eccentricity_rad, Some(0.0025));
+        assert_eq!(radiate.azimuth_eccentricity_rad, Some(0.0018));
     }
 
     #[test]
