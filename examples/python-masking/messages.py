@@ -91,7 +91,7 @@ class MaskedHeader(Message):
         ("twist", c_float * 3),
         ("compensated", c_uint32),
         ("points", c_uint32),
-        ("reserved", c_uint32),
+        ("azimuth_variance_rad2", c_float),
     ]
 
 

@@ -77,7 +77,7 @@ fn layouts() -> [(&'static str, Layout); 9] {
         ),
         (
             "gyre_masked_header_v5",
-            layout!(MaskedHeader: item, n, rasters, cell_m, mask, twist, compensated, points, reserved),
+            layout!(MaskedHeader: item, n, rasters, cell_m, mask, twist, compensated, points, azimuth_variance_rad2),
         ),
         (
             "gyre_rotation_estimate_v1",

@@ -71,6 +71,7 @@ impl Stage for Masking {
             sweep.scan = previous_rows.place(&sweep.scan, &lost);
         }
         let mut sweep = sweep(input.scan, input.motion)?;
+        let azimuths = sweep.scan.geometry.azimuths;
         let lost = self.azimuths.lost(&sweep, input.lost);
         sweep.scan = rows.place(&sweep.scan, &lost);
         if let Some(previous) = &previous
@@ -95,6 +96,7 @@ impl Stage for Masking {
             .points(&sweep.scan, twist, parts.points)
             .map_err(|error| input.scan.malformed(error.to_string()))?;
         *header = self.header(twist, points);
+        header.azimuth_variance_rad2 = lost.variance_rad2(azimuths);
         Ok(())
     }
 

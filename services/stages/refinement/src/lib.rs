@@ -60,6 +60,8 @@ impl Stage for RefinementStage {
         self.restore_state_before(&item)?;
         output.header().motion = match input.pair.previous {
             Some(previous) if !item.is(flag::BREAK) => {
+                let variance_rad2 = input.pair.current.header().azimuth_variance_rad2;
+                self.refiner.expect_azimuth_errors(variance_rad2);
                 let refined = self.refiner.refine(
                     item.seq,
                     points(input.pair.current)?,

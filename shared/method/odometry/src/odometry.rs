@@ -81,8 +81,11 @@ impl Odometry {
         twist: Option<Twist>,
     ) -> Result<(), OdometryError> {
         let lost = self.lost.find(scan, twist);
-        let scan = self.rows.place(scan, &lost);
-        self.pair.mask(self.masker.as_mut(), &scan, twist)
+        let placed = self.rows.place(scan, &lost);
+        self.pair.mask(self.masker.as_mut(), &placed, twist)?;
+        let variance_rad2 = lost.variance_rad2(scan.geometry.azimuths);
+        self.pair.expect_azimuth_errors(variance_rad2);
+        Ok(())
     }
 
     /// Searches for the rotation (Weston et al., Eq. 7), then for the translation (Eq. 8) between

@@ -20,6 +20,7 @@ pub struct Pair {
 struct Frame {
     stamp_ns: i64,
     twist: Option<Twist>,
+    azimuth_variance_rad2: f32,
     raster: Array2<f32>,
     points: Vec<SparsePoint>,
     /// Number of points in use.
@@ -77,6 +78,12 @@ impl Pair {
         later.saturating_sub(earlier)
     }
 
+    /// Returns the mean variance of the azimuths of the later scan's rows, rad²: not zero where
+    /// azimuths were lost at places that are not known.
+    pub fn azimuth_variance_rad2(&self) -> f32 {
+        self.later.azimuth_variance_rad2
+    }
+
     pub(crate) fn new(n: usize, capacity: usize, masked_scans: usize) -> Self {
         Self {
             later: Frame::new(n, capacity),
@@ -108,6 +115,11 @@ impl Pair {
         frame.count = masker.points(scan, frame.twist, &mut frame.points)?;
         frame.stamp_ns = scan.geometry.stamp_ns;
         Ok(())
+    }
+
+    /// Sets the mean variance of the azimuths of the later scan's rows, rad².
+    pub(crate) fn expect_azimuth_errors(&mut self, variance_rad2: f32) {
+        self.later.azimuth_variance_rad2 = variance_rad2;
     }
 
     /// Returns whether a scan at this time continues the chain of motions.
@@ -152,6 +164,7 @@ impl Frame {
         Self {
             stamp_ns: 0,
             twist: None,
+            azimuth_variance_rad2: 0.0,
             raster: Array2::zeros((n, n)),
             points: vec![SparsePoint::default(); capacity],
             count: 0,

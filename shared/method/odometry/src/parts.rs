@@ -129,6 +129,7 @@ impl Refine for Refiner {
     fn refine(&mut self, pair: &Pair, searched: &Pose) -> Refined {
         let (later, earlier) = (pair.later_points(), pair.earlier_points());
         let interval_s = pair.interval_ns() as f64 * 1e-9;
+        self.expect_azimuth_errors(pair.azimuth_variance_rad2());
         Refiner::refine(self, pair.seq(), later, earlier, searched, interval_s)
     }
 

@@ -88,6 +88,7 @@ pub struct Refiner {
     map: LocalMap,
     state: TrackerState,
     points: DeskewedPoints,
+    azimuth_variance_rad2: f64,
 }
 
 impl Refiner {
@@ -102,7 +103,14 @@ impl Refiner {
             config: config.clone(),
             state: TrackerState::default(),
             points: DeskewedPoints::with_capacity(capacity),
+            azimuth_variance_rad2: 0.0,
         })
+    }
+
+    /// Sets the mean variance of the azimuths of the next scan's points, rad²; 0 at first. Errors of
+    /// neighbouring azimuths are alike, as where some were lost, so that they do not average out.
+    pub fn expect_azimuth_errors(&mut self, variance_rad2: f32) {
+        self.azimuth_variance_rad2 = f64::from(variance_rad2);
     }
 
     /// Refines the motion from the `earlier` scan to the `later` one, which has number `scan`.
@@ -229,6 +237,8 @@ impl Refiner {
             let covariance = uncertainty.of_prediction();
             return (Outcome::Predicted, UncertainMotion { motion, covariance });
         };
+        let by_azimuths = uncertainty::by_azimuths(&best.alignment, self.azimuth_variance_rad2);
+        let covariance = covariance + by_azimuths;
         let motion = best.alignment.pose;
         if self.is_firm(scan, best) || self.state.doubtful >= MAX_DOUBTFUL {
             (Outcome::Refined, UncertainMotion { motion, covariance })

@@ -85,8 +85,9 @@ pub struct MaskedHeader {
     pub compensated: u32,
     /// Number of points after the rasters: see [`MaskedHeader::points`].
     pub points: u32,
-    /// Unused, zero.
-    pub reserved: u32,
+    /// Mean variance of the rows' azimuths, rad²: not zero where azimuths were lost at places that
+    /// are not known.
+    pub azimuth_variance_rad2: f32,
 }
 
 /// The parts of a payload, to fill in: see [`MaskedHeader::split`].
