@@ -19,4 +19,6 @@ mod summary;
 pub use identity::{Holds, Identity, Programs};
 pub use out::{Out, OutError, absolute};
 pub use results::{Results, SIMULATED_TRUTH, SUMMARY, map_options, write};
-pub use summary::{Counter, Counts, MotionCounts, Problem, Session, SlamSummary, Summary};
+pub use summary::{
+    Counter, Counts, LostCounts, MotionCounts, Problem, Session, SlamSummary, Summary,
+};

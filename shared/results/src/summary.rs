@@ -15,7 +15,7 @@ use thiserror::Error;
 
 use crate::{judgement::Judgement, machine::Machine};
 
-pub use counts::{Counter, Counts, MotionCounts};
+pub use counts::{Counter, Counts, LostCounts, MotionCounts};
 pub use slam::SlamSummary;
 
 /// This session of a run.
@@ -208,6 +208,10 @@ impl fmt::Display for Summary {
             "published {}  dropped {}  unreadable {}  missing {}  breaks {}",
             c.published, c.dropped, c.unreadable, c.missing, c.breaks
         )?;
+        if let Some(lost) = &c.lost {
+            let LostCounts { scans, azimuths } = lost;
+            writeln!(f, "lost azimuths {azimuths} in {scans} scans")?;
+        }
         if let Some(m) = &c.motions {
             writeln!(
                 f,

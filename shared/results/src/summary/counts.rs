@@ -25,9 +25,29 @@ pub struct Counts {
     pub missing: u64,
     /// Places where the chain of motions starts anew, after the first.
     pub breaks: u64,
+    /// `None`: no scan has lost azimuths, or they were not looked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lost: Option<LostCounts>,
     /// `None`: the run refines no motions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub motions: Option<MotionCounts>,
+}
+
+/// Counts of lost azimuths.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct LostCounts {
+    /// Scans with lost azimuths.
+    pub scans: u64,
+    /// Azimuths that were lost in all.
+    pub azimuths: u64,
+}
+
+impl LostCounts {
+    fn add(&mut self, item: &Item) {
+        let azimuths = item.lost_azimuths().count() as u64;
+        self.scans += u64::from(azimuths > 0);
+        self.azimuths += azimuths;
+    }
 }
 
 /// Counts of motions by outcome.
@@ -80,6 +100,7 @@ pub struct Counter {
     starts: u64,
     last: Option<Item>,
     gaps: Gaps,
+    lost: LostCounts,
     motions: MotionCounts,
 }
 
@@ -90,6 +111,7 @@ impl Counter {
         self.starts += u64::from(pose.item.is(flag::BREAK));
         self.last = Some(pose.item);
         self.gaps.add(pose);
+        self.lost.add(&pose.item);
         self.motions.add(&pose.motion);
     }
 
@@ -109,6 +131,7 @@ impl Counter {
             unreadable: seen.saturating_sub(published),
             missing: self.gaps.missing(),
             breaks: self.starts.saturating_sub(1),
+            lost: (self.lost.scans > 0).then_some(self.lost),
             motions: refines.then_some(self.motions),
         }
     }
@@ -183,6 +206,7 @@ impl Gaps {
 #[cfg(test)]
 mod tests {
     use gyre_messages::RefinementRecord;
+    use gyre_radar::LostAzimuths;
 
     use super::*;
 
@@ -216,6 +240,23 @@ mod tests {
                 ..Counts::default()
             }
         );
+    }
+
+    #[test]
+    fn lost_azimuths_count_where_there_are_any() {
+        let pose = |lost: &[[u16; 2]]| {
+            let mut pose = PoseHeader::default();
+            let lost = LostAzimuths::between(lost.iter().copied());
+            pose.item.set_lost_azimuths(&lost);
+            pose
+        };
+        let poses = [pose(&[]), pose(&[[3, 9]]), pose(&[[1, 1], [7, 8]])];
+        let lost = LostCounts {
+            scans: 2,
+            azimuths: 3,
+        };
+        assert_eq!(counted(&poses).counts(None, 0, false).lost, Some(lost));
+        assert_eq!(counted(&poses[..1]).counts(None, 0, false).lost, None);
     }
 
     #[test]
