@@ -10,7 +10,7 @@ use std::{
     sync::OnceLock,
 };
 
-use gyre_simulator::{SimulationConfig, drive::DriveConfig, write_dataset};
+use gyre_simulator::{OutputFormat, Profile, SimulationConfig, drive::DriveConfig, write_dataset};
 use tempfile::TempDir;
 
 use super::Run;
@@ -60,6 +60,19 @@ fn of_a_block(scans: usize) -> PathBuf {
         ..SimulationConfig::default()
     };
     simulated(&scans.to_string(), &config)
+}
+
+/// A recording as RADIATE has them, whose host loses azimuths or not.
+pub fn of_radiate(loses_azimuths: bool) -> PathBuf {
+    let mut config = SimulationConfig {
+        scans: Some(SCANS),
+        ..SimulationConfig::default()
+    };
+    config.sensor.profile = Profile::Cts350xRadiate;
+    config.output.format = Some(OutputFormat::Radiate);
+    config.drive.speed_mps = 5.0;
+    config.effects.lost_azimuths = loses_azimuths;
+    simulated(&format!("radiate-{loses_azimuths}"), &config)
 }
 
 /// A copy of the small recording's first `scans` scans, to be corrupted. Its images are links:

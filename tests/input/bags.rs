@@ -86,13 +86,11 @@ fn a_run_exported_in_any_form_is_taken_back_to_the_same_motions() {
 
 #[test]
 fn real_scans_are_taken_back_to_the_same_motions() {
-    let Some(data) = real_data("radiate-2019-02-12") else {
+    let Some(data) = real_data("radiate-tiny_foggy") else {
         return;
     };
     let configuration = Path::new(crate::PROJECT).join("configs/radiate.toml");
-    let run = Run::of_file(&configuration)
-        .data(&data)
-        .set("source.scans=30");
+    let run = Run::of_file(&configuration).data(&data);
     let motions = run.complete();
     let path = bag(&run, "bag.mcap");
     export(run.out(), &path, &[]).succeeded();

@@ -122,7 +122,7 @@ pub enum Command {
     Calibrate(CalibrateArguments),
     /// Draw what the mask keeps of scans.
     Masks(MasksArguments),
-    /// Write odometry, transforms, the map and scans as a bag of ROS 2.
+    /// Write odometry, transforms, the map and scans as a bag of ROS 2, or a repaired recording.
     Export(ExportArguments),
     /// Write a simulated recording, or complete one.
     Simulate(SimulateArguments),

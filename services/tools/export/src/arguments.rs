@@ -11,8 +11,15 @@ pub struct ExportArguments {
     /// The source: the folder of a run's results, a recording of a run, NAME.mcap, or a dataset.
     pub source: PathBuf,
     /// The bag to write: a folder, or one file if its name ends in .mcap.
-    #[arg(long, value_name = "BAG")]
-    pub mcap: PathBuf,
+    #[arg(long, value_name = "BAG", required_unless_present = "format")]
+    pub mcap: Option<PathBuf>,
+    /// Write the scans of a run in the form of its dataset instead, with each azimuth that was lost
+    /// put back where the run has found it missing.
+    #[arg(long, value_enum, requires = "out", conflicts_with_all = ["mcap", "scans", "frames", "mounting"])]
+    pub format: Option<DatasetForm>,
+    /// The folder to write such a dataset to: a new or an empty one.
+    #[arg(long, value_name = "FOLDER", requires = "format")]
+    pub out: Option<PathBuf>,
     /// The form of the scans: as whole turns, azimuth by azimuth as the radar sends them, both, or
     /// not.
     #[arg(long, value_enum, value_delimiter = ',', default_value = "b-scan")]
@@ -40,6 +47,13 @@ pub struct FrameArguments {
         allow_hyphen_values = true
     )]
     pub mounting: String,
+}
+
+/// The form of a dataset whose scans are repaired.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum DatasetForm {
+    /// Images of range x azimuth and a list of times, as RADIATE has them.
+    Radiate,
 }
 
 /// The form in which scans are written.

@@ -1,11 +1,13 @@
-//! `gyre export`: what a run has found, and its scans, as a bag of ROS 2.
+//! `gyre export`: what a run has found, and its scans, as a bag of ROS 2; or the repaired recording
+//! of a run, as RADIATE has it ([`repaired`]).
 
 mod arguments;
 mod places;
+mod repaired;
 mod scans;
 mod source;
 
-use std::process::ExitCode;
+use std::{path::Path, process::ExitCode};
 
 use gyre_bags::{BagWriter, Kept, Topic};
 use gyre_ros2_messages::{
@@ -16,18 +18,27 @@ use gyre_ros2_messages::{
 };
 use gyre_terminal::{Failure, print};
 
-pub use arguments::{ExportArguments, FrameArguments, ScanForm};
+pub use arguments::{DatasetForm, ExportArguments, FrameArguments, ScanForm};
 use places::Place;
 use scans::ScanWriter;
 use source::Source;
 
-/// Writes the bag.
+/// Writes the bag or the dataset.
 ///
 /// # Errors
-/// A source that cannot be read, a bag that exists or cannot be written.
+/// A source that cannot be read, a bag or a dataset that exists or cannot be written.
 pub fn export(arguments: &ExportArguments) -> Result<ExitCode, Failure> {
     let mut source = Source::open(&arguments.source)?;
-    let mut bag = BagWriter::create(&arguments.mcap)?;
+    match (&arguments.mcap, &arguments.out) {
+        (Some(bag), _) => write_bag(&mut source, bag, arguments)?,
+        (None, Some(out)) => repaired::write(&source, out)?,
+        (None, None) => return Err("name what to write: --mcap BAG".into()),
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn write_bag(source: &mut Source, path: &Path, arguments: &ExportArguments) -> Result<(), Failure> {
+    let mut bag = BagWriter::create(path)?;
     let frames = arguments.frames.frames.clone();
     let mounting = arguments.frames.mounting.parse()?;
     let mut places = source.places()?.peekable();
@@ -35,7 +46,7 @@ pub fn export(arguments: &ExportArguments) -> Result<ExitCode, Failure> {
         Some(_) => Some(Trajectory::begin(&mut bag, &frames, mounting)?),
         None => None,
     };
-    let mut scans = ScanWriter::begin(&mut bag, &mut source, &arguments.scans, &frames.radar)?;
+    let mut scans = ScanWriter::begin(&mut bag, source, &arguments.scans, &frames.radar)?;
     let mut last_ns = 0;
     while let Some(stamp_ns) = scans.write_next(&mut bag)? {
         while let Some(place) = places.next_if(|place| is_due(place, stamp_ns)) {
@@ -58,13 +69,9 @@ pub fn export(arguments: &ExportArguments) -> Result<ExitCode, Failure> {
         return Err(format!("{source} has nothing to export: neither poses nor scans").into());
     }
     bag.finish()?;
-    print::line(format_args!(
-        "{}: {}",
-        arguments.mcap.display(),
-        counts.join(", ")
-    ))?;
+    print::line(format_args!("{}: {}", path.display(), counts.join(", ")))?;
     scans.describe_losses();
-    Ok(ExitCode::SUCCESS)
+    Ok(())
 }
 
 /// Returns whether a pose is not later than a scan; what cannot be read is due at once.

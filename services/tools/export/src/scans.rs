@@ -3,8 +3,8 @@
 use gyre_bags::{BagWriter, Kept, Topic};
 use gyre_colossus::Configuration as Radar;
 use gyre_radar::{
-    OwnedScan, PolarScan, ReadError, Sense, SweepGeometry, correct_eccentricity, middle_ns,
-    scan::flag,
+    OwnedScan, PlacedRows, PolarScan, ReadError, Sense, SweepGeometry, correct_eccentricity,
+    lost::stale_rows, middle_ns, scan::flag,
 };
 use gyre_ros2_messages::{
     navtech_msgs::{RadarBScanMsg, RadarConfigurationMsg, RadarFftDataMsg},
@@ -14,7 +14,7 @@ use gyre_terminal::{Failure, print};
 
 use crate::{
     arguments::ScanForm,
-    source::{Scans, Source},
+    source::{Lost, Scans, Source},
 };
 
 /// The topics of Navtech's driver.
@@ -31,6 +31,8 @@ pub struct ScanWriter {
 struct Open {
     scans: Scans,
     scan: OwnedScan,
+    lost: Lost,
+    rows: PlacedRows,
     messages: ScanMessages,
     configuration: Topic<RadarConfigurationMsg>,
     azimuths: Option<Topic<RadarFftDataMsg>>,
@@ -46,6 +48,10 @@ struct Losses {
     chirps: bool,
     /// Rows that were not measured but have powers.
     interpolated: u64,
+    /// Scans with lost azimuths: with their rows where the run has found them, and those of which
+    /// it is not known where.
+    placed: u64,
+    not_placed: u64,
     /// Scans whose time is another one than the middle of their first and last azimuth, and the
     /// largest difference, ns.
     retimed: u64,
@@ -58,8 +64,11 @@ impl Losses {
     /// Takes a scan as it is written.
     fn add(&mut self, scan: &PolarScan<'_>) {
         let is_measured = |flags: u8| flags & flag::MEASURED != 0;
-        self.chirps |= scan.flags.iter().any(|flags| flags & !flag::MEASURED != 0);
-        let rows = (0..scan.geometry.azimuths).filter(|row| !is_measured(scan.flags[*row]));
+        let chirps = flag::CHIRP_KNOWN | flag::CHIRP_UP;
+        self.chirps |= scan.flags.iter().any(|flags| flags & chirps != 0);
+        self.not_placed += u64::from(stale_rows(scan) > 0);
+        let read = 0..scan.geometry.azimuths - stale_rows(scan);
+        let rows = read.filter(|row| !is_measured(scan.flags[*row]));
         let rows = rows.filter(|row| scan.row(*row).iter().any(|power| *power > 0));
         self.interpolated += rows.count() as u64;
         let written = scan.stamp_ns.iter().zip(scan.flags);
@@ -105,6 +114,18 @@ impl Losses {
             let rows = self.interpolated;
             sentences.push(format!(
                 "interpolated rows: {rows}. Navtech's messages cannot carry them; a run on the bag finds them missing"
+            ));
+        }
+        if self.placed > 0 {
+            let scans = self.placed;
+            sentences.push(format!(
+                "{scans} scans have lost azimuths: their rows are at the angles where the run has found them, rounded to those of the other scans"
+            ));
+        }
+        if self.not_placed > 0 {
+            let scans = self.not_placed;
+            sentences.push(format!(
+                "{scans} scans have lost azimuths, and it is not known where, so that the angles of their rows are wrong by up to as many: the export of a run has them right"
             ));
         }
         if self.retimed > 0 {
@@ -166,6 +187,8 @@ impl ScanWriter {
                 true => Some(bag.topic(B_SCANS, Kept::ForNobody)?),
                 false => None,
             },
+            lost: source.lost()?,
+            rows: PlacedRows::default(),
             scan,
             scans,
             is_described: false,
@@ -211,7 +234,7 @@ impl ScanWriter {
         };
         while let Some(index) = open.scans.played.next() {
             match open.scans.read(index, &mut open.scan) {
-                Ok(()) => return open.write(bag, &mut self.losses).map(Some),
+                Ok(()) => return open.write(index, bag, &mut self.losses).map(Some),
                 Err(error @ ReadError::Io { .. }) => return Err(error.into()),
                 Err(error) => {
                     print::note(format_args!("scan {index} is left out: {error}"));
@@ -229,8 +252,19 @@ impl ScanWriter {
 }
 
 impl Open {
-    fn write(&mut self, bag: &mut BagWriter, losses: &mut Losses) -> Result<i64, Failure> {
-        let scan = self.scan.view();
+    fn write(
+        &mut self,
+        index: usize,
+        bag: &mut BagWriter,
+        losses: &mut Losses,
+    ) -> Result<i64, Failure> {
+        let mut scan = self.scan.view();
+        if let Some(lost) = self.lost.get(&(index as u64))
+            && lost.count() > 0
+        {
+            scan = self.rows.place(&scan, lost);
+            losses.placed += u64::from(stale_rows(&scan) == 0);
+        }
         losses.add(&scan);
         let stamps = &scan.stamp_ns[..scan.geometry.azimuths];
         let (Some(first_ns), Some(last_ns)) = (stamps.first(), stamps.last()) else {
@@ -317,7 +351,9 @@ mod tests {
 
     #[test]
     fn each_loss_has_a_sentence_of_its_own() {
-        let whole = scan();
+        let mut whole = scan();
+        assert_eq!(sentences(&whole, 0.0), [""; 0]);
+        whole.flags.fill(flag::MEASURED | flag::ASSUMED);
         assert_eq!(sentences(&whole, 0.0), [""; 0]);
         let only = |scan: &OwnedScan, eccentricity_rad, what: &str| {
             let found = sentences(scan, eccentricity_rad);
@@ -326,6 +362,13 @@ mod tests {
         let mut interpolated = scan();
         interpolated.flags[4] = 0;
         only(&interpolated, 0.0, "interpolated rows: 1");
+        let mut lossy = scan();
+        lossy.flags[8..].fill(flag::STALE | flag::ASSUMED);
+        only(
+            &lossy,
+            0.0,
+            "1 scans have lost azimuths, and it is not known where",
+        );
         // A row without powers has nothing to lose.
         interpolated.bytes[8..10].fill(0);
         assert_eq!(sentences(&interpolated, 0.0), [""; 0]);

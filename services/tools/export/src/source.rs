@@ -1,6 +1,7 @@
 //! The source of an export: a run, a recording of one, or a dataset.
 
 use std::{
+    collections::BTreeMap,
     iter,
     path::{Path, PathBuf},
 };
@@ -11,8 +12,10 @@ use gyre_geometry::Pose;
 use gyre_journal as journal;
 use gyre_mapping::grid;
 use gyre_maps::map;
-use gyre_messages::{Correction, CorrectionHeader, Message, Pose as PoseTopic, PoseHeader};
-use gyre_radar::{Dataset, DatasetOptions, Trajectory, ground_truth::read_trajectory};
+use gyre_messages::{Correction, CorrectionHeader, Message, Pose as PoseTopic, PoseHeader, flag};
+use gyre_radar::{
+    Dataset, DatasetOptions, LostAzimuths, Trajectory, ground_truth::read_trajectory,
+};
 use gyre_recording::Recording;
 use gyre_ros2_messages::{
     Mounting,
@@ -39,6 +42,9 @@ enum Kind {
 
 /// The poses of a run, in order.
 pub type Places = Box<dyn Iterator<Item = Result<Place, Failure>>>;
+
+/// Where azimuths of scans were lost, by the number of the scan in its recording.
+pub type Lost = BTreeMap<u64, LostAzimuths>;
 
 /// The scans of a source.
 pub struct Scans {
@@ -72,6 +78,14 @@ impl Source {
         })
     }
 
+    /// Returns the folder of a run's results with its configuration; `None` of another source.
+    pub fn run(&self) -> Option<(&Path, &Configuration)> {
+        match &self.kind {
+            Kind::Run(configuration) => Some((&self.path, configuration)),
+            Kind::Recording | Kind::Dataset => None,
+        }
+    }
+
     /// Returns the poses of a run; none of a dataset.
     ///
     /// # Errors
@@ -94,6 +108,24 @@ impl Source {
             Kind::Recording => recorded(gyre_recording::open_recording(&self.path)?),
             Kind::Dataset => Ok(Box::new(iter::empty())),
         }
+    }
+
+    /// Returns where azimuths were lost of each scan that has a pose in a run; nothing of another
+    /// source.
+    ///
+    /// # Errors
+    /// The poses cannot be read.
+    pub fn lost(&self) -> Result<Lost, Failure> {
+        let mut lost = Lost::new();
+        if let Some((run, _)) = self.run() {
+            for pose in journal::records(&journal::path(run))?.into_iter().flatten() {
+                let item = pose?.item;
+                if !item.is(flag::END) {
+                    lost.insert(item.scan, item.lost_azimuths());
+                }
+            }
+        }
+        Ok(lost)
     }
 
     /// Returns the scans; `None` of a run of a radar, which leaves none.

@@ -6,11 +6,13 @@
 //! a scan with the one before it.
 //!
 //! Reading order: [`LostAzimuthFinder`]; [`PlacedRows`]; `echoes` (what is aligned); `prediction`
-//! (the scan before as the sensor would see it now); `alignment` (how likely each place is).
+//! (the scan before as the sensor would see it now); `alignment` (how likely each place is);
+//! [`repair`].
 
 mod alignment;
 mod echoes;
 mod prediction;
+mod repair;
 #[cfg(test)]
 mod tests;
 
@@ -23,6 +25,8 @@ use crate::{
 use alignment::Alignment;
 use echoes::{Echoes, Layout};
 use prediction::{Motion, Prediction};
+
+pub use repair::repair;
 
 /// The largest number of lost azimuths in a turn. A turn that lost more is used as it is.
 pub const MAX_LOST: usize = 7;

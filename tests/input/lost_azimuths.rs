@@ -1,0 +1,136 @@
+//! A recording of RADIATE whose host lost azimuths: counted in the summary, and put back in an
+//! export.
+
+use std::{f64::consts::TAU, fs, path::Path};
+
+use gyre_radar::{Dataset, DatasetOptions, OwnedScan, lost::stale_rows, open, scan::flag};
+use serde_json::json;
+
+use crate::common::{Ended, Run, gyre, recording};
+
+/// The scans of a recording of RADIATE.
+fn scans(recording: &Path) -> Vec<OwnedScan> {
+    read_all(
+        open(recording, &DatasetOptions::default())
+            .unwrap()
+            .as_mut(),
+    )
+}
+
+fn read_all(dataset: &mut dyn Dataset) -> Vec<OwnedScan> {
+    let indices = 0..dataset.len();
+    let read = |index| {
+        let mut scan = OwnedScan::with_limits(dataset.limits());
+        scan.geometry = dataset.read(index, scan.slot()).unwrap();
+        scan
+    };
+    indices.map(read).collect()
+}
+
+fn stale(scans: &[OwnedScan]) -> Vec<usize> {
+    scans.iter().map(|scan| stale_rows(&scan.view())).collect()
+}
+
+/// The mean difference of powers, in scans with losses, from those of the whole scans.
+fn difference(scans: &[OwnedScan], whole: &[OwnedScan], stale: &[usize]) -> f64 {
+    let lossy = (0..scans.len()).filter(|scan| stale[*scan] > 0);
+    let powers = lossy.flat_map(|scan| scans[scan].bytes.iter().zip(&whole[scan].bytes));
+    let count = powers.clone().count() as f64;
+    powers.map(|(a, b)| f64::from(a.abs_diff(*b))).sum::<f64>() / count
+}
+
+/// The mean distance, in steps, from the angles of measured rows to those at which the whole scans
+/// have them.
+fn misplaced(scans: &[OwnedScan], whole: &[OwnedScan], stale: &[usize]) -> f64 {
+    let mut off = Vec::new();
+    for scan in (0..scans.len()).filter(|scan| stale[*scan] > 0) {
+        let (scan, whole) = (scans[scan].view(), whole[scan].view());
+        let is_measured = |row: &usize| scan.flags[*row] & flag::MEASURED != 0;
+        for row in (0..scan.geometry.azimuths).filter(is_measured) {
+            let angle = f64::from(scan.azimuth_rad[row]) / TAU * 400.0;
+            let is_it = |azimuth: &usize| scan.row(row) == whole.row(*azimuth);
+            let azimuth = (0..400).find(is_it).unwrap();
+            off.push((angle - azimuth as f64).abs());
+        }
+    }
+    off.iter().sum::<f64>() / off.len() as f64
+}
+
+fn export(run: &Run, out: &Path) -> Ended {
+    let mut command = gyre();
+    command.arg("export").arg(run.out());
+    command.args(["--format", "radiate", "--out"]).arg(out);
+    Ended::of(command)
+}
+
+#[test]
+fn lost_azimuths_are_counted_and_put_back_in_an_export() {
+    let (whole, lossy) = (recording::of_radiate(false), recording::of_radiate(true));
+    let run = Run::small().data(&lossy);
+    run.complete();
+    let (before, true_scans) = (scans(&lossy), scans(&whole));
+    let stale_before = stale(&before);
+    let lost: usize = stale_before.iter().sum();
+    let repaired = stale_before.iter().filter(|stale| **stale > 0).count();
+    assert!(lost > repaired && repaired > 5, "{stale_before:?}");
+    let counts = json!({"scans": repaired, "azimuths": lost});
+    assert_eq!(run.summary()["lost"], counts);
+
+    let out = run.folder().join("repaired");
+    let said = export(&run, &out);
+    said.succeeded();
+    let sentence = format!("{repaired} of them repaired, which had lost {lost} azimuths");
+    assert!(said.stdout.contains(&sentence), "{}", said.stdout);
+    let after = scans(&out);
+    assert_eq!(after.len(), before.len());
+    assert_eq!(stale(&after), vec![0; after.len()]);
+    let images = recording::images(&lossy).into_iter();
+    for (scan, (from, to)) in images.zip(recording::images(&out)).enumerate() {
+        let is_copy = fs::read(from).unwrap() == fs::read(to).unwrap();
+        assert_eq!(is_copy, stale_before[scan] == 0, "scan {scan}");
+    }
+    let difference = |scans: &[OwnedScan]| difference(scans, &true_scans, &stale_before);
+    let (wrong, right) = (difference(&before), difference(&after));
+    assert!(right < 0.9 * wrong, "{wrong} as recorded, {right} repaired");
+    for list in ["Navtech_Polar.txt", "ground_truth.tum", "dataset.toml"] {
+        let copied = fs::read(out.join(list)).unwrap();
+        assert_eq!(copied, fs::read(lossy.join(list)).unwrap(), "{list}");
+    }
+    export(&run, &out).failed_with(&["repaired exists: name a new folder"]);
+
+    let bag = run.folder().join("bag.mcap");
+    let mut command = gyre();
+    command.arg("export").arg(run.out()).arg("--mcap").arg(&bag);
+    let said = Ended::of(command);
+    let sentence = format!("{repaired} scans have lost azimuths: their rows are at the angles");
+    assert!(
+        said.succeeded().stderr.contains(&sentence),
+        "{}",
+        said.stderr
+    );
+    let mut dataset = gyre_recording::open(&bag, &DatasetOptions::default()).unwrap();
+    let misplaced = |scans: &[OwnedScan]| misplaced(scans, &true_scans, &stale_before);
+    let (wrong, right) = (misplaced(&before), misplaced(&read_all(dataset.as_mut())));
+    assert!(
+        right < 0.85 * wrong,
+        "{wrong} steps as recorded, {right} in the bag"
+    );
+}
+
+#[test]
+fn only_runs_that_have_looked_for_lost_azimuths_are_exported_in_radiate_s_form() {
+    let ignoring = Run::small().data(&recording::of_radiate(true));
+    let ignoring = ignoring.set("dataset.lost_azimuths='ignore'");
+    ignoring.complete();
+    assert!(ignoring.summary().get("lost").is_none());
+    let out = ignoring.folder().join("repaired");
+    export(&ignoring, &out).failed_with(&["the run has not looked for lost azimuths"]);
+    let other = Run::of_recording();
+    other.complete();
+    export(&other, &out).failed_with(&["are of the format `oxford`"]);
+    let mut command = gyre();
+    command.arg("export").arg(recording::of_radiate(true));
+    command.args(["--format", "radiate", "--out"]).arg(&out);
+    Ended::of(command).failed_with(&["name the folder of its results"]);
+    assert!(!out.exists());
+}
