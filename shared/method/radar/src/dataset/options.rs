@@ -66,8 +66,9 @@ pub struct DatasetOptions {
     /// scans show another number, that one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub encoder_counts: Option<u16>,
-    /// Azimuths that the host has lost, which RADIATE's images do not say: the columns behind them
-    /// have moved up, and the last columns are of the scan before. Default: `find` for RADIATE.
+    /// Azimuths that the host has lost, which images without metadata (RADIATE, MulRan as recorded)
+    /// do not say: the columns behind them have moved up, and the last columns are of the scan
+    /// before. Default: `find`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lost_azimuths: Option<LostAzimuthOption>,
     /// The topic of the scans in a bag of ROS 2. Default: the one whose type is of Navtech's

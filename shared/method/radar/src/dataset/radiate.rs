@@ -12,7 +12,7 @@ use std::path::Path;
 use super::detect::Found;
 use super::error::OpenError;
 use super::images::Images;
-use super::options::{DatasetOptions, LostAzimuthOption};
+use super::options::DatasetOptions;
 use super::sensor_clock::SensorClock;
 use super::stale::StaleRows;
 use super::stamp::{self, SECOND_NS};
@@ -38,10 +38,8 @@ pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<TransposedS
     };
     let (stamps, unpadded) = parse_stamps(&list, &text)?;
     let mut scans = TransposedScans::open(found, options, STAMPS, |bins| RANGE_M / bins as f32)?;
+    scans.stale = scans.stale.map(StaleRows::of_compressed);
     add_turns(&mut scans, &stamps, &list)?;
-    if options.lost_azimuths != Some(LostAzimuthOption::Ignore) {
-        scans.stale = Some(StaleRows::default());
-    }
     if unpadded > 0 {
         scans.notes.push(format!(
             "{unpadded} of {} stamps in {} have nanoseconds without leading zeros (.5 means 5 ns), and are read as integers; \

@@ -4,8 +4,7 @@
 use crate::lost::MAX_LOST;
 
 /// Least correlation of a stale row with the same row of the image before. It is 0.93 to 0.97 with
-/// stale ones, which were compressed anew, and below 0.75 with measured ones, also of a standing
-/// radar.
+/// stale ones, which were compressed anew, and mostly below 0.75 with measured ones.
 const STALE: f64 = 0.85;
 /// Share of the bins, the nearest, that are left out: what the vehicle itself reflects is the same
 /// in each turn.
@@ -18,9 +17,20 @@ pub(crate) struct StaleRows {
     of: Option<usize>,
     /// The last rows, one more than [`MAX_LOST`]; empty if it cannot be read.
     rows: Vec<u8>,
+    is_compressed: bool,
 }
 
 impl StaleRows {
+    /// Expects stale rows that differ a little, as images were compressed with a loss; otherwise
+    /// they are the same to the bit, so that no measured one of a standing radar is taken for
+    /// stale.
+    pub fn of_compressed(self) -> Self {
+        Self {
+            is_compressed: true,
+            ..self
+        }
+    }
+
     /// Returns whether the rows are those of an image.
     pub fn has(&self, index: usize) -> bool {
         self.of == Some(index)
@@ -40,8 +50,10 @@ impl StaleRows {
         let near = (bins as f64 * NEAR) as usize;
         let rows = image.chunks_exact(bins).rev();
         let before = self.rows.chunks_exact(bins).rev();
-        let is_stale =
-            |(row, before): &(&[u8], &[u8])| correlation(&row[near..], &before[near..]) > STALE;
+        let is_stale = |(row, before): &(&[u8], &[u8])| {
+            (self.is_compressed || row == before)
+                && correlation(&row[near..], &before[near..]) > STALE
+        };
         let stale = rows.zip(before).take_while(is_stale).count();
         if stale > MAX_LOST { 0 } else { stale }
     }
@@ -88,11 +100,16 @@ mod tests {
                 // As compressed anew.
                 *power = stale.saturating_add(stale % 7);
             }
-            let mut rows = StaleRows::default();
+            let mut rows = StaleRows::default().of_compressed();
             assert_eq!(rows.count(&now, BINS), 0, "no image before");
             rows.remember(4, &before, BINS);
             assert!(rows.has(4) && !rows.has(5));
             assert_eq!(rows.count(&now, BINS), lost);
+            let mut exact = StaleRows::default();
+            exact.remember(4, &before, BINS);
+            assert_eq!(exact.count(&now, BINS), 0, "measured anew");
+            now[first..].copy_from_slice(&before[first..]);
+            assert_eq!(exact.count(&now, BINS), lost);
         }
         let mut rows = StaleRows::default();
         rows.remember(0, &before, BINS);

@@ -11,7 +11,7 @@ use super::image_size::ImageSize;
 use super::images::Images;
 use super::navtech_png::fill_uniform;
 use super::navtech_scans::check_capacity;
-use super::options::DatasetOptions;
+use super::options::{DatasetOptions, LostAzimuthOption};
 use super::stale::StaleRows;
 use crate::scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, Sense, SweepGeometry, flag};
 
@@ -56,7 +56,7 @@ pub(crate) struct TransposedScans {
     doppler_s: f32,
     azimuth_eccentricity_rad: f32,
     scratch: Vec<u8>,
-    /// The caller sets it where the host may have lost azimuths.
+    /// Without angles nothing else tells that the host has lost azimuths; `None`: they are ignored.
     pub(crate) stale: Option<StaleRows>,
 }
 
@@ -89,7 +89,8 @@ impl TransposedScans {
             doppler_s: options.doppler_s.unwrap_or(0.0),
             azimuth_eccentricity_rad: options.azimuth_eccentricity_rad.unwrap_or(0.0),
             scratch: Vec::new(),
-            stale: None,
+            stale: (options.lost_azimuths != Some(LostAzimuthOption::Ignore))
+                .then(StaleRows::default),
         };
         scans.check_shape()?;
         scans.range_resolution_m = options

@@ -4,6 +4,7 @@
 mod encoders;
 mod formats;
 mod images;
+mod lost_azimuths;
 mod packed;
 mod radiate;
 mod rows;
