@@ -107,8 +107,9 @@ impl Refiner {
         })
     }
 
-    /// Sets the mean variance of the azimuths of the next scan's points, rad²; 0 at first. Errors of
-    /// neighbouring azimuths are alike, as where some were lost, so that they do not average out.
+    /// Sets the mean variance of the azimuths of the next scan's points, rad²; 0 at first. Errors
+    /// of neighbouring azimuths are alike, as where some were lost, so that they do not average
+    /// out.
     pub fn expect_azimuth_errors(&mut self, variance_rad2: f32) {
         self.azimuth_variance_rad2 = f64::from(variance_rad2);
     }
