@@ -2,7 +2,7 @@
 //! restarted goes on from those that the poses have kept.
 
 use gyre_masking::Sweep;
-use gyre_radar::{LostAzimuthFinder, LostAzimuths};
+use gyre_radar::{LostAzimuthFinder, LostAzimuths, lost::stale_rows};
 
 /// Finds lost azimuths of scan after scan.
 #[derive(Default)]
@@ -14,13 +14,24 @@ pub struct Azimuths {
 
 impl Azimuths {
     /// Returns where azimuths of a sweep were lost: the next one, or the last one again. `known` is
-    /// what a masking before this one has found.
-    pub fn lost(&mut self, sweep: &Sweep<'_>, known: Option<LostAzimuths>) -> LostAzimuths {
+    /// what a masking before this one has found. Where a chain of motions `starts`, nothing is known
+    /// of the scan before.
+    pub fn lost(
+        &mut self,
+        sweep: &Sweep<'_>,
+        known: Option<LostAzimuths>,
+        starts: bool,
+    ) -> LostAzimuths {
         if let Some((number, lost)) = self.last
             && number == sweep.number
         {
             return lost;
         }
+        if starts {
+            self.finder.reset();
+        }
+        // What another masking has told of this scan, if it has told of all.
+        let known = known.filter(|known| known.count() == stale_rows(&sweep.scan));
         let lost = match known {
             Some(known) => {
                 self.finder.set_previous(&sweep.scan, &known);

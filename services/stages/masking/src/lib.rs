@@ -12,7 +12,7 @@ mod scans;
 
 use gyre_geometry::Twist;
 use gyre_masking::{MaskError, MaskKind, Masker, MaskingConfig, Sweep};
-use gyre_messages::{Item, Masked, MaskedHeader, Scan, SearchedMotion, StageId, mask_kind};
+use gyre_messages::{Item, Masked, MaskedHeader, Scan, SearchedMotion, StageId, flag, mask_kind};
 use gyre_radar::{PlacedRows, PointsConfig, RasterConfig};
 use gyre_stage::{
     Launch, Stage, StageCounters, StageError, reader::Received, stage, writer::Draft,
@@ -67,12 +67,14 @@ impl Stage for Masking {
             None => None,
         };
         if let (Some(sweep), Some(input)) = (&mut previous, &input.previous) {
-            let lost = self.azimuths.lost(sweep, input.lost);
+            let starts = input.scan.item().is(flag::BREAK);
+            let lost = self.azimuths.lost(sweep, input.lost, starts);
             sweep.scan = previous_rows.place(&sweep.scan, &lost);
         }
         let mut sweep = sweep(input.scan, input.motion)?;
         let azimuths = sweep.scan.geometry.azimuths;
-        let lost = self.azimuths.lost(&sweep, input.lost);
+        let starts = input.scan.item().is(flag::BREAK);
+        let lost = self.azimuths.lost(&sweep, input.lost, starts);
         sweep.scan = rows.place(&sweep.scan, &lost);
         if let Some(previous) = &previous
             && !self.masker.can_follow(previous.number)

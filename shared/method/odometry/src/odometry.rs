@@ -25,7 +25,8 @@ pub struct Odometry {
 
 impl Odometry {
     /// Allocates all buffers. After the first scan, registering one allocates nothing but what a
-    /// network does.
+    /// network does, and what finding lost azimuths does where a scan has more echoes than any
+    /// before.
     ///
     /// # Errors
     /// The first setting out of its bounds; a network that cannot be used.
@@ -80,6 +81,7 @@ impl Odometry {
         scan: &PolarScan<'_>,
         twist: Option<Twist>,
     ) -> Result<(), OdometryError> {
+        scan.check()?;
         let lost = self.lost.find(scan, twist);
         let placed = self.rows.place(scan, &lost);
         self.pair.mask(self.masker.as_mut(), &placed, twist)?;

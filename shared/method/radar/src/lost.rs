@@ -16,6 +16,8 @@ mod repair;
 #[cfg(test)]
 mod tests;
 
+use std::f32::consts::{PI, TAU};
+
 use gyre_geometry::Twist;
 
 use crate::{
@@ -30,6 +32,9 @@ pub use repair::repair;
 
 /// The largest number of lost azimuths in a turn. A turn that lost more is used as it is.
 pub const MAX_LOST: usize = 7;
+
+/// The least azimuths of a turn in which places are found.
+const MIN_AZIMUTHS: usize = 64;
 
 /// By how much faster the vehicle may have become since the motion that predicts: it brakes or
 /// accelerates by 1.2 m/s² for half a second.
@@ -81,7 +86,7 @@ impl LostAzimuths {
             .rows()
             .iter()
             .map(|[first, last]| f32::from(last - first) / 6.0);
-        let step_rad = std::f32::consts::TAU / azimuths.max(1) as f32;
+        let step_rad = TAU / azimuths.max(1) as f32;
         rows.sum::<f32>() / measured as f32 * step_rad * step_rad
     }
 
@@ -115,21 +120,26 @@ struct Previous {
 
 impl LostAzimuthFinder {
     /// Finds where azimuths of the next scan were lost. `twist` predicts its motion from the scan
-    /// before; without it the vehicle is assumed to stand. Without a scan before each may have been
-    /// lost anywhere. The scan is to pass [`PolarScan::check`].
+    /// before. Without it, or without a scan before, each may have been lost anywhere. The scan is to pass [`PolarScan::check`].
     pub fn find(&mut self, scan: &PolarScan<'_>, twist: Option<Twist>) -> LostAzimuths {
+        if !self.read(scan) {
+            return LostAzimuths::default();
+        }
         let count = stale_rows(scan);
-        let lost = match (&self.previous, count) {
-            (_, 0) => LostAzimuths::default(),
-            (Some(previous), _)
+        let lost = match (&self.previous, twist, count) {
+            (_, _, 0) => LostAzimuths::default(),
+            (Some(previous), Some(twist), _)
                 if continues(previous.stamp_ns, scan.geometry.stamp_ns)
-                    && previous.echoes.layout == Layout::of(scan) =>
+                    && previous.echoes.layout == Layout::of(scan)
+                    && scan.geometry.azimuths >= MIN_AZIMUTHS
+                    && previous.echoes.layout.cells > 0 =>
             {
-                self.rows.read(scan);
                 self.alignment.begin();
                 for faster_mps in FASTER_MPS {
-                    let mut twist = twist.unwrap_or_default();
-                    twist.vx_mps += faster_mps;
+                    let twist = Twist {
+                        vx_mps: twist.vx_mps + faster_mps,
+                        ..twist
+                    };
                     let motion = Motion::new(previous.stamp_ns, scan, &twist);
                     self.prediction.make(&previous.echoes, &motion);
                     self.alignment.add(&self.prediction, &self.rows, count);
@@ -138,28 +148,36 @@ impl LostAzimuthFinder {
             }
             _ => LostAzimuths::anywhere(count, scan.geometry.azimuths),
         };
-        self.set_previous(scan, &lost);
+        self.remember(scan, &lost);
         lost
     }
 
     /// Makes a scan the one before the next, to resume after a restart. `lost` are its lost
     /// azimuths.
     pub fn set_previous(&mut self, scan: &PolarScan<'_>, lost: &LostAzimuths) {
-        if scan
-            .flags
-            .first()
-            .is_none_or(|flags| flags & flag::ASSUMED == 0)
-        {
-            // The azimuths are measured, so none is lost unseen.
-            self.previous = None;
-            return;
+        if self.read(scan) {
+            self.remember(scan, lost);
         }
+    }
+
+    /// Reads the rows of a scan. Returns `false` if its azimuths are measured, so that none was lost
+    /// unseen.
+    fn read(&mut self, scan: &PolarScan<'_>) -> bool {
+        let assumed = |flags: &u8| flags & flag::ASSUMED != 0;
+        let is_assumed = scan.flags.first().is_some_and(assumed);
+        match is_assumed {
+            true => self.rows.read(scan),
+            false => self.previous = None,
+        }
+        is_assumed
+    }
+
+    fn remember(&mut self, scan: &PolarScan<'_>, lost: &LostAzimuths) {
         let previous = self.previous.get_or_insert_with(|| Previous {
             stamp_ns: 0,
             echoes: Echoes::default(),
         });
         previous.stamp_ns = scan.geometry.stamp_ns;
-        self.rows.read(scan);
         previous.echoes.place(&self.rows, lost);
     }
 
@@ -196,7 +214,12 @@ impl PlacedRows {
             let (before, share) = (azimuth as usize, azimuth.fract());
             let after = (before + 1).min(azimuths - 1);
             let (start, end) = (scan.azimuth_rad[before], scan.azimuth_rad[after]);
-            self.azimuth_rad.push(start + share * (end - start));
+            // Angles may wrap around anywhere.
+            let step = (end - start + PI).rem_euclid(TAU) - PI;
+            self.azimuth_rad.push(match step == 0.0 || share == 0.0 {
+                true => start,
+                false => (start + share * step).rem_euclid(TAU),
+            });
             let (start, end) = (scan.stamp_ns[before], scan.stamp_ns[after]);
             let passed_ns = share as f64 * (end - start) as f64;
             self.stamp_ns.push(start + passed_ns as i64);

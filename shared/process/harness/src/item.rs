@@ -6,6 +6,7 @@ use gyre_messages::{Item, StageId, flag};
 pub fn not_copied(stage: StageId, input: &Item, output: &Item) -> Vec<&'static str> {
     let mut hops = output.hops;
     hops[stage as usize] = input.hops[stage as usize];
+    let places = Item::lost_azimuths;
     let passes_flags = output.flags & !flag::SYNC == input.flags & !flag::SYNC;
     let fields = [
         ("scan", output.scan == input.scan),
@@ -16,6 +17,10 @@ pub fn not_copied(stage: StageId, input: &Item, output: &Item) -> Vec<&'static s
         ("stamp_ns", output.stamp_ns == input.stamp_ns),
         ("due_ns", output.due_ns == input.due_ns),
         ("flags", passes_flags),
+        (
+            "lost (the places of lost azimuths)",
+            stage <= StageId::Masking || places(output) == places(input),
+        ),
         ("hops (the stamps of the stages before)", hops == input.hops),
     ];
     let missing = fields.into_iter().filter(|(_, copied)| !copied);

@@ -140,6 +140,12 @@ impl MaskedHeader {
         require(self.mask <= mask_kind::LEARNED, "mask", self.mask, "0 to 2")?;
         let [vx, vy, yaw_rate] = self.twist.map(f64::from);
         finite([("twist[0]", vx), ("twist[1]", vy), ("twist[2]", yaw_rate)])?;
+        require(
+            self.azimuth_variance_rad2 >= 0.0 && self.azimuth_variance_rad2.is_finite(),
+            "azimuth_variance_rad2",
+            self.azimuth_variance_rad2,
+            "finite, 0 or more",
+        )?;
         let points = self.points(values).ok_or_else(|| {
             let bytes = size_of_val(values);
             Violation(format!("its payload of {bytes} bytes is shorter than its header says: {rasters} rasters of {n} x {n} cells and {points} points"))

@@ -218,14 +218,22 @@ impl Dataset for TransposedScans {
             && self.stale.as_ref().is_some_and(|stale| !stale.has(before))
         {
             let bytes = &mut slot.bytes[..azimuths * bins];
-            let read = self.decode(before, bytes);
-            self.remember(before, read.is_ok().then_some(&*bytes));
+            match self.decode(before, bytes) {
+                Ok(()) => self.remember(before, Some(bytes)),
+                // The image may come back.
+                Err(error @ ReadError::Io { .. }) => return Err(error),
+                Err(_) => self.remember(before, None),
+            }
         }
         let bytes = &mut slot.bytes[..azimuths * bins];
         self.decode(index, bytes)?;
+        let before = index.checked_sub(1);
         let lost = match &self.stale {
-            Some(stale) => stale.count(bytes, bins),
-            None => 0,
+            Some(stale) if before.is_some_and(|before| stale.has(before)) => {
+                stale.count(bytes, bins)
+            }
+            // No image is before the first one.
+            _ => 0,
         };
         self.remember(index, Some(bytes));
         let azimuth_rad = &mut slot.azimuth_rad[..azimuths];

@@ -81,8 +81,8 @@ impl Survey {
         let stale = stale_rows(scan) as u64;
         self.stale += stale;
         self.stale_scans += usize::from(stale > 0);
-        let not_measured = scan.flags.iter().filter(|f| *f & flag::MEASURED == 0);
-        self.not_measured += not_measured.count() as u64 - stale;
+        let not_measured = |f: &&u8| *f & (flag::MEASURED | flag::STALE) == 0;
+        self.not_measured += scan.flags.iter().filter(not_measured).count() as u64;
         self.with_chirps += usize::from(scan.flags.iter().any(|f| f & flag::CHIRP_KNOWN != 0));
         self.add_azimuths(scan);
         if self.scans <= POWER_SCANS {

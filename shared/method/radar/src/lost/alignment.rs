@@ -12,6 +12,8 @@ const STEPS: usize = 2;
 const AMID: [f32; 4] = [-1.0 / 16.0, 9.0 / 16.0, 9.0 / 16.0, -1.0 / 16.0];
 /// Azimuths beyond the turn on each side that the interpolation takes.
 const BESIDE: usize = 1;
+/// The least share of noise in the energy of a scan.
+const LEAST_NOISE: f32 = 1e-3;
 /// Likelihood of a row that is not as predicted, whatever number it has: of something that moves.
 const OUTLIER: f32 = 1e-3;
 /// Numbers of lost azimuths before a row, from none to all.
@@ -102,7 +104,8 @@ impl Alignment {
         if self.noise == 0.0 {
             let measured: f32 = scan.echoes.iter().map(|echo| echo.power * echo.power).sum();
             let (gain, common) = self.gain(prediction, count);
-            self.noise = ((measured - gain * common) / rows as f32).max(f32::MIN_POSITIVE);
+            let noise = measured - gain * common;
+            self.noise = noise.max(LEAST_NOISE * measured).max(1.0) / rows as f32;
         }
     }
 

@@ -29,6 +29,7 @@ impl Layout {
         let bin_m = geometry.range_resolution_m;
         let bins_per_cell = ((CELL_M / bin_m).round() as usize).max(1);
         let first_bin = ((NEAR_M - geometry.range_offset_m) / bin_m).max(0.0) as usize;
+        let first_bin = first_bin.min(geometry.bins);
         Self {
             azimuths: geometry.azimuths,
             cells: geometry.bins.saturating_sub(first_bin) / bins_per_cell,

@@ -2,7 +2,8 @@
 
 use std::f32::consts::TAU;
 
-use gyre_geometry::Twist;
+use gyre_geometry::{Pose, Twist};
+use nalgebra::Vector2;
 
 use super::echoes::{Echoes, Layout};
 use crate::scan::{PolarScan, Sense};
@@ -14,22 +15,27 @@ const TYPICAL_M: f32 = 30.0;
 /// at the same azimuth by the same motion.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Motion {
-    /// In the sense of the azimuths.
-    twist: Twist,
-    /// Between the middles of both turns.
-    between_s: f64,
+    /// The pose after a turn, in the sense of the azimuths.
+    pose: Pose,
+    /// Its change, in the same frame: m/s and rad/s.
+    velocity_mps: Vector2<f64>,
+    yaw_rate_radps: f64,
     /// From the first azimuth to the last one.
     turn_s: f64,
 }
 
 impl Motion {
     pub fn new(before_ns: i64, scan: &PolarScan<'_>, twist: &Twist) -> Self {
+        let twist = match scan.geometry.sense {
+            Sense::Clockwise => twist.mirrored(),
+            Sense::CounterClockwise => *twist,
+        };
+        let between_ns = scan.geometry.stamp_ns.saturating_sub(before_ns);
+        let pose = twist.pose_at(between_ns as f64 * 1e-9);
         Self {
-            twist: match scan.geometry.sense {
-                Sense::Clockwise => twist.mirrored(),
-                Sense::CounterClockwise => *twist,
-            },
-            between_s: scan.geometry.stamp_ns.saturating_sub(before_ns) as f64 * 1e-9,
+            pose,
+            velocity_mps: pose.rotation * Vector2::new(twist.vx_mps, twist.vy_mps),
+            yaw_rate_radps: twist.yaw_rate_radps,
             turn_s: scan.time_s(scan.geometry.azimuths - 1) - scan.time_s(0),
         }
     }
@@ -38,11 +44,11 @@ impl Motion {
     fn seen_from(&self, bearing_rad: f32) -> Moved {
         let (sin, cos) = bearing_rad.sin_cos();
         let after = |later_s: f64| {
-            let pose = self.twist.pose_at(self.between_s + later_s);
+            let at_m = self.pose.translation.vector + self.velocity_mps * later_s;
             Moved {
-                x_m: pose.translation.x as f32,
-                y_m: pose.translation.y as f32,
-                yaw_rad: pose.rotation.angle() as f32,
+                x_m: at_m.x as f32,
+                y_m: at_m.y as f32,
+                yaw_rad: (self.pose.rotation.angle() + self.yaw_rate_radps * later_s) as f32,
                 sin,
                 cos,
             }
@@ -115,6 +121,7 @@ impl Prediction {
 
     /// Distributes a power over the azimuths and cells on both sides.
     fn draw(&mut self, azimuth: f32, cell: f32, power: f32) {
+        let azimuth = azimuth.rem_euclid(self.layout.azimuths as f32);
         let (low, near) = (azimuth.floor(), cell.floor());
         let (share, depth) = (azimuth - low, cell - near);
         for (azimuth, share) in [(low, 1.0 - share), (low + 1.0, share)] {
@@ -137,7 +144,14 @@ impl Prediction {
         self.energies[self.within(azimuth)]
     }
 
+    /// Returns the azimuth of the turn, for one that is at most a turn beyond it.
     fn within(&self, azimuth: isize) -> usize {
-        azimuth.rem_euclid(self.layout.azimuths as isize) as usize
+        let azimuths = self.layout.azimuths as isize;
+        let within = match azimuth {
+            ..0 => azimuth + azimuths,
+            _ if azimuth >= azimuths => azimuth - azimuths,
+            _ => azimuth,
+        };
+        within as usize
     }
 }

@@ -129,6 +129,48 @@ fn rows_are_placed_at_the_azimuths_where_they_were_measured() {
 }
 
 #[test]
+fn angles_that_wrap_around_anywhere_are_placed_in_their_order() {
+    let (world, twist) = (world(1), Twist::default());
+    let before = scan(&world, &twist, 0.0);
+    let mut now = scan(&world, &twist, TURN_S);
+    lose(&mut now, &before, &[2, 390]);
+    for turned_rad in [-0.001, 0.001, 3.0] {
+        for (azimuth, angle) in now.azimuth_rad.iter_mut().enumerate() {
+            let straight = (azimuth as f64 / AZIMUTHS as f64 * TAU) as f32;
+            *angle = (straight + turned_rad).rem_euclid(TAU as f32);
+        }
+        let (view, mut rows) = (now.view(), PlacedRows::default());
+        let lost = LostAzimuths::between([[0, 3], [380, 398]]);
+        let placed = rows.place(&view, &lost);
+        let steps = placed.azimuth_rad.windows(2).map(|two| {
+            let step_rad = (two[1] - two[0]).rem_euclid(TAU as f32);
+            step_rad / TAU as f32 * AZIMUTHS as f32
+        });
+        for (row, step) in steps.enumerate() {
+            assert!((0.99..1.51).contains(&step), "{turned_rad} {row}: {step}");
+        }
+    }
+}
+
+#[test]
+fn scans_of_any_shape_and_offset_are_looked_at() {
+    let (world, twist) = (world(1), Twist::default());
+    let before = scan(&world, &twist, 0.0);
+    for (azimuths, bins, offset_m) in [(400, 576, -200.0), (400, 3, 0.0), (20, 40, 0.0)] {
+        let mut finder = LostAzimuthFinder::default();
+        for start_s in [0.0, TURN_S] {
+            let mut now = scan(&world, &twist, start_s);
+            lose(&mut now, &before, &[50, 51]);
+            now.flags[azimuths - 2..].fill(flag::STALE | flag::ASSUMED);
+            (now.geometry.azimuths, now.geometry.bins) = (azimuths, bins);
+            now.geometry.range_offset_m = offset_m;
+            let found = finder.find(&now.view(), Some(twist));
+            assert_eq!(found.rows(), [[0, azimuths as u16 - 2]; 2], "{bins} bins");
+        }
+    }
+}
+
+#[test]
 fn without_a_scan_before_they_may_be_anywhere_and_measured_azimuths_are_never_moved() {
     let (world, twist) = (world(2), Twist::default());
     let before = scan(&world, &twist, 0.0);

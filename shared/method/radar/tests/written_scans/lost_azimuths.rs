@@ -13,7 +13,7 @@ const AZIMUTHS: usize = 40;
 const BINS: usize = 60;
 const SCANS: usize = 5;
 /// Azimuths that each scan has lost.
-const LOST: [usize; SCANS] = [0, 0, 2, 0, 1];
+const LOST: [usize; SCANS] = [0, 2, 2, 0, 1];
 
 /// Powers that no other scan and azimuth has.
 fn power(scan: usize, azimuth: usize, bin: usize) -> u8 {
@@ -56,7 +56,9 @@ fn stale_columns_are_counted_in_all_images_without_metadata() {
         write_images(&images);
         let mut dataset = opened(root.path());
         assert_eq!(dataset.format(), format);
-        for (index, lost) in LOST.into_iter().enumerate() {
+        // In any order: the last columns of scan 1 are those of scan 0.
+        for index in [0, 1, 2, 3, 4, 1, 0, 2] {
+            let lost = LOST[index];
             let scan = read(dataset.as_mut(), index).unwrap();
             assert_eq!(stale_rows(&scan.view()), lost, "{format} {index}");
             let (measured, stale) = scan.flags.split_at(AZIMUTHS - lost);
@@ -66,7 +68,7 @@ fn stale_columns_are_counted_in_all_images_without_metadata() {
         }
         let report = inspect(root.path(), &DatasetOptions::default(), None).unwrap();
         let findings = report.findings.join(" ");
-        let sentence = "2 of 5 scans have lost azimuths, 3 in all";
+        let sentence = "3 of 5 scans have lost azimuths, 5 in all";
         assert!(findings.contains(sentence), "{findings}");
 
         let ignoring = options(|o| o.lost_azimuths = Some(LostAzimuthOption::Ignore));

@@ -95,18 +95,24 @@ pub(super) fn of_alignment(
         .then_some(covariance)
 }
 
-/// Share of the first harmonic in the variance of azimuths behind a step at any place, along each
-/// of the two axes: 6 / pi^2, halved.
+/// The largest share in the variance of azimuths that their mean has, where one was lost anywhere in
+/// the turn.
+const MEAN_SHARE: f64 = 0.5;
+/// The largest share that their first harmonic has along each of the two axes.
 const HARMONIC_SHARE: f64 = 0.3;
 
-/// The covariance of an alignment by errors of the azimuths that vary slowly along the turn: their
-/// mean turns the scan, and their first harmonic moves it by as much as points at the typical range
-/// are moved sideways.
+/// A bound of the covariance of an alignment by errors of the azimuths that vary slowly along the
+/// turn: their mean turns the scan, and their first harmonic moves it by as much as points at the
+/// typical range are moved sideways.
 pub(super) fn by_azimuths(alignment: &Alignment, variance_rad2: f64) -> Matrix3<f64> {
     let information = &alignment.normal.information;
     let square_range_m2 = 2.0 * information[(2, 2)] / (information[(0, 0)] + information[(1, 1)]);
     let sideways = HARMONIC_SHARE * square_range_m2 * variance_rad2;
-    Matrix3::from_diagonal(&Vector3::new(sideways, sideways, variance_rad2))
+    Matrix3::from_diagonal(&Vector3::new(
+        sideways,
+        sideways,
+        MEAN_SHARE * variance_rad2,
+    ))
 }
 
 /// The share of a match's covariance by which a map of `keyframes` drifts.
