@@ -3,18 +3,21 @@
 
 use std::{f64::consts::TAU, fs, path::Path};
 
-use gyre_radar::{Dataset, DatasetOptions, OwnedScan, lost::stale_rows, open, scan::flag};
+use gyre_radar::{
+    Dataset, DatasetOptions, LostAzimuthOption, OwnedScan, lost::stale_rows, open, scan::flag,
+    stored_options,
+};
 use serde_json::json;
 
 use crate::common::{Ended, Run, gyre, recording};
 
 /// The scans of a recording of RADIATE.
 fn scans(recording: &Path) -> Vec<OwnedScan> {
-    read_all(
-        open(recording, &DatasetOptions::default())
-            .unwrap()
-            .as_mut(),
-    )
+    let options = DatasetOptions {
+        lost_azimuths: Some(LostAzimuthOption::Find),
+        ..DatasetOptions::default()
+    };
+    read_all(open(recording, &options).unwrap().as_mut())
 }
 
 fn read_all(dataset: &mut dyn Dataset) -> Vec<OwnedScan> {
@@ -92,10 +95,16 @@ fn lost_azimuths_are_counted_and_put_back_in_an_export() {
     let difference = |scans: &[OwnedScan]| difference(scans, &true_scans, &stale_before);
     let (wrong, right) = (difference(&before), difference(&after));
     assert!(right < 0.9 * wrong, "{wrong} as recorded, {right} repaired");
-    for list in ["Navtech_Polar.txt", "ground_truth.tum", "dataset.toml"] {
+    for list in ["Navtech_Polar.txt", "ground_truth.tum"] {
         let copied = fs::read(out.join(list)).unwrap();
         assert_eq!(copied, fs::read(lossy.join(list)).unwrap(), "{list}");
     }
+    let options = stored_options(&out).unwrap();
+    let expected = DatasetOptions {
+        lost_azimuths: Some(LostAzimuthOption::Ignore),
+        ..stored_options(&lossy).unwrap()
+    };
+    assert_eq!(options, expected);
     export(&run, &out).failed_with(&["repaired exists: name a new folder"]);
 
     let bag = run.folder().join("bag.mcap");

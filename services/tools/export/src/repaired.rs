@@ -10,8 +10,10 @@ use std::{
 
 use gyre_configuration::Configuration;
 use gyre_radar::{
-    Dataset, Format, LostAzimuthOption, LostAzimuths, OwnedScan, ReadError, find_ground_truth,
+    Dataset, DatasetOptions, Format, LostAzimuthOption, LostAzimuths, OwnedScan, ReadError,
+    find_ground_truth,
     lost::{repair, stale_rows},
+    stored_options,
 };
 use gyre_storage::{StorageError, create_folder, write as write_file};
 use gyre_terminal::{Failure, print};
@@ -20,6 +22,8 @@ use crate::source::{Lost, Source};
 
 /// The folder of the images in RADIATE's form; the list of their times lies beside it.
 const IMAGES: &str = "Navtech_Polar";
+/// The file with the options of a recording.
+const OPTIONS: &str = "dataset.toml";
 /// The ends of the names of lists that lie beside the images.
 const LISTS: [&str; 6] = ["csv", "json", "npy", "toml", "tum", "txt"];
 
@@ -51,7 +55,14 @@ pub fn write(source: &Source, out: &Path) -> Result<(), Failure> {
     for index in played {
         writer.write(index)?;
     }
-    copy_lists(&images, out)?;
+    let root = images.parent().unwrap_or(Path::new(""));
+    // Beside an interpolated column one of a standing radar may look stale.
+    let options = DatasetOptions {
+        lost_azimuths: Some(LostAzimuthOption::Ignore),
+        ..stored_options(root)?
+    };
+    write_file(&out.join(OPTIONS), toml::to_string(&options)?)?;
+    copy_lists(&images, root, out)?;
     writer.counts.describe(out)
 }
 
@@ -158,9 +169,8 @@ impl Writer {
 
 /// Copies the ground truth and the lists beside the images. The times come last: images without
 /// them are no recording, should this not come to its end.
-fn copy_lists(images: &Path, out: &Path) -> Result<(), Failure> {
+fn copy_lists(images: &Path, root: &Path, out: &Path) -> Result<(), Failure> {
     let times = images.with_extension("txt");
-    let root = images.parent().unwrap_or(Path::new(""));
     let failed = StorageError::at("read", root);
     let mut lists = Vec::new();
     for entry in fs::read_dir(root).map_err(&failed)? {
@@ -168,7 +178,8 @@ fn copy_lists(images: &Path, out: &Path) -> Result<(), Failure> {
     }
     lists.retain(|path| {
         let end = path.extension().and_then(|end| end.to_str());
-        path.is_file() && *path != times && end.is_some_and(|end| LISTS.contains(&end))
+        let is_written = *path == times || path.ends_with(OPTIONS);
+        path.is_file() && !is_written && end.is_some_and(|end| LISTS.contains(&end))
     });
     lists.extend(find_ground_truth(root));
     for list in lists {
