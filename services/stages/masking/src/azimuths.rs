@@ -14,8 +14,8 @@ pub struct Azimuths {
 
 impl Azimuths {
     /// Returns where azimuths of a sweep were lost: the next one, or the last one again. `known` is
-    /// what a masking before this one has found. Where a chain of motions `starts`, nothing is known
-    /// of the scan before.
+    /// what a masking before this one has found. Where a chain of motions `starts`, nothing is
+    /// known of the scan before.
     pub fn lost(
         &mut self,
         sweep: &Sweep<'_>,

@@ -120,7 +120,8 @@ struct Previous {
 
 impl LostAzimuthFinder {
     /// Finds where azimuths of the next scan were lost. `twist` predicts its motion from the scan
-    /// before. Without it, or without a scan before, each may have been lost anywhere. The scan is to pass [`PolarScan::check`].
+    /// before. Without it, or without a scan before, each may have been lost anywhere. The scan is
+    /// to pass [`PolarScan::check`].
     pub fn find(&mut self, scan: &PolarScan<'_>, twist: Option<Twist>) -> LostAzimuths {
         if !self.read(scan) {
             return LostAzimuths::default();
@@ -160,8 +161,8 @@ impl LostAzimuthFinder {
         }
     }
 
-    /// Reads the rows of a scan. Returns `false` if its azimuths are measured, so that none was lost
-    /// unseen.
+    /// Reads the rows of a scan. Returns `false` if its azimuths are measured, so that none was
+    /// lost unseen.
     fn read(&mut self, scan: &PolarScan<'_>) -> bool {
         let assumed = |flags: &u8| flags & flag::ASSUMED != 0;
         let is_assumed = scan.flags.first().is_some_and(assumed);

@@ -17,7 +17,7 @@ const TYPICAL_M: f32 = 30.0;
 pub(super) struct Motion {
     /// The pose after a turn, in the sense of the azimuths.
     pose: Pose,
-    /// Its change, in the same frame: m/s and rad/s.
+    /// Change of that pose, in the same frame: m/s and rad/s.
     velocity_mps: Vector2<f64>,
     yaw_rate_radps: f64,
     /// From the first azimuth to the last one.

@@ -95,8 +95,8 @@ pub(super) fn of_alignment(
         .then_some(covariance)
 }
 
-/// The largest share in the variance of azimuths that their mean has, where one was lost anywhere in
-/// the turn.
+/// The largest share in the variance of azimuths that their mean has, where one was lost anywhere
+/// in the turn.
 const MEAN_SHARE: f64 = 0.5;
 /// The largest share that their first harmonic has along each of the two axes.
 const HARMONIC_SHARE: f64 = 0.3;
