@@ -220,8 +220,8 @@ impl Dataset for TransposedScans {
             let bytes = &mut slot.bytes[..azimuths * bins];
             match self.decode(before, bytes) {
                 Ok(()) => self.remember(before, Some(bytes)),
-                // The image may come back.
-                Err(error @ ReadError::Io { .. }) => return Err(error),
+                // The file may come back, as with this one.
+                Err(ReadError::Io { .. }) => {}
                 Err(_) => self.remember(before, None),
             }
         }
