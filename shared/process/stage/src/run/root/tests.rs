@@ -1,9 +1,6 @@
 #![allow(clippy::unwrap_used)]
 
-use std::{
-    os::unix::fs::{PermissionsExt, symlink},
-    thread,
-};
+use std::os::unix::fs::{PermissionsExt, symlink};
 
 use super::*;
 
@@ -169,18 +166,4 @@ fn a_directory_of_another_user_is_refused() {
         refused.to_string().contains("belongs to user 65534"),
         "{refused}"
     );
-}
-
-#[test]
-fn runs_that_begin_while_the_last_one_of_the_user_ends_find_their_place() {
-    thread::scope(|scope| {
-        for _ in 0..3 {
-            scope.spawn(|| {
-                let out = tempfile::tempdir().unwrap();
-                for _ in 0..400 {
-                    acquire(out.path()).unwrap();
-                }
-            });
-        }
-    });
 }
