@@ -1,5 +1,5 @@
-//! Runs of one user that begin and end at the same time. In a process of its own, since each removes
-//! the dead runs that other tests leave.
+//! Runs of one user that begin and end at the same time. In a process of its own, since each
+//! removes the dead runs that other tests leave.
 
 #![allow(clippy::unwrap_used)]
 
