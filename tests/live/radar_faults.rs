@@ -158,6 +158,8 @@ enum Connection {
     Junk,
     /// Describes the radar, and says again and again that it is alive.
     KeptAlive,
+    /// Describes the radar, and sends that without a pause.
+    Flooded,
 }
 
 /// Listens for connections, and treats one after the other as told; all further ones are relayed.
@@ -171,7 +173,10 @@ fn relay(radar: &str, all: &'static [Connection]) -> String {
             let (client, radar) = (client.unwrap(), radar.clone());
             thread::spawn(move || match all.get(k) {
                 Some(Connection::Junk) => send_junk(client),
-                Some(Connection::KeptAlive) => keep_alive(client, &radar),
+                Some(Connection::KeptAlive) => {
+                    keep_alive(client, &radar, Duration::from_millis(200))
+                }
+                Some(Connection::Flooded) => keep_alive(client, &radar, Duration::ZERO),
                 _ => pass_on(client, &radar),
             });
         }
@@ -194,15 +199,18 @@ fn send_junk(mut client: TcpStream) -> io::Result<()> {
     Ok(())
 }
 
-fn keep_alive(mut client: TcpStream, radar: &str) -> io::Result<()> {
+fn keep_alive(mut client: TcpStream, radar: &str, pause: Duration) -> io::Result<()> {
     let mut described = [0; 256];
     let count = TcpStream::connect(radar)?.read(&mut described)?;
     client.write_all(&described[..count])?;
     let mut alive = Vec::new();
     write_keep_alive(&mut alive);
+    if pause.is_zero() {
+        alive = alive.repeat(4096);
+    }
     loop {
         client.write_all(&alive)?;
-        thread::sleep(Duration::from_millis(200));
+        thread::sleep(pause);
     }
 }
 
@@ -215,6 +223,7 @@ fn what_sends_no_azimuths_is_left_and_the_radar_is_found_again() {
         Connection::Junk,
         Connection::Junk,
         Connection::KeptAlive,
+        Connection::Flooded,
     ];
     let run = run_at(&relay(&radar.address, connections)).set("source.scans=12");
     let mut running = run.start();
@@ -232,7 +241,7 @@ fn what_sends_no_azimuths_is_left_and_the_radar_is_found_again() {
     running.finish().succeeded();
     let summary = run.summary();
     assert_eq!(summary["published"], 12);
-    assert_eq!(count(&summary, "reconnections"), 3);
+    assert_eq!(count(&summary, "reconnections"), 4);
     let log = run.result("log.jsonl");
     for words in ["it does not speak Colossus", "it sent no azimuth for 1s"] {
         assert!(log.contains(words), "{log}");

@@ -19,7 +19,7 @@ use gyre_run::{Ending, Mode};
 use gyre_stage::{
     Manifest,
     run::{RootError, RunRoot, sweep},
-    wake::Signals,
+    wake::{Signals, let_signals_end_the_process},
 };
 use gyre_storage as storage;
 use gyre_supervise::{Plan, SuperviseError, supervise};
@@ -313,6 +313,8 @@ fn finish(
     out: &Out,
     session: &Session<'_>,
 ) -> Result<Results, Failure> {
+    // All poses are kept by now, and the same command writes the results again.
+    let_signals_end_the_process()?;
     let make_way = |poses| earlier::make_way(out, poses);
     let mut written = gyre_results::write(configuration, out, session, &make_way)?;
     let has_replaced = earlier::replaces(out, written.poses);

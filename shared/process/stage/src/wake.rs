@@ -11,7 +11,7 @@ use std::{
         fd::{AsFd, BorrowedFd},
         unix::net::UnixStream,
     },
-    sync::Arc,
+    sync::{Arc, atomic::AtomicBool},
     time::Duration,
 };
 
@@ -39,6 +39,23 @@ pub fn report_file_size_limit() -> Result<(), StageError> {
         .map(drop)
         .map_err(|error| StageError::transport("install the signal handlers", error))
 }
+
+/// Lets SIGTERM, SIGINT and SIGHUP end the process from here on, also where [`Signals`] are
+/// installed: for work after which nobody waits for them.
+///
+/// # Errors
+/// The handlers cannot be installed.
+pub fn let_signals_end_the_process() -> Result<(), StageError> {
+    let always = Arc::new(AtomicBool::new(true));
+    for signal in STOP {
+        signal_hook::flag::register_conditional_default(signal, Arc::clone(&always))
+            .map_err(|error| StageError::transport("install the signal handlers", error))?;
+    }
+    Ok(())
+}
+
+/// The signals by which a process is asked to stop.
+const STOP: [i32; 3] = [consts::SIGTERM, consts::SIGINT, consts::SIGHUP];
 
 /// Signals as file descriptors to wait for.
 #[derive(Debug)]
@@ -85,7 +102,7 @@ impl Signals {
         for socket in [&stop, &child] {
             socket.set_nonblocking(true).map_err(failed)?;
         }
-        for signal in [consts::SIGTERM, consts::SIGINT, consts::SIGHUP] {
+        for signal in STOP {
             pipe::register(signal, stop_end.try_clone().map_err(failed)?).map_err(failed)?;
         }
         pipe::register(consts::SIGCHLD, child_end).map_err(failed)?;
