@@ -1,5 +1,5 @@
 //! `gyre export`: what a run has found, and its scans, as a bag of ROS 2; or the repaired recording
-//! of a run, as RADIATE has it ([`repaired`]).
+//! of a run, as RADIATE has it (`repaired`).
 
 mod arguments;
 mod places;
