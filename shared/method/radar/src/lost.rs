@@ -1,7 +1,7 @@
 //! Lost azimuths: where the host of a radar lost azimuths of a turn.
 //!
 //! The rows behind a lost azimuth have moved up by one. The last rows of the image are *stale*:
-//! they hold what the turn before had there ([`flag::STALE`](crate::scan::flag::STALE)). So it is
+//! they hold what the turn before had there ([`flag::STALE`]). So it is
 //! known how many azimuths were lost, but not where. [`LostAzimuthFinder`] finds that by aligning
 //! a scan with the one before it.
 //!
