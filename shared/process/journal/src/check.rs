@@ -3,7 +3,7 @@
 use std::{collections::VecDeque, path::Path};
 
 use gyre_messages::{PoseHeader, flag};
-use gyre_storage::{File, GroupSync};
+use gyre_storage::{Busy, File, GroupSync};
 
 use crate::{JournalError, record::RECORDS, records::Places};
 
@@ -84,12 +84,17 @@ fn damaged(path: &Path, pose: u64) -> JournalError {
     }
 }
 
-/// Cuts a journal after `records` records. The cut survives a power failure.
+/// Cuts a journal after `records` records. The cut survives a power failure. Waits up to a second
+/// for a stage of a killed run that still writes it: that dies a moment after its supervisor.
 ///
 /// # Errors
-/// A file that cannot be written.
+/// A file that cannot be written, or that another process goes on writing.
 pub fn cut(path: &Path, records: u64) -> Result<(), JournalError> {
     let file = File::open_or_create(path)?;
+    if !file.lock()? {
+        let path = path.to_owned();
+        return Err(Busy { path }.into());
+    }
     file.set_length(if records == 0 {
         0
     } else {

@@ -1,5 +1,5 @@
 #![allow(clippy::unwrap_used)]
-use std::fs;
+use std::{fs, thread, time::Duration};
 
 use gyre_messages::Item;
 use gyre_storage::GroupSync;
@@ -56,6 +56,23 @@ fn corrupt(path: &Path, record: u64) {
     let mut bytes = fs::read(path).unwrap();
     bytes[RECORDS.offset(record) as usize + 100] ^= 1;
     fs::write(path, bytes).unwrap();
+}
+
+#[test]
+fn a_journal_is_cut_when_nobody_writes_it_any_more() {
+    let (_folder, path) = journal_of(5);
+    let writer = Journal::open(&path).unwrap();
+    let refused = cut(&path, 3).unwrap_err();
+    assert!(matches!(refused, JournalError::Busy(_)), "{refused}");
+    assert_eq!(read(&path), [0, 1, 2, 3, 4]);
+    let dying = thread::spawn(move || {
+        thread::sleep(Duration::from_millis(100));
+        let mut writer = writer;
+        writer.append(&pose(5)).unwrap();
+    });
+    cut(&path, 3).unwrap();
+    dying.join().unwrap();
+    assert_eq!(read(&path), [0, 1, 2]);
 }
 
 #[test]
