@@ -194,10 +194,8 @@ impl Renderer {
     pub fn drive(&self) -> &SimulatedDrive {
         &self.drive
     }
-}
 
-impl Renderer {
-    /// Loses azimuths of an image as the host does.
+    /// Loses azimuths of an image as the host does: the image before may have lost some too.
     fn lose_azimuths(&mut self, index: usize, pixels: &mut [u8]) {
         let azimuths = self.drive.lost_azimuths(index);
         if let Some(before) = index.checked_sub(1).filter(|_| !azimuths.is_empty()) {

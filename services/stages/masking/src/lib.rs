@@ -62,20 +62,18 @@ impl Stage for Masking {
     ) -> Result<(), StageError> {
         let malformed = |error: MaskError| input.scan.malformed(error.to_string());
         let [rows, previous_rows] = &mut self.rows;
-        let mut previous = match &input.previous {
-            Some(previous) => Some(sweep(previous.scan, previous.motion)?),
+        let mut place = |received, motion, known, rows| -> Result<_, StageError> {
+            let mut sweep = sweep(received, motion)?;
+            let starts = received.item().is(flag::BREAK);
+            let lost = self.azimuths.lost(&sweep, known, starts);
+            sweep.scan = PlacedRows::place(rows, &sweep.scan, &lost);
+            Ok(sweep)
+        };
+        let previous = match &input.previous {
+            Some(it) => Some(place(it.scan, it.motion, it.lost, previous_rows)?),
             None => None,
         };
-        if let (Some(sweep), Some(input)) = (&mut previous, &input.previous) {
-            let starts = input.scan.item().is(flag::BREAK);
-            let lost = self.azimuths.lost(sweep, input.lost, starts);
-            sweep.scan = previous_rows.place(&sweep.scan, &lost);
-        }
-        let mut sweep = sweep(input.scan, input.motion)?;
-        let azimuths = sweep.scan.geometry.azimuths;
-        let starts = input.scan.item().is(flag::BREAK);
-        let lost = self.azimuths.lost(&sweep, input.lost, starts);
-        sweep.scan = rows.place(&sweep.scan, &lost);
+        let sweep = place(input.scan, input.motion, input.lost, rows)?;
         if let Some(previous) = &previous
             && !self.masker.can_follow(previous.number)
         {
@@ -98,7 +96,8 @@ impl Stage for Masking {
             .points(&sweep.scan, twist, parts.points)
             .map_err(|error| input.scan.malformed(error.to_string()))?;
         *header = self.header(twist, points);
-        header.azimuth_variance_rad2 = lost.variance_rad2(azimuths);
+        let azimuths = input.scan.header().azimuths as usize;
+        header.azimuth_variance_rad2 = self.azimuths.last().variance_rad2(azimuths);
         Ok(())
     }
 

@@ -1,9 +1,9 @@
 //! Lost azimuths: where the host of a radar lost azimuths of a turn.
 //!
 //! The rows behind a lost azimuth have moved up by one. The last rows of the image are *stale*:
-//! they hold what the turn before had there ([`flag::STALE`]). So it is
-//! known how many azimuths were lost, but not where. [`LostAzimuthFinder`] finds that by aligning
-//! a scan with the one before it.
+//! they hold what the turn before had there ([`flag::STALE`]). So it is known how many azimuths
+//! were lost, but not where. [`LostAzimuthFinder`] finds that by aligning a scan with the one
+//! before it.
 //!
 //! Reading order: [`LostAzimuthFinder`]; [`PlacedRows`]; `echoes` (what is aligned); `prediction`
 //! (the scan before as the sensor would see it now); `alignment` (how likely each place is);
@@ -76,8 +76,8 @@ impl LostAzimuths {
         &self.between[..self.count]
     }
 
-    /// Returns the mean variance of the rows' azimuths by what is not known of the places, rad², in
-    /// a turn of `azimuths`.
+    /// Returns the mean variance of the rows' azimuths by what is not known of the places, rad²,
+    /// in a turn of `azimuths`.
     pub fn variance_rad2(&self, azimuths: usize) -> f32 {
         let measured = azimuths.saturating_sub(self.count).max(1);
         // Over the rows of an interval the probability to be behind the place rises from 0 to 1,
@@ -103,7 +103,7 @@ impl LostAzimuths {
 /// Finds where azimuths of scans were lost.
 #[derive(Debug, Default)]
 pub struct LostAzimuthFinder {
-    /// Of the rows as they follow each other.
+    /// The echoes of the rows as they follow each other.
     rows: Echoes,
     /// The scan before.
     previous: Option<Previous>,
@@ -114,7 +114,7 @@ pub struct LostAzimuthFinder {
 #[derive(Debug)]
 struct Previous {
     stamp_ns: i64,
-    /// Of its azimuths.
+    /// Each at its azimuth.
     echoes: Echoes,
 }
 
@@ -217,7 +217,7 @@ impl PlacedRows {
             let (start, end) = (scan.azimuth_rad[before], scan.azimuth_rad[after]);
             // Angles may wrap around anywhere.
             let step = (end - start + PI).rem_euclid(TAU) - PI;
-            self.azimuth_rad.push(match step == 0.0 || share == 0.0 {
+            self.azimuth_rad.push(match share == 0.0 {
                 true => start,
                 false => (start + share * step).rem_euclid(TAU),
             });

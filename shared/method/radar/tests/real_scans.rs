@@ -148,7 +148,8 @@ fn radiate_images_are_transposed_and_the_clock_is_uniform() {
 
 #[test]
 fn lost_azimuths_of_images_without_metadata_are_counted() {
-    // Scans, those with losses, and azimuths that were lost, by ../shared/reference.
+    // Scans, those with losses, and azimuths that were lost, as a script that
+    // was written before this reader counts them.
     for (folder, expected) in [
         ("radiate-2019-02-12", [466, 214, 286]),
         ("radiate-2019-02-12-b", [409, 196, 263]),

@@ -32,7 +32,7 @@ impl Layout {
         let first_bin = first_bin.min(geometry.bins);
         Self {
             azimuths: geometry.azimuths,
-            cells: geometry.bins.saturating_sub(first_bin) / bins_per_cell,
+            cells: (geometry.bins - first_bin) / bins_per_cell,
             bins_per_cell,
             first_bin,
             first_m: scan.range_m(first_bin as f32 + 0.5 * (bins_per_cell as f32 - 1.0)),
