@@ -2,7 +2,11 @@
 
 use std::path::PathBuf;
 
-use gyre_configuration::{MethodConfig, automatic, strict};
+use gyre_configuration::{
+    MethodConfig, automatic,
+    paths::{Named, find_own},
+    strict,
+};
 use gyre_radar::Format;
 use pyo3::{
     prelude::*,
@@ -39,6 +43,7 @@ impl Config {
     }
 
     fn from_table(mut table: Table, note: Option<String>) -> PyResult<Self> {
+        find_own(&mut table);
         let method = MethodConfig::take(&mut table).map_err(errors::config)?;
         if let Some(key) = table.keys().next() {
             let unknown = strict::unknown("the configuration", key, &MethodConfig::SECTIONS);
@@ -59,16 +64,22 @@ impl Config {
         Self::from_table(table.unwrap_or_default(), None)
     }
 
-    /// Reads a TOML file, as `gyre run` does. Its sections `run`, `source`, `simulation`, `budget`,
+    /// Reads a TOML file, or one of Gyre's configurations by its name as `oxford`, as `gyre run`
+    /// does. Relative paths in it start at its folder; Gyre's own files, as
+    /// `models/gyre-255.toml`, are found too. `note` says where a file is taken from if that is
+    /// not clear. Its sections `run`, `source`, `simulation`, `budget`,
     /// `record` and `stages`, which are for a run of processes, are ignored. `overrides` replaces
     /// keys: `{"masking.kind": "none"}`.
     #[staticmethod]
     #[pyo3(signature = (path, overrides=None))]
     fn read(path: PathBuf, overrides: Option<&Bound<'_, PyMapping>>) -> PyResult<Self> {
-        let mut table = strict::read_table(&path).map_err(errors::config)?;
+        let named = Named::read(&path).map_err(errors::config)?;
+        let mut table = named.table.clone();
         table.retain(|section, _| !MethodConfig::SECTIONS_OF_A_RUN.contains(&section));
         values::set_all(&mut table, overrides)?;
-        Self::from_table(table, None)
+        let notes = named.notes(&table);
+        let note = (!notes.is_empty()).then(|| notes.join("; "));
+        Self::from_table(table, note)
     }
 
     /// Finds the settings of a recording, as `gyre run --data` does without a configuration: the

@@ -9,7 +9,7 @@ use gyre_radar::{Dataset, DatasetOptions, Format, OpenError, OwnedScan, ReadErro
 use thiserror::Error;
 use toml::{Table, Value};
 
-use crate::{ConfigurationError, MethodConfig, strict};
+use crate::{ConfigurationError, MethodConfig, paths::Named, strict};
 
 /// Scans that are measured, evenly spread over the recording.
 const SCANS: usize = 8;
@@ -118,22 +118,21 @@ fn of_recorded_run(data: &Path) -> Result<Automatic, AutomaticError> {
     })
 }
 
-/// Returns the constants of the radar of a dataset, from its file in `configs/`.
+/// Returns the constants of the radar of a dataset, from its configuration in the
+/// program.
 fn constants(format: Format) -> Result<DatasetOptions, ConfigurationError> {
-    let text = match format {
-        Format::Oxford => include_str!("../../../configs/oxford.toml"),
-        Format::Boreas => include_str!("../../../configs/boreas.toml"),
-        Format::BoreasRt => include_str!("../../../configs/boreas-rt.toml"),
-        Format::Mulran | Format::MulranOxfordForm => {
-            include_str!("../../../configs/mulran.toml")
+    let name = match format {
+        Format::Oxford => "oxford",
+        Format::Boreas => "boreas",
+        Format::BoreasRt => "boreas-rt",
+        Format::Mulran | Format::MulranOxfordForm => "mulran",
+        Format::Radiate => "radiate",
+        Format::Fomo => "fomo",
+        Format::Oord | Format::Mcap | Format::Other | Format::Ros2Bag => {
+            return Ok(DatasetOptions::default());
         }
-        Format::Radiate => include_str!("../../../configs/radiate.toml"),
-        Format::Fomo => include_str!("../../../configs/fomo.toml"),
-        Format::Oord | Format::Mcap | Format::Other | Format::Ros2Bag => "",
     };
-    let parsed: Result<Table, _> = text.parse();
-    let mut table =
-        parsed.map_err(|error| strict::value("dataset", strict::syntax(text, &error)))?;
+    let mut table = Named::read_in(Path::new(name), None)?.table;
     strict::section(&mut table, "dataset")
 }
 

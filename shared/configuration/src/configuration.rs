@@ -26,6 +26,7 @@ use crate::{
     automatic::{AutomaticError, automatic},
     error::ConfigurationError,
     method::MethodConfig,
+    paths::{self, Named},
     strict,
 };
 
@@ -74,8 +75,23 @@ impl Configuration {
     /// # Errors
     /// A file that cannot be read, an unknown key, a value out of its bounds.
     pub fn read(path: &Path, overrides: &[String]) -> Result<Self, ConfigurationError> {
-        let table = strict::read_table(path)?;
-        Self::resolve(table, overrides)
+        Self::resolve(Named::read_in(path, None)?.table, overrides)
+    }
+
+    /// As [`read`](Self::read), of a path or of the name of a configuration of the program, for a
+    /// person. Returns sentences about its paths too.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub fn named(
+        path: &Path,
+        overrides: &[String],
+    ) -> Result<(Self, Vec<String>), ConfigurationError> {
+        let named = Named::read(path)?;
+        let mut changed = named.table.clone();
+        set_all(&mut changed, overrides)?;
+        let notes = named.notes(&changed);
+        Ok((Self::of_table(changed)?, notes))
     }
 
     /// Creates a configuration from overrides `section.key=value` alone.
@@ -102,9 +118,12 @@ impl Configuration {
     }
 
     fn resolve(mut table: toml::Table, overrides: &[String]) -> Result<Self, ConfigurationError> {
-        for sentence in overrides {
-            strict::set(&mut table, sentence)?;
-        }
+        set_all(&mut table, overrides)?;
+        Self::of_table(table)
+    }
+
+    fn of_table(mut table: toml::Table) -> Result<Self, ConfigurationError> {
+        paths::find_own(&mut table);
         let configuration = Self::from_table(table)?;
         configuration.validate()?;
         Ok(configuration)
@@ -322,6 +341,11 @@ impl Configuration {
         let now: toml::Table = self.to_toml()?.parse().map_err(unparsed)?;
         Ok(difference::first(&relevant(begun), &relevant(&now)))
     }
+}
+
+fn set_all(table: &mut toml::Table, overrides: &[String]) -> Result<(), ConfigurationError> {
+    let mut overrides = overrides.iter();
+    overrides.try_for_each(|sentence| strict::set(table, sentence))
 }
 
 /// Reads the limits for all scenarios, and those for each.

@@ -15,6 +15,16 @@ pub enum ConfigurationError {
         /// The error of the operating system.
         source: std::io::Error,
     },
+    /// A name that neither a file nor a configuration of the program has.
+    #[error(
+        "`{name}` is neither a file nor a configuration of the program, which `gyre config` lists{suggestion}"
+    )]
+    Unknown {
+        /// The name.
+        name: String,
+        /// The nearest known one.
+        suggestion: String,
+    },
     /// It is a folder.
     #[error("the configuration {path} is a folder: {remedy}")]
     Folder {

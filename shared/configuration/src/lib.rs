@@ -2,6 +2,7 @@
 //! that is played without one.
 //!
 //! - [`MethodConfig`]: the settings of the method alone, for a program that computes by itself;
+//! - [`paths`]: configurations by path or by name, and the files that they name;
 //! - [`automatic`](automatic()): the settings of a recording without a configuration;
 //!
 //! and with the feature `run`:
@@ -17,6 +18,7 @@ mod error;
 #[cfg(feature = "run")]
 mod masks;
 mod method;
+pub mod paths;
 #[cfg(feature = "run")]
 mod scans;
 #[cfg(feature = "run")]

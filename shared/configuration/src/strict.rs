@@ -25,10 +25,18 @@ pub fn read_table(path: &Path) -> Result<Table, ConfigurationError> {
         return Err(folder(path));
     }
     let text = gyre_storage::read_text(path, gyre_storage::SETTINGS).map_err(unreadable)?;
+    parse(path, &text)
+}
+
+/// Parses a text; `path` is its name in errors.
+///
+/// # Errors
+/// A text that is not TOML.
+pub fn parse(path: &Path, text: &str) -> Result<Table, ConfigurationError> {
     let parsed: Result<Table, _> = text.parse();
     parsed.map_err(|error| ConfigurationError::Syntax {
         path: path.to_owned(),
-        reason: syntax(&text, &error),
+        reason: syntax(text, &error),
     })
 }
 
@@ -124,18 +132,22 @@ pub fn sections<T: DeserializeOwned>(
 
 /// Returns the error for an unknown key.
 pub fn unknown(section: &str, key: &str, known: &[&str]) -> ConfigurationError {
-    let alike = |name: &&str| (strsim::jaro_winkler(key, name) * 1e6) as u64;
-    let nearest = known.iter().copied().max_by_key(alike);
-    let nearest = nearest.filter(|name| strsim::jaro_winkler(key, name) > ALIKE);
-    let suggestion = match nearest {
-        Some(name) => format!("; did you mean `{name}`?"),
-        None => format!("; it knows {}", known.join(", ")),
-    };
     ConfigurationError::UnknownKey {
         section: section.to_owned(),
         key: key.to_owned(),
-        suggestion,
+        suggestion: match suggestion(key, known) {
+            nearest if nearest.is_empty() => format!("; it knows {}", known.join(", ")),
+            nearest => nearest,
+        },
     }
+}
+
+/// Returns a question for the nearest known name; empty if none is alike.
+pub(crate) fn suggestion(name: &str, known: &[&str]) -> String {
+    let alike = |known: &&str| (strsim::jaro_winkler(name, known) * 1e6) as u64;
+    let nearest = known.iter().copied().max_by_key(alike);
+    let nearest = nearest.filter(|known| strsim::jaro_winkler(name, known) > ALIKE);
+    nearest.map_or_else(String::new, |name| format!("; did you mean `{name}`?"))
 }
 
 /// Sets a key by an override `section.key=value`; the value is TOML, or else a plain string.

@@ -171,7 +171,10 @@ impl Drop for Child<'_> {
 fn words(batch: &Batch<'_>, drive: &Drive) -> Vec<OsString> {
     let path = batch.list.resolve(&drive.path);
     let own = drive.configuration.as_deref();
-    let own = own.map(|configuration| batch.list.resolve(configuration));
+    let own = own.map(|named| match batch.list.resolve(named) {
+        file if file.is_file() => file,
+        file => gyre_shipped::configuration(Path::new(named)).unwrap_or(file),
+    });
     let configuration = own.or_else(|| batch.settings.configuration.clone());
     let configuration = configuration.map(PathBuf::into_os_string);
     let mut words = vec![

@@ -180,7 +180,10 @@ impl Card {
             path: path.to_owned(),
             source,
         };
-        let text = gyre_storage::read_text(path, gyre_storage::SETTINGS).map_err(unreadable)?;
+        let text = match gyre_shipped::text(path) {
+            Some(text) => text.to_owned(),
+            None => gyre_storage::read_text(path, gyre_storage::SETTINGS).map_err(unreadable)?,
+        };
         let card: Self = toml::from_str(&text)
             .map_err(|error| not_a_card(error.message().trim().replace('\n', "; ")))?;
         if !(1..=2).contains(&card.model.inputs) {
@@ -278,13 +281,15 @@ impl Model {
         let path = config.model.as_deref().ok_or(ModelError::NotNamed)?;
         check_raster(path, &card.raster, raster)?;
         let file = path.with_file_name(&card.model.file);
-        let bytes = gyre_storage::read_bytes(&file, MAX_BYTES).map_err(|source| {
-            ModelError::Unreadable {
-                what: "file",
-                path: file.clone(),
-                source,
-            }
-        })?;
+        let unreadable = |source| ModelError::Unreadable {
+            what: "file",
+            path: file.clone(),
+            source,
+        };
+        let bytes = match gyre_shipped::bytes(&file) {
+            Some(bytes) => bytes.to_owned(),
+            None => gyre_storage::read_bytes(&file, MAX_BYTES).map_err(unreadable)?,
+        };
         let actual = hexadecimal(&Sha256::digest(&bytes));
         if !actual.eq_ignore_ascii_case(&card.model.sha256) {
             return Err(ModelError::Checksum {

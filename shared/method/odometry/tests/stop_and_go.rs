@@ -76,7 +76,7 @@ fn configuration(profile: Profile) -> Configuration {
     let text = fs::read_to_string(Path::new(PROJECT).join("configs/stop-and-go.toml")).unwrap();
     let mut config: Configuration = toml::from_str(&text).unwrap();
     let file = config.simulation.drive.file.as_mut().unwrap();
-    *file = Path::new(PROJECT).join(&*file);
+    *file = Path::new(PROJECT).join("configs").join(&*file);
     config.simulation.sensor.profile = profile;
     config
 }

@@ -35,7 +35,7 @@ pub use dataset::{
 };
 pub use fingerprint::Fingerprint;
 pub use ground_truth::{
-    TrajectoryError, find_ground_truth, read_trajectory, write_kitti, write_tum,
+    TrajectoryError, find_ground_truth, parse_trajectory, read_trajectory, write_kitti, write_tum,
 };
 pub use inspect::{Report, inspect, inspect_dataset};
 pub use lost::{LostAzimuthFinder, LostAzimuths, PlacedRows};

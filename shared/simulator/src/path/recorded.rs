@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use gyre_geometry::Pose;
-use gyre_radar::read_trajectory;
+use gyre_radar::{Trajectory, TrajectoryError, parse_trajectory, read_trajectory};
 use nalgebra::Point2;
 
 use super::spline_path::SplinePath;
@@ -91,13 +91,21 @@ pub fn read_in(
     Ok(SplinePath::measured(&moved))
 }
 
+/// Reads a file, or one of the program.
+fn trajectory(path: &Path) -> Result<Trajectory, TrajectoryError> {
+    match gyre_shipped::text(path) {
+        Some(text) => parse_trajectory(text, path),
+        None => read_trajectory(path),
+    }
+}
+
 /// The first pose of a file.
 ///
 /// # Errors
 /// [`SimulatorError::Trajectory`] if the file cannot be read, [`SimulatorError::Drive`] if it is
 /// empty.
 pub fn first_pose(path: &Path) -> Result<Pose, SimulatorError> {
-    let read = read_trajectory(path)?;
+    let read = trajectory(path)?;
     read.poses
         .first()
         .copied()
@@ -131,7 +139,7 @@ fn check_steps(poses: &[&(f64, Pose)]) -> Result<(), String> {
 
 /// The poses with their seconds after the first; of poses with the same stamp the first.
 fn timed(path: &Path, rate_hz: f64) -> Result<Vec<(f64, Pose)>, SimulatorError> {
-    let read = read_trajectory(path)?;
+    let read = trajectory(path)?;
     let seconds = |index: usize| match &read.stamp_ns {
         Some(stamps) => (stamps[index] - stamps[0]) as f64 * 1e-9,
         None => index as f64 / rate_hz,

@@ -1,0 +1,360 @@
+//! The paths of a configuration: relative to it, or files of the program.
+
+use std::{
+    env, fs,
+    path::{Path, PathBuf},
+};
+
+use toml::{Table, Value};
+
+use crate::{ConfigurationError, strict};
+
+/// The keys that name files or folders.
+const KEYS: [&str; 11] = [
+    "run.ground_truth",
+    "source.data",
+    "simulation.drive.file",
+    "simulation.town.streets",
+    "masking.model",
+    "masking.runtime",
+    "slam.map",
+    RECORDING,
+    "link.ca",
+    "link.certificate",
+    "link.key",
+];
+/// The key of the only file that is written.
+const RECORDING: &str = "record.file";
+
+/// A configuration as its file has it, but with each path absolute, or a file of the program.
+#[derive(Clone, Debug)]
+pub struct Named {
+    /// The sections.
+    pub table: Table,
+    notes: Vec<Note>,
+}
+
+/// A sentence about a path, for as long as no other takes its place.
+#[derive(Clone, Debug)]
+struct Note {
+    key: String,
+    sentence: String,
+}
+
+impl Named {
+    /// Reads the configuration of this path, or of this name in the program. A relative path in it
+    /// is one beside it, else of the program, else, with a note, in the current folder.
+    ///
+    /// # Errors
+    /// As [`strict::read_table`]; a name that the program does not know.
+    pub fn read(named: &Path) -> Result<Self, ConfigurationError> {
+        Self::read_in(named, env::current_dir().ok())
+    }
+
+    /// As [`read`](Self::read), with this folder as the current one. `None`: it is not searched.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub fn read_in(named: &Path, here: Option<PathBuf>) -> Result<Self, ConfigurationError> {
+        let own = shipped(named);
+        let mut table = match own.as_deref().and_then(gyre_shipped::text) {
+            Some(text) => strict::parse(named, text)?,
+            None => strict::read_table(named).map_err(|error| unknown(named, error))?,
+        };
+        let file = match &own {
+            Some(_) => named.to_owned(),
+            None => std::path::absolute(named).unwrap_or_else(|_| named.to_owned()),
+        };
+        let mut places = Places {
+            folder: file.parent().filter(|_| own.is_none()),
+            file: named,
+            here,
+            notes: Vec::new(),
+        };
+        for key in KEYS {
+            places.key(&mut table, key)?;
+        }
+        places.commands(&mut table)?;
+        let notes = places.notes;
+        Ok(Self { table, notes })
+    }
+
+    /// Returns sentences about the paths which `changed`, with overrides, still has.
+    pub fn notes(&self, changed: &Table) -> Vec<String> {
+        let is_same = |note: &&Note| value(&self.table, &note.key) == value(changed, &note.key);
+        let notes = self.notes.iter().filter(is_same);
+        notes.map(|note| note.sentence.clone()).collect()
+    }
+}
+
+/// Replaces each relative path that names nothing in the current folder by that of the program's
+/// file that it names: paths of the command line.
+pub fn find_own(table: &mut Table) {
+    for key in KEYS {
+        if let Some(Value::String(path)) = value_mut(table, key)
+            && !Path::new(path).exists()
+            && let Some(own) = gyre_shipped::find(Path::new(path))
+        {
+            *path = own.to_string_lossy().into_owned();
+        }
+    }
+}
+
+/// Returns the path of the configuration of the program that is meant: where there is no such file.
+pub fn shipped(named: &Path) -> Option<PathBuf> {
+    if gyre_shipped::is_own(named) {
+        return Some(named.to_owned());
+    }
+    let is_configuration = |path: &PathBuf| path.extension().is_some_and(|it| it == "toml");
+    let find = || gyre_shipped::find(named).filter(is_configuration);
+    match named.is_file() {
+        true => None,
+        false => gyre_shipped::configuration(named).or_else(find),
+    }
+}
+
+/// Returns a question for the configuration of the program with the nearest name; empty if none is
+/// alike.
+pub fn suggestion(named: &Path) -> String {
+    let known: Vec<&str> = gyre_shipped::configurations().map(|(it, _)| it).collect();
+    strict::suggestion(&named.display().to_string(), &known)
+}
+
+/// Returns the error for a name that is neither that of a file nor known.
+fn unknown(named: &Path, error: ConfigurationError) -> ConfigurationError {
+    let is_name = named.extension().is_none() && named.file_name() == Some(named.as_os_str());
+    match is_name && !named.exists() {
+        true => {
+            let suggestion = suggestion(named);
+            let name = named.display().to_string();
+            ConfigurationError::Unknown { name, suggestion }
+        }
+        false => error,
+    }
+}
+
+/// The places where the files of a configuration are looked for.
+struct Places<'a> {
+    file: &'a Path,
+    folder: Option<&'a Path>,
+    here: Option<PathBuf>,
+    notes: Vec<Note>,
+}
+
+impl Places<'_> {
+    /// Replaces the path or the paths of a key.
+    fn key(&mut self, table: &mut Table, key: &str) -> Result<(), ConfigurationError> {
+        match value_mut(table, key) {
+            Some(Value::String(path)) => self.replace(path, key),
+            Some(Value::Array(paths)) => paths.iter_mut().try_for_each(|path| match path {
+                Value::String(path) => self.replace(path, key),
+                _ => Ok(()),
+            }),
+            _ => Ok(()),
+        }
+    }
+
+    /// Replaces the paths in the commands of stages: that of the program, and others that begin
+    /// with a dot.
+    fn commands(&mut self, table: &mut Table) -> Result<(), ConfigurationError> {
+        let Some(Value::Table(stages)) = table.get_mut("stages") else {
+            return Ok(());
+        };
+        for (name, stage) in stages.iter_mut() {
+            let command = stage.get_mut("command").and_then(Value::as_array_mut);
+            for (index, word) in command.into_iter().flatten().enumerate() {
+                let Value::String(word) = word else { continue };
+                let has_dot = word.starts_with("./") || word.starts_with("../");
+                if has_dot || (index == 0 && word.contains('/')) {
+                    self.replace(word, &format!("stages.{name}.command"))?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn replace(&mut self, path: &mut String, key: &str) -> Result<(), ConfigurationError> {
+        let written = Path::new(path.as_str());
+        if path.is_empty() || written.is_absolute() || gyre_shipped::is_own(written) {
+            return Ok(());
+        }
+        let beside = self.folder.map(|folder| folder.join(written));
+        let is_beside = |path: &PathBuf| key == RECORDING || path.exists();
+        let own = gyre_shipped::find(written);
+        let here = self.here.as_deref().map(|here| here.join(written));
+        let here = here.filter(|here| here.exists());
+        let (found, sentence) = match (beside.clone().filter(is_beside), own, here) {
+            (Some(beside), ..) => (Some(beside), None),
+            (None, Some(own), here) => {
+                let sentence = here.filter(|here| differs(&own, here)).map(|here| {
+                    let here = here.display();
+                    format!("{key}: {path} is that of the program, and {here} differs: to use that, name it by its whole path")
+                });
+                (Some(own), sentence)
+            }
+            (None, None, Some(here)) => {
+                let sentence = format!(
+                    "{key}: {path} is taken from the current folder, as it is not beside {}, where the paths of a configuration start",
+                    self.file.display()
+                );
+                (Some(here), Some(sentence))
+            }
+            (None, None, None) => {
+                let sentence = format!(
+                    "{key}: there is no {path} beside {}, in the program or in the current folder",
+                    self.file.display()
+                );
+                (beside, Some(sentence))
+            }
+        };
+        if let Some(found) = found {
+            let text = found.to_str().map(str::to_owned);
+            *path = text.ok_or(ConfigurationError::Name(found))?;
+        }
+        let key = key.to_owned();
+        self.notes
+            .extend(sentence.map(|sentence| Note { key, sentence }));
+        Ok(())
+    }
+}
+
+/// Returns whether a file has another content than that of the program.
+fn differs(own: &Path, file: &Path) -> bool {
+    let own = gyre_shipped::bytes(own);
+    own.is_some_and(|own| fs::read(file).is_ok_and(|bytes| bytes != own))
+}
+
+fn value<'a>(table: &'a Table, key: &str) -> Option<&'a Value> {
+    let (first, rest) = key.split_once('.')?;
+    let parts = rest.split('.');
+    parts
+        .into_iter()
+        .try_fold(table.get(first)?, |value, part| value.get(part))
+}
+
+fn value_mut<'a>(table: &'a mut Table, key: &str) -> Option<&'a mut Value> {
+    let (first, rest) = key.split_once('.')?;
+    let parts = rest.split('.');
+    parts
+        .into_iter()
+        .try_fold(table.get_mut(first)?, |value, part| value.get_mut(part))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    /// A folder with a configuration in `robot/` and the current folder `here/`.
+    fn read(files: &[&str], text: &str) -> (tempfile::TempDir, Named) {
+        let folder = tempfile::tempdir().unwrap();
+        for file in files {
+            let file = folder.path().join(file);
+            fs::create_dir_all(file.parent().unwrap()).unwrap();
+            fs::write(file, "").unwrap();
+        }
+        let file = folder.path().join("robot/run.toml");
+        fs::create_dir_all(file.parent().unwrap()).unwrap();
+        fs::write(&file, text).unwrap();
+        let named = Named::read_in(&file, Some(folder.path().join("here"))).unwrap();
+        (folder, named)
+    }
+
+    fn at(named: &Named, key: &str) -> PathBuf {
+        value(&named.table, key).unwrap().as_str().unwrap().into()
+    }
+
+    const MODEL: &str = "[masking]\nmodel = 'models/gyre-255.toml'\n";
+
+    #[test]
+    fn a_path_is_one_beside_the_configuration_whatever_the_current_folder_has() {
+        let both = ["robot/models/gyre-255.toml", "here/models/gyre-255.toml"];
+        let (folder, named) = read(&both, MODEL);
+        let beside = folder.path().join("robot/models/gyre-255.toml");
+        assert_eq!(at(&named, "masking.model"), beside);
+        assert!(named.notes(&named.table).is_empty());
+    }
+
+    #[test]
+    fn a_file_of_the_program_is_found_from_any_folder_and_another_one_here_is_named() {
+        let own = Path::new("gyre:models/gyre-255.toml");
+        let (_folder, named) = read(&[], MODEL);
+        assert_eq!(at(&named, "masking.model"), own);
+        assert!(named.notes(&named.table).is_empty());
+        let (_folder, named) = read(&["here/models/gyre-255.toml"], MODEL);
+        assert_eq!(at(&named, "masking.model"), own);
+        let note = &named.notes(&named.table)[0];
+        assert!(note.contains("is that of the program, and"), "{note}");
+    }
+
+    #[test]
+    fn the_current_folder_is_the_last_resort_and_is_named_unless_the_key_is_overridden() {
+        let text = "[source]\ndata = 'drive'\n";
+        let (folder, named) = read(&["here/drive/1.png"], text);
+        assert_eq!(at(&named, "source.data"), folder.path().join("here/drive"));
+        let note = &named.notes(&named.table)[0];
+        assert!(note.contains("is taken from the current folder"), "{note}");
+        let mut changed = named.table.clone();
+        strict::set(&mut changed, "source.data=/other").unwrap();
+        assert!(named.notes(&changed).is_empty());
+    }
+
+    #[test]
+    fn what_is_nowhere_is_said_to_be_missing_beside_the_configuration() {
+        let (folder, named) = read(&[], "[slam]\nmap = 'town.map'\n");
+        assert_eq!(at(&named, "slam.map"), folder.path().join("robot/town.map"));
+        let note = &named.notes(&named.table)[0];
+        let expected = format!(
+            "no town.map beside {}/robot/run.toml",
+            folder.path().display()
+        );
+        assert!(note.contains(&expected), "{note}");
+    }
+
+    #[test]
+    fn a_recording_is_written_beside_the_configuration() {
+        let (folder, named) = read(&["here/a.mcap"], "[record]\nfile = 'a.mcap'\n");
+        assert_eq!(
+            at(&named, "record.file"),
+            folder.path().join("robot/a.mcap")
+        );
+    }
+
+    #[test]
+    fn the_program_of_a_stage_is_beside_the_configuration_and_one_on_the_path_stays() {
+        let text = "[stages.masking]\ncommand = ['./mask', '-f', './a.py', 'b.py']\n\
+            [stages.refinement]\ncommand = ['python3', 'here/b.py']\n";
+        let (folder, named) = read(&["robot/mask", "robot/a.py"], text);
+        let words = |stage: &str| -> Vec<String> {
+            let command = value(&named.table, &format!("stages.{stage}.command"));
+            let words = command.unwrap().as_array().unwrap().iter();
+            words.map(|it| it.as_str().unwrap().to_owned()).collect()
+        };
+        let beside = |name: &str| format!("{}/robot/./{name}", folder.path().display());
+        assert_eq!(
+            words("masking"),
+            [beside("mask"), "-f".into(), beside("a.py"), "b.py".into()]
+        );
+        assert_eq!(words("refinement"), ["python3", "here/b.py"]);
+    }
+
+    #[test]
+    fn a_configuration_of_the_program_is_read_by_its_name_with_its_files() {
+        let named = Named::read_in(Path::new("stop-and-go"), None).unwrap();
+        let own = Path::new("gyre:configs/stop-and-go.tum");
+        assert_eq!(at(&named, "simulation.drive.file"), own);
+        let unknown = Named::read_in(Path::new("oxfrod"), None).unwrap_err();
+        let unknown = unknown.to_string();
+        assert!(unknown.contains("did you mean `oxford`?"), "{unknown}");
+    }
+
+    #[test]
+    fn a_path_of_the_command_line_is_one_here_or_of_the_program() {
+        let mut table: Table = MODEL.parse().unwrap();
+        strict::set(&mut table, "source.data=src").unwrap();
+        find_own(&mut table);
+        let named = |key: &str| value(&table, key).unwrap().as_str().unwrap();
+        assert_eq!(named("masking.model"), "gyre:models/gyre-255.toml");
+        assert_eq!(named("source.data"), "src");
+    }
+}
