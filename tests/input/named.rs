@@ -51,7 +51,7 @@ fn a_folder_in_place_of_a_configuration_is_refused_with_what_to_name() {
     let folder = folder();
     let run = |named: &Path| {
         let mut command = gyre();
-        command.arg("run").arg(named);
+        command.args(["run", "--config"]).arg(named);
         Ended::of(command)
     };
     run(recording::small()).refused_with(&[

@@ -164,7 +164,7 @@ fn a_recording_of_a_radar_is_of_the_results_after_masking_was_killed_and_swapped
     running.await_poses(8).kill("masking");
     running.await_poses(14);
     let mut swap = gyre();
-    swap.args(["swap", "masking", "--out"]).arg(run.out());
+    swap.args(["swap", "masking"]).arg(run.out());
     Ended::of(swap).succeeded();
     running.finish().succeeded();
     assert_lacks_little(&run);

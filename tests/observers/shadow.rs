@@ -73,7 +73,7 @@ impl Shadow {
         fs::create_dir_all(&report).unwrap();
         let file = |name: &str| File::create(report.join(name)).unwrap();
         let mut command = gyre();
-        command.args(["shadow", stage, "--out"]).arg(run.out());
+        command.args(["shadow", stage]).arg(run.out());
         command.arg("--report").arg(&report).args(options);
         command.stdin(Stdio::null());
         command.stdout(file("stdout")).stderr(file("stderr"));
@@ -335,7 +335,7 @@ fn a_shadow_of_a_joint_search_in_the_background_ends_after_so_many_items() {
         &["the run has no rotation-search", "joint-search"],
     );
     let mut down = gyre();
-    down.arg("down").arg("--out").arg(run.out());
+    down.arg("down").arg(run.out());
     Ended::of(down).succeeded();
 }
 
@@ -398,11 +398,7 @@ fn python_masking_beside_the_own_one_is_compared() {
 
 fn refused(run: &Run, arguments: &[&str], words: &[&str]) {
     let mut command: Command = gyre();
-    command
-        .arg("shadow")
-        .args(arguments)
-        .arg("--out")
-        .arg(run.out());
+    command.arg("shadow").args(arguments).arg(run.out());
     Ended::of(command).refused_with(words);
 }
 

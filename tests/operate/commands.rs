@@ -29,7 +29,7 @@ const THIRD: usize = recording::SCANS / 3;
 /// A command about a run.
 pub(crate) fn ask(run: &Run, arguments: &[&str]) -> Ended {
     let mut command = gyre();
-    command.args(arguments).arg("--out").arg(run.out());
+    command.args(arguments).arg(run.out());
     Ended::of(command)
 }
 
@@ -86,7 +86,7 @@ fn a_run_from_elsewhere_is_not_changed_without_its_name() {
     let ended = Ended::of(shell);
     let lines: Vec<&str> = ended.succeeded().stdout.lines().collect();
     let out = run.out().canonicalize().unwrap().display().to_string();
-    let refusal = format!("name it with --out {out}");
+    let refusal = format!("name it: {out}");
     let named = format!("gyre: of the run in {out}");
     assert_eq!(lines.len(), 11, "{lines:?}");
     for (at, code) in [(1, "swap 1"), (3, "restart 1"), (5, "down 1")] {
@@ -332,7 +332,7 @@ fn top_shows_the_processes_of_a_run_in_a_terminal() {
         let output = command.arg("-S").arg(&socket).args(arguments).output();
         String::from_utf8_lossy(&output.unwrap().stdout).into_owned()
     };
-    let top = format!("{PROGRAM} top --every 0.1 --out {}", run.out().display());
+    let top = format!("{PROGRAM} top --every 0.1 {}", run.out().display());
     tmux(&["new-session", "-d", "-x", "130", "-y", "30", &top]);
     let since = Instant::now();
     let screen = loop {

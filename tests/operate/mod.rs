@@ -5,6 +5,7 @@ mod calibrate;
 pub mod commands;
 mod doctor;
 mod evaluate;
+mod front_door;
 mod resources;
 mod scheduling;
 mod slurm;

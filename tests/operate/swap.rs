@@ -20,10 +20,7 @@ use crate::{
 /// A swap; the command comes last.
 fn swap(run: &Run, stage: &str, options: &[&str], command: &[&str]) -> Ended {
     let mut words = gyre();
-    words
-        .args(["swap", stage, "--out"])
-        .arg(run.out())
-        .args(options);
+    words.args(["swap", stage]).arg(run.out()).args(options);
     if !command.is_empty() {
         words.arg("--command").arg(shell_words(command));
     }
@@ -212,7 +209,7 @@ fn a_swap_that_is_interrupted_leaves_nobody_standing_by() {
 fn swapping(run: &Run, options: &[&str]) -> Child {
     let mut words = gyre();
     words
-        .args(["swap", "masking", "--command", "sleep 60", "--out"])
+        .args(["swap", "masking", "--command", "sleep 60"])
         .arg(run.out())
         .args(options);
     words.stderr(Stdio::piped()).spawn().unwrap()
@@ -231,7 +228,7 @@ fn a_supervisor_that_hangs_is_not_waited_for_and_does_nothing_of_that_later() {
     running.await_poses(2).signal(Signal::STOP);
     let swapping = [&[][..], &["--cold"]].map(|options| swapping(&run, options));
     let mut restart = gyre();
-    restart.args(["restart", "masking", "--out"]).arg(run.out());
+    restart.args(["restart", "masking"]).arg(run.out());
     let restarting = restart.stderr(Stdio::piped()).spawn().unwrap();
     let since = Instant::now();
     for client in swapping.into_iter().chain([restarting]) {

@@ -253,7 +253,7 @@ fn a_run_that_it_cannot_serve_is_refused_before_the_stage_gives_way() {
     let mut running = run.start();
     let own = running.await_poses(2).await_stage("masking");
     let mut swap = gyre();
-    swap.args(["swap", "masking", "--out"]).arg(run.out());
+    swap.args(["swap", "masking"]).arg(run.out());
     swap.args(["--command", &command().join(" ")]);
     Ended::of(swap).refused_with(&["cannot take over", "set masking.undo_doppler to false"]);
     assert_eq!(running.await_stage("masking"), own);
@@ -262,7 +262,7 @@ fn a_run_that_it_cannot_serve_is_refused_before_the_stage_gives_way() {
 
 fn swap_masking(run: &Run, command: &[&str]) {
     let mut swap = gyre();
-    swap.args(["swap", "masking", "--out"]).arg(run.out());
+    swap.args(["swap", "masking"]).arg(run.out());
     swap.args(command);
     Ended::of(swap).succeeded();
 }

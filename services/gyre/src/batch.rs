@@ -13,6 +13,7 @@ use std::{
 use gyre_batch::{
     Batch, DriveOutcome, Ended, List, Settings, Slice, Table, collect, compute, table,
 };
+use gyre_configuration::paths::shipped;
 use gyre_results::Out;
 use gyre_stage::wake::Signals;
 use gyre_terminal::{Failure, INTERRUPTED, own, print};
@@ -83,6 +84,9 @@ fn settings(arguments: &BatchArguments) -> Result<Settings, Failure> {
     let unread =
         |path: &Path, error| format!("cannot read the configuration {}: {error}", path.display());
     let configuration = arguments.config.as_deref().map(|path| {
+        if let Some(own) = shipped(path) {
+            return Ok(own);
+        }
         fs::metadata(path).map_err(|error| unread(path, error))?;
         absolute(path).map_err(|error| unread(path, error))
     });

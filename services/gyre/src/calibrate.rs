@@ -26,16 +26,7 @@ const EVERY: Duration = Duration::from_secs(5);
 /// A recording or a configuration that cannot be used, a drive that does not determine the
 /// constants, a file that cannot be written.
 pub fn calibrate(arguments: &CalibrateArguments) -> Result<ExitCode, Failure> {
-    let configuration = match (&arguments.config, &arguments.data) {
-        (Some(path), _) => Configuration::read(path, &arguments.set)?,
-        (None, Some(data)) => {
-            let (configuration, sentence) = Configuration::of_recording(data, &arguments.set)?;
-            print::note(sentence);
-            configuration
-        }
-        (None, None) => Configuration::of_overrides(&arguments.set)?,
-    }
-    .streaming(arguments.data.as_deref());
+    let configuration = arguments.inputs.configuration()?;
     storage::create_folder(&arguments.out)?;
     let started = Instant::now();
     let (drive, geometry) = read(&configuration, arguments)?;

@@ -2,6 +2,7 @@
 
 mod batch;
 mod conformance;
+mod help;
 mod link;
 mod record;
 mod ros2;
@@ -9,11 +10,12 @@ mod shadow;
 mod stress;
 mod watch;
 
-use std::{num::NonZeroUsize, path::PathBuf};
+use std::{io::IsTerminal, num::NonZeroUsize, path::PathBuf};
 
 use clap::{Args, Parser, Subcommand};
 use gyre_doctor::DoctorArguments;
 use gyre_export::ExportArguments;
+use gyre_inputs::{ConfigArguments, Given, InputError, Inputs};
 use gyre_maps::{localise::LocaliseArguments, map::MapArguments};
 use gyre_masks::MasksArguments;
 use gyre_operate::{
@@ -21,12 +23,14 @@ use gyre_operate::{
     TopArguments,
 };
 use gyre_radar_server::RadarServerArguments;
-use gyre_results::evaluate::EvaluateArguments;
+use gyre_report::ReportArguments;
+use gyre_results::{Form, evaluate::EvaluateArguments};
 use gyre_run::Rate;
 use gyre_simulator::OutputFormat;
 
 pub use batch::{BatchArguments, BatchDriveArguments};
 pub use conformance::ConformanceArguments;
+pub use help::command;
 pub use link::{LinkArguments, LinkEnd, NetworkArguments, ReceiveArguments, SendArguments};
 pub use record::{RecordArguments, SplitArguments};
 pub use ros2::Ros2Arguments;
@@ -50,6 +54,8 @@ pub struct Gyre {
 pub enum Command {
     /// Run the whole pipeline on a recording or a live radar, and write a trajectory.
     Run(RunArguments),
+    /// Run a simulated drive around a block, which needs no data: `gyre run demo`.
+    Demo(DemoArguments),
     /// Run the pipeline on many drives, and write a table of their results. The same command goes
     /// on after an interruption.
     Batch(BatchArguments),
@@ -112,6 +118,8 @@ pub enum Command {
     RadarServer(RadarServerArguments),
     /// Report what a dataset contains, and what looks wrong with it.
     Inspect(InspectArguments),
+    /// Write one page about a run, or about several beside each other.
+    Report(ReportArguments),
     /// Evaluate a trajectory against ground truth.
     Evaluate(EvaluateArguments),
     /// Draw the map of a run.
@@ -128,21 +136,31 @@ pub enum Command {
     Simulate(SimulateArguments),
     /// Test whether a program keeps the contract of a stage.
     Conformance(ConformanceArguments),
+    /// List the configurations in the program, or print one of them to edit it.
+    Config(ConfigArguments),
     /// Print the JSON schema of configurations, for editors.
     Schema(SchemaArguments),
+    /// Print the completions of a shell.
+    Completions {
+        /// The shell.
+        shell: clap_complete::Shell,
+    },
+    /// Write a manual page for each command.
+    Man {
+        /// The folder to write them to.
+        folder: PathBuf,
+    },
 }
 
 /// The arguments of `gyre run`.
 #[derive(Default, Debug, Args)]
 pub struct RunArguments {
-    /// The configuration, a TOML file. Default: what the recording's format and its scans say.
-    pub configuration: Option<PathBuf>,
-    /// The dataset's folder, a recording of a run, NAME.mcap, or a bag of ROS 2 (source.data).
-    #[arg(long)]
-    pub data: Option<PathBuf>,
+    /// The recording or the radar, and the configuration.
+    #[command(flatten)]
+    pub inputs: Inputs,
     /// Play a recording from this topic on, without the stages before it: masked, rotation, motion
     /// or refined (source.from).
-    #[arg(long, value_name = "TOPIC", requires = "data")]
+    #[arg(long, value_name = "TOPIC")]
     pub from: Option<String>,
     /// The radar's address, as in 192.168.0.1: run live (source.kind, source.address, run.mode).
     #[arg(long, value_name = "ADDRESS", conflicts_with = "data")]
@@ -151,54 +169,108 @@ pub struct RunArguments {
     /// run live (source.kind, source.topic, run.mode).
     #[arg(long, value_name = "TOPIC", conflicts_with_all = ["data", "radar"])]
     pub ros2: Option<String>,
-    /// The folder of the results. Default: `out/NAME`, NAME being the configuration's, or without
-    /// one the dataset's.
-    #[arg(long)]
-    pub out: Option<PathBuf>,
-    /// The constants of the radar, of `gyre calibrate`: its section `[dataset]` over that of the
-    /// configuration.
+    /// The constants of the radar, of `gyre calibrate`, over those of the configuration.
     #[arg(long, value_name = "FILE")]
     pub calibration: Option<PathBuf>,
+    /// The results and the pace.
+    #[command(flatten)]
+    pub options: RunOptions,
+}
+
+/// The arguments of `gyre demo`.
+#[derive(Debug, Args)]
+pub struct DemoArguments {
+    /// Override a key of the configuration, as in masking.kind=threshold; may be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// The results and the pace.
+    #[command(flatten)]
+    pub options: RunOptions,
+}
+
+/// The results of a run and its pace.
+#[derive(Default, Debug, Args)]
+pub struct RunOptions {
+    /// The folder of the results. Default: `out/NAME`, NAME being the configuration's, or without
+    /// one the dataset's.
+    #[arg(long, value_name = "FOLDER")]
+    pub out: Option<PathBuf>,
     /// Pace of the source: realtime, max, or a factor (run.rate).
     #[arg(long)]
     pub rate: Option<Rate>,
     /// Record the run to this file, NAME.mcap (record.file).
     #[arg(long, value_name = "FILE", value_parser = record::recording)]
     pub record: Option<PathBuf>,
-    /// Override a key, as in masking.kind=none; may be repeated.
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    pub set: Vec<String>,
+    /// Print all figures at the end, as where the output is no terminal.
+    #[arg(short, long)]
+    pub verbose: bool,
+    /// Print the figures as JSON, those of summary.json.
+    #[arg(long, conflicts_with = "verbose")]
+    pub json: bool,
     /// Begin anew: discard an unfinished run in --out, replace the results of another or of a live
     /// run.
     #[arg(long)]
     pub fresh: bool,
 }
 
+impl From<DemoArguments> for RunArguments {
+    fn from(demo: DemoArguments) -> Self {
+        Self {
+            inputs: Inputs {
+                config: Some("gyre:configs/demo.toml".into()),
+                set: demo.set,
+                ..Inputs::default()
+            },
+            options: demo.options,
+            ..Self::default()
+        }
+    }
+}
+
+impl RunOptions {
+    /// Returns the form of the figures at the end.
+    pub fn form(&self) -> Form {
+        match (self.json, self.verbose || !std::io::stdout().is_terminal()) {
+            (true, _) => Form::Json,
+            (false, true) => Form::Table,
+            (false, false) => Form::Brief,
+        }
+    }
+}
+
+impl RunArguments {
+    /// Returns what is to be run.
+    ///
+    /// # Errors
+    /// Words that do not say it.
+    pub fn given(&self) -> Result<Given, InputError> {
+        let given = self.inputs.given()?.with_radar(self.radar.as_ref())?;
+        // A topic of ROS 2 is a radar too.
+        given.clone().with_radar(self.ros2.as_ref())?;
+        Ok(given)
+    }
+}
+
 /// The arguments of `gyre inspect`.
 #[derive(Debug, Args)]
 pub struct InspectArguments {
-    /// The dataset's folder, or a recording of a run.
-    pub path: PathBuf,
+    /// The recording; a configuration says how it is read.
+    #[command(flatten)]
+    pub inputs: Inputs,
     /// A trajectory of this dataset (TUM): checks whether the clock of each ground truth agrees.
     #[arg(long)]
     pub trajectory: Option<PathBuf>,
     /// Print JSON.
     #[arg(long)]
     pub json: bool,
-    /// Override a key, as in dataset.topic=/radar_data/fft_data; may be repeated.
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    pub set: Vec<String>,
 }
 
 /// The arguments of `gyre calibrate`.
 #[derive(Debug, Args)]
 pub struct CalibrateArguments {
-    /// The recording's folder. Default: the configuration's simulation, or its source.data.
-    pub data: Option<PathBuf>,
-    /// The configuration, a TOML file: its constants are those that are checked. Default: those of
-    /// the format.
-    #[arg(long, value_name = "FILE")]
-    pub config: Option<PathBuf>,
+    /// The recording, and the configuration whose constants are checked.
+    #[command(flatten)]
+    pub inputs: Inputs,
     /// The folder of calibration.toml and calibration.svg.
     #[arg(long, default_value = "out/calibrate")]
     pub out: PathBuf,
@@ -209,9 +281,6 @@ pub struct CalibrateArguments {
     /// Maximum number of scans. Their points are kept in memory.
     #[arg(long, default_value = "2000")]
     pub scans: usize,
-    /// Override a key, as in source.first=100; may be repeated.
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    pub set: Vec<String>,
 }
 
 /// The arguments of `gyre schema`.
@@ -225,7 +294,8 @@ pub struct SchemaArguments {
 /// The arguments of `gyre simulate`.
 #[derive(Debug, Args)]
 pub struct SimulateArguments {
-    /// The configuration, whose section `[simulation]` is used; its defaults without one.
+    /// The configuration, a TOML file or a name that `gyre config` lists: its section
+    /// `[simulation]` is used. Default: the defaults of that section.
     pub configuration: Option<PathBuf>,
     /// The folder of the recording. What an earlier call with the same configuration left there is
     /// kept and completed.

@@ -4,6 +4,7 @@ use std::{path::Path, process::ExitCode};
 
 use gyre_configuration::{Configuration, describe_masks, with_stored_options};
 use gyre_conformance::{Candidate, ConformanceError, Demands, InputScans, Report, Test, check};
+use gyre_inputs::Inputs;
 use gyre_messages::StageId;
 use gyre_odometry::SearchKind;
 use gyre_run::Scheduling;
@@ -127,16 +128,21 @@ fn configuration(
     arguments: &ConformanceArguments,
     stage: StageId,
 ) -> Result<Configuration, Failure> {
-    let is_small = arguments.configuration.is_none() && arguments.data.is_none();
+    let given = arguments.inputs.given_recording()?;
+    let is_small = given.configuration.is_none() && given.data.is_none();
     let small = SMALL
         .iter()
         .filter(|_| is_small)
         .map(|key| (*key).to_owned());
     let lossless = ["run.mode='lossless'", "run.rate='max'"].map(str::to_owned);
     let resolved = resolve(&RunArguments {
-        configuration: arguments.configuration.clone(),
-        data: arguments.data.clone(),
-        set: small.chain(arguments.set.clone()).chain(lossless).collect(),
+        inputs: Inputs {
+            set: small
+                .chain(arguments.inputs.set.clone())
+                .chain(lossless)
+                .collect(),
+            ..arguments.inputs.clone()
+        },
         ..RunArguments::default()
     })?;
     let mut configuration = with_stored_options(&resolved)?.streaming(None);

@@ -3,6 +3,7 @@
 use std::process::ExitCode;
 
 use gyre_configuration::Configuration;
+use gyre_inputs::Inputs;
 use gyre_radar::ground_truth::read_trajectory;
 use gyre_terminal::{Failure, print};
 
@@ -18,12 +19,21 @@ pub fn inspect(arguments: &InspectArguments) -> Result<ExitCode, Failure> {
         .as_deref()
         .map(read_trajectory)
         .transpose()?;
+    let Inputs { set, .. } = &arguments.inputs;
+    let given = arguments.inputs.given_recording()?;
+    let configuration = match &given.configuration {
+        Some(named) => gyre_inputs::configuration(named, set)?,
+        None => Configuration::of_overrides(set)?,
+    };
     let (path, options) = (
-        &arguments.path,
-        Configuration::of_overrides(&arguments.set)?.dataset,
+        given.data.unwrap_or(configuration.source.data),
+        configuration.dataset,
     );
-    let dataset = gyre_recording::open(path, &options)?;
-    let report = gyre_radar::inspect_dataset(path, dataset, &options, trajectory.as_ref());
+    if path.as_os_str().is_empty() {
+        return Err("name the recording to inspect: a folder, NAME.mcap or a bag of ROS 2".into());
+    }
+    let dataset = gyre_recording::open(&path, &options)?;
+    let report = gyre_radar::inspect_dataset(&path, dataset, &options, trajectory.as_ref());
     match arguments.json {
         true => print::line(serde_json::to_string_pretty(&report)?)?,
         false => print::line(report)?,

@@ -54,7 +54,8 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
             Ok(ExitCode::SUCCESS)
         }
         Command::Run(arguments) => run::run(&arguments),
-        Command::Up(arguments) => gyre_operate::up(&run::results_folder(&arguments)),
+        Command::Demo(arguments) => run::run(&arguments.into()),
+        Command::Up(arguments) => gyre_operate::up(&run::results_folder(&arguments)?),
         Command::Down(run) => gyre_operate::down(&run),
         Command::Ps(arguments) => gyre_operate::ps(&arguments),
         Command::Logs(arguments) => gyre_operate::logs(&arguments),
@@ -69,11 +70,12 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::BatchDrive(arguments) => batch::drive(&arguments),
         Command::Stress(arguments) => stress::stress(&arguments),
         Command::StressHelper { words } => stress::help(&words),
-        Command::Record(arguments) => Ok(record::record(&arguments)),
+        Command::Record(arguments) => record::record(&arguments),
         Command::Link(arguments) => link::link(&arguments),
         Command::Doctor(arguments) => doctor(&arguments),
         Command::RadarServer(arguments) => gyre_radar_server::serve(&arguments),
         Command::Inspect(arguments) => inspect::inspect(&arguments),
+        Command::Report(arguments) => gyre_report::report(&arguments),
         Command::Evaluate(arguments) => gyre_results::evaluate::evaluate(&arguments),
         Command::Map(arguments) => gyre_maps::map::map(&arguments),
         Command::Localise(arguments) => gyre_maps::localise::localise(&arguments),
@@ -82,7 +84,17 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::Export(arguments) => gyre_export::export(&arguments),
         Command::Simulate(arguments) => simulate::simulate(&arguments),
         Command::Conformance(arguments) => conformance::conformance(&arguments),
+        Command::Config(arguments) => gyre_inputs::config(&arguments),
         Command::Schema(arguments) => print_schema(&arguments),
+        Command::Completions { shell } => {
+            clap_complete::generate(shell, &mut cli::command(), "gyre", &mut std::io::stdout());
+            Ok(ExitCode::SUCCESS)
+        }
+        Command::Man { folder } => {
+            gyre_storage::create_folder(&folder)?;
+            clap_mangen::generate_to(cli::command(), &folder)?;
+            Ok(ExitCode::SUCCESS)
+        }
     }
 }
 

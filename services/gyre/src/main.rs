@@ -10,7 +10,7 @@ use gyre_stage::CountingAllocator;
 static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 fn main() -> ExitCode {
-    match gyre_terminal::parse::<Gyre>("gyre") {
+    match gyre_terminal::parse_as::<Gyre>(gyre::cli::command(), "gyre") {
         Ok(gyre) => gyre_terminal::report("gyre", gyre::execute(gyre.command)),
         Err(code) => code,
     }

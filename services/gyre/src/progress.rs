@@ -9,7 +9,7 @@ use std::{
 use gyre_messages::{FollowerId, Item, PoseHeader};
 use gyre_stage::{clock, follower::Progress as Following};
 use gyre_supervise::Event;
-use gyre_terminal::print;
+use gyre_terminal::{WIDTH, print, wrap};
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// Time between two plain lines.
@@ -139,7 +139,7 @@ impl Progress {
 
     fn say(&self, line: &str) {
         match &self.bar {
-            Some(bar) => bar.println(line),
+            Some(bar) => bar.println(wrap(line, WIDTH).join("\n")),
             None => print::note(line),
         }
     }

@@ -3,7 +3,7 @@
 use std::{process::ExitCode, time::Duration};
 
 use gyre_recorder::{Options, Split};
-use gyre_terminal::print;
+use gyre_terminal::{Failure, print};
 
 use crate::cli::{RecordArguments, SplitArguments};
 
@@ -11,15 +11,15 @@ use crate::cli::{RecordArguments, SplitArguments};
 ///
 /// # Errors
 /// There is no such run or topic.
-pub fn record(arguments: &RecordArguments) -> ExitCode {
+pub fn record(arguments: &RecordArguments) -> Result<ExitCode, Failure> {
     let options = Options {
-        out: arguments.out.clone(),
+        out: arguments.run.folder()?,
         to: arguments.to.clone(),
         topics: arguments.topics.clone(),
         split: split(&arguments.split),
         continues: arguments.continues,
     };
-    match gyre_recorder::record(&options) {
+    Ok(match gyre_recorder::record(&options) {
         Ok(recorded) => {
             print::note(&recorded);
             // To the run it is no failure, and no reason for a restart.
@@ -32,7 +32,7 @@ pub fn record(arguments: &RecordArguments) -> ExitCode {
             print::note(format_args!("gyre record: {error}"));
             ExitCode::from(error.exit_code())
         }
-    }
+    })
 }
 
 /// Returns the limits of a file; 0 and what is no time are none.

@@ -14,7 +14,7 @@ use std::{
 use gyre_configuration::{Configuration, describe_masks, with_stored_options};
 use gyre_messages::StageId;
 use gyre_operate::detach_if_asked;
-use gyre_results::{Identity, Out, Programs, Results, SIMULATED_TRUTH, Session};
+use gyre_results::{Form, Identity, Out, Programs, Results, SIMULATED_TRUTH, Session};
 use gyre_run::{Ending, Mode};
 use gyre_stage::{
     Manifest,
@@ -52,11 +52,17 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
     if configuration.link.side.is_some() {
         split::set_environment()?;
     }
-    let out = Out::lock(&results_folder(arguments))?;
-    compute(configuration, out, arguments.fresh)
+    let out = Out::lock(&results_folder(arguments)?)?;
+    compute(
+        configuration,
+        out,
+        arguments.options.fresh,
+        arguments.options.form(),
+    )
 }
 
-/// Runs a resolved configuration. A `fresh` run goes on from nothing.
+/// Runs a resolved configuration, and prints its figures in a form. A `fresh` run goes on from
+/// nothing.
 ///
 /// # Errors
 /// As [`run`].
@@ -64,6 +70,7 @@ pub(crate) fn compute(
     mut configuration: Configuration,
     out: Out,
     fresh: bool,
+    form: Form,
 ) -> Result<ExitCode, Failure> {
     // An earlier run may have been killed, and this one may be refused before it takes shared
     // memory itself.
@@ -71,8 +78,8 @@ pub(crate) fn compute(
     place_recording(&mut configuration, &out);
     let programs = program::now(&configuration)?;
     match Earlier::of(&out, &configuration, &programs, fresh)? {
-        Earlier::Ended(begun) => write_missing_results(&configuration, &out, &begun),
-        earlier => play(&configuration, &programs, out, &earlier),
+        Earlier::Ended(begun) => write_missing_results(&configuration, &out, &begun, form),
+        earlier => play(&configuration, &programs, out, &earlier, form),
     }
 }
 
@@ -84,15 +91,18 @@ pub(crate) fn place_recording(configuration: &mut Configuration, out: &Out) {
 }
 
 /// Returns the folder of the results that the arguments name.
-pub fn results_folder(arguments: &RunArguments) -> PathBuf {
-    let file = arguments.configuration.as_deref();
-    let data = arguments
-        .data
-        .as_ref()
-        .and_then(|data| data.canonicalize().ok());
-    let name = match file {
+///
+/// # Errors
+/// Arguments that do not say what to run.
+pub fn results_folder(arguments: &RunArguments) -> Result<PathBuf, Failure> {
+    if let Some(out) = &arguments.options.out {
+        return Ok(out.clone());
+    }
+    let given = arguments.given()?;
+    let data = given.data.and_then(|data| data.canonicalize().ok());
+    let name = match &given.configuration {
         Some(file) => file.file_stem(),
-        None if arguments.radar.is_some() || arguments.ros2.is_some() => Some("radar".as_ref()),
+        None if given.radar.is_some() || arguments.ros2.is_some() => Some("radar".as_ref()),
         None => data.as_deref().and_then(|data| {
             match gyre_recording::is_recording(data) || data.is_file() {
                 true => data.file_stem(),
@@ -100,11 +110,7 @@ pub fn results_folder(arguments: &RunArguments) -> PathBuf {
             }
         }),
     };
-    let name = name.unwrap_or_default();
-    arguments
-        .out
-        .clone()
-        .unwrap_or_else(|| Path::new("out").join(name))
+    Ok(Path::new("out").join(name.unwrap_or_default()))
 }
 
 /// The inputs of a run that its configuration does not have.
@@ -168,6 +174,7 @@ fn play(
     programs: &Programs,
     out: Out,
     earlier: &Earlier,
+    form: Form,
 ) -> Result<ExitCode, Failure> {
     let ready = make_ready(configuration, programs, &out, earlier)?;
     let Ready {
@@ -218,7 +225,7 @@ fn play(
     // meanwhile.
     let written = finish(configuration, &out, &session);
     match report {
-        Ok(_) => conclude(&session, &written?),
+        Ok(_) => conclude(&session, &written?, form),
         Err(failure) => Err(failed(&failure, &out, written)),
     }
 }
@@ -288,6 +295,7 @@ fn write_missing_results(
     configuration: &Configuration,
     out: &Out,
     begun: &Begun,
+    form: Form,
 ) -> Result<ExitCode, Failure> {
     print::note(format_args!(
         "gyre: all {} poses of {} are computed, but not all results were written: writing them now",
@@ -303,7 +311,7 @@ fn write_missing_results(
         report: None,
     };
     let written = finish(configuration, out, &session)?;
-    conclude(&session, &written)
+    conclude(&session, &written, form)
 }
 
 /// Writes the results. Only when all of them are in place, the run counts as complete, and the next
@@ -347,10 +355,10 @@ fn failed(failure: &SuperviseError, out: &Out, written: Result<Results, Failure>
 }
 
 /// Prints the summary and returns the exit code.
-fn conclude(session: &Session<'_>, written: &Results) -> Result<ExitCode, Failure> {
+fn conclude(session: &Session<'_>, written: &Results, form: Form) -> Result<ExitCode, Failure> {
     let problem = written.summary.problem();
     if problem.is_none() || written.poses >= 2 {
-        print::line(&written.summary)?;
+        print::line(written.summary.text(form)?)?;
     }
     if let Some(problem) = problem {
         return Err(problem.clone().into());

@@ -19,9 +19,9 @@ use crate::cli::SimulateArguments;
 pub fn simulate(arguments: &SimulateArguments) -> Result<ExitCode, Failure> {
     let overrides = overrides(arguments)?;
     let configuration = match &arguments.configuration {
-        Some(path) => Configuration::read(path, &overrides),
-        None => Configuration::of_overrides(&overrides),
-    }?;
+        Some(named) => gyre_inputs::configuration(named, &overrides)?,
+        None => Configuration::of_overrides(&overrides)?,
+    };
     let started = Instant::now();
     let threads = arguments
         .threads

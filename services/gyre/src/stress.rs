@@ -1,6 +1,6 @@
 //! `gyre stress`: whether a pipeline meets its deadline on this computer.
 
-use std::{fs, path::Path, process::ExitCode, time::Duration};
+use std::{fs, io::IsTerminal, process::ExitCode, time::Duration};
 
 use gyre_configuration::Configuration;
 use gyre_messages::{Masked, Message, Motion, Scan, StageId, topics};
@@ -64,10 +64,7 @@ pub fn help(arguments: &[String]) -> Result<ExitCode, Failure> {
 fn carry_out(arguments: &StressArguments) -> Result<Report, Failure> {
     let out = Out::lock(&arguments.out)?;
     let mut configuration = resolve(&RunArguments {
-        configuration: arguments.configuration.clone(),
-        data: arguments.data.clone(),
-        set: arguments.set.clone(),
-        fresh: true,
+        inputs: arguments.inputs.clone(),
         ..RunArguments::default()
     })?;
     // Many runs would write to one file.
@@ -107,8 +104,10 @@ fn carry_out(arguments: &StressArguments) -> Result<Report, Failure> {
     let mut report = gyre_stress::stress(&tested, &options, &mut |line| print::note(line));
     report.provenance = provenance;
     report.write(out.path())?;
-    for outcome in &report.outcomes {
-        print::line(outcome.sentence())?;
+    // A person has seen each when it was there.
+    if !std::io::stdout().is_terminal() {
+        let mut outcomes = report.outcomes.iter();
+        outcomes.try_for_each(|outcome| print::line(outcome.sentence()))?;
     }
     print::line(format_args!(
         "report in {}: report.md, report.json, report.svg",
@@ -162,14 +161,14 @@ fn provenance(
 ) -> Result<Provenance, Failure> {
     let uname = rustix::system::uname();
     let load = fs::read_to_string("/proc/loadavg").unwrap_or_default();
-    let file = arguments.configuration.as_deref();
+    let file = arguments.inputs.given()?.configuration;
     Ok(Provenance {
         date: today(),
         machine: Machine::this().to_string(),
         kernel: uname.release().to_string_lossy().into_owned(),
         gyre: env!("CARGO_PKG_VERSION").to_owned(),
         build: program::sha256(&own())?,
-        configuration: file.unwrap_or(Path::new("")).display().to_string(),
+        configuration: file.unwrap_or_default().display().to_string(),
         source: configuration.data(),
         load_before: load.split(' ').next().and_then(|load| load.parse().ok()),
     })

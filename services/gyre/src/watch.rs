@@ -15,8 +15,9 @@ use crate::{cli::WatchArguments, earlier};
 /// There is no such run, the token's file cannot be used, or the address cannot be served at.
 pub fn watch(arguments: &WatchArguments) -> Result<ExitCode, Failure> {
     // Before anything is served: one who watches the wrong folder is told at once.
+    let run = arguments.run.folder()?;
     if !arguments.wait {
-        ObservedRun::writing_to(&arguments.out)?;
+        ObservedRun::writing_to(&run)?;
     }
     let token = token(arguments)?;
     let listen = |address: SocketAddr| {
@@ -28,7 +29,7 @@ pub fn watch(arguments: &WatchArguments) -> Result<ExitCode, Failure> {
     let say = |sentence: &str| print::note(format_args!("gyre: {sentence}"));
     let traces = arguments.otlp.as_deref();
     let traces = traces.map(|url| Exporter::start(url, say)).transpose()?;
-    let out = absolute(&arguments.out)?;
+    let out = absolute(&run)?;
     print::note(format_args!(
         "gyre: {} is shown at {}",
         out.display(),

@@ -2,8 +2,13 @@
 
 mod arguments;
 
-use std::{fs, process::ExitCode};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::ExitCode,
+};
 
+use gyre_configuration::Configuration;
 use gyre_evaluation::{Evaluation, MatchedMotions, NeesOptions, Options, TimedMotion, TruthSigma};
 use gyre_radar::{Trajectory, ground_truth::read_trajectory};
 use gyre_terminal::{Failure, print};
@@ -11,6 +16,7 @@ use gyre_terminal::{Failure, print};
 use crate::{
     judgement::{Judgement, judge, judge_motions, note_time_offset, without_time_offset},
     odometry,
+    results::truth_of,
 };
 
 pub use arguments::EvaluateArguments;
@@ -20,8 +26,9 @@ pub use arguments::EvaluateArguments;
 /// # Errors
 /// A file that cannot be read, trajectories that do not overlap.
 pub fn evaluate(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> {
-    let estimate = read_trajectory(&arguments.estimate)?;
-    let truth = read_trajectory(&arguments.ground_truth)?;
+    let files = Files::of(arguments)?;
+    let estimate = read_trajectory(&files.estimate)?;
+    let truth = read_trajectory(&files.truth)?;
     let (truth, offset) = match arguments.find_time_offset {
         true => {
             without_time_offset(&estimate, truth).map(|(truth, offset)| (truth, Some(offset)))?
@@ -39,7 +46,7 @@ pub fn evaluate(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> {
             ..Options::default()
         },
     )?;
-    let motions = judged_motions(arguments, &estimate, &truth, &evaluation)?;
+    let motions = judged_motions(arguments, &files.estimate, &estimate, &truth, &evaluation)?;
     let judgement = Judgement::new(evaluation, motions.as_ref(), &nees_options(arguments))
         .with_time_offset(offset);
     match arguments.json {
@@ -54,6 +61,48 @@ pub fn evaluate(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> {
         }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// The files that are compared.
+struct Files {
+    estimate: PathBuf,
+    truth: PathBuf,
+}
+
+impl Files {
+    /// Finds them: of a run, its trajectory and its ground truth.
+    fn of(arguments: &EvaluateArguments) -> Result<Self, Failure> {
+        let named = |of: &Option<PathBuf>, old: &Option<PathBuf>| of.clone().or(old.clone());
+        let estimate = named(&arguments.estimate, &arguments.named_estimate);
+        let given = named(&arguments.ground_truth, &arguments.named_ground_truth);
+        let estimate = estimate.ok_or("name a trajectory, or a run: the folder of its results")?;
+        let run = estimate.is_dir().then(|| estimate.clone());
+        let truth = match (given, &run) {
+            (Some(truth), _) => truth,
+            (None, Some(run)) => truth_of_run(run)?,
+            (None, None) => {
+                let estimate = estimate.display();
+                return Err(
+                    format!("name the ground truth too: gyre evaluate {estimate} FILE").into(),
+                );
+            }
+        };
+        let estimate = run.map_or(estimate, |run| run.join("trajectory.tum"));
+        Ok(Self { estimate, truth })
+    }
+}
+
+/// Returns the ground truth of a run: its own, or that of its recording.
+///
+/// # Errors
+/// A folder that has no results, a run without a ground truth.
+pub fn truth_of_run(run: &Path) -> Result<PathBuf, Failure> {
+    let configuration = Configuration::read(&run.join("config.toml"), &[])?;
+    let none = || {
+        let run = run.display();
+        format!("the run in {run} has no ground truth: name one, gyre evaluate {run} FILE")
+    };
+    Ok(truth_of(&configuration, run).ok_or_else(none)?)
 }
 
 fn nees_options(arguments: &EvaluateArguments) -> NeesOptions {
@@ -71,6 +120,7 @@ fn nees_options(arguments: &EvaluateArguments) -> NeesOptions {
 /// fits.
 fn judged_motions(
     arguments: &EvaluateArguments,
+    file: &Path,
     estimate: &Trajectory,
     truth: &Trajectory,
     evaluation: &Evaluation,
@@ -80,7 +130,7 @@ fn judged_motions(
     if let Some(path) = &arguments.odometry {
         return judge(&odometry::read(path)?).map(Some);
     }
-    let beside = arguments.estimate.with_file_name("odometry.csv");
+    let beside = file.with_file_name("odometry.csv");
     if !beside.is_file() {
         return Ok(None);
     }

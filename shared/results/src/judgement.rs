@@ -57,6 +57,11 @@ impl Judgement {
         self
     }
 
+    /// The errors.
+    pub fn evaluation(&self) -> &Evaluation {
+        &self.evaluation
+    }
+
     /// Draws the trajectory, errors where the truth has heading, and bands where there are
     /// covariances: names and SVG documents.
     ///

@@ -20,5 +20,6 @@ pub use identity::{Holds, Identity, Programs};
 pub use out::{Out, OutError, absolute};
 pub use results::{Results, SIMULATED_TRUTH, SUMMARY, map_options, write};
 pub use summary::{
-    Counter, Counts, LostCounts, MotionCounts, Problem, Session, SlamSummary, Summary,
+    Counter, Counts, Course, Form, LostCounts, Measured, MotionCounts, Problem, Session,
+    SlamSummary, Summary,
 };

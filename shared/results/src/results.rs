@@ -26,7 +26,7 @@ use gyre_terminal::{Failure, print};
 use crate::{
     judgement::{Judgement, judge, judge_motions, note_time_offset},
     out::Out,
-    summary::{Session, SlamSummary, Summary},
+    summary::{Measured, Session, SlamSummary, Summary},
 };
 use estimate::Estimate;
 use files::Files;
@@ -82,7 +82,7 @@ pub fn write(
     session: &Session<'_>,
     make_way: &dyn Fn(usize) -> Result<bool, Failure>,
 ) -> Result<Results, Failure> {
-    let truth = truth_of(configuration, out);
+    let truth = truth_of(configuration, out.path());
     let mut slam = slam_of(configuration, out);
     let mut files = Files::new(out);
     let mut pass = Pass::new(&mut files, session.resumed, truth.is_some(), slam.as_ref())?;
@@ -92,7 +92,7 @@ pub fn write(
     {
         pass.add(&record?)?;
     }
-    let read = pass.finish();
+    let mut read = pass.finish();
     let corrected = slam.as_mut();
     let corrected = corrected
         .map(|slam| add_corrected(&mut files, slam, truth.as_deref(), &read.corrected))
@@ -109,18 +109,18 @@ pub fn write(
     let latency = read.latency.latency();
     files.add("latency.json", serde_json::to_string_pretty(&latency)?)?;
     let refines = configuration.has(StageId::Refinement);
+    let course = read.counter.course(read.sketch.length_m());
     let counts = read
         .counter
         .counts(read.end.as_ref(), configuration.source.first, refines);
-    let summary = Summary::new(
-        configuration,
-        out.path(),
-        session,
+    let measured = Measured {
         counts,
+        course,
         latency,
-        judgement,
-        corrected,
-    );
+        evaluation: judgement,
+        slam: corrected,
+    };
+    let summary = Summary::new(configuration, out.path(), session, measured);
     files.add(SUMMARY, serde_json::to_string_pretty(&summary)?)?;
     let poses = counts.processed as usize;
     if make_way(poses)? {
@@ -133,8 +133,8 @@ pub fn write(
     })
 }
 
-/// Returns the dataset's ground truth, where there is one.
-fn truth_of(configuration: &Configuration, out: &Out) -> Option<PathBuf> {
+/// Returns the ground truth of the run of this configuration, where there is one.
+pub fn truth_of(configuration: &Configuration, out: &Path) -> Option<PathBuf> {
     let given = configuration.run.ground_truth.clone();
     let simulated = || configuration.streamed().map(|_| out.join(SIMULATED_TRUTH));
     given

@@ -1,6 +1,7 @@
 //! `summary.json`, and the same as a table.
 
 mod counts;
+mod ending;
 mod slam;
 
 use std::{collections::BTreeMap, fmt, path::Path, time::Duration};
@@ -15,7 +16,7 @@ use thiserror::Error;
 
 use crate::{judgement::Judgement, machine::Machine};
 
-pub use counts::{Counter, Counts, LostCounts, MotionCounts};
+pub use counts::{Counter, Counts, Course, LostCounts, MotionCounts};
 pub use slam::SlamSummary;
 
 /// This session of a run.
@@ -85,6 +86,21 @@ impl Problem {
     }
 }
 
+/// The measurements of a run.
+#[derive(Debug)]
+pub struct Measured {
+    /// Scans and motions.
+    pub counts: Counts,
+    /// The path.
+    pub course: Course,
+    /// Latencies.
+    pub latency: Latency,
+    /// The errors, where there is a ground truth.
+    pub evaluation: Option<Judgement>,
+    /// The loops, with SLAM.
+    pub slam: Option<SlamSummary>,
+}
+
 /// The summary of a run: `summary.json`.
 #[derive(Debug, Serialize)]
 pub struct Summary {
@@ -107,6 +123,8 @@ pub struct Summary {
     scans_in_recording: Option<usize>,
     resumed_after: usize,
     #[serde(flatten)]
+    course: Course,
+    #[serde(flatten)]
     counts: Counts,
     wall_s: f64,
     scans_per_s: f64,
@@ -127,7 +145,30 @@ pub struct Summary {
     slam: Option<SlamSummary>,
 }
 
+/// The forms of a summary.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// Five lines.
+    Brief,
+    /// All figures.
+    Table,
+    /// All figures as JSON.
+    Json,
+}
+
 impl Summary {
+    /// Returns it in a form.
+    ///
+    /// # Errors
+    /// A figure that JSON cannot hold.
+    pub fn text(&self, form: Form) -> serde_json::Result<String> {
+        match form {
+            Form::Brief => Ok(self.in_brief()),
+            Form::Table => Ok(self.to_string()),
+            Form::Json => serde_json::to_string_pretty(self),
+        }
+    }
+
     /// The counts of scans.
     pub fn counts(&self) -> &Counts {
         &self.counts
@@ -143,11 +184,15 @@ impl Summary {
         configuration: &Configuration,
         out: &Path,
         session: &Session<'_>,
-        counts: Counts,
-        latency: Latency,
-        evaluation: Option<Judgement>,
-        slam: Option<SlamSummary>,
+        measured: Measured,
     ) -> Self {
+        let Measured {
+            counts,
+            course,
+            latency,
+            evaluation,
+            slam,
+        } = measured;
         let (wall_s, report) = (session.wall.as_secs_f64(), session.report);
         Self {
             version: env!("CARGO_PKG_VERSION"),
@@ -162,6 +207,7 @@ impl Summary {
             mask: Mask::of(&configuration.odometry.masking),
             scans_in_recording: session.scans,
             resumed_after: session.resumed,
+            course,
             counts,
             wall_s,
             scans_per_s: latency.scans as f64 / wall_s.max(f64::MIN_POSITIVE),
@@ -215,7 +261,8 @@ impl fmt::Display for Summary {
         if let Some(m) = &c.motions {
             writeln!(
                 f,
-                "motions refined {} ({} by a second hypothesis)  weak {}  predicted {}  stationary {}",
+                "motions refined {} ({} by a second hypothesis)\n\
+                 weak {}  predicted {}  stationary {}",
                 m.refined, m.second_hypothesis, m.weak, m.predicted, m.stationary
             )?;
         }
@@ -263,7 +310,7 @@ impl Summary {
     fn latency_table(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "\n{:22}{:>10}{:>10}{:>10}{:>10}   busy   allocations",
+            "\n{:20}{:>9}{:>9}{:>9}{:>9}   busy   allocations",
             "latency, us", "p50", "p90", "p99", "max"
         )?;
         row(f, "sensor to pose", &self.latency.sensor_to_pose)?;
@@ -285,19 +332,19 @@ impl Summary {
             }
         }
         let bound_by = self.latency.bound_by.unwrap_or("nothing");
-        write!(
+        writeln!(
             f,
-            "bounded by {bound_by}; two or more stages busy at once {:.0} % of the time",
+            "bounded by {bound_by}; two or more stages busy at once {:.0} % of the time\n\
+             allocations: in `process` after its first five items",
             self.latency.overlap * 100.0
-        )?;
-        writeln!(f, "; allocations: in `process` after its first five items")
+        )
     }
 }
 
 fn row(f: &mut fmt::Formatter<'_>, name: &str, p: &Percentiles) -> fmt::Result {
     write!(
         f,
-        "{name:22}{:10.0}{:10.0}{:10.0}{:10.0}",
+        "{name:20}{:9.0}{:9.0}{:9.0}{:9.0}",
         p.p50_us, p.p90_us, p.p99_us, p.max_us
     )
 }

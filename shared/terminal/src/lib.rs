@@ -4,7 +4,9 @@ mod command;
 mod failure;
 pub mod print;
 mod program;
+mod wrap;
 
 pub use command::{own, seconds, words};
 pub use failure::Failure;
-pub use program::{INTERRUPTED, parse, report};
+pub use program::{INTERRUPTED, parse, parse_as, report};
+pub use wrap::{WIDTH, wrap};

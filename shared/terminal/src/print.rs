@@ -2,10 +2,13 @@
 
 use std::{
     fmt::Display,
-    io::{self, Write},
+    io::{self, IsTerminal, Write},
 };
 
-use crate::failure::Failure;
+use crate::{
+    failure::Failure,
+    wrap::{WIDTH, wrap},
+};
 
 /// Prints a line to standard output. A closed pipe (`gyre inspect ... | head`) is not an error.
 ///
@@ -28,10 +31,14 @@ pub fn printed(written: io::Result<()>) -> Result<(), Failure> {
     }
 }
 
-/// Prints a line to standard error. Failures are ignored: a run does not end because its terminal
-/// is closed.
+/// Prints a line to standard error, on a terminal as several that fit it. Failures are ignored: a
+/// run does not end because its terminal is closed.
 pub fn note(text: impl Display) {
-    let _ = writeln!(io::stderr(), "{}", printable(&text.to_string()));
+    let mut text = printable(&text.to_string());
+    if io::stderr().is_terminal() {
+        text = wrap(&text, WIDTH).join("\n");
+    }
+    let _ = writeln!(io::stderr(), "{text}");
 }
 
 /// Replaces what a terminal would take as a command: names and words of files are quoted as they

@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 
-use crate::{failure::Failure, print};
+use crate::{WIDTH, failure::Failure, print};
 
 /// The exit code after wrong arguments.
 const WRONG_ARGUMENTS: u8 = 2;
@@ -18,7 +18,17 @@ pub const INTERRUPTED: u8 = 130;
 /// # Errors
 /// Help that was asked for, or a wrong argument.
 pub fn parse<P: Parser>(program: &str) -> Result<P, ExitCode> {
-    P::try_parse().map_err(|error| match (error.use_stderr(), error.print()) {
+    parse_as(P::command(), program)
+}
+
+/// As [`parse`], by this command, whose arguments are those of `P`.
+///
+/// # Errors
+/// As [`parse`].
+pub fn parse_as<P: Parser>(command: clap::Command, program: &str) -> Result<P, ExitCode> {
+    let matches = command.max_term_width(WIDTH).try_get_matches();
+    let parsed = matches.and_then(|matches| P::from_arg_matches(&matches));
+    parsed.map_err(|error| match (error.use_stderr(), error.print()) {
         (true, _) => ExitCode::from(WRONG_ARGUMENTS),
         (false, written) => report(program, print::printed(written).map(|()| ExitCode::SUCCESS)),
     })

@@ -9,10 +9,12 @@ use std::{
 };
 
 use gyre_batch::DriveOutcome;
-use gyre_configuration::{AutomaticError, Configuration, ConfigurationError, SourceError};
+use gyre_configuration::{
+    AutomaticError, Configuration, ConfigurationError, SourceError, paths::shipped,
+};
 use gyre_masking::MaskerError;
 use gyre_radar::OpenError;
-use gyre_results::{Holds, Identity, Out, OutError, Problem, SUMMARY};
+use gyre_results::{Form, Holds, Identity, Out, OutError, Problem, SUMMARY};
 use gyre_simulator::SimulatorError;
 use gyre_stage::run::end_with;
 use gyre_terminal::{Failure, INTERRUPTED, print};
@@ -67,15 +69,18 @@ pub fn drive(arguments: &BatchDriveArguments) -> Result<ExitCode, Failure> {
 
 /// Returns how the drive has ended, and whether it had before.
 fn computed(arguments: &RunArguments) -> Result<(DriveOutcome, bool), Failure> {
-    let path = arguments.data.as_ref().or(arguments.configuration.as_ref());
-    if let Some(path) = path.filter(|path| matches!(path.try_exists(), Ok(false))) {
+    // What was to be there when the batch began may have gone.
+    let given = &arguments.inputs;
+    let path = given.data.as_ref().or(given.what.first());
+    let is_missing = |path: &Path| matches!(path.try_exists(), Ok(false));
+    if let Some(path) = path.filter(|path| is_missing(path) && shipped(path).is_none()) {
         return Err(DriveError::Missing(path.display().to_string()).into());
     }
     let mut configuration = resolve(arguments).map_err(of_settings)?;
     if configuration.is_radar() || configuration.source.repeat {
         return Err(DriveError::Endless(configuration.data()).into());
     }
-    let out = locked(&run::results_folder(arguments))?;
+    let out = locked(&run::results_folder(arguments)?)?;
     // The folder is judged by the run that it is of.
     earlier::settle(&out)?;
     run::place_recording(&mut configuration, &out);
@@ -83,7 +88,7 @@ fn computed(arguments: &RunArguments) -> Result<(DriveOutcome, bool), Failure> {
         return finished(&out).map(|outcome| (outcome, true));
     }
     let discards = !continues(&out, &configuration)?;
-    let code = run::compute(configuration, out, discards)?;
+    let code = run::compute(configuration, out, discards, Form::Table)?;
     Ok(match code == ExitCode::from(INTERRUPTED) {
         true => (DriveOutcome::Interrupted, false),
         false => (DriveOutcome::Complete, false),

@@ -1,8 +1,7 @@
 //! The arguments of `gyre conformance`.
 
-use std::path::PathBuf;
-
 use clap::{Args, builder::PossibleValuesParser};
+use gyre_inputs::Inputs;
 use gyre_messages::StageId;
 
 /// The arguments of `gyre conformance`.
@@ -15,15 +14,9 @@ pub struct ConformanceArguments {
     /// Default: the command of the stage in the configuration, else Gyre's own stage.
     #[arg(long, value_name = "COMMAND")]
     pub command: Option<String>,
-    /// The configuration, a TOML file. Default: a simulated drive on small rasters.
-    #[arg(long = "config", value_name = "FILE")]
-    pub configuration: Option<PathBuf>,
-    /// The dataset's folder (source.data). Default: the configuration's scans.
-    #[arg(long)]
-    pub data: Option<PathBuf>,
-    /// Override a key of the configuration, as in raster.n=255; may be repeated.
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    pub set: Vec<String>,
+    /// The scans to test with and their configuration. Default: a simulated drive on small rasters.
+    #[command(flatten)]
+    pub inputs: Inputs,
     /// Scans to test with, 8 or more.
     #[arg(long, default_value_t = 24, value_parser = clap::value_parser!(u16).range(8..=1000))]
     pub scans: u16,

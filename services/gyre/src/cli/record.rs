@@ -3,12 +3,14 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use gyre_operate::RunChoice;
 
 /// The arguments of `gyre record`.
 #[derive(Debug, Args)]
 pub struct RecordArguments {
-    /// The folder of the run's results, its --out.
-    pub out: PathBuf,
+    /// The run.
+    #[command(flatten)]
+    pub run: RunChoice,
     /// The file to write: NAME.mcap.
     #[arg(long, value_name = "FILE", value_parser = recording)]
     pub to: PathBuf,

@@ -1,15 +1,15 @@
 //! The arguments of `gyre ros2`.
 
-use std::path::PathBuf;
-
 use clap::Args;
 use gyre_export::FrameArguments;
+use gyre_operate::RunChoice;
 
 /// The arguments of `gyre ros2`.
 #[derive(Debug, Args)]
 pub struct Ros2Arguments {
-    /// The folder of the run's results, its --out.
-    pub out: PathBuf,
+    /// The run.
+    #[command(flatten)]
+    pub run: RunChoice,
     /// The domain of ROS 2. Default: ROS_DOMAIN_ID, or 0.
     #[arg(long, value_name = "NUMBER")]
     pub domain: Option<u16>,

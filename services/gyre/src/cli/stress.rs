@@ -3,25 +3,23 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use gyre_inputs::Inputs;
 use gyre_messages::StageId;
 use gyre_run::Scenario;
 
 /// The arguments of `gyre stress`.
 #[derive(Debug, Args)]
 pub struct StressArguments {
-    /// The configuration, a TOML file: its section `[budget]` is the verdict.
-    #[arg(required_unless_present = "list")]
-    pub configuration: Option<PathBuf>,
+    /// The configuration, whose section `[budget]` is the verdict, and the recording. Default: the
+    /// configuration's simulation, which is rendered first, or its source.data.
+    #[command(flatten)]
+    pub inputs: Inputs,
     /// A scenario; may be repeated. Default: all.
     #[arg(long = "scenario", value_name = "NAME")]
     pub scenarios: Vec<Scenario>,
     /// Print the scenarios, a line each.
     #[arg(long)]
     pub list: bool,
-    /// The recording's folder. Default: the configuration's simulation, which is rendered first, or
-    /// its source.data.
-    #[arg(long)]
-    pub data: Option<PathBuf>,
     /// The folder of the report. Default: `out/stress`.
     #[arg(long, default_value = "out/stress")]
     pub out: PathBuf,
@@ -38,9 +36,6 @@ pub struct StressArguments {
     /// For the order of stages that are stopped or killed.
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
-    /// Override a key, as in budget.p99_ms=100; may be repeated.
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    pub set: Vec<String>,
 }
 
 /// Parses a duration: 2 s to a week.

@@ -3,12 +3,14 @@
 use std::{net::SocketAddr, path::PathBuf};
 
 use clap::Args;
+use gyre_operate::RunChoice;
 
 /// The arguments of `gyre watch`.
 #[derive(Debug, Args)]
 pub struct WatchArguments {
-    /// The folder of the run's results, its --out.
-    pub out: PathBuf,
+    /// The run.
+    #[command(flatten)]
+    pub run: RunChoice,
     /// The address to serve at. Any but the loopback's needs the token of the address that is
     /// printed.
     #[arg(long, default_value = "127.0.0.1:8080", value_name = "ADDRESS")]

@@ -23,12 +23,13 @@ use crate::cli::Ros2Arguments;
 /// There is no such run, or the domain cannot be joined.
 pub fn publish(arguments: &Ros2Arguments) -> Result<ExitCode, Failure> {
     // One who names the wrong folder is told at once.
+    let run = arguments.run.folder()?;
     if !arguments.wait {
-        ObservedRun::writing_to(&arguments.out)?;
+        ObservedRun::writing_to(&run)?;
     }
     let domain = Domain::new(arguments.domain, arguments.interface.as_deref())?;
     let bridge = Bridge::open(Settings {
-        out: absolute(&arguments.out)?,
+        out: absolute(&run)?,
         domain,
         namespace: arguments.namespace.clone(),
         frames: arguments.frames.frames.clone(),
@@ -36,7 +37,7 @@ pub fn publish(arguments: &Ros2Arguments) -> Result<ExitCode, Failure> {
         transforms: !arguments.no_tf,
         map: (!arguments.no_map).then_some(map_settings),
     })?;
-    let out = arguments.out.display();
+    let out = run.display();
     print::note(format_args!(
         "gyre: {out} is published in domain {} of ROS 2",
         domain.id()

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use gyre_configuration::{Configuration, calibration, strict::path_value};
+use gyre_inputs::Given;
 use gyre_results::absolute;
 use gyre_run::PlayedFrom;
 use gyre_terminal::{Failure, print};
@@ -15,9 +16,16 @@ use crate::cli::RunArguments;
 /// # Errors
 /// An invalid configuration, or a model that cannot be read.
 pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
-    let overrides = overrides(arguments)?;
-    let mut configuration = match (&arguments.configuration, &arguments.data) {
-        (Some(file), _) => Configuration::read(file, &overrides)?,
+    let given = arguments.given()?;
+    if arguments.from.is_some() && given.data.is_none() {
+        return Err(
+            "--from plays a recording of a run: name it, as in `gyre run NAME.mcap --from masked`"
+                .into(),
+        );
+    }
+    let overrides = overrides(arguments, &given)?;
+    let mut configuration = match (&given.configuration, &given.data) {
+        (Some(named), _) => gyre_inputs::configuration(named, &overrides)?,
         (None, Some(data)) => {
             let (configuration, sentence) = Configuration::of_recording(data, &overrides)?;
             print::note(sentence);
@@ -25,7 +33,7 @@ pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
         }
         (None, None) => Configuration::of_overrides(&overrides)?,
     };
-    if arguments.data.is_some() {
+    if given.data.is_some() {
         configuration.simulation = None;
     }
     configuration.leave_other_side();
@@ -68,7 +76,7 @@ pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
         path_value(path)?;
     }
     // The run's processes are told where it is.
-    path_value(&absolute(&results_folder(arguments))?)?;
+    path_value(&absolute(&results_folder(arguments)?)?)?;
     Ok(configuration)
 }
 
@@ -76,15 +84,16 @@ pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
 ///
 /// # Errors
 /// A calibration that cannot be read.
-fn overrides(arguments: &RunArguments) -> Result<Vec<String>, Failure> {
+fn overrides(arguments: &RunArguments, given: &Given) -> Result<Vec<String>, Failure> {
+    let options = &arguments.options;
     let calibration = arguments.calibration.as_deref().map(calibration::overrides);
     // As a value, which is quoted: a folder may be named 2019-01-10 or 7.
-    let data = arguments.data.as_deref().map(path_value).transpose()?;
+    let data = given.data.as_deref().map(path_value).transpose()?;
     let data = data.iter().flat_map(|data| {
         let data = format!("source.data={data}");
         [data, "source.kind='recording'".to_owned()]
     });
-    let radar = arguments.radar.iter().flat_map(|address| {
+    let radar = given.radar.iter().flat_map(|address| {
         let address = toml::Value::from(address.clone());
         [
             "source.kind='colossus'".to_owned(),
@@ -100,21 +109,18 @@ fn overrides(arguments: &RunArguments) -> Result<Vec<String>, Failure> {
             format!("source.topic={topic}"),
         ]
     });
-    let rate = arguments
-        .rate
-        .iter()
-        .map(|rate| format!("run.rate='{rate}'"));
+    let rate = options.rate.iter().map(|rate| format!("run.rate='{rate}'"));
     let from = arguments
         .from
         .iter()
         .map(|topic| format!("source.from='{topic}'"));
-    let record = arguments.record.iter().map(|file| {
+    let record = options.record.iter().map(|file| {
         let file = std::path::absolute(file).unwrap_or_else(|_| file.clone());
         Ok(format!("record.file={}", path_value(&file)?))
     });
     let record: Vec<String> = record.collect::<Result<_, Failure>>()?;
     let calibration = calibration.transpose()?.unwrap_or_default();
-    let set = arguments.set.iter().cloned();
+    let set = arguments.inputs.set.iter().cloned();
     Ok(calibration
         .into_iter()
         .chain(set)

@@ -18,7 +18,7 @@ use std::{
 };
 
 use clap::Args;
-use gyre_configuration::Configuration;
+use gyre_inputs::Inputs;
 use gyre_localisation::{Localiser, Status};
 use gyre_results::Out;
 use gyre_storage::{self as storage, Draft};
@@ -37,20 +37,15 @@ const EVERY: Duration = Duration::from_secs(2);
 /// The arguments of `gyre localise`.
 #[derive(Debug, Args)]
 pub struct LocaliseArguments {
-    /// The configuration, a TOML file: its odometry.
-    pub configuration: PathBuf,
+    /// The scans, and the configuration: its odometry.
+    #[command(flatten)]
+    pub inputs: Inputs,
     /// The folder of the map, of `gyre map --format folder`.
     #[arg(long)]
     pub map: PathBuf,
-    /// The recording's folder. Default: the configuration's simulation, or its source.data.
-    #[arg(long)]
-    pub data: Option<PathBuf>,
     /// The folder of fixes.csv.
     #[arg(long, default_value = "out/localise")]
     pub out: PathBuf,
-    /// Override a key, as in source.first=100; may be repeated.
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    pub set: Vec<String>,
 }
 
 /// Localises the scans of a recording in a map, and writes `fixes.csv`.
@@ -58,8 +53,7 @@ pub struct LocaliseArguments {
 /// # Errors
 /// A map or a recording that cannot be used, a file that cannot be written.
 pub fn localise(arguments: &LocaliseArguments) -> Result<ExitCode, Failure> {
-    let configuration = Configuration::read(&arguments.configuration, &arguments.set)?;
-    let configuration = configuration.streaming(arguments.data.as_deref());
+    let configuration = arguments.inputs.configuration()?;
     let mut localiser = searched_map::open(&arguments.map, &configuration)?;
     let mut scans = Scans::open(&configuration)?;
     let out = &arguments.out;

@@ -12,7 +12,8 @@ pub mod picture;
 use std::{fs, num::NonZeroUsize, ops::Range, path::PathBuf, process::ExitCode};
 
 use clap::Args;
-use gyre_configuration::{Configuration, Played, describe_masks};
+use gyre_configuration::{Played, describe_masks};
+use gyre_inputs::Inputs;
 use gyre_terminal::{Failure, print};
 
 use drawing::Canvas;
@@ -26,11 +27,9 @@ const OVERVIEW: &str = "masks.png";
 /// The arguments of `gyre masks`.
 #[derive(Debug, Args)]
 pub struct MasksArguments {
-    /// The configuration, a TOML file: its raster, masking and search.
-    pub configuration: PathBuf,
-    /// The recording's folder. Default: the configuration's simulation, or its source.data.
-    #[arg(long)]
-    pub data: Option<PathBuf>,
+    /// The scans, and the configuration: its raster, masking and search.
+    #[command(flatten)]
+    pub inputs: Inputs,
     /// The folder of masks.png and of a scan-NUMBER.png for each scan.
     #[arg(long, default_value = "out/masks")]
     pub out: PathBuf,
@@ -40,9 +39,6 @@ pub struct MasksArguments {
     /// Draw every Nth scan.
     #[arg(long, conflicts_with = "scans")]
     pub every: Option<NonZeroUsize>,
-    /// Override a key, as in masking.kind=threshold; may be repeated.
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    pub set: Vec<String>,
 }
 
 /// Draws the chosen scans, and prints a line on each.
@@ -50,8 +46,7 @@ pub struct MasksArguments {
 /// # Errors
 /// A recording or mask that cannot be used, a picture that cannot be written.
 pub fn masks(arguments: &MasksArguments) -> Result<ExitCode, Failure> {
-    let configuration = Configuration::read(&arguments.configuration, &arguments.set)?;
-    let configuration = configuration.streaming(arguments.data.as_deref());
+    let configuration = arguments.inputs.configuration()?;
     let Played { dataset, .. } = gyre_configuration::open(&configuration)?;
     let chosen = choose(
         arguments,

@@ -1,24 +1,46 @@
 //! The arguments of the commands that operate running runs.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
+use gyre_terminal::print;
 
 /// The run that a command is about.
 #[derive(Debug, Args)]
 pub struct RunChoice {
-    /// The folder of the run's results, its --out. Default: the only run there is; a command that
-    /// changes a run asks first if that was not started from the current folder.
-    #[arg(long)]
+    /// The run: the folder of its results. Default: the only run there is; a command that changes a
+    /// run asks first if that was not started from the current folder.
+    #[arg(value_name = "RUN")]
+    pub run: Option<PathBuf>,
+    /// The old way to name it.
+    #[arg(long, hide = true, value_name = "RUN", conflicts_with = "run")]
     pub out: Option<PathBuf>,
+}
+
+impl RunChoice {
+    /// Returns the choice of this run; without one, of the only run there is.
+    pub fn named_by(run: Option<PathBuf>) -> Self {
+        Self { run, out: None }
+    }
+
+    /// Returns the folder that is named. An old way to name it gets a hint.
+    pub fn named(&self) -> Option<&Path> {
+        if let Some(out) = &self.out {
+            print::note(format_args!(
+                "gyre: a run is now named without --out, as its last argument: {}",
+                out.display()
+            ));
+        }
+        self.run.as_deref().or(self.out.as_deref())
+    }
 }
 
 /// The arguments of `gyre ps`.
 #[derive(Debug, Args)]
 pub struct PsArguments {
-    /// The folder of the results of the run to list. Default: all runs of this user.
-    #[arg(long)]
-    pub out: Option<PathBuf>,
+    /// The run to list. Default: all runs of this user.
+    #[command(flatten)]
+    pub run: RunChoice,
     /// Print JSON.
     #[arg(long)]
     pub json: bool,

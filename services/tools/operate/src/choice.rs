@@ -3,7 +3,7 @@
 use std::{
     env,
     io::{self, IsTerminal, Write},
-    path::Path,
+    path::{Path, PathBuf},
 };
 
 use gyre_stage::control::Control;
@@ -11,12 +11,25 @@ use gyre_terminal::{Failure, print};
 
 use crate::arguments::RunChoice;
 
+impl RunChoice {
+    /// Returns the folder that is named, or that of the only run there is.
+    ///
+    /// # Errors
+    /// No run is running, or several are.
+    pub fn folder(&self) -> Result<PathBuf, Failure> {
+        match self.named() {
+            Some(run) => Ok(run.to_owned()),
+            None => Ok(chosen(self)?.out().to_owned()),
+        }
+    }
+}
+
 /// Returns the run that is meant: the one that is named, or the only one, which is named here.
 ///
 /// # Errors
 /// There is no such run, or there are several and none is named.
 pub fn chosen(choice: &RunChoice) -> Result<Control, Failure> {
-    if let Some(out) = &choice.out {
+    if let Some(out) = choice.named() {
         return Ok(Control::of(out)?);
     }
     let run = only_run()?;
@@ -30,8 +43,8 @@ pub fn chosen(choice: &RunChoice) -> Result<Control, Failure> {
 /// # Errors
 /// As [`chosen`]; a run from elsewhere, and nobody to ask or who agrees.
 pub fn chosen_to_change(choice: &RunChoice, what: &str) -> Result<Control, Failure> {
-    if choice.out.is_some() {
-        return chosen(choice);
+    if let Some(out) = choice.named() {
+        return Ok(Control::of(out)?);
     }
     let run = only_run()?;
     let started_in = run.status()?.started_in;
@@ -55,7 +68,7 @@ fn only_run() -> Result<Control, Failure> {
             let names = runs.iter().chain([&last]).map(|run| run.out().display());
             let names: Vec<String> = names.map(|name| name.to_string()).collect();
             let names = names.join(", ");
-            Err(format!("several runs are running: choose one with --out, of {names}").into())
+            Err(format!("several runs are running: name one of {names}").into())
         }
     }
 }
@@ -65,7 +78,7 @@ fn confirm(out: &Path, started_in: &Path, what: &str) -> Result<(), Failure> {
     let (out, started_in) = (out.display(), started_in.display());
     if !(io::stdin().is_terminal() && io::stderr().is_terminal()) {
         return Err(format!(
-            "the only run writes to {out} and was started from {started_in}, not from here: if it is meant, name it with --out {out}"
+            "the only run writes to {out} and was started from {started_in}, not from here: if it is meant, name it: {out}"
         )
         .into());
     }

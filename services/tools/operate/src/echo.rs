@@ -21,14 +21,14 @@ use gyre_stage::{
 use gyre_terminal::Failure;
 use thiserror::Error;
 
+use crate::arguments::RunChoice;
+
 /// The arguments of `gyre echo`.
 #[derive(Debug, Args)]
 pub struct EchoArguments {
-    /// The folder of the run's results, its --out.
-    pub out: PathBuf,
-    /// The topic.
-    #[arg(value_enum, default_value_t = Topic::Pose)]
-    pub topic: Topic,
+    /// The run and the topic, in any order. Default: the only run there is, and pose.
+    #[arg(value_name = "RUN|TOPIC", num_args = 0..=2)]
+    pub words: Vec<PathBuf>,
 }
 
 /// The topics of a run, in the order of the stream.
@@ -59,8 +59,9 @@ pub enum Topic {
 /// # Errors
 /// There is no such run, all places for observers are taken, or the transport fails.
 pub fn echo(arguments: &EchoArguments) -> Result<ExitCode, Failure> {
-    let out = &arguments.out;
-    match arguments.topic {
+    let (out, topic) = chosen_topic(&arguments.words)?;
+    let out = &out;
+    match topic {
         Topic::Scan => observe::<Scan>(out, scan),
         Topic::Masked => observe::<Masked>(out, masked),
         Topic::Rotation => observe::<Rotation>(out, rotation),
@@ -70,6 +71,36 @@ pub fn echo(arguments: &EchoArguments) -> Result<ExitCode, Failure> {
         Topic::Loop => observe::<Loop>(out, |message| closed(message.header())),
         Topic::Correction => observe::<Correction>(out, |message| correction(message.header())),
         Topic::Fix => observe::<Fix>(out, |message| fix(message.header())),
+    }
+}
+
+/// Returns the run and the topic that are named.
+fn chosen_topic(words: &[PathBuf]) -> Result<(PathBuf, Topic), Failure> {
+    let topic = |word: &PathBuf| {
+        let name = word.to_str().filter(|_| !word.is_dir());
+        name.and_then(|name| Topic::from_str(name, false).ok())
+    };
+    let topics: Vec<Topic> = words.iter().filter_map(topic).collect();
+    let runs: Vec<&PathBuf> = words.iter().filter(|word| topic(word).is_none()).collect();
+    match (&topics[..], &runs[..]) {
+        ([] | [_], [] | [_]) => {
+            let run = RunChoice::named_by(runs.first().copied().cloned());
+            Ok((
+                run.folder()?,
+                topics.first().copied().unwrap_or(Topic::Pose),
+            ))
+        }
+        _ => {
+            let topics = Topic::value_variants().iter();
+            let names =
+                topics.filter_map(|topic| Some(topic.to_possible_value()?.get_name().to_owned()));
+            let names: Vec<String> = names.collect();
+            Err(format!(
+                "name a run, the folder of its results, and a topic: {}",
+                names.join(", ")
+            )
+            .into())
+        }
     }
 }
 

@@ -13,7 +13,7 @@ use gyre_configuration::process_names;
 use gyre_stage::{control::Control, wake::Signals};
 use gyre_terminal::{Failure, print};
 
-use crate::{arguments::LogsArguments, choice::chosen, events};
+use crate::{arguments::LogsArguments, events};
 
 /// Time between two looks at the files.
 const PERIOD: Duration = Duration::from_millis(200);
@@ -24,11 +24,12 @@ const PERIOD: Duration = Duration::from_millis(200);
 /// # Errors
 /// There is no such run or process, or a log cannot be read.
 pub fn logs(arguments: &LogsArguments) -> Result<ExitCode, Failure> {
-    let out = match &arguments.run.out {
-        Some(out) => out.clone(),
-        None => chosen(&arguments.run)?.out().to_owned(),
-    };
     let process = arguments.process.as_deref();
+    // A run alone: `gyre logs out/demo`.
+    let (process, out) = match process.filter(|it| Path::new(it).is_dir()) {
+        Some(run) if arguments.run.run.is_none() => (None, run.into()),
+        _ => (process, arguments.run.folder()?),
+    };
     let mut logs = open(&out, process)?;
     // Of each: printed lines have no time by which they could be put between the events.
     for log in &mut logs {

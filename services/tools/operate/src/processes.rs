@@ -22,11 +22,11 @@ struct ListedRun {
 /// Lists the runs of this user.
 ///
 /// # Errors
-/// There is no run that writes to `--out`; standard output cannot be written; or, with `--check`,
+/// There is no such run; standard output cannot be written; or, with `--check`,
 /// not all is well.
 pub fn ps(arguments: &PsArguments) -> Result<ExitCode, Failure> {
     let (mut rows, mut silent) = (Vec::new(), Vec::new());
-    let runs = match &arguments.out {
+    let runs = match arguments.run.named() {
         Some(out) => vec![Control::of(out)?],
         None => Control::of_all(),
     };

@@ -6,6 +6,7 @@ use std::{
 };
 
 use clap::Args;
+use gyre_inputs::Inputs;
 use gyre_run::Rate;
 
 use crate::server::Faults;
@@ -13,11 +14,10 @@ use crate::server::Faults;
 /// The arguments of `gyre radar-server`.
 #[derive(Debug, Args)]
 pub struct RadarServerArguments {
-    /// A configuration, a TOML file: its sections `[simulation]`, `[source]` and `[dataset]`.
-    pub configuration: Option<PathBuf>,
-    /// The dataset's folder, or a file that --capture has written.
-    #[arg(long)]
-    pub data: Option<PathBuf>,
+    /// The scans, or by --data a file that --capture has written; of the configuration the sections
+    /// `[simulation]`, `[source]` and `[dataset]`.
+    #[command(flatten)]
+    pub inputs: Inputs,
     /// Record what the radar at --radar sends, byte for byte, into this new file, instead of
     /// playing; until it ends, or Ctrl-C.
     #[arg(long, value_name = "FILE", requires = "radar", conflicts_with = "data")]
@@ -56,7 +56,4 @@ pub struct RadarServerArguments {
     /// Write the times big-endian, as some clients expect.
     #[arg(long)]
     pub big_endian: bool,
-    /// Override a key, as in source.first=100; may be repeated.
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    pub set: Vec<String>,
 }

@@ -8,6 +8,7 @@ use std::{net::TcpListener, ops::Range, path::Path, process::ExitCode, time::Dur
 
 use gyre_colossus::Address;
 use gyre_configuration::{Configuration, Played};
+use gyre_inputs::Inputs;
 use gyre_stage::wake::Signals;
 use gyre_terminal::{Failure, print};
 
@@ -23,16 +24,12 @@ pub fn serve(arguments: &RadarServerArguments) -> Result<ExitCode, Failure> {
     if let (Some(file), Some(radar)) = (&arguments.capture, &arguments.radar) {
         return record(file, radar, arguments);
     }
-    if let Some(data) = &arguments.data
+    if let Some(data) = &arguments.inputs.data
         && let Some(capture) = Capture::open(data)?
     {
         return play(data, capture, arguments);
     }
-    let configuration = match &arguments.configuration {
-        Some(file) => Configuration::read(file, &arguments.set)?,
-        None => Configuration::of_overrides(&arguments.set)?,
-    };
-    let mut configuration = configuration.streaming(arguments.data.as_deref());
+    let mut configuration = played(&arguments.inputs)?;
     // The angles of an encoder are sent as it counts them: who receives them corrects its
     // eccentricity.
     configuration.dataset.azimuth_eccentricity_rad = Some(0.0);
@@ -55,6 +52,17 @@ pub fn serve(arguments: &RadarServerArguments) -> Result<ExitCode, Failure> {
         played.scans, played.lost_azimuths, played.lost_datagrams, played.resets, played.stalls
     ))?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Returns the configuration whose scans are played. A recording is sent as it is: without a
+/// configuration nothing is measured in it.
+fn played(inputs: &Inputs) -> Result<Configuration, Failure> {
+    let given = inputs.given_recording()?;
+    let configuration = match &given.configuration {
+        Some(named) => gyre_inputs::configuration(named, &inputs.set)?,
+        None => Configuration::of_overrides(&inputs.set)?,
+    };
+    Ok(configuration.streaming(given.data.as_deref()))
 }
 
 /// Records what a radar sends.

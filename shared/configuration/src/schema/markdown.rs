@@ -9,8 +9,11 @@ const INTRODUCTION: &str = "\
 # Configuration
 
 You want to know what a key means, or which keys there are. A run is configured by one TOML file; every key has a default, so a file is
-a few lines. `configs/` has one for each dataset. `gyre run CONFIG --set section.key=value` overrides a key; a value that is not TOML is taken as
-text. Unknown keys are rejected. The resolved configuration is written beside the results as `config.toml`.
+a few lines. `gyre config` lists those of the datasets, and `gyre config oxford` prints one to edit. `gyre run CONFIG --set section.key=value`
+overrides a key; a value that is not TOML is taken as text. Unknown keys are rejected. The resolved configuration is written beside the results
+as `config.toml`.
+
+A relative path is that of a file beside the configuration, or of [one of the program](commands.md#configurations-and-networks-of-the-program).
 
 Units are in the names: `_m`, `_s`, `_ms`, `_deg`, `_rad`, `_mps` (m/s), `_mps2` (m/s²), `_degps2` (degrees/s²).
 

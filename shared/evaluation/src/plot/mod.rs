@@ -9,7 +9,7 @@ mod trajectory;
 
 pub use bands::bands_svg;
 pub use errors::errors_svg;
-pub use trajectory::{path_svg, trajectory_svg};
+pub use trajectory::{path_svg, paths_svg, trajectory_svg};
 
 use crate::EvaluationError;
 

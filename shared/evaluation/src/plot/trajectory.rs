@@ -48,16 +48,44 @@ pub fn trajectory_svg(
 pub fn path_svg(drawn: &[Pose], poses: usize, length_m: f64) -> Result<String, PlotError> {
     require_poses(Side::Estimate, drawn)?;
     scene_svg(&Scene {
-        estimate: positions(drawn),
+        paths: vec![("estimate", positions(drawn))],
         truth: None,
         title: "Trajectory",
         caption: format!("{poses} poses, {length_m:.1} m"),
     })
 }
 
-fn scene_svg(scene: &Scene) -> Result<String, PlotError> {
-    let view = View::around(scene.estimate.iter().chain(scene.truth.iter().flatten()))
-        .ok_or(PlotError::Empty)?;
+/// Returns the plot of trajectories by their names, in the frame of the ground truth if there is
+/// one.
+///
+/// # Errors
+/// As [`trajectory_svg`].
+pub fn paths_svg(paths: &[(&str, Vec<Pose>)], truth: Option<&[Pose]>) -> Result<String, PlotError> {
+    for (_, poses) in paths {
+        require_poses(Side::Estimate, poses)?;
+    }
+    let positions = |poses: &[Pose]| positions(poses);
+    let title = match paths {
+        [_] => "Trajectory",
+        _ => "Trajectories",
+    };
+    scene_svg(&Scene {
+        paths: paths
+            .iter()
+            .map(|(name, poses)| (*name, positions(poses)))
+            .collect(),
+        truth: truth.map(positions),
+        title,
+        caption: match truth {
+            Some(_) => "after SE(2) alignment to the ground truth".to_owned(),
+            None => "each in its own frame".to_owned(),
+        },
+    })
+}
+
+fn scene_svg(scene: &Scene<'_>) -> Result<String, PlotError> {
+    let paths = scene.paths.iter().flat_map(|(_, path)| path);
+    let view = View::around(paths.chain(scene.truth.iter().flatten())).ok_or(PlotError::Empty)?;
     let size = (
         view.width_px + LEFT + 2 * MARGIN,
         view.height_px + BELOW + HEADER + MARGIN,
@@ -69,14 +97,15 @@ fn scene_svg(scene: &Scene) -> Result<String, PlotError> {
 }
 
 /// The content of the plot, positions in m.
-struct Scene {
-    estimate: Vec<(f64, f64)>,
+struct Scene<'a> {
+    /// The estimates by their names.
+    paths: Vec<(&'a str, Vec<(f64, f64)>)>,
     truth: Option<Vec<(f64, f64)>>,
     title: &'static str,
     caption: String,
 }
 
-impl Scene {
+impl Scene<'_> {
     fn matched(matched: &MatchedPoses) -> Self {
         let ate = ate(matched);
         let aligned: Vec<_> = matched
@@ -85,7 +114,7 @@ impl Scene {
             .map(|p| ate.truth_from_estimate * p)
             .collect();
         Self {
-            estimate: positions(&aligned),
+            paths: vec![("estimate", positions(&aligned))],
             truth: Some(positions(matched.truth())),
             title: "Trajectory and ground truth",
             caption: format!(
@@ -95,26 +124,44 @@ impl Scene {
         }
     }
 
-    fn legend(&self) -> Vec<Entry<'static>> {
-        let mut legend = vec![Entry {
-            label: "estimate",
-            symbol: Symbol::Line(line(ESTIMATE, 2.0)),
-        }];
-        if self.truth.is_some() {
-            legend.insert(
-                0,
-                Entry {
-                    label: "ground truth",
-                    symbol: Symbol::Line(line(TRUTH, 4.0)),
-                },
-            );
-        }
-        legend.push(Entry {
+    fn legend(&self) -> Vec<Entry<'_>> {
+        let entry = |label, style| Entry {
+            label,
+            symbol: Symbol::Line(style),
+        };
+        let truth = self
+            .truth
+            .iter()
+            .map(|_| entry("ground truth", line(TRUTH, 4.0)));
+        let paths = self.paths.iter().zip(colours());
+        let paths = paths.map(|((name, _), colour)| entry(shortened(name), line(colour, 2.0)));
+        let start = Entry {
             label: "start",
             symbol: Symbol::Dot,
-        });
-        legend
+        };
+        truth.chain(paths).chain([start]).collect()
     }
+}
+
+/// Returns the colours of estimates: distinct also for those who do not see red and green.
+fn colours() -> impl Iterator<Item = RGBColor> {
+    let others = [
+        (0, 158, 115),
+        (204, 121, 167),
+        (230, 159, 0),
+        (86, 180, 233),
+    ];
+    let others = others.map(|(red, green, blue)| RGBColor(red, green, blue));
+    [ESTIMATE].into_iter().chain(others).cycle()
+}
+
+/// Letters of a name in the legend.
+const LABEL: usize = 18;
+
+/// Returns the end of a name that is too long for the legend.
+fn shortened(name: &str) -> &str {
+    let start = name.char_indices().rev().nth(LABEL - 1);
+    start.map_or(name, |(start, _)| &name[start..])
 }
 
 fn positions(poses: &[Pose]) -> Vec<(f64, f64)> {
@@ -159,7 +206,7 @@ impl View {
     }
 }
 
-fn draw(area: &Area<'_>, scene: &Scene, view: &View) -> Result<(), PlotError> {
+fn draw(area: &Area<'_>, scene: &Scene<'_>, view: &View) -> Result<(), PlotError> {
     let below_header = area.split_vertically(px(f64::from(HEADER))).1;
     let mut chart = within_margins(&below_header, f64::from(MARGIN))
         .set_label_area_size(LabelAreaPosition::Bottom, px(f64::from(BELOW)))
@@ -171,10 +218,11 @@ fn draw(area: &Area<'_>, scene: &Scene, view: &View) -> Result<(), PlotError> {
     if let Some(truth) = &scene.truth {
         curve(&mut chart, truth.iter().copied(), line(TRUTH, 4.0))?;
     }
-    let estimate = scene.estimate.iter().copied();
-    curve(&mut chart, estimate, line(ESTIMATE, 2.0))?;
-    if let Some(&start) = scene.estimate.first() {
-        chart.draw_series([dot(start)]).map_err(drawing)?;
+    for ((_, path), colour) in scene.paths.iter().zip(colours()) {
+        curve(&mut chart, path.iter().copied(), line(colour, 2.0))?;
     }
+    let starts = scene.paths.iter().filter_map(|(_, path)| path.first());
+    let starts = starts.map(|start| dot(*start));
+    chart.draw_series(starts).map_err(drawing)?;
     Ok(())
 }

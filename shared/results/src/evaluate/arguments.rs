@@ -8,13 +8,29 @@ use gyre_evaluation::Part;
 /// The arguments of `gyre evaluate`.
 #[derive(Debug, Args)]
 pub struct EvaluateArguments {
-    /// The trajectory to evaluate: TUM, KITTI, or a dataset's own format.
-    #[arg(long)]
-    pub estimate: PathBuf,
+    /// The trajectory to evaluate: the folder of a run's results, or a file in TUM, KITTI, or a
+    /// dataset's own format.
+    #[arg(required_unless_present = "named_estimate")]
+    pub estimate: Option<PathBuf>,
     /// The ground truth: TUM, KITTI, Oxford radar_odometry.csv, Boreas radar_poses.csv, MulRan
-    /// global_pose.csv.
-    #[arg(long)]
-    pub ground_truth: PathBuf,
+    /// global_pose.csv. Default: that of the run.
+    pub ground_truth: Option<PathBuf>,
+    /// The trajectory, in another place on the command line.
+    #[arg(
+        long = "estimate",
+        value_name = "FILE",
+        hide = true,
+        conflicts_with = "estimate"
+    )]
+    pub named_estimate: Option<PathBuf>,
+    /// The ground truth, in another place on the command line.
+    #[arg(
+        long = "ground-truth",
+        value_name = "FILE",
+        hide = true,
+        conflicts_with = "ground_truth"
+    )]
+    pub named_ground_truth: Option<PathBuf>,
     /// Find the time by which the clock of the ground truth differs, from the speeds and yaw rates
     /// of both, and take it out (UTC and GPS time: 18 s, UTC and TAI: 37 s).
     #[arg(long)]

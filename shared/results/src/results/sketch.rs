@@ -49,6 +49,11 @@ impl Sketch {
         }
     }
 
+    /// Returns the length of the path, m.
+    pub fn length_m(&self) -> f64 {
+        self.length_m
+    }
+
     /// Returns the poses that were kept, and the last one.
     pub fn path(&self) -> Vec<Pose> {
         let last_is_kept = self.poses.saturating_sub(1).is_multiple_of(self.every);

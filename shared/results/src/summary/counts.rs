@@ -33,6 +33,18 @@ pub struct Counts {
     pub motions: Option<MotionCounts>,
 }
 
+/// The path that was driven.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Course {
+    /// Length, m.
+    pub path_m: f64,
+    /// Time from the first pose to the last one, s.
+    pub duration_s: f64,
+    /// Time between two scans of the radar, s; `None` without motions.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub period_s: Option<f64>,
+}
+
 /// Counts of lost azimuths.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct LostCounts {
@@ -98,6 +110,7 @@ impl Counts {
 pub struct Counter {
     processed: u64,
     starts: u64,
+    first_ns: Option<i64>,
     last: Option<Item>,
     gaps: Gaps,
     lost: LostCounts,
@@ -109,10 +122,22 @@ impl Counter {
     pub fn add(&mut self, pose: &PoseHeader) {
         self.processed += 1;
         self.starts += u64::from(pose.item.is(flag::BREAK));
+        self.first_ns = self.first_ns.or(Some(pose.item.stamp_ns));
         self.last = Some(pose.item);
         self.gaps.add(pose);
         self.lost.add(&pose.item);
         self.motions.add(&pose.motion);
+    }
+
+    /// Returns the path, which is so long.
+    pub fn course(&mut self, path_m: f64) -> Course {
+        let span_ns = |(first_ns, last): (i64, Item)| last.stamp_ns - first_ns;
+        let duration_ns = self.first_ns.zip(self.last).map_or(0, span_ns);
+        Course {
+            path_m,
+            duration_s: duration_ns as f64 * 1e-9,
+            period_s: self.gaps.period_ns().map(|ns| ns as f64 * 1e-9),
+        }
     }
 
     /// Returns the counts, with the end of the stream if it came to that. `first` is the first scan
@@ -195,10 +220,15 @@ impl Gaps {
         self.first.clear();
     }
 
-    fn missing(mut self) -> u64 {
+    fn period_ns(&mut self) -> Option<i64> {
         if self.period_ns.is_none() {
             self.settle();
         }
+        self.period_ns
+    }
+
+    fn missing(mut self) -> u64 {
+        self.period_ns();
         self.missing
     }
 }

@@ -1,0 +1,53 @@
+//! Parts of a document in HTML.
+
+use base64::{Engine, engine::general_purpose::STANDARD};
+
+/// Returns a text as it can stand in a document.
+pub fn escaped(text: &str) -> String {
+    let text = text.replace('&', "&amp;").replace('<', "&lt;");
+    text.replace('>', "&gt;").replace('"', "&quot;")
+}
+
+/// Returns a section with a title; nothing without a content.
+pub fn section(title: &str, content: &str) -> String {
+    match content.is_empty() {
+        true => String::new(),
+        false => format!(
+            "<section><h2>{}</h2>\n{content}\n</section>\n",
+            escaped(title)
+        ),
+    }
+}
+
+/// Returns a picture that is a file of PNG.
+pub fn png(bytes: &[u8], what: &str) -> String {
+    let what = escaped(what);
+    let data = STANDARD.encode(bytes);
+    format!("<figure><img alt=\"{what}\" src=\"data:image/png;base64,{data}\"></figure>")
+}
+
+/// Returns a picture that is a document of SVG, which a reader of screens names.
+pub fn svg(text: &str, what: &str) -> String {
+    let what = escaped(what);
+    let text = text.find("<svg").map_or("", |start| &text[start..]);
+    format!("<figure role=\"img\" aria-label=\"{what}\">{text}</figure>")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_of_a_file_is_no_markup() {
+        assert_eq!(
+            escaped("<a href=\"x\">&"),
+            "&lt;a href=&quot;x&quot;&gt;&amp;"
+        );
+    }
+
+    #[test]
+    fn a_section_without_content_is_none() {
+        assert_eq!(section("Map", ""), "");
+        assert!(section("Map", "x").contains("<h2>Map</h2>"));
+    }
+}

@@ -1,0 +1,129 @@
+//! A run or a trajectory that a page is about.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use gyre_evaluation::{Evaluation, Options};
+use gyre_geometry::Pose;
+use gyre_radar::{Trajectory, read_trajectory};
+use gyre_results::{SUMMARY, judgement::judge};
+use gyre_terminal::{Failure, print};
+use serde_json::Value;
+
+/// A run or a trajectory.
+pub struct Subject {
+    /// The name in the page.
+    pub name: String,
+    /// The errors, where there is a ground truth that fits.
+    pub evaluation: Option<Evaluation>,
+    /// The trajectory.
+    pub trajectory: Trajectory,
+    /// The results that only a run of Gyre has.
+    pub run: Option<Run>,
+}
+
+/// The results of a run.
+pub struct Run {
+    /// The folder.
+    pub folder: PathBuf,
+    /// `summary.json`.
+    pub summary: Value,
+    /// `config.toml`.
+    pub configuration: String,
+}
+
+impl Subject {
+    /// Reads a run or a trajectory, and evaluates it against a ground truth.
+    ///
+    /// # Errors
+    /// A file that cannot be read, a folder without results.
+    pub fn read(path: &Path, truth: Option<&Trajectory>) -> Result<Self, Failure> {
+        let run = path.is_dir().then(|| Run::read(path)).transpose()?;
+        let file = match &run {
+            Some(run) => run.folder.join("trajectory.tum"),
+            None => path.to_owned(),
+        };
+        let trajectory = read_trajectory(&file)?;
+        let evaluation = truth.and_then(|truth| {
+            judge(&trajectory, truth, Options::default())
+                .inspect_err(|reason| {
+                    print::note(format_args!(
+                        "{} is not evaluated: {reason}",
+                        file.display()
+                    ))
+                })
+                .ok()
+        });
+        Ok(Self {
+            name: path.display().to_string(),
+            evaluation,
+            trajectory,
+            run,
+        })
+    }
+
+    /// Returns the poses to draw: in the frame of the ground truth, or as they are.
+    pub fn drawn(&self) -> Vec<Pose> {
+        match &self.evaluation {
+            Some(evaluation) => {
+                let aligned = evaluation.ate.truth_from_estimate;
+                let poses = evaluation.matched.estimate().iter();
+                poses.map(|pose| aligned * pose).collect()
+            }
+            None => self.trajectory.poses.clone(),
+        }
+    }
+
+    /// Returns the length of the trajectory, m.
+    pub fn path_m(&self) -> f64 {
+        let steps = self.trajectory.poses.windows(2);
+        let step = |pair: &[Pose]| (pair[1].translation.vector - pair[0].translation.vector).norm();
+        steps.map(step).sum()
+    }
+
+    /// Returns the time from the first to the last pose, s.
+    pub fn duration_s(&self) -> Option<f64> {
+        let stamps = self.trajectory.stamp_ns.as_deref()?;
+        let span_ns = stamps.last()? - stamps.first()?;
+        Some(span_ns as f64 * 1e-9)
+    }
+}
+
+impl Run {
+    fn read(folder: &Path) -> Result<Self, Failure> {
+        let text = |name: &str| {
+            let path = folder.join(name);
+            fs::read_to_string(&path).map_err(|error| {
+                let (folder, path) = (folder.display(), path.display());
+                format!("{folder} has no complete results of a run: cannot read {path}: {error}")
+            })
+        };
+        Ok(Self {
+            folder: folder.to_owned(),
+            summary: serde_json::from_str(&text(SUMMARY)?)?,
+            configuration: text("config.toml")?,
+        })
+    }
+
+    /// Returns a value of the summary by its path, as in `/motions/weak`.
+    pub fn value(&self, path: &str) -> Option<&Value> {
+        self.summary.pointer(path).filter(|value| !value.is_null())
+    }
+
+    /// Returns a number of the summary.
+    pub fn number(&self, path: &str) -> Option<f64> {
+        self.value(path)?.as_f64()
+    }
+
+    /// Returns a word of the summary.
+    pub fn word(&self, path: &str) -> Option<&str> {
+        self.value(path)?.as_str()
+    }
+
+    /// Returns the content of a picture among the results, `None` without one.
+    pub fn picture(&self, name: &str) -> Option<Vec<u8>> {
+        fs::read(self.folder.join(name)).ok()
+    }
+}

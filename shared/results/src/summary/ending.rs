@@ -1,0 +1,225 @@
+//! The five lines with which a run ends on a terminal.
+
+use std::{env, path::Path};
+
+use gyre_run::{Ending, Rate};
+use gyre_terminal::{WIDTH, wrap};
+
+use super::Summary;
+
+/// Columns of the names of the lines.
+const NAMES: usize = 12;
+
+/// The way a run has gone, of which all results tell parts.
+impl Summary {
+    /// Returns five lines: the path, its accuracy, the latency, what is unusual, and where to look.
+    pub fn in_brief(&self) -> String {
+        let lines = [
+            (self.ending_word(), self.path()),
+            ("accuracy", self.accuracy()),
+            ("latency", self.pace()),
+            ("unusual", self.unusual()),
+            ("look at", self.places()),
+        ];
+        let lines = lines.map(|(name, text)| {
+            let indent = format!("\n{:NAMES$}", "");
+            format!("{name:NAMES$}{}", wrap(&text, WIDTH - NAMES).join(&indent))
+        });
+        lines.join("\n")
+    }
+
+    fn ending_word(&self) -> &'static str {
+        match self.ending {
+            Some(Ending::Complete) => "complete",
+            Some(Ending::Interrupted) => "interrupted",
+            None => "failed",
+        }
+    }
+
+    fn path(&self) -> String {
+        let of = self.scans_in_recording.map_or(0, |scans| scans as u64);
+        let scans = match self.counts.processed {
+            poses if poses < of => format!("{poses} of {of} scans"),
+            poses => format!("{poses} scans"),
+        };
+        format!(
+            "{:.0} m in {:.0} s of driving, {scans}; computed in {:.1} s",
+            self.course.path_m, self.course.duration_s, self.wall_s
+        )
+    }
+
+    fn accuracy(&self) -> String {
+        let Some(judgement) = &self.evaluation else {
+            return "not known: the run has no ground truth".to_owned();
+        };
+        let evaluation = judgement.evaluation();
+        let ate = format!("ATE {:.2} m", evaluation.ate.rmse_m);
+        match &evaluation.kitti {
+            Some(kitti) => format!(
+                "{ate}; drift {:.2} % and {:.2} deg/100 m",
+                kitti.translation_percent, kitti.rotation_deg_per_100m
+            ),
+            None => ate,
+        }
+    }
+
+    /// Returns the latency beside the time that the sensor takes for a scan; of a run as fast as it
+    /// goes, whose scans wait for each other, the rate.
+    fn pace(&self) -> String {
+        let p99_ms = self.latency.sensor_to_pose.p99_us / 1e3;
+        let Some(period_s) = self.course.period_s else {
+            return format!("{p99_ms:.0} ms (99 %)");
+        };
+        if self.rate == Rate::Max {
+            let times = self.scans_per_s * period_s;
+            return format!(
+                "{:.1} scans/s, {times:.1} times the radar's {:.1}",
+                self.scans_per_s,
+                1.0 / period_s
+            );
+        }
+        let (p50_ms, period_ms) = (
+            self.latency.sensor_to_pose.p50_us / 1e3,
+            period_s * 1e3 / self.rate.factor().unwrap_or(1.0),
+        );
+        let verdict = match p99_ms < period_ms {
+            true => "within",
+            false => "MORE THAN",
+        };
+        format!(
+            "{p50_ms:.0} ms (median), {p99_ms:.0} ms (99 %): {verdict} the {period_ms:.0} ms of a scan"
+        )
+    }
+
+    fn unusual(&self) -> String {
+        let c = &self.counts;
+        let motions = c.motions.unwrap_or_default();
+        let lost = c.lost.unwrap_or_default();
+        let restarts = self.restarts.values().sum::<usize>() as u64;
+        let counts = [
+            (c.dropped, "scans dropped"),
+            (c.unreadable, "scans unreadable"),
+            (c.missing, "scans missing in the recording"),
+            (c.breaks, "breaks, after which the path starts anew"),
+            (lost.azimuths, "azimuths lost, which are put back"),
+            (motions.weak, "motions weak"),
+            (
+                motions.predicted,
+                "motions predicted, since nothing matched",
+            ),
+            (restarts, "restarts of processes"),
+        ];
+        let counts = counts.iter().filter(|(count, _)| *count > 0);
+        let counts: Vec<String> = counts
+            .map(|(count, what)| format!("{count} {what}"))
+            .collect();
+        match counts.is_empty() {
+            true => "nothing".to_owned(),
+            false => counts.join(", "),
+        }
+    }
+
+    fn places(&self) -> String {
+        let again = match self.ending {
+            Some(Ending::Complete) => "",
+            _ => "; the same command goes on from here",
+        };
+        let out = Path::new(&self.out);
+        // As short as a person here would write it.
+        let here = env::current_dir().ok();
+        let out = here
+            .and_then(|here| out.strip_prefix(here).ok())
+            .unwrap_or(out);
+        let out = out.display();
+        format!("gyre report {out} --open; all figures: {out}/summary.json, or -v{again}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::time::Duration;
+
+    use gyre_configuration::Configuration;
+    use gyre_latency::{Latency, Percentiles};
+
+    use super::*;
+    use crate::summary::{Counts, Course, Measured, MotionCounts, Session};
+
+    fn summary(rate: &str, counts: Counts, p99_us: f64) -> Summary {
+        let configuration = Configuration::of_overrides(&[format!("run.rate='{rate}'")]).unwrap();
+        let session = Session {
+            scans: Some(466),
+            resumed: 0,
+            wall: Duration::from_millis(14_200),
+            footprint: None,
+            ending: Some(Ending::Complete),
+            report: None,
+        };
+        let measured = Measured {
+            counts,
+            course: Course {
+                path_m: 885.2,
+                duration_s: 116.4,
+                period_s: Some(0.25),
+            },
+            latency: Latency {
+                scans: 466,
+                sensor_to_pose: Percentiles {
+                    p50_us: 31_000.0,
+                    p99_us,
+                    ..Percentiles::default()
+                },
+                ..Latency::default()
+            },
+            evaluation: None,
+            slam: None,
+        };
+        Summary::new(&configuration, "out/radiate".as_ref(), &session, measured)
+    }
+
+    #[test]
+    fn a_run_without_faults_ends_with_five_lines_that_fit() {
+        let counts = Counts {
+            processed: 466,
+            ..Counts::default()
+        };
+        let text = summary("realtime", counts, 58_000.0).in_brief();
+        let expected = "\
+complete    885 m in 116 s of driving, 466 scans; computed in 14.2 s
+accuracy    not known: the run has no ground truth
+latency     31 ms (median), 58 ms (99 %): within the 250 ms of a scan
+unusual     nothing
+look at     gyre report out/radiate --open; all figures:
+            out/radiate/summary.json, or -v";
+        assert_eq!(text, expected);
+    }
+
+    #[test]
+    fn what_is_unusual_is_counted_and_a_late_pose_is_told() {
+        let counts = Counts {
+            processed: 463,
+            dropped: 3,
+            motions: Some(MotionCounts {
+                weak: 2,
+                ..MotionCounts::default()
+            }),
+            ..Counts::default()
+        };
+        let text = summary("2", counts, 158_000.0).in_brief();
+        assert!(text.contains("463 of 466 scans"), "{text}");
+        assert!(text.contains("MORE THAN the 125 ms of a scan"), "{text}");
+        assert!(
+            text.contains("unusual     3 scans dropped, 2 motions weak\n"),
+            "{text}"
+        );
+        assert!(text.lines().all(|line| line.chars().count() <= WIDTH));
+    }
+
+    #[test]
+    fn a_run_as_fast_as_it_goes_is_compared_by_its_rate() {
+        let text = summary("max", Counts::default(), 1e6).in_brief();
+        let expected = "latency     32.8 scans/s, 8.2 times the radar's 4.0\n";
+        assert!(text.contains(expected), "{text}");
+    }
+}
