@@ -16,7 +16,10 @@ pub struct CalibrationError {
     reason: String,
 }
 
-/// Returns the section `[dataset]` of a file of `gyre calibrate` as overrides `dataset.key=value`.
+/// The sections whose key `min_range_m` a calibration may have.
+const RANGES: [&str; 2] = ["points", "raster"];
+
+/// Returns the constants in a file of `gyre calibrate` as overrides, as `dataset.key=value`.
 ///
 /// # Errors
 /// A file that cannot be read, or has anything else.
@@ -30,20 +33,28 @@ pub fn overrides(file: &Path) -> Result<Vec<String>, CalibrationError> {
     let table: toml::Table = text
         .parse()
         .map_err(|error: toml::de::Error| unusable(syntax(&text, &error)))?;
-    let section = match table.get("dataset") {
-        Some(toml::Value::Table(section)) if table.len() == 1 => section,
-        _ => {
-            return Err(unusable(
-                "a calibration has the section [dataset] and no other: give the calibration.toml of `gyre calibrate`".to_owned(),
-            ));
+    let is_known = |(section, value): (&String, &toml::Value)| match value {
+        toml::Value::Table(_) if section == "dataset" => true,
+        toml::Value::Table(keys) => {
+            RANGES.contains(&section.as_str()) && keys.keys().all(|key| key == "min_range_m")
         }
+        _ => false,
     };
+    if !table.contains_key("dataset") || !table.iter().all(is_known) {
+        return Err(unusable(
+            "a calibration has the section [dataset], min_range_m in [points] and [raster], and no more: give the calibration.toml of `gyre calibrate`".to_owned(),
+        ));
+    }
     strict::section::<DatasetOptions>(&mut table.clone(), "dataset")
         .map_err(|error| unusable(error.to_string()))?;
-    Ok(section
+    let sections = table
         .iter()
-        .map(|(key, value)| format!("dataset.{key}={value}"))
-        .collect())
+        .filter_map(|(name, section)| Some((name, section.as_table()?)));
+    let keys = sections.flat_map(|(name, section)| {
+        let key = move |(key, value): (&String, &toml::Value)| format!("{name}.{key}={value}");
+        section.iter().map(key)
+    });
+    Ok(keys.collect())
 }
 
 #[cfg(test)]
@@ -66,15 +77,17 @@ mod tests {
             keys,
             ["dataset.doppler_s=0.049", "dataset.range_offset_m=-0.31"]
         );
-        storage::write(
-            &file,
-            "[dataset]\ndoppler_s = 0.049\n[points]\nmin_range_m = 7\n",
-        )
-        .unwrap();
-        let refused = overrides(&file).unwrap_err().to_string();
-        assert!(
-            refused.contains("the section [dataset] and no other"),
-            "{refused}"
-        );
+        let text = "[dataset]\n[points]\nmin_range_m = 7.5\n[raster]\nmin_range_m = 7.5\n";
+        storage::write(&file, text).unwrap();
+        let ranges = ["points.min_range_m=7.5", "raster.min_range_m=7.5"];
+        assert_eq!(overrides(&file).unwrap(), ranges);
+        for text in [
+            "[dataset]\n[points]\nbeam_deg = 3\n",
+            "[points]\nmin_range_m = 7\n",
+        ] {
+            storage::write(&file, text).unwrap();
+            let refused = overrides(&file).unwrap_err().to_string();
+            assert!(refused.contains("and no more"), "{refused}");
+        }
     }
 }

@@ -74,6 +74,8 @@ pub struct Found {
     pub constants: Vec<Constant>,
     /// The range resolution, if the length of the path is given.
     resolution: Result<Constant, String>,
+    /// Range that leaves out the vehicle's own reflections, m, if it is more than configured.
+    pub min_range_m: Option<f64>,
     /// Further properties, a line each.
     others: Vec<[String; 2]>,
 }
@@ -134,6 +136,7 @@ impl Found {
             overlap: calibration.overlap,
             constants,
             resolution: resolution(path_m, configured)?,
+            min_range_m: drive.reflections().min_range_m(configured.min_range_m),
             others: others(drive, calibration, configured),
         })
     }
@@ -328,17 +331,17 @@ fn mounting(mounting: &Mounting) -> String {
 }
 
 fn reflections(drive: &Drive, configured: &Configured) -> String {
-    match drive.reflections().end_m() {
-        None => "too few moving scans to tell them".to_owned(),
-        Some(end_m) if end_m >= OwnReflections::REACH_M => format!(
+    let own = drive.reflections();
+    match (own.end_m(), own.min_range_m(configured.min_range_m)) {
+        (None, _) => "too few moving scans to tell them".to_owned(),
+        (Some(end_m), _) if end_m >= OwnReflections::REACH_M => format!(
             "power everywhere within {end_m:.0} m in nine of ten moving scans: raise masking.threshold to tell them"
         ),
-        Some(end_m) if end_m > configured.min_range_m => format!(
-            "to {end_m:.2} m in nine of ten moving scans, beyond points.min_range_m = {}: set it and raster.min_range_m to {:.1}",
-            configured.min_range_m,
-            (end_m * 10.0).ceil() / 10.0
+        (Some(end_m), Some(min_range_m)) => format!(
+            "to {end_m:.2} m in nine of ten moving scans, beyond points.min_range_m = {}: that and raster.min_range_m are to be {min_range_m:.1}",
+            configured.min_range_m
         ),
-        Some(end_m) => format!(
+        (Some(end_m), None) => format!(
             "to {end_m:.2} m, within points.min_range_m = {}",
             configured.min_range_m
         ),

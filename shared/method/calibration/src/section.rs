@@ -29,6 +29,15 @@ pub fn toml(found: &Found) -> String {
             constant.key, constant.found.value, constant.found.sigma
         );
     }
+    // Last, since a section begins: the keys before are of the dataset.
+    if let Some(min_range_m) = found.min_range_m {
+        for section in ["points", "raster"] {
+            let _ = writeln!(
+                text,
+                "\n[{section}]\nmin_range_m = {min_range_m:.1} # beyond the vehicle's own reflections"
+            );
+        }
+    }
     text
 }
 

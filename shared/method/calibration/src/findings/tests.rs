@@ -24,6 +24,7 @@ fn found(is_proposed: bool, overlap: [f64; 2]) -> Found {
         overlap,
         constants: vec![offset],
         resolution: Err("as configured".to_owned()),
+        min_range_m: None,
         others: Vec::new(),
     }
 }
@@ -55,4 +56,17 @@ fn what_is_said_to_contradict_is_what_is_written() {
         found.overlap(),
         "overlap of the scans  0.4200 as configured, 0.4300 with what is proposed"
     );
+}
+
+#[test]
+fn the_range_of_the_vehicle_is_written_for_points_and_rasters() {
+    let found = Found {
+        min_range_m: Some(3.5),
+        ..found(true, [0.42, 0.43])
+    };
+    let written = toml(&found);
+    for section in ["points", "raster"] {
+        let expected = format!("\n[{section}]\nmin_range_m = 3.5 # ");
+        assert!(written.contains(&expected), "{written}");
+    }
 }
