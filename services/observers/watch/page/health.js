@@ -92,7 +92,8 @@ export class HealthView {
     });
     byId("processes").replaceChildren(...rows);
     const dead = processes.filter((process) => process.last_death);
-    write("deaths", dead.map((process) => `${process.name} died by ${process.last_death}.`).join(" "));
+    const since = (process) => (process.level === "good" ? ", and works again" : "");
+    write("deaths", dead.map((process) => `${process.name} died by ${process.last_death}${since(process)}.`).join(" "));
   }
 
   // Says what is wrong first, then how the run is.

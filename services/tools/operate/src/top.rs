@@ -4,6 +4,7 @@ mod screen;
 mod snapshot;
 
 use std::{
+    io::{self, IsTerminal},
     process::ExitCode,
     time::{Duration, Instant},
 };
@@ -12,7 +13,7 @@ use gyre_stage::{
     observer::{ObservedRun, Observer},
     wake::Signals,
 };
-use gyre_terminal::{Failure, print};
+use gyre_terminal::{Failure, WIDTH, print};
 use ratatui::{
     DefaultTerminal,
     crossterm::event::{self, Event, KeyCode, KeyEventKind, KeyModifiers},
@@ -42,7 +43,7 @@ pub fn top(arguments: &TopArguments) -> Result<ExitCode, Failure> {
         let signals = Signals::install()?;
         snapshots.take()?;
         wait(&mut snapshots, every, || Ok(signals.sleep(PERIOD)?))?;
-        print::line(screen::text(&snapshots.take()?))?;
+        print::line(screen::text(&snapshots.take()?, width()))?;
         return Ok(ExitCode::SUCCESS);
     }
     let mut terminal = ratatui::try_init()
@@ -51,10 +52,18 @@ pub fn top(arguments: &TopArguments) -> Result<ExitCode, Failure> {
     ratatui::restore();
     let last = shown?;
     if let Some(last) = last {
-        print::line(screen::text(&last))?;
+        print::line(screen::text(&last, width()))?;
         print::line("the run has ended")?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Returns the columns of the terminal; any number where the output is none.
+fn width() -> u16 {
+    match io::stdout().is_terminal() {
+        true => ratatui::crossterm::terminal::size().map_or(WIDTH as u16, |(columns, _)| columns),
+        false => u16::MAX,
+    }
 }
 
 /// Returns the last snapshot at a run that has ended; `None` if the person ended it.

@@ -29,6 +29,21 @@ const COLUMNS: [(&str, u16); 12] = [
     ("restarts", 8),
 ];
 
+/// The columns that are left out where the screen is too narrow for all, the first one first.
+const LEFT_OUT: [usize; 5] = [10, 8, 1, 9, 3];
+
+/// Returns the places of the columns that fit into this width, each whole.
+fn columns(width: u16) -> Vec<usize> {
+    let mut shown: Vec<usize> = (0..COLUMNS.len()).collect();
+    let needed = |shown: &[usize]| shown.iter().map(|it| COLUMNS[*it].1 + 1).sum::<u16>() - 1;
+    for column in LEFT_OUT {
+        if needed(&shown) > width {
+            shown.retain(|it| *it != column);
+        }
+    }
+    shown
+}
+
 /// Draws a snapshot.
 pub fn draw(frame: &mut Frame<'_>, snapshot: &Snapshot) {
     let rows = snapshot.status.processes.len() as u16;
@@ -71,24 +86,26 @@ fn draw_processes(frame: &mut Frame<'_>, snapshot: &Snapshot, area: Rect) {
         _ if process.restarts > 0 => Style::new().fg(Color::Yellow),
         _ => Style::new(),
     };
+    let shown = columns(area.width.saturating_sub(2));
     let rows = snapshot.status.processes.iter().zip(&snapshot.processes);
     let rows = rows.map(|(process, used)| {
-        let cells = cells(snapshot, process, used).map(Cell::from);
-        Row::new(cells).style(style(process))
+        let cells = cells(snapshot, process, used);
+        Row::new(shown.iter().map(|it| Cell::from(cells[*it].clone()))).style(style(process))
     });
-    let header = Row::new(COLUMNS.map(|(title, _)| title));
-    let widths = COLUMNS.map(|(_, width)| Constraint::Length(width));
+    let header = Row::new(shown.iter().map(|it| COLUMNS[*it].0));
+    let widths = shown.iter().map(|it| Constraint::Length(COLUMNS[*it].1));
     let table = Table::new(rows, widths)
         .header(header.style(Style::new().add_modifier(Modifier::BOLD)))
         .block(Block::bordered().title(" processes "));
     frame.render_widget(table, area);
 }
 
-/// Returns a snapshot as text.
-pub fn text(snapshot: &Snapshot) -> String {
+/// Returns a snapshot as text of this width at most, as far as its columns can be left out.
+pub fn text(snapshot: &Snapshot, width: u16) -> String {
     let mut lines = head_lines(snapshot).to_vec();
+    let shown = columns(width);
     let line = |cells: [String; COLUMNS.len()]| {
-        let cells = cells.iter().zip(COLUMNS);
+        let cells = shown.iter().map(|it| (&cells[*it], COLUMNS[*it]));
         let cells = cells.map(|(cell, (_, width))| format!("{cell:width$}", width = width.into()));
         cells.collect::<Vec<_>>().join(" ").trim_end().to_owned()
     };
@@ -170,5 +187,22 @@ fn us(us: f64) -> String {
         us if us < 9_995.0 => format!("{:.2} ms", us * 1e-3),
         us if us < 99_950.0 => format!("{:.1} ms", us * 1e-3),
         us => duration(us * 1e-6),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_are_whole_on_a_small_screen_and_all_there_on_a_wide_one() {
+        let titles =
+            |width: u16| -> Vec<&str> { columns(width).iter().map(|it| COLUMNS[*it].0).collect() };
+        let expected = [
+            "process", "state", "cpu", "work p50", "p99", "hop p50", "restarts",
+        ];
+        assert_eq!(titles(78), expected);
+        assert_eq!(titles(116).len(), COLUMNS.len());
+        assert_eq!(titles(115).len(), COLUMNS.len() - 1);
     }
 }
