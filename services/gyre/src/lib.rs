@@ -87,7 +87,9 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         Command::Config(arguments) => gyre_inputs::config(&arguments),
         Command::Schema(arguments) => print_schema(&arguments),
         Command::Completions { shell } => {
-            clap_complete::generate(shell, &mut cli::command(), "gyre", &mut std::io::stdout());
+            let mut text = Vec::new();
+            clap_complete::generate(shell, &mut cli::command(), "gyre", &mut text);
+            print::line(String::from_utf8_lossy(&text).trim_end())?;
             Ok(ExitCode::SUCCESS)
         }
         Command::Man { folder } => {
