@@ -42,8 +42,9 @@ pub const SUMMARY: &str = "summary.json";
 /// The ground truth of a simulation that is played without being stored.
 pub const SIMULATED_TRUTH: &str = "ground_truth.tum";
 /// All results.
-pub const FILES: [&str; 13] = [
+pub const FILES: [&str; 14] = [
     "odometry.csv",
+    "poses.csv",
     "trajectory.tum",
     "trajectory.svg",
     "errors.svg",
