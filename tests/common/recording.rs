@@ -43,6 +43,17 @@ pub fn around_a_block() -> &'static Path {
     FOLDER.get_or_init(|| of_a_block(SCANS_AROUND))
 }
 
+/// The drive of the demo.
+pub fn demo() -> &'static Path {
+    static FOLDER: OnceLock<PathBuf> = OnceLock::new();
+    FOLDER.get_or_init(|| simulated("demo", &SimulationConfig::default()))
+}
+
+/// The recording of a drive with this section `[simulation]`.
+pub fn configured(name: &str, settings: &str) -> PathBuf {
+    simulated(name, &toml::from_str(settings).unwrap())
+}
+
 /// The recording of a drive along a trajectory in the format TUM.
 pub fn along(name: &str, trajectory: &str) -> PathBuf {
     let file = tempfile::NamedTempFile::new().unwrap();
