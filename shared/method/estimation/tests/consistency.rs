@@ -1,5 +1,5 @@
-//! Covariances agree with errors: the mean NEES of many simulated drives of 500 keyframes lies in its
-//! 95 % interval.
+//! Covariances agree with errors: the mean NEES of many simulated drives of 500 keyframes lies in
+//! its 95 % interval.
 
 use crate::common::{Drive, ODOMETRY};
 use gyre_estimation::{Outcome, PoseGraph};
