@@ -21,7 +21,7 @@ fn drive(seed: u64, loses: bool) -> SimulatedDrive {
     config.sensor.profile = Profile::Cts350xRadiate;
     config.output.format = Some(OutputFormat::Radiate);
     config.drive.speed_mps = 5.0;
-    config.effects.lost_azimuths = loses;
+    config.effects.lost_azimuths = Some(loses);
     SimulatedDrive::new(&config).unwrap()
 }
 
