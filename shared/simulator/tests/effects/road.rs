@@ -3,7 +3,7 @@
 use gyre_radar::OwnedScan;
 use gyre_simulator::body::Wall;
 use gyre_simulator::profile::Profile;
-use gyre_simulator::{Effects, Realism, Relief, SimulationConfig, Simulator};
+use gyre_simulator::{Effects, Realism, Relief, SimulationConfig, Simulator, write_dataset};
 use nalgebra::Point2;
 
 use super::scene::{Setup, db, mean_db, peak_bin, peak_db, post, power, powers};
@@ -319,4 +319,20 @@ fn a_plain_simulation_is_the_same_with_all_of_the_road_switched_off() {
     };
     assert!(scan(plain.clone()) == scan(off));
     assert!(scan(plain) != scan(road));
+}
+
+#[test]
+fn a_recording_that_names_what_is_left_out_today_is_continued() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = |scans| SimulationConfig {
+        scans: Some(scans),
+        ..SimulationConfig::default()
+    };
+    write_dataset(&config(1), folder.path(), &mut |_, _| ()).unwrap();
+    let made_by = folder.path().join("simulation.toml");
+    let text = std::fs::read_to_string(&made_by).unwrap();
+    let named = text.replace("[effects]", "[effects]\nlost_azimuths = false");
+    assert!(named != text);
+    std::fs::write(&made_by, named).unwrap();
+    write_dataset(&config(2), folder.path(), &mut |_, _| ()).unwrap();
 }
