@@ -183,7 +183,8 @@ def differences(alone, refined):
     def rms(values):
         return math.sqrt(np.mean(values**2)) if len(values) else None
 
-    return {"translation_m": rms(shift_m), "straight_deg": rms(yaw_deg[~turning]), "turning_deg": rms(yaw_deg[turning])}
+    of_turns = {"straight_deg": rms(yaw_deg[~turning]), "turning_deg": rms(yaw_deg[turning])}
+    return {"translation_m": rms(shift_m), "rotation_deg": rms(yaw_deg)} | of_turns
 
 
 # The comparison.

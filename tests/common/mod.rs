@@ -14,6 +14,7 @@ pub mod processes;
 pub mod recording;
 mod running;
 mod server;
+mod shared;
 mod watch;
 
 use std::{
@@ -36,6 +37,7 @@ pub use other_user::OtherUser;
 pub use processes::{Pid, cpu_time, send};
 pub use running::Running;
 pub use server::Server;
+pub use shared::Shared;
 pub use watch::{Watch, Watched};
 
 /// The stages of a run that does not search jointly, in the order of the stream.
@@ -182,6 +184,11 @@ impl Run {
         let model = project.join("models/gyre-255.toml");
         Self::of_file(&project.join("configs/demo.toml"))
             .set(&format!("masking.model='{}'", model.display()))
+    }
+
+    /// The same, of the demo's drive as a recording.
+    pub fn of_recorded_demo() -> Self {
+        Self::of_demo().data(recording::demo())
     }
 
     /// The same with `--data`.

@@ -43,6 +43,17 @@ pub fn around_a_block() -> &'static Path {
     FOLDER.get_or_init(|| of_a_block(SCANS_AROUND))
 }
 
+/// The drive of the demo.
+pub fn demo() -> &'static Path {
+    static FOLDER: OnceLock<PathBuf> = OnceLock::new();
+    FOLDER.get_or_init(|| simulated("demo", &SimulationConfig::default()))
+}
+
+/// The recording of a drive with this section `[simulation]`.
+pub fn configured(name: &str, settings: &str) -> PathBuf {
+    simulated(name, &toml::from_str(settings).unwrap())
+}
+
 /// The recording of a drive along a trajectory in the format TUM.
 pub fn along(name: &str, trajectory: &str) -> PathBuf {
     let file = tempfile::NamedTempFile::new().unwrap();
@@ -71,7 +82,7 @@ pub fn of_radiate(loses_azimuths: bool) -> PathBuf {
     config.sensor.profile = Profile::Cts350xRadiate;
     config.output.format = Some(OutputFormat::Radiate);
     config.drive.speed_mps = 5.0;
-    config.effects.lost_azimuths = loses_azimuths;
+    config.effects.lost_azimuths = Some(loses_azimuths);
     simulated(&format!("radiate-{loses_azimuths}"), &config)
 }
 

@@ -69,12 +69,24 @@ fn on_the_demo() {
     assert_eq!(assert_same_bits(&Run::of_demo()), 64);
 }
 
-#[test]
-fn on_real_scans() {
+/// Asserts it of the first scans of a real drive.
+fn on_a_real_drive(scans: usize) {
     if let Some(data) = real_data("radiate-2019-02-12") {
         let run = configuration("radiate.toml").data(&data);
-        assert_eq!(assert_same_bits(&run), 466);
+        let run = run.set(&format!("source.scans={scans}"));
+        assert_eq!(assert_same_bits(&run), scans);
     }
+}
+
+#[test]
+fn on_real_scans() {
+    on_a_real_drive(150);
+}
+
+#[test]
+#[ignore = "nightly: a whole drive"]
+fn on_all_real_scans() {
+    on_a_real_drive(466);
 }
 
 #[test]

@@ -18,7 +18,7 @@ const SCANS: usize = 64;
 
 /// The demo with another search, and nobody who follows it.
 fn demo() -> Run {
-    Run::of_demo()
+    Run::of_recorded_demo()
         .set("search.kind=exhaustive")
         .set("slam.kind=none")
 }

@@ -2,6 +2,8 @@
 
 use std::{collections::BTreeSet, fs, process::Command, thread, time::Duration};
 
+use gyre_geometry::{ComposedMotion, OdometryMotion, covariance, pose, xy_yaw};
+
 use crate::common::{Ended, Run, STAGES, assert_nothing_left, odometry, recording, undisturbed};
 use rustix::process::Signal;
 
@@ -64,6 +66,56 @@ fn all_results_are_there_and_each_motion_has_a_row() {
             "{stage} complains"
         );
     }
+}
+
+#[test]
+fn poses_have_the_covariance_of_the_motions_before_them() {
+    let run = Run::of_recording();
+    run.complete();
+    let numbers = |file: &str, names: &[&str]| -> Vec<Vec<f64>> {
+        let columns = odometry::columns(&run.result(file), names);
+        let row = |row: &Vec<String>| row.iter().map(|text| text.parse().unwrap()).collect();
+        columns.iter().map(row).collect()
+    };
+    let of_place = [
+        "x_m",
+        "y_m",
+        "yaw_rad",
+        "cov_xx",
+        "cov_xy",
+        "cov_xyaw",
+        "cov_yy",
+        "cov_yyaw",
+        "cov_yawyaw",
+    ];
+    let motions = numbers(
+        "odometry.csv",
+        &[&of_place[..], &["drift_share", "scale_sigma"]].concat(),
+    );
+    let poses = numbers("poses.csv", &of_place);
+    assert_eq!(poses.len(), recording::SCANS);
+    assert_eq!(poses[0], [0.0; 9]);
+    let mut composed = ComposedMotion::new();
+    for (motion, found) in motions.iter().zip(&poses[1..]) {
+        composed = composed.then(&OdometryMotion {
+            motion: pose(motion[0], motion[1], motion[2]),
+            covariance: covariance::unpack(&std::array::from_fn(|k| motion[3 + k])),
+            drift_share: motion[9],
+            scale_sigma: motion[10],
+        });
+        let expected = composed.motion();
+        let expected = [
+            &xy_yaw(&expected.motion)[..],
+            &covariance::pack(&expected.covariance),
+        ]
+        .concat();
+        let near = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-6 * a.abs().max(1e-3);
+        assert!(
+            found.iter().zip(&expected).all(near),
+            "{found:?} for {expected:?}"
+        );
+    }
+    assert!(poses.last().unwrap()[3] > 0.0);
 }
 
 #[test]

@@ -8,13 +8,14 @@ use crate::common::{Browser, Run, Running, Server, gyre};
 
 /// A drive that is still going on when a test ends it.
 fn long() -> Run {
-    small("scans = 4000").rate("2")
+    small(4000).rate("2")
 }
 
-fn small(simulation: &str) -> Run {
-    Run::configured(&format!(
-        "[simulation]\n{simulation}\n[raster]\nn = 127\ncell_m = 0.8\n[masking]\nkind = \"threshold\"\n"
-    ))
+/// A drive of so many scans: the small recording, again and again.
+fn small(scans: usize) -> Run {
+    Run::of_recording()
+        .set("source.repeat=true")
+        .set(&format!("source.scans={scans}"))
 }
 
 fn started(run: &Run) -> Running {
@@ -35,7 +36,7 @@ fn status(answer: &str) -> &str {
 
 #[test]
 fn a_folder_without_a_run_is_refused_in_a_sentence() {
-    let run = small("scans = 8");
+    let run = small(8);
     let output = gyre().arg("watch").arg(run.out()).output().unwrap();
     assert_eq!(output.status.code(), Some(1));
     let said = String::from_utf8(output.stderr).unwrap();
@@ -178,7 +179,7 @@ fn the_page_shows_poses_a_killed_stage_and_the_end_of_each_run() {
     );
 
     // The next run in the same folder is shown, and the browser changes no result.
-    let short = small("scans = 40").option("--fresh");
+    let short = small(40).option("--fresh");
     let undisturbed = short.complete();
     let watched = short.clone().into(run.out());
     running = watched.start();

@@ -14,23 +14,22 @@ use rustix::process::Signal;
 use serde_json::{Value, json};
 
 use crate::{
-    common::{Ended, Run, Running, gyre, processes, python, real_data, send},
+    common::{
+        Ended, Run, Running, gyre, processes, python, real_data, recording::SCANS, send,
+        undisturbed,
+    },
     operate::commands::{ask, await_status, process},
 };
 
-pub const SCANS: usize = 24;
 /// Every topic that a replay can begin with.
 const ALL: &str = "record.topics=['scan','masked','rotation','motion','refined','pose','log']";
 /// With so large a window the queues hold all scans of these tests: nothing is missed, however slow
 /// the machine is.
 pub const WINDOW: &str = "run.window=32";
 
-/// A drive that makes a loop, through small rasters.
-pub fn simulated() -> Run {
-    Run::configured(&format!(
-        "[simulation]\nscans = {SCANS}\n[raster]\nn = 127\ncell_m = 0.8\n"
-    ))
-    .set(WINDOW)
+/// A run of the small recording whose queues hold all of it.
+pub fn played() -> Run {
+    Run::of_recording().set(WINDOW)
 }
 
 pub fn file(run: &Run) -> PathBuf {
@@ -70,29 +69,27 @@ pub fn await_recorder(running: &mut Running, not: Option<u32>) -> u32 {
 
 #[test]
 fn a_recorded_run_has_the_same_results_and_replays_to_them_from_every_topic() {
-    let undisturbed = simulated().complete();
-    let run = recorded(&simulated()).set(ALL);
+    let run = recorded(&played()).set(ALL);
     let ended = run.finish();
     ended.succeeded();
     assert!(ended.stderr.contains("missed nothing"), "{}", ended.stderr);
-    assert_eq!(run.odometry(), undisturbed);
+    assert_eq!(run.odometry(), undisturbed());
     let recording = open_recording(&file(&run)).unwrap();
     for topic in ["scan", "masked", "rotation", "motion", "refined", "pose"] {
         let all: Vec<u64> = (0..SCANS as u64).collect();
         assert_eq!(seqs(&recording, topic), all, "{topic}");
     }
     assert_eq!(recording.cut().count(), 0);
-    assert_eq!(replay(&file(&run), &[]), undisturbed);
+    assert_eq!(replay(&file(&run), &[]), undisturbed());
     for topic in ["masked", "rotation", "motion", "refined"] {
         let odometry = replay(&file(&run), &["--from", topic]);
-        assert_eq!(odometry, undisturbed, "from {topic}");
+        assert_eq!(odometry, undisturbed(), "from {topic}");
     }
 }
 
 #[test]
 fn a_killed_recorder_changes_no_byte_and_another_one_goes_on_in_the_next_part() {
-    let undisturbed = simulated().complete();
-    let run = recorded(&simulated()).rate("1");
+    let run = recorded(&played()).rate("1");
     let mut running = run.start();
     running.await_poses(SCANS / 4);
     let killed = await_recorder(&mut running, None);
@@ -101,7 +98,7 @@ fn a_killed_recorder_changes_no_byte_and_another_one_goes_on_in_the_next_part() 
     let ended = running.finish();
     ended.succeeded();
     assert!(ended.stderr.contains("started again"), "{}", ended.stderr);
-    assert_eq!(run.odometry(), undisturbed);
+    assert_eq!(run.odometry(), undisturbed());
     assert_eq!(parts(&file(&run)).len(), 2);
     let recording = open_recording(&file(&run)).unwrap();
     assert_eq!(
@@ -116,13 +113,13 @@ fn a_killed_recorder_changes_no_byte_and_another_one_goes_on_in_the_next_part() 
         "what was written before the kill can be read"
     );
     assert_eq!(seqs(&recording, "scan").len(), SCANS);
-    assert_eq!(replay(&file(&run), &[]), undisturbed);
+    assert_eq!(replay(&file(&run), &[]), undisturbed());
 }
 
 #[test]
 fn a_run_that_ended_before_its_first_pose_goes_on_with_its_recording() {
     for (mode, rate) in [("lossless", "max"), ("live", "4")] {
-        let run = recorded(&simulated().rate(rate)).set(ALL);
+        let run = recorded(&played().rate(rate)).set(ALL);
         let run = run
             .set("source.scans=6")
             .set(&format!("run.mode={mode}"))
@@ -152,7 +149,7 @@ fn await_file(path: &Path) {
 
 #[test]
 fn a_recording_in_several_files_replays_to_the_same_bytes() {
-    let run = recorded(&simulated()).set(ALL).set("record.split_s=1.5");
+    let run = recorded(&played()).set(ALL).set("record.split_s=1.5");
     let odometry = run.complete();
     let files = parts(&file(&run));
     // Six seconds of scans; a file may begin with a message of a scan that is in the one before.
@@ -166,7 +163,7 @@ fn a_recording_in_several_files_replays_to_the_same_bytes() {
 
 #[test]
 fn a_recorder_that_is_killed_in_a_later_file_loses_none_of_the_earlier_ones() {
-    let run = recorded(&simulated()).rate("1").set("record.split_mb=1");
+    let run = recorded(&played()).rate("1").set("record.split_mb=1");
     let mut running = run.start();
     running.await_poses(SCANS / 2);
     let killed = await_recorder(&mut running, None);
@@ -184,10 +181,7 @@ fn a_recorder_that_is_killed_in_a_later_file_loses_none_of_the_earlier_ones() {
 
 #[test]
 fn a_recorder_that_is_stopped_for_long_says_exactly_what_it_missed() {
-    let run = recorded(&simulated())
-        .set(ALL)
-        .rate("1")
-        .set("run.window=1");
+    let run = recorded(&played()).set(ALL).rate("1").set("run.window=1");
     let mut running = run.start();
     running.await_poses(SCANS / 4);
     let recorder = await_recorder(&mut running, None);
@@ -195,7 +189,7 @@ fn a_recorder_that_is_stopped_for_long_says_exactly_what_it_missed() {
     running.await_poses(SCANS - 4);
     send(recorder, Signal::CONT);
     let ended = running.finish();
-    assert_eq!(run.odometry(), simulated().set("run.window=1").complete());
+    assert_eq!(run.odometry(), played().set("run.window=1").complete());
     let missed = counted_as_missed(&run, &ended);
     let recording = open_recording(&file(&run)).unwrap();
     // The scans that are there are played, and those that are not are named; what needs every
@@ -233,7 +227,7 @@ fn counted_as_missed(run: &Run, ended: &Ended) -> usize {
 
 #[test]
 fn what_a_killed_recorder_had_not_written_and_the_next_one_did_not_find_is_counted() {
-    let run = recorded(&simulated()).rate("1").set("run.window=1");
+    let run = recorded(&played()).rate("1").set("run.window=1");
     let mut running = run.start();
     running.await_poses(SCANS / 4);
     let killed = await_recorder(&mut running, None);
@@ -251,9 +245,7 @@ fn what_a_killed_recorder_had_not_written_and_the_next_one_did_not_find_is_count
 
 #[test]
 fn a_recorder_that_dies_right_before_the_end_is_reported() {
-    let run = recorded(&simulated())
-        .rate("1")
-        .set("record.topics=['scan']");
+    let run = recorded(&played()).rate("1").set("record.topics=['scan']");
     let mut running = run.start();
     running.await_poses(SCANS / 4);
     let recorder = await_recorder(&mut running, None);
@@ -272,7 +264,7 @@ fn a_recorder_that_dies_right_before_the_end_is_reported() {
 
 #[test]
 fn a_recording_holds_the_health_of_the_run() {
-    let run = recorded(&simulated()).rate("1");
+    let run = recorded(&played()).rate("1");
     let mut running = run.start();
     running.await_poses(SCANS / 4).kill("masking");
     running.finish().succeeded();
@@ -304,8 +296,7 @@ fn health(recording: &Path) -> Vec<Value> {
 
 #[test]
 fn the_recorder_is_listed_with_the_processes_and_started_again_on_request() {
-    let undisturbed = simulated().complete();
-    let run = recorded(&simulated()).rate("1");
+    let run = recorded(&played()).rate("1");
     let mut running = run.start();
     running.await_poses(SCANS / 4);
     let recorder = |what, is_as_wanted: &dyn Fn(&Value) -> bool| {
@@ -333,7 +324,7 @@ fn the_recorder_is_listed_with_the_processes_and_started_again_on_request() {
         it["restarts"] == 2 && it["last_death"] == "signal 9"
     });
     running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed);
+    assert_eq!(run.odometry(), undisturbed());
     assert_eq!(parts(&file(&run)).len(), 3);
     assert_eq!(
         seqs(&open_recording(&file(&run)).unwrap(), "scan").len(),
@@ -343,7 +334,7 @@ fn the_recorder_is_listed_with_the_processes_and_started_again_on_request() {
 
 #[test]
 fn a_player_and_a_stage_that_are_killed_change_no_byte_of_a_replay() {
-    let run = recorded(&simulated()).set(ALL);
+    let run = recorded(&played()).set(ALL);
     let odometry = run.complete();
     let again = Run::configured("");
     let mut command = gyre();
@@ -360,14 +351,14 @@ fn a_player_and_a_stage_that_are_killed_change_no_byte_of_a_replay() {
 
 #[test]
 fn a_recording_of_a_part_of_a_drive_replays_under_its_own_numbers() {
-    let run = recorded(&simulated()).set("source.first=5");
+    let run = recorded(&played()).set("source.first=5");
     let odometry = run.complete();
     assert_eq!(replay(&file(&run), &[]), odometry);
 }
 
 #[test]
 fn a_recording_from_the_middle_of_a_drive_is_refused_where_all_messages_are_needed() {
-    let run = simulated().rate("1").set("run.window=1");
+    let run = played().rate("1").set("run.window=1");
     let mut running = run.start();
     running.await_poses(SCANS / 3);
     let mut record = gyre();
@@ -383,7 +374,7 @@ fn a_recording_from_the_middle_of_a_drive_is_refused_where_all_messages_are_need
     let scans = seqs(&recording, "scan");
     assert!(!scans.is_empty() && scans[0] > 0, "{scans:?}");
     // A scan before the recorder came is not there, and the stages after `masked` need it.
-    let replay = simulated().data(&file(&run)).argument("--from", "masked");
+    let replay = Run::small().data(&file(&run)).argument("--from", "masked");
     replay
         .finish()
         .refused_with(&["lacks message 0 of topic `masked`"]);
@@ -391,23 +382,23 @@ fn a_recording_from_the_middle_of_a_drive_is_refused_where_all_messages_are_need
 
 #[test]
 fn a_recording_without_the_topic_that_is_played_is_refused_with_how_to_record_it() {
-    let run = recorded(&simulated());
+    let run = recorded(&played());
     run.complete();
-    let without = simulated().data(&file(&run)).argument("--from", "masked");
+    let without = Run::small().data(&file(&run)).argument("--from", "masked");
     without.finish().refused_with(&[
         "was recorded without the topic `masked`",
         "record.topics",
         "without --from",
     ]);
     // As in docs/record.md.
-    let run = recorded(&simulated()).set("record.topics=['scan','masked','pose']");
+    let run = recorded(&played()).set("record.topics=['scan','masked','pose']");
     let odometry = run.complete();
     assert_eq!(replay(&file(&run), &["--from", "masked"]), odometry);
 }
 
 #[test]
 fn a_recording_is_not_overwritten() {
-    let run = recorded(&simulated());
+    let run = recorded(&played());
     fs::write(file(&run), "mine").unwrap();
     run.finish()
         .refused_with(&["drive.mcap exists", "never overwritten"]);
@@ -416,7 +407,7 @@ fn a_recording_is_not_overwritten() {
 
 #[test]
 fn a_full_disk_ends_the_recording_with_a_sentence_and_not_the_run() {
-    let run = simulated();
+    let run = played();
     let place = run.folder().join("small");
     fs::create_dir(&place).unwrap();
     let recorded = run
@@ -430,12 +421,12 @@ fn a_full_disk_ends_the_recording_with_a_sentence_and_not_the_run() {
     for part in ["No space left", "the run goes on"] {
         assert!(ended.stderr.contains(part), "{}", ended.stderr);
     }
-    assert_eq!(run.odometry(), simulated().complete());
+    assert_eq!(run.odometry(), undisturbed());
 }
 
 #[test]
 fn inspect_reports_a_recording_as_a_dataset() {
-    let run = recorded(&simulated());
+    let run = recorded(&played());
     run.complete();
     let mut command = gyre();
     command.arg("inspect").arg(file(&run)).arg("--json");
@@ -496,7 +487,7 @@ fn the_python_package_mcap_reads_a_recording() {
         println!("skipped: {} has no package mcap-protobuf-support", python());
         return;
     }
-    let run = recorded(&simulated());
+    let run = recorded(&played());
     run.complete();
     let mut command = Command::new(python());
     command.args(["-c", READ]).arg(file(&run));

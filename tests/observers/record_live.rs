@@ -14,7 +14,7 @@ use crate::{
     live::radar::Radar,
 };
 
-const SCANS: usize = 110;
+const SCANS: usize = 70;
 /// Faster than the refinement of [`slow`].
 const RATE: &str = "2";
 const TOPICS: &str = "record.topics=['scan','masked','rotation','motion','refined','pose']";

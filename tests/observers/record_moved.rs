@@ -5,8 +5,8 @@ use std::{fs, path::Path};
 use gyre_recording::{Recording, open_recording, parts};
 use rustix::process::Signal;
 
-use super::record::{SCANS, await_recorder, file, recorded, replay, seqs, simulated};
-use crate::common::{Ended, gyre, send};
+use super::record::{await_recorder, file, played, recorded, replay, seqs};
+use crate::common::{Ended, gyre, recording::SCANS, send, undisturbed};
 
 /// Moves all parts but the newest one; returns how many.
 fn move_away(recording: &Path, to: &Path) -> usize {
@@ -22,8 +22,7 @@ fn move_away(recording: &Path, to: &Path) -> usize {
 
 #[test]
 fn parts_are_moved_away_while_the_recording_goes_on_and_none_is_overwritten() {
-    let undisturbed = simulated().complete();
-    let run = recorded(&simulated()).rate("1").set("record.split_s=0.7");
+    let run = recorded(&played()).rate("1").set("record.split_s=0.7");
     let other_disk = run.folder().join("disk");
     fs::create_dir(&other_disk).unwrap();
     let mut running = run.start();
@@ -58,5 +57,5 @@ fn parts_are_moved_away_while_the_recording_goes_on_and_none_is_overwritten() {
     assert!(whole.absent_parts().is_empty() && whole.left_out().is_empty());
     assert_eq!(seqs(&whole, "scan").len(), SCANS);
     assert_eq!(whole.missed().get("scan"), None);
-    assert_eq!(replay(&other_disk, &[]), undisturbed);
+    assert_eq!(replay(&other_disk, &[]), undisturbed());
 }

@@ -5,15 +5,19 @@ use std::{path::Path, thread, time::Duration};
 
 use rustix::process::Signal;
 
-use crate::common::{Run, Watch, assert_nothing_left, odometry, real_data};
+use crate::common::{
+    Run, Watch, assert_nothing_left, odometry, real_data,
+    recording::{SCANS_AROUND as SCANS, around_a_block},
+};
 
-const SCANS: u64 = 200;
 /// Places for observers of each topic, by default.
 const PLACES: usize = 8;
 
-fn simulated() -> Run {
-    let scans = format!("[simulation]\nscans = {SCANS}\n");
-    Run::configured(&format!("{scans}[raster]\nn = 127\ncell_m = 0.8\n"))
+/// The recording's thirty seconds in four.
+const MODERATE: &str = "8";
+
+fn around() -> Run {
+    Run::small().data(around_a_block())
 }
 
 /// Runs with eight observers: two look on, two are stopped, two are killed, and two places are for
@@ -52,7 +56,7 @@ fn observers_change_nothing(run: &Run, undisturbed: &str) {
 
 #[test]
 fn observers_that_look_on_stop_die_come_and_go_change_nothing() {
-    observers_change_nothing(&simulated(), &simulated().complete());
+    observers_change_nothing(&around().rate(MODERATE), &around().complete());
 }
 
 #[test]
@@ -61,13 +65,16 @@ fn observers_of_a_real_recording_change_nothing() {
         return;
     };
     let configuration = Path::new(crate::PROJECT).join("configs/radiate.toml");
-    let run = || Run::of_file(&configuration).data(&data);
-    observers_change_nothing(&run(), &run().complete());
+    let run = || {
+        let run = Run::of_file(&configuration).data(&data);
+        run.set(&format!("source.scans={SCANS}"))
+    };
+    observers_change_nothing(&run().rate(MODERATE), &run().complete());
 }
 
 #[test]
 fn an_observer_sees_each_item_once_although_the_publisher_is_restarted() {
-    let run = simulated();
+    let run = around().rate(MODERATE);
     let mut running = run.start();
     running.await_stage("pose-integration");
     let watches = ["masked", "motion"].map(|topic| Watch::start(&run, topic).await_message());
@@ -76,13 +83,13 @@ fn an_observer_sees_each_item_once_although_the_publisher_is_restarted() {
     running.finish().succeeded();
     for watch in watches {
         let watched = watch.finish();
-        assert!(watched.assert_consistent(SCANS).total.is_some());
+        assert!(watched.assert_consistent(SCANS as u64).total.is_some());
     }
 }
 
 #[test]
 fn the_places_of_killed_observers_are_freed() {
-    let run = simulated().rate("8");
+    let run = around().rate("4");
     let mut running = run.start();
     running.await_poses(1);
     for _ in 0..2 {

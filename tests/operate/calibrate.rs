@@ -4,13 +4,22 @@ use std::{fs, path::Path};
 
 use crate::common::{Ended, Run, gyre, recording};
 
+/// Little to compare: as few scans as determine the constants, and points nearby.
+const FEW: &str = "source.scans=60";
+const NEAR: &str = "points.max_range_m=50";
 /// By how much the recording is read with too long ranges, m.
 const WRONG_BY_M: f64 = 0.25;
 
-fn calibrate(recording: &Path, out: &Path, set: &str) -> Ended {
+fn calibrate(recording: &Path, out: &Path, set: &[&str]) -> Ended {
     let mut command = gyre();
-    command.arg("calibrate").arg(recording).args(["--set", set]);
-    command.arg("--out").arg(out);
+    command
+        .arg("calibrate")
+        .arg(recording)
+        .arg("--out")
+        .arg(out);
+    for sentence in set {
+        command.args(["--set", sentence]);
+    }
     Ended::of(command)
 }
 
@@ -28,7 +37,7 @@ fn a_wrong_range_offset_is_named_and_put_right_by_the_file() {
     let out = tempfile::tempdir().unwrap();
     let right_m = range_offset_m(&fs::read_to_string(recording.join("dataset.toml")).unwrap());
     let wrong = format!("dataset.range_offset_m={}", right_m + WRONG_BY_M);
-    let ended = calibrate(recording, out.path(), &wrong);
+    let ended = calibrate(recording, out.path(), &[&wrong, FEW, NEAR]);
     let said = ended.succeeded().stdout.clone();
     let line = |name: &str| said.lines().find(|line| line.starts_with(name)).unwrap();
     assert!(
@@ -74,7 +83,7 @@ fn a_wrong_range_offset_is_named_and_put_right_by_the_file() {
 #[test]
 fn a_drive_that_is_too_short_is_refused() {
     let out = tempfile::tempdir().unwrap();
-    let ended = calibrate(recording::small(), out.path(), "source.scans=3");
+    let ended = calibrate(recording::small(), out.path(), &["source.scans=3"]);
     ended.failed_with(&["scans"]);
     assert!(!out.path().join("calibration.toml").exists());
 }

@@ -123,7 +123,13 @@ fn a_table_and_all_plots_come_of_an_odometry() {
         [1, 1, 1, 0],
         "23 motions have no segment of 64:\n{table}"
     );
-    for word in ["ATE", "covariance    23 motions", "first", "second"] {
+    for word in [
+        "ATE",
+        "covariance    23 motions",
+        "first",
+        "second",
+        "times as much as their covariances say",
+    ] {
         assert!(table.contains(word), "{word} is not in:\n{table}");
     }
     for plot in ["trajectory.svg", "errors.svg", "bands.svg"] {

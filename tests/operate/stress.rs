@@ -14,15 +14,15 @@ use rustix::process::Signal;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::common::{assert_nothing_left, gyre, leftovers, send};
+use crate::common::{assert_nothing_left, gyre, leftovers, recording, send};
 
-/// Time between two scans of a simulated radar, s.
+/// Time between two scans of the recording, s.
 const PERIOD_S: f64 = 0.25;
 
 /// Time for what takes some seconds on a machine that is not loaded.
 const LIMIT: Duration = Duration::from_secs(120);
 
-/// A stress test of a small simulated drive.
+/// A stress test of the small recording.
 struct Stress {
     folder: TempDir,
 }
@@ -33,7 +33,10 @@ impl Stress {
             .prefix("gyre-test-")
             .tempdir()
             .unwrap();
-        let configuration = "[simulation]\nscans = 24\n[raster]\nn = 127\ncell_m = 0.8\n";
+        let configuration = format!(
+            "[source]\ndata = '{}'\n[raster]\nn = 127\ncell_m = 0.8\n",
+            recording::small().display()
+        );
         fs::write(folder.path().join("small.toml"), configuration).unwrap();
         Self { folder }
     }

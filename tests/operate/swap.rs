@@ -37,8 +37,8 @@ fn shell_words(words: &[&str]) -> String {
 
 #[test]
 fn each_stage_gives_way_to_another_program_and_back_without_a_lost_scan() {
-    // Twelve seconds, since the machine may be busy.
-    let run = Run::of_recording().rate("0.5");
+    // Twenty seconds, since the machine may be busy.
+    let run = Run::of_recording().rate("0.3");
     let mut running = run.start();
     running.await_poses(2);
     for stage in STAGES {

@@ -7,7 +7,7 @@ use std::{env, process};
 use gyre_stage::Launch;
 use serde_json::Value;
 
-use crate::common::{Ended, gyre};
+use crate::common::{Ended, gyre, recording};
 use stages::BREACH;
 
 /// The report on a program, and the end of the command.
@@ -25,6 +25,10 @@ fn tested(stage: &str, more: &[&str]) -> (Value, Ended) {
     command
         .args(["--set", "masking.kind='threshold'"])
         .args(more);
+    // The own source is tested with a simulation.
+    if stage != "radar-replay" {
+        command.arg("--data").arg(recording::small());
+    }
     if !more.contains(&"--stop-timeout-s") {
         command.args(["--stop-timeout-s", "30"]);
     }

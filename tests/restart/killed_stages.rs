@@ -77,11 +77,8 @@ fn a_killed_pose_integration_goes_on() {
 #[test]
 fn a_stage_killed_amid_scans_with_lost_azimuths_goes_on() {
     let of_radiate = || {
-        let run = Run::configured("[raster]\nn = 127\ncell_m = 0.8\n[simulation]\nscans = 40\n");
+        let run = Run::small().data(&recording::of_radiate(true));
         run.rate(MODERATE)
-            .set("simulation.sensor.profile=cts350x-radiate")
-            .set("simulation.output.format=radiate")
-            .set("simulation.effects.lost_azimuths=true")
     };
     let undisturbed = of_radiate();
     undisturbed.complete();

@@ -8,16 +8,19 @@ use gyre_slam::{Keyframe, Query, RecordReader, records_path};
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use rustix::process::Signal;
 
-use crate::common::{Ended, Run, Running, Watch, gyre, send};
+use crate::common::{
+    Ended, Run, Running, Watch, gyre,
+    recording::{SCANS_AROUND as SCANS, around_a_block},
+    send,
+};
 
-/// Two and a half laps around a block.
-const SCANS: usize = 200;
+/// The recording's thirty seconds in five: followers are disturbed while scans come.
+const MODERATE: &str = "6";
 const LOOP_CLOSURE: &str = FollowerId::LoopClosure.name();
 const TRAJECTORY: &str = FollowerId::Trajectory.name();
 
 fn without_slam() -> Run {
-    let scans = format!("[simulation]\nscans = {SCANS}\n");
-    Run::configured(&format!("{scans}[raster]\nn = 127\ncell_m = 0.8\n"))
+    Run::small().data(around_a_block())
 }
 
 fn run() -> Run {
@@ -88,7 +91,7 @@ fn a_drive_round_a_block_closes_its_loops_and_has_the_same_odometry() {
 fn followers_killed_at_random_moments_are_restarted_alone() {
     for seed in 0..3 {
         let mut random = StdRng::seed_from_u64(seed);
-        let run = run();
+        let run = run().rate(MODERATE);
         let mut running = run.start();
         for follower in [LOOP_CLOSURE, TRAJECTORY, LOOP_CLOSURE] {
             running.await_poses_or_end(random.random_range(1..SCANS));
@@ -193,7 +196,7 @@ fn a_run_that_goes_on_without_a_follower_can_be_interrupted() {
 #[test]
 fn a_follower_that_hangs_is_restarted_when_the_run_waits_for_it() {
     for follower in [LOOP_CLOSURE, TRAJECTORY] {
-        let run = run().set("run.stall_timeout_s=3");
+        let run = run().rate(MODERATE).set("run.stall_timeout_s=3");
         let mut running = run.start();
         send(running.await_stage(follower), Signal::STOP);
         let ended = running.finish();
@@ -209,7 +212,7 @@ fn a_follower_that_hangs_is_restarted_when_the_run_waits_for_it() {
 
 #[test]
 fn loops_and_corrections_can_be_watched() {
-    let run = run();
+    let run = run().rate(MODERATE);
     let mut running = run.start();
     running.await_stage(TRAJECTORY);
     let watches = ["loop", "correction"].map(|topic| Watch::start(&run, topic).await_message());
@@ -223,7 +226,7 @@ fn loops_and_corrections_can_be_watched() {
 
 #[test]
 fn a_run_without_a_map_says_that_it_has_no_fixes_to_watch() {
-    let run = run();
+    let run = run().rate(MODERATE);
     let mut running = run.start();
     running.await_poses(1);
     let mut watch = gyre();
@@ -234,7 +237,7 @@ fn a_run_without_a_map_says_that_it_has_no_fixes_to_watch() {
 
 #[test]
 fn a_run_without_slam_says_that_it_has_no_loops_to_watch() {
-    let run = without_slam();
+    let run = without_slam().rate(MODERATE);
     let mut running = run.start();
     running.await_poses(1);
     let mut watch = gyre();

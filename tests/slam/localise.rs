@@ -1,45 +1,80 @@
 //! `gyre localise` as a whole: a run is mapped, and other drives are found in its map, or are not.
 
-use std::{fs, os::unix::fs::MetadataExt, path::Path, process::Stdio};
+use std::{
+    fs,
+    os::unix::fs::MetadataExt,
+    path::{Path, PathBuf},
+    process::Stdio,
+    sync::Arc,
+};
 
 use gyre_geometry::Pose;
 use gyre_radar::read_trajectory;
 
-use crate::common::{Ended, Run, folder, gyre};
+use crate::common::{Ended, Run, Shared, folder, gyre, recording};
 
-/// A drive around a block of the town with this seed, with traffic and noise of its own.
-const DRIVE: &str = "[simulation]\n[raster]\nn = 255\ncell_m = 0.4\n";
+const CONFIGURATION: &str = "[raster]\nn = 255\ncell_m = 0.4\n";
+/// The town that is mapped, and another one.
+const TOWN: u64 = 3;
+const OTHER_TOWN: u64 = 4;
 
-/// Runs a drive, and draws its map into the run's folder.
-fn mapped() -> Run {
-    let run = Run::configured(DRIVE)
-        .set("simulation.town.seed=3")
-        .set("slam.kind=graph");
-    run.complete();
-    let mut map = gyre();
-    map.arg("map")
-        .arg(run.out())
-        .args(["--format=folder", "--out"]);
-    map.arg(run.folder().join("map"));
-    Ended::of(map).succeeded();
-    run
+/// Days of drives of one path at one pace.
+#[derive(Debug)]
+enum Day {
+    First,
+    Second,
+    /// It rains, and things of the town have changed.
+    Rainy,
 }
 
-/// Localises a drive of another day in the town with the seed `town`, in the map of `run`.
-fn localise(run: &Run, town: u64, out: &Path) -> Ended {
+/// The drive that is mapped.
+fn first_drive() -> PathBuf {
+    drive(TOWN, Day::First)
+}
+
+/// A drive around a block of the town with the seed `town`, with traffic and noise of its own.
+fn drive(town: u64, day: Day) -> PathBuf {
+    let settings = match day {
+        Day::First => format!("[town]\nseed = {town}\n"),
+        Day::Second => format!("seed = 9\n[town]\nseed = {town}\n"),
+        Day::Rainy => format!(
+            "seed = 9\nweather = [{{ rain_mm_h = 10.0 }}]\n[town]\nseed = {town}\nchanges_seed = 5\n"
+        ),
+    };
+    recording::configured(&format!("town-{town}-{day:?}"), &settings)
+}
+
+/// A run of a drive with SLAM, and its map in the run's folder.
+fn mapped() -> Arc<Run> {
+    static RUN: Shared<Run> = Shared::new();
+    RUN.get(|| {
+        let run = Run::configured(CONFIGURATION)
+            .data(&first_drive())
+            .set("slam.kind=graph");
+        run.complete();
+        let mut map = gyre();
+        map.arg("map")
+            .arg(run.out())
+            .args(["--format=folder", "--out"]);
+        map.arg(map_of(&run));
+        Ended::of(map).succeeded();
+        run
+    })
+}
+
+fn map_of(run: &Run) -> PathBuf {
+    run.folder().join("map")
+}
+
+/// Localises a drive of another day in a town, in this map.
+fn localise(map: &Path, town: u64, out: &Path) -> Ended {
+    let drive = drive(town, Day::Rainy);
     let configuration = out.with_extension("toml");
-    fs::write(&configuration, DRIVE).unwrap();
+    fs::write(&configuration, CONFIGURATION).unwrap();
     let mut command = gyre();
-    command.arg("localise").arg(configuration).arg("--map");
-    command.arg(run.folder().join("map")).arg("--out").arg(out);
-    for sentence in [
-        format!("simulation.town.seed={town}"),
-        "simulation.town.changes_seed=5".to_owned(),
-        "simulation.seed=9".to_owned(),
-        "simulation.weather=[{ rain_mm_h = 10.0 }]".to_owned(),
-    ] {
-        command.args(["--set", &sentence]);
-    }
+    command.arg("localise").arg(configuration);
+    command.arg("--data").arg(drive);
+    command.arg("--map").arg(map).arg("--out").arg(out);
     Ended::of(command)
 }
 
@@ -61,14 +96,14 @@ fn rows(out: &Path) -> Vec<(i64, String, Option<Pose>)> {
 fn a_drive_on_another_day_is_found_in_the_map_of_a_run() {
     let (run, folder) = (mapped(), folder());
     let out = folder.path().join("found");
-    let ended = localise(&run, 3, &out);
+    let ended = localise(&map_of(&run), TOWN, &out);
     ended.succeeded();
     assert!(
         ended.stdout.starts_with("first fix: scan 0"),
         "{}",
         ended.stdout
     );
-    let truth = read_trajectory(&run.out().join("ground_truth.tum")).unwrap();
+    let truth = read_trajectory(&first_drive().join("ground_truth.tum")).unwrap();
     let first = truth.poses[0];
     let rows = rows(&out);
     assert_eq!(rows.len(), truth.poses.len());
@@ -84,11 +119,11 @@ fn a_drive_on_another_day_is_found_in_the_map_of_a_run() {
         assert!(error_m < 0.5 && error_rad.abs() < 0.02, "{number}: {error}");
     }
     let again = folder.path().join("again");
-    localise(&run, 3, &again).succeeded();
+    localise(&map_of(&run), TOWN, &again).succeeded();
     let bytes = |out: &Path| fs::read(out.join("fixes.csv")).unwrap();
     assert_eq!(bytes(&out), bytes(&again));
     // Its results are their user's alone, as those of a run.
-    let map = run.folder().join("map");
+    let map = map_of(&run);
     let fixes = out.join("fixes.csv");
     for file in [map.join("map.toml"), map.join("keyframes.log"), fixes] {
         let mode = fs::metadata(&file).unwrap().mode();
@@ -100,7 +135,7 @@ fn a_drive_on_another_day_is_found_in_the_map_of_a_run() {
 fn a_drive_through_another_town_is_lost_and_gets_no_fix() {
     let (run, folder) = (mapped(), folder());
     let out = folder.path().join("lost");
-    let ended = localise(&run, 4, &out);
+    let ended = localise(&map_of(&run), OTHER_TOWN, &out);
     ended.succeeded();
     assert!(
         ended.stdout.starts_with("no scan was found in the map"),
@@ -117,10 +152,11 @@ fn a_drive_through_another_town_is_lost_and_gets_no_fix() {
 #[test]
 fn a_run_that_names_a_map_publishes_the_places_of_its_keyframes() {
     let mapped = mapped();
-    let map = mapped.folder().join("map");
-    let run = Run::configured(DRIVE)
-        .set("simulation.town.seed=3")
-        .set("simulation.seed=9")
+    let plain = Run::configured(CONFIGURATION).data(&drive(TOWN, Day::Second));
+    let map = map_of(&mapped);
+    let run = plain
+        .clone()
+        .into(&plain.folder().join("mapped"))
         .set("slam.kind=graph")
         .set(&format!("slam.map='{}'", map.display()))
         .rate("20");
@@ -137,15 +173,13 @@ fn a_run_that_names_a_map_publishes_the_places_of_its_keyframes() {
     let places = watched.lines().filter(|line| line.contains(" m, yaw "));
     assert!(places.count() > 10, "{watched}");
     assert!(!watched.contains("lost"), "{watched}");
-    let plain = Run::configured(DRIVE)
-        .set("simulation.town.seed=3")
-        .set("simulation.seed=9");
     assert_eq!(run.odometry(), plain.complete());
 }
 
 #[test]
 fn a_run_in_a_map_that_does_not_exist_is_refused_before_it_starts() {
-    let run = Run::configured(DRIVE).set("slam.map='nowhere'");
+    let run = Run::configured(CONFIGURATION).data(recording::small());
+    let run = run.set("slam.map='nowhere'");
     let refused = run.clone().set("slam.kind=graph").finish();
     refused.refused_with(&["nowhere is not a map"]);
     run.finish()
@@ -156,12 +190,16 @@ fn a_run_in_a_map_that_does_not_exist_is_refused_before_it_starts() {
 fn a_folder_that_is_no_map_to_localise_in_is_refused_with_what_to_do() {
     let (run, folder) = (mapped(), folder());
     let out = folder.path().join("refused");
-    fs::remove_file(run.folder().join("map/keyframes.log")).unwrap();
-    localise(&run, 3, &out).refused_with(&[
+    let map = folder.path().join("map");
+    fs::create_dir(&map).unwrap();
+    for name in ["map.toml", "places.index"] {
+        fs::copy(map_of(&run).join(name), map.join(name)).unwrap();
+    }
+    localise(&map, TOWN, &out).refused_with(&[
         "keyframes.log has 0 keyframes and no end",
         "draw the map again with gyre map",
     ]);
-    fs::remove_file(run.folder().join("map/map.toml")).unwrap();
-    localise(&run, 3, &out).refused_with(&["is not a map", "map.toml"]);
+    fs::remove_file(map.join("map.toml")).unwrap();
+    localise(&map, TOWN, &out).refused_with(&["is not a map", "map.toml"]);
     assert!(!out.exists());
 }

@@ -1,12 +1,12 @@
 //! Results of a run with SLAM: a drive that comes back to its start is corrected by loops, and the
 //! files are the same bytes whatever happens to the run.
 
-use std::{fs, process::Command};
+use std::{fs, process::Command, sync::Arc};
 
 use gyre_estimation::G2o;
 use gyre_geometry::xy_yaw;
 
-use crate::common::{Ended, Run, python};
+use crate::common::{Ended, Run, Shared, python};
 
 /// Reads a graph by GTSAM, and prints its factors, its values, and the last pose.
 const GTSAM: &str = "import gtsam, sys
@@ -24,7 +24,17 @@ const FILES: [&str; 5] = [
 
 /// Once around a block.
 fn run(kind: &str) -> Run {
-    Run::of_demo().set(&format!("slam.kind={kind}"))
+    Run::of_recorded_demo().set(&format!("slam.kind={kind}"))
+}
+
+/// The same by a graph, complete.
+fn corrected() -> Arc<Run> {
+    static RUN: Shared<Run> = Shared::new();
+    RUN.get(|| {
+        let run = run("graph");
+        run.complete();
+        run
+    })
 }
 
 fn files(run: &Run) -> Vec<Vec<u8>> {
@@ -34,9 +44,9 @@ fn files(run: &Run) -> Vec<Vec<u8>> {
 
 #[test]
 fn a_drive_that_comes_back_is_corrected_by_loops() {
-    for kind in ["graph", "filter"] {
-        let run = run(kind);
-        run.complete();
+    let filtered = run("filter");
+    filtered.complete();
+    for (kind, run) in [("graph", &*corrected()), ("filter", &filtered)] {
         let summary = run.summary();
         let figure = |place: &str| summary.pointer(place).and_then(|it| it.as_f64()).unwrap();
         let used = figure("/slam/loops_used");
@@ -68,8 +78,7 @@ fn gtsam_reads_all_of_a_graph() {
         );
         return;
     }
-    let run = run("graph");
-    run.complete();
+    let run = corrected();
     let mut command = Command::new(python());
     command.args(["-c", GTSAM]).arg(run.out().join("graph.g2o"));
     let read = Ended::of(command);
@@ -96,8 +105,7 @@ fn gtsam_reads_all_of_a_graph() {
 
 #[test]
 fn an_interrupted_drive_has_the_same_corrected_trajectory() {
-    let whole = run("graph");
-    whole.complete();
+    let whole = corrected();
     let interrupted = run("graph").rate("20");
     let mut running = interrupted.start();
     running.await_poses(40);

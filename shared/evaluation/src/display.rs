@@ -211,7 +211,15 @@ impl fmt::Display for Nees {
             "\n{:>8}{:>10}{:>11}{:>16}{:>32}{:>25}",
             "motions", "half", "segments", "pose", "translation", "yaw"
         )?;
-        self.by_length.iter().try_for_each(|length| length.fmt(f))
+        self.by_length.iter().try_for_each(|length| length.fmt(f))?;
+        let lengths = self.by_length.iter();
+        let factors = lengths.map(|length| format!("{:.2}", length.all.pose.ratio.sqrt()));
+        write!(
+            f,
+            "\n\n{:14}poses err {} times as much as their covariances say",
+            "",
+            factors.collect::<Vec<_>>().join(", ")
+        )
     }
 }
 

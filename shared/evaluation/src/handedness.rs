@@ -26,6 +26,13 @@ pub struct Axes {
     pub truth_lacks_heading: bool,
 }
 
+impl Axes {
+    /// Returns whether the poses of the ground truth are used as they are, with their heading.
+    pub fn are_as_given(&self) -> bool {
+        !(self.y_negated || self.heading_negated || self.truth_lacks_heading)
+    }
+}
+
 /// The trajectory whose heading has the opposite sense of the turns of its path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]

@@ -12,6 +12,7 @@
 //! - [`handedness`]: frames with y to the right or clockwise yaw, detected and converted;
 //! - [`mod@kitti`], [`mod@seg`], [`mod@ate`], [`mod@end`], [`mod@rpe`]: one metric each, on
 //!   [`MatchedPoses`];
+//! - [`mod@loops`]: places that are seen again, against a trajectory or the ground truth itself;
 //! - [`motions`]: reported motions with covariances, associated with the ground truth;
 //! - [`mod@nees`], [`mod@bands`]: consistency of these covariances, as figures and over time;
 //! - [`plot`]: trajectory, errors and error bands as SVG.
@@ -39,6 +40,7 @@ mod error;
 mod gaps;
 pub mod handedness;
 pub mod kitti;
+pub mod loops;
 mod matched;
 pub mod motions;
 mod mounting;
@@ -58,6 +60,7 @@ pub use error::{EvaluationError, Side};
 pub use gaps::max_gap_ns;
 pub use handedness::{Axes, HeadingFault};
 pub use kitti::{Kitti, kitti};
+pub use loops::{LoopErrors, loop_errors};
 pub use matched::{MatchedPoses, path_m};
 pub use motions::{MatchedMotions, Part, TimedMotion};
 pub use nees::{Nees, NeesFigure, NeesFigures, NeesLength, NeesOptions, nees};

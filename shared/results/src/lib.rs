@@ -13,6 +13,7 @@ pub mod judgement;
 pub mod machine;
 pub mod odometry;
 mod out;
+mod poses;
 mod results;
 mod summary;
 

@@ -42,8 +42,9 @@ pub const SUMMARY: &str = "summary.json";
 /// The ground truth of a simulation that is played without being stored.
 pub const SIMULATED_TRUTH: &str = "ground_truth.tum";
 /// All results.
-pub const FILES: [&str; 13] = [
+pub const FILES: [&str; 14] = [
     "odometry.csv",
+    "poses.csv",
     "trajectory.tum",
     "trajectory.svg",
     "errors.svg",
@@ -95,7 +96,16 @@ pub fn write(
     let mut read = pass.finish();
     let corrected = slam.as_mut();
     let corrected = corrected
-        .map(|slam| add_corrected(&mut files, slam, truth.as_deref(), &read.corrected))
+        .map(|slam| {
+            let odometry = read.estimate.trajectory();
+            add_corrected(
+                &mut files,
+                slam,
+                truth.as_deref(),
+                odometry,
+                &read.corrected,
+            )
+        })
         .transpose()?;
     if let Some(slam) = &slam {
         let trajectory = read.corrected_sketch.path();
@@ -158,22 +168,31 @@ fn add_corrected(
     files: &mut Files<'_>,
     slam: &mut Slam,
     truth: Option<&Path>,
+    odometry: &Trajectory,
     corrected: &Trajectory,
 ) -> Result<SlamSummary, Failure> {
     files.add("loops.csv", slam.loops_csv()?)?;
     files.add("graph.g2o", slam.graph_g2o())?;
+    let mut summary = slam.summary();
+    summary.odometry = slam.errors_of(odometry);
     // Why a truth cannot be used is said where odometry is evaluated.
     let truth = truth.and_then(|path| read_trajectory(path).ok());
     let Some(truth) = truth.filter(|_| corrected.len() > 1) else {
-        return Ok(slam.summary(None));
+        return Ok(summary);
     };
-    let ate = judge(corrected, &truth, Options::default()).map(|evaluation| evaluation.ate);
+    if let Ok(evaluation) = judge(corrected, &truth, Options::default()) {
+        summary.ate_m = Some(evaluation.ate.rmse_m);
+        summary.ground_truth = match evaluation.axes.are_as_given() {
+            true => slam.errors_of(&truth),
+            false => None,
+        };
+    }
     let bands = slam.bands(&truth).and_then(|bands| Ok(bands_svg(&bands)?));
     match bands {
         Ok(svg) => files.add("bands_slam.svg", svg)?,
         Err(reason) => print::note(format_args!("no bands_slam.svg: {reason}")),
     }
-    Ok(slam.summary(ate.ok().map(|ate| ate.rmse_m)))
+    Ok(summary)
 }
 
 /// Evaluates the trajectory and its covariances against the ground truth, if that fits.

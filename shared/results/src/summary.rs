@@ -300,7 +300,7 @@ impl fmt::Display for Summary {
         };
         write!(
             f,
-            "\nresults in {}: odometry.csv, trajectory.tum, trajectory.svg{corrected}, latency.json, summary.json",
+            "\nresults in {}: odometry.csv, poses.csv, trajectory.tum, trajectory.svg{corrected}, latency.json, summary.json",
             self.out
         )
     }

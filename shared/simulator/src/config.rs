@@ -8,6 +8,7 @@ use crate::error::SimulatorError;
 use crate::limits::require_within;
 use crate::output::{OutputConfig, OutputFormat};
 use crate::profile::Chirp;
+use crate::realism::Realism;
 use crate::sensor::{Effects, SensorConfig};
 use crate::town::TownConfig;
 use crate::traffic::TrafficConfig;
@@ -30,6 +31,10 @@ pub struct SimulationConfig {
     /// The seed of all randomness that has no seed of its own: `town.seed`, `town.changes_seed`,
     /// `traffic.seed`, `sensor.seed`.
     pub seed: u64,
+    /// The likeness to a real road: switches of `[simulation.effects]`, `town.belts` and
+    /// `sensor.gain_db` that are left out are as it says. Default: `plain`.
+    #[serde(skip_serializing_if = "Realism::is_plain")]
+    pub realism: Realism,
     /// The path of the vehicle.
     pub drive: DriveConfig,
     /// The buildings and other objects along the streets.
@@ -52,6 +57,7 @@ impl Default for SimulationConfig {
         Self {
             scans: None,
             seed: 1,
+            realism: Realism::default(),
             drive: DriveConfig::default(),
             town: TownConfig::default(),
             traffic: TrafficConfig::default(),
@@ -77,6 +83,23 @@ impl SimulationConfig {
         self.traffic.validate()?;
         self.sensor.validate()?;
         self.weather.iter().try_for_each(WeatherConfig::validate)
+    }
+
+    /// Returns the configuration with all that its realism decides written out.
+    #[must_use]
+    pub fn resolved(&self) -> Self {
+        let mut config = self.clone();
+        let road = self.realism == Realism::Road;
+        for switch in config.effects.of_the_road() {
+            switch.get_or_insert(road);
+        }
+        // Other formats write the azimuth of each row beside it.
+        let can_lose = self.output.format == Some(OutputFormat::Radiate);
+        let lost = &mut config.effects.lost_azimuths;
+        lost.get_or_insert(road && can_lose);
+        config.town.belts.get_or_insert(self.realism.belts());
+        config.sensor.gain_db.get_or_insert(self.realism.gain_db());
+        config
     }
 
     /// The seed of the town and of a drive of kind `town`, whose streets are the town's.

@@ -11,6 +11,7 @@
 //! - [`town`], [`traffic`]: what stands along them and what moves on them,
 //! - [`body`], [`world`], [`occlusion`]: scatterers and walls, and which walls lie between two
 //!   points,
+//! - [`relief`]: the height of the ground,
 //! - [`profile`]: the radars; [`weather`]: rain, fog and snow,
 //! - [`sensor`]: the measurement of one sweep,
 //! - [`simulator`]: single scans with their exact poses,
@@ -43,7 +44,10 @@ mod limits;
 pub mod occlusion;
 pub mod output;
 pub mod path;
+mod place_noise;
 pub mod profile;
+mod realism;
+pub mod relief;
 mod render_ahead;
 pub mod sensor;
 pub mod simulated_drive;
@@ -64,6 +68,8 @@ pub use lanes::DrivingSide;
 pub use output::{HostStamps, OutputFormat};
 pub use path::{BlockLoop, Path, SplinePath};
 pub use profile::{Profile, Sampling};
+pub use realism::Realism;
+pub use relief::Relief;
 pub use sensor::{Effects, Scene, Sensor, SensorConfig, SweepTime};
 pub use simulated_drive::{Renderer, SimulatedDrive};
 pub use simulator::{SimulatedScan, Simulator};

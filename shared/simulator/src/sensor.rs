@@ -7,7 +7,8 @@
 //! - `line_of_sight`: rays in all directions, and the walls along each,
 //! - `echoes`, `highlights`, `ghosts`: direct echoes, specular reflections of walls, and mirror
 //!   images, with their amplitudes; `atmosphere`: attenuation by the weather,
-//! - `scintillation`: fluctuation of echoes with the direction,
+//! - `scintillation`: fluctuation of echoes with the direction; `foliage`: from scan to scan,
+//! - `one_bounce`: paths with one bounce off a wall; `faults`: dirt, vibration, miscalibration,
 //! - `elevation`, `antenna`: the beam's pattern in elevation and azimuth,
 //! - `spectrum`: range processing and quantisation,
 //! - `ground`: backscatter of road and fields,
@@ -16,8 +17,8 @@
 //! - `effects`: switches for all of these.
 //!
 //! Echoes are summed as complex amplitudes with the phase of their true path, so scatterers in one
-//! resolution cell interfere (speckle), differently from each pose. Not modelled: terrain, true
-//! heights of objects, and paths with a single bounce.
+//! resolution cell interfere (speckle), differently from each pose. Not modelled: what hills hide,
+//! and the shape of objects over their height.
 
 mod antenna;
 mod atmosphere;
@@ -26,17 +27,22 @@ mod config;
 mod echoes;
 pub mod effects;
 mod elevation;
+mod faults;
 mod fixed_echoes;
+mod foliage;
 mod ghosts;
 mod ground;
 mod highlights;
 mod line_of_sight;
+mod miscalibration;
 mod noise;
-mod place_noise;
+mod one_bounce;
+mod radome;
 mod scintillation;
 pub mod spectrum;
 mod sweep_poses;
 mod sweep_time;
+mod vibration;
 
 use std::f64::consts::TAU;
 
@@ -52,7 +58,9 @@ use self::beam_index::BeamIndex;
 pub use self::config::SensorConfig;
 use self::echoes::{Echo, View};
 pub use self::effects::Effects;
+use self::effects::is_on;
 use self::elevation::PitchRoll;
+use self::faults::Faults;
 use self::fixed_echoes::FixedEchoes;
 use self::line_of_sight::LineOfSight;
 use self::noise::Noise;
@@ -62,6 +70,7 @@ pub use self::sweep_time::SweepTime;
 use crate::body::{Movers, Moving};
 use crate::path::Path;
 use crate::profile::{Chirp, METADATA_BYTES, Receiver, Sampling};
+use crate::relief::Relief;
 use crate::stream::Stream;
 use crate::weather::WeatherConfig;
 use crate::world::World;
@@ -99,6 +108,7 @@ pub struct Sensor {
     noise: Noise,
     fixed_echoes: FixedEchoes,
     pitch_roll: PitchRoll,
+    faults: Faults,
     sweep_poses: SweepPoses,
     line_of_sight: LineOfSight,
     echoes: Vec<Echo>,
@@ -109,13 +119,14 @@ pub struct Sensor {
 impl Sensor {
     /// A new radar; all its randomness comes from `seed`.
     pub fn new(config: &SensorConfig, effects: &Effects, seed: u64) -> Self {
-        let (sampling, receiver) = (config.sampling(), config.profile.receiver());
+        let (sampling, receiver) = (config.sampling(), config.receiver());
         let spectrum = RangeSpectrum::new(sampling.bins, sampling.range_resolution_m, &receiver);
         Self {
             antenna: Antenna::new(receiver.beam_rad, effects.side_lobes),
             noise: Noise::new(&sampling, &receiver, effects, &spectrum),
             fixed_echoes: FixedEchoes::new(&sampling, &receiver, effects, &spectrum, seed),
             pitch_roll: PitchRoll::new(seed),
+            faults: Faults::new(effects, seed),
             spectrum,
             seed,
             sweep_poses: SweepPoses::default(),
@@ -147,10 +158,11 @@ impl Sensor {
         slot: &mut ScanSlot<'_>,
     ) -> SweepGeometry {
         let mut rng = Stream::Scan(index).generator(self.seed);
-        self.collect_echoes(scene, time, &mut rng);
+        self.collect_echoes(scene, time, index, &mut rng);
+        let relief = scene.world.relief();
         for azimuth in 0..self.sampling.azimuths {
             rng.set_word_pos((azimuth as u128 + 1) * WORDS_PER_AZIMUTH);
-            self.measure(azimuth, &mut rng);
+            self.measure(azimuth, relief, &mut rng);
             self.write_row(azimuth, time, slot);
         }
         if self.effects.dropped_azimuths {
@@ -160,14 +172,23 @@ impl Sensor {
     }
 
     /// Collects the echoes of the sweep.
-    fn collect_echoes(&mut self, scene: Scene<'_>, time: SweepTime, rng: &mut ChaCha8Rng) {
+    fn collect_echoes(
+        &mut self,
+        scene: Scene<'_>,
+        time: SweepTime,
+        index: u64,
+        rng: &mut ChaCha8Rng,
+    ) {
         let eccentricity_rad = if self.effects.encoder_wobble {
             self.config.azimuth_eccentricity_rad
         } else {
             0.0
         };
         let moving = self.effects.sweep_motion;
-        let error_rad = |azimuth_rad: f64| eccentricity_rad * azimuth_rad.cos();
+        self.faults.begin_sweep(&self.effects, self.seed, index);
+        let error_rad = |azimuth_rad: f64| {
+            eccentricity_rad * azimuth_rad.cos() + self.faults.error_rad(azimuth_rad)
+        };
         let elevation_rad =
             |time_s, azimuth_rad| self.pitch_roll.elevation_rad(time_s, azimuth_rad);
         self.sweep_poses.sample(
@@ -178,6 +199,9 @@ impl Sensor {
             error_rad,
             elevation_rad,
         );
+        let relief = scene.world.relief();
+        self.sweep_poses
+            .tilt(|place, direction| relief.slope_rad(place, direction));
         let middle_s = time.drive_time_s(time.middle_us());
         let centre = self.sweep_poses.middle().position;
         let reach_m = self.sampling.reach_m();
@@ -199,6 +223,8 @@ impl Sensor {
             receiver: &self.receiver,
             atmosphere: &atmosphere,
             effects: &self.effects,
+            relief,
+            scan: index,
             reach_m,
         };
         self.echoes.clear();
@@ -209,6 +235,9 @@ impl Sensor {
         }
         if self.effects.multipath {
             view.ghosts(scene.world, &mut self.echoes);
+        }
+        if is_on(self.effects.one_bounce) {
+            view.one_bounce(scene.world, &self.antenna, &mut self.echoes);
         }
         // The number of drawn values does not depend on the effects, so that none changes
         // another's. Interference, which needs a varying number, comes last.
@@ -246,7 +275,7 @@ impl Sensor {
     }
 
     /// Computes the spectrum that one azimuth receives.
-    fn measure(&mut self, azimuth: usize, rng: &mut ChaCha8Rng) {
+    fn measure(&mut self, azimuth: usize, relief: Relief, rng: &mut ChaCha8Rng) {
         let azimuth_pose = *self.sweep_poses.at(azimuth as f64);
         let doppler_s = if self.effects.doppler {
             self.doppler_s(azimuth)
@@ -254,6 +283,7 @@ impl Sensor {
             0.0
         };
         let wavelength_m = self.receiver.wavelength_m();
+        let through = self.faults.amplitude(self.sampling.azimuth_rad(azimuth));
         self.spectrum.clear();
         self.noise.begin_azimuth(|range_m| {
             if !self.effects.ground {
@@ -264,24 +294,21 @@ impl Sensor {
             } else {
                 1.0
             };
-            f64::from(passed)
-                * ground::ground_power(
-                    azimuth_pose.position + azimuth_pose.beam * range_m,
-                    range_m,
-                    &self.receiver,
-                )
+            let power = ground::ground_power(&azimuth_pose, range_m, relief, &self.receiver);
+            f64::from(passed) * power * through * through
         });
         for &number in self.beams.echoes(azimuth) {
             let echo = &self.echoes[number as usize];
             let ray = echo.place(&azimuth_pose) - azimuth_pose.position;
-            let range_m = ray.norm();
+            // On the slant.
+            let range_m = (ray.norm_squared() + echo.height_m.powi(2)).sqrt();
             // Small angles: the tangent is the angle.
             let off_rad = azimuth_pose.beam.perp(&ray) / azimuth_pose.beam.dot(&ray)
                 + self.jitter_rad[azimuth];
-            let amplitude = echo.amplitude * self.antenna.gain(off_rad);
+            let amplitude = echo.amplitude * self.antenna.gain(off_rad) * through;
             let approach_mps = (azimuth_pose.velocity - echo.velocity).dot(&ray) / range_m;
             // With a rising chirp approaching objects are measured too near.
-            let measured_m = range_m - doppler_s * approach_mps;
+            let measured_m = self.faults.shown_m(range_m) - doppler_s * approach_mps;
             let bin = self.sampling.bin(measured_m);
             if self.effects.speckle {
                 // Two-way: two wavelengths of phase for each wavelength of range.

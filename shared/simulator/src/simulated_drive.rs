@@ -13,6 +13,7 @@ use crate::output::{HostStamps, OutputFormat};
 use crate::profile::Chirp;
 use crate::profile::METADATA_BYTES;
 use crate::sensor::Sensor;
+use crate::sensor::effects::is_on;
 use crate::simulator::Simulator;
 use crate::truth;
 
@@ -35,7 +36,7 @@ impl SimulatedDrive {
         let output = config.output.format.unwrap_or_default();
         if output == OutputFormat::Radiate {
             radiate::check(&simulator)?;
-        } else if config.effects.lost_azimuths {
+        } else if is_on(config.effects.lost_azimuths) {
             return Err(SimulatorError::Config {
                 key: "effects.lost_azimuths",
                 value: "true".to_owned(),

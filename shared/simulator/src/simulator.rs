@@ -12,6 +12,8 @@ use crate::error::SimulatorError;
 use crate::path::Path;
 use crate::path::recorded::{self, Excerpt};
 use crate::profile::Sampling;
+use crate::relief::Relief;
+use crate::sensor::effects::is_on;
 use crate::sensor::{Scene, Sensor, SweepTime};
 use crate::streets::Streets;
 use crate::town;
@@ -61,6 +63,7 @@ impl Simulator {
     /// [`SimulatorError::OffStreets`] if it leaves the town's streets.
     pub fn new(config: &SimulationConfig) -> Result<Self, SimulatorError> {
         config.validate()?;
+        let config = &config.resolved();
         let world = match config.town.streets.first() {
             Some(file) => Some(recorded::first_pose(file)?),
             None => None,
@@ -82,12 +85,16 @@ impl Simulator {
                 Streets::along(path.as_ref(), streets_s, side, seed)
             }
         };
+        let relief = match is_on(config.effects.hills) {
+            true => Relief::hills(config.town_seed()),
+            false => Relief::LEVEL,
+        };
         let town = town::build(&config.town, &streets, config.town_seed());
         Ok(Self {
             config: config.clone(),
             scans,
             sampling,
-            world: Arc::new(World::new(town)),
+            world: Arc::new(World::new(town).on(relief)),
             traffic: Traffic::new(
                 &config.traffic,
                 path.clone(),
@@ -100,7 +107,7 @@ impl Simulator {
         })
     }
 
-    /// The configuration.
+    /// The configuration, with all that its realism decides written out.
     pub fn config(&self) -> &SimulationConfig {
         &self.config
     }

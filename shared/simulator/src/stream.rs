@@ -21,6 +21,12 @@ pub(crate) enum Stream {
     Lost(u64),
     /// Pitch and roll of the vehicle.
     PitchRoll,
+    /// The vibration of the mount in one scan, by its number.
+    Vibration(u64),
+    /// The dirt on the radome.
+    Dirt,
+    /// The errors of the calibration.
+    Miscalibration,
     /// Echoes that are fixed to the radar.
     FixedEchoes,
 }
@@ -42,6 +48,9 @@ impl Stream {
             Self::Traffic => 1 << 42,
             Self::Stall(block) => (1 << 43) + block,
             Self::Lost(index) => (1 << 44) + index,
+            Self::Vibration(index) => (1 << 45) + index,
+            Self::Dirt => 1 << 46,
+            Self::Miscalibration => 1 << 47,
             Self::PitchRoll => u64::MAX - 1,
             Self::FixedEchoes => u64::MAX,
         }
@@ -57,16 +66,24 @@ mod tests {
     #[test]
     fn no_two_uses_share_a_stream() {
         // 100 000 scans are the maximum of the configuration.
-        let counted =
-            (0..100_000).flat_map(|i| [Stream::Scan(i), Stream::Stall(i), Stream::Lost(i)]);
+        let counted = (0..100_000).flat_map(|i| {
+            [
+                Stream::Scan(i),
+                Stream::Stall(i),
+                Stream::Lost(i),
+                Stream::Vibration(i),
+            ]
+        });
         let single = [
             Stream::Streets,
             Stream::Drive,
             Stream::Traffic,
+            Stream::Dirt,
+            Stream::Miscalibration,
             Stream::PitchRoll,
             Stream::FixedEchoes,
         ];
         let numbers: BTreeSet<u64> = counted.chain(single).map(Stream::number).collect();
-        assert_eq!(numbers.len(), 300_005);
+        assert_eq!(numbers.len(), 400_007);
     }
 }

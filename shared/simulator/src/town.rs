@@ -8,6 +8,7 @@
 //! The content of a place depends on the seed, the place and the streets near by alone, so a longer
 //! drive or a later pass sees the same town.
 
+mod belt;
 mod boundary;
 mod building;
 mod changes;
@@ -35,6 +36,7 @@ pub(crate) use vehicle::car;
 
 use crate::body::Body;
 use crate::streets::Streets;
+use belt::Belt;
 use changes::Changes;
 use district::{District, Use};
 use frontage::{Frontage, Line};
@@ -126,7 +128,11 @@ impl<'a> Planner<'a> {
             for frontage in Frontage::sides(self.streets, street, line) {
                 for number in 0..(frontage.length_m() / STRETCH_M).ceil() as u64 {
                     let stretch = self.stretch(frontage, number);
-                    self.row(&stretch, row);
+                    match self.belt(&stretch, number) {
+                        Some(mut belt) if row == HouseRow::First => belt.build(&mut self.built),
+                        Some(_) => {}
+                        None => self.row(&stretch, row),
+                    }
                     if row == HouseRow::First {
                         self.kerb(&stretch);
                     }
@@ -163,6 +169,19 @@ impl<'a> Planner<'a> {
             bays,
             depth_m,
         }
+    }
+
+    /// The belt in the place of a stretch's lots, if there is one.
+    fn belt<'l>(&self, stretch: &Stretch<'l>, number: u64) -> Option<Belt<'l>> {
+        let share = self.config.belts.filter(|share| *share > 0.0)?;
+        let along_m = stretch.from_m..stretch.to_m;
+        Belt::draw(
+            stretch.frontage,
+            along_m,
+            stretch.pavement_m,
+            [self.seed, number],
+            share,
+        )
     }
 
     /// Divides a stretch into lots and builds on them.

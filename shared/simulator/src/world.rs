@@ -4,6 +4,7 @@ use nalgebra::Point2;
 
 use crate::body::{Body, Scatterer, Wall};
 use crate::occlusion::WallGrid;
+use crate::relief::Relief;
 
 /// Metres a side of the tiles that scatterers are sorted into.
 const TILE_M: f64 = 16.0;
@@ -19,6 +20,7 @@ pub struct World {
     /// `tile_start[t]..tile_start[t + 1]` are the scatterers of tile `t`.
     tile_start: Vec<usize>,
     walls: WallGrid,
+    relief: Relief,
 }
 
 impl World {
@@ -52,7 +54,19 @@ impl World {
             rows,
             tile_start,
             walls: WallGrid::new(walls),
+            relief: Relief::LEVEL,
         }
+    }
+
+    /// The same world on another ground; without it, it is level.
+    #[must_use]
+    pub fn on(self, relief: Relief) -> Self {
+        Self { relief, ..self }
+    }
+
+    /// The ground.
+    pub fn relief(&self) -> Relief {
+        self.relief
     }
 
     /// All scatterers.

@@ -15,9 +15,9 @@ fn place(drive: &dyn Path, time_s: f64) -> Point2<f64> {
 
 /// Builds the town along a drive and checks that nothing stands on a street or between two places
 /// of the drive.
-fn free_town(drive: &dyn Path, duration_s: f64, seed: u64) -> World {
+fn free_town(drive: &dyn Path, duration_s: f64, seed: u64, config: &TownConfig) -> World {
     let streets = Streets::along(drive, duration_s, DrivingSide::Left, seed);
-    let world = World::new(town::build(&TownConfig::default(), &streets, seed));
+    let world = World::new(town::build(config, &streets, seed));
     for scatterer in world.scatterers() {
         assert!(
             streets.clearance_m(scatterer.position, 1.0) > 0.0,
@@ -39,13 +39,43 @@ fn free_town(drive: &dyn Path, duration_s: f64, seed: u64) -> World {
 fn a_loop_of_streets_is_free() {
     let drive = BlockLoop::new(90.0, 60.0, 9.5, 5.0);
     for seed in 0..6 {
-        let world = free_town(&drive, drive.lap_s(), seed);
+        let world = free_town(&drive, drive.lap_s(), seed, &TownConfig::default());
         assert!(
             world.scatterers().len() > 4_000,
             "seed {seed}: {}",
             world.scatterers().len()
         );
     }
+}
+
+#[test]
+fn belts_leave_the_streets_free_and_hide_what_is_beside_them() {
+    let drive = BlockLoop::new(90.0, 60.0, 9.5, 5.0);
+    let belts = |share| TownConfig {
+        belts: share,
+        ..TownConfig::default()
+    };
+    // Share of the views to both sides of the drive in which less than a third passes.
+    let closed = |config: &TownConfig| {
+        let world = free_town(&drive, drive.lap_s(), 3, config);
+        let hidden = |step: usize, side: f64| {
+            let pose = drive.pose(drive.lap_s() * step as f64 / 200.0);
+            let from = Point2::from(pose.translation.vector);
+            let to = pose * Point2::new(0.0, side * 35.0);
+            world.transmission(from, to, NO_BODY, 0.0) < 0.3
+        };
+        let hidden = (0..400).filter(|view| hidden(view / 2, [-1.0, 1.0][view % 2]));
+        hidden.count() as f64 / 400.0
+    };
+    let (none, half, all) = (
+        closed(&belts(None)),
+        closed(&belts(Some(0.5))),
+        closed(&belts(Some(1.0))),
+    );
+    assert!(
+        all > 0.6 && all > half && half > none,
+        "{none}, {half}, {all}"
+    );
 }
 
 #[test]
@@ -61,7 +91,7 @@ fn real_drives_have_free_streets_and_towns_of_a_reasonable_size() {
     ] {
         let drive = read(&trajectories.join(file), Excerpt::default()).unwrap();
         for seed in 1..4 {
-            let world = free_town(&drive, drive.duration_s(), seed);
+            let world = free_town(&drive, drive.duration_s(), seed, &TownConfig::default());
             let all = world.scatterers().len();
             assert!(
                 (200_000..2_000_000).contains(&all),

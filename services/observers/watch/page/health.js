@@ -1,10 +1,16 @@
 // The state of the run, its processes, and its key figures.
 
 import { milliseconds } from "./delays.js";
-import { axes } from "./track.js";
 
 const LATE_MS = 5000; // Without a pose for so long a working run is shown as late.
 const UNKNOWN = "−"; // What is not known.
+// What a pose rests on.
+const MATCHES = {
+  refined: "of the map is met",
+  weak: "weak: few points, or poor",
+  predicted: "none: motion predicted",
+  searched: "scan to scan",
+};
 
 const byId = (id) => document.getElementById(id);
 const degrees = (angle) => (angle * 180) / Math.PI;
@@ -41,18 +47,21 @@ export class HealthView {
     this.judge();
   }
 
-  setPose(pose) {
+  setPose(pose, drift) {
     if (!pose) return;
     if (pose.seq !== this.pose?.seq) this.advanced = performance.now();
     this.pose = pose;
-    const [x, y, yaw, xx, xy, yy] = pose.vertex;
-    const { major, minor } = axes(xx, xy, yy);
+    const [x, y, yaw] = pose.vertex;
     write("speed", pose.speed_mps.toFixed(2));
     write("speed-note", pose.stationary ? "stationary" : `${(pose.speed_mps * 3.6).toFixed(0)} km/h, ${signed(degrees(pose.yaw_rate_radps), 1)} °/s`);
     write("position", `${signed(x, 1)}, ${signed(y, 1)}`);
     write("heading", `yaw ${signed(degrees(yaw), 1)}°, scan ${pose.scan}`);
-    write("sigma", major.toFixed(2));
-    write("sigma-note", `across ${minor.toFixed(2)} m, yaw ${degrees(pose.yaw_sigma_rad).toFixed(2)}°`);
+    const isMatched = pose.outcome === "refined" || pose.outcome === "weak";
+    write("match", isMatched ? `${(100 * pose.overlap).toFixed(0)} %` : UNKNOWN);
+    write("match-note", MATCHES[pose.outcome]);
+    if (!drift) return;
+    write("drift", drift.position_m.toFixed(2));
+    write("drift-note", `yaw ${degrees(drift.yaw_rad).toFixed(2)}°, last ${drift.over_m.toFixed(0)} m`);
   }
 
   setHealth(health) {
@@ -64,8 +73,8 @@ export class HealthView {
     write("poses", String(health.poses));
     write("rate", `${health.scans_per_s.toFixed(1)}/s`);
     const isLong = health.distance_m >= 10000;
-    write("distance", (health.distance_m / (isLong ? 1000 : 1)).toFixed(isLong ? 2 : 0));
-    write("distance-unit", isLong ? "km" : "m");
+    const driven = (health.distance_m / (isLong ? 1000 : 1)).toFixed(isLong ? 2 : 0);
+    write("driven", `, ${driven} ${isLong ? "km" : "m"} driven`);
     write("dropped", String(health.dropped));
     write("in-flight", `${health.in_flight} in flight`);
     write("missed", `Missed by this page's observer: ${missed.pose} poses, ${missed.scan} scans, ${missed.masked} masked scans`);

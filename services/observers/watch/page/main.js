@@ -29,7 +29,7 @@ const connection = new Connection({
         break;
       case "poses":
         track.add(message);
-        health.setPose(message.pose);
+        health.setPose(message.pose, message.drift);
         break;
       case "health":
         delays.set(message.delays);

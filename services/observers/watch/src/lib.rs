@@ -25,6 +25,7 @@ mod observing;
 mod page;
 mod pictures;
 mod processes;
+mod recent_drift;
 mod run_view;
 mod server;
 mod stream;

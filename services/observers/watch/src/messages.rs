@@ -1,9 +1,9 @@
 //! The layers that a browser asks for, and the messages to it in JSON.
 
-use gyre_messages::PoseHeader;
+use gyre_messages::{PoseHeader, outcome};
 use serde::Serialize;
 
-use crate::{delays::DelayReport, processes::Process, track::Vertex};
+use crate::{delays::DelayReport, processes::Process, recent_drift::Drift, track::Vertex};
 
 /// A layer that a browser may ask for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -110,6 +110,7 @@ pub struct NewPoses<'a> {
     pub replace: bool,
     pub vertices: &'a [Vertex],
     pub pose: Option<CurrentPose>,
+    pub drift: Option<Drift>,
 }
 
 /// The newest pose.
@@ -120,10 +121,13 @@ pub struct CurrentPose {
     pub stamp_ns: i64,
     /// x, y (m), yaw (rad), and the covariance of the position (m^2).
     pub vertex: Vertex,
-    pub yaw_sigma_rad: f64,
     pub speed_mps: f64,
     pub yaw_rate_radps: f64,
     pub stationary: bool,
+    /// The outcome of the match: `searched`, `refined`, `weak` or `predicted`.
+    pub outcome: &'static str,
+    /// Mean of the map under the scan's points, 0 to 1.
+    pub overlap: f64,
 }
 
 impl CurrentPose {
@@ -143,10 +147,16 @@ impl CurrentPose {
             scan: pose.item.scan,
             stamp_ns: pose.item.stamp_ns,
             vertex: Vertex::of(pose),
-            yaw_sigma_rad: pose.covariance[5].max(0.0).sqrt(),
             speed_mps: per_s(pose.motion.x_m.hypot(pose.motion.y_m)),
             yaw_rate_radps: per_s(pose.motion.yaw_rad),
             stationary: pose.motion.refinement.is_stationary(),
+            outcome: match pose.motion.refinement.outcome {
+                outcome::REFINED => "refined",
+                outcome::WEAK => "weak",
+                outcome::PREDICTED => "predicted",
+                _ => "searched",
+            },
+            overlap: pose.motion.refinement.overlap,
         }
     }
 }

@@ -20,6 +20,7 @@ use crate::{
     messages::{CurrentPose, HealthReport, Layer, Missed, NewPoses, RunCounts, RunInfo, RunState},
     pictures::PackedPoints,
     processes::Process,
+    recent_drift::RecentDrift,
     traces::TraceCounts,
     track::{Cursor, Track, Vertex},
 };
@@ -60,6 +61,7 @@ pub struct Updates {
 struct ViewState {
     run: RunInfo,
     track: Track,
+    drift: RecentDrift,
     delays: Delays,
     latest: Option<CurrentPose>,
     counts: RunCounts,
@@ -162,7 +164,9 @@ impl RunView {
 
     /// Adds the next pose of the trajectory.
     pub fn add_to_track(&self, pose: &PoseHeader) {
-        self.state().track.add(pose);
+        let mut state = self.state();
+        state.track.add(pose);
+        state.drift.add(pose);
     }
 
     /// Shows a pose, unless it was shown before: an observer that attaches again receives the last
@@ -275,6 +279,7 @@ impl RunView {
             replace,
             vertices,
             pose: state.latest,
+            drift: state.drift.drift(),
         };
         serde_json::to_string(&poses).ok().map(Utf8Bytes::from)
     }

@@ -1,4 +1,4 @@
-//! Covariances agree with errors: the mean NEES of 200 simulated drives of 500 keyframes lies in
+//! Covariances agree with errors: the mean NEES of many simulated drives of 500 keyframes lies in
 //! its 95 % interval.
 
 use crate::common::{Drive, ODOMETRY};
@@ -6,7 +6,6 @@ use gyre_estimation::{Outcome, PoseGraph};
 use gyre_geometry::{Pose, UncertainMotion};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-const DRIVES: u64 = 200;
 const KEYFRAMES: usize = 500;
 
 /// The mean NEES of poses over the drives.
@@ -25,8 +24,8 @@ impl MeanNees {
 
     /// Asserts that the mean lies in the interval that holds that of consistent covariances with a
     /// probability of 95 %.
-    fn check(&self, name: &str) {
-        assert_eq!(self.samples, DRIVES as usize);
+    fn check(&self, name: &str, drives: u64) {
+        assert_eq!(self.samples, drives as usize);
         let chi_square = ChiSquared::new((3 * self.samples) as f64).unwrap();
         let [low, high] = [0.025, 0.975].map(|p| chi_square.inverse_cdf(p));
         println!(
@@ -43,12 +42,22 @@ impl MeanNees {
 
 #[test]
 fn estimates_are_consistent_without_loops_before_and_after_closing() {
+    assert_consistent(40);
+}
+
+#[test]
+#[ignore = "nightly: as many drives as tell small faults from chance"]
+fn estimates_of_many_drives_are_consistent() {
+    assert_consistent(200);
+}
+
+fn assert_consistent(drives: u64) {
     let mut open: [MeanNees; 2] = Default::default();
     let mut before: [MeanNees; 2] = Default::default();
     let mut after: [MeanNees; 2] = Default::default();
     let mut of_graph: [MeanNees; 2] = Default::default();
     let of_interest = [KEYFRAMES / 2, KEYFRAMES - 1];
-    for seed in 0..DRIVES {
+    for seed in 0..drives {
         let straight = Drive::new(KEYFRAMES, 5 * KEYFRAMES, ODOMETRY, 1000 + seed);
         let filter = straight.filter();
         for (nees, k) in open.iter_mut().zip(of_interest) {
@@ -80,7 +89,7 @@ fn estimates_are_consistent_without_loops_before_and_after_closing() {
         ("graph after closing", of_graph),
     ];
     for (name, nees) in cases {
-        nees[0].check(&format!("{name}, half-way"));
-        nees[1].check(&format!("{name}, at the end"));
+        nees[0].check(&format!("{name}, half-way"), drives);
+        nees[1].check(&format!("{name}, at the end"), drives);
     }
 }

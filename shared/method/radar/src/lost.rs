@@ -101,7 +101,7 @@ impl LostAzimuths {
 }
 
 /// Finds where azimuths of scans were lost.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct LostAzimuthFinder {
     /// The echoes of the rows as they follow each other.
     rows: Echoes,
@@ -111,7 +111,7 @@ pub struct LostAzimuthFinder {
     alignment: Alignment,
 }
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Previous {
     stamp_ns: i64,
     /// Each at its azimuth.

@@ -7,13 +7,14 @@ use gyre_storage::Draft;
 use gyre_terminal::Failure;
 
 use super::{Estimate, Files, Sketch, Slam};
-use crate::{odometry, summary::Counter};
+use crate::{odometry, poses, summary::Counter};
 
 /// Writes the tables row by row, and measures and counts all else.
 pub struct Pass<'a, 'b> {
     files: &'a mut Files<'b>,
     odometry: Draft,
     tum: Draft,
+    poses: Draft,
     row: String,
     /// Poses of earlier sessions that are still to come.
     resumed: usize,
@@ -54,17 +55,17 @@ impl<'a, 'b> Pass<'a, 'b> {
         is_judged: bool,
         slam: Option<&'a Slam>,
     ) -> Result<Self, Failure> {
-        let (mut odometry, tum) = (
-            files.create("odometry.csv")?,
-            files.create("trajectory.tum")?,
-        );
+        let (mut odometry, mut poses) = (files.create("odometry.csv")?, files.create("poses.csv")?);
         odometry.append(odometry::HEADER)?;
+        poses.append(poses::HEADER)?;
+        let tum = files.create("trajectory.tum")?;
         let corrected = |slam| Ok::<_, Failure>((slam, files.create("trajectory_slam.tum")?));
         Ok(Self {
             slam: slam.map(corrected).transpose()?,
             files,
             odometry,
             tum,
+            poses,
             row: String::new(),
             resumed,
             is_judged,
@@ -88,6 +89,9 @@ impl<'a, 'b> Pass<'a, 'b> {
         let mut line = Vec::new();
         write_tum_pose(pose.item.stamp_ns, &place, &mut line)?;
         self.tum.append(line)?;
+        self.row.clear();
+        poses::write_row(pose, &mut self.row);
+        self.poses.append(&self.row)?;
         self.correct(pose)?;
         self.read.counter.add(pose);
         self.read.sketch.add(place);
@@ -122,6 +126,7 @@ impl<'a, 'b> Pass<'a, 'b> {
     pub fn finish(self) -> Read {
         self.files.push(self.odometry);
         self.files.push(self.tum);
+        self.files.push(self.poses);
         if let Some((_, tum)) = self.slam {
             self.files.push(tum);
         }

@@ -5,7 +5,7 @@ use std::fmt::{self, Write};
 
 use gyre_configuration::Configuration;
 use gyre_estimation::{Constraint, EstimationError, G2o};
-use gyre_evaluation::{BandSample, Bands, TruthSigma};
+use gyre_evaluation::{BandSample, Bands, LoopErrors, TruthSigma, loop_errors};
 use gyre_geometry::{Pose, xy_yaw};
 use gyre_journal as journal;
 use gyre_messages::flag;
@@ -184,8 +184,17 @@ impl Slam {
         })
     }
 
-    /// Returns what the summary says. `ate_m` is the error of the corrected trajectory.
-    pub fn summary(&self, ate_m: Option<f64>) -> SlamSummary {
+    /// Compares the loops that are used with a trajectory.
+    pub fn errors_of(&self, trajectory: &Trajectory) -> Option<LoopErrors> {
+        let at = |keyframe: usize| trajectory.at(self.keyframes[keyframe].1);
+        loop_errors(self.used().filter_map(|it| {
+            let by_trajectory = at(it.from)?.inv_mul(&at(it.to)?);
+            Some((it.motion.motion, by_trajectory))
+        }))
+    }
+
+    /// Returns the counts.
+    pub fn summary(&self) -> SlamSummary {
         let loops_used = self.used().count();
         let verified = |query: &Query| {
             let candidates = query.candidates.iter();
@@ -201,7 +210,9 @@ impl Slam {
             keyframes: self.keyframes.len(),
             loops_used,
             loops_rejected: self.queries.iter().map(verified).sum::<usize>() - loops_used,
-            ate_m,
+            odometry: None,
+            ground_truth: None,
+            ate_m: None,
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use gyre_evaluation::LoopErrors;
 use serde::Serialize;
 
 /// The counts of loops in the summary.
@@ -13,6 +14,13 @@ pub struct SlamSummary {
     pub loops_used: usize,
     /// Verified loops that contradict odometry or other loops.
     pub loops_rejected: usize,
+    /// The loops that are used against odometry.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub odometry: Option<LoopErrors>,
+    /// The same loops against the ground truth: where it contradicts them much more than odometry
+    /// does, it is the ground truth that is wrong.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ground_truth: Option<LoopErrors>,
     /// ATE of the corrected trajectory, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ate_m: Option<f64>,
@@ -24,15 +32,26 @@ impl fmt::Display for SlamSummary {
             keyframes,
             loops_used,
             loops_rejected,
+            odometry,
+            ground_truth,
             ate_m,
         } = self;
         write!(
             f,
             "slam          {loops_used} loops between {keyframes} keyframes, {loops_rejected} rejected"
         )?;
-        match ate_m {
-            Some(ate_m) => write!(f, "; ATE after correction {ate_m:.3} m rmse"),
-            None => Ok(()),
+        if let Some(ate_m) = ate_m {
+            write!(f, "; ATE after correction {ate_m:.3} m rmse")?;
         }
+        for (name, errors) in [("odometry", odometry), ("ground truth", ground_truth)] {
+            if let Some(errors) = errors {
+                write!(
+                    f,
+                    "\n              {name} differs from the loops by {:.2} m, {:.2} deg rms",
+                    errors.translation_rmse_m, errors.rotation_rmse_deg
+                )?;
+            }
+        }
+        Ok(())
     }
 }

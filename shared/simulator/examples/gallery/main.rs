@@ -7,6 +7,7 @@
 mod exhibit;
 mod picture;
 mod radars;
+mod road;
 mod scenes;
 mod shot;
 mod surroundings;
@@ -18,8 +19,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("gallery");
     let mut bytes = 0;
     let around = surroundings::exhibits()?.into_iter();
+    let road = road::exhibits()?.into_iter();
     let radars = radars::exhibits()?;
-    for exhibit in switches::exhibits().into_iter().chain(around).chain(radars) {
+    let all = switches::exhibits().into_iter().chain(road).chain(around);
+    for exhibit in all.chain(radars) {
         bytes += exhibit.write(&folder)?;
     }
     println!("{}: {} KB of pictures", folder.display(), bytes / 1024);

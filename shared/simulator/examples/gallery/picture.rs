@@ -159,6 +159,18 @@ fn power_in(scan: &OwnedScan, (azimuth, bin): (i64, i64)) -> f64 {
 }
 
 impl Picture {
+    /// Pictures of one size, one below the other.
+    pub fn stacked(pictures: &[Self]) -> Self {
+        let (columns, rows) = pictures.first().map_or((0, 0), |first| first.size);
+        let grey = pictures
+            .iter()
+            .flat_map(|picture| picture.grey.iter().copied());
+        Self {
+            size: (columns, rows * pictures.len()),
+            grey: grey.collect(),
+        }
+    }
+
     /// A picture of any function of column and row.
     pub fn of(size: (usize, usize), grey: impl Fn(usize, usize) -> f64) -> Self {
         let grey = &grey;

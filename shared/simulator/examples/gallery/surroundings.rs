@@ -152,7 +152,7 @@ fn lost_azimuths() -> Result<Exhibit, SimulatorError> {
         };
         config.output.format = Some(OutputFormat::Radiate);
         config.sensor.profile = Profile::Cts350xRadiate;
-        config.effects.lost_azimuths = lost_azimuths;
+        config.effects.lost_azimuths = Some(lost_azimuths);
         SimulatedDrive::new(&config)
     };
     let losing = drive(true)?;

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::SimulatorError;
 use crate::limits::require_within;
-use crate::profile::{Profile, Sampling};
+use crate::profile::{Profile, Receiver, Sampling};
 
 /// The radar, and its deviations from its profile.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -26,6 +26,10 @@ pub struct SensorConfig {
     /// effect. Default: the profile's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub doppler_s: Option<f64>,
+    /// Decibels by which it is more sensitive than its profile, -20 to 20. Default: 0, or as
+    /// `simulation.realism` says.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gain_db: Option<f64>,
     /// Eccentricity of the encoder's disc, radians: the beam points to `azimuth + eccentricity *
     /// cos(azimuth)`, which `dataset.azimuth_eccentricity_rad` corrects. Default: 0.
     pub azimuth_eccentricity_rad: f64,
@@ -39,6 +43,7 @@ impl Default for SensorConfig {
             period_s: None,
             range_offset_m: None,
             doppler_s: None,
+            gain_db: None,
             azimuth_eccentricity_rad: 0.0,
         }
     }
@@ -57,6 +62,7 @@ impl SensorConfig {
             -5.0,
             5.0,
         )?;
+        require_within("sensor.gain_db", self.gain_db.unwrap_or(0.0), -20.0, 20.0)?;
         require_within("sensor.doppler_s", self.doppler_s.unwrap_or(0.0), -0.5, 0.5)?;
         require_within(
             "sensor.azimuth_eccentricity_rad",
@@ -64,6 +70,15 @@ impl SensorConfig {
             -0.05,
             0.05,
         )
+    }
+
+    /// The transmitter and receiver of the radar.
+    pub fn receiver(&self) -> Receiver {
+        let kind = self.profile.receiver();
+        Receiver {
+            constant: kind.constant * 10f64.powf(self.gain_db.unwrap_or(0.0) / 10.0),
+            ..kind
+        }
     }
 
     /// The sampling of the radar.

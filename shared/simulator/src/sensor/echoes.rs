@@ -3,13 +3,15 @@
 use nalgebra::{Point2, Vector2};
 
 use super::atmosphere::Atmosphere;
-use super::effects::Effects;
-use super::elevation::elevation_gain;
+use super::effects::{Effects, is_on};
+use super::elevation::{elevation_gain, height_m, slant_height_m};
+use super::foliage::swayed;
 use super::line_of_sight::LineOfSight;
 use super::scintillation::scintillation;
 use super::sweep_poses::{AzimuthPose, SweepPoses};
 use crate::body::{Moving, NO_BODY, Scatterer};
 use crate::profile::Receiver;
+use crate::relief::Relief;
 use crate::world::World;
 
 /// Echoes with less power are neglected.
@@ -28,6 +30,8 @@ pub(super) struct Echo {
     pub amplitude: f64,
     /// The azimuth at which the beam passes it, with fractions.
     pub azimuth: f64,
+    /// Height above the radar, metres, that lengthens the way to it.
+    pub height_m: f64,
 }
 
 impl Echo {
@@ -44,6 +48,9 @@ pub(super) struct View<'a> {
     pub receiver: &'a Receiver,
     pub atmosphere: &'a Atmosphere,
     pub effects: &'a Effects,
+    pub relief: Relief,
+    /// Number of the scan.
+    pub scan: u64,
     pub reach_m: f64,
 }
 
@@ -52,7 +59,12 @@ impl View<'_> {
     pub fn standing(&self, world: &World, echoes: &mut Vec<Echo>) {
         let centre = self.sweep_poses.middle().position;
         for scatterer in world.around(centre, self.reach_m).flatten() {
-            self.add_echoes(scatterer, scatterer.position, Vector2::zeros(), echoes);
+            if is_on(self.effects.sway) {
+                let (scatterer, place) = swayed(scatterer, self.scan);
+                self.add_echoes(&scatterer, place, Vector2::zeros(), echoes);
+            } else {
+                self.add_echoes(scatterer, scatterer.position, Vector2::zeros(), echoes);
+            }
         }
     }
 
@@ -91,6 +103,7 @@ impl View<'_> {
                     velocity,
                     amplitude,
                     azimuth,
+                    height_m: self.slant_m(scatterer, azimuth_pose),
                 });
             }
         });
@@ -151,8 +164,9 @@ impl View<'_> {
     /// Share of the beam's power at a scatterer's height, at `range_m`.
     pub fn elevation_gain(&self, scatterer: &Scatterer, range_m: f64, from: &AzimuthPose) -> f64 {
         if self.effects.elevation {
+            let rise_m = self.relief.rise_m(from.position, scatterer.position);
             elevation_gain(
-                scatterer.position,
+                height_m(scatterer.position) + rise_m,
                 scatterer.cross_section_m2,
                 range_m,
                 from.elevation_rad,
@@ -160,6 +174,16 @@ impl View<'_> {
             )
         } else {
             1.0
+        }
+    }
+
+    /// Height of a scatterer above the radar that lengthens the way to it, metres.
+    fn slant_m(&self, scatterer: &Scatterer, from: &AzimuthPose) -> f64 {
+        if is_on(self.effects.slant_range) {
+            slant_height_m(scatterer.position, scatterer.cross_section_m2)
+                + self.relief.rise_m(from.position, scatterer.position)
+        } else {
+            0.0
         }
     }
 

@@ -3,8 +3,9 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Switches for the simulated effects of real radars. All but the last are on by default.
-/// `gallery/README.md` in the crate's folder shows each off and on, with its source.
+/// Switches for the simulated effects of real radars. All up to `dropped_azimuths` are on by
+/// default; the others are as `simulation.realism` says. `gallery/README.md` in the crate's folder
+/// shows each off and on, with its source.
 ///
 /// Each has its own random numbers, so switching one does not change the others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -59,15 +60,57 @@ pub struct Effects {
     /// Some azimuths are lost and interpolated from their neighbours.
     pub dropped_azimuths: bool,
     /// The host loses azimuths as that of RADIATE: the columns behind them move up, and the last
-    /// ones are of the scan before. Only for `output.format = "radiate"`. Default: false.
-    pub lost_azimuths: bool,
+    /// ones are of the scan before. Only for `output.format = "radiate"`. Default: as
+    /// `simulation.realism` says.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lost_azimuths: Option<bool>,
+    /// The road has hills: they tilt the vehicle and its beam, raise and lower what is seen, and
+    /// where the ground rises into the beam it is bright. Default: as `simulation.realism` says.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hills: Option<bool>,
+    /// Things above or below the antenna are measured along the slant, too far. Default: as
+    /// `simulation.realism` says.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub slant_range: Option<bool>,
+    /// Leaves and twigs sway, so that their echoes are others in each scan. Default: as
+    /// `simulation.realism` says.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sway: Option<bool>,
+    /// Paths with one bounce off a smooth wall. Default: as `simulation.realism` says.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub one_bounce: Option<bool>,
+    /// The mount vibrates, so the beam swings about the bearings that the encoder reports. Default:
+    /// as `simulation.realism` says.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub vibration: Option<bool>,
+    /// Dirt on the radome attenuates some sectors. Default: as `simulation.realism` says.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dirt: Option<bool>,
+    /// The radar's range offset, bins and eccentricity deviate from what its recording says.
+    /// Default: as `simulation.realism` says.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub miscalibration: Option<bool>,
 }
 
 impl Effects {
-    /// All effects.
+    /// The effects that are on by default.
     pub const ALL: Self = Self::with(true);
     /// No effects: ideal points, seen through a beam and a range window.
     pub const NONE: Self = Self::with(false);
+
+    /// The switches that `simulation.realism` decides, but for lost azimuths, which not all formats
+    /// have.
+    pub(crate) fn of_the_road(&mut self) -> [&mut Option<bool>; 7] {
+        [
+            &mut self.hills,
+            &mut self.slant_range,
+            &mut self.sway,
+            &mut self.one_bounce,
+            &mut self.vibration,
+            &mut self.dirt,
+            &mut self.miscalibration,
+        ]
+    }
 
     const fn with(on: bool) -> Self {
         Self {
@@ -92,8 +135,14 @@ impl Effects {
             doppler: on,
             encoder_wobble: on,
             dropped_azimuths: on,
-            // No fault of the radar, and of one recording.
-            lost_azimuths: false,
+            lost_azimuths: None,
+            hills: None,
+            slant_range: None,
+            sway: None,
+            one_bounce: None,
+            vibration: None,
+            dirt: None,
+            miscalibration: None,
         }
     }
 }
@@ -102,4 +151,9 @@ impl Default for Effects {
     fn default() -> Self {
         Self::ALL
     }
+}
+
+/// Returns whether a switch that realism decides is on.
+pub(crate) fn is_on(switch: Option<bool>) -> bool {
+    switch == Some(true)
 }

@@ -1,4 +1,4 @@
-//! Elevation in a planar world: the beam has a height of a few degrees, and the vehicle pitches and
+//! Elevation: the beam has a height of a few degrees, and the vehicle pitches and
 //! rolls.
 //!
 //! Each scatterer stands for a column of a facade, a trunk or a car, of which the beam illuminates
@@ -11,7 +11,7 @@ use nalgebra::Point2;
 use rand::Rng;
 use rand_distr::StandardNormal;
 
-use super::place_noise::place_hash;
+use crate::place_noise::place_hash;
 use crate::stream::Stream;
 
 /// Maximum height of scatterers above and below the radar, metres.
@@ -71,20 +71,36 @@ impl PitchRoll {
 /// `elevation_rad`. Strong scatterers are vertical lines (posts, corners), which are always
 /// illuminated at some height.
 pub(super) fn elevation_gain(
-    place: Point2<f64>,
+    height_m: f64,
     cross_section_m2: f64,
     range_m: f64,
     elevation_rad: f64,
     beam_height_rad: f64,
 ) -> f64 {
-    let off = (height_m(place) / range_m - elevation_rad) / beam_height_rad;
-    let spot = (-4.0 * LN_2 * off * off).exp();
-    let upright = cross_section_m2 / (cross_section_m2 + UPRIGHT_M2);
+    let spot = spot_gain(height_m / range_m - elevation_rad, beam_height_rad);
+    let upright = upright(cross_section_m2);
     spot + (1.0 - spot) * upright
 }
 
+/// Share of the beam's power at an angle above its axis, radians.
+pub(super) fn spot_gain(above_rad: f64, beam_height_rad: f64) -> f64 {
+    let off = above_rad / beam_height_rad;
+    (-4.0 * LN_2 * off * off).exp()
+}
+
+/// Share of a scatterer that is a vertical line, 0 to 1.
+fn upright(cross_section_m2: f64) -> f64 {
+    cross_section_m2 / (cross_section_m2 + UPRIGHT_M2)
+}
+
+/// Height above the radar, metres, of the point that a scatterer reflects from: a vertical line
+/// does so where it is level with the radar.
+pub(super) fn slant_height_m(place: Point2<f64>, cross_section_m2: f64) -> f64 {
+    height_m(place) * (1.0 - upright(cross_section_m2))
+}
+
 /// The height of a scatterer above the radar, metres: pseudo-random, by its place.
-fn height_m(place: Point2<f64>) -> f64 {
+pub(super) fn height_m(place: Point2<f64>) -> f64 {
     HEIGHT_M * (2.0 * place_hash(place, 0) - 1.0)
 }
 
@@ -112,15 +128,15 @@ mod tests {
             .find(|p| height_m(*p) > 0.97 * HEIGHT_M)
             .unwrap_or_default();
         assert!(
-            elevation_gain(place, 0.1, 1e4, 0.0, 0.045) > 0.99
-                && elevation_gain(place, 0.1, 1e4, 0.05, 0.045) < 0.1
+            elevation_gain(height_m(place), 0.1, 1e4, 0.0, 0.045) > 0.99
+                && elevation_gain(height_m(place), 0.1, 1e4, 0.05, 0.045) < 0.1
         );
         assert!(
-            elevation_gain(place, 0.1, HEIGHT_M / 0.05, 0.05, 0.045) > 0.9
-                && elevation_gain(place, 0.1, 10.0, 0.0, 0.045) < 0.05
+            elevation_gain(height_m(place), 0.1, HEIGHT_M / 0.05, 0.05, 0.045) > 0.9
+                && elevation_gain(height_m(place), 0.1, 10.0, 0.0, 0.045) < 0.05
         );
         assert!(
-            elevation_gain(place, 0.1, 10.0, 0.0, 0.25) > 0.3,
+            elevation_gain(height_m(place), 0.1, 10.0, 0.0, 0.25) > 0.3,
             "a fan beam illuminates it"
         );
     }

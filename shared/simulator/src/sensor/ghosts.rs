@@ -2,8 +2,7 @@
 //! sensor).
 //!
 //! A mirror image behaves like an object behind the wall, visible where the line of sight to it
-//! crosses the wall. Single-bounce paths return from another direction than they left in, outside a
-//! narrow beam.
+//! crosses the wall.
 
 use std::collections::BTreeMap;
 
@@ -28,16 +27,9 @@ const REACH_M: f64 = 50.0;
 impl View<'_> {
     /// Adds the images of strong reflectors in the largest mirrors.
     pub fn ghosts(&self, world: &World, echoes: &mut Vec<Echo>) {
-        for wall in mirrors(world, self.line_of_sight, self.sweep_poses.azimuths()) {
-            let middle = Point2::from((wall.from.coords + wall.to.coords) / 2.0);
-            let strong = |s: &&Scatterer| {
-                s.cross_section_m2 >= MIN_CROSS_SECTION_M2
-                    && s.body != wall.body
-                    && (s.position - middle).norm() < REACH_M
-            };
-            for scatterer in world.around(middle, REACH_M).flatten().filter(strong) {
-                self.ghost(world, &wall, scatterer, echoes);
-            }
+        let azimuths = self.sweep_poses.azimuths();
+        for (wall, scatterer) in before_mirrors(world, self.line_of_sight, azimuths) {
+            self.ghost(world, &wall, scatterer, echoes);
         }
     }
 
@@ -78,11 +70,32 @@ impl View<'_> {
                         velocity: Vector2::zeros(),
                         amplitude,
                         azimuth,
+                        height_m: 0.0,
                     });
                 }
             },
         );
     }
+}
+
+/// The strong reflectors before the largest mirrors, each with its mirror.
+pub(super) fn before_mirrors<'w>(
+    world: &'w World,
+    line_of_sight: &LineOfSight,
+    azimuths: usize,
+) -> impl Iterator<Item = (Wall, &'w Scatterer)> {
+    mirrors(world, line_of_sight, azimuths)
+        .into_iter()
+        .flat_map(move |wall| {
+            let middle = Point2::from((wall.from.coords + wall.to.coords) / 2.0);
+            let strong = move |s: &&Scatterer| {
+                s.cross_section_m2 >= MIN_CROSS_SECTION_M2
+                    && s.body != wall.body
+                    && (s.position - middle).norm() < REACH_M
+            };
+            let around = world.around(middle, REACH_M).flatten().filter(strong);
+            around.map(move |scatterer| (wall, scatterer))
+        })
 }
 
 /// The mirrors that cover most of the view, by the number of rays that hit them first.
@@ -107,7 +120,7 @@ fn mirrors(world: &World, line_of_sight: &LineOfSight, azimuths: usize) -> Vec<W
 }
 
 /// The mirror image of a place behind the wall.
-fn image(of: Point2<f64>, wall: &Wall) -> Point2<f64> {
+pub(super) fn image(of: Point2<f64>, wall: &Wall) -> Point2<f64> {
     let along = (wall.to - wall.from).normalize();
     let across = Vector2::new(-along.y, along.x);
     of - across * (2.0 * (of - wall.from).dot(&across))

@@ -54,6 +54,7 @@ impl View<'_> {
                     velocity: Vector2::zeros(),
                     amplitude: power.sqrt(),
                     azimuth,
+                    height_m: 0.0,
                 });
             }
         });

@@ -7,10 +7,10 @@ use rand::Rng;
 use rand_distr::StandardNormal;
 
 use super::effects::Effects;
-use super::place_noise::smooth_noise;
 use super::spectrum::{NOISE_OVERLAP, RangeSpectrum};
 use super::sweep_poses::SweepPoses;
 use crate::interpolate::interpolate;
+use crate::place_noise::smooth_noise;
 use crate::profile::{Receiver, Sampling};
 
 /// Length of a cell of the coarse power profile for phase noise and reverberation, metres.

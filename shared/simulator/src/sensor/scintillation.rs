@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Point2, Vector2};
 
-use super::place_noise::place_hash;
+use crate::place_noise::place_hash;
 
 /// Angular scale of a scatterer's lobes, radians: half a wavelength over its size, here some
 /// fifteen centimetres.

@@ -80,6 +80,13 @@ impl SweepPoses {
         }
     }
 
+    /// Tilts the beam at each azimuth by the gradient of the vehicle along it.
+    pub fn tilt(&mut self, gradient_rad: impl Fn(Point2<f64>, Vector2<f64>) -> f64) {
+        for pose in &mut self.all {
+            pose.elevation_rad += gradient_rad(pose.position, pose.beam);
+        }
+    }
+
     /// The sensor at the nearest azimuth of `-MARGIN..azimuths + MARGIN`.
     pub fn at(&self, azimuth: f64) -> &AzimuthPose {
         &self.all[self.index(azimuth)]

@@ -37,6 +37,10 @@ pub struct TownConfig {
     pub leaves: f64,
     /// Share of the lots along streets that are building sites, 0 to 1.
     pub building_sites: f64,
+    /// Share of the roadside, 0 to 1, that belts line: high stone walls and dense woods without
+    /// gaps, which hide what is behind them. Default: 0, or as `simulation.realism` says.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub belts: Option<f64>,
     /// True if all streets are alike: their houses repeat every 216 m, in the same order on each
     /// street, so that places are hard to tell apart.
     pub look_alike: bool,
@@ -72,6 +76,7 @@ impl Default for TownConfig {
             trees: 1.0,
             leaves: 1.0,
             building_sites: 0.0,
+            belts: None,
             look_alike: false,
         }
     }
@@ -85,6 +90,7 @@ impl TownConfig {
     pub fn validate(&self) -> Result<(), SimulatorError> {
         require_within("town.parked_cars", self.parked_cars, 0.0, 1.0)?;
         require_within("town.trees", self.trees, 0.0, 3.0)?;
+        require_within("town.belts", self.belts.unwrap_or(0.0), 0.0, 1.0)?;
         require_within("town.leaves", self.leaves, 0.0, 1.0)?;
         require_within("town.building_sites", self.building_sites, 0.0, 1.0)
     }

@@ -22,6 +22,12 @@ impl Built {
         [self.content.scatterers.len(), self.content.walls.len()]
     }
 
+    /// The number of a new body.
+    pub(super) fn next_body(&mut self) -> u32 {
+        self.last_body += 1;
+        self.last_body
+    }
+
     /// Removes all that was built since there were these numbers of scatterers and walls.
     pub(super) fn cut_back(&mut self, len: [usize; 2]) {
         self.content.scatterers.truncate(len[0]);
@@ -47,8 +53,7 @@ pub(super) struct Screen {
 impl Site<'_> {
     /// The number of a new body.
     pub(super) fn body(&mut self) -> u32 {
-        self.built.last_body += 1;
-        self.built.last_body
+        self.built.next_body()
     }
 
     /// Builds what changes between drives, at a place. It is built as the town's seed has it, and

@@ -129,7 +129,7 @@ fn other_dataset(out: &Path) -> SimulatorError {
 fn same_scans(config: &SimulationConfig) -> SimulationConfig {
     let mut config = SimulationConfig {
         scans: Some(1),
-        ..config.clone()
+        ..config.resolved()
     };
     config.output.store = false;
     config

@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use gyre_simulator::{Effects, Profile};
+use gyre_simulator::{Profile, SimulationConfig};
 
 #[test]
 fn the_gallery_shows_every_switch_and_radar_and_has_all_pictures() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("gallery");
     let page = std::fs::read_to_string(folder.join("README.md")).unwrap();
-    let switches = toml::Table::try_from(Effects::ALL).unwrap();
+    let switches = toml::Table::try_from(SimulationConfig::default().resolved().effects).unwrap();
     for key in switches.keys() {
         assert!(
             page.contains(&format!("(`effects.{key}`)")),

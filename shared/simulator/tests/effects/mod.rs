@@ -8,6 +8,7 @@ mod ground;
 mod highlights;
 mod motion;
 mod noise;
+mod road;
 pub mod scene;
 mod scintillation;
 mod weather;

@@ -7,7 +7,9 @@ use gyre_radar::{OwnedScan, ScanLimits};
 use gyre_simulator::body::{NO_BODY, Scatterer};
 use gyre_simulator::profile::{Profile, Receiver, Sampling};
 use gyre_simulator::weather::WeatherConfig;
-use gyre_simulator::{Body, Effects, Movers, Path, Scene, Sensor, SensorConfig, SweepTime, World};
+use gyre_simulator::{
+    Body, Effects, Movers, Path, Relief, Scene, Sensor, SensorConfig, SweepTime, World,
+};
 use nalgebra::Point2;
 
 /// A scene and a radar. Default: Oxford's radar at rest, without effects.
@@ -18,6 +20,7 @@ pub struct Setup<'a> {
     pub weather: WeatherConfig,
     pub sensor: SensorConfig,
     pub effects: Effects,
+    pub relief: Relief,
 }
 
 const AT_REST: Twist = Twist {
@@ -35,6 +38,7 @@ impl Default for Setup<'_> {
             weather: WeatherConfig::default(),
             sensor: SensorConfig::default(),
             effects: Effects::NONE,
+            relief: Relief::LEVEL,
         }
     }
 }
@@ -72,7 +76,7 @@ impl Setup<'_> {
             period_us,
             ..
         } = self.sampling();
-        let world = World::new(self.body.clone());
+        let world = World::new(self.body.clone()).on(self.relief);
         let mut sensor = Sensor::new(&self.sensor, &self.effects, 7);
         let mut scan = |index: u64| {
             let epoch_us = 1_500_000_000_000_000;

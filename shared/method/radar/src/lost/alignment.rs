@@ -18,16 +18,24 @@ const LEAST_NOISE: f32 = 1e-3;
 const OUTLIER: f32 = 1e-3;
 /// Numbers of lost azimuths before a row, from none to all.
 const NUMBERS: usize = MAX_LOST + 1;
+/// The most azimuths with which a row is compared, a multiple of what a processor takes at once.
+const WIDTH: usize = azimuths(MAX_LOST).next_multiple_of(8);
+/// Turns of the scan, a value for each: those of [`TURN`], and some that fill a multiple of what a
+/// processor takes at once.
+type Turns<T> = [T; TURNS.next_multiple_of(8)];
+const TURNS: usize = 2 * TURN * STEPS + 1;
+/// Steps with which a row is compared at most, as many as the turns of the largest number reach.
+const MOST_STEPS: usize = STEPS * MAX_LOST + TURNS.next_multiple_of(8);
 
 /// Aligns the rows of scans with predictions.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Alignment {
-    /// Sum of products of each row with each predicted azimuth around it: row x azimuth.
-    products: Vec<f32>,
-    /// Likelihood of each row at each step around it, relative to the highest: row x step.
-    likelihoods: Vec<f32>,
-    /// Probability of each number, given the rows up to this one.
-    forward: Vec<[f32; NUMBERS]>,
+    /// Sum of products of each row with each predicted azimuth around it.
+    products: Vec<[f32; WIDTH]>,
+    /// Likelihood of each row at each step around it, relative to the highest.
+    likelihoods: Vec<[f32; MOST_STEPS]>,
+    /// Probability of each number, given the rows up to this one: row x number.
+    forward: Vec<Turns<f32>>,
     places: Places,
     /// Energy of what remains of a row, of the first prediction.
     noise: f32,
@@ -70,10 +78,14 @@ impl Alignment {
         let rows = scan.layout.azimuths - count;
         self.compare(prediction, scan, rows, count);
         let likelihood = self.weigh(prediction, count);
-        for step in 0..=2 * TURN * STEPS {
-            let mut places = self.places_at(step, count);
-            places.likelihood += likelihood;
-            self.places.add(&places);
+        let turns = self.pass_forward(count);
+        let all = self.pass_backward(count);
+        for (places, turn) in all.iter().zip(turns).take(TURNS) {
+            let likelihood = likelihood + turn;
+            self.places.add(&Places {
+                likelihood,
+                ..*places
+            });
         }
     }
 
@@ -90,15 +102,17 @@ impl Alignment {
     }
 
     fn compare(&mut self, prediction: &Prediction, scan: &Echoes, rows: usize, count: usize) {
-        let width = azimuths(count);
+        let width = azimuths(count).next_multiple_of(8);
         self.products.clear();
-        self.products.resize(rows * width, 0.0);
+        self.products.resize(rows, [0.0; WIDTH]);
         for echo in &scan.echoes {
             let row = echo.at as usize;
-            let products = &mut self.products[row * width..][..width];
-            for (k, product) in products.iter_mut().enumerate() {
-                let predicted = prediction.row(azimuth(row, k));
-                *product += echo.power * predicted[usize::from(echo.cell)];
+            let predicted = prediction.from(usize::from(echo.cell), azimuth(row, 0));
+            let products = self.products[row][..width].as_chunks_mut::<8>().0;
+            for (products, predicted) in products.iter_mut().zip(predicted.as_chunks::<8>().0) {
+                for (product, predicted) in products.iter_mut().zip(predicted) {
+                    *product += echo.power * predicted;
+                }
             }
         }
         if self.noise == 0.0 {
@@ -113,7 +127,7 @@ impl Alignment {
     /// sum of its products there.
     fn gain(&self, prediction: &Prediction, count: usize) -> (f32, f32) {
         let (mut common, mut energy) = (0.0, f32::MIN_POSITIVE);
-        for (row, products) in self.products.chunks_exact(azimuths(count)).enumerate() {
+        for (row, products) in self.products.iter().enumerate() {
             let numbers = BESIDE + TURN..=BESIDE + TURN + count;
             let best = numbers.fold(BESIDE + TURN, |best, k| {
                 match products[k] > products[best] {
@@ -135,76 +149,112 @@ impl Alignment {
         let scale = gain / self.noise;
         let mut highest = 0.0;
         self.likelihoods.clear();
-        for (row, products) in self.products.chunks_exact_mut(azimuths(count)).enumerate() {
+        for (row, products) in self.products.iter_mut().enumerate() {
+            let products = &mut products[..azimuths(count)];
             for (k, product) in products.iter_mut().enumerate() {
                 *product = scale * (*product - 0.5 * gain * prediction.energy(azimuth(row, k)));
             }
-            let first = self.likelihoods.len();
-            for around in products.windows(AMID.len()) {
+            let mut steps = [f32::NEG_INFINITY; MOST_STEPS];
+            for (around, pair) in products
+                .windows(AMID.len())
+                .zip(steps.chunks_exact_mut(STEPS))
+            {
                 let amid = AMID
                     .iter()
                     .zip(around)
                     .map(|(weight, score)| weight * score);
-                self.likelihoods.extend([around[BESIDE], amid.sum()]);
+                pair.copy_from_slice(&[around[BESIDE], amid.sum()]);
             }
-            let likelihoods = &mut self.likelihoods[first..];
-            let best = likelihoods
-                .iter()
-                .copied()
-                .fold(f32::NEG_INFINITY, f32::max);
+            let best = steps.iter().copied().fold(f32::NEG_INFINITY, f32::max);
             highest += f64::from(best);
-            for likelihood in likelihoods {
-                *likelihood = OUTLIER + (*likelihood - best).exp();
-            }
+            self.likelihoods.push(steps.map(|step| match step - best {
+                // Beside that nothing is left of it.
+                ..-20.0 => OUTLIER,
+                relative => OUTLIER + relative.exp(),
+            }));
         }
         highest
     }
 
-    /// Passes forward and backward along the rows, with the scan turned by a step.
-    fn places_at(&mut self, step: usize, count: usize) -> Places {
-        let mut places = Places::default();
-        let rows = self.likelihoods.chunks_exact(steps(count));
-        let likelihoods = rows.map(|row| {
-            let mut numbers = [0.0; NUMBERS];
-            let of_numbers = row[step..].iter().step_by(STEPS);
-            for (number, likelihood) in numbers[..=count].iter_mut().zip(of_numbers) {
-                *number = *likelihood;
-            }
-            numbers
-        });
+    /// Passes along the rows, and returns the logarithm of their likelihood for each turn.
+    fn pass_forward(&mut self, count: usize) -> Turns<f64> {
         self.forward.clear();
-        let mut before = [0.0; NUMBERS];
-        before[0] = 1.0;
-        for likelihoods in likelihoods.clone() {
-            let mut reached = 0.0;
-            for number in 0..=count {
-                reached += before[number];
-                before[number] = reached * likelihoods[number];
+        let mut likelihood = Turns::default();
+        let mut product = [1.0; _];
+        let mut before = [Turns::default(); NUMBERS];
+        before[0] = [1.0; _];
+        for (row, steps) in self.likelihoods.iter().enumerate() {
+            let mut reached = Turns::<f32>::default();
+            for (number, before) in before[..=count].iter_mut().enumerate() {
+                let of_turns = likelihoods(steps, number);
+                for ((reached, before), likelihood) in reached.iter_mut().zip(before).zip(of_turns)
+                {
+                    *reached += *before;
+                    *before = *reached * likelihood;
+                }
             }
-            places.likelihood += f64::from(normalise(&mut before[..=count]).ln());
-            self.forward.push(before);
+            let sums = normalise(&mut before[..=count]);
+            for (product, sum) in product.iter_mut().zip(sums) {
+                *product *= f64::from(sum);
+            }
+            // Logarithms are slow, and a row's likelihood is at least that of an outlier.
+            if row % 64 == 63 {
+                add_logarithms(&mut likelihood, &mut product);
+            }
+            self.forward.extend_from_slice(&before[..=count]);
         }
+        add_logarithms(&mut likelihood, &mut product);
+        likelihood
+    }
+
+    /// Passes back along the rows, and returns the places for each turn.
+    fn pass_backward(&self, count: usize) -> Turns<Places> {
+        let mut places = Turns::<Places>::default();
         // What is lost behind the last row shows in none.
-        let mut behind = [1.0; NUMBERS];
-        for (row, (forward, likelihoods)) in self.forward.iter().zip(likelihoods).enumerate().rev()
-        {
-            let mut now: [f32; NUMBERS] = std::array::from_fn(|n| forward[n] * behind[n]);
+        let mut behind = [[1.0; _]; NUMBERS];
+        let forward = self.forward.chunks_exact(count + 1);
+        for (row, (forward, steps)) in forward.zip(&self.likelihoods).enumerate().rev() {
+            let mut now = [Turns::default(); NUMBERS];
+            for ((now, forward), behind) in now.iter_mut().zip(forward).zip(&behind) {
+                *now = std::array::from_fn(|turn| forward[turn] * behind[turn]);
+            }
             normalise(&mut now[..=count]);
             // A place lies behind this row as long as fewer azimuths were lost.
-            let mut fewer = 0.0;
+            let mut fewer = Turns::<f64>::default();
             for (place, probability) in now[..count].iter().enumerate() {
-                fewer += f64::from(*probability);
-                places.mean[place] += fewer;
-                places.mean_square[place] += (2 * row + 1) as f64 * fewer;
+                for ((fewer, probability), places) in
+                    fewer.iter_mut().zip(probability).zip(&mut places)
+                {
+                    *fewer += f64::from(*probability);
+                    places.mean[place] += *fewer;
+                    places.mean_square[place] += (2 * row + 1) as f64 * *fewer;
+                }
             }
-            let mut further = 0.0;
-            for number in (0..=count).rev() {
-                further += behind[number] * likelihoods[number];
-                behind[number] = further;
+            let mut further = Turns::<f32>::default();
+            for (number, behind) in behind[..=count].iter_mut().enumerate().rev() {
+                let of_turns = likelihoods(steps, number);
+                for ((further, behind), likelihood) in further.iter_mut().zip(behind).zip(of_turns)
+                {
+                    *further += *behind * likelihood;
+                    *behind = *further;
+                }
             }
             normalise(&mut behind[..=count]);
         }
         places
+    }
+}
+
+/// Returns the likelihoods of a row if a number of azimuths was lost before it.
+fn likelihoods(steps: &[f32; MOST_STEPS], number: usize) -> &[f32] {
+    &steps[STEPS * number..][..TURNS.next_multiple_of(8)]
+}
+
+/// Adds the logarithms of products, and begins them anew.
+fn add_logarithms(sums: &mut Turns<f64>, products: &mut Turns<f64>) {
+    for (sum, product) in sums.iter_mut().zip(products) {
+        *sum += product.ln();
+        *product = 1.0;
     }
 }
 
@@ -213,21 +263,24 @@ const fn azimuths(count: usize) -> usize {
     count + 2 + 2 * (TURN + BESIDE)
 }
 
-/// Steps with which a row is compared.
-const fn steps(count: usize) -> usize {
-    STEPS * (azimuths(count) + 1 - AMID.len())
-}
-
 /// The `k`-th azimuth with which a row is compared.
 const fn azimuth(row: usize, k: usize) -> isize {
     (row + k) as isize - (TURN + BESIDE) as isize
 }
 
-/// Divides values by their sum, and returns it.
-fn normalise(values: &mut [f32]) -> f32 {
-    let sum = values.iter().sum::<f32>().max(f32::MIN_POSITIVE);
-    for value in values {
-        *value /= sum;
+/// Divides the values of each turn by their sum, and returns the sums.
+fn normalise(numbers: &mut [Turns<f32>]) -> Turns<f32> {
+    let mut sums = [f32::MIN_POSITIVE; _];
+    for turns in &*numbers {
+        for (sum, value) in sums.iter_mut().zip(turns) {
+            *sum += value;
+        }
     }
-    sum
+    let shares = sums.map(f32::recip);
+    for turns in numbers {
+        for (value, share) in turns.iter_mut().zip(shares) {
+            *value *= share;
+        }
+    }
+    sums
 }

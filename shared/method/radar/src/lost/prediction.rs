@@ -10,6 +10,8 @@ use crate::scan::{PolarScan, Sense};
 
 /// Range at which the time between two looks in one direction is determined, m.
 const TYPICAL_M: f32 = 30.0;
+/// Azimuths beyond the turn, to either side, that a prediction has.
+const BEYOND: usize = 32;
 
 /// The motion of the sensor from one turn to the next: at a constant velocity, so between two looks
 /// at the same azimuth by the same motion.
@@ -81,10 +83,11 @@ impl Moved {
     }
 }
 
-/// The predicted powers, azimuth x cell.
-#[derive(Debug, Default)]
+/// The predicted powers.
+#[derive(Clone, Debug, Default)]
 pub(super) struct Prediction {
     layout: Layout,
+    /// Cell x azimuth, those within [`BEYOND`] of the turn's ends on both sides.
     powers: Vec<f32>,
     /// Sum of the squares of an azimuth's powers.
     energies: Vec<f32>,
@@ -103,7 +106,7 @@ impl Prediction {
         } = self.layout;
         let per_rad = azimuths as f32 / TAU;
         self.powers.clear();
-        self.powers.resize(azimuths * cells, 0.0);
+        self.powers.resize(self.width() * cells, 0.0);
         let mut from = (f32::NAN, motion.seen_from(0.0));
         for echo in &before.echoes {
             if from.0 != echo.at {
@@ -113,45 +116,59 @@ impl Prediction {
             let azimuth = echo.at + turned_rad * per_rad;
             self.draw(azimuth, (range_m - first_m) / cell_m, echo.power);
         }
-        self.energies.clear();
-        let rows = self.powers.chunks_exact(cells.max(1));
-        let energies = rows.map(|row| row.iter().map(|power| power * power).sum::<f32>());
-        self.energies.extend(energies);
+        self.close();
     }
 
     /// Distributes a power over the azimuths and cells on both sides.
     fn draw(&mut self, azimuth: f32, cell: f32, power: f32) {
-        let azimuth = azimuth.rem_euclid(self.layout.azimuths as f32);
-        let (low, near) = (azimuth.floor(), cell.floor());
-        let (share, depth) = (azimuth - low, cell - near);
-        for (azimuth, share) in [(low, 1.0 - share), (low + 1.0, share)] {
-            for (cell, depth) in [(near, 1.0 - depth), (near + 1.0, depth)] {
-                if cell >= 0.0 && cell < self.layout.cells as f32 {
-                    let first = self.within(azimuth as isize) * self.layout.cells;
-                    self.powers[first + cell as usize] += power * share * depth;
-                }
+        if cell < 0.0 || cell >= (self.layout.cells - 1) as f32 {
+            return;
+        }
+        let azimuths = self.layout.azimuths as f32;
+        let azimuth = match azimuth {
+            ..0.0 => azimuth + azimuths,
+            _ if azimuth >= azimuths => azimuth - azimuths,
+            _ => azimuth,
+        };
+        let (low, near) = (azimuth as usize, cell as usize);
+        let (share, depth) = (azimuth - low as f32, cell - near as f32);
+        let width = self.width();
+        for (cell, depth) in [(near, 1.0 - depth), (near + 1, depth)] {
+            // The azimuth behind the last is one beyond the turn.
+            let around = &mut self.powers[cell * width + BEYOND + low..][..2];
+            around[0] += power * depth * (1.0 - share);
+            around[1] += power * depth * share;
+        }
+    }
+
+    /// Repeats the turn's ends beyond it, and sums the energies.
+    fn close(&mut self) {
+        let (width, azimuths) = (self.width(), self.layout.azimuths);
+        self.energies.clear();
+        self.energies.resize(width, 0.0);
+        for powers in self.powers.chunks_exact_mut(width) {
+            powers[BEYOND] += powers[BEYOND + azimuths];
+            powers.copy_within(BEYOND..2 * BEYOND, BEYOND + azimuths);
+            powers.copy_within(azimuths..azimuths + BEYOND, 0);
+            for (energy, power) in self.energies.iter_mut().zip(&*powers) {
+                *energy += power * power;
             }
         }
     }
 
-    /// Returns the cells of an azimuth, which may lie beyond the turn.
-    pub fn row(&self, azimuth: isize) -> &[f32] {
-        &self.powers[self.within(azimuth) * self.layout.cells..][..self.layout.cells]
+    /// Azimuths of the turn and beyond it.
+    fn width(&self) -> usize {
+        self.layout.azimuths + 2 * BEYOND
+    }
+
+    /// Returns the powers of a cell at an azimuth and those behind it.
+    pub fn from(&self, cell: usize, azimuth: isize) -> &[f32] {
+        let width = self.width();
+        &self.powers[cell * width..][..width][(azimuth + BEYOND as isize) as usize..]
     }
 
     /// Returns the sum of the squares of an azimuth's powers.
     pub fn energy(&self, azimuth: isize) -> f32 {
-        self.energies[self.within(azimuth)]
-    }
-
-    /// Returns the azimuth of the turn, for one that is at most a turn beyond it.
-    fn within(&self, azimuth: isize) -> usize {
-        let azimuths = self.layout.azimuths as isize;
-        let within = match azimuth {
-            ..0 => azimuth + azimuths,
-            _ if azimuth >= azimuths => azimuth - azimuths,
-            _ => azimuth,
-        };
-        within as usize
+        self.energies[(azimuth + BEYOND as isize) as usize]
     }
 }

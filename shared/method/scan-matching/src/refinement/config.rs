@@ -98,7 +98,7 @@ impl Default for RefinementConfig {
             max_unmatched: 5,
             variance_scale: 0.7,
             yaw_sigma_deg: 0.19,
-            drift_scale: 5.0,
+            drift_scale: 2.0,
             scale_sigma: 0.01,
             hold_standstill: true,
         }

@@ -3,7 +3,7 @@
 use nalgebra::{Point2, Vector2};
 
 /// A number from 0 to 1 for a place; each `index` gives another one.
-pub(super) fn place_hash(place: Point2<f64>, index: u64) -> f64 {
+pub(crate) fn place_hash(place: Point2<f64>, index: u64) -> f64 {
     // The finaliser of SplitMix64 (Steele et al. 2014) over both coordinates' bits.
     let mut bits = place.x.to_bits()
         ^ place.y.to_bits().rotate_left(32)
@@ -15,7 +15,7 @@ pub(super) fn place_hash(place: Point2<f64>, index: u64) -> f64 {
 
 /// A random field over the world, smooth on the scale `size_m`, with a mean of 0, a standard
 /// deviation of about 1 and a maximum of 2.7. Each `index` gives another one.
-pub(super) fn smooth_noise(place: Point2<f64>, size_m: f64, index: u64) -> f64 {
+pub(crate) fn smooth_noise(place: Point2<f64>, size_m: f64, index: u64) -> f64 {
     let at = place / size_m;
     let corner = Point2::new(at.x.floor(), at.y.floor());
     // Smooth weights, which hide the grid.

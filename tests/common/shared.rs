@@ -1,0 +1,24 @@
+//! A result that several tests read.
+
+use std::sync::{Arc, Mutex, Weak};
+
+/// A value that is made for the first test that asks for it, and for all that ask while one of them
+/// has it. What it has on the disk goes with the last of them; a `static` value would leave it.
+pub struct Shared<T>(Mutex<Weak<T>>);
+
+impl<T> Shared<T> {
+    /// Nothing yet.
+    pub const fn new() -> Self {
+        Self(Mutex::new(Weak::new()))
+    }
+
+    /// Returns the value, and makes it if need be; others who ask meanwhile wait for it.
+    pub fn get(&self, make: impl FnOnce() -> T) -> Arc<T> {
+        let mut held = self.0.lock().unwrap();
+        held.upgrade().unwrap_or_else(|| {
+            let made = Arc::new(make());
+            *held = Arc::downgrade(&made);
+            made
+        })
+    }
+}
