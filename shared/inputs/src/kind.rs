@@ -49,7 +49,9 @@ impl Kind {
         match () {
             () if is_recording => Self::Data,
             () if ending == Some("toml") || is_text(word) => Self::Configuration,
-            () if word.exists() => Self::Data,
+            () if word.is_file() => Self::Data,
+            // A pipe, or a device, which is refused where it is read.
+            () if word.exists() => Self::Configuration,
             () if shipped(word).is_some() => Self::Configuration,
             () if is_address(text) => Self::Radar,
             () => Self::Unknown,

@@ -57,7 +57,7 @@ fn measure(folder: &Path, speed_mps: f64) -> Result<(Vec<f64>, Vec<f64>), Box<dy
             std::hint::black_box(finder.find(&scan, Some(twist)));
             start.elapsed().as_secs_f64() * 1e3
         });
-        let found = finder.find(&scan, Some(twist));
+        finder.find(&scan, Some(twist));
         match stale_rows(&scan) {
             0 => whole.push(median(&mut times)),
             _ => lossy.push(median(&mut times)),
