@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeSet, fs, process::Command, thread, time::Duration};
 
-use gyre_geometry::{ComposedMotion, OdometryMotion, covariance, pose, xy_yaw};
+use gyre_geometry::{ComposedMotion, covariance, xy_yaw};
 
 use crate::common::{Ended, Run, STAGES, assert_nothing_left, odometry, recording, undisturbed};
 use rustix::process::Signal;
@@ -72,12 +72,7 @@ fn all_results_are_there_and_each_motion_has_a_row() {
 fn poses_have_the_covariance_of_the_motions_before_them() {
     let run = Run::of_recording();
     run.complete();
-    let numbers = |file: &str, names: &[&str]| -> Vec<Vec<f64>> {
-        let columns = odometry::columns(&run.result(file), names);
-        let row = |row: &Vec<String>| row.iter().map(|text| text.parse().unwrap()).collect();
-        columns.iter().map(row).collect()
-    };
-    let of_place = [
+    let of_pose = [
         "x_m",
         "y_m",
         "yaw_rad",
@@ -88,21 +83,16 @@ fn poses_have_the_covariance_of_the_motions_before_them() {
         "cov_yyaw",
         "cov_yawyaw",
     ];
-    let motions = numbers(
-        "odometry.csv",
-        &[&of_place[..], &["drift_share", "scale_sigma"]].concat(),
-    );
-    let poses = numbers("poses.csv", &of_place);
+    let columns = odometry::columns(&run.result("poses.csv"), &of_pose);
+    let numbers = |row: &Vec<String>| row.iter().map(|text| text.parse().unwrap()).collect();
+    let poses: Vec<Vec<f64>> = columns.iter().map(numbers).collect();
     assert_eq!(poses.len(), recording::SCANS);
     assert_eq!(poses[0], [0.0; 9]);
     let mut composed = ComposedMotion::new();
+    let motions = gyre_results::odometry::read(&run.out().join("odometry.csv")).unwrap();
+    assert_eq!(motions.len(), poses.len() - 1);
     for (motion, found) in motions.iter().zip(&poses[1..]) {
-        composed = composed.then(&OdometryMotion {
-            motion: pose(motion[0], motion[1], motion[2]),
-            covariance: covariance::unpack(&std::array::from_fn(|k| motion[3 + k])),
-            drift_share: motion[9],
-            scale_sigma: motion[10],
-        });
+        composed = composed.then(&motion.estimate);
         let expected = composed.motion();
         let expected = [
             &xy_yaw(&expected.motion)[..],
@@ -110,10 +100,8 @@ fn poses_have_the_covariance_of_the_motions_before_them() {
         ]
         .concat();
         let near = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-6 * a.abs().max(1e-3);
-        assert!(
-            found.iter().zip(&expected).all(near),
-            "{found:?} for {expected:?}"
-        );
+        let is_near = found.iter().zip(&expected).all(near);
+        assert!(is_near, "{found:?} for {expected:?}");
     }
     assert!(poses.last().unwrap()[3] > 0.0);
 }

@@ -11,7 +11,7 @@ use gyre_configuration::paths::shipped;
 
 /// The endings of files that hold scans.
 const RECORDINGS: [&str; 3] = ["mcap", "db3", "bag"];
-/// Bytes of a file by which a text is told: a text has no zero byte.
+/// Bytes at the start of a file that decide whether it is a text: a text has no zero byte.
 const START: u64 = 4096;
 
 /// The kind of a word of the command line.

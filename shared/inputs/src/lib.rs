@@ -1,5 +1,5 @@
 //! The things that commands work on: a recording, a configuration, a radar. All commands are given
-//! them in one way, and each is told by what it is.
+//! them in one way, and each is recognised by what it is.
 //!
 //! - [`Inputs`]: the arguments;
 //! - [`Given`]: what they name;

@@ -26,7 +26,9 @@ type Text = fn(&Subject) -> Option<String>;
 type Error = fn(&Evaluation) -> Option<f64>;
 
 const DRIVE: [(&str, Text); 4] = [
-    ("path, m", |it| Some(format!("{:.1}", it.path_m()))),
+    ("path, m", |it| {
+        Some(format!("{:.1}", it.trajectory.path_length_m()))
+    }),
     ("duration, s", |it| Some(format!("{:.1}", it.duration_s()?))),
     ("poses", |it| Some(it.trajectory.poses.len().to_string())),
     ("compared with the ground truth", |it| {

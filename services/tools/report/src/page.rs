@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use gyre_evaluation::plot::paths_svg;
 use gyre_geometry::Pose;
+use gyre_messages::StageId;
 use gyre_terminal::Failure;
 use toml::{Table, Value};
 
@@ -13,16 +14,6 @@ use crate::{
     subject::{Run, Subject},
 };
 
-/// Stages in the order of the stream.
-const STAGES: [&str; 7] = [
-    "radar-replay",
-    "masking",
-    "rotation-search",
-    "translation-search",
-    "joint-search",
-    "refinement",
-    "pose-integration",
-];
 /// The groups of figures that stand behind the pictures.
 const LAST: [&str; 2] = ["Counts", "Versions"];
 /// Larger maps are left out, bytes.
@@ -183,9 +174,8 @@ fn latencies(subjects: &[Subject]) -> String {
 
 fn latency(run: &Run) -> String {
     let p50_us = |stage: &str| run.number(&format!("/latency/stages/{stage}/work/p50_us"));
-    let there = STAGES
-        .iter()
-        .filter_map(|stage| Some((*stage, p50_us(stage)?)));
+    let stages = StageId::ALL.map(StageId::name).into_iter();
+    let there = stages.filter_map(|stage| Some((stage, p50_us(stage)?)));
     let longest_us = there.clone().map(|(_, us)| us).fold(1.0, f64::max);
     let rows = there.map(|(stage, us)| {
         let number = |place: &str, factor: f64, decimals: usize| {

@@ -76,18 +76,10 @@ impl Subject {
         }
     }
 
-    /// Returns the length of the trajectory, m.
-    pub fn path_m(&self) -> f64 {
-        let steps = self.trajectory.poses.windows(2);
-        let step = |pair: &[Pose]| (pair[1].translation.vector - pair[0].translation.vector).norm();
-        steps.map(step).sum()
-    }
-
     /// Returns the time from the first to the last pose, s.
     pub fn duration_s(&self) -> Option<f64> {
-        let stamps = self.trajectory.stamp_ns.as_deref()?;
-        let span_ns = stamps.last()? - stamps.first()?;
-        Some(span_ns as f64 * 1e-9)
+        let (first_ns, last_ns) = self.trajectory.span_ns()?;
+        Some((last_ns - first_ns) as f64 * 1e-9)
     }
 }
 

@@ -1,5 +1,4 @@
-//! Errors of calibration: what the reader of a recording is told of the radar is not what the radar
-//! does.
+//! Errors of calibration: what a recording says of the radar is not what the radar does.
 
 use rand::Rng;
 use rand_distr::StandardNormal;
@@ -13,7 +12,7 @@ const OFFSET_M: f64 = 0.25;
 const SCALE: f64 = 0.005;
 const ECCENTRICITY_RAD: f64 = 1.0e-3;
 
-/// Deviations of a radar from what is told of it.
+/// Deviations of a radar from what its recording says.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Miscalibration {
     /// Metres by which everything is measured too far.
