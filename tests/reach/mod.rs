@@ -8,6 +8,7 @@ mod foreign_stages;
 #[cfg(feature = "link")]
 mod link;
 mod package;
+mod python_function;
 pub mod python_stage;
 #[cfg(feature = "ros2")]
 mod ros2;

@@ -18,6 +18,7 @@ use gyre_export::ExportArguments;
 use gyre_inputs::{ConfigArguments, Given, InputError, Inputs};
 use gyre_maps::{localise::LocaliseArguments, map::MapArguments};
 use gyre_masks::MasksArguments;
+use gyre_new::NewArguments;
 use gyre_operate::{
     EchoArguments, LogsArguments, PsArguments, RestartArguments, RunChoice, SwapArguments,
     TopArguments,
@@ -79,11 +80,16 @@ pub enum Command {
     /// Run a second program beside a stage of a running run, and compare what both make of the same
     /// inputs. Its results are never used.
     Shadow(ShadowArguments),
+    /// Begin a project: a stage of your own, with its test.
+    New(NewArguments),
     /// Run one process of a run (what `gyre run` starts).
     Stage {
         /// radar-replay, masking, rotation-search, translation-search, joint-search, refinement or
         /// pose-integration.
         name: String,
+        /// File of Python with a function that does the work: see docs/python-stage.md.
+        #[arg(long, value_name = "FILE")]
+        python: Option<PathBuf>,
     },
     /// Print the messages of a running run. It changes neither a result nor a latency.
     Echo(EchoArguments),

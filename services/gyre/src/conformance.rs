@@ -7,7 +7,7 @@ use gyre_conformance::{Candidate, ConformanceError, Demands, InputScans, Report,
 use gyre_inputs::Inputs;
 use gyre_messages::StageId;
 use gyre_odometry::SearchKind;
-use gyre_run::Scheduling;
+use gyre_run::{Scheduling, StageConfig};
 use gyre_scan_matching::RefinementKind;
 use gyre_stage::{Manifest, wake::Signals};
 use gyre_terminal::{Failure, INTERRUPTED, own, print, seconds, words};
@@ -169,21 +169,15 @@ fn command(
     configuration: &Configuration,
     stage: StageId,
 ) -> Result<Vec<String>, Failure> {
-    let own = || {
-        vec![
-            own().to_string_lossy().into_owned(),
-            "stage".to_owned(),
-            stage.name().to_owned(),
-        ]
-    };
-    let Some(command) = &arguments.command else {
-        let configured = configuration.stages.get(stage.name());
-        let configured = configured.map(|stage| stage.command.clone());
-        return Ok(configured
-            .filter(|command| !command.is_empty())
-            .unwrap_or_else(own));
-    };
-    words(command)
+    let (gyre, name) = (own().to_string_lossy().into_owned(), stage.name());
+    match (&arguments.command, &arguments.python) {
+        (Some(command), _) => words(command),
+        (None, Some(file)) => Ok(StageConfig::own_command(&gyre, name, Some(file))),
+        (None, None) => {
+            let configured = configuration.stages.get(name).cloned();
+            Ok(configured.unwrap_or_default().command(&gyre, name))
+        }
+    }
 }
 
 fn manifest(

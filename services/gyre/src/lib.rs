@@ -47,7 +47,8 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
         gyre_stage::run::keep_files_private();
     }
     match command {
-        Command::Stage { name } => Ok(stage::run(&name)),
+        Command::New(arguments) => gyre_new::new(&arguments),
+        Command::Stage { name, python } => Ok(stage::run(&name, python)),
         Command::Guard => {
             let root = std::env::var_os(gyre_stage::run::ENVIRONMENT).map(PathBuf::from);
             gyre_supervise::guard(std::io::stdin().lock(), root.as_deref());

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use gyre_configuration::Configuration;
 use gyre_messages::{FollowerId, StageId};
-use gyre_run::{LinkConfig, Mode, RecordConfig, Scheduling, Side};
+use gyre_run::{LinkConfig, Mode, RecordConfig, Scheduling, Side, StageConfig};
 use gyre_supervise::{END_TIMEOUT, Program, StagePlan};
 use gyre_terminal::Failure;
 
@@ -14,18 +14,14 @@ pub fn stage_plans(configuration: &Configuration, gyre: &Path) -> Vec<StagePlan>
     let plan = |name: &str| {
         let own = configuration.stages.get(name).cloned().unwrap_or_default();
         let is_base = configuration.is_side(Side::Base) && configuration.is_link(name);
-        let ours = || {
-            vec![
-                gyre.to_string_lossy().into_owned(),
-                "stage".to_owned(),
-                name.to_owned(),
-            ]
-        };
+        let gyre = gyre.to_string_lossy();
         // The supervisor keeps its own program; those of others can change under their names.
-        let is_ours = own.command.is_empty() || configuration.is_link(name);
-        let (command, programs) = match is_ours {
-            true => (ours(), Vec::new()),
-            false => (own.command.clone(), Program::all_of(&own.command, None)),
+        let (command, programs) = match configuration.is_link(name) {
+            true => (StageConfig::own_command(&gyre, name, None), Vec::new()),
+            false => (
+                own.command(&gyre, name),
+                Program::all_of(&own.command, None),
+            ),
         };
         let scheduling = match FollowerId::by_name(name) {
             Some(_) => own.scheduling,

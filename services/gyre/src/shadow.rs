@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use gyre_messages::{FollowerId, Footprint, StageId, Window};
 use gyre_operate::chosen;
-use gyre_run::Scheduling;
+use gyre_run::{Scheduling, StageConfig};
 use gyre_shadow::{Options, STAGES};
 use gyre_stage::{control::Control, observer::ObservedRun};
 use gyre_terminal::{Failure, own, print, seconds, words};
@@ -74,7 +74,7 @@ fn require_stage(control: &Control, stage: StageId) -> Result<(), Failure> {
 
 fn options(arguments: &ShadowArguments, stage: StageId) -> Result<Options, Failure> {
     let gyre = own().to_string_lossy().into_owned();
-    let own = || vec![gyre.clone(), "stage".to_owned(), stage.name().to_owned()];
+    let own = || StageConfig::own_command(&gyre, stage.name(), arguments.python.as_deref());
     let command = arguments.command.as_deref().map(words);
     let duration = arguments.duration.map(|it| seconds("--duration", it));
     Ok(Options {

@@ -12,7 +12,8 @@ use gyre_live_radar::Settings;
 use gyre_messages::{FollowerId, StageId};
 use gyre_radar::DatasetOptions;
 use gyre_radar_replay::Pace;
-use gyre_run::{LinkConfig, Side, SourceConfig, SourceKind};
+use gyre_run::{LinkConfig, Side, SourceConfig, SourceKind, StageConfig};
+use gyre_search::{python, rotation, translation};
 use gyre_simulator::{SimulatedDrive, SimulationConfig};
 use gyre_stage::{Launch, Manifest, StageCounters, StageError, launch};
 use gyre_terminal::{own, print};
@@ -24,11 +25,18 @@ use rustix::{
 use crate::{program, ros2, split};
 
 /// The work of a process.
-type Work = fn(&Launch) -> Result<StageCounters, StageError>;
+type Work = Box<dyn FnOnce(&Launch) -> Result<StageCounters, StageError>>;
 
-/// Runs a stage or a follower by its name.
-pub fn run(name: &str) -> ExitCode {
-    let stage = StageId::by_name(name).map(work_of_stage);
+/// Runs a stage or a follower by its name, with a function of Python if one is given.
+pub fn run(name: &str, python: Option<PathBuf>) -> ExitCode {
+    if python.is_some() && !StageConfig::PYTHON.contains(&name) {
+        let names = StageConfig::PYTHON.join(", ");
+        print::note(format_args!(
+            "gyre: {name} cannot be a function of Python; these can: {names}"
+        ));
+        return ExitCode::FAILURE;
+    }
+    let stage = StageId::by_name(name).map(|stage| work_of_stage(stage, python));
     let Some(work) = stage.or_else(|| FollowerId::by_name(name).map(work_of_follower)) else {
         let names = process_names().join(", ");
         print::note(format_args!(
@@ -44,24 +52,34 @@ pub fn run(name: &str) -> ExitCode {
     })
 }
 
-fn work_of_stage(stage: StageId) -> Work {
+/// Returns the work of a stage, which is a function of Python where a file of one is given.
+fn work_of_stage(stage: StageId, python: Option<PathBuf>) -> Work {
+    if let Some(file) = python {
+        return Box::new(move |it| match stage {
+            StageId::RotationSearch => rotation::run_with(it, python::rotation(it, &file)?),
+            StageId::TranslationSearch => {
+                translation::run_with(it, python::translation(it, &file)?)
+            }
+            _ => gyre_masking_stage::run_with(it, gyre_masking_stage::python(it, &file)?),
+        });
+    }
     match stage {
-        StageId::RadarReplay => play,
-        StageId::Masking => gyre_masking_stage::run,
-        StageId::RotationSearch => gyre_search::rotation::run,
-        StageId::TranslationSearch => gyre_search::translation::run,
-        StageId::JointSearch => gyre_search::joint::run,
-        StageId::Refinement => gyre_refinement::run,
-        StageId::PoseIntegration => integrate,
+        StageId::RadarReplay => Box::new(play),
+        StageId::Masking => Box::new(gyre_masking_stage::run),
+        StageId::RotationSearch => Box::new(rotation::run),
+        StageId::TranslationSearch => Box::new(translation::run),
+        StageId::JointSearch => Box::new(gyre_search::joint::run),
+        StageId::Refinement => Box::new(gyre_refinement::run),
+        StageId::PoseIntegration => Box::new(integrate),
     }
 }
 
 fn work_of_follower(follower: FollowerId) -> Work {
-    match follower {
+    Box::new(match follower {
         FollowerId::LoopClosure => gyre_loop_closure::run,
         FollowerId::Trajectory => gyre_trajectory::run,
         FollowerId::Localisation => gyre_localisation_follower::run,
-    }
+    })
 }
 
 /// Checks that this is the supervisor's build. A command of the configuration may name another one.

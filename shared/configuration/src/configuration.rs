@@ -10,6 +10,7 @@ use std::{
     time::Duration,
 };
 
+use gyre_masking::MaskKind;
 use gyre_messages::{FollowerId, StageId, Window};
 use gyre_odometry::{OdometryConfig, SearchKind};
 use gyre_radar::DatasetOptions;
@@ -150,6 +151,7 @@ impl Configuration {
         if let Some(simulation) = &mut configuration.simulation {
             simulation.output.format = simulation.output.format.or(format);
         }
+        configuration.leave_masks_to_python();
         let known = [
             &MethodConfig::SECTIONS_OF_A_RUN[..],
             &MethodConfig::SECTIONS[..],
@@ -158,6 +160,15 @@ impl Configuration {
         match table.keys().next() {
             None => Ok(configuration),
             Some(key) => Err(strict::unknown("the configuration", key, &known)),
+        }
+    }
+
+    /// A mask that is a function of Python takes the place of a network, which is not loaded then.
+    fn leave_masks_to_python(&mut self) {
+        let masking = self.stages.get(StageId::Masking.name());
+        let is_python = masking.is_some_and(|stage| stage.python.is_some());
+        if is_python && self.odometry.masking.kind == MaskKind::Learned {
+            self.odometry.masking.kind = MaskKind::Threshold;
         }
     }
 

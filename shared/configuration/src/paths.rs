@@ -154,8 +154,8 @@ impl Places<'_> {
         }
     }
 
-    /// Replaces the paths in the commands of stages: that of the program, and others that begin
-    /// with a dot.
+    /// Replaces the paths in the commands of stages: that of the program, others that begin with a
+    /// dot, and that of a function of Python.
     fn commands(&mut self, table: &mut Table) -> Result<(), ConfigurationError> {
         let Some(Value::Table(stages)) = table.get_mut("stages") else {
             return Ok(());
@@ -168,6 +168,9 @@ impl Places<'_> {
                 if has_dot || (index == 0 && word.contains('/')) {
                     self.replace(word, &format!("stages.{name}.command"))?;
                 }
+            }
+            if let Some(Value::String(file)) = stage.get_mut("python") {
+                self.replace(file, &format!("stages.{name}.python"))?;
             }
         }
         Ok(())
@@ -323,8 +326,11 @@ mod tests {
     #[test]
     fn the_program_of_a_stage_is_beside_the_configuration_and_one_on_the_path_stays() {
         let text = "[stages.masking]\ncommand = ['./mask', '-f', './a.py', 'b.py']\n\
-            [stages.refinement]\ncommand = ['python3', 'here/b.py']\n";
+            [stages.refinement]\ncommand = ['python3', 'here/b.py']\n\
+            [stages.rotation-search]\npython = 'a.py'\n";
         let (folder, named) = read(&["robot/mask", "robot/a.py"], text);
+        let python = at(&named, "stages.rotation-search.python");
+        assert_eq!(python, folder.path().join("robot/a.py"));
         let words = |stage: &str| -> Vec<String> {
             let command = value(&named.table, &format!("stages.{stage}.command"));
             let words = command.unwrap().as_array().unwrap().iter();

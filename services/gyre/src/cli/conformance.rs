@@ -1,5 +1,7 @@
 //! The arguments of `gyre conformance`.
 
+use std::path::PathBuf;
+
 use clap::{Args, builder::PossibleValuesParser};
 use gyre_inputs::Inputs;
 use gyre_messages::StageId;
@@ -14,6 +16,9 @@ pub struct ConformanceArguments {
     /// Default: the command of the stage in the configuration, else Gyre's own stage.
     #[arg(long, value_name = "COMMAND")]
     pub command: Option<String>,
+    /// File of Python with a function in the place of a program: see docs/python-stage.md.
+    #[arg(long, value_name = "FILE", conflicts_with = "command")]
+    pub python: Option<PathBuf>,
     /// The scans to test with and their configuration. Default: a simulated drive on small rasters.
     #[command(flatten)]
     pub inputs: Inputs,

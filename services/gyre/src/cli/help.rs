@@ -160,11 +160,18 @@ const ELSEWHERE: [(&str, Examples); 3] = [
     ),
 ];
 
-const DEVELOP: [(&str, Examples); 6] = [
+const DEVELOP: [(&str, Examples); 7] = [
+    (
+        "new",
+        [
+            "gyre new stage masking --python",
+            "gyre new stage rotation-search --rust --gyre ../gyre",
+        ],
+    ),
     (
         "conformance",
         [
-            "gyre conformance masking --command ./my-masking",
+            "gyre conformance masking --python my_mask.py",
             "gyre conformance refinement radiate DRIVE",
         ],
     ),
@@ -175,7 +182,13 @@ const DEVELOP: [(&str, Examples); 6] = [
             "gyre stress radiate DRIVE --scenario kills",
         ],
     ),
-    ("stage", ["gyre stage masking", "gyre stage refinement"]),
+    (
+        "stage",
+        [
+            "gyre stage refinement",
+            "gyre stage masking --python my_mask.py",
+        ],
+    ),
     (
         "schema",
         ["gyre schema > gyre.json", "gyre schema --markdown"],

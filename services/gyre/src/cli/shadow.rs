@@ -17,6 +17,9 @@ pub struct ShadowArguments {
     /// Default: Gyre's own stage.
     #[arg(long, value_name = "COMMAND")]
     pub command: Option<String>,
+    /// File of Python with a function in the place of a program: see docs/python-stage.md.
+    #[arg(long, value_name = "FILE", conflicts_with = "command")]
+    pub python: Option<PathBuf>,
     /// Items to compare. Default: until the run ends.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub scans: Option<u64>,

@@ -1,17 +1,19 @@
 //! The masking stage: from `scan` to `masked`, with the motions of previous scans for motion
 //! compensation.
 //!
-//! [`gyre_masking::Masker`] does the work. `scans` and `motions` are its inputs; `lossless` and
-//! `live` are the two modes of taking scans from the queue; `azimuths` finds those that were lost.
+//! [`gyre_masking::Masker`] does the work, with a function of Python where one is given (`python`).
+//! `scans` and `motions` are its inputs; `lossless` and `live` are the two modes of taking scans
+//! from the queue; `azimuths` finds those that were lost.
 
 mod azimuths;
 mod live;
 mod lossless;
 mod motions;
+mod python;
 mod scans;
 
 use gyre_geometry::Twist;
-use gyre_masking::{MaskError, MaskKind, Masker, MaskingConfig, Sweep};
+use gyre_masking::{MaskError, MaskFunction, MaskKind, Masker, MaskerError, MaskingConfig, Sweep};
 use gyre_messages::{Item, Masked, MaskedHeader, Scan, SearchedMotion, StageId, flag, mask_kind};
 use gyre_radar::{PlacedRows, PointsConfig, RasterConfig};
 use gyre_stage::{
@@ -21,15 +23,37 @@ use gyre_stage::{
 use azimuths::Azimuths;
 use scans::{ScanView, Scans};
 
+pub use python::python;
+
 /// Runs the stage until SIGTERM.
 ///
 /// # Errors
 /// An invalid configuration, or an error of [`stage::run`].
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
+    work(launch, Masker::new)
+}
+
+/// Runs the stage until SIGTERM with a mask of your own, in the place of a network.
+///
+/// # Errors
+/// An invalid configuration, a function that fails, or an error of [`stage::run`].
+pub fn run_with(
+    launch: &Launch,
+    function: Box<dyn MaskFunction>,
+) -> Result<StageCounters, StageError> {
+    work(launch, |raster, points, config| {
+        Masker::with_function(raster, points, config, function)
+    })
+}
+
+fn work(
+    launch: &Launch,
+    masker: impl FnOnce(&RasterConfig, &PointsConfig, &MaskingConfig) -> Result<Masker, MaskerError>,
+) -> Result<StageCounters, StageError> {
     let raster: RasterConfig = launch.section("raster")?;
     let points: PointsConfig = launch.section("points")?;
     let config: MaskingConfig = launch.section("masking")?;
-    let masker = Masker::new(&raster, &points, &config)
+    let masker = masker(&raster, &points, &config)
         .map_err(|error| StageError::Configuration(error.to_string()))?;
     let mut masking = Masking {
         raster,
@@ -60,7 +84,10 @@ impl Stage for Masking {
         input: ScanView<'_>,
         output: &mut Draft<Masked>,
     ) -> Result<(), StageError> {
-        let malformed = |error: MaskError| input.scan.malformed(error.to_string());
+        let failed = |error: MaskError| match error {
+            MaskError::Function(reason) => StageError::Function(reason),
+            error => input.scan.malformed(error.to_string()),
+        };
         let [rows, previous_rows] = &mut self.rows;
         let mut place = |received, motion, known, rows| -> Result<_, StageError> {
             let mut sweep = sweep(received, motion)?;
@@ -77,7 +104,7 @@ impl Stage for Masking {
         if let Some(previous) = &previous
             && !self.masker.can_follow(previous.number)
         {
-            self.masker.set_previous(previous).map_err(malformed)?;
+            self.masker.set_previous(previous).map_err(failed)?;
         }
         let (header, values) = output.parts::<f32>();
         let parts =
@@ -90,7 +117,7 @@ impl Stage for Masking {
         let twist = self
             .masker
             .mask(&sweep, follows, parts.later, parts.earlier)
-            .map_err(malformed)?;
+            .map_err(failed)?;
         let points = self
             .masker
             .points(&sweep.scan, twist, parts.points)

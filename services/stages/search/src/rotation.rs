@@ -3,13 +3,17 @@
 
 use gyre_messages::{Masked, Rotation, RotationEstimate, StageId};
 use gyre_radar::raster::RasterConfig;
-use gyre_scan_matching::{RotationConfig, SequentialRotation};
+use gyre_scan_matching::{RotationConfig, RotationMatch, SequentialRotation};
 use gyre_stage::{
     Launch, Stage, StageCounters, StageError,
     inputs::{PairView, Pairs},
     stage,
     writer::Draft,
 };
+
+/// Finds the rotation between two scans; `None` where the chain of motions starts.
+pub type Search =
+    Box<dyn FnMut(&PairView<'_, Masked>) -> Result<Option<RotationMatch>, StageError>>;
 
 /// Runs the stage until SIGTERM.
 ///
@@ -18,13 +22,27 @@ use gyre_stage::{
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let raster: RasterConfig = launch.section("raster")?;
     let config: RotationConfig = launch.section("rotation")?;
-    let rotation = SequentialRotation::new(raster.n, &config)
+    let mut rotation = SequentialRotation::new(raster.n, &config)
         .map_err(|error| StageError::Configuration(error.to_string()))?;
-    stage::run(launch, &mut RotationStage { rotation })
+    let search = move |input: &PairView<'_, Masked>| {
+        let (seq, pair) = (input.current.item().seq, input.rasters()?);
+        rotation
+            .next(seq, pair.later, pair.earlier, pair.earlier_changed)
+            .map_err(|error| input.current.malformed(error.to_string()))
+    };
+    run_with(launch, Box::new(search))
+}
+
+/// Runs the stage until SIGTERM with a search of your own.
+///
+/// # Errors
+/// What the search says, or an error of [`stage::run`].
+pub fn run_with(launch: &Launch, search: Search) -> Result<StageCounters, StageError> {
+    stage::run(launch, &mut RotationStage { search })
 }
 
 struct RotationStage {
-    rotation: SequentialRotation,
+    search: Search,
 }
 
 impl Stage for RotationStage {
@@ -37,11 +55,7 @@ impl Stage for RotationStage {
         input: PairView<'_, Masked>,
         output: &mut Draft<Rotation>,
     ) -> Result<(), StageError> {
-        let (seq, pair) = (input.current.item().seq, input.rasters()?);
-        let found = self
-            .rotation
-            .next(seq, pair.later, pair.earlier, pair.earlier_changed)
-            .map_err(|error| input.current.malformed(error.to_string()))?;
+        let found = (self.search)(&input)?;
         output.header().rotation = found
             .as_ref()
             .map(RotationEstimate::from)

@@ -3,13 +3,19 @@
 
 use gyre_messages::{Masked, Motion, MotionEstimate, Rotation, StageId};
 use gyre_radar::raster::RasterConfig;
-use gyre_scan_matching::{TranslationConfig, TranslationSearch};
+use gyre_scan_matching::{MotionMatch, RotationMatch, TranslationConfig, TranslationSearch};
 use gyre_stage::{
     Launch, Stage, StageCounters, StageError,
-    inputs::{Joined, JoinedView},
+    inputs::{Joined, JoinedView, PairView},
     stage,
     writer::Draft,
 };
+
+/// Finds the motion between two scans whose rotation is known; `None` where the chain of motions
+/// starts.
+pub type Search = Box<
+    dyn FnMut(&PairView<'_, Masked>, &RotationMatch) -> Result<Option<MotionMatch>, StageError>,
+>;
 
 /// Runs the stage until SIGTERM.
 ///
@@ -18,13 +24,28 @@ use gyre_stage::{
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let raster: RasterConfig = launch.section("raster")?;
     let config: TranslationConfig = launch.section("translation")?;
-    let search = TranslationSearch::new(raster.n, raster.cell_m.into(), &config)
+    let mut search = TranslationSearch::new(raster.n, raster.cell_m.into(), &config)
         .map_err(|error| StageError::Configuration(error.to_string()))?;
+    let search = move |input: &PairView<'_, Masked>, rotation: &RotationMatch| {
+        let pair = input.rasters()?;
+        pair.earlier
+            .map(|earlier| search.search(pair.later, earlier, rotation))
+            .transpose()
+            .map_err(|error| input.current.malformed(error.to_string()))
+    };
+    run_with(launch, Box::new(search))
+}
+
+/// Runs the stage until SIGTERM with a search of your own.
+///
+/// # Errors
+/// What the search says, or an error of [`stage::run`].
+pub fn run_with(launch: &Launch, search: Search) -> Result<StageCounters, StageError> {
     stage::run(launch, &mut TranslationStage { search })
 }
 
 struct TranslationStage {
-    search: TranslationSearch,
+    search: Search,
 }
 
 impl Stage for TranslationStage {
@@ -37,12 +58,8 @@ impl Stage for TranslationStage {
         input: JoinedView<'_, Masked, Rotation>,
         output: &mut Draft<Motion>,
     ) -> Result<(), StageError> {
-        let (pair, rotation) = (input.pair.rasters()?, input.other.header().rotation);
-        let found = pair
-            .earlier
-            .map(|earlier| self.search.search(pair.later, earlier, &rotation.into()))
-            .transpose()
-            .map_err(|error| input.pair.current.malformed(error.to_string()))?;
+        let rotation = input.other.header().rotation;
+        let found = (self.search)(&input.pair, &rotation.into())?;
         output.header().motion = found.map_or_else(MotionEstimate::default, |found| {
             MotionEstimate::from_search(&found, rotation, input.pair.interval_ns())
         });

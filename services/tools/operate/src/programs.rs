@@ -2,9 +2,10 @@
 
 use std::{env, process::ExitCode};
 
+use gyre_run::StageConfig;
 use gyre_stage::control::{PendingSwap, Swap};
 use gyre_supervise::Program;
-use gyre_terminal::{Failure, print, words};
+use gyre_terminal::{Failure, own, print, words};
 
 use crate::{
     arguments::{RestartArguments, SwapArguments},
@@ -81,6 +82,11 @@ pub fn swap(arguments: &SwapArguments) -> Result<ExitCode, Failure> {
         }
         command
     });
+    let python = arguments.python.as_deref().map(|file| {
+        let gyre = own().to_string_lossy().into_owned();
+        StageConfig::own_command(&gyre, &arguments.process, Some(file))
+    });
+    let command = command.or(python);
     let what = match &command {
         Some(command) => format!("`{}`", command.join(" ")),
         None => "the program that the run was begun with".to_owned(),

@@ -100,3 +100,19 @@ fn a_resolved_configuration_repeats_itself() {
         Some("raster.cell_m was 0.8 and is now 0.4")
     );
 }
+
+#[test]
+fn a_mask_in_python_takes_the_place_of_a_network() {
+    let learned = "[masking]\nkind = 'learned'\nmodel = 'gyre:models/gyre-255.toml'\n";
+    let python = format!("{learned}[stages.masking]\npython = 'a.py'");
+    assert_eq!(
+        from(learned).unwrap().odometry.masking.kind,
+        MaskKind::Learned
+    );
+    assert_eq!(
+        from(&python).unwrap().odometry.masking.kind,
+        MaskKind::Threshold
+    );
+    let none = from("[masking]\nkind = 'none'\n[stages.masking]\npython = 'a.py'").unwrap();
+    assert_eq!(none.odometry.masking.kind, MaskKind::None);
+}

@@ -3,7 +3,7 @@
 use gyre_colossus::Address;
 use gyre_messages::StageId;
 use gyre_ros2_messages::Domain;
-use gyre_run::{Limits, Mode, PlayedFrom, Rate, Side, SourceConfig, SourceKind};
+use gyre_run::{Limits, Mode, PlayedFrom, Rate, Side, SourceConfig, SourceKind, StageConfig};
 use gyre_simulator::OutputFormat;
 
 use super::Configuration;
@@ -28,7 +28,19 @@ impl Configuration {
         self.validate_times()?;
         within("run", self.run.scheduling.validate())?;
         for (name, stage) in &self.stages {
-            within(&format!("stages.{name}"), stage.scheduling.validate())?;
+            let section = format!("stages.{name}");
+            within(&section, stage.scheduling.validate())?;
+            if stage.python.is_some() && !stage.command.is_empty() {
+                let reason = "command and python are both set, but one program takes the place of the stage: remove one of them";
+                return Err(value(&section, reason));
+            }
+            if stage.python.is_some() && !StageConfig::PYTHON.contains(&name.as_str()) {
+                let names = StageConfig::PYTHON.join(", ");
+                let reason = format!(
+                    "python is set, but of all processes a function of Python can be {names}"
+                );
+                return Err(value(&section, reason));
+            }
         }
         if !self.slam.is_on() && !self.slam.map.as_os_str().is_empty() {
             let reason = "map is set, but the keyframes that are found in it are those of slam: set kind to `graph`";

@@ -1,6 +1,6 @@
 //! The errors of a masker.
 
-use gyre_radar::{PointsError, raster::RasterError};
+use gyre_radar::{PointsError, ScanError, raster::RasterError};
 use thiserror::Error;
 
 use crate::{MaskingConfigError, network::NetworkError};
@@ -28,9 +28,15 @@ pub enum MaskError {
     /// The scan cannot be rasterised.
     #[error(transparent)]
     Raster(#[from] RasterError),
+    /// The scan is inconsistent.
+    #[error(transparent)]
+    Scan(#[from] ScanError),
     /// The network failed.
     #[error(transparent)]
     Network(#[from] NetworkError),
+    /// A mask of your own failed.
+    #[error("{0}")]
+    Function(String),
     /// The mask takes two scans, but the previous one or the output for it is missing.
     #[error(
         "the mask takes two scans, but the previous scan {0} or the output for its raster is missing"

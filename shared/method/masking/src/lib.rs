@@ -1,15 +1,16 @@
 //! Rasterises and masks scans, and extracts their sparse points.
 //!
 //! Reading order: [`Masker`]; `compensation` (motion-compensated rasters above the threshold);
-//! `learned` and [`network`] (masks of a network); `points` (weights of sparse points); [`model`]
-//! (networks and their cards), [`Library`] (what computes them) and [`runtime`] (the search for
-//! ONNX Runtime).
+//! `learned` and [`network`] (masks of a network); [`MaskFunction`] (masks of your own); `points`
+//! (weights of sparse points); [`model`] (networks and their cards), [`Library`] (what computes
+//! them) and [`runtime`] (the search for ONNX Runtime).
 
 pub mod backend;
 mod compensation;
 mod config;
 mod error;
 mod external;
+mod function;
 mod learned;
 mod library;
 pub mod model;
@@ -29,10 +30,12 @@ use ndarray::{ArrayView2, ArrayViewMut2};
 pub use backend::{Backend, Provider};
 pub use config::{MaskKind, MaskingConfig, MaskingConfigError};
 pub use error::{MaskError, MaskerError};
+pub use function::{Factors, MaskFunction};
 pub use library::Library;
 pub use sweep::Sweep;
 
 use compensation::CompensatedRaster;
+use function::AppliedFunction;
 use learned::LearnedMask;
 use points::RasterFrame;
 
@@ -44,8 +47,17 @@ pub struct Masker {
     raster: RasterConfig,
     config: MaskingConfig,
     rasters: CompensatedRaster,
-    learned: Option<LearnedMask>,
+    weights: Weights,
     points: PointExtractor,
+}
+
+/// The origin of the factors.
+#[derive(Debug)]
+enum Weights {
+    /// The threshold alone counts.
+    None,
+    Network(LearnedMask),
+    Function(AppliedFunction),
 }
 
 impl Masker {
@@ -59,15 +71,39 @@ impl Masker {
         config: &MaskingConfig,
     ) -> Result<Self, MaskerError> {
         config.validate()?;
-        let learned = match config.kind {
-            MaskKind::Learned => Some(LearnedMask::load(config, raster)?),
-            MaskKind::None | MaskKind::Threshold => None,
+        let weights = match config.kind {
+            MaskKind::Learned => Weights::Network(LearnedMask::load(config, raster)?),
+            MaskKind::None | MaskKind::Threshold => Weights::None,
         };
+        Self::with_weights(raster, points, config, weights)
+    }
+
+    /// Allocates all buffers for a mask of your own, in the place of a network: no other is loaded.
+    ///
+    /// # Errors
+    /// The first setting out of its bounds.
+    pub fn with_function(
+        raster: &RasterConfig,
+        points: &PointsConfig,
+        config: &MaskingConfig,
+        function: Box<dyn MaskFunction>,
+    ) -> Result<Self, MaskerError> {
+        config.validate()?;
+        let weights = Weights::Function(AppliedFunction::new(function));
+        Self::with_weights(raster, points, config, weights)
+    }
+
+    fn with_weights(
+        raster: &RasterConfig,
+        points: &PointsConfig,
+        config: &MaskingConfig,
+        weights: Weights,
+    ) -> Result<Self, MaskerError> {
         Ok(Self {
             raster: raster.clone(),
             config: config.clone(),
             rasters: CompensatedRaster::new(raster, config)?,
-            learned,
+            weights,
             points: PointExtractor::new(points)?,
         })
     }
@@ -75,15 +111,14 @@ impl Masker {
     /// Returns the number of scans that the mask takes and of the rasters that it gives: 1, or 2
     /// (the scan and the previous one).
     pub fn scans(&self) -> usize {
-        self.learned.as_ref().map_or(1, LearnedMask::scans)
+        self.network().map_or(1, LearnedMask::scans)
     }
 
     /// Returns whether [`Masker::mask`] accepts a scan that follows this one: always if the mask
     /// takes one scan, else if this one was masked or [set](Masker::set_previous) last.
     pub fn can_follow(&self, number: u64) -> bool {
-        self.learned
-            .as_ref()
-            .is_none_or(|learned| learned.can_follow(number))
+        self.network()
+            .is_none_or(|network| network.can_follow(number))
     }
 
     /// Rasterises a scan as the previous one of the next, to resume after a restart.
@@ -91,9 +126,9 @@ impl Masker {
     /// # Errors
     /// As [`Masker::mask`].
     pub fn set_previous(&mut self, sweep: &Sweep<'_>) -> Result<(), MaskError> {
-        match &mut self.learned {
-            Some(learned) => learned.set_previous(&mut self.rasters, sweep),
-            None => Ok(()),
+        match &mut self.weights {
+            Weights::Network(network) => network.set_previous(&mut self.rasters, sweep),
+            Weights::None | Weights::Function(_) => Ok(()),
         }
     }
 
@@ -103,8 +138,8 @@ impl Masker {
     /// compensation.
     ///
     /// # Errors
-    /// An inconsistent scan, rasters of another shape, a network that fails, or a previous scan
-    /// that this one [cannot follow](Masker::can_follow).
+    /// An inconsistent scan, rasters of another shape, a network or a function that fails, or a
+    /// previous scan that this one [cannot follow](Masker::can_follow).
     pub fn mask(
         &mut self,
         sweep: &Sweep<'_>,
@@ -112,15 +147,17 @@ impl Masker {
         later: ArrayViewMut2<'_, f32>,
         earlier: Option<ArrayViewMut2<'_, f32>>,
     ) -> Result<Option<Twist>, MaskError> {
-        match &mut self.learned {
-            None => Ok(self.rasters.make(sweep, later)?),
-            Some(learned) => learned.mask(&mut self.rasters, sweep, follows, later, earlier),
+        let rasters = &mut self.rasters;
+        match &mut self.weights {
+            Weights::None => Ok(rasters.make(sweep, later)?),
+            Weights::Network(network) => network.mask(rasters, sweep, follows, later, earlier),
+            Weights::Function(function) => function.mask(rasters, sweep, later),
         }
     }
 
     /// Writes the scan's points to the start of `out` and returns their number: see
-    /// [`PointExtractor::extract`]. The mask of a network, which is that of the last masked scan
-    /// with compensation by `twist`, is applied with [`MaskingConfig::point_exponent`].
+    /// [`PointExtractor::extract`]. The scan is the one that was masked last, with compensation by
+    /// `twist`. Factors of its raster are applied with [`MaskingConfig::point_exponent`].
     ///
     /// # Errors
     /// An inconsistent scan.
@@ -130,6 +167,10 @@ impl Masker {
         twist: Option<Twist>,
         out: &mut [SparsePoint],
     ) -> Result<usize, ScanError> {
+        let scan = match &self.weights {
+            Weights::Function(function) => &function.left(scan),
+            Weights::None | Weights::Network(_) => scan,
+        };
         let count = self.points.extract(scan, self.config.floor(), out)?;
         let exponent = self.config.point_exponent;
         if let Some(mask) = self.factors(0).filter(|_| exponent > 0.0) {
@@ -138,10 +179,21 @@ impl Masker {
         Ok(count)
     }
 
-    /// Returns the network's factors from 0 to 1, n x n, of the last masked scan (0) or of its
-    /// previous one (1, if the mask takes two). `None` without a network.
+    /// Returns the factors from 0 to 1, n x n, of the raster of the last masked scan (0) or of its
+    /// previous one (1, if the mask takes two). `None` without a network or a function.
     pub fn factors(&self, scan: usize) -> Option<ArrayView2<'_, f32>> {
-        self.learned.as_ref()?.factors(scan)
+        match &self.weights {
+            Weights::Network(network) => network.factors(scan),
+            Weights::Function(function) => function.factors().filter(|_| scan == 0),
+            Weights::None => None,
+        }
+    }
+
+    fn network(&self) -> Option<&LearnedMask> {
+        match &self.weights {
+            Weights::Network(network) => Some(network),
+            Weights::None | Weights::Function(_) => None,
+        }
     }
 
     /// Returns the cell (row, column) of a point in a raster that is compensated by `twist`; `None`

@@ -1,6 +1,6 @@
 //! The sections that are about the processes of a run.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
@@ -61,6 +61,11 @@ pub struct StageConfig {
     /// Program and arguments of a replacement. Default: `gyre stage NAME`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub command: Vec<String>,
+    /// File of Python with the function that does the work, in the place of a command: `mask` for
+    /// `masking`, `rotation` for `rotation-search`, `translation` for `translation-search`. A mask
+    /// replaces the network of `[masking]`. See docs/python-stage.md.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub python: Option<PathBuf>,
     /// Limits of its restarts.
     pub restart: RestartPolicy,
     /// The scheduling of the process: its keys go before those of `run.scheduling`.
@@ -70,6 +75,28 @@ pub struct StageConfig {
     /// none.
     #[serde(skip_serializing_if = "crate::unset::is_zero")]
     pub delay_ms: u64,
+}
+
+impl StageConfig {
+    /// The processes that can be a function of Python.
+    pub const PYTHON: [&'static str; 3] = ["masking", "rotation-search", "translation-search"];
+
+    /// Returns the command of a process: its replacement, or `gyre stage NAME`.
+    pub fn command(&self, gyre: &str, name: &str) -> Vec<String> {
+        match self.command.is_empty() {
+            true => Self::own_command(gyre, name, self.python.as_deref()),
+            false => self.command.clone(),
+        }
+    }
+
+    /// Returns the command of Gyre's own process, with a function of Python if one is given.
+    pub fn own_command(gyre: &str, name: &str, python: Option<&Path>) -> Vec<String> {
+        let mut command = [gyre, "stage", name].map(str::to_owned).to_vec();
+        if let Some(file) = python {
+            command.extend(["--python".to_owned(), file.to_string_lossy().into_owned()]);
+        }
+        command
+    }
 }
 
 /// When to give up on a stage: after `limit` restarts within `window_s`.

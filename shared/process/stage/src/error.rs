@@ -66,6 +66,10 @@ pub enum StageError {
     /// The input cannot be used, and a restart would not change that.
     #[error("{0}")]
     Input(String),
+    /// A function of the user's has failed. Its process may have been killed: another attempt may
+    /// help.
+    #[error("{0}")]
+    Function(String),
     /// The transport failed; a restart usually helps.
     #[error("cannot {action}: {reason}")]
     Transport {
@@ -145,6 +149,7 @@ impl StageError {
             Self::Transport { .. }
             | Self::SequenceGap { .. }
             | Self::Malformed { .. }
+            | Self::Function(_)
             | Self::NoMemory { .. } => Self::TRANSIENT,
             _ => Self::PERMANENT,
         }

@@ -1,0 +1,148 @@
+//! Masks of your own: a function from a scan to factors.
+
+use std::{error::Error, fmt};
+
+use gyre_geometry::Twist;
+use gyre_radar::PolarScan;
+use ndarray::{Array2, ArrayView2, ArrayViewMut2, Zip};
+
+use crate::{MaskError, Sweep, compensation::CompensatedRaster};
+
+/// A mask of your own.
+///
+/// ```
+/// use std::error::Error;
+///
+/// use gyre_masking::{Factors, MaskFunction, Masker, MaskingConfig};
+/// use gyre_radar::{PointsConfig, PolarScan, RasterConfig};
+/// use ndarray::{Array2, ArrayView2, s};
+///
+/// /// Masks what is nearer than the bumper.
+/// #[derive(Debug)]
+/// struct WithoutBumper;
+///
+/// impl MaskFunction for WithoutBumper {
+///     fn factors(
+///         &mut self,
+///         scan: &PolarScan<'_>,
+///         _raster: ArrayView2<'_, f32>,
+///     ) -> Result<Factors, Box<dyn Error + Send + Sync>> {
+///         let mut factors = Array2::ones(scan.power().dim());
+///         factors.slice_mut(s![.., ..20]).fill(0.0);
+///         Ok(Factors::OfPower(factors))
+///     }
+/// }
+///
+/// # fn main() -> Result<(), Box<dyn Error>> {
+/// let masker = Masker::with_function(
+///     &RasterConfig::default(),
+///     &PointsConfig::default(),
+///     &MaskingConfig::default(),
+///     Box::new(WithoutBumper),
+/// )?;
+/// # let _ = masker;
+/// # Ok(())
+/// # }
+/// ```
+pub trait MaskFunction: fmt::Debug + Send + Sync {
+    /// Returns factors from 0 to 1 for a scan. `raster` shows it with motion compensation, above
+    /// the threshold: n x n, row 0 far ahead, column 0 far left. The same scan must give the same
+    /// factors, after a restart too.
+    ///
+    /// # Errors
+    /// The scan cannot be masked.
+    fn factors(
+        &mut self,
+        scan: &PolarScan<'_>,
+        raster: ArrayView2<'_, f32>,
+    ) -> Result<Factors, Box<dyn Error + Send + Sync>>;
+}
+
+/// Factors from 0 to 1.
+#[derive(Debug)]
+pub enum Factors {
+    /// Of the powers, azimuth x range bin: raster and points are made of what is left.
+    OfPower(Array2<f32>),
+    /// Of the cells of the raster, n x n. The weights of points are multiplied as those of a
+    /// network's mask are.
+    OfRaster(Array2<f32>),
+}
+
+/// A function, and what it said of the last scan.
+#[derive(Debug)]
+pub(crate) struct AppliedFunction {
+    function: Box<dyn MaskFunction>,
+    /// Factors of the raster of the last scan, if it gave such.
+    raster: Option<Array2<f32>>,
+    /// The powers of the last scan that are left, row after row, if it gave factors of powers.
+    powers: Vec<u8>,
+}
+
+impl AppliedFunction {
+    pub fn new(function: Box<dyn MaskFunction>) -> Self {
+        Self {
+            function,
+            raster: None,
+            powers: Vec::new(),
+        }
+    }
+
+    /// Masks a scan: see [`Masker::mask`](crate::Masker::mask).
+    pub fn mask(
+        &mut self,
+        rasters: &mut CompensatedRaster,
+        sweep: &Sweep<'_>,
+        mut later: ArrayViewMut2<'_, f32>,
+    ) -> Result<Option<Twist>, MaskError> {
+        let scan = &sweep.scan;
+        scan.check()?;
+        let twist = rasters.make(sweep, later.view_mut())?;
+        let factors = self.function.factors(scan, later.view());
+        self.powers.clear();
+        self.raster = match factors.map_err(|error| MaskError::Function(error.to_string()))? {
+            Factors::OfRaster(factors) => {
+                expect_shape(factors.dim(), later.dim())?;
+                later *= &factors;
+                Some(factors)
+            }
+            Factors::OfPower(factors) => {
+                let power = scan.power();
+                expect_shape(factors.dim(), power.dim())?;
+                let left = Zip::from(power).and(&factors);
+                let left =
+                    left.map_collect(|power, factor| (f32::from(*power) * factor).round() as u8);
+                self.powers.extend(left);
+                let scan = self.left(scan);
+                rasters.make(&Sweep { scan, ..*sweep }, later)?;
+                None
+            }
+        };
+        Ok(twist)
+    }
+
+    /// Returns the last masked scan with the powers that are left.
+    pub fn left<'a>(&'a self, scan: &PolarScan<'a>) -> PolarScan<'a> {
+        if self.powers.is_empty() {
+            return *scan;
+        }
+        let mut left = *scan;
+        left.bytes = &self.powers;
+        left.geometry.stride = scan.geometry.bins;
+        left.geometry.first_byte = 0;
+        left
+    }
+
+    /// Returns the factors of the last masked scan's raster.
+    pub fn factors(&self) -> Option<ArrayView2<'_, f32>> {
+        self.raster.as_ref().map(|factors| factors.view())
+    }
+}
+
+fn expect_shape(given: (usize, usize), expected: (usize, usize)) -> Result<(), MaskError> {
+    match given == expected {
+        true => Ok(()),
+        false => Err(MaskError::Function(format!(
+            "the mask is {given:?}: expected {expected:?}"
+        ))),
+    }
+}

@@ -1,0 +1,307 @@
+//! Stages that are functions of Python: five lines in a file, in the Python that `GYRE_PYTHON`
+//! names, else `python3`, which needs numpy.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+use rustix::process::Signal;
+use tempfile::TempDir;
+
+use crate::common::{
+    Ended, Run, folder, gyre,
+    leftovers::root,
+    odometry::columns,
+    processes::{child_with, of_run},
+    python, send, undisturbed,
+};
+
+/// Returns whether Python has numpy; prints why a test is skipped.
+fn can_start() -> bool {
+    let imported = Command::new(python()).args(["-c", "import numpy"]).output();
+    let has_numpy = imported.is_ok_and(|output| output.status.success());
+    if !has_numpy {
+        println!(
+            "skipped: {} has no numpy, or GYRE_PYTHON names another",
+            python()
+        );
+    }
+    has_numpy
+}
+
+/// A file with a function.
+fn file(text: &str) -> (TempDir, PathBuf) {
+    let folder = folder();
+    let file = folder.path().join("mine.py");
+    fs::write(&file, text).unwrap();
+    (folder, file)
+}
+
+fn with(run: Run, stage: &str, file: &Path) -> Run {
+    run.set(&format!("stages.{stage}.python='{}'", file.display()))
+}
+
+#[test]
+fn factors_of_one_change_no_byte() {
+    if !can_start() {
+        return;
+    }
+    for shape in ["power", "raster"] {
+        let text = format!("def mask(scan):\n    return scan.{shape} >= 0\n");
+        let (_folder, file) = file(&text);
+        let run = with(Run::of_recording(), "masking", &file);
+        assert_eq!(run.complete(), undisturbed(), "{shape}");
+    }
+}
+
+#[test]
+fn factors_of_powers_are_a_threshold_where_they_are_one() {
+    if !can_start() {
+        return;
+    }
+    let threshold = Run::of_recording().set("masking.threshold=90").complete();
+    assert_ne!(threshold, undisturbed());
+    // What is left of a power above 90 is the power, and what is not is below the threshold of 60.
+    let text = "def mask(scan):\n    return scan.power > 90\n";
+    let (_folder, file) = file(text);
+    let run = with(Run::of_recording(), "masking", &file);
+    let masked = run.complete();
+    assert_ne!(masked, undisturbed());
+    // Powers count from the threshold on, so the rasters differ, but not by where things are.
+    for (a, b) in places(&threshold).iter().zip(places(&masked)) {
+        assert!((a[0] - b[0]).hypot(a[1] - b[1]) < 0.1, "{a:?} {b:?}");
+    }
+}
+
+/// The x and y of all motions, m.
+fn places(odometry: &str) -> Vec<[f64; 2]> {
+    let rows = columns(odometry, &["x_m", "y_m"]);
+    let number = |text: &String| text.parse().unwrap();
+    rows.iter()
+        .map(|row| [number(&row[0]), number(&row[1])])
+        .collect()
+}
+
+#[test]
+fn a_mask_sees_the_scan_and_its_place() {
+    if !can_start() {
+        return;
+    }
+    let (folder, file) = file(
+        "import json, pathlib, numpy as np\n\
+         def mask(scan):\n\
+         \x20   print('masks', scan.stamp_ns)\n\
+         \x20   seen = dict(power=scan.power.shape, raster=scan.raster.shape, bearings=scan.azimuth_rad.shape,\n\
+         \x20       sum=int(scan.power.astype(int).sum()), writes=bool(scan.power.flags.writeable),\n\
+         \x20       cell_m=scan.cell_m, bin_m=scan.range_resolution_m)\n\
+         \x20   pathlib.Path(__file__).with_name('seen.json').write_text(json.dumps(seen))\n\
+         \x20   return np.ones(scan.raster.shape)\n",
+    );
+    with(Run::of_recording(), "masking", &file).complete();
+    let seen = fs::read_to_string(folder.path().join("seen.json")).unwrap();
+    let seen: serde_json::Value = serde_json::from_str(&seen).unwrap();
+    let [azimuths, bins] = [0, 1].map(|axis| seen["power"][axis].as_u64().unwrap());
+    assert_eq!(seen["bearings"][0], azimuths);
+    assert_eq!(seen["raster"][0], seen["raster"][1]);
+    assert!(azimuths >= 100 && bins >= 100, "{seen}");
+    assert!(seen["sum"].as_u64().unwrap() > azimuths, "{seen}");
+    assert_eq!(seen["writes"], false);
+    assert!(seen["cell_m"].as_f64().unwrap() > 0.0 && seen["bin_m"].as_f64().unwrap() > 0.0);
+}
+
+#[test]
+fn searches_return_the_motion_of_the_run() {
+    if !can_start() {
+        return;
+    }
+    let (_folder, file) = file(
+        "def rotation(scan, previous):\n\
+         \x20   assert scan.stamp_ns > previous.stamp_ns and scan.raster.shape == previous.raster.shape\n\
+         \x20   return 0.01, 0.002\n\
+         def translation(scan, previous, rotation_rad):\n\
+         \x20   return 1.5, 10.0 * rotation_rad, [[0.04, 0.01], [0.01, 0.09]]\n",
+    );
+    let run = with(Run::of_recording(), "rotation-search", &file);
+    let run = with(run, "translation-search", &file).set("refinement.kind=none");
+    let names = [
+        "x_m",
+        "y_m",
+        "yaw_rad",
+        "cov_xx",
+        "cov_xy",
+        "cov_yy",
+        "cov_yawyaw",
+    ];
+    let odometry = run.complete();
+    let rows = columns(&odometry, &names);
+    assert!(rows.len() > 10);
+    for row in &rows[1..] {
+        let found: Vec<f64> = row.iter().map(|text| text.parse().unwrap()).collect();
+        for (found, expected) in found.iter().zip([1.5, 0.1, 0.01, 0.04, 0.01, 0.09, 4e-6]) {
+            assert!((found - expected).abs() < 1e-6, "{row:?}");
+        }
+    }
+}
+
+#[test]
+fn an_exception_ends_the_run_with_its_line_and_leaves_its_traceback() {
+    if !can_start() {
+        return;
+    }
+    let (_folder, file) = file(
+        "seen = 0\n\
+         def helper():\n\
+         \x20   return {}['wall']\n\
+         def mask(scan):\n\
+         \x20   global seen\n\
+         \x20   seen += 1\n\
+         \x20   if seen > 4: helper()\n\
+         \x20   return scan.power > 0\n",
+    );
+    let run = with(Run::of_recording(), "masking", &file);
+    let place = format!("{}, line 3: KeyError: 'wall'", file.display());
+    run.finish().failed_with(&["masking", &place]);
+    let mut logs = gyre();
+    logs.args(["logs", "masking"]).arg(run.out());
+    let output = logs.output().unwrap();
+    let printed = String::from_utf8_lossy(&output.stdout);
+    assert!(
+        printed.contains("Traceback") && printed.contains("in helper"),
+        "{printed}"
+    );
+
+    let mut conformance = gyre();
+    conformance
+        .args(["conformance", "masking", "--scans", "12", "--python"])
+        .arg(&file);
+    let output = conformance.output().unwrap();
+    let printed = String::from_utf8_lossy(&output.stdout);
+    assert!(
+        !output.status.success() && printed.contains("line 3: KeyError: 'wall'"),
+        "{printed}"
+    );
+}
+
+#[test]
+fn what_cannot_be_loaded_or_returned_is_said() {
+    if !can_start() {
+        return;
+    }
+    for (text, sentence) in [
+        ("def mask(scan)\n    return 1\n", "line 1: SyntaxError"),
+        (
+            "import nothing_of_this_name\n",
+            "line 1: ModuleNotFoundError",
+        ),
+        (
+            "def masks(scan):\n    return 1\n",
+            "there is no function `mask`",
+        ),
+        ("def mask(scan):\n    return scan.power[:, :3]\n", "shape"),
+        (
+            "def mask(scan):\n    return scan.raster + 2.0\n",
+            "not all from 0 to 1",
+        ),
+        (
+            "def mask(scan):\n    return scan.raster * float('nan')\n",
+            "not all from 0 to 1",
+        ),
+        (
+            "import os\ndef mask(scan):\n    os._exit(3)\n",
+            "Python has ended",
+        ),
+    ] {
+        let (_folder, file) = file(text);
+        let run = with(Run::of_recording(), "masking", &file);
+        run.finish().failed_with(&["mine.py", sentence]);
+    }
+    let run = with(Run::of_recording(), "masking", Path::new("no_such.py"));
+    run.finish().failed_with(&["no_such.py"]);
+    let (_folder, file) = file("def mask(scan):\n    return 1\n");
+    with(Run::of_recording(), "refinement", &file)
+        .finish()
+        .refused_with(&[
+            "stages.refinement",
+            "masking, rotation-search, translation-search",
+        ]);
+    let run = with(Run::of_recording(), "masking", &file).set("stages.masking.command=['x']");
+    run.finish()
+        .refused_with(&["stages.masking", "remove one of them"]);
+}
+
+#[test]
+fn killed_it_leaves_no_interpreter_and_no_other_byte() {
+    if !can_start() {
+        return;
+    }
+    let (_folder, file) = file("def mask(scan):\n    return scan.power > 0\n");
+    let run = with(Run::of_recording(), "masking", &file).rate("6");
+    let mut running = run.start();
+    for pose in [6, 12] {
+        running.await_poses(pose);
+        let word = file.to_str().unwrap();
+        let stage = child_with(running.pid(), word).unwrap();
+        let interpreter = child_with(stage, word).unwrap();
+        // Either may die.
+        send(if pose == 6 { stage } else { interpreter }, Signal::KILL);
+    }
+    running.finish().succeeded();
+    assert_eq!(run.odometry(), undisturbed());
+    assert!(of_run(&root(run.out())).is_empty());
+}
+
+#[test]
+fn a_begun_project_keeps_the_contract_and_drives() {
+    if !can_start() {
+        return;
+    }
+    for (stage, function) in [
+        ("masking", "mask"),
+        ("rotation-search", "rotation"),
+        ("translation-search", "translation"),
+    ] {
+        let folder = folder();
+        let mut new = gyre();
+        new.current_dir(&folder)
+            .args(["new", "stage", stage, "--python"]);
+        Ended::of(new).succeeded();
+        let project = folder.path().join(format!("my-{stage}"));
+        let file = project.join(format!("{function}.py"));
+        let mut conformance = gyre();
+        conformance
+            .args(["conformance", stage, "--scans", "12", "--python"])
+            .arg(&file);
+        Ended::of(conformance).succeeded();
+        let odometry = with(Run::of_recording(), stage, &file).complete();
+        for (own, mine) in places(undisturbed()).iter().zip(places(&odometry)) {
+            let apart_m = (own[0] - mine[0]).hypot(own[1] - mine[1]);
+            assert!(apart_m < 0.3, "{stage}: {apart_m} m");
+        }
+    }
+}
+
+#[test]
+#[ignore = "nightly: builds a program"]
+fn a_begun_project_in_rust_builds_and_keeps_the_contract() {
+    let folder = folder();
+    for stage in ["masking", "rotation-search", "translation-search"] {
+        let mut new = gyre();
+        new.current_dir(&folder)
+            .args(["new", "stage", stage, "--rust", "--gyre", crate::PROJECT]);
+        Ended::of(new).succeeded();
+        let project = folder.path().join(format!("my-{stage}"));
+        let mut build = Command::new("cargo");
+        build
+            .current_dir(&project)
+            .env("CARGO_TARGET_DIR", folder.path().join("target"))
+            .args(["build", "--quiet"]);
+        Ended::of(build).succeeded();
+        let program = folder.path().join(format!("target/debug/my-{stage}"));
+        let mut conformance = gyre();
+        conformance.args(["conformance", stage, "--scans", "12", "--command"]);
+        conformance.arg(&program);
+        Ended::of(conformance).succeeded();
+    }
+}
