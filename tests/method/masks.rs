@@ -106,6 +106,13 @@ fn a_threshold_keeps_or_takes_and_no_mask_keeps_all() {
     let folder = folder();
     let ended = masks(folder.path(), &["--scans", "12,3"]);
     ended.succeeded();
+    let json = masks(folder.path(), &["--scans", "12,3", "--json"]);
+    let json: serde_json::Value = serde_json::from_str(&json.succeeded().stdout).unwrap();
+    for (row, object) in figures(&ended).iter().zip(json.as_array().unwrap()) {
+        assert_eq!(object["scan"].as_f64(), Some(row[0]));
+        let percent = object["power_percent"].as_f64().unwrap();
+        assert!((percent - row[1]).abs() < 0.051, "{percent} {}", row[1]);
+    }
     assert_eq!(
         names(folder.path()),
         ["masks.png", "scan-000003.png", "scan-000012.png"]

@@ -121,6 +121,9 @@ impl Shadow {
         println!("{}\n{}", said("stderr"), said("stdout"));
         let report = fs::read_to_string(self.report.join("shadow.json"));
         let report: Value = serde_json::from_str(&report.unwrap()).unwrap();
+        if let Ok(printed) = serde_json::from_str::<Value>(&said("stdout")) {
+            assert_eq!(printed, report);
+        }
         assert_accounted(&report["counts"]);
         let rows = self.rows() as u64;
         assert_eq!(Some(rows), report["counts"]["compared"].as_u64());
@@ -158,7 +161,7 @@ fn assert_identical((code, report): (Option<i32>, Value)) {
 fn own_stages_as_shadows_are_identical_item_for_item_and_the_run_is_untouched() {
     let run = long().rate(HALF_RATE);
     let running = held(&run);
-    let shadows = STAGES.map(|stage| Shadow::start(&run, stage, stage, &[]));
+    let shadows = STAGES.map(|stage| Shadow::start(&run, stage, stage, &["--json"]));
     shadows.iter().for_each(Shadow::await_attached);
     release(&running);
     running.finish().succeeded();

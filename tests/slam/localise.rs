@@ -4,12 +4,13 @@ use std::{
     fs,
     os::unix::fs::MetadataExt,
     path::{Path, PathBuf},
-    process::Stdio,
+    process::{Command, Stdio},
     sync::Arc,
 };
 
 use gyre_geometry::Pose;
 use gyre_radar::read_trajectory;
+use serde_json::Value;
 
 use crate::common::{Ended, Run, Shared, folder, gyre, recording};
 
@@ -68,6 +69,10 @@ fn map_of(run: &Run) -> PathBuf {
 
 /// Localises a drive of another day in a town, in this map.
 fn localise(map: &Path, town: u64, out: &Path) -> Ended {
+    Ended::of(localising(map, town, out))
+}
+
+fn localising(map: &Path, town: u64, out: &Path) -> Command {
     let drive = drive(town, Day::Rainy);
     let configuration = out.with_extension("toml");
     fs::write(&configuration, CONFIGURATION).unwrap();
@@ -75,7 +80,7 @@ fn localise(map: &Path, town: u64, out: &Path) -> Ended {
     command.arg("localise").arg(configuration);
     command.arg("--data").arg(drive);
     command.arg("--map").arg(map).arg("--out").arg(out);
-    Ended::of(command)
+    command
 }
 
 /// The time, the status and the place of each row of `fixes.csv`.
@@ -119,7 +124,13 @@ fn a_drive_on_another_day_is_found_in_the_map_of_a_run() {
         assert!(error_m < 0.5 && error_rad.abs() < 0.02, "{number}: {error}");
     }
     let again = folder.path().join("again");
-    localise(&map_of(&run), TOWN, &again).succeeded();
+    let mut command = localising(&map_of(&run), TOWN, &again);
+    command.arg("--json");
+    let ended = Ended::of(command);
+    let figures: Value = serde_json::from_str(&ended.succeeded().stdout).unwrap();
+    let count = |key: &str| figures[key].as_u64().unwrap();
+    assert_eq!(count("found") + count("tracked"), rows.len() as u64);
+    assert_eq!(figures["first_fix"], serde_json::json!([0, 0.0]));
     let bytes = |out: &Path| fs::read(out.join("fixes.csv")).unwrap();
     assert_eq!(bytes(&out), bytes(&again));
     // Its results are their user's alone, as those of a run.

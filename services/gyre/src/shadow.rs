@@ -32,7 +32,10 @@ pub fn shadow(arguments: &ShadowArguments) -> Result<ExitCode, Failure> {
     let report = gyre_shadow::shadow(&run, &options, &mut |line| {
         print::note(format_args!("gyre shadow: {line}"));
     })?;
-    print::line(&report)?;
+    match arguments.json {
+        true => print::line(serde_json::to_string_pretty(&report)?)?,
+        false => print::line(&report)?,
+    }
     Ok(match report.is_sound() {
         true => ExitCode::SUCCESS,
         false => ExitCode::FAILURE,

@@ -39,4 +39,7 @@ pub struct ShadowArguments {
     /// Time for the program to answer an item, s.
     #[arg(long, default_value_t = 10.0, value_name = "S")]
     pub patience_s: f64,
+    /// Print JSON instead of a table.
+    #[arg(long)]
+    pub json: bool,
 }

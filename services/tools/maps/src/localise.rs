@@ -24,6 +24,7 @@ use gyre_results::Out;
 use gyre_storage::{self as storage, Draft};
 use gyre_terminal::{Failure, print};
 use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
 
 use counts::Counts;
 
@@ -46,6 +47,20 @@ pub struct LocaliseArguments {
     /// The folder of fixes.csv.
     #[arg(long, default_value = "out/localise")]
     pub out: PathBuf,
+    /// Print JSON instead of sentences.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// The figures of a drive, as `--json` prints them.
+#[derive(Serialize)]
+struct Figures<'a> {
+    #[serde(flatten)]
+    counts: &'a Counts,
+    /// Scans that could not be used.
+    left_out: usize,
+    ms_a_scan: f64,
+    fixes: PathBuf,
 }
 
 /// Localises the scans of a recording in a map, and writes `fixes.csv`.
@@ -64,12 +79,19 @@ pub fn localise(arguments: &LocaliseArguments) -> Result<ExitCode, Failure> {
     fixes.commit()?;
     storage::sync_folder(out)?;
     ended?;
-    print::line(counts.summary(scans.left_out()))?;
-    print::line(format_args!(
-        "{:.1} ms a scan; {}",
-        started.elapsed().as_secs_f64() * 1e3 / counts.scans().max(1) as f64,
-        out.join(FIXES).display()
-    ))?;
+    let figures = Figures {
+        counts: &counts,
+        left_out: scans.left_out(),
+        ms_a_scan: started.elapsed().as_secs_f64() * 1e3 / counts.scans().max(1) as f64,
+        fixes: out.join(FIXES),
+    };
+    if arguments.json {
+        print::line(serde_json::to_string_pretty(&figures)?)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    print::line(counts.summary(figures.left_out))?;
+    let (ms_a_scan, fixes) = (figures.ms_a_scan, figures.fixes.display());
+    print::line(format_args!("{ms_a_scan:.1} ms a scan; {fixes}"))?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -1,9 +1,12 @@
 //! The effect of the mask on one scan.
 
+use std::fmt;
+
 use gyre_geometry::Twist;
 use ndarray::Array2;
+use serde::Serialize;
 
-/// The column heads of [`Inspection::line`].
+/// The column heads of [`Figures`].
 pub const HEADER: &str = "  scan   power %   above floor %   cells %   points %      m/s    deg/s";
 
 /// Above this factor a cell or a point counts as kept.
@@ -34,9 +37,21 @@ pub struct MaskedRaster {
     pub above_floor: f64,
 }
 
+/// The shares of a scan that the mask keeps, and its motion; `None`: of nothing.
+#[derive(Serialize)]
+pub struct Figures {
+    scan: usize,
+    power_percent: Option<f64>,
+    above_floor_percent: Option<f64>,
+    cells_percent: Option<f64>,
+    points_percent: Option<f64>,
+    forward_m_s: Option<f64>,
+    yaw_rate_deg_s: Option<f64>,
+}
+
 impl Inspection {
-    /// Returns the shares that the mask keeps, in the columns of [`HEADER`].
-    pub fn line(&self) -> String {
+    /// Returns the shares that the mask keeps.
+    pub fn figures(&self) -> Figures {
         let raster = &self.rasters[0];
         let masked = sum(&raster.masked);
         let kept = |factors: &mut dyn Iterator<Item = f32>| {
@@ -45,19 +60,34 @@ impl Inspection {
             });
             percent(kept as f64, f64::from(all))
         };
-        let motion = |figure: fn(Twist) -> f64| {
-            self.twist
-                .map_or_else(|| "-".to_owned(), |t| format!("{:.2}", figure(t)))
+        Figures {
+            scan: self.number,
+            power_percent: percent(masked, sum(&raster.whole)),
+            above_floor_percent: percent(masked, raster.above_floor),
+            cells_percent: kept(&mut raster.mask.iter().copied()),
+            points_percent: kept(&mut self.points.iter().map(|(_, factor)| *factor)),
+            forward_m_s: self.twist.map(|twist| twist.vx_mps),
+            yaw_rate_deg_s: self.twist.map(|twist| twist.yaw_rate_radps.to_degrees()),
+        }
+    }
+}
+
+impl fmt::Display for Figures {
+    /// Writes the columns of [`HEADER`].
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let figure = |figure: Option<f64>, digits: usize| {
+            figure.map_or_else(|| "-".to_owned(), |figure| format!("{figure:.digits$}"))
         };
-        format!(
+        write!(
+            f,
             "{:6} {:>9} {:>15} {:>9} {:>10} {:>8} {:>8}",
-            self.number,
-            percent(masked, sum(&raster.whole)),
-            percent(masked, raster.above_floor),
-            kept(&mut raster.mask.iter().copied()),
-            kept(&mut self.points.iter().map(|(_, factor)| *factor)),
-            motion(|twist| twist.vx_mps),
-            motion(|twist| twist.yaw_rate_radps.to_degrees()),
+            self.scan,
+            figure(self.power_percent, 1),
+            figure(self.above_floor_percent, 1),
+            figure(self.cells_percent, 1),
+            figure(self.points_percent, 1),
+            figure(self.forward_m_s, 2),
+            figure(self.yaw_rate_deg_s, 2),
         )
     }
 }
@@ -66,11 +96,7 @@ fn sum(cells: &Array2<f32>) -> f64 {
     cells.iter().copied().map(f64::from).sum()
 }
 
-/// `-` of nothing.
-fn percent(part: f64, whole: f64) -> String {
-    if whole > 0.0 {
-        format!("{:.1}", 100.0 * part / whole)
-    } else {
-        "-".to_owned()
-    }
+/// `None` of nothing.
+fn percent(part: f64, whole: f64) -> Option<f64> {
+    (whole > 0.0).then(|| 100.0 * part / whole)
 }

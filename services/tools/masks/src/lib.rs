@@ -39,6 +39,9 @@ pub struct MasksArguments {
     /// Draw every Nth scan.
     #[arg(long, conflicts_with = "scans")]
     pub every: Option<NonZeroUsize>,
+    /// Print JSON instead of a table.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Draws the chosen scans, and prints a line on each.
@@ -58,13 +61,19 @@ pub fn masks(arguments: &MasksArguments) -> Result<ExitCode, Failure> {
     let out = &arguments.out;
     fs::create_dir_all(out)
         .map_err(|error| format!("cannot write to {}: {error}", out.display()))?;
-    print::line(inspection::HEADER)?;
+    if !arguments.json {
+        print::line(inspection::HEADER)?;
+    }
     let (mut overview, apart) = (Vec::new(), chosen.len().div_ceil(FEW));
+    let mut figures = Vec::new();
     for (index, number) in chosen.into_iter().enumerate() {
         let Some(inspection) = inspector.inspect(number)? else {
             continue;
         };
-        print::line(inspection.line())?;
+        figures.push(inspection.figures());
+        if let Some(figures) = figures.last().filter(|_| !arguments.json) {
+            print::line(figures)?;
+        }
         let picture = Canvas::of(&inspection);
         picture.write(&out.join(format!("scan-{number:06}.png")))?;
         if index % apart == 0 {
@@ -79,6 +88,9 @@ pub fn masks(arguments: &MasksArguments) -> Result<ExitCode, Failure> {
         .into());
     }
     Canvas::stack(&overview).write(&out.join(OVERVIEW))?;
+    if arguments.json {
+        print::line(serde_json::to_string_pretty(&figures)?)?;
+    }
     Ok(ExitCode::SUCCESS)
 }
 

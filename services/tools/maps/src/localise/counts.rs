@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use gyre_localisation::Status;
+use serde::Serialize;
 
 use super::RegisteredScan;
 
@@ -10,17 +11,20 @@ use super::RegisteredScan;
 const LISTED: usize = 10;
 
 /// Counts of the scans by their status, and the spans without a fix.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Serialize)]
 pub struct Counts {
     found: usize,
     tracked: usize,
     predicted: usize,
     lost: usize,
+    #[serde(skip)]
     first_ns: Option<i64>,
     /// The first scan with a fix, and its time after the first scan, s.
     first_fix: Option<(usize, f64)>,
     /// The first and the last scan of each span in which the localiser was lost.
+    #[serde(rename = "lost_scans")]
     spans: Vec<(usize, usize)>,
+    #[serde(skip)]
     was_lost: bool,
 }
 
