@@ -123,6 +123,17 @@ fn a_drive_on_another_day_is_found_in_the_map_of_a_run() {
         let (error_m, error_rad) = (error.translation.vector.norm(), error.rotation.angle());
         assert!(error_m < 0.5 && error_rad.abs() < 0.02, "{number}: {error}");
     }
+    let places = read_trajectory(&out.join("fixes.tum")).unwrap();
+    assert_eq!(
+        places.stamp_ns,
+        Some(rows.iter().map(|row| row.0).collect())
+    );
+    for ((.., place), pose) in rows.iter().zip(&places.poses) {
+        let apart = place.unwrap().inv_mul(pose);
+        assert!(apart.translation.vector.norm() < 1e-3, "{apart}");
+    }
+    let picture = fs::read(out.join("fixes.png")).unwrap();
+    assert!(picture.starts_with(b"\x89PNG"));
     let again = folder.path().join("again");
     let mut command = localising(&map_of(&run), TOWN, &again);
     command.arg("--json");

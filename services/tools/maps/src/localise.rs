@@ -12,7 +12,7 @@ pub mod searched_map;
 
 use std::{
     io::IsTerminal,
-    path::PathBuf,
+    path::{Path, PathBuf},
     process::ExitCode,
     time::{Duration, Instant},
 };
@@ -20,6 +20,8 @@ use std::{
 use clap::Args;
 use gyre_inputs::Inputs;
 use gyre_localisation::{Localiser, Status};
+use gyre_mapping::{Map, Overlay, map_png};
+use gyre_radar::{Trajectory, write_tum};
 use gyre_results::Out;
 use gyre_storage::{self as storage, Draft};
 use gyre_terminal::{Failure, print};
@@ -32,6 +34,10 @@ pub use scans::{RegisteredScan, Scans};
 
 /// The table of all places.
 const FIXES: &str = "fixes.csv";
+/// The places of the scans that were found or tracked, in the frame of the map.
+const TUM: &str = "fixes.tum";
+/// The same, drawn over the map.
+const PICTURE: &str = "fixes.png";
 /// Time between two plain lines.
 const EVERY: Duration = Duration::from_secs(2);
 
@@ -44,7 +50,7 @@ pub struct LocaliseArguments {
     /// The folder of the map, of `gyre map --format folder`.
     #[arg(long)]
     pub map: PathBuf,
-    /// The folder of fixes.csv.
+    /// The folder of fixes.csv, fixes.tum and fixes.png.
     #[arg(long, default_value = "out/localise")]
     pub out: PathBuf,
     /// Print JSON instead of sentences.
@@ -74,11 +80,21 @@ pub fn localise(arguments: &LocaliseArguments) -> Result<ExitCode, Failure> {
     let out = &arguments.out;
     let _locked = Out::lock(out)?;
     let mut fixes = Draft::create(&out.join(FIXES))?;
+    let mut path = Trajectory {
+        stamp_ns: Some(Vec::new()),
+        poses: Vec::new(),
+    };
     let (started, mut counts) = (Instant::now(), Counts::default());
-    let ended = follow(&mut scans, &mut localiser, &mut fixes, &mut counts);
+    let ended = follow(
+        &mut scans,
+        &mut localiser,
+        &mut fixes,
+        &mut counts,
+        &mut path,
+    );
     fixes.commit()?;
-    storage::sync_folder(out)?;
     ended?;
+    draw(&arguments.map, &path, out)?;
     let figures = Figures {
         counts: &counts,
         left_out: scans.left_out(),
@@ -101,6 +117,7 @@ fn follow(
     localiser: &mut Localiser,
     fixes: &mut Draft,
     counts: &mut Counts,
+    path: &mut Trajectory,
 ) -> Result<(), Failure> {
     fixes.append(fixes::HEADER)?;
     let (mut progress, mut row) = (Progress::new(scans.len()), String::new());
@@ -113,10 +130,28 @@ fn follow(
         fixes::write_row(&scan, &found, localiser.map(), &mut row);
         fixes.append(&row)?;
         counts.add(&scan, found.status);
+        let is_fix = matches!(found.status, Status::Found | Status::Tracked);
+        if let (Some(fix), Some(stamps), true) = (&found.fix, &mut path.stamp_ns, is_fix) {
+            stamps.push(scan.observation.stamp_ns);
+            path.poses.push(fix.pose.motion);
+        }
         progress.show(counts.scans(), found.status);
     }
     progress.finish();
     Ok(())
+}
+
+/// Writes the fixes as TUM, and draws them over the map.
+fn draw(map: &Path, path: &Trajectory, out: &Path) -> Result<(), Failure> {
+    let mut text = Vec::new();
+    write_tum(path, &mut text).map_err(|error| format!("cannot write the fixes: {error}"))?;
+    storage::write(&out.join(TUM), text)?;
+    let overlay = Overlay {
+        trajectory: &path.poses,
+        ..Overlay::default()
+    };
+    let picture = map_png(&mut Map::open(map)?, &overlay)?;
+    Ok(storage::write(&out.join(PICTURE), picture)?)
 }
 
 /// A bar on a terminal, plain lines elsewhere.
