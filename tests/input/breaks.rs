@@ -167,6 +167,7 @@ fn a_restart_at_a_break_gives_the_same_bytes() {
 }
 
 #[test]
+#[ignore = "nightly: kills at many moments"]
 fn a_restart_at_a_break_gives_the_same_bytes_with_a_network_that_looks_at_two_scans() {
     if !runtime_is_installed() {
         return;

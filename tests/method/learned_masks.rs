@@ -78,6 +78,7 @@ fn a_killed_masking_goes_on_with_a_network_that_looks_at_two_scans() {
 }
 
 #[test]
+#[ignore = "nightly: kills at many moments"]
 fn any_killed_stage_goes_on_with_a_network_that_looks_at_two_scans() {
     for stage in STAGES {
         survives(TWO_SCANS, |running| {

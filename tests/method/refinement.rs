@@ -164,6 +164,7 @@ fn refinement_and_a_neighbour_killed_at_once_go_on() {
 /// The recording's vehicle makes nearly every scan a keyframe, so deaths this dense meet keyframes
 /// and states half written.
 #[test]
+#[ignore = "nightly: kills at many moments"]
 fn refinement_killed_at_any_moment_of_many_lives_goes_on() {
     for run in [Run::of_recording(), with_small_map()] {
         let alone = run.clone().into(&run.folder().join("alone")).complete();

@@ -99,6 +99,7 @@ fn a_recording_is_of_the_results_after_masking_was_killed() {
 }
 
 #[test]
+#[ignore = "nightly: kills at many moments"]
 fn a_recording_is_of_the_results_after_masking_was_killed_with_the_recorder() {
     let run = played();
     let mut running = run.start();
@@ -157,6 +158,7 @@ fn a_recording_is_of_the_results_after_masking_was_killed_twice_while_no_recorde
 }
 
 #[test]
+#[ignore = "nightly: kills at many moments"]
 fn a_recording_of_a_radar_is_of_the_results_after_masking_was_killed_and_swapped() {
     let radar = radar();
     let run = slow(radar.run(SCANS));
@@ -171,6 +173,7 @@ fn a_recording_of_a_radar_is_of_the_results_after_masking_was_killed_and_swapped
 }
 
 #[test]
+#[ignore = "nightly: kills at many moments"]
 fn a_recording_is_of_the_results_after_the_run_was_interrupted_and_after_its_supervisor_was_killed()
 {
     assert_goes_on(&played());
