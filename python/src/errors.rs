@@ -67,8 +67,12 @@ pub fn automatic(error: AutomaticError) -> PyErr {
 /// A scan that cannot be used, or a network or a search that fails, which is not the scan's fault.
 pub fn registration(error: OdometryError) -> PyErr {
     match error {
-        OdometryError::Scan(_) | OdometryError::Mask(MaskError::Raster(_)) => scan(error),
-        OdometryError::Mask(MaskError::Network(_) | MaskError::MissingPrevious(_))
+        OdometryError::Scan(_) | OdometryError::Mask(MaskError::Raster(_) | MaskError::Scan(_)) => {
+            scan(error)
+        }
+        OdometryError::Mask(
+            MaskError::Network(_) | MaskError::Function(_) | MaskError::MissingPrevious(_),
+        )
         | OdometryError::Search(_)
         | OdometryError::Own(_) => other(error),
     }

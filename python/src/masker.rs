@@ -3,7 +3,7 @@
 use gyre_geometry::{SparsePoint, Twist};
 use gyre_masking::Sweep;
 use gyre_odometry::OdometryError;
-use gyre_radar::{PolarScan, continues};
+use gyre_radar::{LostAzimuthFinder, PlacedRows, PolarScan, continues};
 use ndarray::ArrayViewMut2;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyUntypedArray};
 use pyo3::{exceptions::PyTypeError, prelude::*, types::PySlice};
@@ -30,6 +30,9 @@ pub struct Masker {
 
 struct State {
     masker: gyre_masking::Masker,
+    /// Puts rows where they were measured, if azimuths of a scan were lost.
+    finder: LostAzimuthFinder,
+    rows: PlacedRows,
     /// The number and the time of the last masked scan.
     last: Option<(u64, i64)>,
 }
@@ -104,15 +107,20 @@ impl State {
         let follows = self
             .last
             .filter(|(_, last_ns)| continues(*last_ns, stamp_ns));
+        if follows.is_none() {
+            self.finder.reset();
+        }
+        let lost = self.finder.find(scan, twist);
+        let scan = self.rows.place(scan, &lost);
         let sweep = Sweep {
             number: self.last.map_or(0, |(last, _)| last + 1),
-            scan: *scan,
+            scan,
             twist,
         };
         let follows = follows.map(|(last, _)| last);
         let twist = self.masker.mask(&sweep, follows, raster, previous)?;
         self.last = Some((sweep.number, stamp_ns));
-        let count = self.masker.points(scan, twist, points)?;
+        let count = self.masker.points(&scan, twist, points)?;
         Ok((
             count,
             self.masker.factors(0).map(|factors| factors.to_owned()),
@@ -133,12 +141,22 @@ impl Masker {
             n: config.raster.n,
             capacity: config.points.capacity,
             pairs: masker.scans() == 2,
-            masker: Guarded::new("Masker", State { masker, last: None }),
+            masker: Guarded::new(
+                "Masker",
+                State {
+                    masker,
+                    finder: LostAzimuthFinder::default(),
+                    rows: PlacedRows::default(),
+                    last: None,
+                },
+            ),
         })
     }
 
     /// Masks a scan. `velocity` is that of the sensor for motion compensation: x forward and y left
     /// in m/s, and the yaw rate counter-clockwise in rad/s; without it nothing is compensated.
+    ///
+    /// Where azimuths of a scan were lost is found by the scan of the call before and the velocity.
     ///
     /// If the mask takes two scans, the previous one is that of the call before; a scan that is not
     /// later than that, or by more than 10 s, is its own previous scan. A scan that cannot be used

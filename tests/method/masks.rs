@@ -234,6 +234,18 @@ fn sweeps_are_undone_by_the_motions_that_a_run_undoes_them_by() {
 }
 
 #[test]
+fn scans_that_lost_azimuths_are_drawn_as_they_are_matched() {
+    let folder = folder();
+    let lossy = recording::of_radiate(true);
+    let all = ["--every", "1", "--set", "masking.kind=none"];
+    let printed = figures(masks_of(&lossy, folder.path(), &all).succeeded());
+    assert_eq!(printed.len(), recording::SCANS);
+    for row in printed {
+        assert_eq!(row[1], 100.0, "scan {}: no mask keeps all", row[0]);
+    }
+}
+
+#[test]
 fn a_simulation_is_drawn_as_it_is_rendered() {
     let folder = folder();
     let simulated =

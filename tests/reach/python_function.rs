@@ -305,3 +305,27 @@ fn a_begun_project_in_rust_builds_and_keeps_the_contract() {
         Ended::of(conformance).succeeded();
     }
 }
+
+#[test]
+fn it_takes_over_in_a_running_run_and_one_that_cannot_be_loaded_does_not() {
+    if !can_start() {
+        return;
+    }
+    let run = Run::of_recording().rate("2.5");
+    let mut running = run.start();
+    let own = running.await_poses(4).await_stage("masking");
+    let swap = |text: &str| {
+        let (folder, file) = file(text);
+        let mut swap = gyre();
+        swap.args(["swap", "masking"]).arg(run.out());
+        swap.arg("--python").arg(&file);
+        (folder, Ended::of(swap))
+    };
+    let (_folder, ended) = swap("def mask(scan):\n    return scan.\n");
+    ended.refused_with(&["cannot take over", "line 2: SyntaxError"]);
+    assert_eq!(running.await_stage("masking"), own);
+    let (_folder, ended) = swap("def mask(scan):\n    return scan.power > 0\n");
+    ended.succeeded();
+    running.finish().succeeded();
+    assert_eq!(run.odometry(), undisturbed());
+}

@@ -6,7 +6,7 @@ use gyre_configuration::Configuration;
 use gyre_geometry::SparsePoint;
 use gyre_masking::{MaskKind, Masker, MaskingConfig, Sweep};
 use gyre_odometry::{Odometry, OdometryConfig};
-use gyre_radar::{Dataset, OwnedScan};
+use gyre_radar::{Dataset, LostAzimuths, OwnedScan, PlacedRows};
 use gyre_scan_matching::{RefinementConfig, RefinementKind};
 use gyre_terminal::{Failure, print};
 use ndarray::{Array2, ArrayView2};
@@ -31,6 +31,9 @@ pub struct MaskInspector {
     spare: OwnedScan,
     /// The velocities that the last two scans were compensated with.
     twists: [Option<gyre_geometry::Twist>; 2],
+    /// Where their azimuths were lost.
+    lost: [LostAzimuths; 2],
+    rows: PlacedRows,
     floor: u8,
     /// Maskers without any mask, and with the threshold alone.
     plain: [Masker; 2],
@@ -71,6 +74,8 @@ impl MaskInspector {
             last: [scan.clone(), scan.clone()],
             spare: scan,
             twists: [None; 2],
+            lost: [LostAzimuths::default(); 2],
+            rows: PlacedRows::default(),
             floor,
             plain: [plain(MaskKind::None)?, plain(threshold)?],
             points: vec![SparsePoint::default(); config.points.capacity],
@@ -113,10 +118,12 @@ impl MaskInspector {
         self.last.swap(0, 1);
         std::mem::swap(&mut self.last[0], &mut self.spare);
         self.twists = [self.odometry.twist(), self.twists[0]];
+        self.lost = [self.odometry.lost_azimuths(), self.lost[0]];
         if registered.seq == 0 {
             // Where the chain starts a scan is its own scan before.
             self.last[1] = self.last[0].clone();
             self.twists[1] = self.twists[0];
+            self.lost[1] = self.lost[0];
         }
         Ok(true)
     }
@@ -149,7 +156,7 @@ impl MaskInspector {
     ) -> Result<MaskedRaster, Box<dyn Error + Send + Sync>> {
         let sweep = Sweep {
             number: 0,
-            scan: self.last[scan].view(),
+            scan: self.rows.place(&self.last[scan].view(), &self.lost[scan]),
             twist: self.twists[scan],
         };
         let mut plain = [masked.clone(), masked.clone()];
@@ -171,7 +178,8 @@ impl MaskInspector {
     fn point_factors(&mut self) -> Result<Vec<([usize; 2], f32)>, Failure> {
         let twist = self.odometry.twist();
         let (masker, plain) = (&mut self.plain[1], &mut self.points);
-        let count = masker.points(&self.last[0].view(), twist, plain)?;
+        let scan = self.rows.place(&self.last[0].view(), &self.lost[0]);
+        let count = masker.points(&scan, twist, plain)?;
         let points = plain[..count].iter().zip(self.odometry.points());
         let factor = |(plain, weighed): (&SparsePoint, &SparsePoint)| {
             Some((masker.cell_of(plain, twist)?, weighed.weight / plain.weight))

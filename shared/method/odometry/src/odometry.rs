@@ -1,7 +1,7 @@
 //! Odometry: from scans to motions and poses.
 
 use gyre_geometry::{ComposedMotion, OdometryMotion, SparsePoint, Twist, UncertainMotion};
-use gyre_radar::{LostAzimuthFinder, PlacedRows, PolarScan};
+use gyre_radar::{LostAzimuthFinder, LostAzimuths, PlacedRows, PolarScan};
 use gyre_scan_matching::{JointMatch, Refined};
 use ndarray::{ArrayView2, ArrayViewMut2};
 
@@ -16,7 +16,8 @@ pub struct Odometry {
     search: Box<dyn Search>,
     refiner: Option<Box<dyn Refine>>,
     twists: LaggedTwists,
-    lost: LostAzimuthFinder,
+    finder: LostAzimuthFinder,
+    lost: LostAzimuths,
     rows: PlacedRows,
     /// The scan that is being registered and the one before it.
     pair: Pair,
@@ -44,7 +45,8 @@ impl Odometry {
             search: parts.search,
             refiner: parts.refiner,
             twists: LaggedTwists::new(config.masking.feedback_lag()),
-            lost: LostAzimuthFinder::default(),
+            finder: LostAzimuthFinder::default(),
+            lost: LostAzimuths::default(),
             rows: PlacedRows::default(),
             driven: ComposedMotion::new(),
         }
@@ -82,10 +84,10 @@ impl Odometry {
         twist: Option<Twist>,
     ) -> Result<(), OdometryError> {
         scan.check()?;
-        let lost = self.lost.find(scan, twist);
-        let placed = self.rows.place(scan, &lost);
+        self.lost = self.finder.find(scan, twist);
+        let placed = self.rows.place(scan, &self.lost);
         self.pair.mask(self.masker.as_mut(), &placed, twist)?;
-        let variance_rad2 = lost.variance_rad2(scan.geometry.azimuths);
+        let variance_rad2 = self.lost.variance_rad2(scan.geometry.azimuths);
         self.pair.expect_azimuth_errors(variance_rad2);
         Ok(())
     }
@@ -138,7 +140,7 @@ impl Odometry {
     pub fn restart(&mut self) {
         self.pair.restart();
         self.twists.clear();
-        self.lost.reset();
+        self.finder.reset();
         if let Some(refiner) = &mut self.refiner {
             refiner.reset();
         }
@@ -169,6 +171,12 @@ impl Odometry {
     /// Returns the points of the last registered scan.
     pub fn points(&self) -> &[SparsePoint] {
         self.pair.earlier_points()
+    }
+
+    /// Returns where azimuths of the last scan were lost: [`PlacedRows`] puts its rows where they
+    /// were taken to be.
+    pub fn lost_azimuths(&self) -> LostAzimuths {
+        self.lost
     }
 
     /// Returns the velocity with which the last registered scan was motion-compensated.
