@@ -279,3 +279,27 @@ def test_two_threads_can_share_an_odometry() -> None:
     for thread in threads:
         thread.join()
     assert len(odometry.trajectory) == 8
+
+
+def velocity(registered: gyre.Registered) -> tuple[float, float, float] | None:
+    """The constant velocity of a searched motion: m/s, m/s, rad/s."""
+    if registered.searched is None:
+        return None
+    x_m, y_m, yaw_rad = registered.searched.x_m, registered.searched.y_m, registered.searched.yaw_rad
+    half, per_s = 0.5 * yaw_rad, 1e9 / registered.interval_ns
+    along = half / np.tan(half) if half else 1.0
+    return (along * x_m + half * y_m) * per_s, (along * y_m - half * x_m) * per_s, yaw_rad * per_s
+
+
+def test_rows_of_scans_that_lost_azimuths_lie_where_odometry_has_them(radiate: Path) -> None:
+    config = gyre.Config.of(radiate)
+    masker, odometry = gyre.Masker(config), gyre.Odometry(config)
+    velocities: list[tuple[float, float, float] | None] = [None, None]
+    as_recorded = 0
+    for mine in list(gyre.open(radiate, config))[:24]:
+        masked = masker.mask(mine, velocity=velocities[-2])
+        alone = gyre.Masker(config).mask(mine)
+        velocities.append(velocity(odometry.register(mine)))
+        np.testing.assert_allclose(masked.points["x_m"], odometry.points["x_m"], atol=1e-3)
+        as_recorded += np.allclose(alone.points["x_m"], odometry.points["x_m"], atol=1e-3)
+    assert 6 < as_recorded < 20
