@@ -253,6 +253,34 @@ fn killed_it_leaves_no_interpreter_and_no_other_byte() {
 }
 
 #[test]
+fn one_that_changes_neither_goes_on_nor_passes_for_the_one_before() {
+    if !can_start() {
+        return;
+    }
+    let above = |power: u8| format!("def mask(scan):\n    return scan.power > {power}\n");
+    let (text, other) = (above(0), above(100));
+    let (_folder, file) = file(&text);
+    let run = with(Run::of_recording(), "masking", &file).rate("6");
+    let mut running = run.start();
+    running.await_poses(6);
+    fs::write(&file, &other).unwrap();
+    let stage = child_with(running.pid(), file.to_str().unwrap());
+    send(stage.unwrap(), Signal::KILL);
+    let changed = "mine.py has changed since";
+    running
+        .finish()
+        .failed_with(&["masking has ended", changed]);
+    let is_another = "the program of masking is another one";
+    run.finish()
+        .refused_with(&["unfinished run of another program", is_another]);
+    fs::write(&file, &text).unwrap();
+    assert_eq!(run.complete(), undisturbed());
+    // Nor are its results those of another one.
+    fs::write(&file, &other).unwrap();
+    run.finish().refused_with(&[is_another]);
+}
+
+#[test]
 fn a_begun_project_keeps_the_contract_and_drives() {
     if !can_start() {
         return;

@@ -20,7 +20,7 @@ pub fn stage_plans(configuration: &Configuration, gyre: &Path) -> Vec<StagePlan>
             true => (StageConfig::own_command(&gyre, name, None), Vec::new()),
             false => (
                 own.command(&gyre, name),
-                Program::all_of(&own.command, None),
+                Program::all_of(&own.replacement(), None),
             ),
         };
         let scheduling = match FollowerId::by_name(name) {

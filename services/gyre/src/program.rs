@@ -8,6 +8,7 @@ use std::{collections::BTreeMap, io, path::Path};
 
 use gyre_configuration::Configuration;
 use gyre_results::Programs;
+use gyre_run::StageConfig;
 use gyre_supervise::StagePlan;
 use gyre_terminal::own;
 use sha2::{Digest, Sha256};
@@ -24,8 +25,7 @@ pub fn sha256(path: &Path) -> io::Result<String> {
     Ok(format!("{:x}", digest.finalize()))
 }
 
-/// Returns the SHA-256 of the words of each replaced stage's command and of the files that it
-/// names.
+/// Returns the SHA-256 of the words of what replaces each stage and of the files that it names.
 ///
 /// # Errors
 /// A file that cannot be read.
@@ -34,7 +34,8 @@ pub fn replaced(configuration: &Configuration) -> io::Result<BTreeMap<String, St
     let replaced = stages.iter().filter(|stage| !stage.programs.is_empty());
     let digest = |stage: &StagePlan| -> io::Result<(String, String)> {
         let mut digest = Sha256::new();
-        for word in &stage.command {
+        let replacement = configuration.stages.get(&stage.name);
+        for word in replacement.map_or_else(Vec::new, StageConfig::replacement) {
             digest.update((word.len() as u64).to_le_bytes());
             digest.update(word);
         }

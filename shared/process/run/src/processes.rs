@@ -89,6 +89,14 @@ impl StageConfig {
         }
     }
 
+    /// Returns the program that takes the place of Gyre's own process, with its arguments, or the
+    /// file of the function of Python; empty without any.
+    pub fn replacement(&self) -> Vec<String> {
+        let python = self.python.iter().map(|file| file.to_string_lossy());
+        let python = python.map(|file| file.into_owned());
+        self.command.iter().cloned().chain(python).collect()
+    }
+
     /// Returns the command of Gyre's own process, with a function of Python if one is given.
     pub fn own_command(gyre: &str, name: &str, python: Option<&Path>) -> Vec<String> {
         let mut command = [gyre, "stage", name].map(str::to_owned).to_vec();
