@@ -217,6 +217,24 @@ fn what_cannot_be_loaded_or_returned_is_said() {
         let run = with(Run::of_recording(), "masking", &file);
         run.finish().failed_with(&["mine.py", sentence]);
     }
+    for (returned, sentence) in [
+        ("7.0, 0.1", "at most half a turn"),
+        ("0.1, -0.1", "0 or more"),
+        ("0.1", "TypeError"),
+        ("float('nan'), 0.1", "not finite"),
+    ] {
+        let text = format!("def rotation(scan, previous):\n    return {returned}\n");
+        let (_folder, file) = file(&text);
+        let run = with(Run::of_recording(), "rotation-search", &file);
+        run.finish().failed_with(&["mine.py", sentence]);
+    }
+    for spread in ["-0.1", "[[-1, 0], [0, 1]]", "[[1, 5], [0, 1]]"] {
+        let text = format!("def translation(scan, previous, turn):\n    return 1, 0, {spread}\n");
+        let (_folder, file) = file(&text);
+        let run = with(Run::of_recording(), "translation-search", &file);
+        let sentence = "neither a standard deviation nor a covariance";
+        run.finish().failed_with(&["mine.py", sentence]);
+    }
     let run = with(Run::of_recording(), "masking", Path::new("no_such.py"));
     run.finish().failed_with(&["no_such.py"]);
     let (_folder, file) = file("def mask(scan):\n    return 1\n");
@@ -226,6 +244,10 @@ fn what_cannot_be_loaded_or_returned_is_said() {
             "stages.refinement",
             "masking, rotation-search, translation-search",
         ]);
+    with(Run::of_recording(), "rotation-search", &file)
+        .set("search.kind=exhaustive")
+        .finish()
+        .refused_with(&["stages.rotation-search", "no such stage"]);
     let run = with(Run::of_recording(), "masking", &file).set("stages.masking.command=['x']");
     run.finish()
         .refused_with(&["stages.masking", "remove one of them"]);
@@ -356,4 +378,26 @@ fn it_takes_over_in_a_running_run_and_one_that_cannot_be_loaded_does_not() {
     ended.succeeded();
     running.finish().succeeded();
     assert_eq!(run.odometry(), undisturbed());
+}
+
+#[test]
+fn it_does_not_take_over_from_a_network_that_looks_at_two_scans() {
+    if !can_start() {
+        return;
+    }
+    let model = "shared/method/masking/tests/models/pair-127.toml";
+    let model = Path::new(crate::PROJECT).join(model);
+    let run = Run::of_recording().rate("2.5").masked_by(&model);
+    let run = run.set("masking.backend=rten");
+    let mut running = run.start();
+    running.await_poses(4);
+    let (_folder, file) = file("def mask(scan):\n    return scan.power > 0\n");
+    let mut swap = gyre();
+    swap.args(["swap", "masking"]).arg(run.out());
+    swap.arg("--python").arg(&file);
+    Ended::of(swap).refused_with(&["cannot take over", "one scan at a time"]);
+    running.finish().succeeded();
+    // In a run that begins with it, it takes the network's place.
+    let begun = with(Run::of_recording().masked_by(&model), "masking", &file);
+    assert_eq!(begun.complete(), undisturbed());
 }

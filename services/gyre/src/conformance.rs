@@ -7,7 +7,7 @@ use gyre_conformance::{Candidate, ConformanceError, Demands, InputScans, Report,
 use gyre_inputs::Inputs;
 use gyre_messages::StageId;
 use gyre_odometry::SearchKind;
-use gyre_run::{Scheduling, StageConfig};
+use gyre_run::Scheduling;
 use gyre_scan_matching::RefinementKind;
 use gyre_stage::{Manifest, wake::Signals};
 use gyre_terminal::{Failure, INTERRUPTED, own, print, seconds, words};
@@ -134,11 +134,16 @@ fn configuration(
         .iter()
         .filter(|_| is_small)
         .map(|key| (*key).to_owned());
+    let python = arguments.python.iter().map(|file| {
+        let file = toml::Value::from(file.to_string_lossy().into_owned());
+        format!("stages.{}.python={file}", stage.name())
+    });
     let lossless = ["run.mode='lossless'", "run.rate='max'"].map(str::to_owned);
     let resolved = resolve(&RunArguments {
         inputs: Inputs {
             set: small
                 .chain(arguments.inputs.set.clone())
+                .chain(python)
                 .chain(lossless)
                 .collect(),
             ..arguments.inputs.clone()
@@ -170,10 +175,9 @@ fn command(
     stage: StageId,
 ) -> Result<Vec<String>, Failure> {
     let (gyre, name) = (own().to_string_lossy().into_owned(), stage.name());
-    match (&arguments.command, &arguments.python) {
-        (Some(command), _) => words(command),
-        (None, Some(file)) => Ok(StageConfig::own_command(&gyre, name, Some(file))),
-        (None, None) => {
+    match &arguments.command {
+        Some(command) => words(command),
+        None => {
             let configured = configuration.stages.get(name).cloned();
             Ok(configured.unwrap_or_default().command(&gyre, name))
         }

@@ -311,6 +311,14 @@ impl Configuration {
         self.has(stage) && computes.is_none_or(is_here)
     }
 
+    /// Returns whether no side of the run starts this stage.
+    fn is_absent(&self, stage: StageId) -> bool {
+        match self.link.side {
+            Some(_) => !self.has(stage),
+            None => !self.starts(stage),
+        }
+    }
+
     /// Returns the resolved configuration as TOML: a run from it repeats this run.
     ///
     /// # Errors

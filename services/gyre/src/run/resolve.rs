@@ -57,6 +57,8 @@ pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
         configuration.source.data = PathBuf::new();
     }
     configuration.odometry.masking.resolve()?;
+    let functions = configuration.stages.values_mut();
+    let functions = functions.filter_map(|stage| stage.python.as_mut());
     // Absolute, so that the resolved configuration repeats the run from any folder. The reader
     // reports what does not exist.
     for path in [
@@ -69,6 +71,7 @@ pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
     ]
     .into_iter()
     .flatten()
+    .chain(functions)
     {
         if let Ok(absolute) = path.canonicalize() {
             *path = absolute;

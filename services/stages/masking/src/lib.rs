@@ -13,7 +13,7 @@ mod python;
 mod scans;
 
 use gyre_geometry::Twist;
-use gyre_masking::{MaskError, MaskFunction, MaskKind, Masker, MaskerError, MaskingConfig, Sweep};
+use gyre_masking::{MaskError, MaskFunction, MaskKind, Masker, MaskingConfig, Sweep};
 use gyre_messages::{Item, Masked, MaskedHeader, Scan, SearchedMotion, StageId, flag, mask_kind};
 use gyre_radar::{PlacedRows, PointsConfig, RasterConfig};
 use gyre_stage::{
@@ -30,35 +30,46 @@ pub use python::python;
 /// # Errors
 /// An invalid configuration, or an error of [`stage::run`].
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
-    work(launch, Masker::new)
+    work(launch, launch.section("masking")?, None)
 }
 
 /// Runs the stage until SIGTERM with a mask of your own, in the place of a network.
 ///
 /// # Errors
-/// An invalid configuration, a function that fails, or an error of [`stage::run`].
+/// A run whose masks look at two scans, an invalid configuration, a function that fails, or an
+/// error of [`stage::run`].
 pub fn run_with(
     launch: &Launch,
     function: Box<dyn MaskFunction>,
 ) -> Result<StageCounters, StageError> {
-    work(launch, |raster, points, config| {
-        Masker::with_function(raster, points, config, function)
-    })
+    if launch.manifest.limits.rasters != 1 {
+        return Err(StageError::Configuration(
+            "a function masks one scan at a time, and the network of this run two: name the function when the run is begun, or choose masking.kind `threshold`"
+                .to_owned(),
+        ));
+    }
+    let mut config: MaskingConfig = launch.section("masking")?;
+    if config.kind == MaskKind::Learned {
+        config.kind = MaskKind::Threshold;
+    }
+    work(launch, config, Some(function))
 }
 
 fn work(
     launch: &Launch,
-    masker: impl FnOnce(&RasterConfig, &PointsConfig, &MaskingConfig) -> Result<Masker, MaskerError>,
+    config: MaskingConfig,
+    function: Option<Box<dyn MaskFunction>>,
 ) -> Result<StageCounters, StageError> {
     let raster: RasterConfig = launch.section("raster")?;
     let points: PointsConfig = launch.section("points")?;
-    let config: MaskingConfig = launch.section("masking")?;
-    let masker = masker(&raster, &points, &config)
-        .map_err(|error| StageError::Configuration(error.to_string()))?;
+    let masker = match function {
+        None => Masker::new(&raster, &points, &config),
+        Some(function) => Masker::with_function(&raster, &points, &config, function),
+    };
     let mut masking = Masking {
         raster,
         config,
-        masker,
+        masker: masker.map_err(|error| StageError::Configuration(error.to_string()))?,
         azimuths: Azimuths::default(),
         rows: [PlacedRows::default(), PlacedRows::default()],
     };

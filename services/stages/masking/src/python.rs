@@ -4,7 +4,7 @@ use std::{error::Error, path::Path};
 
 use gyre_masking::{Factors, MaskFunction};
 use gyre_python_function::{Argument, Array, Function, Name, Returned, Scan};
-use gyre_radar::{PolarScan, RasterConfig};
+use gyre_radar::{PolarScan, RasterConfig, Sense};
 use gyre_stage::{Launch, StageError};
 use ndarray::{ArrayView1, ArrayView2};
 use serde_json::{Map, json};
@@ -15,8 +15,7 @@ use serde_json::{Map, json};
 /// No such file, function or interpreter, or an exception while it is loaded.
 pub fn python(launch: &Launch, file: &Path) -> Result<Box<dyn MaskFunction>, StageError> {
     let raster: RasterConfig = launch.section("raster")?;
-    let function = Function::load(file, Name::Mask);
-    let function = function.map_err(|error| StageError::Configuration(error.to_string()))?;
+    let function = Function::load(file, Name::Mask)?;
     let cell_m = raster.cell_m;
     Ok(Box::new(PythonMask { function, cell_m }))
 }
@@ -38,6 +37,7 @@ impl MaskFunction for PythonMask {
             ("stamp_ns", json!(geometry.stamp_ns)),
             ("range_resolution_m", json!(geometry.range_resolution_m)),
             ("range_offset_m", json!(geometry.range_offset_m)),
+            ("clockwise", json!(geometry.sense == Sense::Clockwise)),
             ("cell_m", json!(self.cell_m)),
         ];
         let azimuths = ArrayView1::from(&scan.azimuth_rad[..geometry.azimuths]);

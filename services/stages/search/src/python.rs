@@ -67,9 +67,7 @@ pub fn translation(launch: &Launch, file: &Path) -> Result<translation::Search, 
 
 fn load(launch: &Launch, file: &Path, name: Name) -> Result<(Function, f32), StageError> {
     let raster: RasterConfig = launch.section("raster")?;
-    let function = Function::load(file, name);
-    let function = function.map_err(|error| StageError::Configuration(error.to_string()))?;
-    Ok((function, raster.cell_m))
+    Ok((Function::load(file, name)?, raster.cell_m))
 }
 
 /// Returns the two scans of a pair, the later one first; `None` where the chain of motions starts.

@@ -18,8 +18,9 @@ use std::{
 };
 
 use clap::Args;
+use gyre_geometry::Pose;
 use gyre_inputs::Inputs;
-use gyre_localisation::{Localiser, Status};
+use gyre_localisation::{Localisation, Localiser, Status};
 use gyre_mapping::{Map, Overlay, map_png};
 use gyre_radar::{Trajectory, write_tum};
 use gyre_results::Out;
@@ -80,9 +81,9 @@ pub fn localise(arguments: &LocaliseArguments) -> Result<ExitCode, Failure> {
     let out = &arguments.out;
     let _locked = Out::lock(out)?;
     let mut fixes = Draft::create(&out.join(FIXES))?;
-    let mut path = Trajectory {
-        stamp_ns: Some(Vec::new()),
-        poses: Vec::new(),
+    let mut path = Fixed {
+        stamps_ns: Vec::new(),
+        pieces: vec![Vec::new()],
     };
     let (started, mut counts) = (Instant::now(), Counts::default());
     let ended = follow(
@@ -92,13 +93,15 @@ pub fn localise(arguments: &LocaliseArguments) -> Result<ExitCode, Failure> {
         &mut counts,
         &mut path,
     );
+    let ms_a_scan = started.elapsed().as_secs_f64() * 1e3 / counts.scans().max(1) as f64;
     fixes.commit()?;
+    let drawn = draw(&arguments.map, &path, out);
     ended?;
-    draw(&arguments.map, &path, out)?;
+    drawn?;
     let figures = Figures {
         counts: &counts,
         left_out: scans.left_out(),
-        ms_a_scan: started.elapsed().as_secs_f64() * 1e3 / counts.scans().max(1) as f64,
+        ms_a_scan,
         fixes: out.join(FIXES),
     };
     if arguments.json {
@@ -106,9 +109,30 @@ pub fn localise(arguments: &LocaliseArguments) -> Result<ExitCode, Failure> {
         return Ok(ExitCode::SUCCESS);
     }
     print::line(counts.summary(figures.left_out))?;
-    let (ms_a_scan, fixes) = (figures.ms_a_scan, figures.fixes.display());
+    let fixes = figures.fixes.display();
     print::line(format_args!("{ms_a_scan:.1} ms a scan; {fixes}"))?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// The scans with a fix.
+struct Fixed {
+    stamps_ns: Vec<i64>,
+    /// Their poses, in pieces with a fix for each scan; the last may be empty.
+    pieces: Vec<Vec<Pose>>,
+}
+
+impl Fixed {
+    fn add(&mut self, stamp_ns: i64, found: &Localisation) {
+        let is_fix = matches!(found.status, Status::Found | Status::Tracked);
+        match (&found.fix, self.pieces.last_mut()) {
+            (Some(fix), Some(piece)) if is_fix => {
+                self.stamps_ns.push(stamp_ns);
+                piece.push(fix.pose.motion);
+            }
+            (_, Some(piece)) if piece.is_empty() => {}
+            _ => self.pieces.push(Vec::new()),
+        }
+    }
 }
 
 /// Localises all scans. The rows so far are whole when it fails.
@@ -117,7 +141,7 @@ fn follow(
     localiser: &mut Localiser,
     fixes: &mut Draft,
     counts: &mut Counts,
-    path: &mut Trajectory,
+    path: &mut Fixed,
 ) -> Result<(), Failure> {
     fixes.append(fixes::HEADER)?;
     let (mut progress, mut row) = (Progress::new(scans.len()), String::new());
@@ -130,11 +154,7 @@ fn follow(
         fixes::write_row(&scan, &found, localiser.map(), &mut row);
         fixes.append(&row)?;
         counts.add(&scan, found.status);
-        let is_fix = matches!(found.status, Status::Found | Status::Tracked);
-        if let (Some(fix), Some(stamps), true) = (&found.fix, &mut path.stamp_ns, is_fix) {
-            stamps.push(scan.observation.stamp_ns);
-            path.poses.push(fix.pose.motion);
-        }
+        path.add(scan.observation.stamp_ns, &found);
         progress.show(counts.scans(), found.status);
     }
     progress.finish();
@@ -142,12 +162,18 @@ fn follow(
 }
 
 /// Writes the fixes as TUM, and draws them over the map.
-fn draw(map: &Path, path: &Trajectory, out: &Path) -> Result<(), Failure> {
+fn draw(map: &Path, path: &Fixed, out: &Path) -> Result<(), Failure> {
     let mut text = Vec::new();
-    write_tum(path, &mut text).map_err(|error| format!("cannot write the fixes: {error}"))?;
+    let trajectory = Trajectory {
+        stamp_ns: Some(path.stamps_ns.clone()),
+        poses: path.pieces.concat(),
+    };
+    write_tum(&trajectory, &mut text)
+        .map_err(|error| format!("cannot write the fixes: {error}"))?;
     storage::write(&out.join(TUM), text)?;
+    let pieces: Vec<&[Pose]> = path.pieces.iter().map(Vec::as_slice).collect();
     let overlay = Overlay {
-        trajectory: &path.poses,
+        trajectory: &pieces,
         ..Overlay::default()
     };
     let picture = map_png(&mut Map::open(map)?, &overlay)?;

@@ -12,7 +12,7 @@ pub mod picture;
 use std::{fs, num::NonZeroUsize, ops::Range, path::PathBuf, process::ExitCode};
 
 use clap::Args;
-use gyre_configuration::{Played, describe_masks};
+use gyre_configuration::{Played, describe_masks_in_process};
 use gyre_inputs::Inputs;
 use gyre_terminal::{Failure, print};
 
@@ -57,7 +57,9 @@ pub fn masks(arguments: &MasksArguments) -> Result<ExitCode, Failure> {
         &configuration.data(),
     )?;
     let mut inspector = MaskInspector::new(&configuration, dataset)?;
-    describe_masks(&configuration)?.iter().for_each(print::note);
+    describe_masks_in_process(&configuration)?
+        .iter()
+        .for_each(print::note);
     let out = &arguments.out;
     fs::create_dir_all(out)
         .map_err(|error| format!("cannot write to {}: {error}", out.display()))?;

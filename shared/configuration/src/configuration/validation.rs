@@ -41,6 +41,11 @@ impl Configuration {
                 );
                 return Err(value(&section, reason));
             }
+            let is_absent = StageId::by_name(name).is_some_and(|stage| self.is_absent(stage));
+            if stage.python.is_some() && is_absent {
+                let reason = "python is set, but this run has no such stage: see search.kind and source.from";
+                return Err(value(&section, reason));
+            }
         }
         if !self.slam.is_on() && !self.slam.map.as_os_str().is_empty() {
             let reason = "map is set, but the keyframes that are found in it are those of slam: set kind to `graph`";

@@ -85,7 +85,7 @@ impl Drawing {
         let place = |pose: Pose| Point2::from((map_from_given * pose).translation.vector);
         let loops: Vec<[Point2<f64>; 2]> = loops.iter().map(|ends| ends.map(place)).collect();
         let overlay = Overlay {
-            trajectory: &trajectory,
+            trajectory: &[&trajectory],
             odometry: if self.is_corrected {
                 &self.odometry
             } else {

@@ -32,8 +32,8 @@ const MAX_CELL_M: f64 = 3.2;
 /// The overlay drawn over a map, all in the map frame.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Overlay<'a> {
-    /// The trajectory by which the map was drawn.
-    pub trajectory: &'a [Pose],
+    /// The trajectory by which the map was drawn, or one through it, in pieces that are not joined.
+    pub trajectory: &'a [&'a [Pose]],
     /// The trajectory by odometry alone, drawn thin; empty where it is the same.
     pub odometry: &'a [Pose],
     /// Both ends of each loop.
@@ -85,8 +85,9 @@ fn draw_paths(canvas: &mut Canvas, view: &View, overlay: &Overlay<'_>) {
     canvas.lines(loops.clone(), LOOPS_RIM);
     canvas.lines(loops, Pen::opaque(LOOPS, 1.0));
     canvas.lines([path(overlay.odometry)], Pen::opaque(ODOMETRY, 1.0));
-    canvas.lines([path(overlay.trajectory)], Pen::opaque(TRAJECTORY, 1.7));
-    if let Some(first) = overlay.trajectory.first() {
+    let pieces = overlay.trajectory.iter().map(|piece| path(piece));
+    canvas.lines(pieces, Pen::opaque(TRAJECTORY, 1.7));
+    if let Some(first) = overlay.trajectory.iter().find_map(|piece| piece.first()) {
         let start = view.pixel(&Point2::from(first.translation.vector));
         // The picture's y axis points down.
         let heading = first.rotation.angle() as f32;

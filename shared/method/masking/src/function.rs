@@ -101,13 +101,13 @@ impl AppliedFunction {
         self.powers.clear();
         self.raster = match factors.map_err(|error| MaskError::Function(error.to_string()))? {
             Factors::OfRaster(factors) => {
-                expect_shape(factors.dim(), later.dim())?;
+                check(&factors, later.dim())?;
                 later *= &factors;
                 Some(factors)
             }
             Factors::OfPower(factors) => {
                 let power = scan.power();
-                expect_shape(factors.dim(), power.dim())?;
+                check(&factors, power.dim())?;
                 let left = Zip::from(power).and(&factors);
                 let left =
                     left.map_collect(|power, factor| (f32::from(*power) * factor).round() as u8);
@@ -138,11 +138,19 @@ impl AppliedFunction {
     }
 }
 
-fn expect_shape(given: (usize, usize), expected: (usize, usize)) -> Result<(), MaskError> {
-    match given == expected {
-        true => Ok(()),
-        false => Err(MaskError::Function(format!(
-            "the mask is {given:?}: expected {expected:?}"
-        ))),
+/// Checks the shape and the range of factors.
+fn check(factors: &Array2<f32>, expected: (usize, usize)) -> Result<(), MaskError> {
+    let failed = |reason: String| Err(MaskError::Function(reason));
+    if factors.dim() != expected {
+        return failed(format!(
+            "the mask is {:?}: expected {expected:?}",
+            factors.dim()
+        ));
+    }
+    match factors.iter().find(|factor| !(0.0..=1.0).contains(*factor)) {
+        Some(factor) => failed(format!(
+            "the mask has a factor of {factor}: expected 0 to 1"
+        )),
+        None => Ok(()),
     }
 }

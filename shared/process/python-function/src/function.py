@@ -1,5 +1,7 @@
 """Calls a function of a user's file: a stage sends the arguments through standard input, and reads the result."""
 
+from __future__ import annotations
+
 import ctypes
 import importlib.util
 import json
@@ -32,14 +34,15 @@ def refuse(sentence: str) -> None:
 
 def refuse_with_place(path: pathlib.Path, error: BaseException) -> None:
     """Prints the traceback from the user's file on, and answers with the deepest line of that file in it."""
-    error.__traceback__ = error.__traceback__ and error.__traceback__.tb_next
-    traceback.print_exception(error)
-    frames = traceback.extract_tb(error.__traceback__)
-    lines = [frame.lineno for frame in frames if frame.filename == str(path)]
+    trace = error.__traceback__ and error.__traceback__.tb_next
+    traceback.print_exception(type(error), error, trace)
+    lines = [frame.lineno for frame in traceback.extract_tb(trace) if frame.filename == str(path)]
+    words = str(error)
     if isinstance(error, SyntaxError) and error.filename == str(path):
         lines.append(error.lineno)
+        words = error.msg
     place = f", line {lines[-1]}" if lines else ""
-    refuse(f"{path}{place}: {traceback.format_exception_only(error)[-1].strip()}")
+    refuse(f"{path}{place}: {type(error).__name__}: {' '.join(words.split())}")
 
 
 def mask(result, scan) -> tuple[dict, memoryview]:
@@ -51,23 +54,32 @@ def mask(result, scan) -> tuple[dict, memoryview]:
     if not of:
         raise ValueError(f"it returned an array of shape {factors.shape}: expected that of scan.power, {shapes['power']}, "
                          f"or of scan.raster, {shapes['raster']}")
+    if len(of) == 2:
+        raise ValueError(f"scan.power and scan.raster are both {factors.shape}: choose another raster.n")
     if not (factors.min() >= 0.0 and factors.max() <= 1.0):
         raise ValueError("it returned factors that are not all from 0 to 1")
     return {"of": of[0], "kind": factors.dtype.str[1:], "shape": factors.shape}, factors.data
 
 
 def rotation(result, *_) -> tuple[dict, bytes]:
-    angle_rad, sigma_rad = result
-    return {"values": finite([angle_rad, float(sigma_rad) ** 2])}, b""
+    angle_rad, sigma_rad = finite(result)
+    if abs(angle_rad) > np.pi or sigma_rad < 0.0:
+        raise ValueError(f"it returned {angle_rad} rad with a standard deviation of {sigma_rad}: expected at most half a turn, and 0 or more")
+    return {"values": [angle_rad, sigma_rad**2]}, b""
 
 
 def translation(result, *_) -> tuple[dict, bytes]:
     x_m, y_m, spread = result
-    covariance = np.eye(2) * float(spread) ** 2 if np.ndim(spread) == 0 else np.asarray(spread, float).reshape(2, 2)
-    return {"values": finite([x_m, y_m, *covariance.ravel()])}, b""
+    is_sigma = np.ndim(spread) == 0
+    covariance = np.eye(2) * float(spread) ** 2 if is_sigma else np.asarray(spread, float).reshape(2, 2)
+    values = finite([x_m, y_m, *covariance.ravel()])
+    is_one = spread >= 0.0 if is_sigma else np.allclose(covariance, covariance.T) and np.linalg.eigvalsh(covariance).min() >= 0.0
+    if not is_one:
+        raise ValueError(f"it returned {spread}, which is neither a standard deviation nor a covariance")
+    return {"values": values}, b""
 
 
-def finite(values: list) -> list[float]:
+def finite(values) -> list[float]:
     values = [float(value) for value in values]
     if not np.isfinite(values).all():
         raise ValueError(f"it returned numbers that are not finite: {values}")

@@ -11,6 +11,7 @@ use std::{
     process::{Child, ChildStdin, ChildStdout, Command, Stdio},
 };
 
+use gyre_stage::StageError;
 use ndarray::{Array2, ArrayViewD};
 use serde_json::{Map, Value, json};
 use thiserror::Error;
@@ -40,8 +41,8 @@ pub enum FunctionError {
         /// The system error.
         source: std::io::Error,
     },
-    /// The interpreter has ended in the middle of a call.
-    #[error("Python has ended in the middle of {file}: {status}")]
+    /// The interpreter has ended while it loaded the file, or in the middle of a call.
+    #[error("Python has ended while it worked for {file}: {status}")]
     Ended {
         /// The file of the function.
         file: PathBuf,
@@ -51,6 +52,21 @@ pub enum FunctionError {
     /// An exception: the file, its line, and what Python says. The traceback is on standard error.
     #[error("{0}")]
     Exception(String),
+}
+
+impl From<FunctionError> for StageError {
+    /// For a function that is loaded: another attempt helps where a process was killed or not to
+    /// be had.
+    fn from(error: FunctionError) -> Self {
+        match error {
+            FunctionError::Missing(_) | FunctionError::Exception(_) => {
+                Self::Configuration(error.to_string())
+            }
+            FunctionError::Start { .. } | FunctionError::Ended { .. } => {
+                Self::Function(error.to_string())
+            }
+        }
+    }
 }
 
 /// The name of a function, which stands for what it gets and returns.

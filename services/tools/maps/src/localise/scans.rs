@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use gyre_configuration::{Configuration, Played, describe_masks};
+use gyre_configuration::{Configuration, Played, describe_masks_in_process};
 use gyre_geometry::Twist;
 use gyre_localisation::Observation;
 use gyre_odometry::{Odometry, Outcome};
@@ -38,7 +38,9 @@ impl Scans {
     /// A recording or a configuration that cannot be used.
     pub fn open(configuration: &Configuration) -> Result<Self, Failure> {
         let Played { dataset, .. } = gyre_configuration::open(configuration)?;
-        describe_masks(configuration)?.iter().for_each(print::note);
+        describe_masks_in_process(configuration)?
+            .iter()
+            .for_each(print::note);
         Ok(Self {
             played: configuration.source.played(dataset.as_ref()),
             odometry: Odometry::new(&configuration.odometry)?,

@@ -10,7 +10,8 @@ fn main() -> ExitCode {
     gyre_stage::launch::main("rotation-search", |launch| {
         let raster: gyre_radar::RasterConfig = launch.section("raster")?;
         // Gyre's own search, to be replaced by yours.
-        let mut search = SequentialRotation::new(raster.n, &RotationConfig::default())
+        let config: RotationConfig = launch.section("rotation")?;
+        let mut search = SequentialRotation::new(raster.n, &config)
             .map_err(|error| StageError::Configuration(error.to_string()))?;
         rotation::run_with(
             launch,

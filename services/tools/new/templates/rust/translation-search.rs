@@ -10,7 +10,7 @@ fn main() -> ExitCode {
     gyre_stage::launch::main("translation-search", |launch| {
         let raster: gyre_radar::RasterConfig = launch.section("raster")?;
         // Gyre's own search, to be replaced by yours.
-        let config = TranslationConfig::default();
+        let config: TranslationConfig = launch.section("translation")?;
         let mut search = TranslationSearch::new(raster.n, raster.cell_m.into(), &config)
             .map_err(|error| StageError::Configuration(error.to_string()))?;
         translation::run_with(

@@ -52,7 +52,7 @@ fn a_picture_has_the_trajectory_and_its_loops_in_it() {
     let drive = drive(20, &wall());
     let poses = poses(&drive);
     let with_trajectory = Overlay {
-        trajectory: &poses,
+        trajectory: &[&poses],
         ..Overlay::default()
     };
     let loops = [[Point2::new(0.0, -8.0), Point2::new(0.0, 8.0)]];
