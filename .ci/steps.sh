@@ -5,7 +5,7 @@ export GYRE_DATA="${GYRE_DATA:-$PWD/../shared/data}"
 [ -d "$GYRE_DATA" ] || { echo "no real scans at $GYRE_DATA: tests that need them will be skipped"; unset GYRE_DATA; }
 target="$(realpath -m "${CARGO_TARGET_DIR:-target}")"
 mkdir -p "$target"
-export GYRE_PYTHON="$target/python/bin/python" ORT_DYLIB_PATH="$target/onnxruntime" PATH="$PATH:$target/deny/bin"
+export GYRE_PYTHON="$target/python/bin/python" ORT_DYLIB_PATH="$target/onnxruntime" PATH="$PATH:$target/deny/bin:$target/mdbook/bin"
 # To write down what a second build could use again takes time.
 export CARGO_INCREMENTAL=0
 
@@ -57,6 +57,11 @@ state_of() {
 }
 has_passed() {
     [ "$(cat ".ci/$1.passed" 2> /dev/null)" = "$(state_of "${@:2}")" ]
+}
+
+install_mdbook() {
+    command -v mdbook || cargo install --quiet --locked --debug --root "$target/mdbook" --version 0.5.4 \
+        --no-default-features --features search mdbook
 }
 
 check_dependencies() {
