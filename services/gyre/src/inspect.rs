@@ -36,7 +36,7 @@ pub fn inspect(arguments: &InspectArguments) -> Result<ExitCode, Failure> {
     let report = gyre_radar::inspect_dataset(&path, dataset, &options, trajectory.as_ref());
     match arguments.json {
         true => print::line(serde_json::to_string_pretty(&report)?)?,
-        false => print::line(report)?,
+        false => print::values(report)?,
     }
     Ok(ExitCode::SUCCESS)
 }

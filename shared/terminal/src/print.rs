@@ -7,7 +7,7 @@ use std::{
 
 use crate::{
     failure::Failure,
-    wrap::{WIDTH, wrap},
+    wrap::{WIDTH, wrap, wrap_values},
 };
 
 /// Prints a line to standard output. A closed pipe (`gyre inspect ... | head`) is not an error.
@@ -16,6 +16,17 @@ use crate::{
 /// Any other failure to write.
 pub fn line(text: impl Display) -> Result<(), Failure> {
     printed(writeln!(io::stdout(), "{text}"))
+}
+
+/// Prints lines of names and values, on a terminal so that they fit it.
+///
+/// # Errors
+/// As [`line`].
+pub fn values(text: impl Display) -> Result<(), Failure> {
+    match io::stdout().is_terminal() {
+        true => line(wrap_values(&text.to_string(), WIDTH).join("\n")),
+        false => line(text),
+    }
 }
 
 /// Returns whether standard output was written, in a sentence.

@@ -44,11 +44,11 @@ pub fn doctor(
         memory::results(&arguments.out),
         system::onnx_runtime(),
     ];
-    findings.iter().try_for_each(print::line)?;
+    findings.iter().try_for_each(print::values)?;
     let bad = findings.iter().filter(|found| found.state == State::Bad);
     match bad.count() {
         0 => {
-            print::line("a run works here; `gyre run configs/demo.toml` tries it")?;
+            print::line("a run works here; `gyre demo` tries it")?;
             Ok(ExitCode::SUCCESS)
         }
         count => {

@@ -143,7 +143,7 @@ fn head_lines(snapshot: &Snapshot) -> [String; 4] {
                 .collect::<String>()
         ),
         format!(
-            "sensor to pose p50 {}, p99 {}, max {} over {} poses of the last 10 s",
+            "sensor to pose p50 {}, p99 {}, max {} of {} poses in 10 s",
             us(p50_us),
             us(p99_us),
             us(max_us),
