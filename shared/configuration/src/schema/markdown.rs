@@ -8,10 +8,16 @@ use serde_json::{Map, Value};
 const INTRODUCTION: &str = "\
 # Configuration
 
-You want to know what a key means, or which keys there are. A run is configured by one TOML file; every key has a default, so a file is
-a few lines. `gyre config` lists those of the datasets, and `gyre config oxford` prints one to edit. `gyre run CONFIG --set section.key=value`
-overrides a key; a value that is not TOML is taken as text. Unknown keys are rejected. The resolved configuration is written beside the results
-as `config.toml`.
+You want to know what a key means, or which keys there are.
+
+```sh
+gyre config                                    # lists the configurations of the program
+gyre config oxford > mine.toml                 # prints one to edit
+gyre run mine.toml DRIVE --set run.window=2    # overrides a key
+```
+
+A run is configured by one TOML file; every key has a default, so a file is a few lines. A value of `--set` that is not TOML is taken as text.
+Unknown keys are rejected. The resolved configuration is written beside the results as `config.toml`.
 
 A relative path is that of a file beside the configuration, or of [one of the program](commands.md#configurations-and-networks-of-the-program).
 
