@@ -36,9 +36,9 @@ pub struct MaskingConfig {
     /// Execution provider of the network: `cpu`, or `cuda`, `tensorrt` or `openvino` in a build
     /// with that feature.
     pub provider: Provider,
-    /// Exponent of the mask of a network or function in the weights of the sparse points, 0 to 4: 0 ignores the
-    /// mask, 1 applies it as in the rasters. The weights are compressed powers, so the mask is
-    /// compressed too; in full it gives the weakest single returns the largest weights.
+    /// Exponent of the mask of a network or function in the weights of the sparse points, 0 to 4: 0
+    /// ignores the mask, 1 applies it as in the rasters. The weights are compressed powers, so the
+    /// mask is compressed too; in full it gives the weakest single returns the largest weights.
     pub point_exponent: f32,
     /// True if rasters are motion compensated.
     pub compensate: bool,
