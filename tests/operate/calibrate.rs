@@ -10,13 +10,14 @@ const NEAR: &str = "points.max_range_m=50";
 /// By how much the recording is read with too long ranges, m.
 const WRONG_BY_M: f64 = 0.25;
 
-fn calibrate(recording: &Path, out: &Path, set: &[&str]) -> Ended {
+fn calibrate(recording: &Path, out: &Path, set: &[&str], words: &[&str]) -> Ended {
     let mut command = gyre();
     command
         .arg("calibrate")
         .arg(recording)
         .arg("--out")
-        .arg(out);
+        .arg(out)
+        .args(words);
     for sentence in set {
         command.args(["--set", sentence]);
     }
@@ -37,7 +38,7 @@ fn a_wrong_range_offset_is_named_and_put_right_by_the_file() {
     let out = tempfile::tempdir().unwrap();
     let right_m = range_offset_m(&fs::read_to_string(recording.join("dataset.toml")).unwrap());
     let wrong = format!("dataset.range_offset_m={}", right_m + WRONG_BY_M);
-    let ended = calibrate(recording, out.path(), &[&wrong, FEW, NEAR]);
+    let ended = calibrate(recording, out.path(), &[&wrong, FEW, NEAR], &[]);
     let said = ended.succeeded().stdout.clone();
     let line = |name: &str| said.lines().find(|line| line.starts_with(name)).unwrap();
     assert!(
@@ -80,10 +81,54 @@ fn a_wrong_range_offset_is_named_and_put_right_by_the_file() {
     );
 }
 
+/// The offset and its standard deviation in the line of a drive or of all together.
+fn offset_of(block: &str) -> [f64; 2] {
+    let line = block.lines().find(|line| line.starts_with("range offset"));
+    let words = line.unwrap().split_whitespace();
+    let figures: Vec<f64> = words.filter_map(|word| word.parse().ok()).collect();
+    [figures[0], figures[1]]
+}
+
+#[test]
+fn two_drives_of_one_radar_tell_more_than_one() {
+    let recording = recording::around_a_block();
+    let out = tempfile::tempdir().unwrap();
+    let with = ["--with", recording.to_str().unwrap()];
+    let ended = calibrate(recording, out.path(), &[FEW, NEAR], &with);
+    let said = ended.succeeded().stdout.clone();
+    let (each, together) = said.split_once("all together: ").unwrap();
+    let [alone, both] = [each, together].map(offset_of);
+    assert!((both[0] - alone[0]).abs() < 1e-3, "{said}");
+    assert!((both[1] - alone[1] / 2f64.sqrt()).abs() < 1e-3, "{said}");
+    assert!(together.starts_with("120 scans, "), "{said}");
+    assert!(out.path().join("calibration-2.svg").exists());
+    let file = fs::read_to_string(out.path().join("calibration.toml")).unwrap();
+    assert!((range_offset_m(&file) - both[0]).abs() < 1e-3, "{file}");
+}
+
+#[test]
+fn drives_that_are_read_with_different_constants_are_refused() {
+    let (recording, out) = (recording::small(), tempfile::tempdir().unwrap());
+    let other = recording::linked(recording, |number| number < 2);
+    let settings = other.path().join("dataset.toml");
+    let offset_m = range_offset_m(&fs::read_to_string(&settings).unwrap());
+    let said = fs::read_to_string(&settings).unwrap();
+    let changed = said.replace(
+        &format!("range_offset_m = {offset_m}"),
+        "range_offset_m = -0.4",
+    );
+    assert_ne!(said, changed);
+    fs::remove_file(&settings).unwrap();
+    fs::write(&settings, changed).unwrap();
+    let with = ["--with", other.path().to_str().unwrap()];
+    let ended = calibrate(recording, out.path(), &["source.scans=2"], &with);
+    ended.failed_with(&["range_offset_m", "with -0.4, which is not one radar"]);
+}
+
 #[test]
 fn a_drive_that_is_too_short_is_refused() {
     let out = tempfile::tempdir().unwrap();
-    let ended = calibrate(recording::small(), out.path(), &["source.scans=3"]);
+    let ended = calibrate(recording::small(), out.path(), &["source.scans=3"], &[]);
     ended.failed_with(&["scans"]);
     assert!(!out.path().join("calibration.toml").exists());
 }

@@ -277,14 +277,18 @@ pub struct CalibrateArguments {
     /// The recording, and the configuration whose constants are checked.
     #[command(flatten)]
     pub inputs: Inputs,
+    /// Another drive of the same radar, read in the same way: the file has what all drives say
+    /// together. May be repeated.
+    #[arg(long, value_name = "RECORDING")]
+    pub with: Vec<PathBuf>,
     /// The folder of calibration.toml and calibration.svg.
     #[arg(long, default_value = "out/calibrate")]
     pub out: PathBuf,
     /// Length of the path by an odometer or GNSS, m: without it the range resolution cannot be
     /// told.
-    #[arg(long, value_parser = length)]
+    #[arg(long, value_parser = length, conflicts_with = "with")]
     pub distance_m: Option<f64>,
-    /// Maximum number of scans. Their points are kept in memory.
+    /// Maximum number of scans of a drive. Their points are kept in memory.
     #[arg(long, default_value = "2000")]
     pub scans: usize,
 }

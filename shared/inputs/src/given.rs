@@ -108,7 +108,22 @@ impl Inputs {
     /// # Errors
     /// As [`given`](Self::given); a configuration or a recording that cannot be used.
     pub fn configuration(&self) -> Result<Configuration, Failure> {
-        let given = self.given_recording()?;
+        self.configuration_of(&self.given_recording()?)
+    }
+
+    /// As [`configuration`](Self::configuration), of another recording that is read in the same
+    /// way.
+    ///
+    /// # Errors
+    /// As [`configuration`](Self::configuration).
+    pub fn configuration_with(&self, data: &Path) -> Result<Configuration, Failure> {
+        self.configuration_of(&Given {
+            data: Some(data.to_owned()),
+            ..self.given_recording()?
+        })
+    }
+
+    fn configuration_of(&self, given: &Given) -> Result<Configuration, Failure> {
         let configuration = match (&given.configuration, &given.data) {
             (Some(named), _) => configuration(named, &self.set)?,
             (None, Some(data)) => {

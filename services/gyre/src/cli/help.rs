@@ -87,8 +87,8 @@ const RADARS: [(&str, Examples); 4] = [
     (
         "calibrate",
         [
-            "gyre calibrate DRIVE",
             "gyre calibrate robot.toml DRIVE --distance-m 1520",
+            "gyre calibrate DRIVE --with ANOTHER-DRIVE",
         ],
     ),
     (

@@ -30,7 +30,7 @@ const ROW_TIME_SHARE: f64 = 0.05;
 const MIN_REVISITS: usize = 5;
 /// Facts that are solved for together, as far as the drive determines them. The others only
 /// confirm: odometry needs no correction of them.
-const SOLVED: [Fact; 3] = [Fact::RangeOffset, Fact::EccentricityCos, Fact::Doppler];
+pub(crate) const SOLVED: [Fact; 3] = [Fact::RangeOffset, Fact::EccentricityCos, Fact::Doppler];
 
 /// A fact with its change against the configured value.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,6 +82,21 @@ impl Calibration {
     /// Returns the changes of the facts that are corrected.
     pub fn change(&self) -> FactVector {
         change_of(&self.facts, &self.proposed)
+    }
+
+    /// Returns the mean overlap of the pairs as configured, and with these changes of the facts.
+    pub(crate) fn overlap_with(
+        &self,
+        drive: &Drive,
+        change: &FactVector,
+    ) -> Result<[f64; 2], CalibrationError> {
+        let (none, after) = (FactVector::zeros(), track(drive, change)?);
+        let pairs = pairs(&self.before, &self.revisits);
+        Ok(overlaps(
+            drive,
+            &pairs,
+            [(&self.before, &none), (&after, change)],
+        ))
     }
 }
 

@@ -1,15 +1,19 @@
 //! The constants that were found, beside the configured ones, and the evidence for each.
 
+mod constant;
 #[cfg(test)]
 mod tests;
 
-use std::fmt;
+use std::{fmt, iter};
 
 use gyre_radar::{Sense, SweepGeometry};
 
 use crate::{
-    Calibration, CalibrationError, Drive, Estimate, Fact, FactEstimate, Mounting, OwnReflections,
+    Calibration, CalibrationError, Drive, Fact, FactVector, Mounting, OwnReflections,
+    calibrate::SOLVED,
 };
+pub use constant::Constant;
+use constant::{constant, resolution};
 
 /// The configuration of the drive before it is calibrated.
 pub struct Configured {
@@ -25,41 +29,6 @@ pub struct Configured {
 
 /// A configured value that is off by so many standard deviations is wrong.
 const WRONG_SIGMAS: f64 = 3.0;
-/// The given length of the path over that by the scans: beyond, it is of another drive, or scans
-/// are missing.
-const PLAUSIBLE_RATIO: std::ops::RangeInclusive<f64> = 0.8..=1.25;
-/// Share of the path by which that in both directions of time differs, at least: the error of its
-/// length.
-const PATH_ERROR: f64 = 1e-3;
-
-/// A constant that the configuration has a key for.
-pub struct Constant {
-    /// The key of the section `[dataset]`.
-    pub key: &'static str,
-    /// The name for a person.
-    pub name: &'static str,
-    /// The unit in which it is printed.
-    pub unit: &'static str,
-    /// The factor to the printed unit.
-    pub scale: f64,
-    /// The configured value.
-    pub configured: f64,
-    /// The value by the drive.
-    pub found: Estimate,
-    /// The drive says more about it than was known.
-    pub is_determined: bool,
-    /// It is written into the section for the configuration.
-    pub is_proposed: bool,
-    /// The data that it rests on.
-    pub basis: String,
-}
-
-impl Constant {
-    /// Returns whether the configured value contradicts the drive.
-    pub fn is_wrong(&self) -> bool {
-        (self.configured - self.found.value).abs() > WRONG_SIGMAS * self.found.sigma
-    }
-}
 
 /// All that was found.
 pub struct Found {
@@ -141,6 +110,48 @@ impl Found {
         })
     }
 
+    /// Returns the means of what several drives say, each weighted by its uncertainty, and their
+    /// overlap yet to be compared. The rest is in what each of them says alone.
+    pub(crate) fn mean(first: &Self, others: &[&Self]) -> Self {
+        let drives = || iter::once(&first).chain(others);
+        let constants = (0..first.constants.len()).map(|k| {
+            let others: Vec<_> = others.iter().map(|it| &it.constants[k]).collect();
+            first.constants[k].mean(&others)
+        });
+        Self {
+            scans: drives().map(|it| it.scans).sum(),
+            path_m: drives().map(|it| it.path_m).sum(),
+            has_settled: drives().all(|it| it.has_settled),
+            overlap: [0.0; 2],
+            constants: constants.collect(),
+            resolution: Err("as configured: --distance-m tells it from one drive alone".to_owned()),
+            min_range_m: drives().filter_map(|it| it.min_range_m).reduce(f64::max),
+            others: Vec::new(),
+        }
+    }
+
+    /// Returns the changes of the facts that are proposed.
+    pub(crate) fn change(&self) -> FactVector {
+        let mut change = FactVector::zeros();
+        for (fact, constant) in SOLVED.into_iter().zip(&self.constants) {
+            if constant.is_proposed {
+                change[fact as usize] = constant.found.value - constant.configured;
+            }
+        }
+        change
+    }
+
+    /// Takes the overlap as configured and with what is proposed, which is not if that is less.
+    pub(crate) fn compared(mut self, overlap: [f64; 2]) -> Self {
+        self.overlap = overlap;
+        if overlap[1] < overlap[0] {
+            for constant in &mut self.constants {
+                constant.is_proposed = false;
+            }
+        }
+        self
+    }
+
     /// Returns the constants that are written.
     pub fn proposed(&self) -> impl Iterator<Item = &Constant> {
         let solved = self
@@ -167,93 +178,6 @@ impl Found {
         };
         format!("overlap of the scans  {before:.4} as configured, {after:.4} {with}")
     }
-}
-
-fn constant(
-    key: &'static str,
-    name: &'static str,
-    (unit, scale): (&'static str, f64),
-    configured: f64,
-    fact: &FactEstimate,
-    calibration: &Calibration,
-) -> Constant {
-    let found = Estimate {
-        value: configured + fact.change.value,
-        sigma: fact.change.sigma,
-    };
-    let part = |estimate: &Estimate| {
-        format!(
-            "{:.3} \u{b1} {:.3}",
-            (configured + estimate.value) * scale,
-            estimate.sigma * scale
-        )
-    };
-    let basis = match (&fact.by_drift, calibration.revisits.is_empty()) {
-        (Some(drift), _) => format!(
-            "overlap {}; drift between {} revisits {}",
-            part(&fact.by_overlap),
-            calibration.revisits.len(),
-            part(drift)
-        ),
-        (None, true) => format!(
-            "overlap of {} pairs of scans alone: no revisit in this drive",
-            calibration.pairs
-        ),
-        (None, false) => format!(
-            "overlap of {} pairs of scans, {} of them revisits",
-            calibration.pairs,
-            calibration.revisits.len()
-        ),
-    };
-    Constant {
-        key,
-        name,
-        unit,
-        scale,
-        configured,
-        found,
-        is_determined: fact.is_useful() && calibration.has_settled,
-        is_proposed: calibration.proposed.contains(&fact.fact),
-        basis,
-    }
-}
-
-/// The range resolution from the length of the path, or why the drive cannot tell it.
-///
-/// # Errors
-/// A length that is not of this drive.
-fn resolution(
-    path_m: f64,
-    configured: &Configured,
-) -> Result<Result<Constant, String>, CalibrationError> {
-    let resolution_m = f64::from(configured.geometry.range_resolution_m);
-    let Some(distance_m) = configured.distance_m else {
-        return Ok(Err(format!(
-            "{resolution_m:.5} m as configured: a drive alone cannot tell it, since a larger world driven through faster looks the same; \
-             the path is {path_m:.1} m: give its length by an odometer or GNSS with --distance-m"
-        )));
-    };
-    let ratio = distance_m / path_m;
-    if !PLAUSIBLE_RATIO.contains(&ratio) {
-        return Err(CalibrationError::Distance { distance_m, path_m });
-    }
-    let value = resolution_m * ratio;
-    Ok(Ok(Constant {
-        key: "range_resolution_m",
-        name: "range resolution",
-        unit: "m",
-        scale: 1.0,
-        configured: resolution_m,
-        found: Estimate {
-            value,
-            sigma: value * PATH_ERROR,
-        },
-        is_determined: true,
-        is_proposed: true,
-        basis: format!(
-            "{distance_m:.1} m given for {path_m:.1} m of path, with the constants as found"
-        ),
-    }))
 }
 
 fn others(drive: &Drive, calibration: &Calibration, configured: &Configured) -> Vec<[String; 2]> {
@@ -350,47 +274,21 @@ fn reflections(drive: &Drive, configured: &Configured) -> String {
 
 impl fmt::Display for Found {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "{} scans, {:.0} m", self.scans, self.path_m)?;
+        write!(f, "{} scans, {:.0} m", self.scans, self.path_m)?;
         if !self.has_settled {
-            writeln!(
+            write!(
                 f,
-                "the constants have not settled: take a longer drive, or begin with constants that are nearer"
+                "\nthe constants have not settled: take a longer drive, or begin with constants that are nearer"
             )?;
         }
         for constant in self.constants.iter().chain(self.resolution.as_ref().ok()) {
-            let Constant {
-                name,
-                unit,
-                scale,
-                configured,
-                found,
-                ..
-            } = constant;
-            let verdict = match (constant.is_determined, constant.is_proposed) {
-                (false, _) => "the drive does not tell it well enough",
-                (true, false) => "not proposed: the scans would overlap less",
-                _ if constant.is_wrong() => "CONTRADICTS the configured value",
-                _ => "agrees with the configured value",
-            };
-            writeln!(
-                f,
-                "{name:<21} {:.4} \u{b1} {:.4} {unit}, configured {:.4}: {verdict}",
-                found.value * scale,
-                found.sigma * scale,
-                configured * scale
-            )?;
-            writeln!(f, "{:<21} {}", "", constant.basis)?;
+            write!(f, "\n{constant}")?;
         }
         if let Err(reason) = &self.resolution {
-            writeln!(f, "{:<21} {reason}", "range resolution")?;
+            write!(f, "\n{:<21} {reason}", "range resolution")?;
         }
-        let last = self.others.len().saturating_sub(1);
-        for (k, [name, sentence]) in self.others.iter().enumerate() {
-            write!(
-                f,
-                "{name:<21} {sentence}{}",
-                if k < last { "\n" } else { "" }
-            )?;
+        for [name, sentence] in &self.others {
+            write!(f, "\n{name:<21} {sentence}")?;
         }
         Ok(())
     }

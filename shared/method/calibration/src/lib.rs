@@ -17,7 +17,8 @@
 //! - [`calibrate`]: the method;
 //! - [`Mounting`], [`OwnReflections`]: what follows from the track and from the scans directly;
 //! - [`Found`]: the constants beside the configured ones, with what each rests on; [`toml()`]: as a
-//!   section of a configuration; [`svg`]: a place seen twice, before and after.
+//!   section of a configuration; [`svg`]: a place seen twice, before and after;
+//! - [`Study`]: a drive with all that, and what several drives of one radar say together.
 
 mod calibrate;
 mod drift;
@@ -33,6 +34,7 @@ mod pair;
 mod picture;
 mod revisits;
 mod section;
+mod study;
 
 pub use calibrate::{Calibration, FactEstimate, calibrate};
 pub use drive::{Drive, Sweep, Track};
@@ -44,6 +46,7 @@ pub use own_reflections::OwnReflections;
 pub use picture::svg;
 pub use revisits::Revisit;
 pub use section::toml;
+pub use study::Study;
 
 /// A number with its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -19,7 +19,7 @@ pub fn toml(found: &Found) -> String {
         );
     }
     for constant in found.kept() {
-        let reason = match constant.is_determined {
+        let reason = match constant.is_determined() {
             true => "makes the scans overlap less",
             false => "is no better",
         };

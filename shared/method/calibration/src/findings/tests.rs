@@ -1,5 +1,7 @@
+#![allow(clippy::unwrap_used)]
+
 use super::*;
-use crate::toml;
+use crate::{Estimate, toml};
 
 /// An offset that the drive determines and that contradicts the configured one.
 fn found(is_proposed: bool, overlap: [f64; 2]) -> Found {
@@ -13,7 +15,8 @@ fn found(is_proposed: bool, overlap: [f64; 2]) -> Found {
             value: -0.5,
             sigma: 0.02,
         },
-        is_determined: true,
+        useful_sigma: 0.2,
+        has_settled: true,
         is_proposed,
         basis: "overlap".to_owned(),
     };
@@ -69,4 +72,42 @@ fn the_range_of_the_vehicle_is_written_for_points_and_rasters() {
         let expected = format!("\n[{section}]\nmin_range_m = 3.5 # ");
         assert!(written.contains(&expected), "{written}");
     }
+}
+
+#[test]
+fn several_drives_tell_together_what_none_tells_alone() {
+    let of = |value: f64, sigma: f64, min_range_m| {
+        let mut found = found(false, [0.42, 0.43]);
+        found.constants[0].found = Estimate { value, sigma };
+        found.min_range_m = min_range_m;
+        found
+    };
+    let drives = [of(-0.5, 0.25, None), of(-0.4, 0.25, Some(3.5))];
+    assert!(
+        drives
+            .iter()
+            .all(|drive| !drive.constants[0].is_determined())
+    );
+    let both = Found::mean(&drives[0], &[&drives[1]]).compared([0.42, 0.43]);
+    assert_eq!(
+        (both.scans, both.path_m, both.min_range_m),
+        (200, 1000.0, Some(3.5))
+    );
+    let offset = &both.constants[0];
+    assert!((offset.found.value + 0.45).abs() < 1e-12);
+    assert!((offset.found.sigma - 0.25 / 2f64.sqrt()).abs() < 1e-12);
+    assert!(offset.is_determined() && offset.is_proposed);
+    assert_eq!(
+        offset.basis,
+        "of the drives -0.5000 \u{b1} 0.2500; -0.4000 \u{b1} 0.2500"
+    );
+    assert!((both.change()[Fact::RangeOffset as usize] + 0.35).abs() < 1e-12);
+    // What a drive determines alone and rejects is rejected for all, as is what fits all together
+    // less well.
+    let rejecting = of(-0.5, 0.1, None);
+    let rejected = Found::mean(&rejecting, &[&drives[1]]);
+    assert!(!rejected.constants[0].is_proposed);
+    assert_eq!(rejected.change(), FactVector::zeros());
+    let less = Found::mean(&drives[0], &[&drives[1]]).compared([0.43, 0.42]);
+    assert!(!less.constants[0].is_proposed && less.overlap().contains("which is less"));
 }

@@ -1,0 +1,181 @@
+//! A constant beside the configured one.
+
+use std::{fmt, iter};
+
+use super::{Configured, WRONG_SIGMAS};
+use crate::{Calibration, CalibrationError, Estimate, FactEstimate};
+
+/// The given length of the path over that by the scans: beyond, it is of another drive, or scans
+/// are missing.
+const PLAUSIBLE_RATIO: std::ops::RangeInclusive<f64> = 0.8..=1.25;
+/// Share of the path by which that in both directions of time differs, at least: the error of its
+/// length.
+const PATH_ERROR: f64 = 1e-3;
+
+/// A constant that the configuration has a key for.
+#[derive(Clone)]
+pub struct Constant {
+    /// The key of the section `[dataset]`.
+    pub key: &'static str,
+    /// The name for a person.
+    pub name: &'static str,
+    /// The unit in which it is printed.
+    pub unit: &'static str,
+    /// The factor to the printed unit.
+    pub scale: f64,
+    /// The configured value.
+    pub configured: f64,
+    /// The value by the drive.
+    pub found: Estimate,
+    /// The standard deviation from which on a drive says no more about it than is known of any
+    /// radar.
+    pub(super) useful_sigma: f64,
+    /// The solution has settled, so that the value can be trusted.
+    pub(super) has_settled: bool,
+    /// It is written into the section for the configuration.
+    pub is_proposed: bool,
+    /// The data that it rests on.
+    pub basis: String,
+}
+
+impl Constant {
+    /// Returns whether the drive says more about it than was known.
+    pub fn is_determined(&self) -> bool {
+        self.has_settled && self.found.sigma < self.useful_sigma
+    }
+
+    /// Returns the mean of what several drives of one radar say. It is proposed if they determine
+    /// it together, and none of them rejects what it determines alone.
+    pub(super) fn mean(&self, others: &[&Self]) -> Self {
+        let drives = || iter::once(&self).chain(others);
+        let found = others
+            .iter()
+            .fold(self.found, |all, next| all.combined(&next.found));
+        let basis = drives().map(|it| {
+            let [value, sigma] = [it.found.value, it.found.sigma].map(|figure| figure * it.scale);
+            format!("{value:.4} \u{b1} {sigma:.4}")
+        });
+        let mut mean = Self {
+            found,
+            has_settled: drives().all(|it| it.has_settled),
+            basis: format!("of the drives {}", basis.collect::<Vec<_>>().join("; ")),
+            ..self.clone()
+        };
+        mean.is_proposed =
+            mean.is_determined() && drives().all(|it| it.is_proposed || !it.is_determined());
+        mean
+    }
+
+    /// Returns whether the configured value contradicts the drive.
+    pub fn is_wrong(&self) -> bool {
+        (self.configured - self.found.value).abs() > WRONG_SIGMAS * self.found.sigma
+    }
+}
+
+/// Puts what was found of a fact beside its configured value.
+pub(super) fn constant(
+    key: &'static str,
+    name: &'static str,
+    (unit, scale): (&'static str, f64),
+    configured: f64,
+    fact: &FactEstimate,
+    calibration: &Calibration,
+) -> Constant {
+    let found = Estimate {
+        value: configured + fact.change.value,
+        sigma: fact.change.sigma,
+    };
+    let part = |estimate: &Estimate| {
+        format!(
+            "{:.3} \u{b1} {:.3}",
+            (configured + estimate.value) * scale,
+            estimate.sigma * scale
+        )
+    };
+    let basis = match (&fact.by_drift, calibration.revisits.is_empty()) {
+        (Some(drift), _) => format!(
+            "overlap {}; drift between {} revisits {}",
+            part(&fact.by_overlap),
+            calibration.revisits.len(),
+            part(drift)
+        ),
+        (None, true) => format!(
+            "overlap of {} pairs of scans alone: no revisit in this drive",
+            calibration.pairs
+        ),
+        (None, false) => format!(
+            "overlap of {} pairs of scans, {} of them revisits",
+            calibration.pairs,
+            calibration.revisits.len()
+        ),
+    };
+    Constant {
+        key,
+        name,
+        unit,
+        scale,
+        configured,
+        found,
+        useful_sigma: fact.fact.useful_sigma(),
+        has_settled: calibration.has_settled,
+        is_proposed: calibration.proposed.contains(&fact.fact),
+        basis,
+    }
+}
+
+/// The range resolution from the length of the path, or why the drive cannot tell it.
+///
+/// # Errors
+/// A length that is not of this drive.
+pub(super) fn resolution(
+    path_m: f64,
+    configured: &Configured,
+) -> Result<Result<Constant, String>, CalibrationError> {
+    let resolution_m = f64::from(configured.geometry.range_resolution_m);
+    let Some(distance_m) = configured.distance_m else {
+        return Ok(Err(format!(
+            "{resolution_m:.5} m as configured: a drive alone cannot tell it, since a larger world driven through faster looks the same; \
+             the path is {path_m:.1} m: give its length by an odometer or GNSS with --distance-m"
+        )));
+    };
+    let ratio = distance_m / path_m;
+    if !PLAUSIBLE_RATIO.contains(&ratio) {
+        return Err(CalibrationError::Distance { distance_m, path_m });
+    }
+    let value = resolution_m * ratio;
+    Ok(Ok(Constant {
+        key: "range_resolution_m",
+        name: "range resolution",
+        unit: "m",
+        scale: 1.0,
+        configured: resolution_m,
+        found: Estimate {
+            value,
+            sigma: value * PATH_ERROR,
+        },
+        useful_sigma: f64::INFINITY,
+        has_settled: true,
+        is_proposed: true,
+        basis: format!(
+            "{distance_m:.1} m given for {path_m:.1} m of path, with the constants as found"
+        ),
+    }))
+}
+
+impl fmt::Display for Constant {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let verdict = match (self.is_determined(), self.is_proposed) {
+            (false, _) => "the scans do not tell it well enough",
+            (true, false) => "not proposed: the scans would overlap less",
+            _ if self.is_wrong() => "CONTRADICTS the configured value",
+            _ => "agrees with the configured value",
+        };
+        let [value, sigma, configured] =
+            [self.found.value, self.found.sigma, self.configured].map(|figure| figure * self.scale);
+        write!(
+            f,
+            "{:<21} {value:.4} \u{b1} {sigma:.4} {}, configured {configured:.4}: {verdict}\n{:<21} {}",
+            self.name, self.unit, "", self.basis
+        )
+    }
+}

@@ -1,0 +1,51 @@
+//! A drive with what it says, and several drives of one radar together.
+
+use std::iter;
+
+use crate::{Calibration, CalibrationError, Configured, Drive, Found, calibrate};
+
+/// A drive, and what it says.
+pub struct Study {
+    /// The drive.
+    pub drive: Drive,
+    /// The solution.
+    pub calibration: Calibration,
+    /// The constants beside the configured ones.
+    pub found: Found,
+}
+
+impl Study {
+    /// Finds the constants of a drive.
+    ///
+    /// # Errors
+    /// A drive that does not determine them; a length of the path that cannot be its own.
+    pub fn new(drive: Drive, configured: &Configured) -> Result<Self, CalibrationError> {
+        let calibration = calibrate(&drive)?;
+        let found = Found::new(&drive, &calibration, configured)?;
+        Ok(Self {
+            drive,
+            calibration,
+            found,
+        })
+    }
+
+    /// Combines what this drive and others of one radar say, each with its own uncertainty. It is
+    /// proposed if their scans overlap more with it, all together.
+    ///
+    /// # Errors
+    /// Scans that cannot be registered with it.
+    pub fn combined(&self, others: &[Self]) -> Result<Found, CalibrationError> {
+        let of_others: Vec<_> = others.iter().map(|it| &it.found).collect();
+        let mean = Found::mean(&self.found, &of_others);
+        let (change, mut overlap) = (mean.change(), [0.0; 2]);
+        for Self {
+            drive, calibration, ..
+        } in iter::once(self).chain(others)
+        {
+            let share = drive.sweeps.len() as f64 / mean.scans as f64;
+            let of_drive = calibration.overlap_with(drive, &change)?;
+            overlap = [0, 1].map(|k| overlap[k] + share * of_drive[k]);
+        }
+        Ok(mean.compared(overlap))
+    }
+}
