@@ -7,7 +7,7 @@ use std::{
 };
 
 use gyre_calibration::{Configured, Drive, Study, svg, toml};
-use gyre_configuration::{Configuration, Played, describe_masks};
+use gyre_configuration::{Configuration, Played, describe_masks_in_process};
 use gyre_radar::{DatasetOptions, OwnedScan, SweepGeometry};
 use gyre_storage as storage;
 use gyre_terminal::{Failure, print};
@@ -139,7 +139,9 @@ fn read(
     arguments: &CalibrateArguments,
 ) -> Result<(Drive, SweepGeometry), Failure> {
     let Played { mut dataset, .. } = gyre_configuration::open(configuration)?;
-    describe_masks(configuration)?.iter().for_each(print::note);
+    describe_masks_in_process(configuration)?
+        .iter()
+        .for_each(print::note);
     let mut scan = OwnedScan::with_limits(dataset.limits());
     let mut drive = Drive::new(&configuration.odometry)?;
     let played = configuration.source.played(dataset.as_ref());
