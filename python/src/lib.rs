@@ -25,7 +25,10 @@ mod slam;
 mod trajectory;
 mod values;
 
-use pyo3::pymodule;
+use std::path::Path;
+
+use gyre_masking::runtime::search_packages;
+use pyo3::{prelude::*, types::PyModule};
 
 /// The part of the package that is written in Rust.
 #[pymodule]
@@ -44,6 +47,18 @@ mod _gyre {
         slam::{Loop, Slam},
         trajectory::Trajectory,
     };
+
+    use super::*;
+
+    /// Learned masks find ONNX Runtime where pip has installed it, beside this package.
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        let file = module.filename()?;
+        if let Some(packages) = Path::new(file.to_str()?).ancestors().nth(2) {
+            search_packages(packages.to_owned());
+        }
+        Ok(())
+    }
 
     /// The version of the package.
     #[pymodule_export]

@@ -55,7 +55,7 @@ pub fn describe_masks(
         }
         Library::Rten => format!(
             "the masks of {card} are computed by rten, in one thread; ONNX Runtime is several times faster: \
-             `{INSTALL}` in the folder of Gyre's sources installs it"
+             `{INSTALL}` installs it"
         ),
     }];
     let unlike = Card::read(masking)?.training_mismatches(masking, raster);

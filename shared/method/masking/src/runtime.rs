@@ -4,17 +4,17 @@ use std::{
     env,
     error::Error as _,
     ffi::OsString,
-    fs,
+    fs::{self, DirEntry},
     path::{Path, PathBuf},
-    sync::{Arc, Mutex, PoisonError},
+    sync::{Arc, Mutex, OnceLock, PoisonError},
 };
 
 use ort::{LoadDynamicError, environment::Environment, logging::LogLevel};
 use thiserror::Error;
 
-/// The command that installs it in the user's data folder. The library does not depend on the
-/// version of Python.
-pub const INSTALL: &str = "python3 -m pip install --no-deps --python-version 3.12 --target \"${XDG_DATA_HOME:-$HOME/.local/share}/gyre/onnxruntime\" -r models/onnxruntime.txt";
+/// The command that installs it in the user's data folder: the release of `models/onnxruntime.txt`.
+/// The library does not depend on the version of Python.
+pub const INSTALL: &str = "python3 -m pip install --no-deps --python-version 3.12 --target \"${XDG_DATA_HOME:-$HOME/.local/share}/gyre/onnxruntime\" onnxruntime==1.31.1";
 /// The environment variable that may name the library.
 const VARIABLE: &str = "ORT_DYLIB_PATH";
 /// The folder that [`INSTALL`] creates in that of Gyre's data; beside the program it has the same
@@ -24,14 +24,16 @@ const INSTALLED: &str = "onnxruntime";
 /// package.
 const PLACES: [&str; 3] = ["", "capi", "onnxruntime/capi"];
 const LIBRARY: &str = "libonnxruntime.so";
+/// The folder of the packages among which Gyre's own Python package is, in a process that uses it.
+static PACKAGES: OnceLock<PathBuf> = OnceLock::new();
 
 /// An error in finding or opening ONNX Runtime.
 #[derive(Debug, Error)]
 pub enum RuntimeError {
     /// It is not installed.
     #[error(
-        "ONNX Runtime is not installed: `{INSTALL}` in the folder of Gyre's sources installs it; masking.runtime or {VARIABLE} names one \
-         in another place; masking.backend = \"rten\" does not need it"
+        "ONNX Runtime is not installed: `{INSTALL}` installs it; masking.runtime or {VARIABLE} names one in another place; \
+         masking.backend = \"rten\" does not need it"
     )]
     Missing,
     /// The named path has no library.
@@ -66,8 +68,9 @@ pub enum RuntimeError {
 }
 
 /// Returns the path of the library: named by `configured` (`masking.runtime`) or by the
-/// environment, installed by [`INSTALL`], or beside this program. A library is code, so no folder
-/// is searched that is not the user's own or the program's; the current one may be anybody's.
+/// environment, installed by [`INSTALL`], beside this program, or a package of the Python that
+/// Gyre is installed in. A library is code, so no folder is searched that is not the user's own or
+/// the program's; the current one may be anybody's.
 ///
 /// # Errors
 /// [`RuntimeError::NotFound`] if a named path has no library, [`RuntimeError::Missing`] if none is
@@ -92,17 +95,49 @@ fn find_in(
     }
     installed_in
         .iter()
-        .find_map(|folder| library_at(&folder.join(INSTALLED)))
+        .filter_map(|folder| library_at(&folder.join(INSTALLED)))
+        // An older one was installed for other programs.
+        .find(|library| !is_too_old(library))
         .ok_or(RuntimeError::Missing)
 }
 
-/// Returns the folders of an installed library: the user's data, then the folder of this program.
+/// Returns the folders of an installed library: the user's data, the folder of this program, then
+/// the packages of Python beside it.
 fn installed_in() -> Vec<PathBuf> {
     let program = env::current_exe().ok();
     let program =
         program.and_then(|program| Some(program.canonicalize().ok()?.parent()?.to_owned()));
     let data = data_folder(env::var_os("XDG_DATA_HOME"), env::var_os("HOME"));
-    data.into_iter().chain(program).collect()
+    let packages = program.as_deref().map(packages_beside).unwrap_or_default();
+    let named = PACKAGES.get().cloned();
+    data.into_iter()
+        .chain(program)
+        .chain(named)
+        .chain(packages)
+        .collect()
+}
+
+/// Names the folder of the packages among which Gyre's own Python package is: [`find`] looks there
+/// too. Only the first call counts.
+pub fn search_packages(folder: PathBuf) {
+    PACKAGES.get_or_init(|| folder);
+}
+
+/// Returns the folders of packages of the Python environment whose programs are in `bin`.
+fn packages_beside(bin: &Path) -> Vec<PathBuf> {
+    let lib = bin.parent().map(|environment| environment.join("lib"));
+    let entries = lib.and_then(|lib| fs::read_dir(lib).ok());
+    let entries = entries.into_iter().flatten().flatten();
+    let versions = entries.filter(|entry| {
+        let name = entry.file_name();
+        name.to_string_lossy().starts_with("python3.")
+    });
+    let packages = |version: DirEntry| {
+        ["site-packages", "dist-packages"].map(|name| version.path().join(name))
+    };
+    let mut found: Vec<PathBuf> = versions.flat_map(packages).collect();
+    found.sort();
+    found
 }
 
 /// Returns the folder of Gyre's data. A relative path would be in the current folder and is
@@ -140,6 +175,12 @@ fn version(file: &Path) -> Option<Vec<u32>> {
     let mut numbers = suffix.split('.');
     numbers.next().filter(|between| between.is_empty())?;
     numbers.map(|number| number.parse().ok()).collect()
+}
+
+/// Returns whether the name of a library says a version older than the one that is needed.
+fn is_too_old(file: &Path) -> bool {
+    let version = version(file).filter(|version| version.len() > 1);
+    version.is_some_and(|version| version < vec![1, ort::MINOR_VERSION])
 }
 
 /// Opens the library. A process opens only one: later calls return the first one that succeeded.
@@ -226,6 +267,39 @@ mod tests {
             third
         );
         assert_eq!(find_in(None, None, &installed_in).unwrap(), third);
+    }
+
+    #[test]
+    fn the_library_is_found_among_the_packages_of_the_environment_of_the_program() {
+        let package = "lib/python3.12/site-packages/onnxruntime/capi/libonnxruntime.so.1.31.1";
+        let (environment, library) = folder_with(package);
+        let found_from = |bin: &str| {
+            let packages = packages_beside(&environment.path().join(bin));
+            find_in(None, None, &packages).ok()
+        };
+        assert_eq!(found_from("bin"), Some(library));
+        assert_eq!(found_from("bin/deeper"), None);
+        assert_eq!(found_from("no/such"), None);
+    }
+
+    #[test]
+    fn a_library_that_is_too_old_is_passed_over_unless_it_is_named() {
+        let (old, library) = folder_with("onnxruntime/capi/libonnxruntime.so.1.9.0");
+        let (new, newer) = folder_with("onnxruntime/capi/libonnxruntime.so.1.31.1");
+        let folders = [old.path().to_owned(), new.path().to_owned()];
+        assert_eq!(find_in(None, None, &folders).unwrap(), newer);
+        assert!(matches!(
+            find_in(None, None, &folders[..1]),
+            Err(RuntimeError::Missing)
+        ));
+        assert_eq!(find_in(Some(old.path()), None, &folders).unwrap(), library);
+    }
+
+    #[test]
+    fn the_command_installs_the_release_of_the_requirements() {
+        let requirements = include_str!("../../../../models/onnxruntime.txt");
+        let release = INSTALL.rsplit(' ').next().unwrap();
+        assert!(requirements.contains(&format!("\n{release} ")), "{release}");
     }
 
     #[test]
