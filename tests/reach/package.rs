@@ -48,8 +48,8 @@ fn installed() -> Vec<String> {
     let mut installed = Vec::new();
     for asset in package["assets"].as_array().unwrap() {
         let (source, to) = (text(&asset[0]), text(&asset[1]));
-        if source == "target/release/gyre" {
-            installed.push(format!("/{to}gyre"));
+        if let Some(built) = source.strip_prefix("target/release/") {
+            installed.push(format!("/{to}{built}"));
             continue;
         }
         let files = files(source);
