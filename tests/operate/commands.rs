@@ -39,7 +39,8 @@ pub(crate) fn status(run: &Run) -> Option<Value> {
     ps.args(["ps", "--json"]);
     let ended = Ended::of(ps);
     let runs: Vec<Value> = serde_json::from_str(&ended.stdout).unwrap();
-    let out = run.out().canonicalize().unwrap();
+    // A run that has just been started may not have made it.
+    let out = run.out().canonicalize().ok()?;
     runs.into_iter()
         .map(|run| run["status"].clone())
         .find(|status| status["out"] == out.to_str().unwrap())

@@ -376,8 +376,12 @@ fn it_takes_over_in_a_running_run_and_one_that_cannot_be_loaded_does_not() {
     assert_eq!(running.await_stage("masking"), own);
     let (_folder, ended) = swap("def mask(scan):\n    return scan.power > 0\n");
     ended.succeeded();
+    // The command that has swapped it in has ended, and the stage can be started again.
+    let swapped = child_with(running.pid(), "--python");
+    send(swapped.unwrap(), Signal::KILL);
     running.finish().succeeded();
     assert_eq!(run.odometry(), undisturbed());
+    assert_eq!(run.summary()["restarts"]["masking"], 1);
 }
 
 #[test]

@@ -168,7 +168,7 @@ fn provenance(
         kernel: uname.release().to_string_lossy().into_owned(),
         gyre: env!("CARGO_PKG_VERSION").to_owned(),
         build: program::sha256(&own())?,
-        configuration: file.unwrap_or_default().display().to_string(),
+        configuration: file.map_or_else(|| configuration.data(), |file| file.display().to_string()),
         source: configuration.data(),
         load_before: load.split(' ').next().and_then(|load| load.parse().ok()),
     })

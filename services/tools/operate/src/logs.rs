@@ -25,9 +25,12 @@ const PERIOD: Duration = Duration::from_millis(200);
 /// There is no such run or process, or a log cannot be read.
 pub fn logs(arguments: &LogsArguments) -> Result<ExitCode, Failure> {
     let process = arguments.process.as_deref();
-    // A run alone: `gyre logs out/demo`.
+    let run = arguments.run.run.as_deref();
     let (process, out) = match process.filter(|it| Path::new(it).is_dir()) {
-        Some(run) if arguments.run.run.is_none() => (None, run.into()),
+        // A run alone, or before the process: `gyre logs out/demo`, `gyre logs out/demo masking`.
+        Some(folder) if run.is_none_or(|run| !run.is_dir()) => {
+            (run.and_then(Path::to_str), folder.into())
+        }
         _ => (process, arguments.run.folder()?),
     };
     let mut logs = open(&out, process)?;

@@ -5,7 +5,7 @@ use std::{env, process::ExitCode};
 use gyre_run::StageConfig;
 use gyre_stage::control::{PendingSwap, Swap};
 use gyre_supervise::Program;
-use gyre_terminal::{Failure, own, print, words};
+use gyre_terminal::{Failure, print, words};
 
 use crate::{
     arguments::{RestartArguments, SwapArguments},
@@ -82,11 +82,16 @@ pub fn swap(arguments: &SwapArguments) -> Result<ExitCode, Failure> {
         }
         command
     });
-    let python = arguments.python.as_deref().map(|file| {
-        let gyre = own().to_string_lossy().into_owned();
-        StageConfig::own_command(&gyre, &arguments.process, Some(file))
-    });
-    let command = command.or(python);
+    let command = match &arguments.python {
+        None => command,
+        Some(file) => {
+            // By its own name: this process ends before the stage does.
+            let gyre = env::current_exe()
+                .map_err(|error| format!("cannot tell the program of this process: {error}"))?;
+            let (gyre, process) = (gyre.to_string_lossy(), &arguments.process);
+            Some(StageConfig::own_command(&gyre, process, Some(file)))
+        }
+    };
     let what = match &command {
         Some(command) => format!("`{}`", command.join(" ")),
         None => "the program that the run was begun with".to_owned(),
