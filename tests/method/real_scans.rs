@@ -56,6 +56,9 @@ fn radiate_drifts_less_than_cfear_2() {
     }
 }
 
+/// The place of the ATE in [`drift`].
+const ATE: usize = 2;
+
 /// Translation (%), rotation (deg/100 m), ATE (m) and seg (%) of a run.
 fn drift(run: &Run) -> [f64; 4] {
     run.complete();
@@ -104,7 +107,15 @@ fn masks_help_on_scans_of_a_kind_that_they_have_never_seen() {
             0.6,
         ),
         (
-            "Gyre",
+            "the search alone",
+            run("radiate.toml").set("refinement.kind=none"),
+            masked(run("radiate.toml"), "gyre-255.toml").set("refinement.kind=none"),
+            1.0,
+        ),
+        // Where loops close the truth differs from what the radar sees twice by 3.5 m, so that 0.1
+        // m of ATE say nothing of a refined drive: docs/decisions.md.
+        (
+            "refined",
             run("radiate.toml"),
             masked(run("radiate.toml"), "gyre-255.toml"),
             1.03,
@@ -116,7 +127,9 @@ fn masks_help_on_scans_of_a_kind_that_they_have_never_seen() {
         let worse = with
             .iter()
             .zip(&without)
-            .find(|(with, without)| **with > most * **without);
+            .enumerate()
+            .filter(|(figure, _)| name != "refined" || *figure != ATE)
+            .find(|(_, (with, without))| **with > most * **without);
         assert!(worse.is_none(), "{name}: {worse:?}");
     }
 }
