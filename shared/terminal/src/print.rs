@@ -21,7 +21,7 @@ pub fn line(text: impl Display) -> Result<(), Failure> {
 /// Prints lines of names and values, on a terminal so that they fit it.
 ///
 /// # Errors
-/// As [`line`].
+/// As [`line()`].
 pub fn values(text: impl Display) -> Result<(), Failure> {
     match io::stdout().is_terminal() {
         true => line(wrap_values(&text.to_string(), WIDTH).join("\n")),
