@@ -43,6 +43,12 @@ fn with(run: Run, stage: &str, file: &Path) -> Run {
     run.set(&format!("stages.{stage}.python='{}'", file.display()))
 }
 
+/// A run that ends at the first failure of the function.
+fn failing(stage: &str, file: &Path) -> Run {
+    let run = with(Run::of_recording(), stage, file);
+    run.set(&format!("stages.{stage}.restart.limit=0"))
+}
+
 #[test]
 fn factors_of_one_change_no_byte() {
     if !can_start() {
@@ -160,7 +166,7 @@ fn an_exception_ends_the_run_with_its_line_and_leaves_its_traceback() {
          \x20   if seen > 4: helper()\n\
          \x20   return scan.power > 0\n",
     );
-    let run = with(Run::of_recording(), "masking", &file);
+    let run = failing("masking", &file);
     let place = format!("{}, line 3: KeyError: 'wall'", file.display());
     run.finish().failed_with(&["masking", &place]);
     let mut logs = gyre();
@@ -214,7 +220,7 @@ fn what_cannot_be_loaded_or_returned_is_said() {
         ),
     ] {
         let (_folder, file) = file(text);
-        let run = with(Run::of_recording(), "masking", &file);
+        let run = failing("masking", &file);
         run.finish().failed_with(&["mine.py", sentence]);
     }
     for (returned, sentence) in [
@@ -225,13 +231,13 @@ fn what_cannot_be_loaded_or_returned_is_said() {
     ] {
         let text = format!("def rotation(scan, previous):\n    return {returned}\n");
         let (_folder, file) = file(&text);
-        let run = with(Run::of_recording(), "rotation-search", &file);
+        let run = failing("rotation-search", &file);
         run.finish().failed_with(&["mine.py", sentence]);
     }
     for spread in ["-0.1", "[[-1, 0], [0, 1]]", "[[1, 5], [0, 1]]"] {
         let text = format!("def translation(scan, previous, turn):\n    return 1, 0, {spread}\n");
         let (_folder, file) = file(&text);
-        let run = with(Run::of_recording(), "translation-search", &file);
+        let run = failing("translation-search", &file);
         let sentence = "neither a standard deviation nor a covariance";
         run.finish().failed_with(&["mine.py", sentence]);
     }
@@ -303,15 +309,25 @@ fn one_that_changes_neither_goes_on_nor_passes_for_the_one_before() {
 }
 
 #[test]
-fn a_begun_project_keeps_the_contract_and_drives() {
+fn a_begun_mask_keeps_the_contract_and_drives() {
+    begun_keep_the_contract_and_drive(&[("masking", "mask")]);
+}
+
+#[test]
+#[ignore = "nightly: the same of the searches"]
+fn begun_searches_keep_the_contract_and_drive() {
+    let searches = [
+        ("rotation-search", "rotation"),
+        ("translation-search", "translation"),
+    ];
+    begun_keep_the_contract_and_drive(&searches);
+}
+
+fn begun_keep_the_contract_and_drive(stages: &[(&str, &str)]) {
     if !can_start() {
         return;
     }
-    for (stage, function) in [
-        ("masking", "mask"),
-        ("rotation-search", "rotation"),
-        ("translation-search", "translation"),
-    ] {
+    for (stage, function) in stages {
         let folder = folder();
         let mut new = gyre();
         new.current_dir(&folder)
