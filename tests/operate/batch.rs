@@ -1,6 +1,8 @@
 //! `gyre batch`: whatever is killed, the same command completes the table, and failures are told
 //! apart.
 
+mod drives;
+
 use std::{
     fs,
     path::{Path, PathBuf},
@@ -11,7 +13,8 @@ use std::{
 
 use gyre_journal as journal;
 use rustix::process::{Pid, Signal, kill_process_group};
-use tempfile::TempDir;
+
+pub(crate) use drives::Drives;
 
 use crate::common::{Ended, assert_nothing_left, gyre, leftovers, processes, recording, send};
 
@@ -19,56 +22,6 @@ use crate::common::{Ended, assert_nothing_left, gyre, leftovers, processes, reco
 const LIMIT: Duration = Duration::from_secs(180);
 const LOOK: Duration = Duration::from_millis(2);
 const SMALL: &str = "[raster]\nn = 127\ncell_m = 0.8\n";
-
-/// A list of drives, and the recordings in it.
-pub(crate) struct Drives {
-    folder: TempDir,
-    names: Vec<String>,
-}
-
-impl Drives {
-    pub fn new() -> Self {
-        let folder = crate::common::folder();
-        fs::write(folder.path().join("list.csv"), "name,drive,set\n").unwrap();
-        Self {
-            folder,
-            names: Vec::new(),
-        }
-    }
-
-    /// Parts of the small recording.
-    pub fn recordings(mut self, parts: &[usize]) -> Self {
-        for scans in parts {
-            let kept = recording::linked(recording::small(), |scan| scan < *scans).keep();
-            let place = self.path(&format!("part-{scans}"));
-            fs::rename(kept, &place).unwrap();
-            self = self.line(&format!("part-{scans}"), &place, "");
-        }
-        self
-    }
-
-    pub fn line(mut self, name: &str, drive: &Path, set: &str) -> Self {
-        let list = self.path("list.csv");
-        let lines = fs::read_to_string(&list).unwrap();
-        let line = format!("{name},{},{set}\n", drive.display());
-        fs::write(list, lines + &line).unwrap();
-        self.names.push(name.to_owned());
-        self
-    }
-
-    pub fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    /// The command with its results in a folder.
-    pub fn batch(&self, out: &str) -> Batch<'_> {
-        Batch {
-            drives: self,
-            out: self.path(out),
-            options: Vec::new(),
-        }
-    }
-}
 
 /// A `gyre batch` command.
 #[derive(Clone)]

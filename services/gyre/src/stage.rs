@@ -29,11 +29,10 @@ type Work = Box<dyn FnOnce(&Launch) -> Result<StageCounters, StageError>>;
 
 /// Runs a stage or a follower by its name, with a function of Python if one is given.
 pub fn run(name: &str, python: Option<PathBuf>) -> ExitCode {
-    if python.is_some() && !StageConfig::PYTHON.contains(&name) {
-        let names = StageConfig::PYTHON.join(", ");
-        print::note(format_args!(
-            "gyre: {name} cannot be a function of Python; these can: {names}"
-        ));
+    if python.is_some()
+        && let Err(reason) = StageConfig::function(name)
+    {
+        print::note(format_args!("gyre: {name}: {reason}"));
         return ExitCode::FAILURE;
     }
     let stage = StageId::by_name(name).map(|stage| work_of_stage(stage, python));

@@ -39,7 +39,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
 /// Runs the stage until SIGTERM with a search of your own.
 ///
 /// # Errors
-/// What the search says, or an error of [`stage::run`].
+/// A search that fails, or an error of [`stage::run`].
 pub fn run_with(launch: &Launch, search: Search) -> Result<StageCounters, StageError> {
     stage::run(launch, &mut TranslationStage { search })
 }

@@ -29,7 +29,7 @@ pub enum New {
 #[derive(Debug, Args)]
 pub struct StageArguments {
     /// The stage that it takes the place of.
-    #[arg(value_parser = PossibleValuesParser::new(StageConfig::PYTHON))]
+    #[arg(value_parser = PossibleValuesParser::new(StageConfig::PYTHON.map(|(stage, _)| stage)))]
     pub stage: String,
     /// The folder of the project. Default: `my-STAGE`.
     pub folder: Option<PathBuf>,
@@ -63,6 +63,7 @@ pub fn new(arguments: &NewArguments) -> Result<ExitCode, Failure> {
         Some(gyre) => checkout(gyre)?,
         None => PathBuf::new(),
     };
+    let function = StageConfig::function(stage)?;
     let files = match arguments.rust {
         true => rust(stage),
         false => python(stage),
@@ -70,7 +71,7 @@ pub fn new(arguments: &NewArguments) -> Result<ExitCode, Failure> {
     for (name, text) in files {
         let fill_in = |text: &str| {
             text.replace("@stage@", stage)
-                .replace("@function@", function(stage))
+                .replace("@function@", function)
                 .replace("@gyre@", &checkout.display().to_string())
         };
         write(&folder.join(fill_in(name)), &fill_in(text))?;
@@ -80,15 +81,6 @@ pub fn new(arguments: &NewArguments) -> Result<ExitCode, Failure> {
         "{folder} is begun: {folder}/README.md says how it is tried"
     ))?;
     Ok(ExitCode::SUCCESS)
-}
-
-/// Returns the name of the function of a stage in Python.
-fn function(stage: &str) -> &'static str {
-    match stage {
-        "rotation-search" => "rotation",
-        "translation-search" => "translation",
-        _ => "mask",
-    }
 }
 
 fn python(stage: &str) -> Vec<File> {

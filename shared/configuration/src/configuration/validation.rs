@@ -34,12 +34,10 @@ impl Configuration {
                 let reason = "command and python are both set, but one program takes the place of the stage: remove one of them";
                 return Err(value(&section, reason));
             }
-            if stage.python.is_some() && !StageConfig::PYTHON.contains(&name.as_str()) {
-                let names = StageConfig::PYTHON.join(", ");
-                let reason = format!(
-                    "python is set, but of all processes a function of Python can be {names}"
-                );
-                return Err(value(&section, reason));
+            if stage.python.is_some()
+                && let Err(reason) = StageConfig::function(name)
+            {
+                return Err(value(&section, format!("python is set, but {reason}")));
             }
             let is_absent = StageId::by_name(name).is_some_and(|stage| self.is_absent(stage));
             if stage.python.is_some() && is_absent {

@@ -4,7 +4,7 @@ use std::{error::Error, fmt};
 
 use gyre_geometry::Twist;
 use gyre_radar::PolarScan;
-use ndarray::{Array2, ArrayView2, ArrayViewMut2, Zip};
+use ndarray::{Array2, ArrayView2, ArrayViewMut2};
 
 use crate::{MaskError, Sweep, compensation::CompensatedRaster};
 
@@ -108,10 +108,11 @@ impl AppliedFunction {
             Factors::OfPower(factors) => {
                 let power = scan.power();
                 check(&factors, power.dim())?;
-                let left = Zip::from(power).and(&factors);
-                let left =
-                    left.map_collect(|power, factor| (f32::from(*power) * factor).round() as u8);
-                self.powers.extend(left);
+                for (power, factors) in power.rows().into_iter().zip(factors.rows()) {
+                    let left = power.iter().zip(factors);
+                    let left = left.map(|(power, factor)| f32::from(*power) * factor);
+                    self.powers.extend(left.map(|power| power.round() as u8));
+                }
                 let scan = self.left(scan);
                 rasters.make(&Sweep { scan, ..*sweep }, later)?;
                 None

@@ -56,7 +56,7 @@ def mask(result, scan) -> tuple[dict, memoryview]:
                          f"or of scan.raster, {shapes['raster']}")
     if len(of) == 2:
         raise ValueError(f"scan.power and scan.raster are both {factors.shape}: choose another raster.n")
-    if not (factors.min() >= 0.0 and factors.max() <= 1.0):
+    if result.dtype != bool and not (factors.min() >= 0.0 and factors.max() <= 1.0):
         raise ValueError("it returned factors that are not all from 0 to 1")
     return {"of": of[0], "kind": factors.dtype.str[1:], "shape": factors.shape}, factors.data
 

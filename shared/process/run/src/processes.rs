@@ -78,8 +78,24 @@ pub struct StageConfig {
 }
 
 impl StageConfig {
-    /// The processes that can be a function of Python.
-    pub const PYTHON: [&'static str; 3] = ["masking", "rotation-search", "translation-search"];
+    /// The processes that can be a function of Python, each with the name of the function.
+    pub const PYTHON: [(&'static str, &'static str); 3] = [
+        ("masking", "mask"),
+        ("rotation-search", "rotation"),
+        ("translation-search", "translation"),
+    ];
+
+    /// Returns the function of Python that a process can be.
+    ///
+    /// # Errors
+    /// Of the others: those that can be one.
+    pub fn function(process: &str) -> Result<&'static str, String> {
+        let found = Self::PYTHON.iter().find(|(name, _)| *name == process);
+        found.map(|(_, function)| *function).ok_or_else(|| {
+            let names = Self::PYTHON.map(|(name, _)| name).join(", ");
+            format!("of all processes {names} can be a function of Python")
+        })
+    }
 
     /// Returns the command of a process: its replacement, or `gyre stage NAME`.
     pub fn command(&self, gyre: &str, name: &str) -> Vec<String> {

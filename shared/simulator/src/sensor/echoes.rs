@@ -35,6 +35,17 @@ pub(super) struct Echo {
 }
 
 impl Echo {
+    /// Creates the echo of what stands still at the radar's height; `None` if it is negligible.
+    pub fn still(position: Point2<f64>, power: f64, azimuth: f64) -> Option<Self> {
+        (power > NEGLIGIBLE_POWER).then(|| Self {
+            position,
+            velocity: Vector2::zeros(),
+            amplitude: power.sqrt(),
+            azimuth,
+            height_m: 0.0,
+        })
+    }
+
     /// The position at the time of an azimuth.
     pub fn place(&self, azimuth_pose: &AzimuthPose) -> Point2<f64> {
         self.position + self.velocity * azimuth_pose.time_s

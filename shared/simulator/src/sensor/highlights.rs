@@ -9,9 +9,9 @@
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
 
-use nalgebra::{Point2, Vector2};
+use nalgebra::Point2;
 
-use super::echoes::{Echo, NEGLIGIBLE_POWER, View};
+use super::echoes::{Echo, View};
 use super::sweep_poses::AzimuthPose;
 use crate::body::Wall;
 use crate::world::World;
@@ -48,15 +48,7 @@ impl View<'_> {
             let cross_section_m2 = PI * range_m * range_m * wall.mirror * SMOOTHNESS;
             let passed = self.transmission(azimuth, range_m, wall.body);
             let power = cross_section_m2 * passed * self.received(range_m);
-            if power > NEGLIGIBLE_POWER {
-                echoes.push(Echo {
-                    position,
-                    velocity: Vector2::zeros(),
-                    amplitude: power.sqrt(),
-                    azimuth,
-                    height_m: 0.0,
-                });
-            }
+            echoes.extend(Echo::still(position, power, azimuth));
         });
     }
 }

@@ -5,10 +5,10 @@
 //! (the first type of Kamann et al. 2018, Automotive Radar Multipath Propagation in Uncertain
 //! Environments).
 
-use nalgebra::{Point2, Vector2};
+use nalgebra::Point2;
 
 use super::antenna::Antenna;
-use super::echoes::{Echo, NEGLIGIBLE_POWER, View};
+use super::echoes::{Echo, View};
 use super::ghosts::{before_mirrors, image};
 use super::sweep_poses::AzimuthPose;
 use crate::body::{Scatterer, Wall};
@@ -51,14 +51,8 @@ impl View<'_> {
                 * cross_section_m2
                 * self.received(range_m)
                 * self.elevation_gain(of, range_m, from);
-            if range_m < self.reach_m && power > NEGLIGIBLE_POWER {
-                echoes.push(Echo {
-                    position,
-                    velocity: Vector2::zeros(),
-                    amplitude: power.sqrt(),
-                    azimuth,
-                    height_m: 0.0,
-                });
+            if range_m < self.reach_m {
+                echoes.extend(Echo::still(position, power, azimuth));
             }
         });
     }
