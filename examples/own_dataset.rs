@@ -133,7 +133,7 @@ pub(crate) fn drive(dataset: &mut dyn Dataset) -> Result<Trajectory, Box<dyn Err
     let mut trajectory = Trajectory::default();
     for index in 0..dataset.len() {
         scan.geometry = dataset.read(index, scan.slot())?;
-        let registered = odometry.register(&scan.view())?;
+        let registered = odometry.register(&scan.view(), &[])?;
         let stamps = trajectory.stamp_ns.get_or_insert_default();
         stamps.push(scan.geometry.stamp_ns);
         trajectory.poses.push(registered.pose.motion);

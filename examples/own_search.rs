@@ -78,7 +78,7 @@ pub(crate) fn drive(simulator: &Simulator) -> Result<Vec<Registered>, Box<dyn Er
     let mut odometry = Odometry::with_parts(&config, parts);
     let scans = (0..simulator.scans()).map(|index| simulator.render_scan(index).scan);
     scans
-        .map(|scan| Ok(odometry.register(&scan.view())?))
+        .map(|scan| Ok(odometry.register(&scan.view(), &[])?))
         .collect()
 }
 

@@ -53,7 +53,7 @@ pub(crate) fn drive(sweeps: i64) -> Result<Vec<Registered>, Box<dyn Error>> {
             stamp_ns: &stamp_ns,
             flags: &[flag::MEASURED; AZIMUTHS],
         };
-        Ok(odometry.register(&scan)?)
+        Ok(odometry.register(&scan, &[])?)
     };
     (0..sweeps).map(register).collect()
 }

@@ -22,7 +22,7 @@ struct State {
 
 impl State {
     fn register(&mut self, scan: &gyre_radar::PolarScan<'_>) -> Result<Registered, OdometryError> {
-        let mut registered = self.odometry.register(scan)?;
+        let mut registered = self.odometry.register(scan, &[])?;
         // Numbers are those of a run, which counts on where a new chain starts.
         registered.seq = self.trajectory.len() as u64;
         let stamp_ns = scan.geometry.stamp_ns;

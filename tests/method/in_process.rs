@@ -23,7 +23,7 @@ fn register_all(run: &Run) -> Vec<Registered> {
     scans
         .map(|index| {
             scan.geometry = dataset.read(index, scan.slot()).unwrap();
-            odometry.register(&scan.view()).unwrap()
+            odometry.register(&scan.view(), &[]).unwrap()
         })
         .collect()
 }

@@ -113,7 +113,7 @@ impl MaskInspector {
                 return Ok(false);
             }
         }
-        let registered = self.odometry.register(&self.spare.view());
+        let registered = self.odometry.register(&self.spare.view(), &[]);
         let registered = registered.map_err(|error| format!("scan {number}: {error}"))?;
         self.last.swap(0, 1);
         std::mem::swap(&mut self.last[0], &mut self.spare);

@@ -98,7 +98,7 @@ impl Drive {
         if scan.geometry.doppler_s == 0.0 {
             scan.geometry.doppler_s = NO_DOPPLER_S;
         }
-        let registered = self.odometry.register(&scan)?;
+        let registered = self.odometry.register(&scan, &[])?;
         self.sense = match scan.geometry.sense {
             Sense::Clockwise => -1.0,
             Sense::CounterClockwise => 1.0,

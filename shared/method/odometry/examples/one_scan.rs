@@ -24,7 +24,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut odometry = Odometry::new(&OdometryConfig::default())?;
     for index in scans {
         scan.geometry = dataset.read(index, scan.slot())?;
-        let registered = odometry.register(&scan.view())?;
+        let registered = odometry.register(&scan.view(), &[])?;
         let [x_m, y_m, yaw_rad] = xy_yaw(&registered.motion.motion);
         let sigma = registered
             .motion

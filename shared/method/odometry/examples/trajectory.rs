@@ -42,7 +42,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 continue;
             }
         }
-        let registered = odometry.register(&scan.view())?;
+        let registered = odometry.register(&scan.view(), &[])?;
         stamps.push(scan.geometry.stamp_ns);
         poses.push(registered.pose.motion);
     }

@@ -2,6 +2,7 @@
 
 use gyre_masking::MaskingConfig;
 use gyre_radar::{PointsConfig, RasterConfig};
+use gyre_samples::GyroConfig;
 use gyre_scan_matching::{ExhaustiveConfig, RefinementConfig, RotationConfig, TranslationConfig};
 use serde::{Deserialize, Serialize};
 
@@ -26,6 +27,8 @@ pub struct OdometryConfig {
     pub exhaustive: ExhaustiveConfig,
     /// The refinement of searched motions.
     pub refinement: RefinementConfig,
+    /// The gyro, if there is one.
+    pub gyro: GyroConfig,
 }
 
 /// The section `[search]`.

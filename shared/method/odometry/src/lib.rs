@@ -25,7 +25,7 @@
 //! let mut odometry = Odometry::new(&OdometryConfig::default())?;
 //! for index in 0..2 {
 //!     scan.geometry = dataset.read(index, scan.slot())?;
-//!     let registered = odometry.register(&scan.view())?;
+//!     let registered = odometry.register(&scan.view(), &[])?;
 //!     if index == 1 {
 //!         assert_eq!(registered.outcome, Outcome::Refined);
 //!         assert!(registered.motion.motion.translation.x > 0.5, "the vehicle drives ahead");

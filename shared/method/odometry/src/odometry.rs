@@ -2,6 +2,7 @@
 
 use gyre_geometry::{ComposedMotion, OdometryMotion, SparsePoint, Twist, UncertainMotion};
 use gyre_radar::{LostAzimuthFinder, LostAzimuths, PlacedRows, PolarScan};
+use gyre_samples::{Gyro, Sample};
 use gyre_scan_matching::{JointMatch, Refined};
 use ndarray::{ArrayView2, ArrayViewMut2};
 
@@ -16,6 +17,7 @@ pub struct Odometry {
     search: Box<dyn Search>,
     refiner: Option<Box<dyn Refine>>,
     twists: LaggedTwists,
+    gyro: Gyro,
     finder: LostAzimuthFinder,
     lost: LostAzimuths,
     rows: PlacedRows,
@@ -45,6 +47,7 @@ impl Odometry {
             search: parts.search,
             refiner: parts.refiner,
             twists: LaggedTwists::new(config.masking.feedback_lag()),
+            gyro: Gyro::new(&config.gyro),
             finder: LostAzimuthFinder::default(),
             lost: LostAzimuths::default(),
             rows: PlacedRows::default(),
@@ -56,16 +59,25 @@ impl Odometry {
     /// that is not later than the previous one, or by more than [`gyre_radar::MAX_INTERVAL_NS`],
     /// starts a new chain as after [`Odometry::restart`].
     ///
+    /// `samples` are those of other sensors since the last azimuth of the scan before; none, for
+    /// radar alone.
+    ///
     /// # Errors
     /// A scan that cannot be used. It is skipped: the next scan is registered against the one
     /// before the error.
-    pub fn register(&mut self, scan: &PolarScan<'_>) -> Result<Registered, OdometryError> {
+    pub fn register(
+        &mut self,
+        scan: &PolarScan<'_>,
+        samples: &[Sample],
+    ) -> Result<Registered, OdometryError> {
         scan.check()?;
         scan.check_times()?;
         if !self.pair.is_continued_at(scan.geometry.stamp_ns) {
             self.restart();
         }
-        self.mask(scan, self.twists.next())?;
+        self.gyro.push(samples);
+        self.pair.expect_turn(scan, &self.gyro);
+        self.mask(scan, self.pair.compensated(self.twists.next()))?;
         let searched = self.search()?;
         let refined = searched.as_ref().and_then(|motion| self.refine(motion));
         let registered = self.integrate(searched, refined);
@@ -140,6 +152,7 @@ impl Odometry {
     pub fn restart(&mut self) {
         self.pair.restart();
         self.twists.clear();
+        self.gyro.clear();
         self.finder.reset();
         if let Some(refiner) = &mut self.refiner {
             refiner.reset();

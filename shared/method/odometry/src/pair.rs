@@ -3,6 +3,7 @@
 use gyre_geometry::{SparsePoint, Twist};
 use gyre_masking::Sweep;
 use gyre_radar::{PolarScan, continues};
+use gyre_samples::{Gyro, GyroTurn};
 use ndarray::{Array2, ArrayView2, ArrayViewMut2};
 
 use crate::{Mask, OdometryError, Rasters};
@@ -14,6 +15,8 @@ pub struct Pair {
     /// The raster of the earlier scan, masked for this pair, if the mask takes two scans.
     earlier_for_pair: Option<Array2<f32>>,
     seq: u64,
+    /// From the earlier scan to the later one.
+    turn: Option<GyroTurn>,
 }
 
 /// The products of a scan.
@@ -84,12 +87,38 @@ impl Pair {
         self.later.azimuth_variance_rad2
     }
 
+    /// Returns the turn from the earlier scan to the later one, as the gyro has measured it.
+    pub fn turn(&self) -> Option<GyroTurn> {
+        self.turn
+    }
+
+    /// Integrates the turn from the earlier scan to the one that comes.
+    pub(crate) fn expect_turn(&mut self, scan: &PolarScan<'_>, gyro: &Gyro) {
+        let stamps = [self.earlier.stamp_ns, scan.geometry.stamp_ns];
+        self.turn = (self.seq > 0)
+            .then(|| gyro.turn(stamps, scan.span_ns()))
+            .flatten();
+    }
+
+    /// The velocity for the compensation of the scan that comes: the gyro's yaw rate, if there is
+    /// one.
+    pub(crate) fn compensated(&self, twist: Option<Twist>) -> Option<Twist> {
+        let turned = |twist: Twist| Twist {
+            yaw_rate_radps: self
+                .turn
+                .map_or(twist.yaw_rate_radps, |turn| turn.sweep_rate_radps),
+            ..twist
+        };
+        twist.map(turned)
+    }
+
     pub(crate) fn new(n: usize, capacity: usize, masked_scans: usize) -> Self {
         Self {
             later: Frame::new(n, capacity),
             earlier: Frame::new(n, capacity),
             earlier_for_pair: (masked_scans == 2).then(|| Array2::zeros((n, n))),
             seq: 0,
+            turn: None,
         }
     }
 

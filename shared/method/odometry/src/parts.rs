@@ -65,7 +65,7 @@ pub trait Refine: Send + Sync {
 /// # use gyre_simulator::{SimulationConfig, Simulator};
 /// # let drive = Simulator::new(&SimulationConfig { scans: Some(1), ..SimulationConfig::default() })?;
 /// # let scan = drive.render_scan(0).scan;
-/// odometry.register(&scan.view())?;
+/// odometry.register(&scan.view(), &[])?;
 /// assert!(odometry.raster().slice(s![128.., 122..133]).iter().all(|power| *power == 0.0));
 /// assert!(odometry.raster().iter().any(|power| *power > 0.0));
 /// # Ok(())
@@ -119,7 +119,7 @@ fn refiner(config: &OdometryConfig) -> Result<Option<Box<dyn Refine>>, SetupErro
         RefinementKind::None => Ok(None),
         RefinementKind::LocalMap if capacity == 0 => Err(SetupError::NoPoints),
         RefinementKind::LocalMap => {
-            let refiner = Refiner::new(&config.refinement, capacity)?;
+            let refiner = Refiner::new(&config.refinement, capacity)?.with_gyro(&config.gyro);
             Ok(Some(Box::new(refiner)))
         }
     }
@@ -130,6 +130,7 @@ impl Refine for Refiner {
         let (later, earlier) = (pair.later_points(), pair.earlier_points());
         let interval_s = pair.interval_ns() as f64 * 1e-9;
         self.expect_azimuth_errors(pair.azimuth_variance_rad2());
+        self.expect_turn(pair.turn());
         Refiner::refine(self, pair.seq(), later, earlier, searched, interval_s)
     }
 

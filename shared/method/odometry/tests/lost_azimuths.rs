@@ -96,7 +96,7 @@ fn errors_m(seed: u64) -> [f64; 4] {
             let scan = scan.view();
             let places = rows_before_which(&drive, index).into_iter();
             let known = LostAzimuths::between(places.filter(|_| known).map(|row| [row as u16; 2]));
-            let registered = odometry.register(&rows.place(&scan, &known)).unwrap();
+            let registered = odometry.register(&rows.place(&scan, &known), &[]).unwrap();
             if index >= FIRST {
                 let off = motion(&drive, index).inv_mul(&registered.motion.motion);
                 square_m2 += off.translation.vector.norm_squared();

@@ -25,7 +25,7 @@ fn motion(recording: &Path, hold: bool) -> [f64; 3] {
     let mut odometry = Odometry::new(&config.odometry).unwrap();
     let registered = [0, 1].map(|index| {
         scan.geometry = dataset.read(index, scan.slot()).unwrap();
-        odometry.register(&scan.view()).unwrap()
+        odometry.register(&scan.view(), &[]).unwrap()
     });
     xy_yaw(&registered[1].motion.motion)
 }

@@ -94,7 +94,7 @@ fn drive(config: &Configuration) -> Report {
     let (mut report, mut stamp_ns) = (Report::default(), 0);
     for index in 0..scans.len() {
         scan.geometry = scans.read(index, scan.slot()).unwrap();
-        let registered = odometry.register(&scan.view()).unwrap();
+        let registered = odometry.register(&scan.view(), &[]).unwrap();
         let truth = drive.simulator().pose(index);
         let before_ns = std::mem::replace(&mut stamp_ns, scan.geometry.stamp_ns);
         if index > 0 {

@@ -115,6 +115,13 @@ impl<'a> PolarScan<'a> {
         self.stamp_ns[azimuth].saturating_sub(self.geometry.stamp_ns) as f64 * 1e-9
     }
 
+    /// Times of the first and of the last azimuth, ns since 1970; the stamp twice without azimuths.
+    pub fn span_ns(&self) -> [i64; 2] {
+        let stamps = self.stamp_ns.iter().copied();
+        let or_stamp = |ns: Option<i64>| ns.unwrap_or(self.geometry.stamp_ns);
+        [or_stamp(stamps.clone().min()), or_stamp(stamps.max())]
+    }
+
     /// Doppler coefficient of one azimuth, s: [`SweepGeometry::doppler_s`] with the sign of the
     /// azimuth's chirp where it is known.
     pub fn doppler_s(&self, azimuth: usize) -> f32 {

@@ -12,6 +12,7 @@
 //! - `alignment`, `normal_equations`: Gauss-Newton with a line search;
 //! - `tracker`: the last poses, what is predicted from them, and which poses a vehicle can have
 //!   reached;
+//! - `heading`: with a gyro, the heading and the gyro's bias;
 //! - `uncertainty`: covariances, and the shares of them that accumulate;
 //! - `standstill`: the pose of a standing vehicle is held;
 //! - [`Submap`]: the points of a keyframe and of those around it;
@@ -20,6 +21,7 @@
 
 mod alignment;
 mod config;
+mod heading;
 mod initial_guess;
 mod keyframe_aligner;
 mod local_map;
@@ -34,6 +36,8 @@ mod uncertainty;
 
 pub use config::{RefinementConfig, RefinementKind};
 use gyre_geometry::{OdometryMotion, Pose, SparsePoint, Twist, UncertainMotion};
+use gyre_samples::{GyroConfig, GyroTurn};
+pub use heading::Heading;
 pub use initial_guess::InitialGuess;
 pub use keyframe_aligner::KeyframeAligner;
 pub use local_map::Keyframe;
@@ -42,10 +46,12 @@ pub use submap::Submap;
 pub use tracker::{Anchor, TrackerState};
 
 use crate::ConfigError;
+use heading::PredictedTurn;
 use local_map::LocalMap;
 use points::DeskewedPoints;
 use registration::{Candidate, Registration, Scan};
 use standstill::{Estimate, Report};
+use tracker::Step;
 use uncertainty::Uncertainty;
 
 /// After this many doubtful scans in a row a plausible match is accepted.
@@ -85,10 +91,12 @@ pub struct Refined {
 #[derive(Debug)]
 pub struct Refiner {
     config: RefinementConfig,
+    gyro: GyroConfig,
     map: LocalMap,
     state: TrackerState,
     points: DeskewedPoints,
     azimuth_variance_rad2: f64,
+    turn: Option<GyroTurn>,
 }
 
 impl Refiner {
@@ -101,10 +109,25 @@ impl Refiner {
         Ok(Self {
             map: LocalMap::new(config),
             config: config.clone(),
+            gyro: GyroConfig::default(),
             state: TrackerState::default(),
             points: DeskewedPoints::with_capacity(capacity),
             azimuth_variance_rad2: 0.0,
+            turn: None,
         })
+    }
+
+    /// Uses the turns of a gyro of this kind: [`Refiner::expect_turn`].
+    #[must_use]
+    pub fn with_gyro(mut self, gyro: &GyroConfig) -> Self {
+        self.gyro = gyro.clone();
+        self
+    }
+
+    /// Sets the turn from the earlier scan to the later one that the gyro has measured; `None`
+    /// where it has not.
+    pub fn expect_turn(&mut self, turn: Option<GyroTurn>) {
+        self.turn = turn;
     }
 
     /// Sets the mean variance of the azimuths of the next scan's points, rad²; 0 at first. Errors
@@ -130,8 +153,11 @@ impl Refiner {
             id: scan,
             points: later,
             searched: self.state.pose * searched,
-            // Stamps that do not advance give no velocity: a second is assumed.
-            interval_s: if interval_s > 0.0 { interval_s } else { 1.0 },
+            step: Step {
+                // Stamps that do not advance give no velocity: a second is assumed.
+                interval_s: if interval_s > 0.0 { interval_s } else { 1.0 },
+                turn: self.predict_turn(),
+            },
         };
         let predictions = self.ensure_map(&scan, earlier);
         let uncertainty = Uncertainty::before(&scan, &self.map, predictions, &self.config);
@@ -200,13 +226,20 @@ impl Refiner {
     /// with the searched motion, then with the one that aligning the later scan gives.
     fn start_map(&mut self, scan: &Scan<'_>, earlier: &[SparsePoint]) {
         let (id, pose) = (scan.id.wrapping_sub(1), self.state.pose);
-        let twist = self.state.twist_to(&scan.searched, scan.interval_s);
+        let twist = self.state.twist_to(&scan.searched, &scan.step);
         self.insert_keyframe(id, earlier, &pose, &twist);
         let aligned = self.registration(scan).match_prediction_or_search();
         let pose_of_later = aligned.alignment.pose;
-        let twist = self.state.twist_to(&pose_of_later, scan.interval_s);
+        let twist = self.state.twist_to(&pose_of_later, &scan.step);
         self.map.clear();
         self.insert_keyframe(id, earlier, &pose, &twist);
+    }
+
+    /// Predicts the turn since the scan before by the gyro.
+    fn predict_turn(&mut self) -> Option<PredictedTurn> {
+        let turn = self.turn?;
+        let heading = self.state.heading.get_or_insert(Heading::new(&self.gyro));
+        Some(heading.predict(&turn, &self.gyro))
     }
 
     fn registration<'a>(&'a mut self, scan: &'a Scan<'a>) -> Registration<'a> {
@@ -222,7 +255,7 @@ impl Refiner {
     /// Returns the pose of a plausible match and the covariance of its motion, or the predicted
     /// ones.
     fn accept_or_predict(
-        &self,
+        &mut self,
         scan: &Scan<'_>,
         best: &Candidate,
         uncertainty: &Uncertainty,
@@ -234,19 +267,34 @@ impl Refiner {
             &self.config,
         );
         let Some(covariance) = covariance.filter(|_| best.is_plausible) else {
-            let [motion, _] = self.state.predict(scan.interval_s);
+            let [motion, _] = self.state.predict(&scan.step);
             let covariance = uncertainty.of_prediction();
             return (Outcome::Predicted, UncertainMotion { motion, covariance });
         };
         let by_azimuths = uncertainty::by_azimuths(&best.alignment, self.azimuth_variance_rad2);
-        let covariance = covariance + by_azimuths;
-        let motion = best.alignment.pose;
-        if self.is_firm(scan, best) || self.state.doubtful >= MAX_DOUBTFUL {
-            (Outcome::Refined, UncertainMotion { motion, covariance })
-        } else {
-            let covariance = covariance * uncertainty::WEAK_FACTOR;
-            (Outcome::Weak, UncertainMotion { motion, covariance })
-        }
+        let is_firm = self.is_firm(scan, best) || self.state.doubtful >= MAX_DOUBTFUL;
+        let (outcome, factor) = match is_firm {
+            true => (Outcome::Refined, 1.0),
+            false => (Outcome::Weak, uncertainty::WEAK_FACTOR),
+        };
+        let registered = UncertainMotion {
+            motion: best.alignment.pose,
+            covariance: (covariance + by_azimuths) * factor,
+        };
+        (outcome, self.with_gyro_heading(scan, registered))
+    }
+
+    /// Weighs the heading of a registered pose against that of the gyro, if there is one.
+    fn with_gyro_heading(
+        &mut self,
+        scan: &Scan<'_>,
+        registered: UncertainMotion,
+    ) -> UncertainMotion {
+        let (Some(turn), Some(heading)) = (scan.step.turn, &mut self.state.heading) else {
+            return registered;
+        };
+        let drift_share = uncertainty::drift_share(self.map.len(), &self.config);
+        heading.weigh(&registered, &self.state.pose, &turn, drift_share)
     }
 
     /// Returns whether the scan overlaps the map well, has enough points, and agrees with the
@@ -271,7 +319,7 @@ impl Refiner {
             pose,
             previous: self.state.pose,
             outcome,
-            interval_s: scan.interval_s,
+            interval_s: scan.step.interval_s,
         };
         match self.config.hold_standstill {
             true => self.state.standstill.next(&estimate),
@@ -282,14 +330,19 @@ impl Refiner {
     /// Updates the tracker state and the map with the accepted or predicted pose.
     fn update(&mut self, scan: &Scan<'_>, best: &Candidate, outcome: Outcome, pose: &Pose) {
         let (config, fit) = (&self.config, [best.overlap, best.weight]);
-        let twist = self.state.twist_to(pose, scan.interval_s);
-        self.state
-            .update(*pose, outcome, fit, scan.interval_s, config);
+        let twist = self.state.twist_to(pose, &scan.step);
+        self.state.update(*pose, outcome, fit, &scan.step, config);
         if self.state.unmatched >= config.max_unmatched {
             // A new map starts with this scan at the next call, and so on until two scans match.
             self.map.clear();
+            if let Some(heading) = &mut self.state.heading {
+                heading.start_map();
+            }
         } else if outcome == Outcome::Refined && self.map.needs_keyframe(pose, config) {
             self.insert_keyframe(scan.id, scan.points, pose, &twist);
+            if let Some(heading) = &mut self.state.heading {
+                heading.follow(self.map.len());
+            }
         }
     }
 

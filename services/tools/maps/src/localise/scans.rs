@@ -76,7 +76,7 @@ impl Scans {
             let registered = match self.dataset.read(number, self.scan.slot()) {
                 Ok(geometry) => {
                     self.scan.geometry = geometry;
-                    let registered = self.odometry.register(&self.scan.view());
+                    let registered = self.odometry.register(&self.scan.view(), &[]);
                     registered.map_err(|error| format!("scan {number}: {error}"))
                 }
                 Err(error) => Err(error.to_string()),

@@ -9,6 +9,7 @@ use super::{
     initial_guess::{initial_guesses, yaw_offsets},
     local_map::LocalMap,
     points::DeskewedPoints,
+    tracker::Step,
 };
 
 const COARSE_ITERATIONS: usize = 10;
@@ -29,8 +30,7 @@ pub(super) struct Scan<'a> {
     pub points: &'a [SparsePoint],
     /// Pose in the map by the motion that the search found.
     pub searched: Pose,
-    /// Time since the scan before, s.
-    pub interval_s: f64,
+    pub step: Step,
 }
 
 /// The registration of one scan.
@@ -83,14 +83,14 @@ impl Registration<'_> {
         if best.is_plausible {
             return best;
         }
-        let [predicted, _] = self.state.predict(self.scan.interval_s);
+        let [predicted, _] = self.state.predict(&self.scan.step);
         let offset = self.align(&yaw_offsets(predicted));
         if offset.is_plausible { offset } else { best }
     }
 
     /// Returns the best match of the predictions and the searched motion.
     pub fn match_prediction_or_search(&mut self) -> Candidate {
-        let predicted = self.state.predict(self.scan.interval_s);
+        let predicted = self.state.predict(&self.scan.step);
         self.align(&initial_guesses(predicted, self.scan.searched))
     }
 
@@ -152,7 +152,7 @@ impl Registration<'_> {
 
     /// Deskews the scan with the motion that leads to `pose`.
     fn deskew(&mut self, pose: &Pose) {
-        let twist = self.state.twist_to(pose, self.scan.interval_s);
+        let twist = self.state.twist_to(pose, &self.scan.step);
         self.points.deskew(self.scan.points, &twist);
     }
 
@@ -181,6 +181,6 @@ impl Registration<'_> {
 
     fn is_reachable(&self, pose: &Pose, jitter_share: f64) -> bool {
         self.state
-            .can_reach(pose, self.scan.interval_s, jitter_share, self.config)
+            .can_reach(pose, &self.scan.step, jitter_share, self.config)
     }
 }

@@ -2,8 +2,9 @@
 //! match on average.
 
 use gyre_geometry::{Pose, Twist};
+use nalgebra::UnitComplex;
 
-use super::{Outcome, RefinementConfig, Standstill};
+use super::{Heading, Outcome, RefinementConfig, Standstill, heading::PredictedTurn};
 
 /// Weight of the newest velocity, which jitters with each match, in its running mean.
 const TWIST_GAIN: f64 = 0.5;
@@ -28,6 +29,17 @@ pub struct TrackerState {
     pub unmatched: u32,
     /// The place where the vehicle stands, for the reported motions.
     pub standstill: Standstill,
+    /// What is known of the gyro; `None` until it has measured a turn.
+    pub heading: Option<Heading>,
+}
+
+/// What is known of the next scan before it is registered.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Step {
+    /// Time since the scan before, s.
+    pub interval_s: f64,
+    /// The turn since then, by the gyro.
+    pub turn: Option<PredictedTurn>,
 }
 
 /// A refined scan from which the next poses are predicted.
@@ -51,14 +63,24 @@ impl Default for TrackerState {
             doubtful: 0,
             unmatched: 0,
             standstill: Standstill::default(),
+            heading: None,
         }
     }
 }
 
 impl Anchor {
-    /// The pose after the interval at constant velocity.
-    fn predict(&self, interval_s: f64) -> Pose {
-        self.pose * self.twist.chord_pose_at(self.age_s + interval_s)
+    /// The pose after the interval at constant velocity; with the heading of the gyro, if there is
+    /// one.
+    fn predict(&self, interval_s: f64, heading: Option<UnitComplex<f64>>) -> Pose {
+        let time_s = self.age_s + interval_s;
+        let Some(heading) = heading else {
+            return self.pose * self.twist.chord_pose_at(time_s);
+        };
+        let twist = Twist {
+            yaw_rate_radps: self.pose.rotation.rotation_to(&heading).angle() / time_s,
+            ..self.twist
+        };
+        self.pose * twist.chord_pose_at(time_s)
     }
 
     /// The mean velocity from here to `pose`.
@@ -73,6 +95,7 @@ impl Anchor {
         &self,
         pose: &Pose,
         interval_s: f64,
+        heading: Option<UnitComplex<f64>>,
         jitter_share: f64,
         config: &RefinementConfig,
     ) -> bool {
@@ -81,8 +104,14 @@ impl Anchor {
         let moved = (twist.linear_mps() - self.twist.linear_mps()) * time_s;
         let turned = (twist.yaw_rate_radps - self.twist.yaw_rate_radps) * time_s;
         let shift = config.jitter_m * jitter_share + config.acceleration_mps2 * time_s.powi(2);
-        let turn =
-            config.jitter_deg * jitter_share + config.yaw_acceleration_degps2 * time_s.powi(2);
+        let jitter = config.jitter_deg * jitter_share;
+        let (turned, turn) = match heading {
+            Some(heading) => (heading.rotation_to(&pose.rotation).angle(), jitter),
+            None => (
+                turned,
+                jitter + config.yaw_acceleration_degps2 * time_s.powi(2),
+            ),
+        };
         moved.norm() <= shift && turned.abs() <= turn.to_radians()
     }
 }
@@ -90,15 +119,32 @@ impl Anchor {
 impl TrackerState {
     /// The poses after the interval at constant velocity, predicted from each anchor; the last pose
     /// if there is none.
-    pub(super) fn predict(&self, interval_s: f64) -> [Pose; 2] {
-        let from = |anchor: &Anchor| anchor.predict(interval_s);
+    pub(super) fn predict(&self, step: &Step) -> [Pose; 2] {
+        let heading = self.heading_at(step);
+        let from = |anchor: &Anchor| anchor.predict(step.interval_s, heading);
         let first = self.anchors[0].as_ref().map_or(self.pose, from);
         [first, self.anchors[1].as_ref().map_or(first, from)]
     }
 
-    /// The mean velocity from the newest anchor, (or from the last pose if there is none) to
-    /// `pose`.
-    pub(super) fn twist_to(&self, pose: &Pose, interval_s: f64) -> Twist {
+    /// The heading of a scan by the gyro.
+    fn heading_at(&self, step: &Step) -> Option<UnitComplex<f64>> {
+        let turn = step.turn?;
+        Some(self.pose.rotation * UnitComplex::new(turn.yaw_rad))
+    }
+
+    /// The velocity during a scan at `pose`: the mean since the newest anchor, or since the last
+    /// pose if there is none; the gyro's yaw rate, if there is one.
+    pub(super) fn twist_to(&self, pose: &Pose, step: &Step) -> Twist {
+        let mean = self.mean_twist_to(pose, step.interval_s);
+        Twist {
+            yaw_rate_radps: step
+                .turn
+                .map_or(mean.yaw_rate_radps, |turn| turn.sweep_rate_radps),
+            ..mean
+        }
+    }
+
+    fn mean_twist_to(&self, pose: &Pose, interval_s: f64) -> Twist {
         match &self.anchors[0] {
             Some(anchor) => anchor.twist_to(pose, interval_s),
             None => Twist::from_chord(&self.pose.inv_mul(pose), interval_s),
@@ -109,13 +155,15 @@ impl TrackerState {
     pub(super) fn can_reach(
         &self,
         pose: &Pose,
-        interval_s: f64,
+        step: &Step,
         jitter_share: f64,
         config: &RefinementConfig,
     ) -> bool {
+        let (interval_s, heading) = (step.interval_s, self.heading_at(step));
         let mut anchors = self.anchors.iter().flatten().peekable();
         anchors.peek().is_none()
-            || anchors.any(|anchor| anchor.can_reach(pose, interval_s, jitter_share, config))
+            || anchors
+                .any(|anchor| anchor.can_reach(pose, interval_s, heading, jitter_share, config))
     }
 
     /// Updates the state with the pose of the next scan.
@@ -124,11 +172,12 @@ impl TrackerState {
         pose: Pose,
         outcome: Outcome,
         [overlap, weight]: [f64; 2],
-        interval_s: f64,
+        step: &Step,
         config: &RefinementConfig,
     ) {
+        let interval_s = step.interval_s;
         match outcome {
-            Outcome::Refined => self.push_anchor(pose, interval_s, config),
+            Outcome::Refined => self.push_anchor(pose, step, config),
             _ => self
                 .anchors
                 .iter_mut()
@@ -154,18 +203,19 @@ impl TrackerState {
 
     /// Makes `pose` the newest anchor. An anchor from which it cannot be reached was wrong and is
     /// dropped.
-    fn push_anchor(&mut self, pose: Pose, interval_s: f64, config: &RefinementConfig) {
+    fn push_anchor(&mut self, pose: Pose, step: &Step, config: &RefinementConfig) {
+        let (interval_s, heading) = (step.interval_s, self.heading_at(step));
         let valid = self
             .anchors
             .iter()
             .flatten()
-            .find(|anchor| anchor.can_reach(&pose, interval_s, 1.0, config))
+            .find(|anchor| anchor.can_reach(&pose, interval_s, heading, 1.0, config))
             .copied();
         let twist = match &valid {
             Some(anchor) => anchor
                 .twist
                 .lerp(&anchor.twist_to(&pose, interval_s), TWIST_GAIN),
-            None => self.twist_to(&pose, interval_s),
+            None => self.mean_twist_to(&pose, interval_s),
         };
         let aged = valid.map(|anchor| Anchor {
             age_s: anchor.age_s + interval_s,
@@ -196,14 +246,17 @@ mod tests {
 
     use super::*;
 
-    const INTERVAL_S: f64 = 0.25;
+    const STEP: Step = Step {
+        interval_s: 0.25,
+        turn: None,
+    };
 
     fn after(poses: &[(f64, f64)]) -> TrackerState {
         let config = RefinementConfig::default();
         let mut state = TrackerState::default();
         for (x, yaw) in poses {
             let pose = pose(*x, 0.0, *yaw);
-            state.update(pose, Outcome::Refined, [0.3, 100.0], INTERVAL_S, &config);
+            state.update(pose, Outcome::Refined, [0.3, 100.0], &STEP, &config);
         }
         state
     }
@@ -219,7 +272,7 @@ mod tests {
             (12.5, 0.0),
             (15.0, 0.0),
         ]);
-        let [from_last, from_second_last] = state.predict(INTERVAL_S);
+        let [from_last, from_second_last] = state.predict(&STEP);
         assert!((from_last.translation.x - 17.5).abs() < 0.1, "{from_last}");
         assert!(
             (from_second_last.translation.x - 17.5).abs() < 0.2,
@@ -233,7 +286,7 @@ mod tests {
             after(&[(0.0, 0.0), (2.5, 0.0), (5.0, 0.0)]),
             RefinementConfig::default(),
         );
-        let at = |x: f64, yaw: f64| state.can_reach(&pose(x, 0.0, yaw), INTERVAL_S, 1.0, &config);
+        let at = |x: f64, yaw: f64| state.can_reach(&pose(x, 0.0, yaw), &STEP, 1.0, &config);
         assert!(at(7.5, 0.0) && at(7.2, 0.1));
         assert!(!at(7.5, std::f64::consts::FRAC_PI_2) && !at(30.0, 0.0));
     }
@@ -244,8 +297,8 @@ mod tests {
         let config = RefinementConfig::default();
         let mut step = |x: f64, yaw: f64| {
             let pose = pose(x, 0.0, yaw);
-            let allowed = state.can_reach(&pose, INTERVAL_S, 1.0, &config);
-            state.update(pose, Outcome::Refined, [0.3, 100.0], INTERVAL_S, &config);
+            let allowed = state.can_reach(&pose, &STEP, 1.0, &config);
+            state.update(pose, Outcome::Refined, [0.3, 100.0], &STEP, &config);
             allowed
         };
         assert!(step(12.4, 0.14), "eight degrees at once are just possible");

@@ -34,7 +34,7 @@ impl Uncertainty {
         config: &RefinementConfig,
     ) -> Self {
         Self {
-            of_prediction: of_prediction(scan.interval_s, config),
+            of_prediction: of_prediction(scan.step.interval_s, config),
             predictions,
             of_map: drift_share(map.len(), config),
         }
@@ -122,7 +122,7 @@ pub(super) fn by_azimuths(alignment: &Alignment, variance_rad2: f64) -> Matrix3<
 /// steps are 2 / (k + 1) of the noise. What a vehicle has passed drops out of the mean earlier, and
 /// neighbouring scans err alike: hence the factor. A slow vehicle, not all of whose scans become
 /// keyframes, drifts less in simulation, but not on real drives.
-fn drift_share(keyframes: usize, config: &RefinementConfig) -> f64 {
+pub(super) fn drift_share(keyframes: usize, config: &RefinementConfig) -> f64 {
     let step = config.drift_scale * 2.0 / (keyframes as f64 + 1.0);
     step.powi(2).min(1.0)
 }

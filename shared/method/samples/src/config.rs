@@ -1,0 +1,187 @@
+//! Configuration of the gyro.
+
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// Configuration of the gyro: section `[gyro]`.
+///
+/// The noise is that of a data sheet. The defaults are those of a gyro that cars have.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct GyroConfig {
+    /// Whose yaw rate is used.
+    pub kind: GyroKind,
+    /// The log, for `kind = "log"`: a table as CSV whose first row names its columns.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub file: Option<PathBuf>,
+    /// Time by which the stamps of the gyro are late against the radar's, s: it is taken off them.
+    pub late_s: f64,
+    /// The axis of the gyro that points up: `z`, `-z`, `x`, `-x`, `y` or `-y`.
+    pub up: UpAxis,
+    /// True yaw rate over the measured one.
+    pub scale: f64,
+    /// Standard deviation of that scale.
+    pub scale_sigma: f64,
+    /// Bias with which a run begins, rad/s: it is taken off the measured rate.
+    pub bias_radps: f64,
+    /// Standard deviation of that bias, rad/s.
+    pub bias_sigma_radps: f64,
+    /// Angle random walk, rad/√s: that of one degree per square root of an hour is 2.9e-4.
+    pub noise_rad_per_sqrt_s: f64,
+    /// Random walk of the bias, rad/s/√s.
+    pub bias_walk_radps_per_sqrt_s: f64,
+    /// Standard deviation of the time of a sample against the radar's clock, s.
+    pub time_sigma_s: f64,
+    /// Longest time between two samples over which the rate is interpolated, s.
+    pub max_gap_s: f64,
+}
+
+/// Whose yaw rate is used.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum GyroKind {
+    /// None: by the radar alone.
+    #[default]
+    None,
+    /// The log that lies beside the scans, or what comes with them; without one it is an error.
+    Auto,
+    /// The log that `file` names.
+    Log,
+}
+
+/// The axis of a gyro that points up.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+)]
+pub enum UpAxis {
+    /// x points up.
+    #[serde(rename = "x")]
+    X,
+    /// x points down.
+    #[serde(rename = "-x")]
+    MinusX,
+    /// y points up.
+    #[serde(rename = "y")]
+    Y,
+    /// y points down.
+    #[serde(rename = "-y")]
+    MinusY,
+    /// z points up.
+    #[default]
+    #[serde(rename = "z")]
+    Z,
+    /// z points down.
+    #[serde(rename = "-z")]
+    MinusZ,
+}
+
+impl UpAxis {
+    /// Returns the rate about this axis, of the rates about x, y and z.
+    pub fn of(self, [x, y, z]: [f64; 3]) -> f64 {
+        match self {
+            Self::X => x,
+            Self::MinusX => -x,
+            Self::Y => y,
+            Self::MinusY => -y,
+            Self::Z => z,
+            Self::MinusZ => -z,
+        }
+    }
+}
+
+impl Default for GyroConfig {
+    fn default() -> Self {
+        Self {
+            kind: GyroKind::None,
+            file: None,
+            late_s: 0.0,
+            up: UpAxis::Z,
+            scale: 1.0,
+            scale_sigma: 0.01,
+            bias_radps: 0.0,
+            bias_sigma_radps: 0.01,
+            noise_rad_per_sqrt_s: 1e-4,
+            bias_walk_radps_per_sqrt_s: 5e-6,
+            time_sigma_s: 0.005,
+            max_gap_s: 0.12,
+        }
+    }
+}
+
+/// A setting of `[gyro]` out of its bounds.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[error("gyro.{key} is {value}, but must be {expected}")]
+pub struct GyroConfigError {
+    /// The key.
+    pub key: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// What it must be.
+    pub expected: &'static str,
+}
+
+impl GyroConfig {
+    /// Returns whether a gyro is used.
+    pub fn is_used(&self) -> bool {
+        self.kind != GyroKind::None
+    }
+
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// The first key that is out of its bounds.
+    pub fn validate(&self) -> Result<(), GyroConfigError> {
+        let within = |key, value: f64, [least, most]: [f64; 2], expected| match (least..=most)
+            .contains(&value)
+        {
+            true => Ok(()),
+            false => Err(GyroConfigError {
+                key,
+                value,
+                expected,
+            }),
+        };
+        let rate = "a rate in rad/s, at most 1";
+        within(
+            "late_s",
+            self.late_s,
+            [-1e6, 1e6],
+            "seconds, at most a million",
+        )?;
+        within("scale", self.scale, [0.5, 2.0], "a factor, 0.5 to 2")?;
+        within(
+            "scale_sigma",
+            self.scale_sigma,
+            [0.0, 1.0],
+            "a share, 0 to 1",
+        )?;
+        within("bias_radps", self.bias_radps, [-1.0, 1.0], rate)?;
+        within("bias_sigma_radps", self.bias_sigma_radps, [0.0, 1.0], rate)?;
+        let noise = [
+            ("noise_rad_per_sqrt_s", self.noise_rad_per_sqrt_s),
+            (
+                "bias_walk_radps_per_sqrt_s",
+                self.bias_walk_radps_per_sqrt_s,
+            ),
+        ];
+        for (key, value) in noise {
+            within(key, value, [0.0, 1.0], "0 to 1")?;
+        }
+        within(
+            "time_sigma_s",
+            self.time_sigma_s,
+            [0.0, 1.0],
+            "seconds, 0 to 1",
+        )?;
+        within(
+            "max_gap_s",
+            self.max_gap_s,
+            [1e-3, 10.0],
+            "seconds, 0.001 to 10",
+        )
+    }
+}

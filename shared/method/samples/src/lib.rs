@@ -1,0 +1,21 @@
+//! What other sensors measure between the scans of the radar.
+//!
+//! A [`Sample`] is one measurement with its stamp on the radar's clock. The source hands each scan
+//! the samples whose *stamps* fall into its interval, so that what a scan is registered with never
+//! depends on when a sample arrived.
+//!
+//! Reading order:
+//! - [`Sample`]: one measurement, as it travels with a scan;
+//! - [`GyroConfig`]: the section `[gyro]`;
+//! - [`Gyro`]: integrates the yaw rate between two scans, to a [`GyroTurn`].
+//!
+//! Axes are those of the vehicle by REP-103: x forward, y left, z up. Rates are in rad/s, stamps in
+//! ns since 1970 on the radar's clock.
+
+mod config;
+mod gyro;
+mod sample;
+
+pub use config::{GyroConfig, GyroConfigError, GyroKind, UpAxis};
+pub use gyro::{Gyro, GyroTurn};
+pub use sample::{Sample, SampleKind};

@@ -1,0 +1,42 @@
+//! One measurement of another sensor.
+
+use bytemuck::{Pod, Zeroable};
+
+/// One measurement of a sensor beside the radar, as it travels with a scan.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Sample {
+    /// When it was measured, ns since 1970 on the radar's clock.
+    pub stamp_ns: i64,
+    /// What was measured: a number of [`SampleKind`].
+    pub kind: u32,
+    /// Zero.
+    pub reserved: u32,
+    /// What [`SampleKind`] says; unused ones are zero.
+    pub values: [f64; 6],
+}
+
+/// What a sample measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum SampleKind {
+    /// Angular velocity about x, y, z (rad/s), then acceleration along them (m/s²).
+    Gyro = 1,
+}
+
+impl Sample {
+    /// Creates a sample of a gyro that measures the yaw rate alone, counter-clockwise, rad/s.
+    pub fn yaw_rate(stamp_ns: i64, rate_radps: f64) -> Self {
+        Self {
+            stamp_ns,
+            kind: SampleKind::Gyro as u32,
+            reserved: 0,
+            values: [0.0, 0.0, rate_radps, 0.0, 0.0, 0.0],
+        }
+    }
+
+    /// Returns whether it is of this kind.
+    pub fn is(&self, kind: SampleKind) -> bool {
+        self.kind == kind as u32
+    }
+}
