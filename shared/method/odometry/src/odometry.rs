@@ -75,9 +75,15 @@ impl Odometry {
         if !self.pair.is_continued_at(scan.geometry.stamp_ns) {
             self.restart();
         }
-        self.gyro.push(samples);
-        self.pair.expect_turn(scan, &self.gyro);
-        self.mask(scan, self.pair.compensated(self.twists.next()))?;
+        self.gyro
+            .push(samples, scan.geometry.stamp_ns, scan.span_ns());
+        self.pair.expect_turn(self.gyro.turn());
+        let masked = self.mask(scan, self.gyro.turned(self.twists.next()));
+        if masked.is_err() {
+            // The next turn would be from the scan that is skipped.
+            self.gyro.clear();
+        }
+        masked?;
         let searched = self.search()?;
         let refined = searched.as_ref().and_then(|motion| self.refine(motion));
         let registered = self.integrate(searched, refined);

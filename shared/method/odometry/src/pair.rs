@@ -3,7 +3,7 @@
 use gyre_geometry::{SparsePoint, Twist};
 use gyre_masking::Sweep;
 use gyre_radar::{PolarScan, continues};
-use gyre_samples::{Gyro, GyroTurn};
+use gyre_samples::GyroTurn;
 use ndarray::{Array2, ArrayView2, ArrayViewMut2};
 
 use crate::{Mask, OdometryError, Rasters};
@@ -92,24 +92,9 @@ impl Pair {
         self.turn
     }
 
-    /// Integrates the turn from the earlier scan to the one that comes.
-    pub(crate) fn expect_turn(&mut self, scan: &PolarScan<'_>, gyro: &Gyro) {
-        let stamps = [self.earlier.stamp_ns, scan.geometry.stamp_ns];
-        self.turn = (self.seq > 0)
-            .then(|| gyro.turn(stamps, scan.span_ns()))
-            .flatten();
-    }
-
-    /// The velocity for the compensation of the scan that comes: the gyro's yaw rate, if there is
-    /// one.
-    pub(crate) fn compensated(&self, twist: Option<Twist>) -> Option<Twist> {
-        let turned = |twist: Twist| Twist {
-            yaw_rate_radps: self
-                .turn
-                .map_or(twist.yaw_rate_radps, |turn| turn.sweep_rate_radps),
-            ..twist
-        };
-        twist.map(turned)
+    /// Sets the turn from the earlier scan to the one that comes.
+    pub(crate) fn expect_turn(&mut self, turn: Option<GyroTurn>) {
+        self.turn = turn;
     }
 
     pub(crate) fn new(n: usize, capacity: usize, masked_scans: usize) -> Self {

@@ -1,5 +1,7 @@
 //! From samples of a gyro to the turn between two scans.
 
+use gyre_geometry::Twist;
+
 use crate::{GyroConfig, Sample, SampleKind};
 
 /// What the gyro says of the turn of the sensor from one scan to the next, counter-clockwise.
@@ -17,19 +19,31 @@ pub struct GyroTurn {
 
 /// Integrates the yaw rate between scans.
 ///
-/// It keeps the samples of the last two scans, and nothing else: so a process that is restarted at
-/// the scan before finds the same turn.
+/// What it says of a scan depends on the samples since the sweep of the scan before began, and on
+/// nothing else: so a process that is restarted at the scan before says the same.
 #[derive(Clone, Debug, Default)]
 pub struct Gyro {
     config: GyroConfig,
-    rates: Rates,
+    /// Those of the scan before and of the scan, in the order of their stamps.
+    rates: Vec<Rate>,
     /// Number of rates that the scan before has.
     earlier: usize,
+    /// Of the scan before and of the scan.
+    sweeps: [Option<Sweep>; 2],
+    /// Of scans that were dropped since the last one.
+    dropped: Vec<Rate>,
 }
 
-/// Rates in the order of their stamps.
-#[derive(Clone, Debug, Default)]
-struct Rates(Vec<(i64, f64)>);
+/// A stamp, ns, and the yaw rate, rad/s.
+type Rate = (i64, f64);
+
+/// The times of a scan, ns.
+#[derive(Clone, Copy, Debug)]
+struct Sweep {
+    stamp_ns: i64,
+    /// Of the first and of the last azimuth.
+    span_ns: [i64; 2],
+}
 
 impl Gyro {
     /// Creates an integrator without samples.
@@ -40,34 +54,36 @@ impl Gyro {
         }
     }
 
-    /// Takes the samples of the next scan. Those of the scan before the last are forgotten.
-    pub fn push(&mut self, samples: &[Sample]) {
-        self.rates.0.drain(..self.earlier);
-        self.earlier = self.rates.0.len();
-        self.extend(samples);
+    /// Takes the samples of the next scan, in the order of their stamps, and the times of its stamp
+    /// and of its first and last azimuth.
+    pub fn push(&mut self, samples: &[Sample], stamp_ns: i64, span_ns: [i64; 2]) {
+        self.rates.drain(..self.earlier);
+        self.earlier = self.rates.len();
+        self.rates.append(&mut self.dropped);
+        self.rates.extend(rates(samples));
+        self.sweeps = [self.sweeps[1], Some(Sweep { stamp_ns, span_ns })];
     }
 
-    /// Takes more samples of the same scan: those of a scan that was dropped.
-    pub fn extend(&mut self, samples: &[Sample]) {
-        let gyro = samples.iter().filter(|sample| sample.is(SampleKind::Gyro));
-        let rates = gyro.map(|sample| (sample.stamp_ns, sample.values[2]));
-        self.rates.0.extend(rates);
+    /// Takes the samples of a scan that is dropped: they count as those of the next one.
+    pub fn drop_scan(&mut self, samples: &[Sample]) {
+        self.dropped.extend(rates(samples));
     }
 
     /// Forgets all samples.
     pub fn clear(&mut self) {
-        self.rates.0.clear();
-        self.earlier = 0;
+        *self = Self::new(&self.config);
     }
 
-    /// Integrates the rate from the stamp of the scan before to that of the scan, and over the
-    /// scan's sweep; `None` where samples are missing.
-    pub fn turn(&self, [from_ns, to_ns]: [i64; 2], sweep_ns: [i64; 2]) -> Option<GyroTurn> {
-        let max_gap_ns = (self.config.max_gap_s * 1e9) as i64;
-        let integral = |span| self.rates.integral(span, max_gap_ns);
-        let yaw_rad = integral([from_ns, to_ns])?;
-        let interval_s = seconds(to_ns - from_ns);
-        let change = self.rates.at(to_ns)? - self.rates.at(from_ns)?;
+    /// Integrates the rate from the stamp of the scan before to that of the scan; `None` where
+    /// samples are missing.
+    pub fn turn(&self) -> Option<GyroTurn> {
+        let [before, scan] = self.sweeps;
+        let (before, scan) = (before?, scan?);
+        let rates = since(&self.rates, before.span_ns[0]);
+        let span_ns = [before.stamp_ns, scan.stamp_ns];
+        let yaw_rad = integral(rates, span_ns, self.max_gap_ns())?;
+        let interval_s = seconds(scan.stamp_ns - before.stamp_ns);
+        let change = rate_at(rates, scan.stamp_ns)? - rate_at(rates, before.stamp_ns)?;
         let by_scale = self.config.scale_sigma * yaw_rad;
         let by_time = self.config.time_sigma_s * change;
         let walk = self.config.noise_rad_per_sqrt_s.powi(2) * interval_s;
@@ -75,55 +91,84 @@ impl Gyro {
             yaw_rad,
             variance_rad2: walk + by_scale * by_scale + by_time * by_time,
             interval_s,
-            sweep_rate_radps: match sweep_ns[0] < sweep_ns[1] {
-                true => integral(sweep_ns)? / seconds(sweep_ns[1] - sweep_ns[0]),
-                false => self.rates.at(to_ns)?,
-            },
+            sweep_rate_radps: self.sweep_rate_radps()?,
         })
+    }
+
+    /// Returns the mean rate during the sweep of the scan; `None` where samples are missing.
+    pub fn sweep_rate_radps(&self) -> Option<f64> {
+        let [start_ns, end_ns] = self.sweeps[1]?.span_ns;
+        let rates = since(&self.rates[self.earlier..], start_ns);
+        match start_ns < end_ns {
+            true => {
+                let turned = integral(rates, [start_ns, end_ns], self.max_gap_ns())?;
+                Some(turned / seconds(end_ns - start_ns))
+            }
+            false => rate_at(rates, end_ns),
+        }
+    }
+
+    /// Returns the velocity for the compensation of the scan: with the gyro's yaw rate, if it has
+    /// one.
+    pub fn turned(&self, twist: Option<Twist>) -> Option<Twist> {
+        let rate = self.sweep_rate_radps();
+        twist.map(|twist| Twist {
+            yaw_rate_radps: rate.unwrap_or(twist.yaw_rate_radps),
+            ..twist
+        })
+    }
+
+    fn max_gap_ns(&self) -> i64 {
+        (self.config.max_gap_s * 1e9) as i64
     }
 }
 
-impl Rates {
-    /// The integral of the rate, interpolated linearly; `None` if two samples are farther apart, or
-    /// an end is farther from the nearest one.
-    fn integral(&self, [from_ns, to_ns]: [i64; 2], max_gap_ns: i64) -> Option<f64> {
-        if from_ns >= to_ns {
-            return None;
-        }
-        let first = self.0.partition_point(|(stamp_ns, _)| *stamp_ns <= from_ns);
-        let end = self.0.partition_point(|(stamp_ns, _)| *stamp_ns < to_ns);
-        let mut before = (from_ns, self.at(from_ns)?);
-        let inside = self.0.get(first..end)?.iter().copied();
-        let mut sum = 0.0;
-        for next in inside.chain([(to_ns, self.at(to_ns)?)]) {
-            sum += 0.5 * (before.1 + next.1) * seconds(next.0 - before.0);
-            before = next;
-        }
-        let around = self
-            .0
-            .get(first.saturating_sub(1)..self.0.len().min(end + 1))?;
-        let is_near = |sample: Option<&(i64, f64)>, at_ns: i64| {
-            sample.is_some_and(|(stamp_ns, _)| (stamp_ns - at_ns).abs() <= max_gap_ns)
-        };
-        let is_dense = around
-            .windows(2)
-            .all(|pair| pair[1].0 - pair[0].0 <= max_gap_ns);
-        let covers = is_near(around.first(), from_ns) && is_near(around.last(), to_ns);
-        (is_dense && covers).then_some(sum)
-    }
+fn rates(samples: &[Sample]) -> impl Iterator<Item = Rate> {
+    let gyro = samples.iter().filter(|sample| sample.is(SampleKind::Gyro));
+    gyro.map(|sample| (sample.stamp_ns, sample.values[2]))
+}
 
-    /// The rate at a time, interpolated linearly; before the first sample and after the last, that
-    /// of the nearest.
-    fn at(&self, stamp_ns: i64) -> Option<f64> {
-        let next = self.0.partition_point(|(at_ns, _)| *at_ns < stamp_ns);
-        let after = self.0.get(next).or(self.0.last())?;
-        let before = self.0.get(next.saturating_sub(1))?;
-        if after.0 <= before.0 {
-            return Some(after.1);
-        }
-        let share = seconds(stamp_ns - before.0) / seconds(after.0 - before.0);
-        Some(before.1 + (after.1 - before.1) * share.clamp(0.0, 1.0))
+/// The rates from a time on.
+fn since(rates: &[Rate], stamp_ns: i64) -> &[Rate] {
+    &rates[rates.partition_point(|(at_ns, _)| *at_ns < stamp_ns)..]
+}
+
+/// The integral of the rate, interpolated linearly; `None` if two samples are farther apart than
+/// that, or an end is farther from the nearest one.
+fn integral(rates: &[Rate], [from_ns, to_ns]: [i64; 2], max_gap_ns: i64) -> Option<f64> {
+    if from_ns >= to_ns {
+        return None;
     }
+    let first = rates.partition_point(|(stamp_ns, _)| *stamp_ns <= from_ns);
+    let end = rates.partition_point(|(stamp_ns, _)| *stamp_ns < to_ns);
+    let inside = rates.get(first..end)?.iter().copied();
+    let (mut sum, mut before) = (0.0, (from_ns, rate_at(rates, from_ns)?));
+    for next in inside.chain([(to_ns, rate_at(rates, to_ns)?)]) {
+        sum += 0.5 * (before.1 + next.1) * seconds(next.0 - before.0);
+        before = next;
+    }
+    let around = &rates[first.saturating_sub(1)..rates.len().min(end + 1)];
+    let is_near = |sample: Option<&Rate>, at_ns: i64| {
+        sample.is_some_and(|(stamp_ns, _)| (stamp_ns - at_ns).abs() <= max_gap_ns)
+    };
+    let is_dense = around
+        .windows(2)
+        .all(|pair| pair[1].0 - pair[0].0 <= max_gap_ns);
+    let covers = is_near(around.first(), from_ns) && is_near(around.last(), to_ns);
+    (is_dense && covers).then_some(sum)
+}
+
+/// The rate at a time, interpolated linearly; before the first sample and after the last, that of
+/// the nearest.
+fn rate_at(rates: &[Rate], stamp_ns: i64) -> Option<f64> {
+    let next = rates.partition_point(|(at_ns, _)| *at_ns < stamp_ns);
+    let after = rates.get(next).or(rates.last())?;
+    let before = rates.get(next.saturating_sub(1))?;
+    if after.0 <= before.0 {
+        return Some(after.1);
+    }
+    let share = seconds(stamp_ns - before.0) / seconds(after.0 - before.0);
+    Some(before.1 + (after.1 - before.1) * share.clamp(0.0, 1.0))
 }
 
 fn seconds(ns: i64) -> f64 {
@@ -136,76 +181,88 @@ mod tests {
     use proptest::prelude::*;
 
     const MS: i64 = 1_000_000;
+    const SWEEP: i64 = 250 * MS;
 
-    fn gyro(samples: &[&[(i64, f64)]]) -> Gyro {
+    /// The samples of sweep after sweep of 250 ms, each stamped in its middle.
+    fn gyro(first_sweep: i64, scans: &[&[Rate]]) -> Gyro {
         let mut gyro = Gyro::new(&GyroConfig::default());
-        for samples in samples {
-            let samples = samples
-                .iter()
-                .map(|(ms, rate)| Sample::yaw_rate(ms * MS, *rate));
-            gyro.push(&samples.collect::<Vec<_>>());
+        for (k, rates) in (first_sweep..).zip(scans) {
+            gyro.push(
+                &samples(rates),
+                k * SWEEP + SWEEP / 2,
+                [k * SWEEP, (k + 1) * SWEEP],
+            );
         }
         gyro
     }
 
-    /// Samples of a rate that grows evenly, from one time to another, ms.
-    fn ramp(from: i64, to: i64, every: i64) -> Vec<(i64, f64)> {
-        let stamps = (from..to).step_by(every as usize);
-        stamps.map(|ms| (ms, 1e-3 * ms as f64)).collect()
+    fn samples(rates: &[Rate]) -> Vec<Sample> {
+        let sample = |(ms, rate): &Rate| Sample::yaw_rate(ms * MS, *rate);
+        rates.iter().map(sample).collect()
     }
 
-    fn turn(gyro: &Gyro) -> Option<GyroTurn> {
-        gyro.turn([125 * MS, 375 * MS], [250 * MS, 500 * MS])
+    /// Samples of a rate that grows evenly, from one time to another, ms.
+    fn ramp(from: i64, to: i64, every: usize) -> Vec<Rate> {
+        let stamps = (from..=to).step_by(every);
+        stamps.map(|ms| (ms, 1e-3 * ms as f64)).collect()
     }
 
     proptest! {
         /// A rate that grows evenly is integrated exactly, whatever the stamps of the samples.
         #[test]
-        fn the_turn_is_the_integral_of_the_rate(first in 0i64..20, every in 1i64..100) {
-            let samples = ramp(first, 501, every);
-            let [before, after] = [true, false].map(|before| {
-                let of_scan = |(ms, _): &&(i64, f64)| (*ms <= 250) == before;
-                samples.iter().filter(of_scan).copied().collect::<Vec<_>>()
-            });
-            let turn = gyro(&[&before, &after]).turn([125 * MS, 375 * MS], [250 * MS, 400 * MS]);
-            let turn = turn.unwrap_or_default();
+        fn the_turn_is_the_integral_of_the_rate(first in 0i64..100, every in 1usize..100) {
+            let all = ramp(first, 501, every);
+            let (before, after) = all.split_at(all.partition_point(|(ms, _)| *ms <= 250));
+            let turn = gyro(0, &[before, after]).turn().unwrap_or_default();
             prop_assert!((turn.yaw_rad - 0.25 * 0.25).abs() < 1e-9, "{turn:?}");
-            prop_assert!((turn.sweep_rate_radps - 0.325).abs() < 1e-9, "{turn:?}");
+            // At the ends of a sweep the nearest sample holds.
+            let off = turn.sweep_rate_radps - 0.375;
+            prop_assert!(off.abs() < 1e-3 * every as f64, "{turn:?}");
             prop_assert_eq!(turn.interval_s, 0.25);
         }
     }
 
     #[test]
-    fn a_process_that_starts_at_the_scan_before_finds_the_same_turn() {
-        let scans = [0, 250, 500].map(|from| ramp(from - 250, from, 7));
-        let whole = gyro(&[&scans[0], &scans[1], &scans[2]]);
-        let late = gyro(&[&scans[1], &scans[2]]);
-        assert!(turn(&whole).is_some());
-        assert_eq!(turn(&whole), turn(&late));
+    fn a_process_that_starts_at_the_scan_before_says_the_same() {
+        let scans = [0, 250, 500].map(|from| ramp(from + 3, from + 250, 7));
+        let whole = gyro(0, &[&scans[0], &scans[1], &scans[2]]);
+        let late = gyro(1, &[&scans[1], &scans[2]]);
+        assert!(whole.turn().is_some());
+        assert_eq!(whole.turn(), late.turn());
+        let alone = gyro(2, &[&scans[2]]);
+        assert_eq!(alone.turn(), None);
+        assert_eq!(whole.sweep_rate_radps(), alone.sweep_rate_radps());
     }
 
     #[test]
     fn nothing_is_made_up_where_samples_are_missing() {
-        let all = ramp(0, 501, 10);
-        let without = |lost: std::ops::Range<i64>| -> Vec<_> {
+        let all = ramp(0, 500, 10);
+        let turn_without = |lost: std::ops::Range<i64>| {
             let kept = all.iter().filter(|(ms, _)| !lost.contains(ms));
-            kept.copied().collect()
+            let (before, after): (Vec<_>, Vec<_>) = kept.partition(|(ms, _)| *ms <= 250);
+            gyro(0, &[&before, &after]).turn()
         };
-        let is_known = |samples: &[(i64, f64)]| turn(&gyro(&[samples])).is_some();
-        assert!(is_known(&all) && is_known(&without(200..300)));
+        assert!(turn_without(0..0).is_some() && turn_without(200..300).is_some());
         for lost in [200..330, 0..250, 370..501, 0..501] {
-            assert!(!is_known(&without(lost.clone())), "{lost:?}");
+            assert_eq!(turn_without(lost.clone()), None, "{lost:?}");
         }
     }
 
     #[test]
     fn samples_of_a_dropped_scan_are_those_of_the_next_one() {
-        let (first, second) = (ramp(0, 250, 10), ramp(250, 501, 10));
-        let mut dropped = gyro(&[&[], &first]);
-        let more = second
-            .iter()
-            .map(|(ms, rate)| Sample::yaw_rate(ms * MS, *rate));
-        dropped.extend(&more.collect::<Vec<_>>());
-        assert_eq!(turn(&dropped), turn(&gyro(&[&first, &second])));
+        let [first, second, third] = [0, 250, 500].map(|from| ramp(from + 1, from + 250, 10));
+        let mut live = gyro(0, &[&first]);
+        live.drop_scan(&samples(&second));
+        live.push(&samples(&third), 625 * MS, [500 * MS, 750 * MS]);
+        let turn = live.turn().unwrap_or_default();
+        assert!((turn.yaw_rad - 0.5 * 0.375).abs() < 1e-3, "{turn:?}");
+        let mut replayed = gyro(0, &[&first]);
+        let both: Vec<Rate> = second.iter().chain(&third).copied().collect();
+        replayed.push(&samples(&both), 625 * MS, [500 * MS, 750 * MS]);
+        assert_eq!(Some(turn), replayed.turn());
+        assert_eq!(
+            live.sweep_rate_radps(),
+            gyro(2, &[&third]).sweep_rate_radps()
+        );
     }
 }
