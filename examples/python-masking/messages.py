@@ -63,7 +63,7 @@ class Item(Message):
 
 
 class ScanHeader(Message):
-    NAME = "gyre_scan_header_v5"
+    NAME = "gyre_scan_header_v6"
     _fields_ = [
         ("item", Item),
         ("azimuths", c_uint32),
@@ -74,14 +74,21 @@ class ScanHeader(Message):
         ("range_offset_m", c_float),
         ("clockwise", c_uint32),
         ("doppler_s", c_float),
+        ("samples", c_uint32),
+        ("samples_left_out", c_uint32),
         ("azimuth_stamp_ns", c_int64 * MAX_AZIMUTHS),
         ("azimuth_rad", c_float * MAX_AZIMUTHS),
         ("azimuth_flags", c_uint8 * MAX_AZIMUTHS),
     ]
 
 
+class GyroTurn(Message):
+    NAME = "gyre_gyro_turn_v1"
+    _fields_ = [(name, c_double) for name in ("yaw_rad", "variance_rad2", "interval_s", "sweep_rate_radps")]
+
+
 class MaskedHeader(Message):
-    NAME = "gyre_masked_header_v5"
+    NAME = "gyre_masked_header_v6"
     _fields_ = [
         ("item", Item),
         ("n", c_uint32),
@@ -92,6 +99,8 @@ class MaskedHeader(Message):
         ("compensated", c_uint32),
         ("points", c_uint32),
         ("azimuth_variance_rad2", c_float),
+        ("gyro", GyroTurn),
+        ("has_gyro", c_uint64),
     ]
 
 
@@ -104,18 +113,21 @@ class RotationEstimate(Message):
 
 
 class RefinementRecord(Message):
-    NAME = "gyre_refinement_v2"
+    NAME = "gyre_refinement_v3"
     _fields_ = [
         ("outcome", c_uint32),
         ("initial_guess", c_uint32),
         ("overlap", c_double),
         ("support", c_double),
         ("stationary", c_uint64),
+        ("gyro", c_uint64),
+        ("gyro_bias_radps", c_double),
+        ("gyro_bias_sigma_radps", c_double),
     ]
 
 
 class MotionEstimate(Message):
-    NAME = "gyre_motion_estimate_v4"
+    NAME = "gyre_motion_estimate_v5"
     _fields_ = [
         ("x_m", c_double),
         ("y_m", c_double),
@@ -133,12 +145,12 @@ class MotionEstimate(Message):
 
 
 class MotionHeader(Message):
-    NAME = "gyre_motion_header_v7"
+    NAME = "gyre_motion_header_v8"
     _fields_ = [("item", Item), ("motion", MotionEstimate)]
 
 
 class PoseHeader(Message):
-    NAME = "gyre_pose_header_v7"
+    NAME = "gyre_pose_header_v8"
     _fields_ = [
         ("item", Item),
         ("motion", MotionEstimate),
@@ -171,13 +183,14 @@ POINT_FLOATS = 5  # x_m, y_m, time_s, weight, doppler_s
 SIZES = {
     Hop: 32,
     Item: 320,
-    ScanHeader: 13664,
-    MaskedHeader: 360,
+    ScanHeader: 13672,
+    GyroTurn: 32,
+    MaskedHeader: 400,
     RotationEstimate: 40,
-    RefinementRecord: 32,
-    MotionEstimate: 208,
-    MotionHeader: 528,
-    PoseHeader: 656,
+    RefinementRecord: 56,
+    MotionEstimate: 232,
+    MotionHeader: 552,
+    PoseHeader: 680,
     ByteBlock: 64,
     FloatBlock: 64,
 }

@@ -41,7 +41,7 @@ pub struct Track {
 impl Recording {
     /// Opens what a configuration names, as a run of it would.
     pub fn open(configuration: &Configuration) -> Result<Self, Failure> {
-        let Played { dataset, truth } = gyre_configuration::open(configuration)?;
+        let Played { dataset, truth, .. } = gyre_configuration::open(configuration)?;
         let named = configuration.run.ground_truth.clone();
         let truth = match truth {
             Some(tum) if named.is_none() => Some(Track::simulated(&tum)?),

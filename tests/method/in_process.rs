@@ -16,14 +16,17 @@ fn register_all(run: &Run) -> Vec<Registered> {
     let configuration = Configuration::read(&resolved, &[]).unwrap();
     let config: OdometryConfig = toml::from_str(&run.result("config.toml")).unwrap();
     assert_eq!(config, configuration.odometry);
-    let mut dataset = gyre_configuration::open(&configuration).unwrap().dataset;
+    let played = gyre_configuration::open(&configuration).unwrap();
+    let (mut dataset, samples) = (played.dataset, played.samples);
     let mut scan = OwnedScan::with_limits(dataset.limits());
     let mut odometry = Odometry::new(&config).unwrap();
     let scans = configuration.source.played(dataset.as_ref());
     scans
         .map(|index| {
             scan.geometry = dataset.read(index, scan.slot()).unwrap();
-            odometry.register(&scan.view(), &[]).unwrap()
+            let stamp_ns = scan.geometry.stamp_ns;
+            let samples = samples.of(dataset.as_ref(), index, stamp_ns);
+            odometry.register(&scan.view(), samples).unwrap()
         })
         .collect()
 }
@@ -81,6 +84,23 @@ fn on_a_real_drive(scans: usize) {
 #[test]
 fn on_real_scans() {
     on_a_real_drive(150);
+}
+
+#[test]
+fn with_the_gyro_of_a_real_drive() {
+    if let Some(data) = real_data("radiate-2019-02-12") {
+        let log = data.join("imu_as_logged.csv");
+        let run = configuration("radiate.toml").data(&data);
+        let run = run
+            .set("gyro.kind=log")
+            .set(&format!("gyro.file={}", log.display()))
+            .set("gyro.late_s=1.58")
+            .set("gyro.up=-z")
+            .set("source.scans=150");
+        assert_eq!(assert_same_bits(&run), 150);
+        let summary = run.summary();
+        assert!(summary["gyro"]["motions"].as_u64() > Some(100), "{summary}");
+    }
 }
 
 #[test]

@@ -15,6 +15,7 @@ use gyre_messages::{
     ByteBlock, FloatBlock, Hop, Item, MaskedHeader, MotionEstimate, MotionHeader, PoseHeader,
     RefinementRecord, RotationEstimate, ScanHeader,
 };
+use gyre_samples::GyroTurn;
 use rustix::process::Signal;
 use serde_json::Value;
 
@@ -59,7 +60,7 @@ macro_rules! layout {
     };
 }
 
-fn layouts() -> [(&'static str, Layout); 9] {
+fn layouts() -> [(&'static str, Layout); 10] {
     [
         (
             "gyre_hop_v1",
@@ -71,30 +72,35 @@ fn layouts() -> [(&'static str, Layout); 9] {
                 flags, lost, lost_count, hops),
         ),
         (
-            "gyre_scan_header_v5",
+            "gyre_scan_header_v6",
             layout!(ScanHeader: item, azimuths, bins, stride, first_byte, range_resolution_m, range_offset_m, clockwise,
-                doppler_s, azimuth_stamp_ns, azimuth_rad, azimuth_flags),
+                doppler_s, samples, samples_left_out, azimuth_stamp_ns, azimuth_rad, azimuth_flags),
         ),
         (
-            "gyre_masked_header_v5",
-            layout!(MaskedHeader: item, n, rasters, cell_m, mask, twist, compensated, points, azimuth_variance_rad2),
+            "gyre_masked_header_v6",
+            layout!(MaskedHeader: item, n, rasters, cell_m, mask, twist, compensated, points, azimuth_variance_rad2, gyro, has_gyro),
+        ),
+        (
+            "gyre_gyro_turn_v1",
+            layout!(GyroTurn: yaw_rad, variance_rad2, interval_s, sweep_rate_radps),
         ),
         (
             "gyre_rotation_estimate_v1",
             layout!(RotationEstimate: angle_rad, variance_rad2, score, runner_up_rad, runner_up_score),
         ),
         (
-            "gyre_refinement_v2",
-            layout!(RefinementRecord: outcome, initial_guess, overlap, support, stationary),
+            "gyre_refinement_v3",
+            layout!(RefinementRecord: outcome, initial_guess, overlap, support, stationary, gyro, gyro_bias_radps,
+                gyro_bias_sigma_radps),
         ),
         (
-            "gyre_motion_estimate_v4",
+            "gyre_motion_estimate_v5",
             layout!(MotionEstimate: x_m, y_m, yaw_rad, covariance, drift_share, scale_sigma, interval_ns, score,
                 runner_up_score, rotation, searched, refinement),
         ),
-        ("gyre_motion_header_v7", layout!(MotionHeader: item, motion)),
+        ("gyre_motion_header_v8", layout!(MotionHeader: item, motion)),
         (
-            "gyre_pose_header_v7",
+            "gyre_pose_header_v8",
             layout!(PoseHeader: item, motion, x_m, y_m, yaw_rad, covariance, accumulated_covariance, trajectory_version),
         ),
     ]

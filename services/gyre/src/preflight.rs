@@ -10,6 +10,7 @@ use gyre_messages::{Footprint, Limits, StageId, Window};
 use gyre_radar::{DEFAULT_TURN_NS, Fingerprint, turn_ns};
 use gyre_radar_replay::{Listing, Player};
 use gyre_run::{MOST_OPEN_FILES, PlayedFrom, Side, SourceKind};
+use gyre_samples::MAX_SAMPLES;
 use gyre_stage::run::free_shared_memory;
 use gyre_terminal::Failure;
 use rustix::process::{Resource, getrlimit};
@@ -116,6 +117,10 @@ pub fn check(configuration: &Configuration) -> Result<Preflight, Failure> {
         cell_m: configuration.odometry.raster.cell_m,
         rasters: masker.scans(),
         points: configuration.odometry.points.capacity,
+        samples: match configuration.odometry.gyro.is_used() {
+            true => MAX_SAMPLES,
+            false => 0,
+        },
     };
     let footprint = Footprint::new(&window, &limits);
     Ok(Preflight {
@@ -141,7 +146,7 @@ pub(crate) struct Scans {
 
 impl Scans {
     fn of_recording(configuration: &Configuration) -> Result<Self, Failure> {
-        let Played { dataset, truth } = open(configuration)?;
+        let Played { dataset, truth, .. } = open(configuration)?;
         let count = configuration.source.stream_len(dataset.as_ref());
         if let Some(scans @ 0..2) = count {
             return Err(PreflightError::TooFew {

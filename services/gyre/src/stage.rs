@@ -7,7 +7,7 @@ use std::{
     process::ExitCode,
 };
 
-use gyre_configuration::process_names;
+use gyre_configuration::{process_names, simulated_samples};
 use gyre_live_radar::Settings;
 use gyre_messages::{FollowerId, StageId};
 use gyre_radar::DatasetOptions;
@@ -137,5 +137,7 @@ fn play(launch: &Launch) -> Result<StageCounters, StageError> {
     let options: DatasetOptions = launch.section("dataset")?;
     let drive = SimulatedDrive::new(&simulation).map_err(|error| input(&error))?;
     let dataset = drive.open(&options).map_err(|error| input(&error))?;
-    gyre_radar_replay::play(launch, dataset, Pace::OnDemand)
+    let samples = simulated_samples(&drive, &launch.section("gyro")?, dataset.as_ref());
+    let samples = samples.map_err(|error| input(&error))?;
+    gyre_radar_replay::play(launch, dataset, samples, Pace::OnDemand)
 }

@@ -17,7 +17,7 @@ use crate::{
 pub struct MethodConfig {
     /// The format of the recording, and the constants of its radar.
     pub dataset: DatasetOptions,
-    /// The settings of the method: the sections from `raster` to `refinement`.
+    /// The settings of the method: the sections from `raster` to `gyro`.
     #[serde(flatten)]
     pub odometry: OdometryConfig,
     /// The correction of the trajectory at places that are seen again.
@@ -26,7 +26,7 @@ pub struct MethodConfig {
 
 impl MethodConfig {
     /// The names of the sections.
-    pub const SECTIONS: [&str; 10] = [
+    pub const SECTIONS: [&str; 11] = [
         "dataset",
         "raster",
         "points",
@@ -36,6 +36,7 @@ impl MethodConfig {
         "translation",
         "exhaustive",
         "refinement",
+        "gyro",
         "slam",
     ];
 
@@ -66,6 +67,7 @@ impl MethodConfig {
                 translation: section(table, "translation")?,
                 exhaustive: section(table, "exhaustive")?,
                 refinement: section(table, "refinement")?,
+                gyro: section(table, "gyro")?,
             },
             slam: section(table, "slam")?,
         })
@@ -84,6 +86,7 @@ impl MethodConfig {
         within("translation", odometry.translation.validate())?;
         within("exhaustive", odometry.exhaustive.validate())?;
         within("refinement", odometry.refinement.validate())?;
+        within("gyro", odometry.gyro.validate())?;
         within("slam.places", self.slam.validate())
     }
 }

@@ -10,7 +10,7 @@ use toml::{Table, Value};
 use crate::{ConfigurationError, strict};
 
 /// The keys that name files or folders.
-const KEYS: [&str; 11] = [
+const KEYS: [&str; 12] = [
     "run.ground_truth",
     "source.data",
     "simulation.drive.file",
@@ -18,6 +18,7 @@ const KEYS: [&str; 11] = [
     "masking.model",
     "masking.runtime",
     "slam.map",
+    "gyro.file",
     RECORDING,
     "link.ca",
     "link.certificate",

@@ -1,8 +1,11 @@
 //! The scans that a configuration names: a recording, or a simulation that is rendered while it is
 //! read.
 
-use gyre_radar::{Dataset, Fingerprint, OpenError};
+use std::path::Path;
+
+use gyre_radar::{Dataset, Fingerprint, GyroLog, LogError, OpenError, ScanSamples};
 use gyre_run::PlayedFrom;
+use gyre_samples::{GyroConfig, GyroKind};
 use gyre_simulator::{SimulatedDrive, SimulatorError};
 use thiserror::Error;
 
@@ -28,6 +31,14 @@ pub enum SourceError {
     /// The recording cannot be opened.
     #[error(transparent)]
     Open(#[from] OpenError),
+    /// The log of the gyro cannot be used.
+    #[error(transparent)]
+    Gyro(#[from] LogError),
+    /// A simulation without a gyro.
+    #[error(
+        "gyro.kind is `auto`, but the simulation has no gyro: give it one in [simulation.gyro], or set gyro.kind = \"none\""
+    )]
+    NoGyro,
 }
 
 /// An open recording or simulation.
@@ -36,6 +47,8 @@ pub struct Played {
     pub dataset: Box<dyn Dataset>,
     /// `ground_truth.tum` of a simulation that is played without being stored.
     pub truth: Option<Vec<u8>>,
+    /// What other sensors measured meanwhile.
+    pub samples: ScanSamples,
 }
 
 /// Opens the recording or the simulation that is to be played.
@@ -44,6 +57,7 @@ pub struct Played {
 /// No dataset is named, or it cannot be opened.
 pub fn open(configuration: &Configuration) -> Result<Played, SourceError> {
     let (data, options) = (&configuration.source.data, &configuration.dataset);
+    let gyro = &configuration.odometry.gyro;
     if configuration.is_radar() {
         return Err(SourceError::Radar {
             radar: configuration.data(),
@@ -51,19 +65,40 @@ pub fn open(configuration: &Configuration) -> Result<Played, SourceError> {
     }
     if let Some(simulation) = configuration.streamed() {
         let drive = SimulatedDrive::new(simulation)?;
-        let truth = Some(drive.ground_truth_tum());
+        let dataset = drive.open(options)?;
         return Ok(Played {
-            dataset: drive.open(options)?,
-            truth,
+            samples: simulated_samples(&drive, gyro, dataset.as_ref())?,
+            dataset,
+            truth: Some(drive.ground_truth_tum()),
         });
     }
-    match data.as_os_str().is_empty() {
-        true => Err(SourceError::NoData),
-        false => Ok(Played {
-            dataset: gyre_recording::open(data, options)?,
-            truth: None,
-        }),
+    if data.as_os_str().is_empty() {
+        return Err(SourceError::NoData);
     }
+    let dataset = gyre_recording::open(data, options)?;
+    Ok(Played {
+        samples: ScanSamples::open(gyro, data, dataset.as_ref())?,
+        dataset,
+        truth: None,
+    })
+}
+
+/// Returns the samples that go with the scans of a simulation: of its own gyro, unless another log
+/// is named.
+///
+/// # Errors
+/// The simulation has no gyro, or a log that cannot be used.
+pub fn simulated_samples(
+    drive: &SimulatedDrive,
+    gyro: &GyroConfig,
+    dataset: &dyn Dataset,
+) -> Result<ScanSamples, SourceError> {
+    if gyro.kind != GyroKind::Auto {
+        return Ok(ScanSamples::open(gyro, Path::new(""), dataset)?);
+    }
+    let _ = drive;
+    let samples: Vec<gyre_samples::Sample> = None.ok_or(SourceError::NoGyro)?;
+    Ok(ScanSamples::of_log(&GyroLog::of(samples), gyro, dataset)?)
 }
 
 /// Returns the configuration with the options of the recording's `dataset.toml` where it has none.

@@ -266,6 +266,16 @@ impl fmt::Display for Summary {
                 m.refined, m.second_hypothesis, m.weak, m.predicted, m.stationary
             )?;
         }
+        if let Some(gyro) = &c.gyro {
+            writeln!(
+                f,
+                "turns by the gyro {} of {}  bias {:.2e} +- {:.0e} rad/s",
+                gyro.motions,
+                c.processed.saturating_sub(1 + c.breaks),
+                gyro.bias_radps,
+                gyro.bias_sigma_radps
+            )?;
+        }
         if let Some(mask) = &self.mask {
             writeln!(f, "masks of {} by {}", mask.model, mask.backend.name())?;
         }

@@ -14,7 +14,7 @@ mod scans;
 
 use gyre_geometry::Twist;
 use gyre_masking::{MaskError, MaskFunction, MaskKind, Masker, MaskingConfig, Sweep};
-use gyre_messages::{Item, Masked, MaskedHeader, Scan, SearchedMotion, StageId, flag, mask_kind};
+use gyre_messages::{Item, Masked, MaskedHeader, Scan, StageId, flag, mask_kind};
 use gyre_radar::{PlacedRows, PointsConfig, RasterConfig};
 use gyre_stage::{
     Launch, Stage, StageCounters, StageError, reader::Received, stage, writer::Draft,
@@ -100,18 +100,18 @@ impl Stage for Masking {
             error => input.scan.malformed(error.to_string()),
         };
         let [rows, previous_rows] = &mut self.rows;
-        let mut place = |received, motion, known, rows| -> Result<_, StageError> {
-            let mut sweep = sweep(received, motion)?;
+        let mut place = |received, twist, known, rows| -> Result<_, StageError> {
+            let mut sweep = sweep(received, twist)?;
             let starts = received.item().is(flag::BREAK);
             let lost = self.azimuths.lost(&sweep, known, starts);
             sweep.scan = PlacedRows::place(rows, &sweep.scan, &lost);
             Ok(sweep)
         };
         let previous = match &input.previous {
-            Some(it) => Some(place(it.scan, it.motion, it.lost, previous_rows)?),
+            Some(it) => Some(place(it.scan, it.twist, it.lost, previous_rows)?),
             None => None,
         };
-        let sweep = place(input.scan, input.motion, input.lost, rows)?;
+        let sweep = place(input.scan, input.twist, input.lost, rows)?;
         if let Some(previous) = &previous
             && !self.masker.can_follow(previous.number)
         {
@@ -136,6 +136,7 @@ impl Stage for Masking {
         *header = self.header(twist, points);
         let azimuths = input.scan.header().azimuths as usize;
         header.azimuth_variance_rad2 = self.azimuths.last().variance_rad2(azimuths);
+        header.set_turn(input.turn);
         Ok(())
     }
 
@@ -166,16 +167,13 @@ impl Masking {
 }
 
 /// Views a received scan, with the velocity for its motion compensation.
-fn sweep(
-    received: &Received<Scan>,
-    motion: Option<SearchedMotion>,
-) -> Result<Sweep<'_>, StageError> {
+fn sweep(received: &Received<Scan>, twist: Option<Twist>) -> Result<Sweep<'_>, StageError> {
     let scan = received.header().view(received.values());
     let scan =
         scan.ok_or_else(|| received.malformed("its payload is shorter than its header says"))?;
     Ok(Sweep {
         number: received.item().scan,
         scan,
-        twist: motion.map(|motion| motion.twist()),
+        twist,
     })
 }

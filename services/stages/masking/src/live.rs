@@ -5,10 +5,11 @@
 //! the window has room for: so a restart that is shorter than that drops none of those that came
 //! meanwhile.
 
-use std::collections::VecDeque;
+use std::{collections::VecDeque, mem};
 
 use gyre_messages::{Item, NumberedBy, Scan, Window, flag};
 use gyre_radar::continues;
+use gyre_samples::Sample;
 use gyre_stage::{
     Generation, Launch, Listener, Manifest, StageError,
     inputs::Action,
@@ -32,6 +33,8 @@ pub struct NewestOnly {
     chain: Option<Chain>,
     /// Scans that may still be processed in order after a start; 0: the newest scan alone.
     in_order: usize,
+    /// Samples of the scans that were dropped since the last one.
+    dropped: Vec<Sample>,
 }
 
 /// The state of the sequence numbers.
@@ -61,6 +64,7 @@ impl NewestOnly {
             manifest: launch.manifest.clone(),
             chain: None,
             in_order: window.scans * WINDOWS_IN_ORDER,
+            dropped: Vec::new(),
         })
     }
 
@@ -155,8 +159,17 @@ impl NewestOnly {
             _ => self.window.scans,
         };
         while self.scans() > room {
-            self.queue.pop_front();
+            let dropped = self.queue.pop_front();
+            let samples = dropped
+                .as_ref()
+                .and_then(|scan| scan.header().samples(scan.values()));
+            self.dropped.extend_from_slice(samples.unwrap_or_default());
         }
+    }
+
+    /// Returns the samples of the scans that were dropped since the last one.
+    pub fn take_dropped(&mut self) -> Vec<Sample> {
+        mem::take(&mut self.dropped)
     }
 
     /// Returns the number of scans in the queue, without the end of the stream.

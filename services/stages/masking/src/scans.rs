@@ -1,7 +1,9 @@
 //! The inputs of masking: a scan and the motion for its motion compensation.
 
+use gyre_geometry::Twist;
 use gyre_messages::{Item, Scan, SearchedMotion, Window, flag};
 use gyre_radar::LostAzimuths;
+use gyre_samples::{Gyro, GyroTurn, with_yaw_rate};
 use gyre_stage::{
     Launch, Listener, StageError,
     inputs::{Action, Inputs},
@@ -14,6 +16,9 @@ use crate::{live::NewestOnly, lossless::InOrder, motions::Motions};
 pub struct Scans {
     queue: Queue,
     motions: Motions,
+    gyro: Gyro,
+    /// The scan whose samples it has taken last.
+    sampled: Option<u64>,
     window: Window,
     /// The motions for the current and for the previous scan.
     found: [Option<SearchedMotion>; 2],
@@ -30,8 +35,11 @@ enum Queue {
 pub struct ScanView<'a> {
     /// The scan.
     pub scan: &'a Received<Scan>,
-    /// The motion of the scan `lag` scans earlier; `None` without one.
-    pub motion: Option<SearchedMotion>,
+    /// The velocity for its motion compensation: of the motion of the scan `lag` scans earlier, with
+    /// the yaw rate of the gyro; `None` without such a motion.
+    pub twist: Option<Twist>,
+    /// The turn since the scan before by the gyro.
+    pub turn: Option<GyroTurn>,
     /// Where its azimuths were lost, if it has a pose from before a restart.
     pub lost: Option<LostAzimuths>,
     /// The previous scan, if the mask takes two; `None` where the chain starts.
@@ -42,8 +50,8 @@ pub struct ScanView<'a> {
 pub struct PreviousScan<'a> {
     /// The scan.
     pub scan: &'a Received<Scan>,
-    /// The motion with which it was compensated.
-    pub motion: Option<SearchedMotion>,
+    /// The velocity with which it was compensated.
+    pub twist: Option<Twist>,
     /// Where its azimuths were lost, if it has a pose.
     pub lost: Option<LostAzimuths>,
 }
@@ -60,6 +68,8 @@ impl Inputs for Scans {
         Ok(Self {
             queue,
             motions,
+            gyro: Gyro::new(&launch.section("gyro")?),
+            sampled: None,
             window: launch.manifest.window,
             found: [None; 2],
             lost: [None; 2],
@@ -84,6 +94,14 @@ impl Inputs for Scans {
         };
         match action {
             Action::Process(item, _) if !self.find_motions(&item) => Ok(Action::Wait),
+            Action::Process(item, _) => {
+                self.take_samples(item.is(flag::BREAK))?;
+                Ok(action)
+            }
+            Action::Keep => {
+                self.take_samples(false)?;
+                Ok(action)
+            }
             action => Ok(action),
         }
     }
@@ -94,15 +112,20 @@ impl Inputs for Scans {
             Queue::Live(queue) => (queue.current(), queue.previous()),
         };
         let [motion, previous_motion] = self.found;
+        let [previous_rate, rate] = self.gyro.sweep_rates_radps();
+        let twist = |motion: Option<SearchedMotion>, rate| {
+            with_yaw_rate(motion.map(|motion| motion.twist()), rate)
+        };
         let [lost, previous_lost] = self.lost;
         let previous = previous.map(|scan| PreviousScan {
             scan,
-            motion: previous_motion,
+            twist: twist(previous_motion, previous_rate),
             lost: previous_lost,
         });
         Some(ScanView {
             scan: scan?,
-            motion,
+            twist: twist(motion, rate),
+            turn: self.gyro.turn(),
             lost,
             previous,
         })
@@ -154,10 +177,45 @@ impl Scans {
         found.iter().all(Option::is_some)
     }
 
+    /// Hands the samples of the current scan to the gyro, once; before it those of the previous scan,
+    /// if that came with a restart, and of the scans that were dropped since.
+    fn take_samples(&mut self, starts_chain: bool) -> Result<(), StageError> {
+        let (scans, dropped) = match &mut self.queue {
+            Queue::Lossless(queue) => ([queue.previous(), queue.current()], Vec::new()),
+            Queue::Live(queue) => {
+                let dropped = queue.take_dropped();
+                ([queue.previous(), queue.current()], dropped)
+            }
+        };
+        let is_new = |scan: &&Received<Scan>| self.sampled < Some(scan.item().published);
+        let [previous, current] = scans.map(|scan| scan.filter(is_new));
+        let Some(current) = current else {
+            return Ok(());
+        };
+        match previous {
+            _ if starts_chain => self.gyro.clear(),
+            Some(previous) => push(&mut self.gyro, previous)?,
+            None => self.gyro.drop_scan(&dropped),
+        }
+        push(&mut self.gyro, current)?;
+        self.sampled = Some(current.item().published);
+        Ok(())
+    }
+
     fn motion_for(&self, seq: u64) -> Option<Option<SearchedMotion>> {
         match self.window.lag {
             0 => Some(None),
             lag => self.motions.before(seq, lag as u64),
         }
     }
+}
+
+/// Hands the samples of a scan to the gyro.
+fn push(gyro: &mut Gyro, received: &Received<Scan>) -> Result<(), StageError> {
+    let (header, bytes) = (received.header(), received.values());
+    let parts = header.view(bytes).zip(header.samples(bytes));
+    let (scan, samples) =
+        parts.ok_or_else(|| received.malformed("its payload is shorter than its header says"))?;
+    gyro.push(samples, scan.geometry.stamp_ns, scan.span_ns());
+    Ok(())
 }

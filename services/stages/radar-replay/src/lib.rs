@@ -10,8 +10,9 @@ mod turns;
 use std::{error::Error, num::NonZeroUsize, ops::Range, path::Path, time::Duration};
 
 use gyre_messages::{ScanHeader, StageId};
-use gyre_radar::{Dataset, DatasetOptions};
+use gyre_radar::{Dataset, DatasetOptions, ScanSamples};
 use gyre_run::{PlayedFrom, SourceConfig};
+use gyre_samples::GyroConfig;
 use gyre_stage::{
     Launch, Source, StageCounters, StageError,
     source::{self, Tolerance, Unreadable},
@@ -49,7 +50,12 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let root = &launch.manifest.root;
     let open = || open(root, &config, &options).map_err(|error| error.to_string());
     match source::open(launch, &tolerance(&config), open)? {
-        Some(dataset) => play(launch, dataset, Pace::Sensor),
+        Some(dataset) => {
+            let gyro: GyroConfig = launch.section("gyro")?;
+            let samples = ScanSamples::open(&gyro, &config.data, dataset.as_ref());
+            let samples = samples.map_err(|error| StageError::Input(error.to_string()))?;
+            play(launch, dataset, samples, Pace::Sensor)
+        }
         None => Ok(StageCounters::default()),
     }
 }
@@ -83,6 +89,7 @@ fn open(
 pub fn play(
     launch: &Launch,
     dataset: Box<dyn Dataset>,
+    samples: ScanSamples,
     pace: Pace,
 ) -> Result<StageCounters, StageError> {
     let config: SourceConfig = launch.section("source")?;
@@ -91,6 +98,7 @@ pub fn play(
         turns: Turns::of(config.played(dataset.as_ref()), dataset.as_ref()),
         burst: config.burst,
         dataset,
+        samples,
         pace,
     };
     let counters = source::run(launch, &mut replay, &tolerance(&config))?;
@@ -104,6 +112,7 @@ pub fn play(
 /// The selected part of a dataset.
 struct Replay {
     dataset: Box<dyn Dataset>,
+    samples: ScanSamples,
     /// The scans of the stream, counted on through all turns.
     scans: Range<usize>,
     turns: Turns,
@@ -148,7 +157,10 @@ impl Source for Replay {
             true => Unreadable::Io(error.to_string()),
             false => Unreadable::Damaged(error.to_string()),
         })?);
-        header.shift_times(shift_ns);
+        let stamp_ns = header.item.stamp_ns;
+        let samples = self.samples.of(self.dataset.as_ref(), scan, stamp_ns);
+        header.set_samples(bytes, samples, 0);
+        header.shift_times(shift_ns, bytes);
         Ok(())
     }
 }

@@ -4,6 +4,7 @@ use gyre_geometry::SparsePoint;
 use gyre_journal::checkpoint::{self, Checkpoint, CheckpointError};
 use gyre_messages::{Item, Masked, Motion, Refined, StageId, flag};
 use gyre_radar::PointsConfig;
+use gyre_samples::GyroConfig;
 use gyre_scan_matching::{RefinementConfig, Refiner};
 use gyre_stage::{
     Launch, Stage, StageCounters, StageError,
@@ -20,8 +21,10 @@ use gyre_stage::{
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let points: PointsConfig = launch.section("points")?;
     let config: RefinementConfig = launch.section("refinement")?;
+    let gyro: GyroConfig = launch.section("gyro")?;
     let refiner = Refiner::new(&config, points.capacity)
-        .map_err(|error| StageError::Configuration(error.to_string()))?;
+        .map_err(|error| StageError::Configuration(error.to_string()))?
+        .with_gyro(&gyro);
     if !launch.take_place()? {
         return Ok(StageCounters::default());
     }
@@ -60,8 +63,10 @@ impl Stage for RefinementStage {
         self.restore_state_before(&item)?;
         output.header().motion = match input.pair.previous {
             Some(previous) if !item.is(flag::BREAK) => {
-                let variance_rad2 = input.pair.current.header().azimuth_variance_rad2;
-                self.refiner.expect_azimuth_errors(variance_rad2);
+                let masked = input.pair.current.header();
+                self.refiner
+                    .expect_azimuth_errors(masked.azimuth_variance_rad2);
+                self.refiner.expect_turn(masked.turn());
                 let refined = self.refiner.refine(
                     item.seq,
                     points(input.pair.current)?,
@@ -84,12 +89,18 @@ impl Stage for RefinementStage {
 impl RefinementStage {
     /// Restores the state of the refiner before this item.
     fn restore_state_before(&mut self, item: &Item) -> Result<(), StageError> {
-        if item.is(flag::BREAK) {
+        let starts_chain = item.is(flag::BREAK);
+        if self.next != Some(item.seq) {
+            let before = item.seq.saturating_sub(1);
+            let restored = self.checkpoint.restore(before, &mut self.refiner);
+            // A chain goes on with the bias of the gyro alone, which the first one has not.
+            restored.or_else(|error| match starts_chain {
+                true => Ok(()),
+                false => Err(unusable(error)),
+            })?;
+        }
+        if starts_chain {
             self.refiner.reset();
-        } else if self.next != Some(item.seq) {
-            self.checkpoint
-                .restore(item.seq.saturating_sub(1), &mut self.refiner)
-                .map_err(unusable)?;
         }
         Ok(())
     }

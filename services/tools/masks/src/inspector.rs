@@ -2,11 +2,11 @@
 
 use std::error::Error;
 
-use gyre_configuration::Configuration;
+use gyre_configuration::{Configuration, Played};
 use gyre_geometry::SparsePoint;
 use gyre_masking::{MaskKind, Masker, MaskingConfig, Sweep};
 use gyre_odometry::{Odometry, OdometryConfig};
-use gyre_radar::{Dataset, LostAzimuths, OwnedScan, PlacedRows};
+use gyre_radar::{Dataset, LostAzimuths, OwnedScan, PlacedRows, ScanSamples};
 use gyre_scan_matching::{RefinementConfig, RefinementKind};
 use gyre_terminal::{Failure, print};
 use ndarray::{Array2, ArrayView2};
@@ -29,6 +29,7 @@ pub struct MaskInspector {
     last: [OwnedScan; 2],
     /// Memory to read the next scan into.
     spare: OwnedScan,
+    samples: ScanSamples,
     /// The velocities that the last two scans were compensated with.
     twists: [Option<gyre_geometry::Twist>; 2],
     /// Where their azimuths were lost.
@@ -45,7 +46,8 @@ impl MaskInspector {
     ///
     /// # Errors
     /// A setting that is out of its bounds, a network that cannot be used.
-    pub fn new(configuration: &Configuration, dataset: Box<dyn Dataset>) -> Result<Self, Failure> {
+    pub fn new(configuration: &Configuration, played: Played) -> Result<Self, Failure> {
+        let (dataset, samples) = (played.dataset, played.samples);
         let config = OdometryConfig {
             refinement: RefinementConfig {
                 kind: RefinementKind::None,
@@ -73,6 +75,7 @@ impl MaskInspector {
             next: configuration.source.played(dataset.as_ref()).start,
             last: [scan.clone(), scan.clone()],
             spare: scan,
+            samples,
             twists: [None; 2],
             lost: [LostAzimuths::default(); 2],
             rows: PlacedRows::default(),
@@ -113,7 +116,9 @@ impl MaskInspector {
                 return Ok(false);
             }
         }
-        let registered = self.odometry.register(&self.spare.view(), &[]);
+        let stamp_ns = self.spare.geometry.stamp_ns;
+        let samples = self.samples.of(self.dataset.as_ref(), number, stamp_ns);
+        let registered = self.odometry.register(&self.spare.view(), samples);
         let registered = registered.map_err(|error| format!("scan {number}: {error}"))?;
         self.last.swap(0, 1);
         std::mem::swap(&mut self.last[0], &mut self.spare);

@@ -12,7 +12,7 @@ pub mod picture;
 use std::{fs, num::NonZeroUsize, ops::Range, path::PathBuf, process::ExitCode};
 
 use clap::Args;
-use gyre_configuration::{Played, describe_masks_in_process};
+use gyre_configuration::describe_masks_in_process;
 use gyre_inputs::Inputs;
 use gyre_terminal::{Failure, print};
 
@@ -50,13 +50,13 @@ pub struct MasksArguments {
 /// A recording or mask that cannot be used, a picture that cannot be written.
 pub fn masks(arguments: &MasksArguments) -> Result<ExitCode, Failure> {
     let configuration = arguments.inputs.configuration()?;
-    let Played { dataset, .. } = gyre_configuration::open(&configuration)?;
+    let played = gyre_configuration::open(&configuration)?;
     let chosen = choose(
         arguments,
-        configuration.source.played(dataset.as_ref()),
+        configuration.source.played(played.dataset.as_ref()),
         &configuration.data(),
     )?;
-    let mut inspector = MaskInspector::new(&configuration, dataset)?;
+    let mut inspector = MaskInspector::new(&configuration, played)?;
     describe_masks_in_process(&configuration)?
         .iter()
         .for_each(print::note);

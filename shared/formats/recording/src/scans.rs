@@ -8,6 +8,7 @@ use gyre_radar::{
     DEFAULT_TURN_NS, Dataset, DatasetOptions, FileList, Format, ImageSize, MAX_AZIMUTHS, OpenError,
     ReadError, ScanLimits, ScanSlot, SweepGeometry, turn_ns,
 };
+use gyre_samples::Sample;
 
 use crate::{Entry, Recording, RecordingError, Stored, image::read};
 
@@ -23,6 +24,8 @@ pub(crate) struct Scans {
     first: SweepGeometry,
     period_ns: i64,
     notes: Vec<String>,
+    /// Of the scan that was read last.
+    samples: Vec<Sample>,
 }
 
 impl Scans {
@@ -54,6 +57,7 @@ impl Scans {
         let files: FileList = recording.paths().map(Path::to_owned).collect();
         Ok(Self {
             notes: notes(&recording, &entries),
+            samples: Vec::new(),
             recording,
             files,
             entries,
@@ -233,7 +237,12 @@ impl Dataset for Scans {
             reason: format!("scan {index} does not fit its header"),
         };
         let (geometry, header) = geometry(&stored).ok_or_else(damaged)?;
-        copy(&stored.payload, slot.bytes, "bytes")?;
+        let samples = header.read_samples(&stored.payload);
+        self.samples = samples.ok_or_else(damaged)?;
+        let powers = header
+            .power_bytes()
+            .and_then(|end| stored.payload.get(..end));
+        copy(powers.ok_or_else(damaged)?, slot.bytes, "bytes")?;
         let azimuths = geometry.azimuths;
         copy(
             &header.azimuth_rad[..azimuths],
@@ -247,6 +256,10 @@ impl Dataset for Scans {
         )?;
         copy(&header.azimuth_flags[..azimuths], slot.flags, "flags")?;
         Ok(geometry)
+    }
+
+    fn samples(&self) -> &[Sample] {
+        &self.samples
     }
 }
 

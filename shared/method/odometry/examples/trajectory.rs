@@ -8,7 +8,7 @@
 use std::{env, error::Error, fs, io, path::Path};
 
 use gyre_odometry::{Odometry, OdometryConfig};
-use gyre_radar::{DatasetOptions, OwnedScan, Trajectory, write_tum};
+use gyre_radar::{DatasetOptions, OwnedScan, ScanSamples, Trajectory, write_tum};
 use serde::Deserialize;
 
 /// The sections of a run's configuration that matter here.
@@ -33,6 +33,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut dataset = gyre_radar::open(Path::new(folder), &config.dataset)?;
     let mut scan = OwnedScan::with_limits(dataset.limits());
     let mut odometry = Odometry::new(&config.odometry)?;
+    let gyro = &config.odometry.gyro;
+    let samples = ScanSamples::open(gyro, Path::new(folder), dataset.as_ref())?;
     let (mut stamps, mut poses) = (Vec::new(), Vec::new());
     for index in 0..dataset.len() {
         match dataset.read(index, scan.slot()) {
@@ -42,8 +44,10 @@ fn main() -> Result<(), Box<dyn Error>> {
                 continue;
             }
         }
-        let registered = odometry.register(&scan.view(), &[])?;
-        stamps.push(scan.geometry.stamp_ns);
+        let stamp_ns = scan.geometry.stamp_ns;
+        let samples = samples.of(dataset.as_ref(), index, stamp_ns);
+        let registered = odometry.register(&scan.view(), samples)?;
+        stamps.push(stamp_ns);
         poses.push(registered.pose.motion);
     }
     let trajectory = Trajectory {

@@ -2,7 +2,7 @@
 
 use gyre_geometry::{ComposedMotion, OdometryMotion, SparsePoint, Twist, UncertainMotion};
 use gyre_radar::{LostAzimuthFinder, LostAzimuths, PlacedRows, PolarScan};
-use gyre_samples::{Gyro, Sample};
+use gyre_samples::{Gyro, Sample, with_yaw_rate};
 use gyre_scan_matching::{JointMatch, Refined};
 use ndarray::{ArrayView2, ArrayViewMut2};
 
@@ -78,7 +78,8 @@ impl Odometry {
         self.gyro
             .push(samples, scan.geometry.stamp_ns, scan.span_ns());
         self.pair.expect_turn(self.gyro.turn());
-        let masked = self.mask(scan, self.gyro.turned(self.twists.next()));
+        let [_, rate] = self.gyro.sweep_rates_radps();
+        let masked = self.mask(scan, with_yaw_rate(self.twists.next(), rate));
         if masked.is_err() {
             // The next turn would be from the scan that is skipped.
             self.gyro.clear();

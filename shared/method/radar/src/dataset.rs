@@ -25,6 +25,7 @@ mod oxford;
 mod png_image;
 mod radiate;
 mod row_order;
+mod samples;
 mod sensor_clock;
 
 mod stale;
@@ -40,10 +41,13 @@ pub use error::{OpenError, ReadError};
 pub use file_list::FileList;
 pub use foreign::foreign;
 pub use format::Format;
+use gyre_samples::Sample;
 pub use image_size::ImageSize;
 pub use image_source::ImageSource;
 pub use options::{AzimuthSource, DatasetOptions, LostAzimuthOption};
-pub use stamp::{DEFAULT_TURN_NS, middle_ns, turn_ns};
+pub use radiate::frame_stamps;
+pub use samples::ScanSamples;
+pub use stamp::{DEFAULT_TURN_NS, middle_ns, parse_seconds, to_ns as stamp_to_ns, turn_ns};
 
 /// The scans of one recording, ordered by time.
 ///
@@ -117,6 +121,12 @@ pub trait Dataset: Send {
     /// An index past the end, an image that cannot be read or decoded, metadata that is not of one
     /// sweep, a slot that is too small.
     fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError>;
+
+    /// The samples of other sensors that were recorded with the scan that was read last, in the
+    /// order of their stamps: of a recording of a run with such sensors.
+    fn samples(&self) -> &[Sample] {
+        &[]
+    }
 }
 
 /// Opens the dataset at `root`: the folder that holds the radar's folder, or the folder of images

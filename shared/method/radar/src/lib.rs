@@ -15,6 +15,7 @@ mod clock;
 pub mod dataset;
 pub mod fingerprint;
 pub mod ground_truth;
+mod gyro_log;
 pub mod inspect;
 pub mod lost;
 mod median;
@@ -29,14 +30,15 @@ pub use chain::{MAX_INTERVAL_NS, continues};
 pub use clock::{ClockOffset, MAX_OFFSET_S, clock_offset};
 pub use dataset::{
     AzimuthSource, DEFAULT_TURN_NS, Dataset, DatasetOptions, EncoderTurn, FIRST_TURNS, FileList,
-    Format, ImageSize, ImageSource, LostAzimuthOption, OpenError, ReadError, correct_eccentricity,
-    encoder_counts, foreign, middle_ns, open, open_resolved, open_source, reopen, stored_options,
-    turn_ns,
+    Format, ImageSize, ImageSource, LostAzimuthOption, OpenError, ReadError, ScanSamples,
+    correct_eccentricity, encoder_counts, foreign, frame_stamps, middle_ns, open, open_resolved,
+    open_source, parse_seconds, reopen, stamp_to_ns, stored_options, turn_ns,
 };
 pub use fingerprint::Fingerprint;
 pub use ground_truth::{
     TrajectoryError, find_ground_truth, parse_trajectory, read_trajectory, write_kitti, write_tum,
 };
+pub use gyro_log::{GyroLog, LogError, LogFaults, LogGap, SampleTrack};
 pub use inspect::{Report, inspect, inspect_dataset};
 pub use lost::{LostAzimuthFinder, LostAzimuths, PlacedRows};
 pub use median::median;

@@ -5,6 +5,7 @@
 mod common;
 
 mod frames;
+mod gyro_logs;
 mod inspect;
 mod real_scans;
 mod trajectories;

@@ -1,11 +1,15 @@
 //! From samples of a gyro to the turn between two scans.
 
+use std::mem;
+
+use bytemuck::{Pod, Zeroable};
 use gyre_geometry::Twist;
 
 use crate::{GyroConfig, Sample, SampleKind};
 
 /// What the gyro says of the turn of the sensor from one scan to the next, counter-clockwise.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct GyroTurn {
     /// From the stamp of the scan before to that of the scan, rad, with the bias.
     pub yaw_rad: f64,
@@ -28,7 +32,7 @@ pub struct Gyro {
     rates: Vec<Rate>,
     /// Number of rates that the scan before has.
     earlier: usize,
-    /// Of the scan before and of the scan.
+    /// The scan before and the scan.
     sweeps: [Option<Sweep>; 2],
     /// Of scans that were dropped since the last one.
     dropped: Vec<Rate>,
@@ -41,8 +45,10 @@ type Rate = (i64, f64);
 #[derive(Clone, Copy, Debug)]
 struct Sweep {
     stamp_ns: i64,
-    /// Of the first and of the last azimuth.
-    span_ns: [i64; 2],
+    /// Of the first azimuth.
+    start_ns: i64,
+    /// Mean rate during the sweep, rad/s; `None` where samples are missing.
+    rate_radps: Option<f64>,
 }
 
 impl Gyro {
@@ -59,9 +65,17 @@ impl Gyro {
     pub fn push(&mut self, samples: &[Sample], stamp_ns: i64, span_ns: [i64; 2]) {
         self.rates.drain(..self.earlier);
         self.earlier = self.rates.len();
-        self.rates.append(&mut self.dropped);
-        self.rates.extend(rates(samples));
-        self.sweeps = [self.sweeps[1], Some(Sweep { stamp_ns, span_ns })];
+        let dropped = mem::take(&mut self.dropped);
+        for rate in dropped.into_iter().chain(rates(samples)) {
+            let is_later = self.rates.last().is_none_or(|last| last.0 < rate.0);
+            self.rates.extend(is_later.then_some(rate));
+        }
+        let sweep = Sweep {
+            stamp_ns,
+            start_ns: span_ns[0],
+            rate_radps: self.mean_rate(span_ns),
+        };
+        self.sweeps = [self.sweeps[1], Some(sweep)];
     }
 
     /// Takes the samples of a scan that is dropped: they count as those of the next one.
@@ -79,7 +93,7 @@ impl Gyro {
     pub fn turn(&self) -> Option<GyroTurn> {
         let [before, scan] = self.sweeps;
         let (before, scan) = (before?, scan?);
-        let rates = since(&self.rates, before.span_ns[0]);
+        let rates = since(&self.rates, before.start_ns);
         let span_ns = [before.stamp_ns, scan.stamp_ns];
         let yaw_rad = integral(rates, span_ns, self.max_gap_ns())?;
         let interval_s = seconds(scan.stamp_ns - before.stamp_ns);
@@ -91,13 +105,17 @@ impl Gyro {
             yaw_rad,
             variance_rad2: walk + by_scale * by_scale + by_time * by_time,
             interval_s,
-            sweep_rate_radps: self.sweep_rate_radps()?,
+            sweep_rate_radps: scan.rate_radps?,
         })
     }
 
-    /// Returns the mean rate during the sweep of the scan; `None` where samples are missing.
-    pub fn sweep_rate_radps(&self) -> Option<f64> {
-        let [start_ns, end_ns] = self.sweeps[1]?.span_ns;
+    /// Returns the mean rates during the sweeps of the scan before and of the scan, rad/s; `None`
+    /// where samples are missing.
+    pub fn sweep_rates_radps(&self) -> [Option<f64>; 2] {
+        self.sweeps.map(|sweep| sweep?.rate_radps)
+    }
+
+    fn mean_rate(&self, [start_ns, end_ns]: [i64; 2]) -> Option<f64> {
         let rates = since(&self.rates[self.earlier..], start_ns);
         match start_ns < end_ns {
             true => {
@@ -108,19 +126,17 @@ impl Gyro {
         }
     }
 
-    /// Returns the velocity for the compensation of the scan: with the gyro's yaw rate, if it has
-    /// one.
-    pub fn turned(&self, twist: Option<Twist>) -> Option<Twist> {
-        let rate = self.sweep_rate_radps();
-        twist.map(|twist| Twist {
-            yaw_rate_radps: rate.unwrap_or(twist.yaw_rate_radps),
-            ..twist
-        })
-    }
-
     fn max_gap_ns(&self) -> i64 {
         (self.config.max_gap_s * 1e9) as i64
     }
+}
+
+/// Returns the velocity for the compensation of a sweep: with the gyro's mean rate, if it has one.
+pub fn with_yaw_rate(twist: Option<Twist>, rate_radps: Option<f64>) -> Option<Twist> {
+    twist.map(|twist| Twist {
+        yaw_rate_radps: rate_radps.unwrap_or(twist.yaw_rate_radps),
+        ..twist
+    })
 }
 
 fn rates(samples: &[Sample]) -> impl Iterator<Item = Rate> {
@@ -231,7 +247,7 @@ mod tests {
         assert_eq!(whole.turn(), late.turn());
         let alone = gyro(2, &[&scans[2]]);
         assert_eq!(alone.turn(), None);
-        assert_eq!(whole.sweep_rate_radps(), alone.sweep_rate_radps());
+        assert_eq!(whole.sweep_rates_radps()[1], alone.sweep_rates_radps()[1]);
     }
 
     #[test]
@@ -260,9 +276,6 @@ mod tests {
         let both: Vec<Rate> = second.iter().chain(&third).copied().collect();
         replayed.push(&samples(&both), 625 * MS, [500 * MS, 750 * MS]);
         assert_eq!(Some(turn), replayed.turn());
-        assert_eq!(
-            live.sweep_rate_radps(),
-            gyro(2, &[&third]).sweep_rate_radps()
-        );
+        assert_eq!(live.sweep_rates_radps(), replayed.sweep_rates_radps());
     }
 }

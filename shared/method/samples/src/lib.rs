@@ -17,5 +17,5 @@ mod gyro;
 mod sample;
 
 pub use config::{GyroConfig, GyroConfigError, GyroKind, UpAxis};
-pub use gyro::{Gyro, GyroTurn};
-pub use sample::{Sample, SampleKind};
+pub use gyro::{Gyro, GyroTurn, with_yaw_rate};
+pub use sample::{MAX_SAMPLES, Sample, SampleKind};

@@ -16,6 +16,9 @@ pub struct Sample {
     pub values: [f64; 6],
 }
 
+/// The most samples that travel with one scan: those of a second at 1000 Hz.
+pub const MAX_SAMPLES: usize = 1024;
+
 /// What a sample measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
@@ -33,6 +36,11 @@ impl Sample {
             reserved: 0,
             values: [0.0, 0.0, rate_radps, 0.0, 0.0, 0.0],
         }
+    }
+
+    /// Returns whether its kind is known, and all its values are finite.
+    pub fn is_valid(&self) -> bool {
+        self.is(SampleKind::Gyro) && self.values.iter().all(|value| value.is_finite())
     }
 
     /// Returns whether it is of this kind.

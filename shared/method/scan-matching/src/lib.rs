@@ -82,8 +82,8 @@ pub use fft::fast_size;
 pub use masked_correlation::MaskedCorrelation;
 pub use peak::{LinePeak, line_peak};
 pub use refinement::{
-    Anchor, InitialGuess, Keyframe, KeyframeAligner, Outcome, Refined, RefinementConfig,
-    RefinementKind, Refiner, Standstill, Submap, TrackerState,
+    Anchor, GyroBias, Heading, InitialGuess, Keyframe, KeyframeAligner, Outcome, Refined,
+    RefinementConfig, RefinementKind, Refiner, Standstill, Submap, TrackerState,
 };
 pub use rotation::{RotationMatch, RotationRunnerUp, RotationSearch};
 pub use sequential::SequentialRotation;

@@ -37,7 +37,7 @@ mod uncertainty;
 pub use config::{RefinementConfig, RefinementKind};
 use gyre_geometry::{OdometryMotion, Pose, SparsePoint, Twist, UncertainMotion};
 use gyre_samples::{GyroConfig, GyroTurn};
-pub use heading::Heading;
+pub use heading::{GyroBias, Heading};
 pub use initial_guess::InitialGuess;
 pub use keyframe_aligner::KeyframeAligner;
 pub use local_map::Keyframe;
@@ -83,6 +83,8 @@ pub struct Refined {
     pub guess: InitialGuess,
     /// The vehicle stands: the motion is zero.
     pub stationary: bool,
+    /// The bias of the gyro; `None` where it has not measured the turn.
+    pub gyro: Option<GyroBias>,
 }
 
 /// Refines motions scan by scan against a map of the last keyframes.
@@ -180,13 +182,20 @@ impl Refiner {
             },
             outcome,
             stationary: report.stationary,
+            gyro: scan.step.turn.and(self.state.heading).map(|it| it.bias()),
         }
     }
 
-    /// Forgets the map and the tracker state: the next scan starts a new chain of motions.
+    /// Forgets the map and the tracker state but for the bias of the gyro: the next scan starts a new
+    /// chain of motions.
     pub fn reset(&mut self) {
-        self.state = TrackerState::default();
         self.map.clear();
+        let mut heading = self.state.heading.take();
+        heading.iter_mut().for_each(Heading::start_map);
+        self.state = TrackerState {
+            heading,
+            ..TrackerState::default()
+        };
     }
 
     /// Restores an earlier state. `load` fills in the next keyframe, oldest first, and returns

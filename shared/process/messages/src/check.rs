@@ -84,6 +84,7 @@ mod tests {
         cell_m: 2.0,
         rasters: 1,
         points: 2,
+        samples: 2,
     };
 
     /// The start of the sentence that refuses a header, and how to make it such.

@@ -164,6 +164,8 @@ pub struct Limits {
     pub rasters: usize,
     /// Points in a `masked` message.
     pub points: usize,
+    /// Samples of other sensors in a `scan` message.
+    pub samples: usize,
 }
 
 impl Limits {

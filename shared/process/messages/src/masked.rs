@@ -2,6 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use gyre_geometry::{SparsePoint, Twist};
+use gyre_samples::GyroTurn;
 use ndarray::{ArrayView2, ArrayViewMut2};
 
 use crate::{
@@ -52,7 +53,7 @@ impl Message for Masked {
             + (limits.points * size_of::<SparsePoint>()).div_ceil(ByteBlock::LEN)
     }
 }
-header!(MaskedHeader, "gyre_masked_header_v5");
+header!(MaskedHeader, "gyre_masked_header_v6");
 
 /// Values of [`MaskedHeader::mask`].
 pub mod mask_kind {
@@ -88,6 +89,10 @@ pub struct MaskedHeader {
     /// Mean variance of the rows' azimuths, rad²: not zero where azimuths were lost at places that
     /// are not known.
     pub azimuth_variance_rad2: f32,
+    /// What the gyro says of the turn since the previous scan: see [`MaskedHeader::turn`].
+    pub gyro: GyroTurn,
+    /// 1 if it says so.
+    pub has_gyro: u64,
 }
 
 /// The parts of a payload, to fill in: see [`MaskedHeader::split`].
@@ -146,6 +151,23 @@ impl MaskedHeader {
             self.azimuth_variance_rad2,
             "finite, 0 or more",
         )?;
+        require(self.has_gyro <= 1, "has_gyro", self.has_gyro, "0 or 1")?;
+        let gyro = &self.gyro;
+        finite([
+            ("gyro.yaw_rad", gyro.yaw_rad),
+            ("gyro.sweep_rate_radps", gyro.sweep_rate_radps),
+        ])?;
+        for (key, value) in [
+            ("gyro.variance_rad2", gyro.variance_rad2),
+            ("gyro.interval_s", gyro.interval_s),
+        ] {
+            require(
+                value >= 0.0 && value.is_finite(),
+                key,
+                value,
+                "finite, 0 or more",
+            )?;
+        }
         let points = self.points(values).ok_or_else(|| {
             let bytes = size_of_val(values);
             Violation(format!("its payload of {bytes} bytes is shorter than its header says: {rasters} rasters of {n} x {n} cells and {points} points"))
@@ -168,6 +190,18 @@ impl MaskedHeader {
     fn raster_values(n: usize) -> Option<usize> {
         let cells = n.checked_mul(n)?;
         Some(FloatBlock::count(cells) * FloatBlock::LEN)
+    }
+
+    /// Returns the turn from the previous scan to this one, as the gyro has measured it; `None`
+    /// where it has not.
+    pub fn turn(&self) -> Option<GyroTurn> {
+        (self.has_gyro == 1).then_some(self.gyro)
+    }
+
+    /// Sets it.
+    pub fn set_turn(&mut self, turn: Option<GyroTurn>) {
+        self.gyro = turn.unwrap_or_default();
+        self.has_gyro = turn.is_some().into();
     }
 
     /// Splits a payload into its parts, with `rasters` (1 or 2) of n x n cells. `None` if it is too

@@ -44,6 +44,12 @@ pub struct RefinementRecord {
     pub support: f64,
     /// 1 while the vehicle stands, and its pose is held: the motion is zero. Otherwise 0.
     pub stationary: u64,
+    /// 1 if the gyro has measured the turn.
+    pub gyro: u64,
+    /// Bias of the gyro after the scan, rad/s; zero without one.
+    pub gyro_bias_radps: f64,
+    /// Standard deviation of that bias, rad/s.
+    pub gyro_bias_sigma_radps: f64,
 }
 
 impl RefinementRecord {
@@ -72,7 +78,13 @@ impl RefinementRecord {
             self.stationary,
             "0 or 1",
         )?;
-        finite([("overlap", self.overlap), ("support", self.support)])
+        require(self.gyro <= 1, "gyro", self.gyro, "0 or 1")?;
+        finite([
+            ("overlap", self.overlap),
+            ("support", self.support),
+            ("gyro_bias_radps", self.gyro_bias_radps),
+            ("gyro_bias_sigma_radps", self.gyro_bias_sigma_radps),
+        ])
     }
 }
 
@@ -92,6 +104,9 @@ impl From<&gyre_scan_matching::Refined> for RefinementRecord {
             overlap: refined.overlap,
             support: refined.support,
             stationary: refined.stationary.into(),
+            gyro: refined.gyro.is_some().into(),
+            gyro_bias_radps: refined.gyro.map_or(0.0, |bias| bias.rate_radps),
+            gyro_bias_sigma_radps: refined.gyro.map_or(0.0, |bias| bias.sigma_radps),
         }
     }
 }

@@ -1,7 +1,10 @@
 //! `scan`: one polar scan as measured by the sensor.
 
+use std::ops::Range;
+
 use bytemuck::{Pod, Zeroable};
 use gyre_radar::{MAX_AZIMUTHS, PolarScan, ScanSlot, Sense, SweepGeometry};
+use gyre_samples::Sample;
 
 use crate::{
     block::ByteBlock,
@@ -12,7 +15,8 @@ use crate::{
 };
 
 /// A polar scan: the power of azimuth `a` at range bin `b` is byte `first_byte + a * stride + b` of
-/// the payload.
+/// the payload. What other sensors have measured since the scan before follows in the payload's
+/// next block: [`ScanHeader::samples`].
 #[derive(Debug)]
 pub enum Scan {}
 
@@ -27,18 +31,21 @@ impl Message for Scan {
     fn check_content(
         header: &Self::Header,
         payload: &[Self::Element],
-        _: &Limits,
+        limits: &Limits,
     ) -> Result<(), Violation> {
-        header.check(bytemuck::cast_slice(payload))
+        header.check(bytemuck::cast_slice(payload), limits)
     }
 
     fn max_elements(limits: &Limits) -> usize {
-        ByteBlock::count(limits.scan_bytes)
+        ByteBlock::count(limits.scan_bytes) + limits.samples
     }
 
-    /// Up to the last bin of the last row.
+    /// Up to the last bin of the last row, or the last sample.
     fn content_bytes(header: &Self::Header) -> Option<usize> {
-        header.end()
+        match header.samples {
+            0 => header.power_bytes(),
+            _ => Some(header.sample_bytes()?.end),
+        }
     }
 
     /// In live mode the history holds the scans that are published while masking restarts.
@@ -56,7 +63,7 @@ impl Message for Scan {
         }
     }
 }
-header!(ScanHeader, "gyre_scan_header_v5");
+header!(ScanHeader, "gyre_scan_header_v6");
 
 /// The geometry of a scan, and the measured angle and time of each azimuth.
 #[repr(C)]
@@ -82,6 +89,10 @@ pub struct ScanHeader {
     /// Metres to add to a range for each m/s of approach; 0 if unknown: see
     /// [`SweepGeometry::doppler_s`].
     pub doppler_s: f32,
+    /// Number of samples of other sensors after the powers: see [`ScanHeader::samples`].
+    pub samples: u32,
+    /// Number of their samples that were measured since the scan before, but cannot be used.
+    pub samples_left_out: u32,
     /// Time of each row, ns since 1970.
     pub azimuth_stamp_ns: [i64; MAX_AZIMUTHS],
     /// Angle of each row from straight ahead, rad in [0, 2 pi).
@@ -101,7 +112,7 @@ impl ScanHeader {
     /// than the header says.
     pub fn view<'a>(&'a self, bytes: &'a [u8]) -> Option<PolarScan<'a>> {
         let geometry = self.geometry();
-        let fits = geometry.azimuths <= MAX_AZIMUTHS && self.end()? <= bytes.len();
+        let fits = geometry.azimuths <= MAX_AZIMUTHS && self.power_bytes()? <= bytes.len();
         fits.then(|| PolarScan {
             geometry,
             bytes,
@@ -113,7 +124,7 @@ impl ScanHeader {
 
     /// Returns the position behind the last bin of the last row; `None` without rows, or beyond all
     /// memory.
-    fn end(&self) -> Option<usize> {
+    pub fn power_bytes(&self) -> Option<usize> {
         let geometry = self.geometry();
         let rows = geometry
             .stride
@@ -124,7 +135,7 @@ impl ScanHeader {
 
     /// Checks the geometry, the angles and the times, and that the payload is as long as the
     /// geometry says.
-    fn check(&self, bytes: &[u8]) -> Result<(), Violation> {
+    fn check(&self, bytes: &[u8], limits: &Limits) -> Result<(), Violation> {
         let azimuths = self.azimuths as usize;
         let range = format_args!("1 to {MAX_AZIMUTHS}");
         require(
@@ -143,7 +154,85 @@ impl ScanHeader {
             ))
         })?;
         let checked = scan.check().and_then(|()| scan.check_times());
-        checked.map_err(|error| Violation(error.to_string()))
+        checked.map_err(|error| Violation(error.to_string()))?;
+        self.check_samples(bytes, limits)
+    }
+
+    fn check_samples(&self, bytes: &[u8], limits: &Limits) -> Result<(), Violation> {
+        require(
+            self.samples as usize <= limits.samples,
+            "samples",
+            self.samples,
+            format_args!("at most {}", limits.samples),
+        )?;
+        let samples = self.samples(bytes).ok_or_else(|| {
+            Violation(format!(
+                "its payload of {} bytes is shorter than its header says: {} samples",
+                bytes.len(),
+                self.samples
+            ))
+        })?;
+        if let Some(index) = samples.iter().position(|sample| !sample.is_valid()) {
+            let sample = samples[index];
+            return Err(Violation(format!(
+                "sample {index} is {sample:?}, but must be of a known kind and finite"
+            )));
+        }
+        let disorder = samples
+            .windows(2)
+            .position(|pair| pair[0].stamp_ns >= pair[1].stamp_ns);
+        disorder.map_or(Ok(()), |index| {
+            Err(Violation(format!(
+                "sample {} is not later than the one before",
+                index + 1
+            )))
+        })
+    }
+
+    /// Where the samples begin in the payload.
+    fn first_sample(&self) -> Option<usize> {
+        self.power_bytes()?.checked_next_multiple_of(ByteBlock::LEN)
+    }
+
+    /// Views the samples, in the order of their stamps; `None` if the payload is shorter than the
+    /// header says.
+    pub fn samples<'a>(&self, bytes: &'a [u8]) -> Option<&'a [Sample]> {
+        if self.samples == 0 {
+            return Some(&[]);
+        }
+        bytemuck::try_cast_slice(bytes.get(self.sample_bytes()?)?).ok()
+    }
+
+    /// Copies the samples of a payload that is aligned anyhow; as [`samples`](Self::samples).
+    pub fn read_samples(&self, bytes: &[u8]) -> Option<Vec<Sample>> {
+        if self.samples == 0 {
+            return Some(Vec::new());
+        }
+        let samples = bytes
+            .get(self.sample_bytes()?)?
+            .chunks_exact(size_of::<Sample>());
+        Some(samples.map(bytemuck::pod_read_unaligned).collect())
+    }
+
+    /// Where the samples are in the payload.
+    fn sample_bytes(&self) -> Option<Range<usize>> {
+        let first = self.first_sample()?;
+        let bytes = (self.samples as usize).checked_mul(size_of::<Sample>())?;
+        Some(first..first.checked_add(bytes)?)
+    }
+
+    /// Stores the samples behind the powers, whose geometry is set; those for which there is no
+    /// room are left out, and counted.
+    pub fn set_samples(&mut self, bytes: &mut [u8], samples: &[Sample], left_out: usize) {
+        let first = self.first_sample().unwrap_or(usize::MAX);
+        let room = bytes.len().saturating_sub(first) / size_of::<Sample>();
+        let stored = &samples[..samples.len().min(room)];
+        if let Some(place) = bytes.get_mut(first..).filter(|_| !stored.is_empty()) {
+            let stored = bytemuck::cast_slice(stored);
+            place[..stored.len()].copy_from_slice(stored);
+        }
+        self.samples = stored.len() as u32;
+        self.samples_left_out = (left_out + samples.len() - stored.len()) as u32;
     }
 
     /// Returns the buffers that a dataset reader fills: the tables of this header and the bytes of
@@ -170,9 +259,9 @@ impl ScanHeader {
         self.item.stamp_ns = geometry.stamp_ns;
     }
 
-    /// Adds to the time of the scan and of its rows, ns: a recording that is played again goes on
+    /// Adds to the time of the scan, of its rows and of its samples, ns: a recording that is played again goes on
     /// in time.
-    pub fn shift_times(&mut self, shift_ns: i64) {
+    pub fn shift_times(&mut self, shift_ns: i64, bytes: &mut [u8]) {
         if shift_ns == 0 {
             return;
         }
@@ -180,6 +269,12 @@ impl ScanHeader {
         let stamps = self.azimuth_stamp_ns.iter_mut().take(rows);
         for stamp_ns in stamps.chain([&mut self.item.stamp_ns]) {
             *stamp_ns = stamp_ns.saturating_add(shift_ns);
+        }
+        let bytes = self.sample_bytes().and_then(|range| bytes.get_mut(range));
+        let samples: Option<&mut [Sample]> =
+            bytes.and_then(|bytes| bytemuck::try_cast_slice_mut(bytes).ok());
+        for sample in samples.into_iter().flatten() {
+            sample.stamp_ns = sample.stamp_ns.saturating_add(shift_ns);
         }
     }
 

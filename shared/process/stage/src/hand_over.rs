@@ -138,6 +138,7 @@ fn manifest(root: &RunRoot, out: &Path, bytes: usize, readers: usize) -> Manifes
             cell_m: 1.0,
             rasters: 1,
             points: 0,
+            samples: 0,
         },
         live: false,
         refines: false,

@@ -58,6 +58,7 @@ impl Run {
                 cell_m: 1.0,
                 rasters: 1,
                 points: 0,
+                samples: 0,
             },
             live: false,
             refines: false,

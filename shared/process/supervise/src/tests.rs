@@ -42,6 +42,7 @@ pub(crate) fn manifest(out: &Path) -> Manifest {
             cell_m: 1.0,
             rasters: 1,
             points: 0,
+            samples: 0,
         },
         live: false,
         refines: false,

@@ -11,7 +11,7 @@ const MAX_UNREADABLE_SHARE: f64 = 0.2;
 const MOTIONS_OF_PERIOD: usize = 1 << 16;
 
 /// Counts of scans.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Counts {
     /// Scans that the source published.
     pub published: u64,
@@ -31,6 +31,9 @@ pub struct Counts {
     /// `None`: the run refines no motions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub motions: Option<MotionCounts>,
+    /// `None`: no gyro has measured a turn.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gyro: Option<GyroCounts>,
 }
 
 /// The path that was driven.
@@ -59,6 +62,28 @@ impl LostCounts {
         let azimuths = item.lost_azimuths().count() as u64;
         self.scans += u64::from(azimuths > 0);
         self.azimuths += azimuths;
+    }
+}
+
+/// What a gyro contributed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct GyroCounts {
+    /// Motions whose turn it measured; the others are those of the radar alone.
+    pub motions: u64,
+    /// Its bias after the last of them, rad/s.
+    pub bias_radps: f64,
+    /// Standard deviation of that bias, rad/s.
+    pub bias_sigma_radps: f64,
+}
+
+impl GyroCounts {
+    fn add(&mut self, motion: &MotionEstimate) {
+        let refinement = &motion.refinement;
+        if refinement.gyro == 1 {
+            self.motions += 1;
+            self.bias_radps = refinement.gyro_bias_radps;
+            self.bias_sigma_radps = refinement.gyro_bias_sigma_radps;
+        }
     }
 }
 
@@ -115,6 +140,7 @@ pub struct Counter {
     gaps: Gaps,
     lost: LostCounts,
     motions: MotionCounts,
+    gyro: GyroCounts,
 }
 
 impl Counter {
@@ -127,6 +153,7 @@ impl Counter {
         self.gaps.add(pose);
         self.lost.add(&pose.item);
         self.motions.add(&pose.motion);
+        self.gyro.add(&pose.motion);
     }
 
     /// Returns the path, which is so long.
@@ -158,6 +185,7 @@ impl Counter {
             breaks: self.starts.saturating_sub(1),
             lost: (self.lost.scans > 0).then_some(self.lost),
             motions: refines.then_some(self.motions),
+            gyro: (self.gyro.motions > 0).then_some(self.gyro),
         }
     }
 }

@@ -2,11 +2,11 @@
 
 use std::ops::Range;
 
-use gyre_configuration::{Configuration, Played, describe_masks_in_process};
+use gyre_configuration::{Configuration, describe_masks_in_process};
 use gyre_geometry::Twist;
 use gyre_localisation::Observation;
 use gyre_odometry::{Odometry, Outcome};
-use gyre_radar::{Dataset, OwnedScan};
+use gyre_radar::{Dataset, OwnedScan, ScanSamples};
 use gyre_terminal::{Failure, print};
 
 /// The scans of a recording, one after the other.
@@ -15,6 +15,7 @@ pub struct Scans {
     played: Range<usize>,
     odometry: Odometry,
     scan: OwnedScan,
+    samples: ScanSamples,
     left_out: usize,
     /// Scans in a row that were left out, and the most that may be.
     unreadable: usize,
@@ -37,7 +38,8 @@ impl Scans {
     /// # Errors
     /// A recording or a configuration that cannot be used.
     pub fn open(configuration: &Configuration) -> Result<Self, Failure> {
-        let Played { dataset, .. } = gyre_configuration::open(configuration)?;
+        let played = gyre_configuration::open(configuration)?;
+        let dataset = played.dataset;
         describe_masks_in_process(configuration)?
             .iter()
             .for_each(print::note);
@@ -45,6 +47,7 @@ impl Scans {
             played: configuration.source.played(dataset.as_ref()),
             odometry: Odometry::new(&configuration.odometry)?,
             scan: OwnedScan::with_limits(dataset.limits()),
+            samples: played.samples,
             left_out: 0,
             unreadable: 0,
             max_unreadable: configuration.source.max_unreadable,
@@ -76,7 +79,9 @@ impl Scans {
             let registered = match self.dataset.read(number, self.scan.slot()) {
                 Ok(geometry) => {
                     self.scan.geometry = geometry;
-                    let registered = self.odometry.register(&self.scan.view(), &[]);
+                    let stamp_ns = geometry.stamp_ns;
+                    let samples = self.samples.of(self.dataset.as_ref(), number, stamp_ns);
+                    let registered = self.odometry.register(&self.scan.view(), samples);
                     registered.map_err(|error| format!("scan {number}: {error}"))
                 }
                 Err(error) => Err(error.to_string()),

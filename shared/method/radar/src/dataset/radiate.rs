@@ -59,6 +59,14 @@ pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<TransposedS
     Ok(scans)
 }
 
+/// Reads a list of `Frame: <number> Time: <seconds>.<nanoseconds>`: the times by frame number, ns.
+///
+/// # Errors
+/// A list that cannot be read, or a line of another form.
+pub fn frame_stamps(list: &Path) -> Result<BTreeMap<i64, i64>, OpenError> {
+    Ok(parse_stamps(list, &read_list(list)?)?.0)
+}
+
 fn read_list(list: &Path) -> Result<String, OpenError> {
     let path = list.to_owned();
     gyre_storage::read_text(list, MAX_LIST_BYTES).map_err(|source| match source.kind() {

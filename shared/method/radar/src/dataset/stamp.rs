@@ -22,7 +22,7 @@ pub(crate) fn plausible(stamp_ns: i64) -> bool {
 
 /// Converts a stamp of unknown unit to ns: the years 2015 to 2040 do not overlap in s, ms, us and
 /// ns.
-pub(crate) fn to_ns(raw: i64) -> Option<i64> {
+pub fn to_ns(raw: i64) -> Option<i64> {
     [1, 1_000, 1_000_000, SECOND_NS]
         .into_iter()
         .filter_map(|unit| raw.checked_mul(unit))
@@ -31,7 +31,7 @@ pub(crate) fn to_ns(raw: i64) -> Option<i64> {
 
 /// Parses decimal seconds to ns, exactly: `12.5` is 12,500,000,000. Values with an exponent are
 /// rounded to `f64`.
-pub(crate) fn parse_seconds(text: &str) -> Option<i64> {
+pub fn parse_seconds(text: &str) -> Option<i64> {
     let (whole, fraction) = text.split_once('.').unwrap_or((text, ""));
     let digits = |t: &str| t.bytes().all(|b| b.is_ascii_digit());
     let unsigned = whole.strip_prefix('-').unwrap_or(whole);

@@ -28,6 +28,15 @@ pub struct Heading {
     pub covariance: Matrix3<f64>,
 }
 
+/// The bias of the gyro, as it is known after a scan.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GyroBias {
+    /// The bias, rad/s.
+    pub rate_radps: f64,
+    /// Its standard deviation, rad/s.
+    pub sigma_radps: f64,
+}
+
 /// The heading that the gyro predicts, against the scan before.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PredictedTurn {
@@ -47,6 +56,14 @@ impl Heading {
             bias_radps: config.bias_radps,
             lean_rad: 0.0,
             covariance: Matrix3::from_diagonal(&variances),
+        }
+    }
+
+    /// Returns what is known of the bias.
+    pub(super) fn bias(&self) -> GyroBias {
+        GyroBias {
+            rate_radps: self.bias_radps,
+            sigma_radps: self.covariance[(1, 1)].max(0.0).sqrt(),
         }
     }
 

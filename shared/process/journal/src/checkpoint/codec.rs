@@ -2,20 +2,23 @@
 //! checksum of the rest.
 
 use gyre_geometry::Twist;
-use gyre_scan_matching::{Anchor, Keyframe, Standstill, TrackerState};
+use gyre_scan_matching::{Anchor, Heading, Keyframe, Standstill, TrackerState};
 use gyre_storage::Checksum;
-use nalgebra::{Complex, Isometry2, Translation2, UnitComplex};
+use nalgebra::{Complex, Isometry2, Matrix3, Translation2, UnitComplex};
 
 /// Words of a state's slot before the names of its keyframes: the checksum; the item, the checksum
 /// of its motion, the number of keyframes; the tracker state.
 const STATE_WORDS: usize = 1 + 3 + TRACKER_WORDS;
 const NAME_WORDS: usize = 2;
-const TRACKER_WORDS: usize = STANDSTILL + STANDSTILL_WORDS;
+const TRACKER_WORDS: usize = HEADING + HEADING_WORDS;
 const STANDSTILL_WORDS: usize = 4 + 4 + 4;
+/// Whether there is one, bias, lean, covariance.
+const HEADING_WORDS: usize = 1 + 1 + 1 + 9;
 const ANCHOR_WORDS: usize = 9;
-/// Where the means and counts of a tracker state begin, and its standstill.
+/// Where the means and counts of a tracker state begin, its standstill, and its heading.
 const REST: usize = 4 + 2 * ANCHOR_WORDS;
 const STANDSTILL: usize = REST + 4;
+const HEADING: usize = STANDSTILL + STANDSTILL_WORDS;
 /// Words of a keyframe's slot before its cells: checksum, id, pose, corners of both levels.
 pub(super) const KEYFRAME_WORDS: usize = 2 + 4 + 4;
 /// The checksum of an empty slot. No content has it.
@@ -100,8 +103,29 @@ fn tracker_words(state: &TrackerState) -> [u64; TRACKER_WORDS] {
         state.unmatched.into(),
     ];
     words[REST..STANDSTILL].copy_from_slice(&rest);
-    words[STANDSTILL..].copy_from_slice(&standstill_words(&state.standstill));
+    words[STANDSTILL..HEADING].copy_from_slice(&standstill_words(&state.standstill));
+    if let Some(heading) = &state.heading {
+        words[HEADING..].copy_from_slice(&heading_words(heading));
+    }
     words
+}
+
+fn heading_words(heading: &Heading) -> [u64; HEADING_WORDS] {
+    let mut words = [1; HEADING_WORDS];
+    words[1] = heading.bias_radps.to_bits();
+    words[2] = heading.lean_rad.to_bits();
+    let covariance = words[3..].iter_mut().zip(&heading.covariance);
+    covariance.for_each(|(word, value)| *word = value.to_bits());
+    words
+}
+
+fn heading_from(words: &[u64]) -> Option<Heading> {
+    let value = |k: usize| f64::from_bits(words[k]);
+    (words[0] == 1).then(|| Heading {
+        bias_radps: value(1),
+        lean_rad: value(2),
+        covariance: Matrix3::from_fn(|row, column| value(3 + row + 3 * column)),
+    })
 }
 
 fn standstill_words(standstill: &Standstill) -> [u64; STANDSTILL_WORDS] {
@@ -152,6 +176,7 @@ fn tracker_from(words: &[u64; TRACKER_WORDS]) -> TrackerState {
         doubtful: rest[2] as u32,
         unmatched: rest[3] as u32,
         standstill: standstill_from(&words[STANDSTILL..]),
+        heading: heading_from(&words[HEADING..]),
     }
 }
 

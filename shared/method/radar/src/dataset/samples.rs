@@ -1,0 +1,84 @@
+//! The samples of other sensors that go with each scan of a dataset.
+
+use std::path::Path;
+
+use gyre_samples::{GyroConfig, GyroKind, Sample};
+
+use super::{Dataset, Format};
+use crate::gyro_log::{GyroLog, LogError, SampleTrack};
+
+/// The samples of other sensors that go with the scans of a dataset: by their stamps alone, each
+/// with the first scan whose sweep ends after it.
+#[derive(Debug)]
+pub enum ScanSamples {
+    /// There are none.
+    None,
+    /// From a log.
+    Log(SampleTrack),
+    /// With the scans of the recording of a run, whatever their stamps.
+    Recorded,
+}
+
+impl ScanSamples {
+    /// Opens what the section `[gyro]` names for the dataset in this folder.
+    ///
+    /// # Errors
+    /// No log beside the scans, or one that cannot be read.
+    pub fn open(
+        config: &GyroConfig,
+        folder: &Path,
+        dataset: &dyn Dataset,
+    ) -> Result<Self, LogError> {
+        let file = match (config.kind, dataset.format()) {
+            (GyroKind::None, _) => return Ok(Self::None),
+            (_, Format::Mcap) => return Ok(Self::Recorded),
+            (GyroKind::Auto, _) => GyroLog::find(folder)?,
+            (GyroKind::Log, _) => config.file.clone().unwrap_or_default(),
+        };
+        Self::of_log(&GyroLog::read(&file)?, config, dataset)
+    }
+
+    /// Takes the samples of a log.
+    ///
+    /// # Errors
+    /// It has none from the first scan to the last.
+    pub fn of_log(
+        log: &GyroLog,
+        config: &GyroConfig,
+        dataset: &dyn Dataset,
+    ) -> Result<Self, LogError> {
+        let track = SampleTrack::new(log, config);
+        let last = dataset.len().saturating_sub(1);
+        let [first_ns, last_ns] =
+            [dataset.first(), last].map(|index| dataset.nominal_stamp_ns(index));
+        if let (Some(first_ns), Some(last_ns), Some(span_ns)) = (first_ns, last_ns, track.span_ns())
+            && track.between(first_ns, last_ns).is_empty()
+        {
+            return Err(LogError::Elsewhere {
+                path: log.path.clone(),
+                after_s: (span_ns[0] - first_ns) as f64 * 1e-9,
+            });
+        }
+        Ok(Self::Log(track))
+    }
+
+    /// Returns the samples of the scan of this index, which was read last and has this stamp, in the
+    /// order of their stamps.
+    ///
+    /// They are those since the end of the sweep before, as far as the times of both scans are known
+    /// without decoding; else since a turn before the scan's own sweep. A sample may then go with
+    /// two scans, and counts once.
+    pub fn of<'a>(&'a self, dataset: &'a dyn Dataset, index: usize, stamp_ns: i64) -> &'a [Sample] {
+        match self {
+            Self::None => &[],
+            Self::Recorded => dataset.samples(),
+            Self::Log(track) => {
+                let period_ns = dataset.period_ns();
+                let end_ns = |index| Some(dataset.nominal_stamp_ns(index)? + period_ns / 2);
+                let until_ns = end_ns(index).unwrap_or(stamp_ns + period_ns / 2);
+                let after_ns = index.checked_sub(1).and_then(end_ns);
+                track.between(after_ns.unwrap_or(until_ns - 2 * period_ns), until_ns)
+            }
+        }
+    }
+}

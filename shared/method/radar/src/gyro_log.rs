@@ -1,0 +1,130 @@
+//! The log of a gyro as a file.
+//!
+//! - [`GyroLog`]: where it lies beside the scans of a dataset, and how it is read;
+//! - `table`: tables as CSV; `columns`: which of their columns are what;
+//! - `twist`: the files of RADIATE, one for each sample;
+//! - [`SampleTrack`]: its samples in the vehicle's axes on the radar's clock;
+//! - `faults`: what is wrong with the samples, and which of them are left out.
+
+mod columns;
+mod error;
+mod faults;
+mod table;
+mod track;
+mod twist;
+
+use std::path::{Path, PathBuf};
+
+pub use error::LogError;
+pub use faults::{LogFaults, LogGap};
+pub use track::SampleTrack;
+
+use gyre_samples::Sample;
+
+/// Logs relative to the root of a dataset, in order of precedence.
+const PLACES: [&str; 12] = [
+    "imu_as_logged.csv",
+    "imu.csv",
+    "gyro.csv",
+    // Boreas-RT
+    "imu/dmu_imu.csv",
+    "imu/dmu_imu_infilled.csv",
+    "imu/aeva_imu.csv",
+    // MulRan
+    "sensor_data/xsens_imu.csv",
+    "xsens_imu.csv",
+    // FoMo
+    "vectornav.csv",
+    "xsens.csv",
+    // RADIATE
+    "GPS_IMU_Twist",
+    "imu/imu.csv",
+];
+
+/// Folders of images, beside which the log lies too if one of them is given for the dataset.
+const IMAGES: [&str; 5] = [
+    "radar",
+    "Navtech_Polar",
+    "navtech",
+    "polar",
+    "polar_oxford_form",
+];
+
+/// The log of a gyro, in its own axes and on its own clock.
+#[derive(Clone, Debug, Default)]
+pub struct GyroLog {
+    /// The samples in the order of their stamps, which all differ. Rates are in rad/s,
+    /// accelerations in m/s²: all zero where the log has none.
+    pub samples: Vec<Sample>,
+    /// What is wrong with the log, and how many of its samples were left out.
+    pub faults: LogFaults,
+    /// The file, or the folder of files.
+    pub path: PathBuf,
+}
+
+impl GyroLog {
+    /// Reads a log. The first row, or the number of columns, says of which format it is.
+    ///
+    /// # Errors
+    /// A file that cannot be read or has no angular rates, and one whose stamps or rates cannot be
+    /// those of a gyro.
+    pub fn read(path: &Path) -> Result<Self, LogError> {
+        let raw = match path.is_dir() {
+            true => twist::read(path)?,
+            false => table::read(path)?,
+        };
+        let (samples, faults) = faults::examine(raw, path)?;
+        Ok(Self {
+            samples,
+            faults,
+            path: path.to_owned(),
+        })
+    }
+
+    /// Returns the log that lies beside the scans of a dataset folder.
+    pub fn beside(folder: &Path) -> Option<PathBuf> {
+        Self::find(folder).ok()
+    }
+
+    /// Returns the log that lies beside the scans of a dataset folder, which may also be that of
+    /// the images.
+    ///
+    /// # Errors
+    /// No log, or only one of which the ground truth was made.
+    pub fn find(folder: &Path) -> Result<PathBuf, LogError> {
+        let name = folder.file_name().and_then(|name| name.to_str());
+        let is_of_images = name.is_some_and(|name| IMAGES.contains(&name));
+        let above = folder.parent().filter(|_| is_of_images);
+        let roots = [Some(folder), above];
+        let roots = || roots.into_iter().flatten();
+        let found = roots()
+            .flat_map(|root| PLACES.iter().map(|place| root.join(place)))
+            .find(|path| path.is_file() || (path.is_dir() && twist::is_one(path)));
+        let in_truth = || roots().map(|root| root.join(error::IN_TRUTH));
+        found.ok_or_else(|| match in_truth().find(|path| path.is_file()) {
+            Some(path) => LogError::InTruth { path },
+            None => LogError::None {
+                folder: folder.to_owned(),
+            },
+        })
+    }
+
+    /// Takes samples that need no examination: those of a simulation.
+    pub fn of(samples: Vec<Sample>) -> Self {
+        Self {
+            samples,
+            ..Self::default()
+        }
+    }
+}
+
+/// The samples of a file as they stand there.
+#[derive(Debug, Default)]
+struct Raw {
+    samples: Vec<Sample>,
+    /// Rows that are none of the table, and the line of the first.
+    unreadable: usize,
+    first_unreadable: usize,
+    /// The unit of the rates is named nowhere.
+    unit_is_assumed: bool,
+}

@@ -1,0 +1,67 @@
+//! Errors of logs. Each message says what is wrong, where, and what to do.
+
+use std::{io, path::PathBuf};
+
+use crate::OpenError;
+use thiserror::Error;
+
+/// The log of the INS that Boreas' ground truth was computed from.
+pub(super) const IN_TRUTH: &str = "applanix/imu.csv";
+
+/// A log that cannot be used.
+#[derive(Debug, Error)]
+pub enum LogError {
+    /// No log beside the scans.
+    #[error(
+        "no log of a gyro lies beside the scans in {folder}: name one with gyro.kind = \"log\" and gyro.file, or set gyro.kind = \"none\""
+    )]
+    None {
+        /// The folder of the dataset.
+        folder: PathBuf,
+    },
+    /// The only log is that of the ground truth.
+    #[error(
+        "the only log beside the scans is {path}, of which the ground truth was computed, so that an evaluation with it says little: name it in gyro.file if it is to be used all the same"
+    )]
+    InTruth {
+        /// The log.
+        path: PathBuf,
+    },
+    /// A file that cannot be read.
+    #[error("cannot read the log of the gyro {path}: {source}")]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// The cause.
+        source: io::Error,
+    },
+    /// A table that is no log of a gyro.
+    #[error("{path} is no log of a gyro: {reason}")]
+    Unknown {
+        /// The file.
+        path: PathBuf,
+        /// What is missing, and what would do.
+        reason: String,
+    },
+    /// A log whose stamps or rates cannot be those of a gyro.
+    #[error("the log of the gyro {path} cannot be used: {reason}")]
+    Unusable {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, and what to do.
+        reason: String,
+    },
+    /// A log of another time than the scans.
+    #[error(
+        "the log of the gyro {path} has no sample while the scans were measured: it begins {after_s:.1} s after the first of them. It is of another drive, or gyro.late_s is wrong"
+    )]
+    Elsewhere {
+        /// The log.
+        path: PathBuf,
+        /// From the first scan to its first sample, s.
+        after_s: f64,
+    },
+    /// The list of the times of RADIATE's files.
+    #[error(transparent)]
+    List(#[from] OpenError),
+}

@@ -1,0 +1,74 @@
+//! Clocks that were set: stretches of samples whose stamps belong together.
+
+use std::{iter, ops::Range};
+
+use super::LogFaults;
+use gyre_samples::Sample;
+
+/// A step of the stamps by more than this, ns, parts stretches; back it is no disorder but a step of
+/// the clock.
+const STEP_NS: i64 = 1_000_000_000;
+/// A step ahead by more than this is no gap but a step of the clock, ns.
+const AHEAD_NS: i64 = 3_600_000_000_000;
+/// Stretches from which on the stamps are no clock's.
+const MAX_STRETCHES: usize = 5000;
+
+/// Keeps those stretches between steps of the stamps that follow one another and have the most
+/// samples.
+pub(super) fn repair(samples: Vec<Sample>, faults: &mut LogFaults) -> Result<Vec<Sample>, String> {
+    let steps = (1..samples.len()).map(|k| (k, step_ns(&samples, k)));
+    let of_clock = steps.clone().map(|(_, ns)| ns);
+    let of_clock = of_clock.filter(|ns| !(-STEP_NS..=AHEAD_NS).contains(ns));
+    faults.clock_steps_s = of_clock.map(|ns| ns as f64 * 1e-9).collect();
+    if faults.clock_steps_s.is_empty() {
+        return Ok(samples);
+    }
+    let starts = steps.filter(|(_, ns)| ns.abs() > STEP_NS).map(|(k, _)| k);
+    let bounds: Vec<usize> = iter::once(0).chain(starts).chain([samples.len()]).collect();
+    let stretches: Vec<_> = bounds.windows(2).map(|pair| pair[0]..pair[1]).collect();
+    let kept = match stretches.len() <= MAX_STRETCHES {
+        true => most(&stretches, &samples),
+        false => Vec::new(),
+    };
+    let kept = kept.into_iter().flat_map(|stretch| &samples[stretch]);
+    let kept: Vec<Sample> = kept.copied().collect();
+    faults.by_clock_steps = samples.len() - kept.len();
+    match faults.by_clock_steps > kept.len() {
+        true => Err(format!(
+            "its stamps step back by more than a second, or ahead by more than an hour, {} times, so that most do not fit with each other: is the column of stamps another one?",
+            faults.clock_steps_s.len()
+        )),
+        false => Ok(kept),
+    }
+}
+
+/// The step of the stamps to a sample from the one before, ns.
+fn step_ns(samples: &[Sample], k: usize) -> i64 {
+    samples[k].stamp_ns - samples[k - 1].stamp_ns
+}
+
+/// Stretches that follow one another in time and have the most samples.
+fn most(stretches: &[Range<usize>], samples: &[Sample]) -> Vec<Range<usize>> {
+    let span = |stretch: &Range<usize>| {
+        let stamps = samples[stretch.clone()].iter().map(|it| it.stamp_ns);
+        (stamps.clone().min(), stamps.max())
+    };
+    let spans: Vec<_> = stretches.iter().map(span).collect();
+    // The samples of the best chain that ends with a stretch, and the stretch before that.
+    let mut best: Vec<(usize, Option<usize>)> = Vec::new();
+    for (k, stretch) in stretches.iter().enumerate() {
+        let follows = |earlier: &usize| spans[*earlier].1 < spans[k].0;
+        let before = (0..k)
+            .filter(follows)
+            .max_by_key(|earlier| best[*earlier].0);
+        best.push((stretch.len() + before.map_or(0, |k| best[k].0), before));
+    }
+    let mut at = (0..best.len()).max_by_key(|k| best[*k].0);
+    let mut chain = Vec::new();
+    while let Some(k) = at {
+        chain.push(stretches[k].clone());
+        at = best[k].1;
+    }
+    chain.reverse();
+    chain
+}

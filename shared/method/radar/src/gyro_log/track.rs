@@ -1,0 +1,153 @@
+//! Samples of a log on the radar's clock.
+
+use gyre_samples::{GyroConfig, Sample, UpAxis};
+
+use super::GyroLog;
+
+/// Samples in the vehicle's axes on the radar's clock, in the order of their stamps.
+#[derive(Clone, Debug, Default)]
+pub struct SampleTrack(Vec<Sample>);
+
+impl SampleTrack {
+    /// Takes the samples of a log over to the vehicle's axes and the radar's clock: the delay of
+    /// the configuration is taken off the stamps, its scale is applied to the yaw rate alone, and
+    /// its bias to nothing.
+    pub fn new(log: &GyroLog, config: &GyroConfig) -> Self {
+        let late_ns = (config.late_s * 1e9).round() as i64;
+        let taken = log.samples.iter().map(|sample| {
+            let [x, y, z, along_x, along_y, along_z] = sample.values;
+            let [roll, pitch, yaw] = in_vehicle(config.up, [x, y, z]);
+            let [ahead, left, above] = in_vehicle(config.up, [along_x, along_y, along_z]);
+            Sample {
+                stamp_ns: sample.stamp_ns.saturating_sub(late_ns),
+                values: [roll, pitch, yaw * config.scale, ahead, left, above],
+                ..*sample
+            }
+        });
+        Self(taken.collect())
+    }
+
+    /// Takes samples that are on the radar's clock, and sorts them by their stamps.
+    pub fn of(mut samples: Vec<Sample>) -> Self {
+        samples.sort_by_key(|sample| sample.stamp_ns);
+        Self(samples)
+    }
+
+    /// Returns the samples with stamps after one time and up to another, which is included.
+    pub fn between(&self, after_ns: i64, until_ns: i64) -> &[Sample] {
+        let up_to = |ns| self.0.partition_point(|sample| sample.stamp_ns <= ns);
+        let (from, to) = (up_to(after_ns), up_to(until_ns));
+        self.0.get(from..to).unwrap_or_default()
+    }
+
+    /// Returns the first stamp and the last; `None` without samples.
+    pub fn span_ns(&self) -> Option<[i64; 2]> {
+        Some([self.0.first()?.stamp_ns, self.0.last()?.stamp_ns])
+    }
+}
+
+/// A vector along the axes of the gyro in right-handed axes of which the third points up. The axis
+/// that points ahead is not known: z down is taken for x ahead and y right, z up for x ahead and y
+/// left; other axes are named in their order.
+fn in_vehicle(up: UpAxis, [x, y, z]: [f64; 3]) -> [f64; 3] {
+    match up {
+        UpAxis::Z => [x, y, z],
+        UpAxis::MinusZ => [x, -y, -z],
+        UpAxis::X => [y, z, x],
+        UpAxis::MinusX => [y, -z, -x],
+        UpAxis::Y => [z, x, y],
+        UpAxis::MinusY => [z, -x, -y],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const AXES: [UpAxis; 6] = [
+        UpAxis::X,
+        UpAxis::MinusX,
+        UpAxis::Y,
+        UpAxis::MinusY,
+        UpAxis::Z,
+        UpAxis::MinusZ,
+    ];
+
+    proptest! {
+        /// Whatever axis points up, the third rate is that about it, and the axes stay right-handed:
+        /// the cross product of two vectors is that of the vectors as they were.
+        #[test]
+        fn the_axes_are_right_handed(a in [-9.0..9.0, -9.0..9.0, -9.0..9.0f64], b in [-9.0..9.0, -9.0..9.0, -9.0..9.0f64]) {
+            for up in AXES {
+                prop_assert_eq!(in_vehicle(up, a)[2], up.of(a));
+                let crossed = in_vehicle(up, cross(a, b));
+                let of_turned = cross(in_vehicle(up, a), in_vehicle(up, b));
+                for k in 0..3 {
+                    prop_assert!((crossed[k] - of_turned[k]).abs() < 1e-9, "{up:?}");
+                }
+            }
+        }
+
+        /// Intervals that follow one another take every sample once, whatever their bounds.
+        #[test]
+        fn each_sample_is_of_one_interval(
+            stamps in prop::collection::vec(0i64..1000, 0..50),
+            mut bounds in prop::collection::vec(-10i64..1010, 2..20),
+        ) {
+            bounds.sort_unstable();
+            let track = SampleTrack::of(stamps.iter().map(|ns| Sample::yaw_rate(*ns, 0.0)).collect());
+            let taken: Vec<i64> = bounds
+                .windows(2)
+                .flat_map(|pair| track.between(pair[0], pair[1]))
+                .map(|sample| sample.stamp_ns)
+                .collect();
+            let mut expected: Vec<i64> = stamps
+                .into_iter()
+                .filter(|ns| bounds[0] < *ns && *ns <= *bounds.last().unwrap())
+                .collect();
+            expected.sort_unstable();
+            prop_assert_eq!(taken, expected);
+        }
+    }
+
+    fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+        [
+            a[1] * b[2] - a[2] * b[1],
+            a[2] * b[0] - a[0] * b[2],
+            a[0] * b[1] - a[1] * b[0],
+        ]
+    }
+
+    #[test]
+    fn delay_axis_and_scale_are_applied_and_the_bias_is_not() {
+        let log = GyroLog::of(vec![Sample {
+            stamp_ns: 5_000_000_000,
+            values: [0.1, 0.2, -0.3, 1.0, 2.0, -9.8],
+            ..Sample::yaw_rate(0, 0.0)
+        }]);
+        let config = GyroConfig {
+            late_s: 1.58,
+            up: UpAxis::MinusZ,
+            scale: 1.01,
+            bias_radps: 0.5,
+            ..GyroConfig::default()
+        };
+        let track = SampleTrack::new(&log, &config);
+        assert_eq!(track.span_ns(), Some([3_420_000_000; 2]));
+        let [sample] = track.between(0, 3_420_000_000) else {
+            panic!("one sample");
+        };
+        assert_eq!(sample.values, [0.1, -0.2, 0.3 * 1.01, 1.0, -2.0, 9.8]);
+    }
+
+    #[test]
+    fn a_reversed_interval_has_no_samples() {
+        let track = SampleTrack::of(vec![Sample::yaw_rate(5, 0.0)]);
+        assert!(track.between(7, 3).is_empty() && track.between(5, 5).is_empty());
+        assert_eq!(track.between(4, 5).len(), 1);
+        assert_eq!(SampleTrack::default().span_ns(), None);
+    }
+}

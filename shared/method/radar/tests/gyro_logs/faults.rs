@@ -1,0 +1,225 @@
+//! Faults of logs: none of them changes a sample in silence.
+
+use proptest::prelude::*;
+
+use super::{START_NS, read};
+
+const MS: i64 = 1_000_000;
+const HEADER: &str = "stamp_ns,gyro_x_radps,gyro_y_radps,gyro_z_radps";
+
+/// A log of 100 Hz whose rates tell the samples apart.
+fn rows(count: i64) -> Vec<(i64, f64)> {
+    (0..count)
+        .map(|k| (START_NS + 10 * k * MS, 1e-4 * k as f64))
+        .collect()
+}
+
+fn text(rows: &[(i64, f64)]) -> String {
+    let rows = rows.iter().map(|(ns, rate)| format!("{ns},0,0,{rate}\n"));
+    format!("{HEADER}\n{}", rows.collect::<String>())
+}
+
+/// One fault that is put into a log.
+#[derive(Clone, Debug)]
+enum Fault {
+    Lost(usize),
+    Repeated(usize, usize),
+    Late(usize, usize),
+    NotANumber(usize),
+    Absurd(usize),
+    CutOff(usize),
+}
+
+fn fault() -> impl Strategy<Value = Fault> {
+    let at = 1usize..290;
+    prop_oneof![
+        at.clone().prop_map(Fault::Lost),
+        (at.clone(), 0usize..20).prop_map(|(k, by)| Fault::Repeated(k, by)),
+        (at.clone(), 1usize..20).prop_map(|(k, by)| Fault::Late(k, by)),
+        at.clone().prop_map(Fault::NotANumber),
+        at.clone().prop_map(Fault::Absurd),
+        at.prop_map(Fault::CutOff),
+    ]
+}
+
+impl Fault {
+    /// Puts the fault into the lines of a log. Returns the sample that is lost by it.
+    fn put(&self, lines: &mut Vec<String>) -> Option<usize> {
+        let with = |line: &str, rate: &str| {
+            let stamp = line.split(',').next().unwrap().to_owned();
+            format!("{stamp},0,0,{rate}")
+        };
+        match *self {
+            Self::Lost(k) => drop(lines.remove(k)),
+            Self::Repeated(k, by) => {
+                let line = lines[k].clone();
+                lines.insert((k + by + 1).min(lines.len()), line);
+                return None;
+            }
+            Self::Late(k, by) => {
+                let line = lines.remove(k);
+                lines.insert((k + by).min(lines.len()), line);
+                return None;
+            }
+            Self::NotANumber(k) => lines[k] = with(&lines[k], "nan"),
+            Self::Absurd(k) => lines[k] = with(&lines[k], "-57.3"),
+            Self::CutOff(k) => lines[k].truncate(22),
+        }
+        match *self {
+            Self::Lost(k) | Self::NotANumber(k) | Self::Absurd(k) | Self::CutOff(k) => Some(k),
+            _ => None,
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(300))]
+
+    /// Samples that are left are those that were measured, in their order, each once; those that are
+    /// not are counted.
+    #[test]
+    fn a_fault_is_counted_and_changes_no_other_sample(fault in fault()) {
+        let rows = rows(300);
+        let mut lines: Vec<String> = text(&rows).lines().skip(1).map(str::to_owned).collect();
+        let lost = fault.put(&mut lines);
+        let log = read("imu.csv", &format!("{HEADER}\n{}\n", lines.join("\n"))).unwrap();
+        let expected: Vec<_> = (0..300).filter(|k| Some(*k) != lost).map(|k| rows[k]).collect();
+        let found: Vec<_> = log.samples.iter().map(|it| (it.stamp_ns, it.values[2])).collect();
+        prop_assert_eq!(found, expected);
+        let faults = &log.faults;
+        let counted = [faults.repeated, faults.out_of_order, faults.not_a_number, faults.absurd, faults.unreadable];
+        let one = match fault {
+            Fault::Lost(_) => [0, 0, 0, 0, 0],
+            Fault::Repeated(..) => [1, 0, 0, 0, 0],
+            Fault::Late(..) => [0, 1, 0, 0, 0],
+            Fault::NotANumber(_) => [0, 0, 1, 0, 0],
+            Fault::Absurd(_) => [0, 0, 0, 1, 0],
+            Fault::CutOff(_) => [0, 0, 0, 0, 1],
+        };
+        prop_assert_eq!(counted, one);
+        prop_assert_eq!(log.faults.sentences().is_empty(), counted == [0; 5]);
+    }
+
+    /// Whatever a file holds, reading it ends with samples in the order of their stamps, which are
+    /// finite and differ, or with a sentence.
+    #[test]
+    fn no_file_makes_disorder(rows in prop::collection::vec((prop::num::i64::ANY, prop::num::f64::ANY), 0..60)) {
+        let Ok(log) = read("imu.csv", &text(&rows)) else { return Ok(()) };
+        prop_assert!(log.samples.windows(2).all(|pair| pair[0].stamp_ns < pair[1].stamp_ns));
+        prop_assert!(log.samples.iter().all(|it| it.values.iter().all(|value| value.abs() <= 10.0)));
+        prop_assert_eq!(log.samples.len() + log.faults.left_out(), rows.len());
+    }
+}
+
+#[test]
+fn gaps_are_told_with_the_longest() {
+    let mut rows = rows(300);
+    rows.drain(200..280);
+    rows.drain(100..103);
+    let log = read("imu.csv", &text(&rows)).unwrap();
+    let gaps: Vec<_> = log
+        .faults
+        .gaps
+        .iter()
+        .map(|gap| (gap.after_s, gap.seconds))
+        .collect();
+    assert_eq!(gaps.len(), 2);
+    assert!(
+        (gaps[0].0 - 0.99).abs() < 1e-9 && (gaps[0].1 - 0.04).abs() < 1e-9,
+        "{gaps:?}"
+    );
+    assert!((log.faults.longest_gap_s() - 0.81).abs() < 1e-9);
+    let sentence = "Samples are missing in 2 places, for up to 0.81 s (2.0 s after the first).";
+    assert_eq!(log.faults.sentences(), [sentence]);
+}
+
+#[test]
+fn a_clock_that_was_set_leaves_the_longer_part() {
+    // After two hours ahead both parts follow one another.
+    for (step_ms, kept) in [
+        (-5_000, 100..300),
+        (-86_400_000, 100..300),
+        (7_200_000, 0..300),
+    ] {
+        let mut rows = rows(300);
+        rows[100..].iter_mut().for_each(|row| row.0 += step_ms * MS);
+        let log = read("imu.csv", &text(&rows)).unwrap();
+        let faults = &log.faults;
+        let step_s = 1e-3 * step_ms as f64 + 0.01;
+        assert!(
+            (faults.clock_steps_s[0] - step_s).abs() < 1e-6,
+            "{faults:?}"
+        );
+        assert_eq!(faults.clock_steps_s.len(), 1);
+        assert_eq!(log.samples.len(), kept.len(), "{step_ms}");
+        assert_eq!(log.samples[0].values[2], rows[kept.start].1);
+        let sentences = faults.sentences();
+        assert!(
+            sentences[0].contains("The clock steps 1 times"),
+            "{sentences:?}"
+        );
+    }
+}
+
+#[test]
+fn a_single_stamp_that_is_far_off_is_left_out() {
+    for off_s in [-31_536_000i64, -30, 7_200, 31_536_000] {
+        let mut rows = rows(300);
+        rows[100].0 += off_s * 1_000_000_000;
+        let log = read("imu.csv", &text(&rows)).unwrap();
+        assert_eq!(log.samples.len(), 299, "{off_s}");
+        assert_eq!(log.faults.by_clock_steps, 1, "{off_s}");
+    }
+}
+
+#[test]
+fn times_that_are_measured_twice_are_used_by_nobody() {
+    // From the 100th sample on the clock is 0.305 s back.
+    let mut rows = rows(300);
+    rows[100..].iter_mut().for_each(|row| row.0 -= 305 * MS);
+    let log = read("imu.csv", &text(&rows)).unwrap();
+    let stamps: Vec<i64> = log
+        .samples
+        .iter()
+        .map(|it| (it.stamp_ns - START_NS) / MS)
+        .collect();
+    assert!(stamps.iter().all(|ms| *ms < 695 || *ms > 990), "{stamps:?}");
+    assert_eq!(log.faults.out_of_order, 30);
+    assert_eq!(log.faults.measured_twice + log.samples.len(), 300);
+    assert_eq!(log.faults.measured_twice, 60);
+}
+
+#[test]
+fn a_log_in_degrees_is_refused_or_its_unit_said_to_be_assumed() {
+    let turning: Vec<_> = rows(300)
+        .into_iter()
+        .map(|(ns, rate)| (ns, 1e3 * rate))
+        .collect();
+    let refused = read("imu.csv", &text(&turning)).unwrap_err().to_string();
+    assert!(
+        refused.contains("if they are in deg/s, name the columns so, as gyro_z_degps"),
+        "{refused}"
+    );
+    let named = text(&turning).replace("_radps", "_degps");
+    let log = read("imu.csv", &named).unwrap();
+    assert!((log.samples[299].values[2] - 29.9f64.to_radians()).abs() < 1e-12);
+    let unnamed = text(&rows(300)).replace("_radps", "");
+    let log = read("imu.csv", &unnamed).unwrap();
+    assert!(
+        log.faults.sentences()[0].contains("rad/s is assumed"),
+        "{:?}",
+        log.faults
+    );
+}
+
+#[test]
+fn stamps_that_are_no_clock_are_refused() {
+    let rows: Vec<_> = (0..300)
+        .map(|k| (START_NS + (k % 2) * 10_000_000_000, 0.0))
+        .collect();
+    let refused = read("imu.csv", &text(&rows)).unwrap_err().to_string();
+    assert!(
+        refused.contains("is the column of stamps another one?"),
+        "{refused}"
+    );
+}
