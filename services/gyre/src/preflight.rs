@@ -39,6 +39,11 @@ pub enum PreflightError {
         /// The scans.
         scans: usize,
     },
+    /// No gyro comes with the scans of a live radar.
+    #[error(
+        "gyro.kind names a gyro, but none can be read beside a live radar yet: set gyro.kind = \"none\", or play a recording"
+    )]
+    LiveGyro,
     /// The segments would not fit.
     #[error(
         "shared memory at /dev/shm has {free_mb:.1} MB free, but the run needs {footprint}: enlarge it (containers: --shm-size), \
@@ -207,6 +212,9 @@ impl Scans {
 
     /// Asks the radar.
     fn of_radar(configuration: &Configuration) -> Result<Self, Failure> {
+        if configuration.odometry.gyro.is_used() {
+            return Err(PreflightError::LiveGyro.into());
+        }
         configuration.dataset.check()?;
         let (source, options) = (&configuration.source, &configuration.dataset);
         let radar = match source.kind {

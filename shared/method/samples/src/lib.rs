@@ -18,4 +18,4 @@ mod sample;
 
 pub use config::{GyroConfig, GyroConfigError, GyroKind, UpAxis};
 pub use gyro::{Gyro, GyroTurn, with_yaw_rate};
-pub use sample::{MAX_SAMPLES, Sample, SampleKind};
+pub use sample::{MAX_RATE_RADPS, MAX_SAMPLES, Sample, SampleKind};

@@ -19,6 +19,10 @@ pub struct Sample {
 /// The most samples that travel with one scan: those of a second at 1000 Hz.
 pub const MAX_SAMPLES: usize = 1024;
 
+/// The largest angular velocity of a sample, rad/s: 2000 degrees a second, the widest range of
+/// gyros of this kind.
+pub const MAX_RATE_RADPS: f64 = 35.0;
+
 /// What a sample measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
@@ -38,9 +42,12 @@ impl Sample {
         }
     }
 
-    /// Returns whether its kind is known, and all its values are finite.
+    /// Returns whether its kind is known, all its values are finite, and its rates are within
+    /// [`MAX_RATE_RADPS`].
     pub fn is_valid(&self) -> bool {
-        self.is(SampleKind::Gyro) && self.values.iter().all(|value| value.is_finite())
+        let is_rate = |rate: &f64| rate.abs() <= MAX_RATE_RADPS;
+        let are_finite = self.values.iter().all(|value| value.is_finite());
+        self.is(SampleKind::Gyro) && are_finite && self.values[..3].iter().all(is_rate)
     }
 
     /// Returns whether it is of this kind.

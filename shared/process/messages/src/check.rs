@@ -71,6 +71,7 @@ pub(crate) fn covariance(packed: &covariance::Packed) -> Result<(), Violation> {
 #[cfg(test)]
 mod tests {
     use bytemuck::Zeroable;
+    use gyre_samples::Sample;
 
     use crate::{
         ByteBlock, Correction, CorrectionHeader, Fix, FixHeader, FloatBlock, Item, Limits, Loop,
@@ -329,5 +330,47 @@ mod tests {
                 ("azimuth 3", &|header| header.azimuth_rad[3] = f32::INFINITY),
             ],
         );
+    }
+
+    #[test]
+    fn samples_of_a_scan_are_finite_and_each_is_later_than_the_one_before() {
+        let mut header = ScanHeader {
+            azimuths: 1,
+            bins: 10,
+            stride: 10,
+            range_resolution_m: 0.1,
+            ..ScanHeader::default()
+        };
+        let mut payload = [ByteBlock::zeroed(); 3];
+        let good = [1, 2].map(|ns| Sample::yaw_rate(ns, 0.5));
+        header.set_samples(bytemuck::cast_slice_mut(&mut payload), &good, 0);
+        each_is_refused::<Scan>(
+            header,
+            &payload,
+            &[
+                ("samples is 3", &|header| header.samples = 3),
+                ("its payload of 192 bytes is shorter", &|header| {
+                    header.stride = 64;
+                    header.azimuths = 2;
+                }),
+            ],
+        );
+        let unknown = Sample { kind: 9, ..good[1] };
+        for (bad, expected) in [
+            (Sample::yaw_rate(2, f64::NAN), "sample 1 is"),
+            (Sample::yaw_rate(2, 40.0), "sample 1 is"),
+            (unknown, "sample 1 is"),
+            (Sample::yaw_rate(1, 0.5), "sample 1 is not later"),
+        ] {
+            let bytes = bytemuck::cast_slice_mut(&mut payload);
+            header.set_samples(bytes, &[good[0], bad], 0);
+            let violation = Scan::check(&header, &payload, &LIMITS).map_err(|v| v.to_string());
+            assert!(
+                violation
+                    .as_ref()
+                    .is_err_and(|text| text.starts_with(expected)),
+                "{violation:?}"
+            );
+        }
     }
 }

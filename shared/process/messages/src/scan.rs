@@ -175,7 +175,7 @@ impl ScanHeader {
         if let Some(index) = samples.iter().position(|sample| !sample.is_valid()) {
             let sample = samples[index];
             return Err(Violation(format!(
-                "sample {index} is {sample:?}, but must be of a known kind and finite"
+                "sample {index} is {sample:?}, but must be of a known kind, finite, and at most 35 rad/s"
             )));
         }
         let disorder = samples
@@ -317,5 +317,41 @@ mod tests {
         assert!(header.view(&bytes).is_none());
         header.azimuths = u32::MAX;
         assert!(header.view(&bytes).is_none());
+    }
+
+    #[test]
+    fn samples_are_stored_behind_the_powers_and_those_without_room_are_counted() {
+        let mut header = ScanHeader {
+            azimuths: 2,
+            bins: 10,
+            stride: 35,
+            ..ScanHeader::default()
+        };
+        let samples: Vec<_> = (1..4).map(|ns| Sample::yaw_rate(ns, 0.1)).collect();
+        let mut blocks = [ByteBlock::zeroed(); 3];
+        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut blocks);
+        bytes[..45].fill(7);
+        header.set_samples(bytes, &samples, 4);
+        assert_eq!((header.samples, header.samples_left_out), (2, 5));
+        assert_eq!(header.samples(bytes), Some(&samples[..2]));
+        assert_eq!(
+            header.read_samples(&bytes.to_vec()),
+            Some(samples[..2].to_vec())
+        );
+        assert_eq!(Scan::content_bytes(&header), Some(192));
+        assert!(
+            header
+                .view(bytes)
+                .is_some_and(|scan| scan.row(1) == [7; 10])
+        );
+        header.shift_times(100, bytes);
+        let stamps = header
+            .samples(bytes)
+            .map(|it| [it[0].stamp_ns, it[1].stamp_ns]);
+        assert_eq!(stamps, Some([101, 102]));
+        assert_eq!(header.samples(&bytes[..191]), None);
+        header.set_samples(&mut [], &samples, 0);
+        assert_eq!((header.samples, header.samples_left_out), (0, 3));
+        assert_eq!(Scan::content_bytes(&header), Some(45));
     }
 }
