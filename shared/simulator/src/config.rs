@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::drive::DriveConfig;
 use crate::error::SimulatorError;
+use crate::gyro::SimulatedGyroConfig;
 use crate::limits::require_within;
 use crate::output::{OutputConfig, OutputFormat};
 use crate::profile::Chirp;
@@ -29,7 +30,7 @@ pub struct SimulationConfig {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scans: Option<usize>,
     /// The seed of all randomness that has no seed of its own: `town.seed`, `town.changes_seed`,
-    /// `traffic.seed`, `sensor.seed`.
+    /// `traffic.seed`, `sensor.seed`, `gyro.seed`.
     pub seed: u64,
     /// The likeness to a real road: switches of `[simulation.effects]`, `town.belts` and
     /// `sensor.gain_db` that are left out are as it says. Default: `plain`.
@@ -45,6 +46,9 @@ pub struct SimulationConfig {
     pub sensor: SensorConfig,
     /// The effects of the sensor that are simulated.
     pub effects: Effects,
+    /// The gyro beside the radar. Default: none.
+    #[serde(skip_serializing_if = "SimulatedGyroConfig::is_default")]
+    pub gyro: SimulatedGyroConfig,
     /// The weather, section by section of the drive. Default: clear.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub weather: Vec<WeatherConfig>,
@@ -63,6 +67,7 @@ impl Default for SimulationConfig {
             traffic: TrafficConfig::default(),
             sensor: SensorConfig::default(),
             effects: Effects::default(),
+            gyro: SimulatedGyroConfig::default(),
             weather: Vec::new(),
             output: OutputConfig::default(),
         }
@@ -82,6 +87,7 @@ impl SimulationConfig {
         self.town.validate()?;
         self.traffic.validate()?;
         self.sensor.validate()?;
+        self.gyro.validate()?;
         self.weather.iter().try_for_each(WeatherConfig::validate)
     }
 
@@ -115,6 +121,11 @@ impl SimulationConfig {
     /// The seed of the radar's noise, the rain's drops among it.
     pub fn sensor_seed(&self) -> u64 {
         self.sensor.seed.unwrap_or(self.seed)
+    }
+
+    /// The seed of the gyro's errors and of its clock.
+    pub fn gyro_seed(&self) -> u64 {
+        self.gyro.seed.unwrap_or(self.seed)
     }
 
     /// Returns the options with which a reader gets the ranges and angles of the simulated radar.

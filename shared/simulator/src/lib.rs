@@ -13,7 +13,7 @@
 //!   points,
 //! - [`relief`]: the height of the ground,
 //! - [`profile`]: the radars; [`weather`]: rain, fog and snow,
-//! - [`sensor`]: the measurement of one sweep,
+//! - [`sensor`]: the measurement of one sweep; [`gyro`]: what a gyro beside the radar measures,
 //! - [`simulator`]: single scans with their exact poses,
 //! - [`output`], [`simulated_drive`], [`truth`]: the drive in a dataset format,
 //! - [`writer`]: the same on a disk.
@@ -36,6 +36,7 @@ pub mod body;
 pub mod config;
 pub mod drive;
 pub mod error;
+pub mod gyro;
 mod image;
 mod interpolate;
 pub mod lanes;
@@ -64,6 +65,7 @@ pub mod writer;
 pub use body::{Body, Movers, Moving};
 pub use config::SimulationConfig;
 pub use error::SimulatorError;
+pub use gyro::{GyroProfile, SimulatedGyroConfig};
 pub use lanes::DrivingSide;
 pub use output::{HostStamps, OutputFormat};
 pub use path::{BlockLoop, Path, SplinePath};

@@ -59,7 +59,7 @@ pub use self::config::SensorConfig;
 use self::echoes::{Echo, View};
 pub use self::effects::Effects;
 use self::effects::is_on;
-use self::elevation::PitchRoll;
+pub(crate) use self::elevation::PitchRoll;
 use self::faults::Faults;
 use self::fixed_echoes::FixedEchoes;
 use self::line_of_sight::LineOfSight;

@@ -4,9 +4,11 @@
 use std::path::PathBuf;
 
 use gyre_radar::{DatasetOptions, Format, ImageSize, ImageSource, OwnedScan, ScanSlot};
+use gyre_samples::Sample;
 
 use crate::config::SimulationConfig;
 use crate::error::SimulatorError;
+use crate::gyro::log;
 use crate::layout::side_file::SideFile;
 use crate::layout::{boreas, oxford, radiate};
 use crate::output::{HostStamps, OutputFormat};
@@ -136,6 +138,12 @@ impl SimulatedDrive {
         )
     }
 
+    /// The samples of the gyro, by their stamps: rates and accelerations in its own axes, as
+    /// `imu.csv` has them. `None` without a gyro.
+    pub fn gyro_samples(&self) -> Option<Vec<Sample>> {
+        log::samples(&self.simulator)
+    }
+
     /// All files beside the images.
     pub(crate) fn side_files(&self) -> Vec<SideFile> {
         let mut files = match self.output {
@@ -152,6 +160,10 @@ impl SimulatedDrive {
             "azimuth_poses.npy".into(),
             truth::azimuth_poses_npy(&self.simulator),
         ));
+        files.extend(
+            self.gyro_samples()
+                .map(|samples| (log::FILE.into(), log::csv(&samples))),
+        );
         files
     }
 

@@ -29,6 +29,12 @@ pub(crate) enum Stream {
     Miscalibration,
     /// Echoes that are fixed to the radar.
     FixedEchoes,
+    /// Bias, scale, misalignment and noise of the gyro.
+    GyroErrors,
+    /// Jitter and losses of the gyro's clock.
+    GyroClock,
+    /// Stalls of the gyro's host.
+    GyroStalls,
 }
 
 impl Stream {
@@ -51,6 +57,9 @@ impl Stream {
             Self::Vibration(index) => (1 << 45) + index,
             Self::Dirt => 1 << 46,
             Self::Miscalibration => 1 << 47,
+            Self::GyroErrors => 1 << 48,
+            Self::GyroClock => 1 << 49,
+            Self::GyroStalls => 1 << 50,
             Self::PitchRoll => u64::MAX - 1,
             Self::FixedEchoes => u64::MAX,
         }
@@ -82,8 +91,11 @@ mod tests {
             Stream::Miscalibration,
             Stream::PitchRoll,
             Stream::FixedEchoes,
+            Stream::GyroErrors,
+            Stream::GyroClock,
+            Stream::GyroStalls,
         ];
         let numbers: BTreeSet<u64> = counted.chain(single).map(Stream::number).collect();
-        assert_eq!(numbers.len(), 400_007);
+        assert_eq!(numbers.len(), 400_010);
     }
 }

@@ -8,7 +8,9 @@ use gyre_geometry::Pose;
 use gyre_radar::OwnedScan;
 use gyre_radar::scan::flag;
 use gyre_simulator::profile::METADATA_BYTES;
-use gyre_simulator::{SimulationConfig, Simulator, SimulatorError, write_dataset};
+use gyre_simulator::{
+    GyroProfile, SimulatedGyroConfig, SimulationConfig, Simulator, SimulatorError, write_dataset,
+};
 
 fn config(scans: usize) -> SimulationConfig {
     SimulationConfig {
@@ -182,4 +184,28 @@ fn invalid_configuration_names_its_key() {
         .unwrap_err()
         .to_string();
     assert!(unknown.contains("scanz"), "{unknown}");
+}
+
+#[test]
+fn a_gyro_adds_its_log_and_changes_nothing_else() {
+    let gyro = SimulatedGyroConfig {
+        profile: GyroProfile::Bmi088,
+        ..SimulatedGyroConfig::default()
+    };
+    let without = all_files(generate(&config(3)).path());
+    let mut with = all_files(generate(&SimulationConfig { gyro, ..config(3) }).path());
+    let log = String::from_utf8(with.remove("imu.csv").unwrap()).unwrap();
+    assert_eq!(log.lines().count(), 1 + 75);
+    assert!(log.starts_with("stamp_ns,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_mps2,"));
+    let made_by = with.insert(
+        "simulation.toml".to_owned(),
+        without["simulation.toml"].clone(),
+    );
+    assert!(
+        String::from_utf8(made_by.unwrap())
+            .unwrap()
+            .contains("profile = \"bmi088\"")
+    );
+    assert!(!String::from_utf8_lossy(&without["simulation.toml"]).contains("gyro"));
+    assert_eq!(with, without);
 }

@@ -34,7 +34,7 @@ struct Oscillation {
 
 /// The pitch and roll of the vehicle.
 #[derive(Clone, Debug)]
-pub(super) struct PitchRoll {
+pub(crate) struct PitchRoll {
     pitch: [Oscillation; OSCILLATIONS],
     roll: [Oscillation; OSCILLATIONS],
 }
