@@ -65,6 +65,11 @@ pub fn along(name: &str, trajectory: &str) -> PathBuf {
     simulated(name, &config)
 }
 
+/// The recording of a simulated drive.
+pub fn of(name: &str, config: &SimulationConfig) -> PathBuf {
+    simulated(name, config)
+}
+
 fn of_a_block(scans: usize) -> PathBuf {
     let config = SimulationConfig {
         scans: Some(scans),

@@ -2,7 +2,7 @@
 
 mod foxglove;
 mod page;
-mod record;
+pub mod record;
 mod record_live;
 mod record_moved;
 mod shadow;

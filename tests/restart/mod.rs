@@ -3,6 +3,7 @@
 
 mod faults;
 mod full_disk;
+mod gyro;
 mod identity;
 mod killed_stages;
 mod power_failure;

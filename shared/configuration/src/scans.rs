@@ -96,9 +96,8 @@ pub fn simulated_samples(
     if gyro.kind != GyroKind::Auto {
         return Ok(ScanSamples::open(gyro, Path::new(""), dataset)?);
     }
-    let _ = drive;
-    let samples: Vec<gyre_samples::Sample> = None.ok_or(SourceError::NoGyro)?;
-    Ok(ScanSamples::of_log(&GyroLog::of(samples), gyro, dataset)?)
+    let samples = drive.gyro_samples().ok_or(SourceError::NoGyro)?;
+    Ok(ScanSamples::of_log(&GyroLog::of(samples)?, gyro, dataset)?)
 }
 
 /// Returns the configuration with the options of the recording's `dataset.toml` where it has none.

@@ -109,12 +109,22 @@ impl GyroLog {
         })
     }
 
-    /// Takes samples that need no examination: those of a simulation.
-    pub fn of(samples: Vec<Sample>) -> Self {
-        Self {
+    /// Takes the samples of a simulation.
+    ///
+    /// # Errors
+    /// Stamps or rates that cannot be those of a gyro.
+    pub fn of(samples: Vec<Sample>) -> Result<Self, LogError> {
+        let path = PathBuf::from("of the simulation");
+        let raw = Raw {
             samples,
-            ..Self::default()
-        }
+            ..Raw::default()
+        };
+        let (samples, faults) = faults::examine(raw, &path)?;
+        Ok(Self {
+            samples,
+            faults,
+            path,
+        })
     }
 }
 

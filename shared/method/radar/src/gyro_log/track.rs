@@ -127,7 +127,8 @@ mod tests {
             stamp_ns: 5_000_000_000,
             values: [0.1, 0.2, -0.3, 1.0, 2.0, -9.8],
             ..Sample::yaw_rate(0, 0.0)
-        }]);
+        }])
+        .unwrap();
         let config = GyroConfig {
             late_s: 1.58,
             up: UpAxis::MinusZ,
