@@ -224,7 +224,8 @@ fn masked_rasters() {
             target.run(|| -> Result<(), Failure> {
                 let pair = header.pair(&values, Some((&earlier, &earlier_values)));
                 let pair = pair.ok_or("its rasters do not fit their headers")?;
-                let found = rotations.next(*seq, pair.later, pair.earlier, pair.earlier_changed)?;
+                let found =
+                    rotations.next(*seq, pair.later, pair.earlier, pair.earlier_changed, None)?;
                 let estimate = found
                     .as_ref()
                     .map(RotationEstimate::from)

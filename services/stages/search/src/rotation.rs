@@ -26,8 +26,9 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
         .map_err(|error| StageError::Configuration(error.to_string()))?;
     let search = move |input: &PairView<'_, Masked>| {
         let (seq, pair) = (input.current.item().seq, input.rasters()?);
+        let turn = input.current.header().turn().map(|turn| turn.yaw_rad);
         rotation
-            .next(seq, pair.later, pair.earlier, pair.earlier_changed)
+            .next(seq, pair.later, pair.earlier, pair.earlier_changed, turn)
             .map_err(|error| input.current.malformed(error.to_string()))
     };
     run_with(launch, Box::new(search))

@@ -122,8 +122,8 @@ fn steps() {
         let (mut f, mut g) = (rotation.new_spectrum(), rotation.new_spectrum());
         rotation.spectrum(earlier.view(), &mut g).unwrap();
         let spectrum = median_ms(|| rotation.spectrum(black_box(later.view()), &mut f).unwrap());
-        let angle = median_ms(|| _ = black_box(rotation.search(&f, &g).unwrap()));
-        let estimate = rotation.search(&f, &g).unwrap();
+        let angle = median_ms(|| _ = black_box(rotation.search(&f, &g, None).unwrap()));
+        let estimate = rotation.search(&f, &g, None).unwrap();
         let shift = median_ms(|| {
             _ = black_box(
                 translation
@@ -133,7 +133,7 @@ fn steps() {
         });
         let total = median_ms(|| {
             rotation.spectrum(black_box(later.view()), &mut f).unwrap();
-            let estimate = rotation.search(&f, &g).unwrap();
+            let estimate = rotation.search(&f, &g, None).unwrap();
             black_box(
                 translation
                     .search(later.view(), earlier.view(), &estimate)

@@ -45,7 +45,7 @@
 //!
 //! rotation.spectrum(earlier.view(), &mut earlier_spectrum)?;
 //! rotation.spectrum(later.view(), &mut later_spectrum)?;
-//! let angle = rotation.search(&later_spectrum, &earlier_spectrum)?;
+//! let angle = rotation.search(&later_spectrum, &earlier_spectrum, None)?;
 //! let motion = translation.search(later.view(), earlier.view(), &angle)?;
 //! assert!((motion.x_m - 1.6).abs() < 0.01 && motion.y_m.abs() < 0.01);
 //! # Ok(())

@@ -1,6 +1,7 @@
 //! The angle between two scans, from their magnitude spectra alone.
 
 use std::f64::consts::PI;
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 use ndarray::ArrayView2;
@@ -17,6 +18,8 @@ use crate::spectrum::PolarSpectrum;
 use crate::whiten::Whitening;
 use crate::{ShapeError, cells, kernels, taper};
 
+/// Distance from the turn of a gyro beyond which a maximum is that of something else, rad.
+const NEAR_GYRO_RAD: f64 = 4.0 * PI / 180.0;
 /// Half width of the neighbourhood in which a second maximum counts as the same peak, rad.
 const SAME_PEAK_RAD: f64 = 2.0 * PI / 180.0;
 
@@ -141,7 +144,8 @@ impl RotationSearch {
         Ok(())
     }
 
-    /// Finds the angle between two scans from their spectra.
+    /// Finds the angle between two scans from their spectra; near the turn that a gyro has measured,
+    /// rad, if it is given.
     ///
     /// # Errors
     /// If a spectrum is another search's.
@@ -149,6 +153,7 @@ impl RotationSearch {
         &mut self,
         later: &PolarSpectrum,
         earlier: &PolarSpectrum,
+        turn_rad: Option<f64>,
     ) -> Result<RotationMatch, ShapeError> {
         later.expect(self.profiles(), self.grid.angles)?;
         earlier.expect(self.profiles(), self.grid.angles)?;
@@ -157,7 +162,7 @@ impl RotationSearch {
             return Ok(self.no_match());
         }
         self.correlate(later, earlier, energy);
-        Ok(self.best_match())
+        Ok(self.best_match(self.shifts_near(turn_rad)))
     }
 
     /// Number of profiles along the angle that are compared: one per radius, or one in all.
@@ -241,18 +246,26 @@ impl RotationSearch {
         f64::from(self.correlation[k.rem_euclid(self.grid.angles as isize) as usize])
     }
 
-    fn best_match(&self) -> RotationMatch {
+    /// The shifts within reach, and near the turn of the gyro.
+    fn shifts_near(&self, turn_rad: Option<f64>) -> RangeInclusive<isize> {
         let step = PI / self.grid.angles as f64;
-        let within = -self.reach..=self.reach;
-        let Some(best) = within
-            .clone()
-            .filter(|&k| self.at(k).is_finite())
-            .max_by(|&a, &b| {
-                self.at(a)
-                    .total_cmp(&self.at(b))
-                    .then(b.abs().cmp(&a.abs()))
-            })
-        else {
+        let within_reach = |shift: f64| (shift.round() as isize).clamp(-self.reach, self.reach);
+        match turn_rad {
+            None => -self.reach..=self.reach,
+            Some(turn) => {
+                within_reach((turn - NEAR_GYRO_RAD) / step)
+                    ..=within_reach((turn + NEAR_GYRO_RAD) / step)
+            }
+        }
+    }
+
+    fn best_match(&self, within: RangeInclusive<isize>) -> RotationMatch {
+        let step = PI / self.grid.angles as f64;
+        let Some(best) = within.filter(|&k| self.at(k).is_finite()).max_by(|&a, &b| {
+            self.at(a)
+                .total_cmp(&self.at(b))
+                .then(b.abs().cmp(&a.abs()))
+        }) else {
             return self.no_match();
         };
         let peak = line_peak(self.config.peak, |j| self.at(best + j));
@@ -355,6 +368,37 @@ mod tests {
         sum / (energy(f) * energy(g)).sqrt()
     }
 
+    #[test]
+    fn a_higher_peak_far_from_the_turn_of_the_gyro_is_not_taken() {
+        let config = RotationConfig {
+            reach_deg: 30.0,
+            ..RotationConfig::default()
+        };
+        let mut search = RotationSearch::new(N, &config).unwrap();
+        let step = PI / search.grid.angles as f64;
+        let [true_peak, false_peak] =
+            [5.0, -20.0].map(|deg: f64| (deg.to_radians() / step) as isize);
+        let angles = search.grid.angles as isize;
+        for (peak, height) in [(true_peak, 0.5), (false_peak, 0.9)] {
+            for j in -4..=4 {
+                let place = (peak + j).rem_euclid(angles) as usize;
+                search.correlation[place] = height - 0.01 * (j * j) as f32;
+            }
+        }
+        let found = |turn: Option<f64>| {
+            let turn = turn.map(f64::to_radians);
+            search
+                .best_match(search.shifts_near(turn))
+                .angle_rad
+                .to_degrees()
+        };
+        assert!((found(None) + 20.0).abs() < 0.5);
+        assert!((found(Some(6.5)) - 5.0).abs() < 0.5);
+        assert!((found(Some(-18.0)) + 20.0).abs() < 0.5);
+        let beyond = found(Some(80.0));
+        assert!((26.0..=30.0).contains(&beyond), "within reach: {beyond}");
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(24))]
         #[test]
@@ -371,7 +415,7 @@ mod tests {
             let view = |raster| ArrayView2::from_shape((N, N), raster).unwrap();
             search.spectrum(view(&f), &mut later).unwrap();
             search.spectrum(view(&g), &mut earlier).unwrap();
-            search.search(&later, &earlier).unwrap();
+            search.search(&later, &earlier, None).unwrap();
             let (f, g) = (rings(&mut search, &f), rings(&mut search, &g));
             for m in 0..angles {
                 prop_assert!((search.at(m as isize) - direct(&f, &g, m)).abs() < 1e-4, "{m}");

@@ -35,7 +35,8 @@ impl SequentialRotation {
     /// Finds the rotation of scan `seq` against the one before; `None` without an earlier raster.
     ///
     /// `earlier_changed`: the earlier raster is not the one that was given as the later one last
-    /// time, as with a mask that looks at both scans of a pair.
+    /// time, as with a mask that looks at both scans of a pair. `turn_rad`: the rotation as a gyro
+    /// has measured it, near which it is searched.
     ///
     /// # Errors
     /// If a raster is not n x n in standard layout.
@@ -45,6 +46,7 @@ impl SequentialRotation {
         later: ArrayView2<'_, f32>,
         earlier: Option<ArrayView2<'_, f32>>,
         earlier_changed: bool,
+        turn_rad: Option<f64>,
     ) -> Result<Option<RotationMatch>, ShapeError> {
         self.search.spectrum(later, &mut self.later)?;
         let mut rotation = None;
@@ -56,7 +58,7 @@ impl SequentialRotation {
             if earlier_changed || !is_kept {
                 self.search.spectrum(earlier, &mut self.earlier)?;
             }
-            rotation = Some(self.search.search(&self.later, &self.earlier)?);
+            rotation = Some(self.search.search(&self.later, &self.earlier, turn_rad)?);
         }
         std::mem::swap(&mut self.later, &mut self.earlier);
         self.kept = Some(seq);

@@ -56,7 +56,7 @@ fn searches_allocate_nothing_after_construction() {
         let before = ALLOCATIONS.with(Cell::get);
         rotation.spectrum(earlier.view(), &mut g).unwrap();
         rotation.spectrum(later.view(), &mut f).unwrap();
-        let angle = rotation.search(&f, &g).unwrap();
+        let angle = rotation.search(&f, &g, None).unwrap();
         translation
             .search(later.view(), earlier.view(), &angle)
             .unwrap();

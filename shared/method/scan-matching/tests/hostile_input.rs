@@ -100,7 +100,7 @@ fn rasters_of_another_shape_or_layout_are_rejected() {
         ..RotationConfig::default()
     };
     let mut other = RotationSearch::new(N, &line14).unwrap();
-    assert!(other.search(&spectrum, &spectrum).is_err());
+    assert!(other.search(&spectrum, &spectrum, None).is_err());
 }
 
 #[test]
@@ -142,7 +142,7 @@ fn results_repeat_to_the_last_bit() {
         rotation.spectrum(between.view(), &mut f).unwrap(); // an earlier spectrum leaves no trace
         rotation.spectrum(later.view(), &mut f).unwrap();
         rotation.spectrum(earlier.view(), &mut g).unwrap();
-        let angle = rotation.search(&f, &g).unwrap();
+        let angle = rotation.search(&f, &g, None).unwrap();
         (
             angle,
             translation

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::{
     Outcome, RefinementConfig, alignment::Alignment, local_map::LocalMap, points::DeskewedPoints,
-    registration::Scan, standstill::Report,
+    registration::Scan, standstill::Report, tracker::Step,
 };
 
 /// Factor on the covariance of a weak match.
@@ -34,7 +34,7 @@ impl Uncertainty {
         config: &RefinementConfig,
     ) -> Self {
         Self {
-            of_prediction: of_prediction(scan.step.interval_s, config),
+            of_prediction: of_prediction(&scan.step, config),
             predictions,
             of_map: drift_share(map.len(), config),
         }
@@ -128,8 +128,9 @@ pub(super) fn drift_share(keyframes: usize, config: &RefinementConfig) -> f64 {
 }
 
 /// The covariance of a motion predicted at constant velocity, whose acceleration is within the
-/// limits.
-fn of_prediction(interval_s: f64, config: &RefinementConfig) -> Matrix3<f64> {
+/// limits; of its turn, by the gyro if there is one.
+fn of_prediction(step: &Step, config: &RefinementConfig) -> Matrix3<f64> {
+    let interval_s = step.interval_s;
     let variance =
         |jitter: f64, acceleration: f64| (jitter + acceleration * interval_s.powi(2)).powi(2) / 3.0;
     let shift = variance(config.jitter_m, config.acceleration_mps2);
@@ -137,6 +138,7 @@ fn of_prediction(interval_s: f64, config: &RefinementConfig) -> Matrix3<f64> {
         config.jitter_deg.to_radians(),
         config.yaw_acceleration_degps2.to_radians(),
     );
+    let turn = step.turn.map_or(turn, |it| it.variance_rad2.min(turn));
     Matrix3::from_diagonal(&Vector3::new(shift, shift, turn))
 }
 

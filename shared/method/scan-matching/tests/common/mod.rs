@@ -130,7 +130,7 @@ pub fn search(
     let (mut f, mut g) = (rotation.new_spectrum(), rotation.new_spectrum());
     rotation.spectrum(earlier.view(), &mut g).unwrap();
     rotation.spectrum(later.view(), &mut f).unwrap();
-    let angle = rotation.search(&f, &g).unwrap();
+    let angle = rotation.search(&f, &g, None).unwrap();
     let motion = translation
         .search(later.view(), earlier.view(), &angle)
         .unwrap();
