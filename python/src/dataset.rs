@@ -9,7 +9,7 @@ use std::{
 };
 
 use gyre_configuration::radar_constants;
-use gyre_radar::DatasetOptions;
+use gyre_radar::{DatasetOptions, ScanSamples};
 use numpy::PyArray1;
 use pyo3::{exceptions::PyIndexError, prelude::*, types::PyTuple};
 
@@ -21,6 +21,8 @@ const MAX_UNREADABLE: usize = 10;
 /// Opens a recording: a folder of a format that Gyre knows, an MCAP file of `gyre record`, or a bag
 /// of ROS 2.
 ///
+/// Its scans have the samples of the gyro that the section `gyro` of `config` names, if it does.
+///
 /// The constants of the radar are those of the section `dataset` of `config`. Without one they are
 /// those of the format, or of the recording's `dataset.toml`, as `Config.of` takes them. Raises
 /// ReadError.
@@ -31,23 +33,28 @@ pub fn open(
     data: PathBuf,
     config: Option<&Bound<'_, Config>>,
 ) -> PyResult<Dataset> {
-    let options = config.map(|config| Config::method(Some(config)).dataset);
-    let dataset = py.detach(|| {
+    let method = Config::method(config);
+    let options = config.map(|_| method.dataset.clone());
+    let opened = py.detach(|| -> PyResult<Opened> {
         let options = match options {
             Some(options) => options,
             None => {
                 radar_constants(&data, &DatasetOptions::default()).map_err(errors::automatic)?
             }
         };
-        gyre_recording::open(&data, &options).map_err(errors::open)
+        let scans = gyre_recording::open(&data, &options).map_err(errors::open)?;
+        let samples = ScanSamples::open(&method.odometry.gyro, &data, scans.as_ref());
+        let samples = samples.map_err(errors::gyro)?;
+        Ok(Opened { scans, samples })
     })?;
+    let scans = &opened.scans;
     Ok(Dataset {
-        format: dataset.format().name(),
-        len: dataset.len(),
-        first: dataset.first(),
+        format: scans.format().name(),
+        len: scans.len(),
+        first: scans.first(),
         data,
         config: config.map(|config| config.clone().unbind()),
-        dataset: Arc::new(Guarded::new("Dataset", dataset)),
+        dataset: Arc::new(Guarded::new("Dataset", opened)),
     })
 }
 
@@ -55,6 +62,14 @@ pub fn open(
 #[pyfunction]
 pub fn find_ground_truth(data: PathBuf) -> Option<PathBuf> {
     gyre_radar::find_ground_truth(&data)
+}
+
+/// An open recording.
+pub struct Opened {
+    /// The scans.
+    pub scans: Box<dyn gyre_radar::Dataset>,
+    /// What other sensors measured meanwhile.
+    pub samples: ScanSamples,
 }
 
 /// The scans of a recording, ordered by time.
@@ -71,7 +86,7 @@ pub struct Dataset {
     format: &'static str,
     len: usize,
     first: usize,
-    dataset: Arc<Guarded<Box<dyn gyre_radar::Dataset>>>,
+    dataset: Arc<Guarded<Opened>>,
 }
 
 #[pymethods]
@@ -94,7 +109,7 @@ impl Dataset {
     #[getter]
     fn files(&self, py: Python<'_>) -> PyResult<Vec<PathBuf>> {
         self.dataset.with(py, |dataset| {
-            let files = dataset.files();
+            let files = dataset.scans.files();
             let paths = (0..files.len()).filter_map(|index| files.get(index));
             paths.map(ToOwned::to_owned).collect()
         })
@@ -105,8 +120,8 @@ impl Dataset {
     #[getter]
     fn stamp_ns<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<i64>>> {
         let stamps = self.dataset.with(py, |dataset| {
-            let stamp = |index| dataset.nominal_stamp_ns(index).unwrap_or(-1);
-            (0..dataset.len()).map(stamp).collect()
+            let stamp = |index| dataset.scans.nominal_stamp_ns(index).unwrap_or(-1);
+            (0..dataset.scans.len()).map(stamp).collect()
         })?;
         Ok(PyArray1::from_vec(py, stamps))
     }
@@ -114,13 +129,14 @@ impl Dataset {
     /// The median time between two scans, ns.
     #[getter]
     fn period_ns(&self, py: Python<'_>) -> PyResult<i64> {
-        self.dataset.with(py, |dataset| dataset.period_ns())
+        self.dataset.with(py, |dataset| dataset.scans.period_ns())
     }
 
     /// Observations of the reader: whole sentences.
     #[getter]
     fn notes(&self, py: Python<'_>) -> PyResult<Vec<String>> {
-        self.dataset.with(py, |dataset| dataset.notes().to_vec())
+        self.dataset
+            .with(py, |dataset| dataset.scans.notes().to_vec())
     }
 
     fn __len__(&self) -> usize {
@@ -170,7 +186,7 @@ impl Dataset {
 /// An iteration over a dataset.
 #[pyclass(module = "gyre", frozen)]
 pub struct Scans {
-    dataset: Arc<Guarded<Box<dyn gyre_radar::Dataset>>>,
+    dataset: Arc<Guarded<Opened>>,
     next: AtomicUsize,
     end: usize,
 }

@@ -5,7 +5,7 @@ use std::{ffi::CString, fmt::Display};
 use gyre_configuration::AutomaticError;
 use gyre_masking::MaskError;
 use gyre_odometry::OdometryError;
-use gyre_radar::OpenError;
+use gyre_radar::{LogError, OpenError};
 use pyo3::{prelude::*, sync::PyOnceLock, types::PyType};
 
 /// Returns a function that makes exceptions of one type.
@@ -51,6 +51,14 @@ exception!(
 pub fn open(error: OpenError) -> PyErr {
     match error {
         OpenError::BadOption { .. } => config(error),
+        error => read(error),
+    }
+}
+
+/// A log of a gyro.
+pub fn gyro(error: LogError) -> PyErr {
+    match error {
+        LogError::None { .. } => config(error),
         error => read(error),
     }
 }

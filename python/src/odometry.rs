@@ -1,6 +1,7 @@
 //! Odometry.
 
 use gyre_odometry::OdometryError;
+use gyre_samples::Sample;
 use pyo3::prelude::*;
 
 use crate::{
@@ -21,8 +22,12 @@ struct State {
 }
 
 impl State {
-    fn register(&mut self, scan: &gyre_radar::PolarScan<'_>) -> Result<Registered, OdometryError> {
-        let mut registered = self.odometry.register(scan, &[])?;
+    fn register(
+        &mut self,
+        scan: &gyre_radar::PolarScan<'_>,
+        samples: &[Sample],
+    ) -> Result<Registered, OdometryError> {
+        let mut registered = self.odometry.register(scan, samples)?;
         // Numbers are those of a run, which counts on where a new chain starts.
         registered.seq = self.trajectory.len() as u64;
         let stamp_ns = scan.geometry.stamp_ns;
@@ -53,12 +58,13 @@ impl Odometry {
     /// Registers the next scan: estimates its motion from the previous scan, and its pose.
     ///
     /// A scan that is not later than the previous one, or by more than 10 s, starts a new chain of
-    /// motions. A scan that cannot be used raises ScanError and is left out: the next one is
+    /// motions. What a gyro has measured, `scan.gyro`, is used with the noise that the section `gyro`
+    /// says. A scan that cannot be used raises ScanError and is left out: the next one is
     /// registered against the scan before it. A network that fails raises Error.
     fn register(&self, py: Python<'_>, scan: &Bound<'_, Scan>) -> PyResult<Registered> {
         let borrowed = scan.get().borrowed(py)?;
-        let scan = borrowed.view()?;
-        let registered = self.0.with(py, |state| state.register(&scan))?;
+        let (view, samples) = (borrowed.view()?, scan.get().samples());
+        let registered = self.0.with(py, |state| state.register(&view, samples))?;
         registered.map_err(errors::registration)
     }
 

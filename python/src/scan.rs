@@ -1,6 +1,7 @@
 //! Scans, whose memory is that of numpy arrays.
 
-use gyre_radar::{Dataset, PolarScan, ReadError, ScanSlot, Sense, SweepGeometry, scan::flag};
+use gyre_radar::{PolarScan, ReadError, ScanSlot, Sense, SweepGeometry, scan::flag};
+use gyre_samples::{MAX_RATE_RADPS, Sample};
 use ndarray::{Ix1, Ix2, IxDyn};
 use numpy::{
     PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods,
@@ -12,6 +13,7 @@ use pyo3::{
 };
 
 use crate::{
+    dataset::Opened,
     errors,
     lock::Guarded,
     numpy_arrays::{converted, given, readable},
@@ -37,7 +39,9 @@ const FLAGS: &str = "one uint8 for each azimuth";
 /// a turn. azimuth_flags: uint8 (azimuths,), what is known of each azimuth: 1 measured, 2 rising
 /// chirp, 4 the chirp is known; without them all are measured. range_offset_m: m; the centre of bin
 /// b is at (b + 0.5) * range_resolution_m + range_offset_m. doppler_s: metres to add to a range for
-/// each m/s of closing speed; 0: unknown.
+/// each m/s of closing speed; 0: unknown. gyro: what a gyro has measured since the end of the sweep
+/// before: pairs of a time, ns, and a yaw rate, rad/s, counter-clockwise, in the order of their
+/// times.
 ///
 /// Arrays that are written to while a scan is registered by another thread give undefined motions.
 #[pyclass(module = "gyre", frozen)]
@@ -50,16 +54,18 @@ pub struct Scan {
     azimuth_stamp_ns: Py<PyAny>,
     azimuth_flags: Py<PyAny>,
     index: Option<usize>,
+    /// Of a gyro, since the scan before.
+    samples: Vec<Sample>,
 }
 
 impl Scan {
     /// Decodes a scan of a dataset straight into arrays of numpy.
     pub fn read(
         py: Python<'_>,
-        dataset: &Guarded<Box<dyn Dataset>>,
+        dataset: &Guarded<Opened>,
         index: usize,
     ) -> PyResult<Result<Self, ReadError>> {
-        let limits = dataset.with(py, |dataset| dataset.limits())?;
+        let limits = dataset.with(py, |dataset| dataset.scans.limits())?;
         let bytes = PyArray1::<u8>::zeros(py, limits.bytes, false);
         let azimuth_rad = PyArray1::<f32>::zeros(py, limits.azimuths, false);
         let stamps = PyArray1::<i64>::zeros(py, limits.azimuths, false);
@@ -73,10 +79,14 @@ impl Scan {
                 stamp_ns: stamps.as_slice_mut()?,
                 flags: flags.as_slice_mut()?,
             };
-            dataset.with(py, |dataset| dataset.read(index, slot))?
+            dataset.with(py, |Opened { scans, samples }| {
+                let geometry = scans.read(index, slot)?;
+                let samples = samples.of(scans.as_ref(), index, geometry.stamp_ns);
+                Ok((geometry, samples.to_vec()))
+            })?
         };
-        let geometry = match read {
-            Ok(geometry) => geometry,
+        let (geometry, samples) = match read {
+            Ok(read) => read,
             Err(error) => return Ok(Err(error)),
         };
         let first = |array: Bound<'_, PyAny>| -> PyResult<Py<PyAny>> {
@@ -96,7 +106,13 @@ impl Scan {
             azimuth_stamp_ns: first(stamps.into_any())?,
             azimuth_flags: first(flags.into_any())?,
             index: Some(index),
+            samples,
         }))
+    }
+
+    /// Returns the samples of the gyro.
+    pub fn samples(&self) -> &[Sample] {
+        &self.samples
     }
 
     /// Borrows the memory, for [`Borrowed::view`].
@@ -178,6 +194,23 @@ fn even_stamps_ns(stamp_ns: i64, sweep_s: f64, azimuths: usize) -> PyResult<Vec<
     Ok(stamps.collect())
 }
 
+/// Returns the samples of a gyro: times, ns, and yaw rates, rad/s.
+fn gyro_samples(pairs: Vec<(i64, f64)>) -> PyResult<Vec<Sample>> {
+    let sample = |(stamp_ns, rate_radps): (i64, f64)| Sample::yaw_rate(stamp_ns, rate_radps);
+    let samples: Vec<Sample> = pairs.into_iter().map(sample).collect();
+    let is_later = |pair: &[Sample]| pair[0].stamp_ns < pair[1].stamp_ns;
+    if !samples.windows(2).all(is_later) {
+        return Err(errors::scan("the times of gyro must increase"));
+    }
+    match samples.iter().find(|sample| !sample.is_valid()) {
+        None => Ok(samples),
+        Some(sample) => Err(errors::scan(format!(
+            "gyro has a yaw rate of {} rad/s, but rates are finite, and at most {MAX_RATE_RADPS} rad/s",
+            sample.values[2]
+        ))),
+    }
+}
+
 fn even_angles_rad(azimuths: usize) -> Vec<f32> {
     let step = std::f64::consts::TAU / azimuths as f64;
     (0..azimuths)
@@ -189,7 +222,7 @@ fn even_angles_rad(azimuths: usize) -> Vec<f32> {
 impl Scan {
     #[new]
     #[pyo3(signature = (power, *, stamp_ns, range_resolution_m, clockwise, azimuth_stamp_ns=None, sweep_s=None, azimuth_rad=None,
-        azimuth_flags=None, range_offset_m=0.0, doppler_s=0.0))]
+        azimuth_flags=None, range_offset_m=0.0, doppler_s=0.0, gyro=None))]
     #[allow(clippy::too_many_arguments)] // They are keywords.
     fn new(
         power: &Bound<'_, PyAny>,
@@ -202,6 +235,7 @@ impl Scan {
         azimuth_flags: Option<&Bound<'_, PyAny>>,
         range_offset_m: f32,
         doppler_s: f32,
+        gyro: Option<Vec<(i64, f64)>>,
     ) -> PyResult<Self> {
         let py = power.py();
         let array = given::<u8, Ix2>(power, "power", POWER)?;
@@ -256,6 +290,7 @@ impl Scan {
             azimuth_stamp_ns: stamps.into_any().unbind(),
             azimuth_flags: flags.into_any().unbind(),
             index: None,
+            samples: gyro_samples(gyro.unwrap_or_default())?,
         };
         scan.check(py)?;
         Ok(scan)
@@ -316,6 +351,14 @@ impl Scan {
     #[getter]
     fn clockwise(&self) -> bool {
         self.geometry.sense == Sense::Clockwise
+    }
+
+    /// What the gyro has measured since the end of the sweep before: pairs of a time, ns, and a yaw
+    /// rate, rad/s, counter-clockwise, with its bias.
+    #[getter]
+    fn gyro(&self) -> Vec<(i64, f64)> {
+        let pair = |sample: &Sample| (sample.stamp_ns, sample.values[2]);
+        self.samples.iter().map(pair).collect()
     }
 
     /// The index in the dataset; None for a scan of arrays.

@@ -53,6 +53,17 @@ def test_motions_of_real_scans_are_those_of_a_run(radiate: Path, tmp_path: Path)
     assert_same(gyre.Config.of(radiate), radiate, tmp_path, 100)
 
 
+def test_motions_with_a_gyro_are_those_of_a_run(radiate: Path, tmp_path: Path) -> None:
+    gyro = {"gyro.kind": "auto", "gyro.late_s": 1.58, "gyro.up": "-z"}
+    given = [argument for key, value in gyro.items() for argument in ("--set", f"{key}={value}")]
+    gyre_program("run", "--data", radiate, "--out", tmp_path, "--set", "source.scans=40", *given)
+    config = gyre.Config.read(tmp_path / "config.toml")
+    assert_same(config, radiate, tmp_path, 40)
+    samples = [sample for scan in gyre.open(radiate, config).scans(0, 40) for sample in scan.gyro]
+    stamps = np.diff([stamp_ns for stamp_ns, _ in samples])
+    assert len(samples) > 190 and stamps.min() > 0, "each sample goes with one scan"
+
+
 def test_a_learned_mask_is_that_of_a_run(recording: Path, tmp_path: Path) -> None:
     overrides: dict[str, object] = {"masking.kind": "learned", "masking.model": ROOT / "models/gyre-255.toml", "masking.backend": "rten"}
     given = [argument for key, value in overrides.items() for argument in ("--set", f"{key}={value}")]

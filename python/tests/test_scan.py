@@ -303,3 +303,19 @@ def test_rows_of_scans_that_lost_azimuths_lie_where_odometry_has_them(radiate: P
         np.testing.assert_allclose(masked.points["x_m"], odometry.points["x_m"], atol=1e-3)
         as_recorded += np.allclose(alone.points["x_m"], odometry.points["x_m"], atol=1e-3)
     assert 6 < as_recorded < 20
+
+
+def test_samples_of_a_gyro_are_finite_and_in_order() -> None:
+    def with_gyro(pairs: list[tuple[int, float]]) -> gyre.Scan:
+        return gyre.Scan(noise(), stamp_ns=STAMP_NS, range_resolution_m=0.175, clockwise=True, sweep_s=0.25, gyro=pairs)
+
+    pairs = [(STAMP_NS - 50_000_000, 0.1), (STAMP_NS, 0.2)]
+    assert with_gyro(pairs).gyro == pairs
+    assert scan(noise()).gyro == []
+    for wrong, sentence in [
+        ([(STAMP_NS, 0.1), (STAMP_NS, 0.2)], "the times of gyro must increase"),
+        ([(STAMP_NS, float("nan"))], "gyro has a yaw rate of NaN"),
+        ([(STAMP_NS, 57.0)], "gyro has a yaw rate of 57 rad/s"),
+    ]:
+        with pytest.raises(gyre.ScanError, match=sentence):
+            with_gyro(wrong)

@@ -60,7 +60,10 @@ class Scan:
         azimuth_flags: NDArray[np.uint8] | None = None,
         range_offset_m: float = 0.0,
         doppler_s: float = 0.0,
+        gyro: Sequence[tuple[int, float]] | None = None,
     ) -> Scan: ...
+    @property
+    def gyro(self) -> list[tuple[int, float]]: ...
     @property
     def power(self) -> NDArray[np.uint8]: ...
     @property
