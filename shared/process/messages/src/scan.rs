@@ -259,8 +259,8 @@ impl ScanHeader {
         self.item.stamp_ns = geometry.stamp_ns;
     }
 
-    /// Adds to the time of the scan, of its rows and of its samples, ns: a recording that is played again goes on
-    /// in time.
+    /// Adds to the time of the scan, of its rows and of its samples, ns: a recording that is played
+    /// again goes on in time.
     pub fn shift_times(&mut self, shift_ns: i64, bytes: &mut [u8]) {
         if shift_ns == 0 {
             return;

@@ -65,12 +65,12 @@ impl LostCounts {
     }
 }
 
-/// What a gyro contributed.
+/// The contribution of a gyro.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct GyroCounts {
     /// Motions whose turn it measured; the others are those of the radar alone.
     pub motions: u64,
-    /// Its bias after the last of them, rad/s.
+    /// Bias after the last of them, rad/s.
     pub bias_radps: f64,
     /// Standard deviation of that bias, rad/s.
     pub bias_sigma_radps: f64,
