@@ -42,8 +42,8 @@ pub fn open(
                 radar_constants(&data, &DatasetOptions::default()).map_err(errors::automatic)?
             }
         };
-        let scans = gyre_recording::open(&data, &options).map_err(errors::open)?;
-        let samples = ScanSamples::open(&method.odometry.gyro, &data, scans.as_ref());
+        let mut scans = gyre_recording::open(&data, &options).map_err(errors::open)?;
+        let samples = ScanSamples::open(&method.odometry.gyro, &data, scans.as_mut());
         let samples = samples.map_err(errors::gyro)?;
         Ok(Opened { scans, samples })
     })?;

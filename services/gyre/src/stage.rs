@@ -136,8 +136,8 @@ fn play(launch: &Launch) -> Result<StageCounters, StageError> {
     };
     let options: DatasetOptions = launch.section("dataset")?;
     let drive = SimulatedDrive::new(&simulation).map_err(|error| input(&error))?;
-    let dataset = drive.open(&options).map_err(|error| input(&error))?;
-    let samples = simulated_samples(&drive, &launch.section("gyro")?, dataset.as_ref());
+    let mut dataset = drive.open(&options).map_err(|error| input(&error))?;
+    let samples = simulated_samples(&drive, &launch.section("gyro")?, dataset.as_mut());
     let samples = samples.map_err(|error| input(&error))?;
     gyre_radar_replay::play(launch, dataset, samples, Pace::OnDemand)
 }

@@ -65,9 +65,9 @@ pub fn open(configuration: &Configuration) -> Result<Played, SourceError> {
     }
     if let Some(simulation) = configuration.streamed() {
         let drive = SimulatedDrive::new(simulation)?;
-        let dataset = drive.open(options)?;
+        let mut dataset = drive.open(options)?;
         return Ok(Played {
-            samples: simulated_samples(&drive, gyro, dataset.as_ref())?,
+            samples: simulated_samples(&drive, gyro, dataset.as_mut())?,
             dataset,
             truth: Some(drive.ground_truth_tum()),
         });
@@ -75,9 +75,9 @@ pub fn open(configuration: &Configuration) -> Result<Played, SourceError> {
     if data.as_os_str().is_empty() {
         return Err(SourceError::NoData);
     }
-    let dataset = gyre_recording::open(data, options)?;
+    let mut dataset = gyre_recording::open(data, options)?;
     Ok(Played {
-        samples: ScanSamples::open(gyro, data, dataset.as_ref())?,
+        samples: ScanSamples::open(gyro, data, dataset.as_mut())?,
         dataset,
         truth: None,
     })
@@ -91,13 +91,17 @@ pub fn open(configuration: &Configuration) -> Result<Played, SourceError> {
 pub fn simulated_samples(
     drive: &SimulatedDrive,
     gyro: &GyroConfig,
-    dataset: &dyn Dataset,
+    dataset: &mut dyn Dataset,
 ) -> Result<ScanSamples, SourceError> {
     if gyro.kind != GyroKind::Auto {
         return Ok(ScanSamples::open(gyro, Path::new(""), dataset)?);
     }
     let samples = drive.gyro_samples().ok_or(SourceError::NoGyro)?;
-    Ok(ScanSamples::of_log(&GyroLog::of(samples)?, gyro, dataset)?)
+    Ok(ScanSamples::of_log(
+        &GyroLog::of(samples, Path::new("simulation"))?,
+        gyro,
+        dataset,
+    )?)
 }
 
 /// Returns the configuration with the options of the recording's `dataset.toml` where it has none.

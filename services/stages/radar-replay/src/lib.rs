@@ -50,9 +50,9 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let root = &launch.manifest.root;
     let open = || open(root, &config, &options).map_err(|error| error.to_string());
     match source::open(launch, &tolerance(&config), open)? {
-        Some(dataset) => {
+        Some(mut dataset) => {
             let gyro: GyroConfig = launch.section("gyro")?;
-            let samples = ScanSamples::open(&gyro, &config.data, dataset.as_ref());
+            let samples = ScanSamples::open(&gyro, &config.data, dataset.as_mut());
             let samples = samples.map_err(|error| StageError::Input(error.to_string()))?;
             play(launch, dataset, samples, Pace::Sensor)
         }

@@ -10,12 +10,14 @@ use gyre_radar::{
     AzimuthSource, DEFAULT_TURN_NS, Dataset, DatasetOptions, FileList, Format, ImageSize,
     OpenError, ReadError, ScanLimits, ScanSlot, SweepGeometry, turn_ns,
 };
+use gyre_samples::Sample;
 
 use crate::{
     BagError,
     azimuths::{Described, azimuths},
     bag::Bag,
     files::files,
+    gyro,
     reading::Message,
     topics::Topics,
 };
@@ -64,6 +66,7 @@ fn open_files(
 
 /// The scans of a bag.
 struct Scans {
+    path: PathBuf,
     bag: Bag,
     topics: Topics,
     described: Described,
@@ -96,6 +99,7 @@ impl Scans {
             period_ns: turn_ns(stamps).unwrap_or(DEFAULT_TURN_NS),
             notes: notes(&bag, &topics, &described, &origin, &index),
             files: paths.iter().cloned().collect(),
+            path: path.to_owned(),
             bag,
             topics,
             described,
@@ -249,6 +253,10 @@ impl Dataset for Scans {
 
     fn notes(&self) -> &[String] {
         &self.notes
+    }
+
+    fn gyro(&mut self, topic: Option<&str>) -> Result<Option<Vec<Sample>>, OpenError> {
+        Ok(gyro::read(&mut self.bag, &self.path, topic)?)
     }
 
     fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError> {

@@ -1,8 +1,12 @@
-//! `sensor_msgs`: images.
+//! `sensor_msgs`: images, and what an inertial sensor measures.
 
 use serde::{Deserialize, Serialize};
 
-use crate::{definition::message, std_msgs::Header};
+use crate::{
+    definition::message,
+    geometry_msgs::{Quaternion, Vector3},
+    std_msgs::Header,
+};
 
 /// An image.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -29,4 +33,32 @@ message!(
     "std_msgs/Header header\nuint32 height\nuint32 width\nstring encoding\nuint8 is_bigendian\n\
      uint32 step\nuint8[] data\n",
     [Header]
+);
+
+/// What an inertial sensor measures. Covariances are 3 x 3, by rows; the first element is -1 where
+/// there is no such measurement.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Imu {
+    /// Time and frame.
+    pub header: Header,
+    /// The orientation.
+    pub orientation: Quaternion,
+    /// Its covariance.
+    pub orientation_covariance: [f64; 9],
+    /// Rates about the axes, rad/s.
+    pub angular_velocity: Vector3,
+    /// Their covariance.
+    pub angular_velocity_covariance: [f64; 9],
+    /// Acceleration along the axes, m/s².
+    pub linear_acceleration: Vector3,
+    /// Its covariance.
+    pub linear_acceleration_covariance: [f64; 9],
+}
+message!(
+    Imu,
+    "sensor_msgs",
+    "std_msgs/Header header\ngeometry_msgs/Quaternion orientation\nfloat64[9] orientation_covariance\n\
+     geometry_msgs/Vector3 angular_velocity\nfloat64[9] angular_velocity_covariance\n\
+     geometry_msgs/Vector3 linear_acceleration\nfloat64[9] linear_acceleration_covariance\n",
+    [Header, Quaternion, Vector3]
 );

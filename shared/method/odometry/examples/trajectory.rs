@@ -34,7 +34,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut scan = OwnedScan::with_limits(dataset.limits());
     let mut odometry = Odometry::new(&config.odometry)?;
     let gyro = &config.odometry.gyro;
-    let samples = ScanSamples::open(gyro, Path::new(folder), dataset.as_ref())?;
+    let samples = ScanSamples::open(gyro, Path::new(folder), dataset.as_mut())?;
     let (mut stamps, mut poses) = (Vec::new(), Vec::new());
     for index in 0..dataset.len() {
         match dataset.read(index, scan.slot()) {

@@ -122,6 +122,17 @@ pub trait Dataset: Send {
     /// sweep, a slot that is too small.
     fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError>;
 
+    /// Reads the samples of a gyro that the recording itself has, on the topic of this name, else on
+    /// the only one: in the gyro's own axes and on its own clock, in the order of the recording.
+    /// `None` without one.
+    ///
+    /// # Errors
+    /// No such topic, several without a name, or samples that cannot be read.
+    fn gyro(&mut self, topic: Option<&str>) -> Result<Option<Vec<Sample>>, OpenError> {
+        let _ = topic;
+        Ok(None)
+    }
+
     /// The samples of other sensors that were recorded with the scan that was read last, in the
     /// order of their stamps: of a recording of a run with such sensors.
     fn samples(&self) -> &[Sample] {

@@ -109,21 +109,20 @@ impl GyroLog {
         })
     }
 
-    /// Takes the samples of a simulation.
+    /// Takes the samples of a bag or of a simulation, which messages name by this path.
     ///
     /// # Errors
     /// Stamps or rates that cannot be those of a gyro.
-    pub fn of(samples: Vec<Sample>) -> Result<Self, LogError> {
-        let path = PathBuf::from("of the simulation");
+    pub fn of(samples: Vec<Sample>, path: &Path) -> Result<Self, LogError> {
         let raw = Raw {
             samples,
             ..Raw::default()
         };
-        let (samples, faults) = faults::examine(raw, &path)?;
+        let (samples, faults) = faults::examine(raw, path)?;
         Ok(Self {
             samples,
             faults,
-            path,
+            path: path.to_owned(),
         })
     }
 }

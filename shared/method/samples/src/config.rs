@@ -16,6 +16,10 @@ pub struct GyroConfig {
     /// The log, for `kind = "log"`: a table as CSV whose first row names its columns.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
+    /// The topic of the samples in a bag of ROS 2, of the type `sensor_msgs/msg/Imu`. Default: the
+    /// only one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub topic: Option<String>,
     /// Time by which the stamps of the gyro are late against the radar's, s: it is taken off them.
     pub late_s: f64,
     /// The axis of the gyro that points up: `z`, `-z`, `x`, `-x`, `y` or `-y`.
@@ -98,6 +102,7 @@ impl Default for GyroConfig {
         Self {
             kind: GyroKind::None,
             file: None,
+            topic: None,
             late_s: 0.0,
             up: UpAxis::Z,
             scale: 1.0,

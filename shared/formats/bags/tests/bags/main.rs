@@ -4,6 +4,7 @@
 mod damage;
 mod drivers;
 mod encoders;
+mod gyro;
 mod order;
 
 use std::{

@@ -20,22 +20,25 @@ pub enum ScanSamples {
 }
 
 impl ScanSamples {
-    /// Opens what the section `[gyro]` names for the dataset in this folder.
+    /// Opens what the section `[gyro]` names for the dataset in this folder, or for this bag.
     ///
     /// # Errors
     /// No log beside the scans, or one that cannot be read.
     pub fn open(
         config: &GyroConfig,
         folder: &Path,
-        dataset: &dyn Dataset,
+        dataset: &mut dyn Dataset,
     ) -> Result<Self, LogError> {
-        let file = match (config.kind, dataset.format()) {
+        let log = match (config.kind, dataset.format()) {
             (GyroKind::None, _) => return Ok(Self::None),
             (_, Format::Mcap) => return Ok(Self::Recorded),
-            (GyroKind::Auto, _) => GyroLog::find(folder)?,
-            (GyroKind::Log, _) => config.file.clone().unwrap_or_default(),
+            (GyroKind::Auto, _) => match dataset.gyro(config.topic.as_deref())? {
+                Some(samples) => GyroLog::of(samples, folder)?,
+                None => GyroLog::read(&GyroLog::find(folder)?)?,
+            },
+            (GyroKind::Log, _) => GyroLog::read(&config.file.clone().unwrap_or_default())?,
         };
-        Self::of_log(&GyroLog::read(&file)?, config, dataset)
+        Self::of_log(&log, config, dataset)
     }
 
     /// Takes the samples of a log.

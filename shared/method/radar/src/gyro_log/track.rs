@@ -63,6 +63,8 @@ fn in_vehicle(up: UpAxis, [x, y, z]: [f64; 3]) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
+    use std::path::Path;
+
     use proptest::prelude::*;
 
     use super::*;
@@ -123,11 +125,14 @@ mod tests {
 
     #[test]
     fn delay_axis_and_scale_are_applied_and_the_bias_is_not() {
-        let log = GyroLog::of(vec![Sample {
-            stamp_ns: 5_000_000_000,
-            values: [0.1, 0.2, -0.3, 1.0, 2.0, -9.8],
-            ..Sample::yaw_rate(0, 0.0)
-        }])
+        let log = GyroLog::of(
+            vec![Sample {
+                stamp_ns: 5_000_000_000,
+                values: [0.1, 0.2, -0.3, 1.0, 2.0, -9.8],
+                ..Sample::yaw_rate(0, 0.0)
+            }],
+            Path::new("log"),
+        )
         .unwrap();
         let config = GyroConfig {
             late_s: 1.58,
