@@ -4,9 +4,10 @@ use gyre_ros2_messages::{
     BadMessage, Ros2Message, decode,
     diagnostic_msgs::{DiagnosticArray, DiagnosticStatus, KeyValue},
     encode,
-    geometry_msgs::TransformStamped,
+    geometry_msgs::{Quaternion, TransformStamped},
     nav_msgs::{OccupancyGrid, Odometry},
     navtech_msgs::{RadarBScanMsg, RadarConfigurationMsg, RadarFftDataMsg},
+    sensor_msgs::Imu,
     std_msgs::Header,
     tf2_msgs::TFMessage,
 };
@@ -162,4 +163,36 @@ proptest! {
         let _ = decode::<DiagnosticArray>(&framed);
         let _ = decode::<TFMessage>(&framed);
     }
+}
+
+/// What an inertial sensor measures, as rosbags 0.11.9 serialises it.
+const IMU: &str = "\
+    0001000030eb625c0700000004000000696d7500000000000000000000000000\
+    000000000000000000000000000000000000f03f000000000000f0bf00000000\
+    0000000000000000000000000000000000000000000000000000000000000000\
+    000000000000000000000000000000000000000000000000000000007b14ae47\
+    e17a843f7b14ae47e17a943f9a9999999999b93f000000000000e03f00000000\
+    0000000000000000000000000000000000000000000000000000000000000000\
+    0000000000000000000000000000000000000000000000000000000000000000\
+    0000e03f00000000000000009a99999999992340000000000000000000000000\
+    0000f03f00000000000000400000000000000840000000000000104000000000\
+    0000144000000000000018400000000000001c400000000000002040\
+";
+
+#[test]
+fn an_imu_of_another_writer_is_read_and_written_alike() {
+    let bytes: Vec<u8> = (0..IMU.len())
+        .step_by(2)
+        .map(|at| u8::from_str_radix(&IMU[at..at + 2], 16).unwrap())
+        .collect();
+    let imu: Imu = decode(&bytes).unwrap();
+    assert_eq!(imu.header, Header::new(1_549_986_608_000_000_007, "imu"));
+    assert_eq!(imu.orientation, Quaternion::default());
+    assert_eq!(imu.orientation_covariance[0], -1.0);
+    let [turn, along] = [imu.angular_velocity, imu.linear_acceleration];
+    assert_eq!([turn.x, turn.y, turn.z], [0.01, 0.02, 0.1]);
+    assert_eq!(imu.angular_velocity_covariance[0], 0.5);
+    assert_eq!([along.x, along.y, along.z], [0.5, 0.0, 9.8]);
+    assert_eq!(imu.linear_acceleration_covariance[8], 8.0);
+    assert_eq!(encode(&imu).unwrap(), bytes);
 }
