@@ -9,7 +9,8 @@ use std::{
 };
 
 use gyre_configuration::radar_constants;
-use gyre_radar::{DatasetOptions, ScanSamples};
+use gyre_radar::{DatasetOptions, ReadError, ScanSamples, ScanSlot, SweepGeometry};
+use gyre_samples::Sample;
 use numpy::PyArray1;
 use pyo3::{exceptions::PyIndexError, prelude::*, types::PyTuple};
 
@@ -70,6 +71,36 @@ pub struct Opened {
     pub scans: Box<dyn gyre_radar::Dataset>,
     /// What other sensors measured meanwhile.
     pub samples: ScanSamples,
+}
+
+impl Opened {
+    /// Decodes a scan, and returns the samples that come with it.
+    pub fn read(
+        &mut self,
+        index: usize,
+        slot: ScanSlot<'_>,
+    ) -> Result<(SweepGeometry, Vec<Sample>), ReadError> {
+        let ScanSlot {
+            bytes,
+            azimuth_rad,
+            stamp_ns,
+            flags,
+        } = slot;
+        let geometry = self.scans.read(
+            index,
+            ScanSlot {
+                bytes,
+                azimuth_rad,
+                stamp_ns: &mut *stamp_ns,
+                flags,
+            },
+        )?;
+        let stamps = stamp_ns[..geometry.azimuths].iter().copied();
+        let first = stamps.clone().min().unwrap_or(geometry.stamp_ns);
+        let last = stamps.max().unwrap_or(geometry.stamp_ns);
+        let samples = self.samples.of(self.scans.as_ref(), [first, last]);
+        Ok((geometry, samples.to_vec()))
+    }
 }
 
 /// The scans of a recording, ordered by time.

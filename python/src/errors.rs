@@ -58,7 +58,7 @@ pub fn open(error: OpenError) -> PyErr {
 /// A log of a gyro.
 pub fn gyro(error: LogError) -> PyErr {
     match error {
-        LogError::None { .. } => config(error),
+        LogError::None { .. } | LogError::Live => config(error),
         error => read(error),
     }
 }

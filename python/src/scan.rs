@@ -79,11 +79,7 @@ impl Scan {
                 stamp_ns: stamps.as_slice_mut()?,
                 flags: flags.as_slice_mut()?,
             };
-            dataset.with(py, |Opened { scans, samples }| {
-                let geometry = scans.read(index, slot)?;
-                let samples = samples.of(scans.as_ref(), index, geometry.stamp_ns);
-                Ok((geometry, samples.to_vec()))
-            })?
+            dataset.with(py, |dataset| dataset.read(index, slot))?
         };
         let (geometry, samples) = match read {
             Ok(read) => read,

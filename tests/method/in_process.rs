@@ -24,9 +24,9 @@ fn register_all(run: &Run) -> Vec<Registered> {
     scans
         .map(|index| {
             scan.geometry = dataset.read(index, scan.slot()).unwrap();
-            let stamp_ns = scan.geometry.stamp_ns;
-            let samples = samples.of(dataset.as_ref(), index, stamp_ns);
-            odometry.register(&scan.view(), samples).unwrap()
+            let scan = scan.view();
+            let samples = samples.of(dataset.as_ref(), scan.span_ns());
+            odometry.register(&scan, samples).unwrap()
         })
         .collect()
 }

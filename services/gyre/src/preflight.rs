@@ -10,7 +10,7 @@ use gyre_messages::{Footprint, Limits, StageId, Window};
 use gyre_radar::{DEFAULT_TURN_NS, Fingerprint, turn_ns};
 use gyre_radar_replay::{Listing, Player};
 use gyre_run::{MOST_OPEN_FILES, PlayedFrom, Side, SourceKind};
-use gyre_samples::MAX_SAMPLES;
+use gyre_samples::{GyroKind, MAX_SAMPLES};
 use gyre_stage::run::free_shared_memory;
 use gyre_terminal::Failure;
 use rustix::process::{Resource, getrlimit};
@@ -39,9 +39,9 @@ pub enum PreflightError {
         /// The scans.
         scans: usize,
     },
-    /// No gyro comes with the scans of a live radar.
+    /// A log beside a live radar, or a topic beside one that is not in ROS 2.
     #[error(
-        "gyro.kind names a gyro, but none can be read beside a live radar yet: set gyro.kind = \"none\", or play a recording"
+        "gyro.kind is of a recording, but the radar is live: set it to `udp`, to `ros2` for a radar behind its driver in ROS 2, or to `none`"
     )]
     LiveGyro,
     /// The segments would not fit.
@@ -212,7 +212,13 @@ impl Scans {
 
     /// Asks the radar.
     fn of_radar(configuration: &Configuration) -> Result<Self, Failure> {
-        if configuration.odometry.gyro.is_used() {
+        let is_in_ros2 = configuration.source.kind == SourceKind::Ros2;
+        let can_come = match configuration.odometry.gyro.kind {
+            GyroKind::None | GyroKind::Udp => true,
+            GyroKind::Ros2 => is_in_ros2,
+            GyroKind::Auto | GyroKind::Log => false,
+        };
+        if !can_come {
             return Err(PreflightError::LiveGyro.into());
         }
         configuration.dataset.check()?;

@@ -157,8 +157,7 @@ impl Source for Replay {
             true => Unreadable::Io(error.to_string()),
             false => Unreadable::Damaged(error.to_string()),
         })?);
-        let stamp_ns = header.item.stamp_ns;
-        let samples = self.samples.of(self.dataset.as_ref(), scan, stamp_ns);
+        let samples = self.samples.of(self.dataset.as_ref(), header.span_ns());
         header.set_samples(bytes, samples, 0);
         header.shift_times(shift_ns, bytes);
         Ok(())

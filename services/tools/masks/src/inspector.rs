@@ -116,9 +116,9 @@ impl MaskInspector {
                 return Ok(false);
             }
         }
-        let stamp_ns = self.spare.geometry.stamp_ns;
-        let samples = self.samples.of(self.dataset.as_ref(), number, stamp_ns);
-        let registered = self.odometry.register(&self.spare.view(), samples);
+        let scan = self.spare.view();
+        let samples = self.samples.of(self.dataset.as_ref(), scan.span_ns());
+        let registered = self.odometry.register(&scan, samples);
         let registered = registered.map_err(|error| format!("scan {number}: {error}"))?;
         self.last.swap(0, 1);
         std::mem::swap(&mut self.last[0], &mut self.spare);

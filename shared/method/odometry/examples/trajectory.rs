@@ -44,10 +44,9 @@ fn main() -> Result<(), Box<dyn Error>> {
                 continue;
             }
         }
-        let stamp_ns = scan.geometry.stamp_ns;
-        let samples = samples.of(dataset.as_ref(), index, stamp_ns);
+        let samples = samples.of(dataset.as_ref(), scan.view().span_ns());
         let registered = odometry.register(&scan.view(), samples)?;
-        stamps.push(stamp_ns);
+        stamps.push(scan.geometry.stamp_ns);
         poses.push(registered.pose.motion);
     }
     let trajectory = Trajectory {

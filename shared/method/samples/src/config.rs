@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use crate::Sample;
+
 /// Configuration of the gyro: section `[gyro]`.
 ///
 /// The noise is that of a data sheet. The defaults are those of a gyro that cars have.
@@ -16,10 +18,15 @@ pub struct GyroConfig {
     /// The log, for `kind = "log"`: a table as CSV whose first row names its columns.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
-    /// The topic of the samples in a bag of ROS 2, of the type `sensor_msgs/msg/Imu`. Default: the
-    /// only one.
+    /// The topic of the samples in ROS 2, of the type `sensor_msgs/msg/Imu`. Default: the only one
+    /// of a bag.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub topic: Option<String>,
+    /// The address and port at which datagrams of a live gyro are received: lines of a stamp (ns since
+    /// 1970) and the rates about x, y and z (rad/s), with commas between.
+    pub listen: String,
+    /// Longest time for which a scan of a live radar waits for its samples, ms.
+    pub max_wait_ms: f64,
     /// Time by which the stamps of the gyro are late against the radar's, s: it is taken off them.
     pub late_s: f64,
     /// The axis of the gyro that points up: `z`, `-z`, `x`, `-x`, `y` or `-y`.
@@ -55,6 +62,10 @@ pub enum GyroKind {
     Auto,
     /// The log that `file` names.
     Log,
+    /// Of a live radar: what arrives in datagrams at `listen`.
+    Udp,
+    /// Of a live radar behind its driver in ROS 2: `topic`.
+    Ros2,
 }
 
 /// The axis of a gyro that points up.
@@ -84,6 +95,20 @@ pub enum UpAxis {
 }
 
 impl UpAxis {
+    /// Returns a vector along the axes of the gyro in right-handed axes of which the third points up. The axis
+    /// that points ahead is not known: z down is taken for x ahead and y right, z up for x ahead and y
+    /// left; other axes are named in their order.
+    pub fn in_vehicle(self, [x, y, z]: [f64; 3]) -> [f64; 3] {
+        match self {
+            Self::Z => [x, y, z],
+            Self::MinusZ => [x, -y, -z],
+            Self::X => [y, z, x],
+            Self::MinusX => [y, -z, -x],
+            Self::Y => [z, x, y],
+            Self::MinusY => [z, -x, -y],
+        }
+    }
+
     /// Returns the rate about this axis, of the rates about x, y and z.
     pub fn of(self, [x, y, z]: [f64; 3]) -> f64 {
         match self {
@@ -103,6 +128,8 @@ impl Default for GyroConfig {
             kind: GyroKind::None,
             file: None,
             topic: None,
+            listen: "127.0.0.1:6321".to_owned(),
+            max_wait_ms: 20.0,
             late_s: 0.0,
             up: UpAxis::Z,
             scale: 1.0,
@@ -135,6 +162,25 @@ impl GyroConfig {
         self.kind != GyroKind::None
     }
 
+    /// Returns whether the gyro is live: its samples arrive while the radar is received.
+    pub fn is_live(&self) -> bool {
+        matches!(self.kind, GyroKind::Udp | GyroKind::Ros2)
+    }
+
+    /// Takes a sample over to the vehicle's axes and the radar's clock: the delay is taken off its
+    /// stamp, the scale is applied to the yaw rate alone, and the bias to nothing.
+    pub fn on_radar(&self, sample: &Sample) -> Sample {
+        let late_ns = (self.late_s * 1e9).round() as i64;
+        let [x, y, z, along_x, along_y, along_z] = sample.values;
+        let [roll, pitch, yaw] = self.up.in_vehicle([x, y, z]);
+        let [ahead, left, above] = self.up.in_vehicle([along_x, along_y, along_z]);
+        Sample {
+            stamp_ns: sample.stamp_ns.saturating_sub(late_ns),
+            values: [roll, pitch, yaw * self.scale, ahead, left, above],
+            ..*sample
+        }
+    }
+
     /// Checks every value.
     ///
     /// # Errors
@@ -156,6 +202,12 @@ impl GyroConfig {
             self.late_s,
             [-1e6, 1e6],
             "seconds, at most a million",
+        )?;
+        within(
+            "max_wait_ms",
+            self.max_wait_ms,
+            [0.0, 1000.0],
+            "milliseconds, 0 to 1000",
         )?;
         within("scale", self.scale, [0.5, 2.0], "a factor, 0.5 to 2")?;
         within(

@@ -1,11 +1,12 @@
 //! From samples of a gyro to the turn between two scans.
 
-use std::mem;
-
 use bytemuck::{Pod, Zeroable};
 use gyre_geometry::Twist;
 
 use crate::{GyroConfig, Sample, SampleKind};
+
+/// Turn of the radar that is taken for a scan whose azimuths all have the same time, ns.
+const MIN_TURN_NS: i64 = 250_000_000;
 
 /// What the gyro says of the turn of the sensor from one scan to the next, counter-clockwise.
 #[repr(C)]
@@ -23,30 +24,29 @@ pub struct GyroTurn {
 
 /// Integrates the yaw rate between scans.
 ///
-/// What it says of a scan depends on the samples since the sweep of the scan before began, and on
+/// What it says of a scan depends on the samples that came with it and with the scan before, and on
 /// nothing else: so a process that is restarted at the scan before says the same.
 #[derive(Clone, Debug, Default)]
 pub struct Gyro {
     config: GyroConfig,
-    /// Those of the scan before and of the scan, in the order of their stamps.
-    rates: Vec<Rate>,
-    /// Number of rates that the scan before has.
-    earlier: usize,
-    /// The scan before and the scan.
-    sweeps: [Option<Sweep>; 2],
+    earlier: Option<Sweep>,
+    later: Option<Sweep>,
     /// Of scans that were dropped since the last one.
     dropped: Vec<Rate>,
+    turn: Option<GyroTurn>,
 }
 
 /// A stamp, ns, and the yaw rate, rad/s.
 type Rate = (i64, f64);
 
-/// The times of a scan, ns.
-#[derive(Clone, Copy, Debug)]
+/// A scan with what came with it.
+#[derive(Clone, Debug, Default)]
 struct Sweep {
     stamp_ns: i64,
-    /// Of the first azimuth.
-    start_ns: i64,
+    /// Times of the first and of the last azimuth.
+    span_ns: [i64; 2],
+    /// In the order of their stamps.
+    rates: Vec<Rate>,
     /// Mean rate during the sweep, rad/s; `None` where samples are missing.
     rate_radps: Option<f64>,
 }
@@ -60,22 +60,17 @@ impl Gyro {
         }
     }
 
-    /// Takes the samples of the next scan, in the order of their stamps, and the times of its stamp
-    /// and of its first and last azimuth.
+    /// Takes the samples that come with the next scan, in the order of their stamps, and the times
+    /// of its stamp and of its first and last azimuth.
     pub fn push(&mut self, samples: &[Sample], stamp_ns: i64, span_ns: [i64; 2]) {
-        self.rates.drain(..self.earlier);
-        self.earlier = self.rates.len();
-        let dropped = mem::take(&mut self.dropped);
-        for rate in dropped.into_iter().chain(rates(samples)) {
-            let is_later = self.rates.last().is_none_or(|last| last.0 < rate.0);
-            self.rates.extend(is_later.then_some(rate));
-        }
-        let sweep = Sweep {
-            stamp_ns,
-            start_ns: span_ns[0],
-            rate_radps: self.mean_rate(span_ns),
-        };
-        self.sweeps = [self.sweeps[1], Some(sweep)];
+        let mut sweep = self.earlier.take().unwrap_or_default();
+        sweep.rates.clear();
+        sweep.rates.extend(rates(samples));
+        (sweep.stamp_ns, sweep.span_ns) = (stamp_ns, span_ns);
+        sweep.rate_radps = sweep.mean_rate(self.max_gap_ns());
+        self.earlier = self.later.replace(sweep);
+        self.turn = self.integrate();
+        self.dropped.clear();
     }
 
     /// Takes the samples of a scan that is dropped: they count as those of the next one.
@@ -88,16 +83,33 @@ impl Gyro {
         *self = Self::new(&self.config);
     }
 
-    /// Integrates the rate from the stamp of the scan before to that of the scan; `None` where
-    /// samples are missing.
+    /// Returns the turn from the stamp of the scan before to that of the scan; `None` where samples
+    /// are missing.
     pub fn turn(&self) -> Option<GyroTurn> {
-        let [before, scan] = self.sweeps;
-        let (before, scan) = (before?, scan?);
-        let rates = since(&self.rates, before.start_ns);
-        let span_ns = [before.stamp_ns, scan.stamp_ns];
-        let yaw_rad = integral(rates, span_ns, self.max_gap_ns())?;
+        self.turn
+    }
+
+    /// Returns the mean rates during the sweeps of the scan before and of the scan, rad/s; `None`
+    /// where samples are missing.
+    pub fn sweep_rates_radps(&self) -> [Option<f64>; 2] {
+        [&self.earlier, &self.later].map(|sweep| sweep.as_ref()?.rate_radps)
+    }
+
+    fn integrate(&self) -> Option<GyroTurn> {
+        let (before, scan) = (self.earlier.as_ref()?, self.later.as_ref()?);
+        let since = before
+            .rates
+            .iter()
+            .filter(|rate| rate.0 >= before.span_ns[0]);
+        let mut rates: Vec<Rate> = Vec::with_capacity(before.rates.len() + scan.rates.len());
+        for rate in since.chain(&self.dropped).chain(&scan.rates) {
+            // A sample can come with two scans.
+            let is_later = rates.last().is_none_or(|last| last.0 < rate.0);
+            rates.extend(is_later.then_some(*rate));
+        }
+        let yaw_rad = integral(&rates, [before.stamp_ns, scan.stamp_ns], self.max_gap_ns())?;
         let interval_s = seconds(scan.stamp_ns - before.stamp_ns);
-        let change = rate_at(rates, scan.stamp_ns)? - rate_at(rates, before.stamp_ns)?;
+        let change = rate_at(&rates, scan.stamp_ns)? - rate_at(&rates, before.stamp_ns)?;
         let by_scale = self.config.scale_sigma * yaw_rad;
         let by_time = self.config.time_sigma_s * change;
         let walk = self.config.noise_rad_per_sqrt_s.powi(2) * interval_s;
@@ -109,26 +121,36 @@ impl Gyro {
         })
     }
 
-    /// Returns the mean rates during the sweeps of the scan before and of the scan, rad/s; `None`
-    /// where samples are missing.
-    pub fn sweep_rates_radps(&self) -> [Option<f64>; 2] {
-        self.sweeps.map(|sweep| sweep?.rate_radps)
-    }
-
-    fn mean_rate(&self, [start_ns, end_ns]: [i64; 2]) -> Option<f64> {
-        let rates = since(&self.rates[self.earlier..], start_ns);
-        match start_ns < end_ns {
-            true => {
-                let turned = integral(rates, [start_ns, end_ns], self.max_gap_ns())?;
-                Some(turned / seconds(end_ns - start_ns))
-            }
-            false => rate_at(rates, end_ns),
-        }
-    }
-
     fn max_gap_ns(&self) -> i64 {
         (self.config.max_gap_s * 1e9) as i64
     }
+}
+
+impl Sweep {
+    /// The mean rate from the first azimuth to the last, by the samples between.
+    fn mean_rate(&self, max_gap_ns: i64) -> Option<f64> {
+        let [start_ns, end_ns] = self.span_ns;
+        let first = self.rates.partition_point(|rate| rate.0 < start_ns);
+        let end = self.rates.partition_point(|rate| rate.0 <= end_ns);
+        let rates = self.rates.get(first..end)?;
+        match start_ns < end_ns {
+            true => {
+                let turned = integral(rates, self.span_ns, max_gap_ns)?;
+                Some(turned / seconds(end_ns - start_ns))
+            }
+            false => rate_at(&self.rates, end_ns),
+        }
+    }
+}
+
+/// Returns the interval whose samples come with a scan, from the times of its first and its last
+/// azimuth: those after the first time and up to the second. It begins a turn before the sweep, so
+/// that a scan that cannot be read leaves no hole; a sample then comes with two scans, and counts
+/// once.
+pub fn interval_of(span_ns: [i64; 2]) -> [i64; 2] {
+    let [start_ns, end_ns] = span_ns;
+    let turn_ns = end_ns.saturating_sub(start_ns).max(MIN_TURN_NS);
+    [start_ns.saturating_sub(turn_ns), end_ns]
 }
 
 /// Returns the velocity for the compensation of a sweep: with the gyro's mean rate, if it has one.
@@ -142,11 +164,6 @@ pub fn with_yaw_rate(twist: Option<Twist>, rate_radps: Option<f64>) -> Option<Tw
 fn rates(samples: &[Sample]) -> impl Iterator<Item = Rate> {
     let gyro = samples.iter().filter(|sample| sample.is(SampleKind::Gyro));
     gyro.map(|sample| (sample.stamp_ns, sample.values[2]))
-}
-
-/// The rates from a time on.
-fn since(rates: &[Rate], stamp_ns: i64) -> &[Rate] {
-    &rates[rates.partition_point(|(at_ns, _)| *at_ns < stamp_ns)..]
 }
 
 /// The integral of the rate, interpolated linearly; `None` if two samples are farther apart than

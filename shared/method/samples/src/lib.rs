@@ -7,15 +7,18 @@
 //! Reading order:
 //! - [`Sample`]: one measurement, as it travels with a scan;
 //! - [`GyroConfig`]: the section `[gyro]`;
-//! - [`Gyro`]: integrates the yaw rate between two scans, to a [`GyroTurn`].
+//! - [`Gyro`]: integrates the yaw rate between two scans, to a [`GyroTurn`];
+//! - [`LiveSamples`]: what has arrived of a live gyro.
 //!
 //! Axes are those of the vehicle by REP-103: x forward, y left, z up. Rates are in rad/s, stamps in
 //! ns since 1970 on the radar's clock.
 
 mod config;
 mod gyro;
+mod live;
 mod sample;
 
 pub use config::{GyroConfig, GyroConfigError, GyroKind, UpAxis};
-pub use gyro::{Gyro, GyroTurn, with_yaw_rate};
+pub use gyro::{Gyro, GyroTurn, interval_of, with_yaw_rate};
+pub use live::LiveSamples;
 pub use sample::{MAX_RATE_RADPS, MAX_SAMPLES, Sample, SampleKind};

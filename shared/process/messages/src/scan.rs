@@ -189,6 +189,15 @@ impl ScanHeader {
         })
     }
 
+    /// Returns the times of the first and of the last azimuth, ns since 1970; the stamp twice
+    /// without azimuths.
+    pub fn span_ns(&self) -> [i64; 2] {
+        let rows = (self.azimuths as usize).min(MAX_AZIMUTHS);
+        let stamps = self.azimuth_stamp_ns[..rows].iter().copied();
+        let or_stamp = |ns: Option<i64>| ns.unwrap_or(self.item.stamp_ns);
+        [or_stamp(stamps.clone().min()), or_stamp(stamps.max())]
+    }
+
     /// Where the samples begin in the payload.
     fn first_sample(&self) -> Option<usize> {
         self.power_bytes()?.checked_next_multiple_of(ByteBlock::LEN)

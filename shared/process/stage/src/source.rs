@@ -3,6 +3,7 @@
 
 mod attempts;
 mod credit;
+mod live_gyro;
 mod pace;
 mod playback;
 mod player;

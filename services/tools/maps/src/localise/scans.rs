@@ -79,9 +79,9 @@ impl Scans {
             let registered = match self.dataset.read(number, self.scan.slot()) {
                 Ok(geometry) => {
                     self.scan.geometry = geometry;
-                    let stamp_ns = geometry.stamp_ns;
-                    let samples = self.samples.of(self.dataset.as_ref(), number, stamp_ns);
-                    let registered = self.odometry.register(&self.scan.view(), samples);
+                    let scan = self.scan.view();
+                    let samples = self.samples.of(self.dataset.as_ref(), scan.span_ns());
+                    let registered = self.odometry.register(&scan, samples);
                     registered.map_err(|error| format!("scan {number}: {error}"))
                 }
                 Err(error) => Err(error.to_string()),

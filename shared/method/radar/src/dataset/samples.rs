@@ -2,13 +2,12 @@
 
 use std::path::Path;
 
-use gyre_samples::{GyroConfig, GyroKind, Sample};
+use gyre_samples::{GyroConfig, GyroKind, Sample, interval_of};
 
 use super::{Dataset, Format};
 use crate::gyro_log::{GyroLog, LogError, SampleTrack};
 
-/// The samples of other sensors that go with the scans of a dataset: by their stamps alone, each
-/// with the first scan whose sweep ends after it.
+/// The samples of other sensors that come with the scans of a dataset: by their stamps alone.
 #[derive(Debug)]
 pub enum ScanSamples {
     /// There are none.
@@ -36,6 +35,7 @@ impl ScanSamples {
                 Some(samples) => GyroLog::of(samples, folder)?,
                 None => GyroLog::read(&GyroLog::find(folder)?)?,
             },
+            (GyroKind::Udp | GyroKind::Ros2, _) => return Err(LogError::Live),
             (GyroKind::Log, _) => GyroLog::read(&config.file.clone().unwrap_or_default())?,
         };
         Self::of_log(&log, config, dataset)
@@ -65,22 +65,15 @@ impl ScanSamples {
         Ok(Self::Log(track))
     }
 
-    /// Returns the samples of the scan of this index, which was read last and has this stamp, in the
-    /// order of their stamps.
-    ///
-    /// They are those since the end of the sweep before, as far as the times of both scans are known
-    /// without decoding; else since a turn before the scan's own sweep. A sample may then go with
-    /// two scans, and counts once.
-    pub fn of<'a>(&'a self, dataset: &'a dyn Dataset, index: usize, stamp_ns: i64) -> &'a [Sample] {
+    /// Returns the samples that come with the scan that was read last, in the order of their stamps,
+    /// from the times of its first and its last azimuth: [`interval_of`].
+    pub fn of<'a>(&'a self, dataset: &'a dyn Dataset, span_ns: [i64; 2]) -> &'a [Sample] {
         match self {
             Self::None => &[],
             Self::Recorded => dataset.samples(),
             Self::Log(track) => {
-                let period_ns = dataset.period_ns();
-                let end_ns = |index| Some(dataset.nominal_stamp_ns(index)? + period_ns / 2);
-                let until_ns = end_ns(index).unwrap_or(stamp_ns + period_ns / 2);
-                let after_ns = index.checked_sub(1).and_then(end_ns);
-                track.between(after_ns.unwrap_or(until_ns - 2 * period_ns), until_ns)
+                let [after_ns, until_ns] = interval_of(span_ns);
+                track.between(after_ns, until_ns)
             }
         }
     }

@@ -27,6 +27,11 @@ pub enum LogError {
         /// The log.
         path: PathBuf,
     },
+    /// A live gyro beside scans of a recording.
+    #[error(
+        "gyro.kind is that of a live gyro, but the scans are of a recording: set gyro.kind to `auto`, `log` or `none`"
+    )]
+    Live,
     /// A file that cannot be read.
     #[error("cannot read the log of the gyro {path}: {source}")]
     Io {

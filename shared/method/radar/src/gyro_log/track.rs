@@ -1,6 +1,6 @@
 //! Samples of a log on the radar's clock.
 
-use gyre_samples::{GyroConfig, Sample, UpAxis};
+use gyre_samples::{GyroConfig, Sample};
 
 use super::GyroLog;
 
@@ -9,21 +9,10 @@ use super::GyroLog;
 pub struct SampleTrack(Vec<Sample>);
 
 impl SampleTrack {
-    /// Takes the samples of a log over to the vehicle's axes and the radar's clock: the delay of
-    /// the configuration is taken off the stamps, its scale is applied to the yaw rate alone, and
-    /// its bias to nothing.
+    /// Takes the samples of a log over to the vehicle's axes and the radar's clock:
+    /// [`GyroConfig::on_radar`].
     pub fn new(log: &GyroLog, config: &GyroConfig) -> Self {
-        let late_ns = (config.late_s * 1e9).round() as i64;
-        let taken = log.samples.iter().map(|sample| {
-            let [x, y, z, along_x, along_y, along_z] = sample.values;
-            let [roll, pitch, yaw] = in_vehicle(config.up, [x, y, z]);
-            let [ahead, left, above] = in_vehicle(config.up, [along_x, along_y, along_z]);
-            Sample {
-                stamp_ns: sample.stamp_ns.saturating_sub(late_ns),
-                values: [roll, pitch, yaw * config.scale, ahead, left, above],
-                ..*sample
-            }
-        });
+        let taken = log.samples.iter().map(|sample| config.on_radar(sample));
         Self(taken.collect())
     }
 
@@ -46,25 +35,12 @@ impl SampleTrack {
     }
 }
 
-/// A vector along the axes of the gyro in right-handed axes of which the third points up. The axis
-/// that points ahead is not known: z down is taken for x ahead and y right, z up for x ahead and y
-/// left; other axes are named in their order.
-fn in_vehicle(up: UpAxis, [x, y, z]: [f64; 3]) -> [f64; 3] {
-    match up {
-        UpAxis::Z => [x, y, z],
-        UpAxis::MinusZ => [x, -y, -z],
-        UpAxis::X => [y, z, x],
-        UpAxis::MinusX => [y, -z, -x],
-        UpAxis::Y => [z, x, y],
-        UpAxis::MinusY => [z, -x, -y],
-    }
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
     use std::path::Path;
 
+    use gyre_samples::UpAxis;
     use proptest::prelude::*;
 
     use super::*;
@@ -84,9 +60,9 @@ mod tests {
         #[test]
         fn the_axes_are_right_handed(a in [-9.0..9.0, -9.0..9.0, -9.0..9.0f64], b in [-9.0..9.0, -9.0..9.0, -9.0..9.0f64]) {
             for up in AXES {
-                prop_assert_eq!(in_vehicle(up, a)[2], up.of(a));
-                let crossed = in_vehicle(up, cross(a, b));
-                let of_turned = cross(in_vehicle(up, a), in_vehicle(up, b));
+                prop_assert_eq!(up.in_vehicle(a)[2], up.of(a));
+                let crossed = up.in_vehicle(cross(a, b));
+                let of_turned = cross(up.in_vehicle(a), up.in_vehicle(b));
                 for k in 0..3 {
                     prop_assert!((crossed[k] - of_turned[k]).abs() < 1e-9, "{up:?}");
                 }

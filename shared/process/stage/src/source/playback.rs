@@ -342,12 +342,9 @@ struct Times {
 
 impl Times {
     fn of(header: &ScanHeader) -> Self {
-        let stamp_ns = header.item.stamp_ns;
-        let rows = header.azimuths as usize;
-        let stamps = header.azimuth_stamp_ns.iter().take(rows);
         Self {
-            stamp_ns,
-            complete_ns: stamps.copied().max().unwrap_or(stamp_ns),
+            stamp_ns: header.item.stamp_ns,
+            complete_ns: header.span_ns()[1],
         }
     }
 }

@@ -4,20 +4,26 @@
 use std::{os::fd::BorrowedFd, time::Duration};
 
 use gyre_messages::{Hop, NumberedBy, Scan, ScanHeader, StageId};
+use gyre_samples::Sample;
 
 use super::{
     Credit,
+    live_gyro::LiveGyro,
     position::Position,
     received::{self, Received, ReceivedWriter},
 };
 use crate::{
-    Generation, Launch, StageCounters, StageError, allocations, clock, schedule::ScheduleWriter,
-    wake, writer::Writer,
+    Generation, Launch, StageCounters, StageError, allocations, clock,
+    schedule::ScheduleWriter,
+    wake,
+    writer::{Draft, Writer},
 };
 
 /// Time for which the supervisor need not intervene: this loop says again and again that it is not
 /// late, since a radar that is switched off is no reason to restart it.
 pub(crate) const ALIVE_NS: i64 = 5_000_000_000;
+/// Time between two looks for samples of a gyro that comes with the sensor.
+const GYRO_POLL: Duration = Duration::from_millis(2);
 /// Time between two such words, ns: it wakes many times for each scan, and a word is a write to a
 /// file.
 const SAID_EVERY_NS: i64 = 1_000_000_000;
@@ -41,6 +47,12 @@ pub trait Sensor {
     /// `CLOCK_MONOTONIC`, ns, however late it was read; `None` if that is not known: then its
     /// latency counts from when it was read.
     fn due_ns(&self) -> Option<i64>;
+
+    /// Takes the next sample of a gyro that comes with the sensor, in its own axes and on its own
+    /// clock.
+    fn gyro_sample(&mut self) -> Option<Sample> {
+        None
+    }
 
     /// Goes on counting after a source that has died.
     fn resume(&mut self, before: Received);
@@ -82,6 +94,7 @@ pub fn run_sensor(
         schedule: ScheduleWriter::resume(&launch.manifest)?,
         scans: Writer::open(&launch.node, &launch.manifest)?,
         counters: StageCounters::default(),
+        gyro: LiveGyro::open(launch)?,
         said_ns: 0,
     };
     if let Some(start) = stream.wait_for_start()? {
@@ -100,6 +113,7 @@ struct Stream<'a> {
     scans: Writer<Scan>,
     counters: StageCounters,
     received: ReceivedWriter,
+    gyro: Option<LiveGyro>,
     /// When the supervisor was last told that this process is alive, `CLOCK_MONOTONIC`, ns.
     said_ns: i64,
 }
@@ -160,6 +174,9 @@ impl Stream<'_> {
                     }
                 }
             };
+            if !self.add_samples(sensor, &mut draft)? {
+                return Ok(());
+            }
             let header = draft.header();
             position.identify(&mut header.item);
             generation.mark(&mut header.item);
@@ -189,6 +206,32 @@ impl Stream<'_> {
         self.schedule.has_published(position.published)?;
         while !self.sleep(None, wake::MAX_WAIT)? {}
         Ok(())
+    }
+
+    /// Waits for the samples of a complete scan, and adds them; false on a request to stop.
+    fn add_samples<S: Sensor>(
+        &mut self,
+        sensor: &mut S,
+        draft: &mut Draft<Scan>,
+    ) -> Result<bool, StageError> {
+        let Some(mut gyro) = self.gyro.take() else {
+            return Ok(true);
+        };
+        let until_ns = clock::now_ns() + gyro.max_wait().as_nanos() as i64;
+        loop {
+            gyro.receive(sensor)?;
+            let left = clock::until(until_ns);
+            if gyro.covers(draft.header()) || left.is_zero() {
+                break;
+            }
+            if self.sleep(gyro.socket(), left.min(GYRO_POLL))? {
+                return Ok(false);
+            }
+        }
+        let (header, bytes) = draft.parts();
+        gyro.store(header, bytes);
+        self.gyro = Some(gyro);
+        Ok(true)
     }
 
     /// Sleeps until the connection has something to read, and answers the handshakes of new

@@ -1,0 +1,136 @@
+//! Samples of a live gyro, until the scan comes that they go with.
+
+use crate::{GyroConfig, MAX_SAMPLES, Sample, interval_of};
+
+/// A sample that is so much later than the last scan is of a clock that has jumped, ns.
+const MAX_AHEAD_NS: i64 = 10_000_000_000;
+
+/// Samples that have arrived, in the order of their stamps. Which of them go with a scan is decided
+/// by their stamps; when they arrived decides only whether they are late.
+#[derive(Clone, Debug, Default)]
+pub struct LiveSamples {
+    config: GyroConfig,
+    samples: Vec<Sample>,
+    /// The end of the last scan, ns.
+    handed_until_ns: Option<i64>,
+    left_out: usize,
+}
+
+impl LiveSamples {
+    /// Creates an empty queue.
+    pub fn new(config: &GyroConfig) -> Self {
+        Self {
+            config: config.clone(),
+            ..Self::default()
+        }
+    }
+
+    /// Takes a sample as its sensor sends it: in its own axes, on its own clock. One that cannot be
+    /// used is left out, and counted: no number, a rate beyond any gyro, a stamp that there was
+    /// already, one of a scan that is gone, or one far ahead of the radar's.
+    pub fn add(&mut self, sample: &Sample) {
+        let sample = self.config.on_radar(sample);
+        let place = self
+            .samples
+            .partition_point(|it| it.stamp_ns < sample.stamp_ns);
+        let is_repeated = self
+            .samples
+            .get(place)
+            .is_some_and(|it| it.stamp_ns == sample.stamp_ns);
+        let is_of_now = self.handed_until_ns.is_none_or(|until_ns| {
+            let after = sample.stamp_ns.saturating_sub(until_ns);
+            (1..=MAX_AHEAD_NS).contains(&after)
+        });
+        if is_repeated || !is_of_now || !sample.is_valid() {
+            self.left_out += 1;
+            return;
+        }
+        self.samples.insert(place, sample);
+        // Before the first scan nothing takes them.
+        if self.samples.len() > 2 * MAX_SAMPLES {
+            self.samples.remove(0);
+        }
+    }
+
+    /// Returns whether no sample of a scan that ends then can be missing, unless samples overtake
+    /// each other.
+    pub fn cover(&self, until_ns: i64) -> bool {
+        let last = self.samples.last();
+        last.is_some_and(|last| last.stamp_ns >= until_ns)
+    }
+
+    /// Returns the samples that come with a scan, from the times of its first and its last azimuth
+    /// ([`interval_of`]), and the number of samples that were left out since the scan before.
+    pub fn of_scan(&mut self, span_ns: [i64; 2]) -> (&[Sample], usize) {
+        let [after_ns, until_ns] = interval_of(span_ns);
+        self.samples.retain(|sample| sample.stamp_ns > after_ns);
+        self.handed_until_ns = Some(until_ns);
+        let end = self
+            .samples
+            .partition_point(|sample| sample.stamp_ns <= until_ns);
+        let left_out = std::mem::take(&mut self.left_out);
+        (&self.samples[..end], left_out)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const MS: i64 = 1_000_000;
+
+    fn stamps(samples: &[Sample]) -> Vec<i64> {
+        samples.iter().map(|it| it.stamp_ns / MS).collect()
+    }
+
+    proptest! {
+        /// Whatever the order of arrival, each scan has the samples of its interval.
+        #[test]
+        fn stamps_alone_decide(order in Just((1..=50i64).collect::<Vec<_>>()).prop_shuffle()) {
+            let mut live = LiveSamples::new(&GyroConfig::default());
+            order.iter().for_each(|ms| live.add(&Sample::yaw_rate(10 * ms * MS, 0.1)));
+            for sweep in [[5 * MS, 255 * MS], [255 * MS, 505 * MS]] {
+                let [after, until] = interval_of(sweep).map(|ns| ns / MS);
+                let expected: Vec<i64> = (1..=50).map(|ms| 10 * ms).collect();
+                let is_in = |ms: &i64| after < *ms && *ms <= until;
+                let expected: Vec<i64> = expected.into_iter().filter(is_in).collect();
+                let (samples, left_out) = live.of_scan(sweep);
+                prop_assert_eq!((stamps(samples), left_out), (expected, 0));
+            }
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_used_is_left_out_and_counted() {
+        let mut live = LiveSamples::new(&GyroConfig::default());
+        live.of_scan([0, 100 * MS]);
+        for (stamp_ns, rate) in [
+            (100 * MS, 0.1),    // of the scan that is gone
+            (20_000 * MS, 0.1), // of a clock that has jumped
+            (110 * MS, f64::NAN),
+            (110 * MS, 57.0),
+            (120 * MS, 0.1),
+            (120 * MS, 0.2), // repeated
+            (115 * MS, 0.1), // overtaken, and in time
+        ] {
+            live.add(&Sample::yaw_rate(stamp_ns, rate));
+        }
+        assert!(live.cover(120 * MS) && !live.cover(121 * MS));
+        let (samples, left_out) = live.of_scan([100 * MS, 200 * MS]);
+        assert_eq!((stamps(samples), left_out), (vec![115, 120], 5));
+        assert_eq!(live.of_scan([500 * MS, 600 * MS]).1, 0);
+    }
+
+    #[test]
+    fn samples_are_put_on_the_radars_clock_and_axes() {
+        let mut live = LiveSamples::new(&GyroConfig {
+            late_s: 0.1,
+            up: crate::UpAxis::MinusZ,
+            ..GyroConfig::default()
+        });
+        live.add(&Sample::yaw_rate(200 * MS, -0.5));
+        let (samples, _) = live.of_scan([0, 100 * MS]);
+        assert_eq!(samples, [Sample::yaw_rate(100 * MS, 0.5)]);
+    }
+}

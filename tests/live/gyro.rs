@@ -1,0 +1,110 @@
+//! A live radar with a live gyro, whose samples arrive in datagrams.
+
+use std::{
+    fs,
+    net::UdpSocket,
+    path::{Path, PathBuf},
+    process,
+    thread::{self, JoinHandle},
+    time::Duration,
+};
+
+use gyre_simulator::{GyroProfile, SimulationConfig};
+use tempfile::TempDir;
+
+use super::radar::Radar;
+use crate::{
+    common::{Run, recording},
+    observers::record::{file, recorded, replay},
+};
+
+const SCANS: usize = 12;
+
+/// A recording with the log of a gyro, all rows of which are measured: a radar sends no others.
+fn with_log() -> TempDir {
+    let mut config = SimulationConfig {
+        scans: Some(SCANS),
+        ..SimulationConfig::default()
+    };
+    config.gyro.profile = GyroProfile::Asm330lhh;
+    let drive = recording::of("live-gyro", &config);
+    let whole = recording::linked(&drive, |_| true);
+    for image in recording::images(whole.path()) {
+        recording::complete(&image);
+    }
+    whole
+}
+
+/// A gyro that sends what a log holds once somebody receives it, in datagrams of ten samples.
+fn sending(log: PathBuf, address: String) -> JoinHandle<()> {
+    thread::spawn(move || {
+        let text = fs::read_to_string(log).unwrap();
+        let lines: Vec<&str> = text.lines().skip(1).collect();
+        while UdpSocket::bind(&address).is_ok() {
+            thread::sleep(Duration::from_millis(5));
+        }
+        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+        for datagram in lines.chunks(10) {
+            socket
+                .send_to(datagram.join("\n").as_bytes(), &address)
+                .unwrap();
+        }
+        socket.send_to(b"no sample", &address).unwrap();
+    })
+}
+
+fn address(test: u32) -> String {
+    format!(
+        "127.0.0.1:{}",
+        40_000 + test * 4_000 + process::id() % 4_000
+    )
+}
+
+fn recorded_with_log(recording: &Path) -> String {
+    Run::small()
+        .data(recording)
+        .set("gyro.kind=auto")
+        .complete()
+}
+
+#[test]
+fn a_live_gyro_gives_the_motions_of_its_log_and_its_recording_replays_to_them() {
+    let whole = with_log();
+    let expected = recorded_with_log(whole.path());
+    let alone = Run::small().data(whole.path()).complete();
+    assert_ne!(expected, alone);
+    let address = address(0);
+    let radar = Radar::playing(whole.path(), &[]);
+    let run = recorded(&radar.run(SCANS))
+        .set("gyro.kind=udp")
+        .set(&format!("gyro.listen='{address}'"))
+        .set("run.window=32");
+    let gyro = sending(whole.path().join("imu.csv"), address);
+    let live = run.complete();
+    gyro.join().unwrap();
+    assert_eq!(run.summary()["dropped"], 0);
+    assert_eq!(run.summary()["gyro"]["motions"], SCANS - 1);
+    assert!(live == expected, "{live}\n{expected}");
+    assert_eq!(replay(&file(&run), &[]), expected);
+}
+
+#[test]
+fn a_live_gyro_that_is_silent_leaves_the_radar_alone() {
+    let whole = with_log();
+    let radar = Radar::playing(whole.path(), &[]);
+    let run = radar
+        .run(SCANS)
+        .set("gyro.kind=udp")
+        .set(&format!("gyro.listen='{}'", address(1)));
+    let live = run.complete();
+    assert!(live == Run::small().data(whole.path()).complete(), "{live}");
+    assert!(run.summary().get("gyro").is_none());
+}
+
+#[test]
+fn a_log_beside_a_live_radar_is_refused() {
+    let radar = Radar::playing(recording::small(), &[]);
+    let run = radar.run(SCANS).set("gyro.kind=auto");
+    run.finish()
+        .refused_with(&["gyro.kind", "the radar is live", "`udp`"]);
+}
