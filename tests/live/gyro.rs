@@ -18,10 +18,10 @@ use crate::{
     observers::record::{file, recorded, replay},
 };
 
-const SCANS: usize = 12;
+pub const SCANS: usize = 12;
 
 /// A recording with the log of a gyro, all rows of which are measured: a radar sends no others.
-fn with_log() -> TempDir {
+pub fn with_log() -> TempDir {
     let mut config = SimulationConfig {
         scans: Some(SCANS),
         ..SimulationConfig::default()

@@ -1,6 +1,6 @@
 //! Live runs: a radar does not wait.
 
-mod gyro;
+pub mod gyro;
 mod load;
 pub mod radar;
 mod radar_faults;

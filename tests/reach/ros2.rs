@@ -39,7 +39,7 @@ pub(crate) fn can_speak() -> bool {
 /// A domain that only this test of this process uses. Those above 101 share their ports with other
 /// programs.
 pub(crate) fn domain(test: u32) -> String {
-    (1 + (process::id() % 11) * 9 + test).to_string()
+    (1 + (process::id() % 10) * 10 + test).to_string()
 }
 
 /// A program that says lines. Dropped, it is killed.

@@ -9,6 +9,7 @@ use std::{
 
 use crate::{
     common::{Run, gyre, odometry, recording, recording::with_constants},
+    live::gyro::{SCANS, with_log},
     reach::ros2::{Program, can_speak, domain},
 };
 
@@ -25,6 +26,17 @@ struct Driver {
 
 impl Driver {
     fn playing(recording: &Path, domain: &str, publishes: &str, options: &[&str]) -> Self {
+        Self::with_log(recording, domain, publishes, options, None)
+    }
+
+    /// One beside which a gyro publishes what its log holds.
+    fn with_log(
+        recording: &Path,
+        domain: &str,
+        publishes: &str,
+        options: &[&str],
+        log: Option<&Path>,
+    ) -> Self {
         let mut command = gyre();
         command.args(["radar-server", "--listen", "127.0.0.1:0", "--data"]);
         let mut server = command
@@ -39,7 +51,9 @@ impl Driver {
             .read_line(&mut said)
             .unwrap();
         let address = said.trim().rsplit(' ').next().unwrap();
-        let driver = Program::peer("driver.py", &[domain, address, publishes]);
+        let mut arguments = vec![domain, address, publishes];
+        arguments.extend(log.and_then(Path::to_str));
+        let driver = Program::peer("driver.py", &arguments);
         Self {
             server,
             _driver: driver,
@@ -124,6 +138,29 @@ fn assert_configuration_is_found(publishes: &str, topic: &str, domain: String) {
     odometry::assert_unbroken(&motions);
     let log = run.result("log.jsonl");
     assert!(log.contains("it was found from azimuths"), "{log}");
+}
+
+#[test]
+fn a_gyro_beside_the_driver_is_used() {
+    if !can_speak() {
+        return;
+    }
+    let whole = with_log();
+    let log = whole.path().join("imu.csv");
+    let domain = domain(9);
+    let _driver = Driver::with_log(whole.path(), &domain, "configured", &[], Some(&log));
+    let run = receiving(with_constants(Run::small()), &domain, FFT_DATA, SCANS);
+    let run = run.set("gyro.kind=ros2").set("gyro.max_wait_ms=200");
+    let live = run.complete();
+    let used = run.summary()["gyro"]["motions"].as_u64().unwrap_or(0) as usize;
+    assert!(
+        used > SCANS / 2,
+        "{used}: samples are sent once, and may be lost"
+    );
+    if used == SCANS - 1 {
+        let recorded = Run::small().data(whole.path()).set("gyro.kind=auto");
+        assert!(live == recorded.complete(), "{live}");
+    }
 }
 
 #[test]

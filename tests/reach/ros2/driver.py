@@ -2,7 +2,8 @@
 
 Arguments: the domain, the address of the radar, and what is published: azimuths and the configuration (`configured`), azimuths alone (`silent`), both
 with numbers as bytes, as until 2024 (`older`), turns and the configuration (`turns`), or turns alone (`silent-turns`). The radar is asked for azimuths
-once somebody subscribes to them, who has a second for the configuration.
+once somebody subscribes to them, who has a second for the configuration. A fourth argument is the log of a gyro, which is
+published beside the azimuths by its stamps.
 """
 
 import os
@@ -17,7 +18,8 @@ from cyclonedds.pub import DataWriter
 SIGNATURE = bytes.fromhex("000103030707 0f0f1f1f3f3f7f7ffefe".replace(" ", ""))
 CONFIGURATION, REQUEST_CONFIGURATION, START, AZIMUTH = 10, 20, 21, 30
 
-domain, address, publishes = int(sys.argv[1]), *sys.argv[2:]
+domain, address, publishes = int(sys.argv[1]), *sys.argv[2:4]
+log = [line.split(",") for line in open(sys.argv[4]).read().splitlines()[1:]] if len(sys.argv) > 4 else []
 is_silent, in_turns = publishes.startswith("silent"), publishes.endswith("turns")
 AZIMUTHS, CONFIGURATIONS = {
     "turns": (ros.RadarBScanMsg, ros.RadarConfigurationMsg),
@@ -29,6 +31,7 @@ participant, kept = ros.join(domain)
 name = "radar_data/b_scan_msg" if in_turns else "radar_data/fft_data"
 scans = DataWriter(participant, ros.topic(participant, name, AZIMUTHS, depth=400), qos=ros.qos(400))
 configurations = DataWriter(participant, ros.topic(participant, "radar_data/configuration_data", CONFIGURATIONS, depth=1), qos=ros.qos(1))
+gyro = DataWriter(participant, ros.topic(participant, "imu/data", ros.Imu, depth=100), qos=ros.best_effort(100)) if log else None
 host, port = address.split(":")
 radar = socket.create_connection((host, int(port)))
 stream = radar.makefile("rb")
@@ -89,6 +92,15 @@ class Turn:
         scans.write(ros.RadarBScanMsg(image, self.encoders, self.stamps))
 
 
+def measure(until_ns):
+    while log and int(log[0][0]) <= until_ns:
+        stamp, *values = log.pop(0)
+        stamp, values = int(stamp), [float(value) for value in values]
+        header = ros.Header(ros.Time(stamp // 10**9, stamp % 10**9), "imu")
+        turn, along = ros.Vector3(*values[:3]), ros.Vector3(*values[3:])
+        gyro.write(ros.Imu(header, ros.Quaternion(0.0, 0.0, 0.0, 1.0), [0.0] * 9, turn, [0.0] * 9, along, [0.0] * 9))
+
+
 print("ready", flush=True)
 while not scans.get_matched_subscriptions():
     configure()
@@ -105,6 +117,8 @@ while True:
     first, counter, azimuth = struct.unpack(">3H", payload[:6])
     seconds, split = struct.unpack("<2I", payload[6:14])
     powers = payload[first:]
+    # It is a little ahead of the radar, so that no scan waits.
+    measure(seconds * 10**9 + split + 30_000_000)
     if in_turns:
         if azimuth <= last:
             turn.publish()

@@ -84,6 +84,17 @@ class Odometry(IdlStruct, typename="nav_msgs.msg.dds_.Odometry_"):
 
 
 @dataclass
+class Imu(IdlStruct, typename="sensor_msgs.msg.dds_.Imu_"):
+    header: Header
+    orientation: Quaternion
+    orientation_covariance: array[float64, 9]
+    angular_velocity: Vector3
+    angular_velocity_covariance: array[float64, 9]
+    linear_acceleration: Vector3
+    linear_acceleration_covariance: array[float64, 9]
+
+
+@dataclass
 class Transform(IdlStruct, typename="geometry_msgs.msg.dds_.Transform_"):
     translation: Vector3
     rotation: Quaternion
@@ -216,6 +227,16 @@ def qos(depth=100, latched=False):
     return Qos(
         Policy.Reliability.Reliable(duration(seconds=10)),
         Policy.Durability.TransientLocal if latched else Policy.Durability.Volatile,
+        Policy.History.KeepLast(depth),
+        Policy.DataRepresentation(use_cdrv0_representation=True),
+    )
+
+
+def best_effort(depth=100):
+    """As drivers of sensors publish."""
+    return Qos(
+        Policy.Reliability.BestEffort,
+        Policy.Durability.Volatile,
         Policy.History.KeepLast(depth),
         Policy.DataRepresentation(use_cdrv0_representation=True),
     )

@@ -163,6 +163,22 @@ impl Node {
         subscription.map_err(|error| topic_error(topic, &error))
     }
 
+    /// Subscribes to a topic of which messages may be lost, as drivers publish what a sensor
+    /// measures, with room for so many messages that are not yet taken.
+    ///
+    /// # Errors
+    /// The name of the topic is none.
+    pub fn subscribe_to_sensor<M: Ros2Message + 'static>(
+        &mut self,
+        topic: &str,
+        depth: usize,
+    ) -> Result<Subscription<M>, NodeError> {
+        let qos = Keep::Last(depth).qos().reliability(Reliability::BestEffort);
+        let opened = self.open::<M>(topic, &qos)?;
+        let subscription = self.node.create_subscription(&opened, None);
+        subscription.map_err(|error| topic_error(topic, &error))
+    }
+
     /// Returns the type on DDS of a topic by its name on DDS; `None` while there is no publisher.
     pub fn type_of(&self, dds_name: &str) -> Option<String> {
         let participant = self.context.domain_participant();

@@ -14,10 +14,14 @@ use gyre_live_radar::{encoder_counts, silence};
 use gyre_radar::DatasetOptions;
 use gyre_ros2_messages::{Domain, DomainError};
 use gyre_run::SourceConfig;
+use gyre_samples::{GyroConfig, GyroKind};
 use gyre_stage::{Launch, StageCounters, StageError, source};
 
 pub use ask::{AskError, ask};
 pub use gyre_live_radar::Sizes;
+
+/// The topic of an inertial sensor by REP-145.
+const IMU: &str = "/imu/data";
 
 /// The topics of a driver, and the properties of its radar that it does not publish.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,6 +30,8 @@ pub struct Settings {
     pub domain: Domain,
     /// The topic of the azimuths, such as `/radar_data/fft_data`. The configuration is beside it.
     pub topic: String,
+    /// The topic of an inertial sensor, if there is one.
+    pub gyro_topic: Option<String>,
     /// Encoder counts per turn of a radar whose driver does not publish its configuration.
     pub encoder_counts: u16,
     /// Time without a message after which that is reported.
@@ -47,6 +53,7 @@ impl Settings {
         Ok(Self {
             domain: Domain::new(source.domain, interface)?,
             topic: source.topic.clone(),
+            gyro_topic: None,
             encoder_counts: encoder_counts(options),
             silence: silence(source),
             scans: source.scans.map(|scans| scans as u64),
@@ -68,7 +75,10 @@ impl Settings {
 /// # Errors
 /// A domain that cannot be joined, a radar whose scans are larger than at the start of the run, or
 /// a failure of the transport.
-pub fn run(launch: &Launch, settings: Settings) -> Result<StageCounters, StageError> {
+pub fn run(launch: &Launch, mut settings: Settings) -> Result<StageCounters, StageError> {
+    let gyro: GyroConfig = launch.section("gyro")?;
+    let topic = gyro.topic.unwrap_or_else(|| IMU.to_owned());
+    settings.gyro_topic = (gyro.kind == GyroKind::Ros2).then_some(topic);
     let scans = settings.scans;
     let radar = radar::Radar::open(settings).map_err(|error| StageError::Input(error.to_string()));
     source::run_sensor(launch, &mut radar?, scans)

@@ -3,12 +3,9 @@
 use std::{collections::BTreeSet, path::Path};
 
 use gyre_ros2_messages::{decode, sensor_msgs::Imu};
-use gyre_samples::{Sample, SampleKind};
+use gyre_samples::Sample;
 
 use crate::{BagError, bag::Bag, reading::Message};
-
-/// The first element of a covariance where nothing is measured.
-const NOT_MEASURED: f64 = -1.0;
 
 /// Reads all samples on the topic of this name, else on the only topic of the type; in the gyro's
 /// own axes and on the clock of its driver, in the order of the bag. `None` without such a topic.
@@ -75,21 +72,8 @@ fn choose(bag: &Bag, path: &Path, wished: Option<&str>) -> Result<Option<String>
     }
 }
 
-/// Returns a message as a sample. A stamp of zero, of a driver that sets none, is the time of
-/// receipt.
 fn sample(message: &Message) -> Result<Sample, String> {
     let imu: Imu = decode(&message.data).map_err(|error| error.to_string())?;
-    if imu.angular_velocity_covariance[0] == NOT_MEASURED {
-        return Err("they say that they have no angular velocity".to_owned());
-    }
-    let (turn, along) = (imu.angular_velocity, imu.linear_acceleration);
-    Ok(Sample {
-        stamp_ns: match imu.header.stamp.ns() {
-            0 => message.log_ns,
-            stamp_ns => stamp_ns,
-        },
-        kind: SampleKind::Gyro as u32,
-        reserved: 0,
-        values: [turn.x, turn.y, turn.z, along.x, along.y, along.z],
-    })
+    let sample = imu.sample(message.log_ns);
+    sample.ok_or_else(|| "they say that they have no angular velocity".to_owned())
 }

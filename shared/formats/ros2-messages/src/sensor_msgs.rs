@@ -1,5 +1,6 @@
 //! `sensor_msgs`: images, and what an inertial sensor measures.
 
+use gyre_samples::{Sample, SampleKind};
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -62,3 +63,25 @@ message!(
      geometry_msgs/Vector3 linear_acceleration\nfloat64[9] linear_acceleration_covariance\n",
     [Header, Quaternion, Vector3]
 );
+
+/// The first element of a covariance where nothing is measured.
+const NOT_MEASURED: f64 = -1.0;
+
+impl Imu {
+    /// Returns the rates and accelerations as a sample, in the sensor's own axes and on its own
+    /// clock; `None` if it measures no rates. The time of receipt, ns since 1970, stands for the
+    /// stamp of a driver that sets none.
+    pub fn sample(&self, received_ns: i64) -> Option<Sample> {
+        let (turn, along) = (self.angular_velocity, self.linear_acceleration);
+        let sample = Sample {
+            stamp_ns: match self.header.stamp.ns() {
+                0 => received_ns,
+                stamp_ns => stamp_ns,
+            },
+            kind: SampleKind::Gyro as u32,
+            reserved: 0,
+            values: [turn.x, turn.y, turn.z, along.x, along.y, along.z],
+        };
+        (self.angular_velocity_covariance[0] != NOT_MEASURED).then_some(sample)
+    }
+}

@@ -19,7 +19,7 @@ pub struct GyroConfig {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
     /// The topic of the samples in ROS 2, of the type `sensor_msgs/msg/Imu`. Default: the only one
-    /// of a bag.
+    /// of a bag; `/imu/data` of a live radar.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub topic: Option<String>,
     /// The address and port at which datagrams of a live gyro are received: lines of a stamp (ns since

@@ -89,7 +89,7 @@ pub struct MaskedHeader {
     /// Mean variance of the rows' azimuths, rad²: not zero where azimuths were lost at places that
     /// are not known.
     pub azimuth_variance_rad2: f32,
-    /// What the gyro says of the turn since the previous scan: see [`MaskedHeader::turn`].
+    /// The turn since the previous scan by the gyro: see [`MaskedHeader::turn`].
     pub gyro: GyroTurn,
     /// 1 if it says so.
     pub has_gyro: u64,

@@ -7,8 +7,10 @@ use gyre_ros2_messages::{
     BadMessage, Definition, Ros2Message,
     messages::{RadarConfigurationMessage, RadarFftDataMessage},
     navtech_msgs::{RadarBScanMsg, RadarConfigurationMsg, RadarFftDataMsg},
+    sensor_msgs::Imu,
     std_msgs::Header,
 };
+use gyre_samples::Sample;
 use gyre_stage::clock;
 use ros2_client::{Gid, ReadError, Subscription};
 use thiserror::Error;
@@ -20,6 +22,8 @@ use crate::{NodeError, node::Node};
 const NODE: &str = "gyre_source";
 /// Azimuths that are kept until they are taken: ten turns. The driver keeps one turn.
 const AZIMUTHS: usize = 4_000;
+/// Samples of a gyro that are kept: ten seconds of 400 a second.
+const SAMPLES: usize = 4_000;
 /// Turns, and configurations, that are kept.
 const TURNS: usize = 10;
 
@@ -132,6 +136,8 @@ pub struct Driver {
     /// Of a driver before 2024.
     older: Subscription<RadarConfigurationMessage>,
     azimuths: Option<Azimuths>,
+    /// What an inertial sensor measures. Azimuths wake often enough for it.
+    gyro: Option<Subscription<Imu>>,
 }
 
 /// The radar's description of itself.
@@ -156,6 +162,8 @@ impl Driver {
         let mut older = node.subscribe(&topic, TURNS)?;
         wakeups.add(&mut configurations)?;
         wakeups.add(&mut older)?;
+        let gyro = settings.gyro_topic.as_ref();
+        let gyro = gyro.map(|topic| node.subscribe_to_sensor(topic, SAMPLES));
         Ok(Self {
             topic: settings.topic.clone(),
             dds_name: node.dds_name(&settings.topic)?,
@@ -165,6 +173,7 @@ impl Driver {
             configurations,
             older,
             azimuths: None,
+            gyro: gyro.transpose()?,
         })
     }
 
@@ -248,6 +257,24 @@ impl Driver {
     /// Returns whether configurations are published in this form.
     fn is_described_as(&self, form: &Definition) -> bool {
         self.node.type_of(&self.configuration_dds_name) == Some(form.dds_name())
+    }
+
+    /// Takes the next sample of the gyro. Messages that cannot be read, or have no rates, are passed
+    /// over.
+    pub fn gyro_sample(&self) -> Option<Sample> {
+        let gyro = self.gyro.as_ref()?;
+        loop {
+            match gyro.take() {
+                Ok(None) => return None,
+                Ok(Some((imu, _))) => {
+                    let sample = imu.sample(clock::since_1970_ns());
+                    if sample.is_some() {
+                        return sample;
+                    }
+                }
+                Err(_) => {}
+            }
+        }
     }
 
     /// Takes the next message with azimuths.
