@@ -35,7 +35,7 @@ pub fn open(
     config: Option<&Bound<'_, Config>>,
 ) -> PyResult<Dataset> {
     let method = Config::method(config);
-    let options = config.map(|_| method.dataset.clone());
+    let options = config.map(|_| method.dataset);
     let opened = py.detach(|| -> PyResult<Opened> {
         let options = match options {
             Some(options) => options,

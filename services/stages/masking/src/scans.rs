@@ -27,8 +27,8 @@ pub struct Scans {
 }
 
 enum Queue {
-    Lossless(InOrder),
-    Live(NewestOnly),
+    Lossless(Box<InOrder>),
+    Live(Box<NewestOnly>),
 }
 
 /// A scan to mask.
@@ -62,8 +62,8 @@ impl Inputs for Scans {
     fn open(launch: &Launch) -> Result<Self, StageError> {
         let motions = Motions::open(launch)?;
         let queue = match launch.manifest.live {
-            false => Queue::Lossless(InOrder::open(launch)?),
-            true => Queue::Live(NewestOnly::open(launch)?),
+            false => Queue::Lossless(Box::new(InOrder::open(launch)?)),
+            true => Queue::Live(Box::new(NewestOnly::open(launch)?)),
         };
         Ok(Self {
             queue,

@@ -12,7 +12,7 @@ const STATE_WORDS: usize = 1 + 3 + TRACKER_WORDS;
 const NAME_WORDS: usize = 2;
 const TRACKER_WORDS: usize = HEADING + HEADING_WORDS;
 const STANDSTILL_WORDS: usize = 4 + 4 + 4;
-/// Whether there is one, bias, lean, covariance.
+/// A word that says whether there is one; bias, lean, covariance.
 const HEADING_WORDS: usize = 1 + 1 + 1 + 9;
 const ANCHOR_WORDS: usize = 9;
 /// Where the means and counts of a tracker state begin, its standstill, and its heading.
