@@ -344,7 +344,7 @@ mod tests {
         assert_eq!((header.samples, header.samples_left_out), (2, 5));
         assert_eq!(header.samples(bytes), Some(&samples[..2]));
         assert_eq!(
-            header.read_samples(&bytes.to_vec()),
+            header.read_samples(bytes),
             Some(samples[..2].to_vec())
         );
         assert_eq!(Scan::content_bytes(&header), Some(192));
