@@ -291,3 +291,20 @@ fn datagrams_of_others_are_passed_over_and_counted() {
     assert!(count(&summary, "foreign_messages") > 100);
     assert!(run.result("log.jsonl").contains("give each radar a group"));
 }
+
+#[test]
+fn a_radar_that_is_silent_is_waited_for_by_name_until_it_sends_again() {
+    let mut radar = Radar::playing(recording::small(), &["--rate", "4"]);
+    let run = run_at(&radar.address);
+    let mut running = run.start();
+    radar.played();
+    running.await_words(&format!(
+        "waiting for the radar at {}: no scan for 3 s",
+        radar.address
+    ));
+    running.await_words("no scan for 6 s");
+    let again = Radar::to(&["--listen", &radar.address], recording::small(), &[]);
+    running.await_words(&format!("the radar at {} sends, after ", again.address));
+    running.signal(Signal::INT);
+    running.finish();
+}

@@ -260,6 +260,27 @@ fn what_cannot_be_loaded_or_returned_is_said() {
 }
 
 #[test]
+fn an_interpreter_that_is_none_is_tried_once() {
+    let (_folder, file) = file("def mask(scan):\n    return scan.power > 0\n");
+    for (python, sentence) in [
+        ("/bin/false", "/bin/false has ended before it had loaded"),
+        ("/no/such/python", "cannot start /no/such/python for"),
+    ] {
+        let run = with(Run::of_recording(), "masking", &file);
+        let mut command = run.command();
+        command.env("GYRE_PYTHON", python);
+        let ended = run.start_as(command).finish();
+        ended.failed_with(&[sentence, "GYRE_PYTHON"]);
+        assert_eq!(
+            ended.stderr.matches("masking died").count(),
+            1,
+            "{}",
+            ended.stderr
+        );
+    }
+}
+
+#[test]
 fn killed_it_leaves_no_interpreter_and_no_other_byte() {
     if !can_start() {
         return;

@@ -1,5 +1,7 @@
 //! The progress of a run: a bar on a terminal, plain lines elsewhere.
 
+mod silence;
+
 use std::{
     fmt::Display,
     io::IsTerminal,
@@ -7,10 +9,12 @@ use std::{
 };
 
 use gyre_messages::{FollowerId, Item, PoseHeader};
-use gyre_stage::{clock, follower::Progress as Following};
+use gyre_stage::{Manifest, clock, follower::Progress as Following, source::received_of};
 use gyre_supervise::Event;
 use gyre_terminal::{WIDTH, print, wrap};
 use indicatif::{ProgressBar, ProgressStyle};
+
+use silence::Silence;
 
 /// Time between two plain lines.
 const EVERY: Duration = Duration::from_secs(2);
@@ -23,6 +27,8 @@ pub struct Progress {
     done: u64,
     since: Option<(Instant, u64)>,
     last_line: Instant,
+    /// Of a live run, until it ends.
+    radar: Option<(Silence, Manifest)>,
 }
 
 impl Progress {
@@ -45,12 +51,18 @@ impl Progress {
             done: resumed as u64,
             since: None,
             last_line: Instant::now(),
+            radar: None,
         };
         progress.say(&footprint.to_string());
         if resumed > 0 {
             progress.say(&format!("resuming after {resumed} scans"));
         }
         progress
+    }
+
+    /// Reports from now on when the radar of a live run is silent; `radar` is its name.
+    pub fn watch_radar(&mut self, radar: String, manifest: Manifest) {
+        self.radar = Some((Silence::new(radar, clock::now_ns()), manifest));
     }
 
     /// Shows an event.
@@ -72,7 +84,10 @@ impl Progress {
             }
             Event::Recorder { sentence } => self.say(sentence),
             Event::Stalled(stall) => self.say(&stall.to_string()),
-            Event::Following { follower, progress } => self.following(follower, *progress),
+            Event::Following { follower, progress } => {
+                self.radar = None;
+                self.following(follower, *progress);
+            }
             Event::Swapped { stage, command } => {
                 self.say(&format!("{stage} is `{}` from here on", command.join(" ")));
             }
@@ -81,7 +96,9 @@ impl Progress {
                     "{stage} goes back to the program before: {reason}"
                 ));
             }
-            Event::Ready | Event::Watched | Event::Stopping => {}
+            Event::Watched => self.silence(),
+            Event::Stopping => self.radar = None,
+            Event::Ready => {}
         }
     }
 
@@ -104,6 +121,26 @@ impl Progress {
                 print::note(format_args!("{}{} scans  {message}", self.done, self.of));
             }
             None => {}
+        }
+    }
+
+    /// Says how long the radar of a live run has been silent.
+    fn silence(&mut self) {
+        let Some((silence, manifest)) = &mut self.radar else {
+            return;
+        };
+        // The source has not begun yet.
+        let Some(received) = received_of(manifest) else {
+            return;
+        };
+        let Some(report) = silence.update(&received, clock::now_ns()) else {
+            return;
+        };
+        if report.is_new {
+            self.say(&report.sentence);
+        }
+        if let Some(bar) = &self.bar {
+            bar.set_message(report.sentence);
         }
     }
 

@@ -200,6 +200,9 @@ fn play(
     resolved.link.describe().iter().for_each(print::note);
     let resumed = unfinished.map_or(0, |begun| begun.poses as usize);
     let mut progress = Progress::new(checked.scans, resumed, &checked.footprint);
+    if resolved.is_radar() {
+        progress.watch_radar(resolved.data(), plan.manifest.clone());
+    }
     let mut notifier = Notifier::of_environment();
     let started = Instant::now();
     let report = supervise(&plan, signals, &mut |event| {

@@ -43,6 +43,7 @@ pub fn doctor(
         system::core_files(),
         memory::results(&arguments.out),
         system::onnx_runtime(),
+        system::python(),
     ];
     findings.iter().try_for_each(print::values)?;
     let bad = findings.iter().filter(|found| found.state == State::Bad);

@@ -1,8 +1,9 @@
-//! Kernel, processors, clock, limits of the process, ONNX Runtime.
+//! Kernel, processors, clock, limits of the process, ONNX Runtime, Python.
 
 use std::{collections::BTreeSet, fs};
 
 use gyre_masking::runtime::{self, RuntimeError};
+use gyre_python_function::Interpreter;
 use gyre_results::machine::Machine;
 use gyre_run::MOST_OPEN_FILES;
 use rustix::process::{Resource, getrlimit};
@@ -152,6 +153,32 @@ pub fn onnx_runtime() -> Finding {
                 _ => "cannot be used: no learned masks, unless masking.backend is `rten`",
             };
             Finding::good("ONNX Runtime", found).limited(error.to_string())
+        }
+    }
+}
+
+/// The interpreter of stages that are functions of Python.
+pub fn python() -> Finding {
+    let without = "no stage can be a function of Python";
+    let found = match Interpreter::find() {
+        Ok(found) => found,
+        Err(error) => {
+            return Finding::good("Python", format!("none: {without}")).limited(error.to_string());
+        }
+    };
+    let Interpreter {
+        executable,
+        version: [major, minor, micro],
+        numpy,
+    } = found;
+    let python = format!("{executable}, {major}.{minor}.{micro}");
+    match numpy {
+        Some(numpy) => Finding::good("Python", format!("{python}, with numpy {numpy}")),
+        None => {
+            Finding::good("Python", format!("{python}, without numpy: {without}")).limited(format!(
+                "install it there: `{executable} -m pip install numpy`, or python3-numpy for the \
+                 system's own; or name another Python with GYRE_PYTHON"
+            ))
         }
     }
 }

@@ -73,7 +73,8 @@ struct Figures<'a> {
 /// Localises the scans of a recording in a map, and writes `fixes.csv`.
 ///
 /// # Errors
-/// A map or a recording that cannot be used, a file that cannot be written.
+/// A map or a recording that cannot be used, a file that cannot be written. When all is written: no
+/// scan was found.
 pub fn localise(arguments: &LocaliseArguments) -> Result<ExitCode, Failure> {
     let configuration = arguments.inputs.configuration()?;
     let mut localiser = searched_map::open(&arguments.map, &configuration)?;
@@ -106,12 +107,21 @@ pub fn localise(arguments: &LocaliseArguments) -> Result<ExitCode, Failure> {
     };
     if arguments.json {
         print::line(serde_json::to_string_pretty(&figures)?)?;
-        return Ok(ExitCode::SUCCESS);
+    } else {
+        print::line(counts.summary(figures.left_out))?;
+        let fixes = figures.fixes.display();
+        print::line(format_args!("{ms_a_scan:.1} ms a scan; {fixes}"))?;
     }
-    print::line(counts.summary(figures.left_out))?;
-    let fixes = figures.fixes.display();
-    print::line(format_args!("{ms_a_scan:.1} ms a scan; {fixes}"))?;
-    Ok(ExitCode::SUCCESS)
+    match counts.has_fix() {
+        true => Ok(ExitCode::SUCCESS),
+        false => Err(format!(
+            "no scan of {} was found in {}: it may be of another place, or made with settings for \
+             another radar",
+            configuration.data(),
+            arguments.map.display()
+        )
+        .into()),
+    }
 }
 
 /// The scans with a fix.

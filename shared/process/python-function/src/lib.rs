@@ -5,10 +5,12 @@
 //! array that it returns: a scan of 1.5 MB takes about a millisecond. So any Python will do, its
 //! crash is not the stage's, and no interpreter is linked.
 
+mod interpreter;
+
 use std::{
-    io::{BufRead, BufReader, BufWriter, Read, Write},
+    io::{BufRead, BufReader, BufWriter, ErrorKind, Read, Write},
     path::{Path, PathBuf},
-    process::{Child, ChildStdin, ChildStdout, Command, Stdio},
+    process::{Child, ChildStdin, ChildStdout, Command, ExitStatus, Stdio},
 };
 
 use gyre_stage::StageError;
@@ -16,10 +18,10 @@ use ndarray::{Array2, ArrayViewD};
 use serde_json::{Map, Value, json};
 use thiserror::Error;
 
+pub use interpreter::{Interpreter, NoInterpreter};
+
 /// The program of the interpreter's side.
 const PROGRAM: &str = include_str!("function.py");
-/// The environment variable that names the interpreter.
-const INTERPRETER: &str = "GYRE_PYTHON";
 /// Room in the pipes, bytes: the most that a process may ask for without privileges.
 const PIPE_BYTES: usize = 1 << 20;
 
@@ -41,7 +43,20 @@ pub enum FunctionError {
         /// The system error.
         source: std::io::Error,
     },
-    /// The interpreter has ended while it loaded the file, or in the middle of a call.
+    /// The interpreter has ended by itself before it had loaded the file.
+    #[error(
+        "{python} has ended before it had loaded {file}: {status}; name a Python of version 3 with \
+         GYRE_PYTHON, and see that the file does not end it"
+    )]
+    NotLoaded {
+        /// The interpreter.
+        python: String,
+        /// The file of the function.
+        file: PathBuf,
+        /// The exit code.
+        status: ExitStatus,
+    },
+    /// The interpreter was killed while it loaded the file, or has ended in the middle of a call.
     #[error("Python has ended while it worked for {file}: {status}")]
     Ended {
         /// The file of the function.
@@ -58,15 +73,20 @@ impl From<FunctionError> for StageError {
     /// For a function that is loaded: another attempt helps where a process was killed or not to
     /// be had.
     fn from(error: FunctionError) -> Self {
+        let sentence = error.to_string();
         match error {
-            FunctionError::Missing(_) | FunctionError::Exception(_) => {
-                Self::Configuration(error.to_string())
+            FunctionError::Start { source, .. } if !is_no_program(&source) => {
+                Self::Function(sentence)
             }
-            FunctionError::Start { .. } | FunctionError::Ended { .. } => {
-                Self::Function(error.to_string())
-            }
+            FunctionError::Ended { .. } => Self::Function(sentence),
+            _ => Self::Configuration(sentence),
         }
     }
+}
+
+fn is_no_program(error: &std::io::Error) -> bool {
+    let kinds = [ErrorKind::NotFound, ErrorKind::PermissionDenied];
+    kinds.contains(&error.kind())
 }
 
 /// The name of a function, which stands for what it gets and returns.
@@ -142,7 +162,7 @@ impl Function {
     pub fn load(file: &Path, name: Name) -> Result<Self, FunctionError> {
         let absolute = std::path::absolute(file).ok().filter(|file| file.is_file());
         let file = absolute.ok_or_else(|| FunctionError::Missing(file.to_owned()))?;
-        let python = std::env::var(INTERPRETER).unwrap_or_else(|_| "python3".to_owned());
+        let python = interpreter::name();
         let start = |source| FunctionError::Start {
             python: python.clone(),
             file: file.clone(),
@@ -159,7 +179,7 @@ impl Function {
             .spawn()
             .map_err(start)?;
         let (Some(requests), Some(answers)) = (child.stdin.take(), child.stdout.take()) else {
-            return Err(start(std::io::ErrorKind::BrokenPipe.into()));
+            return Err(start(ErrorKind::BrokenPipe.into()));
         };
         // Smaller ones work too.
         let _ = rustix::pipe::fcntl_setpipe_size(&requests, PIPE_BYTES);
@@ -170,8 +190,18 @@ impl Function {
             requests: BufWriter::new(requests),
             answers: BufReader::with_capacity(PIPE_BYTES, answers),
         };
-        function.answer()?;
-        Ok(function)
+        match (function.answer(), function.python.try_wait()) {
+            (Err(FunctionError::Ended { file, .. }), Ok(Some(status)))
+                if status.code().is_some() =>
+            {
+                Err(FunctionError::NotLoaded {
+                    python,
+                    file,
+                    status,
+                })
+            }
+            (answer, _) => answer.map(|_| function),
+        }
     }
 
     /// Calls the function.

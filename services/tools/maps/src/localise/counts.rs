@@ -61,6 +61,11 @@ impl Counts {
         self.found + self.tracked + self.predicted + self.lost
     }
 
+    /// Returns whether any scan was found.
+    pub fn has_fix(&self) -> bool {
+        self.first_fix.is_some()
+    }
+
     /// Says what was found, lost and left out.
     pub fn summary(&self, left_out: usize) -> String {
         let mut text = match self.first_fix {
@@ -117,7 +122,9 @@ mod tests {
 
     #[test]
     fn a_drive_elsewhere_was_not_found() {
-        let summary = counts(&[Status::Lost; 3]).summary(0);
+        let elsewhere = counts(&[Status::Lost; 3]);
+        assert!(!elsewhere.has_fix());
+        let summary = elsewhere.summary(0);
         assert!(
             summary.starts_with("no scan was found in the map\n0 of 3 scans localised (0.0 %)")
         );

@@ -1,0 +1,79 @@
+//! The interpreter that functions are called in.
+
+use std::{
+    env,
+    process::{Command, Stdio},
+};
+
+use serde::Deserialize;
+use thiserror::Error;
+
+/// The environment variable that names the interpreter.
+const VARIABLE: &str = "GYRE_PYTHON";
+/// The oldest version that the interpreter's side runs in.
+const OLDEST: [u32; 2] = [3, 8];
+/// Prints an [`Interpreter`].
+const PROBE: &str = "
+import json, sys
+try:
+    import numpy
+    version = numpy.__version__
+except ImportError:
+    version = None
+print(json.dumps({'executable': sys.executable, 'version': list(sys.version_info[:3]), 'numpy': version}))
+";
+
+/// An interpreter that starts.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+pub struct Interpreter {
+    /// The path.
+    pub executable: String,
+    /// Major, minor, micro.
+    pub version: [u32; 3],
+    /// The version of numpy; `None`: it cannot be imported.
+    pub numpy: Option<String>,
+}
+
+/// There is none.
+#[derive(Debug, Error)]
+pub enum NoInterpreter {
+    /// It cannot be started.
+    #[error("cannot start {python}: {source}; install Python 3, or name one with GYRE_PYTHON")]
+    Start {
+        /// The name.
+        python: String,
+        /// The system error.
+        source: std::io::Error,
+    },
+    /// It is another program, or too old.
+    #[error("{python} is no Python of version {}.{} or newer: name one with GYRE_PYTHON", OLDEST[0], OLDEST[1])]
+    Other {
+        /// The name.
+        python: String,
+    },
+}
+
+/// Returns what `GYRE_PYTHON` names, or `python3`.
+pub(crate) fn name() -> String {
+    env::var(VARIABLE).unwrap_or_else(|_| "python3".to_owned())
+}
+
+impl Interpreter {
+    /// Starts the interpreter that functions would be called in, and asks what it has.
+    ///
+    /// # Errors
+    /// It cannot be started, or it is no Python in which functions can be called.
+    pub fn find() -> Result<Self, NoInterpreter> {
+        let python = name();
+        let mut command = Command::new(&python);
+        command.args(["-c", PROBE]).stdin(Stdio::null());
+        let output = match command.output() {
+            Ok(output) => output,
+            Err(source) => return Err(NoInterpreter::Start { python, source }),
+        };
+        let found: Option<Self> = serde_json::from_slice(&output.stdout).ok();
+        found
+            .filter(|found| found.version[..2] >= OLDEST[..])
+            .ok_or(NoInterpreter::Other { python })
+    }
+}
