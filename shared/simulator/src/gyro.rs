@@ -17,5 +17,6 @@ pub mod profile;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use attitude::Vehicle;
 pub use config::SimulatedGyroConfig;
 pub use profile::{GyroFigures, GyroProfile};

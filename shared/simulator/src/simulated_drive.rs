@@ -141,7 +141,7 @@ impl SimulatedDrive {
     /// The samples of the gyro, by their stamps: rates and accelerations in its own axes, as
     /// `imu.csv` has them. `None` without a gyro.
     pub fn gyro_samples(&self) -> Option<Vec<Sample>> {
-        log::samples(&self.simulator)
+        self.simulator.gyro_samples()
     }
 
     /// All files beside the images.

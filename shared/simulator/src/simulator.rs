@@ -5,16 +5,18 @@ use std::sync::Arc;
 
 use gyre_geometry::Pose;
 use gyre_radar::{OwnedScan, ScanLimits, ScanSlot, SweepGeometry};
+use gyre_samples::Sample;
 use nalgebra::Point2;
 
 use crate::config::{MAX_SCANS, SimulationConfig};
 use crate::error::SimulatorError;
+use crate::gyro::{Vehicle, log};
 use crate::path::Path;
 use crate::path::recorded::{self, Excerpt};
 use crate::profile::Sampling;
 use crate::relief::Relief;
 use crate::sensor::effects::is_on;
-use crate::sensor::{Scene, Sensor, SweepTime};
+use crate::sensor::{PitchRoll, Scene, Sensor, SweepTime};
 use crate::streets::Streets;
 use crate::town;
 use crate::traffic::Traffic;
@@ -151,6 +153,18 @@ impl Simulator {
     pub fn pose(&self, index: usize) -> Pose {
         let time = self.time(index);
         self.path.pose(time.drive_time_s(time.middle_us()))
+    }
+
+    /// The samples of the gyro, by their stamps: rates and accelerations in its own axes. `None`
+    /// without a gyro.
+    pub fn gyro_samples(&self) -> Option<Vec<Sample>> {
+        let Self { config, .. } = self;
+        let nods = config.effects.elevation;
+        let pitch_roll = nods.then(|| PitchRoll::new(config.sensor_seed()));
+        let vehicle = Vehicle::new(self.path(), self.world.relief(), pitch_roll);
+        let end_s = self.scans as f64 * self.sampling.period_us as f64 * 1e-6;
+        let drive = (EPOCH_US * 1000, end_s);
+        log::samples(&config.gyro, config.gyro_seed(), &vehicle, drive)
     }
 
     /// A new sensor for [`Simulator::render_into`].

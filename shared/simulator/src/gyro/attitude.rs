@@ -7,13 +7,12 @@ use nalgebra::{Point2, UnitQuaternion, Vector2, Vector3};
 use crate::path::Path;
 use crate::relief::Relief;
 use crate::sensor::PitchRoll;
-use crate::simulator::Simulator;
 
 /// Standard gravity, m/s².
 const GRAVITY_MPS2: f64 = 9.806_65;
 
 /// A vehicle on its path: it follows the hills, and pitches and rolls as the radar's beam does.
-pub(super) struct Vehicle<'a> {
+pub(crate) struct Vehicle<'a> {
     path: &'a dyn Path,
     relief: Relief,
     pitch_roll: Option<PitchRoll>,
@@ -29,20 +28,18 @@ pub(super) struct MeanMotion {
 }
 
 impl<'a> Vehicle<'a> {
-    /// The vehicle of a simulation.
-    pub fn new(simulator: &'a Simulator) -> Self {
-        let config = simulator.config();
-        let nods = config.effects.elevation;
+    /// A vehicle whose pitch and roll on its springs are `pitch_roll`, if it has any.
+    pub fn new(path: &'a dyn Path, relief: Relief, pitch_roll: Option<PitchRoll>) -> Self {
         Self {
-            path: simulator.path(),
-            relief: simulator.world().relief(),
-            pitch_roll: nods.then(|| PitchRoll::new(config.sensor_seed())),
+            path,
+            relief,
+            pitch_roll,
         }
     }
 
     /// The mean motion from one time of the drive to another, s. The rates are what turns the
     /// attitude at the first into that at the second, so that no rotation is lost.
-    pub fn mean_motion(&self, [from_s, to_s]: [f64; 2]) -> MeanMotion {
+    pub(super) fn mean_motion(&self, [from_s, to_s]: [f64; 2]) -> MeanMotion {
         let [before, after] = [from_s, to_s].map(|time_s| self.attitude(time_s));
         let duration_s = to_s - from_s;
         let [slow, fast] = [from_s, to_s].map(|time_s| self.velocity(time_s, duration_s));

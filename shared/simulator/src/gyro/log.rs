@@ -6,26 +6,26 @@ use gyre_samples::{Sample, SampleKind};
 
 use super::attitude::Vehicle;
 use super::clock::Clock;
+use super::config::SimulatedGyroConfig;
 use super::errors::Errors;
-use crate::simulator::Simulator;
 
 /// The file beside the scans.
 pub(crate) const FILE: &str = "imu.csv";
-/// Its first row: that of the log of RADIATE.
+/// The first row of the file: that of the log of RADIATE.
 const HEADER: &str =
     "stamp_ns,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_mps2,accel_y_mps2,accel_z_mps2";
 
-/// The samples of a drive, from its first azimuth to its last, by their stamps: rates and
-/// accelerations in the gyro's own axes. `None` without a gyro.
-pub(crate) fn samples(simulator: &Simulator) -> Option<Vec<Sample>> {
-    let config = simulator.config();
-    let figures = config.gyro.figures()?;
-    let seed = config.gyro_seed();
-    let vehicle = Vehicle::new(simulator);
-    let mut errors = Errors::new(&figures, config.gyro.up, seed);
-    let mut clock = Clock::new(&config.gyro, seed);
-    let start_ns = simulator.time(0).epoch_us * 1000;
-    let end_s = simulator.scans() as f64 * simulator.sampling().period_us as f64 * 1e-6;
+/// The samples during a drive, whose start is `start_ns` and which ends `end_s` later, by their
+/// stamps: rates and accelerations in the gyro's own axes. `None` without a gyro.
+pub(crate) fn samples(
+    config: &SimulatedGyroConfig,
+    seed: u64,
+    vehicle: &Vehicle<'_>,
+    (start_ns, end_s): (i64, f64),
+) -> Option<Vec<Sample>> {
+    let figures = config.figures()?;
+    let mut errors = Errors::new(&figures, config.up, seed);
+    let mut clock = Clock::new(config, seed);
     let sample = |index: usize| {
         let span_s = [index, index + 1].map(|index| index as f64 / figures.rate_hz);
         let values = errors.measure(&vehicle.mean_motion(span_s));

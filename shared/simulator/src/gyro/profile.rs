@@ -1,8 +1,8 @@
 //! Gyros that can be bought, by the figures of their data sheets.
 //!
 //! "Typical" figures are taken for standard deviations. No data sheet says how a bias wanders with
-//! the temperature inside a vehicle: a wander of 1 K over 10 minutes is assumed, and how well a gyro
-//! is mounted is assumed where the sheet has no figure.
+//! the temperature inside a vehicle: a wander of 1 K over 10 minutes is assumed, and how well a
+//! gyro is mounted is assumed where the sheet has no figure.
 
 use serde::{Deserialize, Serialize};
 

@@ -45,7 +45,7 @@ fn simulator(gyro: SimulatedGyroConfig, scans: usize, hills: bool) -> Simulator 
 
 fn drive(gyro: SimulatedGyroConfig, scans: usize, hills: bool) -> (Simulator, Vec<Sample>) {
     let simulator = simulator(gyro, scans, hills);
-    let samples = log::samples(&simulator).unwrap();
+    let samples = simulator.gyro_samples().unwrap();
     (simulator, samples)
 }
 
