@@ -1,6 +1,12 @@
 //! `gyre calibrate`: what it says of a recording, and that a run takes its file.
 
-use std::{fs, path::Path};
+use std::{
+    env, fs,
+    os::unix::fs::symlink,
+    path::{Path, PathBuf},
+};
+
+use tempfile::TempDir;
 
 use crate::common::{Ended, Run, gyre, recording};
 
@@ -130,5 +136,71 @@ fn a_drive_that_is_too_short_is_refused() {
     let out = tempfile::tempdir().unwrap();
     let ended = calibrate(recording::small(), out.path(), &["source.scans=3"], &[]);
     ended.failed_with(&["scans"]);
+    assert!(!out.path().join("calibration.toml").exists());
+}
+
+/// The three-point turn of a real drive: it tells the clock of its gyro in a second, and is too
+/// short for the constants of the radar.
+fn turning() -> Option<TempDir> {
+    let Some(data) = env::var_os("GYRE_DATA").map(PathBuf::from) else {
+        println!("skipped: GYRE_DATA is not set");
+        return None;
+    };
+    let (drive, part) = (data.join("radiate-2019-02-12"), TempDir::new().unwrap());
+    let images = |of: &Path| of.join("Navtech_Polar");
+    fs::create_dir(images(part.path())).unwrap();
+    for number in 437..537 {
+        let name = format!("{number:06}.png");
+        symlink(images(&drive).join(&name), images(part.path()).join(name)).unwrap();
+    }
+    for file in ["Navtech_Polar.txt", "imu_as_logged.csv"] {
+        fs::copy(drive.join(file), part.path().join(file)).unwrap();
+    }
+    Some(part)
+}
+
+#[test]
+fn the_clock_and_the_axis_of_a_gyro_are_found_and_a_run_takes_them() {
+    let Some(recording) = turning() else { return };
+    let (recording, out) = (recording.path(), TempDir::new().unwrap());
+    let ended = calibrate(recording, out.path(), &[], &["--config", "radiate"]);
+    let said = ended.succeeded().stdout.clone();
+    assert!(said.contains("gyro, axis up         -z\n"), "{said}");
+    let file = out.path().join("calibration.toml");
+    let table: toml::Table = fs::read_to_string(&file).unwrap().parse().unwrap();
+    let gyro = table["gyro"].as_table().unwrap();
+    let late_s = gyro["late_s"].as_float().unwrap();
+    assert!((late_s - 1.58).abs() < 0.06, "{said}");
+    assert_eq!(gyro["kind"].as_str(), Some("auto"));
+    let run = Run::of_recording_named(recording.to_str().unwrap())
+        .set("source.scans=6")
+        .argument("--calibration", file.to_str().unwrap());
+    run.complete();
+    let used: toml::Table = run.result("config.toml").parse().unwrap();
+    assert_eq!(used["gyro"]["late_s"].as_float(), Some(late_s));
+    assert_eq!(used["gyro"]["up"].as_str(), Some("-z"));
+}
+
+#[test]
+fn the_log_of_another_drive_is_refused() {
+    let Some(recording) = turning() else { return };
+    let (recording, out) = (recording.path(), TempDir::new().unwrap());
+    let log = fs::read_to_string(recording.join("imu_as_logged.csv")).unwrap();
+    let (header, rows) = log.split_once('\n').unwrap();
+    let rows = rows.lines().filter_map(|row| row.split_once(','));
+    // The stamps as they are, the rates in the order of a drive backwards.
+    let backwards = rows.clone().zip(rows.rev());
+    let backwards = backwards.map(|((stamp, _), (_, rates))| format!("{stamp},{rates}\n"));
+    let other = out.path().join("log.csv");
+    let text = format!("{header}\n{}", backwards.collect::<String>());
+    fs::write(&other, text).unwrap();
+    let words = ["--config", "radiate", "--gyro", other.to_str().unwrap()];
+    let ended = calibrate(recording, out.path(), &[], &words);
+    assert!(
+        ended.stdout.contains("the log is of another drive"),
+        "{}",
+        ended.stdout
+    );
+    ended.failed_with(&["are too few"]);
     assert!(!out.path().join("calibration.toml").exists());
 }

@@ -1,4 +1,7 @@
-//! `gyre calibrate`: finds the constants of a radar from drives alone.
+//! `gyre calibrate`: finds the constants of a radar from drives alone, and the clock and the axes
+//! of a gyro beside it.
+
+mod gyro;
 
 use std::{
     path::Path,
@@ -6,13 +9,15 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_calibration::{Configured, Drive, Study, svg, toml};
+use gyre_calibration::{Configured, Drive, Found, Study, svg, toml};
 use gyre_configuration::{Configuration, Played, describe_masks_in_process};
 use gyre_radar::{DatasetOptions, OwnedScan, SweepGeometry};
+use gyre_samples::GyroKind;
 use gyre_storage as storage;
 use gyre_terminal::{Failure, print};
 
 use crate::cli::CalibrateArguments;
+use gyro::{Gyro, Section};
 
 /// The section for the configuration.
 const SECTION: &str = "calibration.toml";
@@ -25,41 +30,72 @@ const EVERY: Duration = Duration::from_secs(5);
 ///
 /// # Errors
 /// A recording or a configuration that cannot be used, a drive that does not determine the
-/// constants, drives that are read with different ones, a file that cannot be written.
+/// constants, drives that are read with different ones, a file that cannot be written; a named log
+/// of a gyro that the drive does not tell.
 pub fn calibrate(arguments: &CalibrateArguments) -> Result<ExitCode, Failure> {
     let started = Instant::now();
-    let section = arguments.out.join(SECTION);
+    let file = arguments.out.join(SECTION);
     storage::create_folder(&arguments.out)?;
-    let first = Recorded::read(&arguments.inputs.configuration()?, arguments)?;
-    let others = arguments.with.iter().map(|data| {
-        let configuration = arguments.inputs.configuration_with(data)?;
-        let other = Recorded::read(&configuration, arguments)?;
-        first.require_same_constants(&other)?;
-        Ok(other)
-    });
-    let others: Vec<_> = others.collect::<Result<_, Failure>>()?;
-    let first = first.study(&arguments.out.join(PICTURE))?;
-    let others = others.into_iter().enumerate().map(|(k, other)| {
-        let picture = format!("calibration-{}.svg", k + 2);
-        other.study(&arguments.out.join(picture))
-    });
-    let others: Vec<_> = others.collect::<Result<_, _>>()?;
-    let found = match others.is_empty() {
-        true => first.found,
-        false => {
-            let found = first.combined(&others)?;
-            print::line(format_args!("all together: {found}"))?;
-            found
+    let drives = read_drives(arguments)?;
+    let logs = drives
+        .iter()
+        .filter_map(|it| Some((it.gyro.as_ref()?, &it.drive)));
+    let gyro = Section::of(logs.collect())?;
+    let radar = found_by(drives, &arguments.out);
+    let text = match &radar {
+        Ok(found) => toml(found),
+        // A drive may tell the gyro alone, as one that stands and turns.
+        Err(error) if gyro.is_told => {
+            print::note(format_args!("the radar is not calibrated: {error}"));
+            format!("# Found by gyre calibrate. The radar is not calibrated: {error}\n")
         }
+        Err(_) => return radar.map(|_| ExitCode::SUCCESS),
     };
-    storage::write(&section, toml(&found))?;
+    storage::write(&file, text + &gyro.text)?;
     print::line(format_args!(
-        "{:.0} s; {} for `gyre run --calibration`, {PICTURE} beside it",
+        "{:.0} s; {} for `gyre run --calibration`{}",
         started.elapsed().as_secs_f64(),
-        section.display(),
+        file.display(),
+        if radar.is_ok() {
+            format!(", {PICTURE} beside it")
+        } else {
+            String::new()
+        }
     ))?;
-    print::line(found.overlap())?;
-    Ok(ExitCode::SUCCESS)
+    if let Ok(found) = radar {
+        print::line(found.overlap())?;
+    }
+    gyro.refused.map_or(Ok(ExitCode::SUCCESS), Err)
+}
+
+/// Reads the drive and the others of the same radar.
+fn read_drives(arguments: &CalibrateArguments) -> Result<Vec<Recorded>, Failure> {
+    let configuration = arguments.inputs.configuration()?;
+    let mut drives = vec![Recorded::read(configuration, arguments)?];
+    for data in &arguments.with {
+        let configuration = arguments.inputs.configuration_with(data)?;
+        let other = Recorded::read(configuration, arguments)?;
+        drives[0].require_same_constants(&other)?;
+        drives.push(other);
+    }
+    Ok(drives)
+}
+
+/// Finds the constants by each drive, and by all together; draws a picture of each.
+fn found_by(drives: Vec<Recorded>, out: &Path) -> Result<Found, Failure> {
+    let studies = drives.into_iter().enumerate().map(|(k, drive)| match k {
+        0 => drive.study(&out.join(PICTURE)),
+        _ => drive.study(&out.join(format!("calibration-{}.svg", k + 1))),
+    });
+    let mut studies: Vec<Study> = studies.collect::<Result<_, _>>()?;
+    let others = studies.split_off(1);
+    let first = studies.remove(0);
+    if others.is_empty() {
+        return Ok(first.found);
+    }
+    let found = first.combined(&others)?;
+    print::line(format_args!("all together: {found}"))?;
+    Ok(found)
 }
 
 /// A drive as it was read.
@@ -67,14 +103,19 @@ struct Recorded {
     name: String,
     drive: Drive,
     configured: Configured,
+    gyro: Option<Gyro>,
 }
 
 impl Recorded {
     /// Registers the scans of a recording, as many as are asked for at most.
     fn read(
-        configuration: &Configuration,
+        mut configuration: Configuration,
         arguments: &CalibrateArguments,
     ) -> Result<Self, Failure> {
+        let gyro = Gyro::read(&configuration, arguments.gyro.as_deref())?;
+        // By radar alone: what the gyro says is compared with that.
+        configuration.odometry.gyro.kind = GyroKind::None;
+        let configuration = &configuration;
         let (drive, geometry) = read(configuration, arguments)?;
         let eccentricity_rad = options(configuration)?.azimuth_eccentricity_rad;
         Ok(Self {
@@ -86,6 +127,7 @@ impl Recorded {
                 min_range_m: configuration.odometry.points.min_range_m.into(),
                 distance_m: arguments.distance_m,
             },
+            gyro,
         })
     }
 

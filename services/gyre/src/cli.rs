@@ -284,6 +284,10 @@ pub struct CalibrateArguments {
     /// The folder of calibration.toml and calibration.svg.
     #[arg(long, default_value = "out/calibrate")]
     pub out: PathBuf,
+    /// The log of a gyro, a table as CSV: its clock and its axes are found too. Default: what lies
+    /// beside the scans.
+    #[arg(long, value_name = "FILE", conflicts_with = "with")]
+    pub gyro: Option<PathBuf>,
     /// Length of the path by an odometer or GNSS, m: without it the range resolution cannot be
     /// told.
     #[arg(long, value_parser = length, conflicts_with = "with")]

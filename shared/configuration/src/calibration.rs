@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use gyre_radar::DatasetOptions;
+use gyre_samples::GyroConfig;
 use gyre_storage as storage;
 use thiserror::Error;
 
@@ -16,6 +17,8 @@ pub struct CalibrationError {
     reason: String,
 }
 
+/// The sections of which a calibration may have any key: those of the radar and of the gyro.
+const WHOLE: [&str; 2] = ["dataset", "gyro"];
 /// The sections whose key `min_range_m` a calibration may have.
 const RANGES: [&str; 2] = ["points", "raster"];
 
@@ -34,18 +37,21 @@ pub fn overrides(file: &Path) -> Result<Vec<String>, CalibrationError> {
         .parse()
         .map_err(|error: toml::de::Error| unusable(syntax(&text, &error)))?;
     let is_known = |(section, value): (&String, &toml::Value)| match value {
-        toml::Value::Table(_) if section == "dataset" => true,
+        toml::Value::Table(_) if WHOLE.contains(&section.as_str()) => true,
         toml::Value::Table(keys) => {
             RANGES.contains(&section.as_str()) && keys.keys().all(|key| key == "min_range_m")
         }
         _ => false,
     };
-    if !table.contains_key("dataset") || !table.iter().all(is_known) {
+    if !WHOLE.iter().any(|section| table.contains_key(*section)) || !table.iter().all(is_known) {
         return Err(unusable(
-            "a calibration has the section [dataset], min_range_m in [points] and [raster], and no more: give the calibration.toml of `gyre calibrate`".to_owned(),
+            "a calibration has the sections [dataset] and [gyro], min_range_m in [points] and [raster], and no more: give the calibration.toml of `gyre calibrate`".to_owned(),
         ));
     }
-    strict::section::<DatasetOptions>(&mut table.clone(), "dataset")
+    let mut sections = table.clone();
+    strict::section::<DatasetOptions>(&mut sections, "dataset")
+        .map_err(|error| unusable(error.to_string()))?;
+    strict::section::<GyroConfig>(&mut sections, "gyro")
         .map_err(|error| unusable(error.to_string()))?;
     let sections = table
         .iter()
@@ -81,6 +87,10 @@ mod tests {
         storage::write(&file, text).unwrap();
         let ranges = ["points.min_range_m=7.5", "raster.min_range_m=7.5"];
         assert_eq!(overrides(&file).unwrap(), ranges);
+        let text = "[gyro]\nkind = \"auto\"\nup = \"-z\"\nlate_s = 1.58\n";
+        storage::write(&file, text).unwrap();
+        let gyro = ["gyro.kind=\"auto\"", "gyro.late_s=1.58", "gyro.up=\"-z\""];
+        assert_eq!(overrides(&file).unwrap(), gyro);
         for text in [
             "[dataset]\n[points]\nbeam_deg = 3\n",
             "[points]\nmin_range_m = 7\n",
@@ -89,5 +99,8 @@ mod tests {
             let refused = overrides(&file).unwrap_err().to_string();
             assert!(refused.contains("and no more"), "{refused}");
         }
+        storage::write(&file, "[gyro]\nlate = 1.58\n").unwrap();
+        let refused = overrides(&file).unwrap_err().to_string();
+        assert!(refused.contains("late"), "{refused}");
     }
 }

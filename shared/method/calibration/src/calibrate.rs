@@ -90,7 +90,7 @@ impl Calibration {
         drive: &Drive,
         change: &FactVector,
     ) -> Result<[f64; 2], CalibrationError> {
-        let (none, after) = (FactVector::zeros(), track(drive, change)?);
+        let (none, after) = (FactVector::zeros(), drive.mean_track_with(change)?);
         let pairs = pairs(&self.before, &self.revisits);
         Ok(overlaps(
             drive,
@@ -114,7 +114,7 @@ fn change_of(facts: &[FactEstimate; FACTS], corrected: &[Fact]) -> FactVector {
 /// A drive that does not determine them.
 pub fn calibrate(drive: &Drive) -> Result<Calibration, CalibrationError> {
     let none = FactVector::zeros();
-    let before = track(drive, &none)?;
+    let before = drive.mean_track_with(&none)?;
     require_motion(drive, &before)?;
     let revisits = evenly(revisits::find(drive, &before, &none)?, &before);
     let mut solution = Solution::find(drive, &before, &revisits, &SOLVED)?;
@@ -129,7 +129,7 @@ pub fn calibrate(drive: &Drive) -> Result<Calibration, CalibrationError> {
         proposed = solution.determined();
     }
     let change = change_of(&facts, &proposed);
-    let mut after = track(drive, &change)?;
+    let mut after = drive.mean_track_with(&change)?;
     let pairs = pairs(&before, &revisits);
     let overlap = overlaps(drive, &pairs, [(&before, &none), (&after, &change)]);
     if overlap[1] < overlap[0] {
@@ -170,7 +170,7 @@ impl Solution {
                 break;
             }
             change += found.step();
-            at = track(drive, &change)?;
+            at = drive.mean_track_with(&change)?;
             found = round(drive, &at, revisits, &change, free)?;
         }
         let by_drift = match free.contains(&Fact::EccentricityCos) {
@@ -192,13 +192,6 @@ impl Solution {
             false => Vec::new(),
         }
     }
-}
-
-/// The mean of the tracks in both directions of time: errors of the processing that depend on the
-/// direction cancel.
-fn track(drive: &Drive, change: &FactVector) -> Result<Track, ConfigError> {
-    let [forward, reversed] = [false, true].map(|reversed| drive.track(change, reversed));
-    Ok(forward?.mean(&reversed?, drive))
 }
 
 fn require_motion(drive: &Drive, track: &Track) -> Result<(), CalibrationError> {
@@ -282,7 +275,7 @@ fn drift_of(
     let shifted = |by_rad: f64| -> Result<DVector<f64>, ConfigError> {
         let mut shifted = *change;
         shifted[Fact::EccentricityCos as usize] += by_rad;
-        let track = track(drive, &shifted)?;
+        let track = drive.mean_track_with(&shifted)?;
         Ok(drift::residuals(
             &track,
             &aligned(drive, &track, revisits, &shifted),

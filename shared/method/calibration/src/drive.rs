@@ -182,6 +182,21 @@ impl Drive {
         self.sweeps[scan].row_time_s[direction.min(DIRECTIONS - 1)].into()
     }
 
+    /// Returns the mean of the tracks in both directions of time, as configured.
+    ///
+    /// # Errors
+    /// The refinement's configuration.
+    pub fn mean_track(&self) -> Result<Track, ConfigError> {
+        self.mean_track_with(&FactVector::zeros())
+    }
+
+    /// Returns the mean of the tracks in both directions of time under changed facts: errors of the
+    /// processing that depend on the direction cancel.
+    pub(crate) fn mean_track_with(&self, change: &FactVector) -> Result<Track, ConfigError> {
+        let [forward, reversed] = [false, true].map(|reversed| self.track(change, reversed));
+        Ok(forward?.mean(&reversed?, self))
+    }
+
     /// Registers all scans under changed facts, in the order of time or against it.
     ///
     /// # Errors

@@ -18,6 +18,7 @@
 //! - [`Mounting`], [`OwnReflections`]: what follows from the track and from the scans directly;
 //! - [`Found`]: the constants beside the configured ones, with what each rests on; [`toml()`]: as a
 //!   section of a configuration; [`svg`]: a place seen twice, before and after;
+//! - [`calibrate_gyro`]: the clock and the axes of a gyro, by the same track;
 //! - [`Study`]: a drive with all that, and what several drives of one radar say together.
 
 mod calibrate;
@@ -26,6 +27,7 @@ mod drive;
 mod error;
 mod facts;
 mod findings;
+mod gyro;
 mod image;
 mod mounting;
 mod overlap;
@@ -41,6 +43,7 @@ pub use drive::{Drive, Sweep, Track};
 pub use error::CalibrationError;
 pub use facts::{FACTS, Fact, FactMatrix, FactVector};
 pub use findings::{Configured, Found};
+pub use gyro::{GyroCalibration, GyroError, calibrate_gyro};
 pub use mounting::Mounting;
 pub use own_reflections::OwnReflections;
 pub use picture::svg;

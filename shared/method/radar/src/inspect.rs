@@ -3,6 +3,7 @@
 mod display;
 mod findings;
 mod ground_truth;
+mod gyro;
 mod rows;
 mod timing;
 
@@ -11,6 +12,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 pub use ground_truth::GroundTruthReport;
+pub use gyro::{GyroReport, QuietReport};
 pub use rows::{Chirps, RowsReport};
 pub use timing::{Gap, Stall, TimingReport};
 
@@ -61,6 +63,8 @@ pub struct Report {
     pub unreadable: Vec<Unreadable>,
     /// Ground truth files found.
     pub ground_truths: Vec<GroundTruthReport>,
+    /// The log of a gyro beside the scans.
+    pub gyro: Option<GyroReport>,
     /// Observations of the reader and faults: whole sentences.
     pub findings: Vec<String>,
 }
@@ -103,6 +107,7 @@ pub fn inspect_dataset(
     let read = read_scans(dataset.as_mut());
     let mut report = assemble(root, dataset.as_ref(), read, timing);
     report.ground_truths = ground_truth::examine(root, dataset.as_ref(), trajectory);
+    report.gyro = gyro::examine(root, report.timing.as_ref());
     report.findings = findings::list(&report, dataset.notes(), options);
     report
 }
@@ -170,6 +175,7 @@ fn assemble(
         rows: read.rows,
         unreadable: read.unreadable,
         ground_truths: Vec::new(),
+        gyro: None,
         findings: Vec::new(),
     }
 }

@@ -190,3 +190,63 @@ fn a_dataset_without_faults_has_few_findings() {
             && report.unreadable.is_empty()
     );
 }
+
+#[test]
+fn the_log_of_a_gyro_is_told_with_its_span_and_faults() {
+    let folder = tempfile::tempdir().unwrap();
+    write_oxford(folder.path(), 8);
+    let plain = inspect(folder.path(), &DatasetOptions::default(), None).unwrap();
+    assert!(plain.gyro.is_none() && !plain.to_string().contains("gyro"));
+    let first_ns = plain.timing.as_ref().unwrap().first_ns;
+    // 100 Hz for 10 s from half a second before the first scan; x points up; it turns for 4 s.
+    let rows = (0..1000).filter(|k| !(700..720).contains(k)).map(|k| {
+        let stamp_ns = first_ns - 500_000_000 + 10_000_000 * k;
+        let rate = if k < 400 {
+            0.2 * (0.01 * k as f64).sin()
+        } else {
+            0.01
+        };
+        format!("{stamp_ns},{rate},0,0,9.8,0.1,0.1\n")
+    });
+    let text = format!(
+        "stamp_ns,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x,accel_y,accel_z\n{}",
+        rows.collect::<String>()
+    );
+    std::fs::write(folder.path().join("imu.csv"), text).unwrap();
+    let report = inspect(folder.path(), &DatasetOptions::default(), None).unwrap();
+    println!("{report}");
+    let gyro = report.gyro.as_ref().unwrap();
+    assert_eq!(gyro.samples, 980);
+    assert!((gyro.rate_hz - 100.0).abs() < 1e-6 && (gyro.missing - 0.02).abs() < 1e-6);
+    let [before, after] = gyro.after_scans_s.unwrap();
+    let scans_s = (report.timing.as_ref().unwrap().last_ns - first_ns) as f64 * 1e-9;
+    assert!((before + 0.5).abs() < 1e-6 && (after - (9.49 - scans_s)).abs() < 1e-6);
+    let quiet = gyro.quiet.unwrap();
+    assert!(quiet.after_s >= 4.0 && (quiet.mean_degps[0] - 0.01f64.to_degrees()).abs() < 1e-9);
+    assert_eq!(gyro.up_by_gravity.unwrap().name(), "x");
+    assert_mentions(&report, &["Samples are missing in 1 places"]);
+    assert_mentions(&report, &["by gravity its axis x points up"]);
+    assert_mentions(&report, &["gyre calibrate", "imu.csv"]);
+    assert!(
+        report
+            .to_string()
+            .contains("imu.csv: 980 samples of 100.0 Hz, 2.0 % missing")
+    );
+    std::fs::write(folder.path().join("imu.csv"), "a,b\n").unwrap();
+    let report = inspect(folder.path(), &DatasetOptions::default(), None).unwrap();
+    assert_mentions(&report, &["cannot be used", "no angular rates"]);
+}
+
+#[test]
+fn stalls_of_the_gyro_of_radiate_are_reported() {
+    let Some(report) = report("radiate-2019-02-12", None) else {
+        return;
+    };
+    let gyro = report.gyro.as_ref().unwrap();
+    assert!(
+        (gyro.rate_hz - 20.0).abs() < 0.1 && (0.05..0.06).contains(&gyro.missing),
+        "{gyro:?}"
+    );
+    assert!(gyro.up_by_gravity.is_none(), "gravity is taken out");
+    assert_mentions(&report, &["missing in 13 places, for up to 0.80 s"]);
+}

@@ -95,9 +95,9 @@ pub enum UpAxis {
 }
 
 impl UpAxis {
-    /// Returns a vector along the axes of the gyro in right-handed axes of which the third points up. The axis
-    /// that points ahead is not known: z down is taken for x ahead and y right, z up for x ahead and y
-    /// left; other axes are named in their order.
+    /// Returns a vector along the axes of the gyro in right-handed axes of which the third points
+    /// up. The axis that points ahead is not known: z down is taken for x ahead and y right, z up
+    /// for x ahead and y left; other axes are named in their order.
     pub fn in_vehicle(self, [x, y, z]: [f64; 3]) -> [f64; 3] {
         match self {
             Self::Z => [x, y, z],
@@ -106,6 +106,18 @@ impl UpAxis {
             Self::MinusX => [y, -z, -x],
             Self::Y => [z, x, y],
             Self::MinusY => [z, -x, -y],
+        }
+    }
+
+    /// Returns the name in configurations.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::X => "x",
+            Self::MinusX => "-x",
+            Self::Y => "y",
+            Self::MinusY => "-y",
+            Self::Z => "z",
+            Self::MinusZ => "-z",
         }
     }
 

@@ -130,7 +130,7 @@ const MULRAN: usize = 17;
 /// Columns of its first version, without rates.
 const MULRAN_WITHOUT_RATES: usize = 8;
 
-/// What would do, for messages.
+/// The remedy, for messages.
 const REMEDY: &str = "the first row must name the columns, as in `stamp_ns,gyro_x_radps,gyro_y_radps,gyro_z_radps` (also stamp_us, stamp_s; _degps)";
 
 impl Columns {

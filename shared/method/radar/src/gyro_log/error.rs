@@ -45,7 +45,7 @@ pub enum LogError {
     Unknown {
         /// The file.
         path: PathBuf,
-        /// What is missing, and what would do.
+        /// The finding, and the remedy.
         reason: String,
     },
     /// A log whose stamps or rates cannot be those of a gyro.
@@ -53,7 +53,7 @@ pub enum LogError {
     Unusable {
         /// The file.
         path: PathBuf,
-        /// What is wrong, and what to do.
+        /// The finding, and the remedy.
         reason: String,
     },
     /// A log of another time than the scans.

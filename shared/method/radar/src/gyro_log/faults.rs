@@ -1,4 +1,4 @@
-//! What is wrong with the samples of a log, and which of them are left out.
+//! Faults of the samples of a log, and which samples are left out.
 
 mod breaks;
 mod order;
@@ -18,7 +18,7 @@ const ABSURD_SHARE: f64 = 0.01;
 /// Time between two samples from which on it is a gap, median periods.
 const GAP_PERIODS: f64 = 3.0;
 
-/// What is wrong with a log. What is counted as left out is not in its samples.
+/// Faults of a log. What is counted as left out is not in its samples.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct LogFaults {
     /// Rows that are none of the table, as one that was cut off: left out.
@@ -50,7 +50,7 @@ pub struct LogFaults {
 pub struct LogGap {
     /// The last sample before it, s since the first of the log.
     pub after_s: f64,
-    /// Its duration, s.
+    /// The duration, s.
     pub seconds: f64,
 }
 

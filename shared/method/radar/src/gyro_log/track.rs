@@ -55,8 +55,8 @@ mod tests {
     ];
 
     proptest! {
-        /// Whatever axis points up, the third rate is that about it, and the axes stay right-handed:
-        /// the cross product of two vectors is that of the vectors as they were.
+        /// Whatever axis points up, the third rate is that about it, and the axes stay
+        /// right-handed: the cross product of two vectors is that of the vectors as they were.
         #[test]
         fn the_axes_are_right_handed(a in [-9.0..9.0, -9.0..9.0, -9.0..9.0f64], b in [-9.0..9.0, -9.0..9.0, -9.0..9.0f64]) {
             for up in AXES {

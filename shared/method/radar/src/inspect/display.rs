@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::Path;
 
-use super::{Chirps, GroundTruthReport, Report, TimingReport};
+use super::{Chirps, GroundTruthReport, GyroReport, Report, TimingReport};
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -53,6 +53,9 @@ impl fmt::Display for Report {
         }
         if self.ground_truths.is_empty() {
             line(f, "ground truth", format_args!("none found"))?;
+        }
+        if let Some(gyro) = &self.gyro {
+            gyro_lines(f, gyro, &self.root)?;
         }
         writeln!(f, "findings")?;
         self.findings
@@ -166,4 +169,42 @@ fn truth_line(f: &mut fmt::Formatter<'_>, truth: &GroundTruthReport, root: &Path
         "ground truth",
         format_args!("{name}: {poses} poses, {metres:.1} m, {span}{covered}{nearest}{clock}"),
     )
+}
+
+fn gyro_lines(f: &mut fmt::Formatter<'_>, gyro: &GyroReport, root: &Path) -> fmt::Result {
+    let name = gyro.file.strip_prefix(root).unwrap_or(&gyro.file).display();
+    if gyro.error.is_some() {
+        return line(f, "gyro", format_args!("{name}: cannot be used"));
+    }
+    let (samples, rate_hz) = (gyro.samples, gyro.rate_hz);
+    let missing = gyro.missing * 100.0;
+    line(
+        f,
+        "gyro",
+        format_args!("{name}: {samples} samples of {rate_hz:.1} Hz, {missing:.1} % missing"),
+    )?;
+    if let (Some([first, last]), Some([before, after])) = (gyro.span_ns, gyro.after_scans_s) {
+        let seconds = (last - first) as f64 * 1e-9;
+        let jitter_ms = gyro.jitter_s * 1e3;
+        line(
+            f,
+            "gyro stamps",
+            format_args!(
+                "{seconds:.1} s, from {before:+.2} s of the first scan to {after:+.2} s of the last, jitter {jitter_ms:.1} ms RMS"
+            ),
+        )?;
+    }
+    if let Some(quiet) = &gyro.quiet {
+        let [mean, sigma] = [quiet.mean_degps, quiet.sigma_degps]
+            .map(|[x, y, z]| format!("{x:.3}, {y:.3}, {z:.3}"));
+        line(
+            f,
+            "gyro quietest",
+            format_args!(
+                "{mean} deg/s about x, y, z, deviation {sigma}, in the 5 s from {:.1} s on: bias and noise, if it stood",
+                quiet.after_s
+            ),
+        )?;
+    }
+    Ok(())
 }

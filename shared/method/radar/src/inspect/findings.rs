@@ -1,6 +1,6 @@
 //! Faults of a dataset, in sentences.
 
-use super::{Chirps, GroundTruthReport, Report, TimingReport};
+use super::{Chirps, GroundTruthReport, GyroReport, Report, TimingReport};
 use crate::clock::MAX_OFFSET_S;
 use crate::dataset::{DatasetOptions, Format};
 
@@ -30,6 +30,34 @@ pub(super) fn list(report: &Report, notes: &[String], options: &DatasetOptions) 
                 .flat_map(|truth| ground_truth_findings(truth, report)),
         ),
     }
+    found.extend(report.gyro.iter().flat_map(gyro));
+    found
+}
+
+fn gyro(report: &GyroReport) -> Vec<String> {
+    let name = report.file.file_name().unwrap_or_default().display();
+    if let Some(error) = &report.error {
+        return vec![format!(
+            "The log of a gyro, {name}, cannot be used: {error}."
+        )];
+    }
+    let faults = report.faults.sentences().into_iter();
+    let mut found: Vec<String> = faults.map(|it| format!("Gyro: {it}")).collect();
+    found.extend(
+        report
+            .up_by_gravity
+            .map(|up| format!("Gyro: by gravity its axis {} points up.", up.name())),
+    );
+    let covers = report
+        .after_scans_s
+        .map(|[first_s, last_s]| first_s <= 0.0 && last_s >= 0.0);
+    let clocks = match covers {
+        Some(false) => ", whose stamps do not cover those of the scans",
+        _ => "",
+    };
+    found.push(format!(
+        "The log of a gyro, {name}{clocks}, lies beside the scans: `gyre calibrate` finds its axis and how late its clock is, and gyro.kind = \"auto\" uses it."
+    ));
     found
 }
 

@@ -75,8 +75,8 @@ impl Fault {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
 
-    /// Samples that are left are those that were measured, in their order, each once; those that are
-    /// not are counted.
+    /// Samples that are left are those that were measured, in their order, each once; those that
+    /// are not are counted.
     #[test]
     fn a_fault_is_counted_and_changes_no_other_sample(fault in fault()) {
         let rows = rows(300);

@@ -5,8 +5,8 @@ use std::{iter, ops::Range};
 use super::LogFaults;
 use gyre_samples::Sample;
 
-/// A step of the stamps by more than this, ns, parts stretches; back it is no disorder but a step of
-/// the clock.
+/// A step of the stamps by more than this, ns, parts stretches; back it is no disorder but a step
+/// of the clock.
 const STEP_NS: i64 = 1_000_000_000;
 /// A step ahead by more than this is no gap but a step of the clock, ns.
 const AHEAD_NS: i64 = 3_600_000_000_000;

@@ -1,0 +1,108 @@
+//! The clock and the axes of a gyro, from the turns of the radar.
+//!
+//! Both turn together, so the log fits where the radar's turns correlate with it best: over all
+//! three axes and all offsets of its clock, first coarsely, then by least squares for the offset,
+//! the scale and the bias at once. The radar's turns are those of the track, by radar alone.
+//!
+//! - `turns`: the radar's; `angles`: the gyro's, over any time;
+//! - `search`: the axis and the coarse offset, and whether another pair fits about as well;
+//! - `fit`: the least squares, with the jackknife over blocks of the drive;
+//! - [`GyroCalibration`]: what was found; [`GyroError`]: why nothing was.
+
+mod angles;
+mod error;
+mod fit;
+mod found;
+mod search;
+#[cfg(test)]
+mod tests;
+mod turns;
+
+pub use error::GyroError;
+pub use found::GyroCalibration;
+
+use gyre_radar::GyroLog;
+
+use crate::{Drive, Estimate, Track};
+use angles::Angles;
+use turns::turns;
+
+/// Offsets of the clocks that are looked at, s: UTC and GPS time are 18 s apart, UTC and TAI 37 s,
+/// and the two clocks of a recording of RADIATE 64 s.
+pub(crate) const MAX_LATE_S: f64 = 120.0;
+/// Scales that a gyro can have: beyond, its unit is another one.
+const SCALES: std::ops::RangeInclusive<f64> = 0.9..=1.1;
+/// Least standard deviation of the offset, periods of the gyro: its samples are interpolated.
+const PERIOD_SHARE: f64 = 0.1;
+/// Least standard deviation of the scale: that of an axis which leans by 2.5 degrees.
+const SCALE_SIGMA: f64 = 1e-3;
+/// Least standard deviation of the bias, rad/s: a track turns by itself where constants of the
+/// radar are wrong.
+const BIAS_SIGMA_RADPS: f64 = 1e-4;
+/// An offset that is known less well is refused, s: at 10 degrees per second it is half a degree.
+const MAX_LATE_SIGMA_S: f64 = 0.05;
+/// As is a scale.
+const MAX_SCALE_SIGMA: f64 = 0.05;
+
+/// Finds the offset, the axis, the scale and the bias of a gyro by a track of the drive.
+///
+/// Over `max_gap_s` without samples its rate is not interpolated.
+///
+/// # Errors
+/// A log that does not tell them.
+pub fn calibrate_gyro(
+    drive: &Drive,
+    track: &Track,
+    log: &GyroLog,
+    max_gap_s: f64,
+) -> Result<GyroCalibration, GyroError> {
+    let stamps: Vec<i64> = drive.sweeps.iter().map(|sweep| sweep.stamp_ns).collect();
+    let headings: Vec<f64> = track
+        .poses
+        .iter()
+        .map(|pose| pose.rotation.angle())
+        .collect();
+    let starts: Vec<bool> = drive.sweeps.iter().map(|it| it.interval_s <= 0.0).collect();
+    calibrate_turns(&stamps, &headings, &starts, log, max_gap_s)
+}
+
+/// As [`calibrate_gyro`], from the headings of the scans, counter-clockwise; `starts` says where
+/// the chain of motions begins anew.
+pub(crate) fn calibrate_turns(
+    stamps: &[i64],
+    headings: &[f64],
+    starts: &[bool],
+    log: &GyroLog,
+    max_gap_s: f64,
+) -> Result<GyroCalibration, GyroError> {
+    let first_ns = stamps.first().copied().unwrap_or_default();
+    let turns = turns(stamps, headings, starts);
+    let angles = Angles::new(log, first_ns, max_gap_s);
+    let peak = search::peak(&turns, &angles)?;
+    let fit = fit::Fit::new(&turns, &angles, &peak).ok_or(GyroError::Unsettled)?;
+    let [scale, bias_radps, late_s] = fit.parameters;
+    let floored = |estimate: Estimate, floor: f64| Estimate {
+        sigma: estimate.sigma.hypot(floor),
+        ..estimate
+    };
+    let least_s = PERIOD_SHARE * angles.period_s();
+    let late_s = floored(late_s, least_s);
+    let span_s = turns.last().map_or(1.0, |turn| turn.to_s);
+    let found = GyroCalibration {
+        up: peak.up(),
+        scale: floored(scale, SCALE_SIGMA),
+        bias_radps: floored(bias_radps, BIAS_SIGMA_RADPS),
+        late_s,
+        halves_s: fit.halves_s,
+        drift: floored(fit.drift, least_s / span_s),
+        correlation: peak.correlation.abs(),
+        turns: fit.turns,
+    };
+    if !SCALES.contains(&scale.value) && (scale.value - 1.0).abs() > 3.0 * scale.sigma {
+        return Err(GyroError::Scale { scale: scale.value });
+    }
+    match late_s.sigma <= MAX_LATE_SIGMA_S && scale.sigma <= MAX_SCALE_SIGMA {
+        true => Ok(found),
+        false => Err(GyroError::Straight { late_s, scale }),
+    }
+}

@@ -1,0 +1,108 @@
+//! Why a drive does not tell the clock and the axes of a gyro.
+
+use thiserror::Error;
+
+use super::{MAX_LATE_S, search::Peak};
+use crate::Estimate;
+
+/// Why nothing was found.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum GyroError {
+    /// The times of the log are not those of the scans.
+    #[error(
+        "with offsets of the clocks up to {MAX_LATE_S:.0} s the log covers {turns} turns of a second, and {needed} are needed: {}",
+        begins(*begins_s)
+    )]
+    Apart {
+        /// Turns of the radar that the log has samples for, at most.
+        turns: usize,
+        /// Turns that are needed.
+        needed: usize,
+        /// From the first scan to the first sample, s.
+        begins_s: Option<f64>,
+    },
+    /// Two offsets or axes fit about as well.
+    #[error(
+        "the gyro turns as the radar best {best}, but about as well {rival}: the drive is too straight or too short, its turns repeat, or the log is of another drive"
+    )]
+    Ambiguous {
+        /// The best offset and axis.
+        best: Candidate,
+        /// Another one.
+        rival: Candidate,
+    },
+    /// The least squares do not end near the peak.
+    #[error(
+        "the offset of the clocks is not determined: parts of the drive lead to different ones"
+    )]
+    Unsettled,
+    /// The drive turns too little.
+    #[error(
+        "the offset of the clocks is {:.2} \u{b1} {:.2} s and the scale {:.2} \u{b1} {:.2}, which is too uncertain to be used: the drive turns too little, or a clock drifts",
+        late_s.value, late_s.sigma, scale.value, scale.sigma
+    )]
+    Straight {
+        /// The offset, s.
+        late_s: Estimate,
+        /// The scale.
+        scale: Estimate,
+    },
+    /// The rates have another unit.
+    #[error(
+        "the radar turns {scale:.4} times as much as the gyro measures: {}",
+        unit(*scale)
+    )]
+    Scale {
+        /// The scale.
+        scale: f64,
+    },
+    /// Drives of one gyro that contradict each other.
+    #[error(
+        "one drive says that {one} points up, another that {other} does: these are not logs of one gyro as it is mounted"
+    )]
+    Axes {
+        /// The axis of one drive.
+        one: &'static str,
+        /// The axis of another one.
+        other: &'static str,
+    },
+}
+
+/// An offset with an axis.
+#[derive(Clone, Copy, Debug, PartialEq, Error)]
+#[error("about {axis} with late_s = {late_s:.2} (correlation {correlation:.2})")]
+pub struct Candidate {
+    /// The axis that points up.
+    pub axis: &'static str,
+    /// The offset, s.
+    pub late_s: f64,
+    /// The correlation.
+    pub correlation: f64,
+}
+
+impl From<Peak> for Candidate {
+    fn from(peak: Peak) -> Self {
+        Self {
+            axis: peak.up().name(),
+            late_s: peak.late_s,
+            correlation: peak.correlation.abs(),
+        }
+    }
+}
+
+fn begins(begins_s: Option<f64>) -> String {
+    match begins_s {
+        Some(begins_s) if begins_s.abs() > MAX_LATE_S => format!(
+            "it begins {begins_s:.0} s after the first scan; is it of another drive, or its clock set otherwise? Then correct its stamps first"
+        ),
+        _ => "the drive is too short, or most samples are missing".to_owned(),
+    }
+}
+
+fn unit(scale: f64) -> &'static str {
+    let is_degree = (scale / 1f64.to_radians() - 1.0).abs() < 0.1;
+    match is_degree {
+        true => "its rates are in deg/s, name the columns so, as gyro_z_degps",
+        false => "its rates have another unit, or none of its axes points up",
+    }
+}

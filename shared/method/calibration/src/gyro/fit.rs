@@ -1,0 +1,150 @@
+//! Least squares for scale, bias and offset of a gyro, and for the drift of its clock.
+
+use gyre_radar::median;
+use nalgebra::{Matrix4, Vector4};
+
+use super::{angles::Angles, search::Peak, turns::Turn};
+use crate::Estimate;
+
+/// Blocks of the drive for the jackknife.
+const BLOCKS: usize = 12;
+/// Solutions of the linearised residuals, at most, and the change of the offset that ends them, s.
+const ROUNDS: usize = 30;
+const CONVERGED_S: f64 = 1e-6;
+/// Residuals beyond so many standard deviations count less: the radar is wrong now and then.
+const USUAL_SIGMAS: f64 = 3.0;
+/// Standard deviation over the median of the absolute deviation, of a normal distribution.
+const OF_MEDIAN: f64 = 1.4826;
+/// An offset farther than this from the peak is another one, s.
+const NEAR_S: f64 = 1.0;
+
+/// Scale, bias (rad/s), offset (s), drift (s/s):
+/// `yaw = scale * angle(time + offset) - bias * time`.
+type Parameters = Vector4<f64>;
+
+/// The parameters by all turns together.
+pub(super) struct Fit {
+    /// Scale, bias (rad/s) and offset (s) without a drift.
+    pub(super) parameters: [Estimate; 3],
+    /// The offset of each half of the drive, s.
+    pub(super) halves_s: [Option<f64>; 2],
+    /// The drift of the clock.
+    pub(super) drift: Estimate,
+    /// Number of turns.
+    pub(super) turns: usize,
+}
+
+impl Fit {
+    /// Fits the turns around a peak; `None` if they do not determine the parameters, or another
+    /// offset than that of the peak.
+    pub(super) fn new(turns: &[Turn], angles: &Angles, peak: &Peak) -> Option<Self> {
+        let sign = peak.correlation.signum();
+        let covered = |turn: &&Turn| {
+            let late_s = peak.late_s;
+            angles
+                .between(turn.from_s + late_s, turn.to_s + late_s)
+                .is_some()
+        };
+        let turns: Vec<Turn> = turns.iter().filter(covered).copied().collect();
+        let problem = Problem {
+            angles,
+            axis: peak.axis,
+            sign,
+            middle_s: turns.get(turns.len() / 2)?.from_s,
+            late_s: peak.late_s,
+        };
+        let count = turns.len();
+        let block = |k: usize| k * BLOCKS / count;
+        let without = |left_out: usize, free: usize| {
+            let kept = (0..count)
+                .filter(|k| block(*k) != left_out)
+                .map(|k| turns[k]);
+            problem.solve(&kept.collect::<Vec<_>>(), free)
+        };
+        let jackknife = |free: usize| -> Option<[Estimate; 4]> {
+            let all = problem.solve(&turns, free)?;
+            let mut variance = Parameters::zeros();
+            for left_out in 0..BLOCKS {
+                let apart = without(left_out, free)? - all;
+                variance += apart.component_mul(&apart);
+            }
+            let share = (BLOCKS - 1) as f64 / BLOCKS as f64;
+            Some(std::array::from_fn(|k| Estimate {
+                value: all[k],
+                sigma: (share * variance[k]).sqrt(),
+            }))
+        };
+        let [scale, bias, late, _] = jackknife(3)?;
+        let unknown = Estimate {
+            value: 0.0,
+            sigma: f64::INFINITY,
+        };
+        let halves = [&turns[..count / 2], &turns[count / 2..]];
+        Some(Self {
+            parameters: [scale, bias, late],
+            halves_s: halves.map(|half| Some(problem.solve(half, 3)?[2])),
+            drift: jackknife(4).map_or(unknown, |all| all[3]),
+            turns: count,
+        })
+    }
+}
+
+struct Problem<'a> {
+    angles: &'a Angles,
+    axis: usize,
+    sign: f64,
+    /// The time at which the offset is that of the parameters, s.
+    middle_s: f64,
+    /// The offset to begin with, s.
+    late_s: f64,
+}
+
+impl Problem<'_> {
+    /// Solves for the first `free` parameters.
+    fn solve(&self, turns: &[Turn], free: usize) -> Option<Parameters> {
+        let mut at = Parameters::new(1.0, 0.0, self.late_s, 0.0);
+        for _ in 0..ROUNDS {
+            let rows = self.rows(turns, &at);
+            let sigma = OF_MEDIAN * median(rows.iter().map(|(residual, _)| residual.abs()))?;
+            let (mut normal, mut right) = (Matrix4::zeros(), Vector4::zeros());
+            for (residual, slopes) in &rows {
+                let weight = 1.0 / (1.0 + (residual / (USUAL_SIGMAS * sigma.max(1e-9))).powi(2));
+                normal += weight * slopes * slopes.transpose();
+                right += weight * *residual * slopes;
+            }
+            for fixed in free..4 {
+                normal.row_mut(fixed).fill(0.0);
+                normal.column_mut(fixed).fill(0.0);
+                normal[(fixed, fixed)] = 1.0;
+                right[fixed] = 0.0;
+            }
+            let step = normal.cholesky()?.solve(&right);
+            at += step;
+            if (at[2] - self.late_s).abs() > NEAR_S {
+                return None;
+            }
+            if step[2].abs() < CONVERGED_S {
+                break;
+            }
+        }
+        Some(at)
+    }
+
+    /// The residual of each turn, and its slopes by the parameters.
+    fn rows(&self, turns: &[Turn], at: &Parameters) -> Vec<(f64, Parameters)> {
+        let [scale, bias, late_s, drift] = (*at).into();
+        let row = |turn: &Turn| {
+            let late_s = late_s + drift * (turn.from_s - self.middle_s);
+            let turned = self
+                .angles
+                .between(turn.from_s + late_s, turn.to_s + late_s)?;
+            let angle = self.sign * turned.angle[self.axis];
+            let time_s = turn.to_s - turn.from_s;
+            let by_late = scale * self.sign * turned.by_late[self.axis];
+            let by_drift = by_late * (turn.from_s - self.middle_s);
+            let slopes = Parameters::new(angle, -time_s, by_late, by_drift);
+            Some((turn.yaw_rad - (scale * angle - bias * time_s), slopes))
+        };
+        turns.iter().filter_map(row).collect()
+    }
+}

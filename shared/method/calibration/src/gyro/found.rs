@@ -1,0 +1,160 @@
+//! The results for a gyro, as a table and as a section of a configuration.
+
+use std::path::Path;
+
+use gyre_samples::{GyroConfig, UpAxis};
+
+use super::GyroError;
+use crate::Estimate;
+
+/// A scale that is known less well says no more than the default does.
+const USEFUL_SCALE_SIGMA: f64 = 0.01;
+/// A drift that differs from none by so many standard deviations is one.
+const DRIFT_SIGMAS: f64 = 3.0;
+/// A configured value that is off by so many standard deviations is wrong.
+const WRONG_SIGMAS: f64 = 3.0;
+
+/// The clock and the axes of a gyro, by the turns of the radar.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GyroCalibration {
+    /// The axis that points up.
+    pub up: UpAxis,
+    /// Time by which the stamps of the gyro are late, s.
+    pub late_s: Estimate,
+    /// That of each half of the drive, where it tells it, s.
+    pub halves_s: [Option<f64>; 2],
+    /// Change of that time, s/s.
+    pub drift: Estimate,
+    /// True yaw rate over the measured one.
+    pub scale: Estimate,
+    /// Bias, rad/s: scaled rate less true one.
+    pub bias_radps: Estimate,
+    /// Correlation of the turns with those of the radar.
+    pub correlation: f64,
+    /// Number of turns that were compared, of a second each.
+    pub turns: usize,
+}
+
+impl GyroCalibration {
+    /// Returns the mean of what drives of one gyro say, each weighted by its uncertainty.
+    ///
+    /// # Errors
+    /// Another axis points up in one of them.
+    pub fn mean(&self, others: &[Self]) -> Result<Self, GyroError> {
+        let mut mean = self.clone();
+        for other in others {
+            if other.up != mean.up {
+                return Err(GyroError::Axes {
+                    one: mean.up.name(),
+                    other: other.up.name(),
+                });
+            }
+            mean.late_s = mean.late_s.combined(&other.late_s);
+            mean.drift = mean.drift.combined(&other.drift);
+            mean.scale = mean.scale.combined(&other.scale);
+            mean.bias_radps = mean.bias_radps.combined(&other.bias_radps);
+            mean.correlation = mean.correlation.min(other.correlation);
+            mean.turns += other.turns;
+            mean.halves_s = [None; 2];
+        }
+        Ok(mean)
+    }
+
+    /// Returns whether the clock of the gyro drifts against that of the radar.
+    pub fn drifts(&self) -> bool {
+        self.drift.value.abs() > DRIFT_SIGMAS * self.drift.sigma
+    }
+
+    /// Returns whether the drive says more about the scale than is known of any gyro.
+    fn tells_scale(&self) -> bool {
+        self.scale.sigma < USEFUL_SCALE_SIGMA
+    }
+
+    /// Returns the section `[gyro]`, with the log if it does not lie beside the scans.
+    pub fn toml(&self, file: Option<&Path>) -> String {
+        let (late, scale, bias) = (self.late_s, self.scale, self.bias_radps);
+        let mut text = match file.map(|file| toml::Value::from(file.display().to_string())) {
+            Some(file) => format!("\n[gyro]\nkind = \"log\"\nfile = {file}\n"),
+            None => "\n[gyro]\nkind = \"auto\"\n".to_owned(),
+        };
+        text += &format!(
+            "up = \"{}\" # correlation {:.3} of {} turns with those of the radar\n",
+            self.up.name(),
+            self.correlation,
+            self.turns
+        );
+        text += &format!(
+            "late_s = {:.4}\ntime_sigma_s = {:.4}\n",
+            late.value,
+            late.sigma.max(1e-4)
+        );
+        text += &match self.tells_scale() {
+            true => format!(
+                "scale = {:.4}\nscale_sigma = {:.4}\n",
+                scale.value, scale.sigma
+            ),
+            false => format!(
+                "# scale stays as configured: {:.4} \u{b1} {:.4} is no better\n",
+                scale.value, scale.sigma
+            ),
+        };
+        text + &format!(
+            "bias_radps = {:.6} # \u{b1} {:.6} in this drive: the next one may begin with another\n",
+            bias.value, bias.sigma
+        )
+    }
+
+    /// Returns the lines of a table, beside what is configured if a gyro is used.
+    pub fn table(&self, configured: &GyroConfig) -> String {
+        let verdict = |value: f64, found: &Estimate| match configured.is_used() {
+            false => String::new(),
+            true if (value - found.value).abs() > WRONG_SIGMAS * found.sigma => {
+                format!(", configured {value:.4}: CONTRADICTS the configured value")
+            }
+            true => format!(", configured {value:.4}: agrees with the configured value"),
+        };
+        let axis = match configured.is_used() && configured.up != self.up {
+            true => format!(
+                ", configured {}: CONTRADICTS the configured value",
+                configured.up.name()
+            ),
+            false => String::new(),
+        };
+        let (late, scale, drift) = (&self.late_s, &self.scale, &self.drift);
+        let halves = match self.halves_s {
+            [Some(first), Some(second)] => {
+                format!(
+                    "{first:.4} s in the first half of the drive, {second:.4} s in the second; "
+                )
+            }
+            _ => String::new(),
+        };
+        let drifts = match self.drifts() {
+            true => ": one late_s does not do for a long drive",
+            false => "",
+        };
+        let tells = match self.tells_scale() {
+            true => verdict(configured.scale, scale),
+            false => ", which is not told well enough".to_owned(),
+        };
+        [
+            format!(
+                "{:<21} {}{axis}\n{:<21} {} turns of a second, correlation {:.4}",
+                "gyro, axis up", self.up.name(), "", self.turns, self.correlation
+            ),
+            format!(
+                "{:<21} {:.4} \u{b1} {:.4} s{}\n{:<21} {halves}drift {:.0} \u{b1} {:.0} ppm{drifts}",
+                "gyro, late by", late.value, late.sigma, verdict(configured.late_s, late), "",
+                drift.value * 1e6, drift.sigma * 1e6
+            ),
+            format!("{:<21} {:.4} \u{b1} {:.4}{tells}", "gyro, scale", scale.value, scale.sigma),
+            format!(
+                "{:<21} {:.4} \u{b1} {:.4} deg/s in this drive",
+                "gyro, bias",
+                self.bias_radps.value.to_degrees(),
+                self.bias_radps.sigma.to_degrees()
+            ),
+        ]
+        .join("\n")
+    }
+}

@@ -1,0 +1,159 @@
+//! The axis and the offset at which the gyro turns as the radar.
+
+use gyre_samples::UpAxis;
+
+use super::{
+    GyroError, MAX_LATE_S,
+    angles::Angles,
+    turns::{BASELINE_S, Turn},
+};
+
+/// Steps of the offset, s: rates change little meanwhile.
+const STEP_S: f64 = 0.25;
+/// Peaks that are refined, and parts of a step.
+const CANDIDATES: usize = 8;
+const FINE: i32 = 20;
+/// Offsets within this of the best are of its peak, s.
+const PEAK_S: f64 = 3.0;
+/// Turns that the log must have in common, and their share of the most that it has at any offset.
+/// Among many offsets one of a few turns agrees by chance.
+const MIN_TURNS: usize = 36;
+const MIN_SHARE: f64 = 0.6;
+/// Time after which a turn is independent of another, baselines.
+const INDEPENDENT: f64 = 2.0;
+/// Logarithm of the likelihood by which the best offset must exceed any other.
+const MIN_EVIDENCE: f64 = 5.0;
+
+/// The axis and the offset that fit best.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Peak {
+    pub(super) late_s: f64,
+    pub(super) axis: usize,
+    /// Of the radar's turns and the angles about the axis.
+    pub(super) correlation: f64,
+    /// The turns that it is of.
+    turns: usize,
+}
+
+impl Peak {
+    /// Returns the axis that points up.
+    pub(super) fn up(&self) -> UpAxis {
+        match (self.axis, self.correlation < 0.0) {
+            (0, false) => UpAxis::X,
+            (0, true) => UpAxis::MinusX,
+            (1, false) => UpAxis::Y,
+            (1, true) => UpAxis::MinusY,
+            (_, false) => UpAxis::Z,
+            (_, true) => UpAxis::MinusZ,
+        }
+    }
+
+    /// Returns whether it is about another axis, or farther than a peak is wide.
+    fn is_other(&self, peak: &Self) -> bool {
+        peak.axis != self.axis || (peak.late_s - self.late_s).abs() > PEAK_S
+    }
+
+    /// The highest correlation within a step.
+    fn refined(&self, turns: &[Turn], angles: &Angles) -> Self {
+        let near = (-FINE..=FINE).map(|k| self.late_s + STEP_S * f64::from(k) / f64::from(FINE));
+        let near = near.map(|late_s| correlations(turns, angles, late_s)[self.axis]);
+        let covered = near.filter(|peak| 10 * peak.turns >= 9 * self.turns);
+        covered
+            .max_by(|a, b| a.correlation.abs().total_cmp(&b.correlation.abs()))
+            .unwrap_or(*self)
+    }
+
+    /// The logarithm of the likelihood of this peak over that of another one, by so many turns that
+    /// are independent.
+    fn evidence(&self, other: &Self, independent: f64) -> f64 {
+        let unexplained = |peak: &Self| (1.0 - peak.correlation.powi(2)).max(1e-12);
+        0.5 * independent * (unexplained(other) / unexplained(self)).ln()
+    }
+}
+
+/// Finds the offset and the axis of the highest correlation.
+pub(super) fn peak(turns: &[Turn], angles: &Angles) -> Result<Peak, GyroError> {
+    let steps = (MAX_LATE_S / STEP_S) as i32;
+    let offsets = (-steps..=steps).map(|k| f64::from(k) * STEP_S);
+    let mut peaks: Vec<Peak> = offsets
+        .flat_map(|late_s| correlations(turns, angles, late_s))
+        .collect();
+    let most = peaks.iter().map(|peak| peak.turns).max().unwrap_or(0);
+    if most < MIN_TURNS {
+        return Err(GyroError::Apart {
+            turns: most,
+            needed: MIN_TURNS,
+            begins_s: angles.span_s().map(|[first_s, _]| first_s),
+        });
+    }
+    let enough = MIN_TURNS.max((MIN_SHARE * most as f64) as usize);
+    peaks.retain(|peak| peak.turns >= enough);
+    peaks.sort_by(|a, b| b.correlation.abs().total_cmp(&a.correlation.abs()));
+    let mut highest: Vec<Peak> = Vec::new();
+    for peak in peaks {
+        if highest.len() < CANDIDATES && highest.iter().all(|it| it.is_other(&peak)) {
+            highest.push(peak);
+        }
+    }
+    // Between the steps each may be higher, and another one the best.
+    let mut refined = highest
+        .iter()
+        .map(|peak| peak.refined(turns, angles))
+        .collect::<Vec<_>>();
+    refined.sort_by(|a, b| b.correlation.abs().total_cmp(&a.correlation.abs()));
+    let best = refined.first().copied().unwrap_or_default();
+    let rival = refined.get(1).copied().unwrap_or_default();
+    match best.evidence(&rival, independent(turns)) < MIN_EVIDENCE {
+        true => Err(GyroError::Ambiguous {
+            best: best.into(),
+            rival: rival.into(),
+        }),
+        false => Ok(best),
+    }
+}
+
+/// The number of turns that are independent of each other, each as far as it turns: a straight road
+/// tells nothing, and one bend looks like any other.
+fn independent(turns: &[Turn]) -> f64 {
+    let count = turns.len() as f64;
+    let mean = turns.iter().map(|turn| turn.yaw_rad).sum::<f64>() / count;
+    let squares = || turns.iter().map(|turn| (turn.yaw_rad - mean).powi(2));
+    let fourth: f64 = squares().map(|square| square * square).sum();
+    let times = turns.windows(2).map(|pair| pair[1].from_s - pair[0].from_s);
+    let interval_s = gyre_radar::median(times).unwrap_or_default();
+    let turning = squares().sum::<f64>().powi(2) / fourth.max(1e-30);
+    turning * (interval_s / (INDEPENDENT * BASELINE_S)).min(1.0)
+}
+
+/// The correlations with the angles about each axis at one offset.
+fn correlations(turns: &[Turn], angles: &Angles, late_s: f64) -> [Peak; 3] {
+    let common = turns.iter().filter_map(|turn| {
+        let turned = angles.between(turn.from_s + late_s, turn.to_s + late_s)?;
+        Some((turn.yaw_rad, turned.angle))
+    });
+    let common: Vec<_> = common.collect();
+    let count = common.len().max(1) as f64;
+    let mean_yaw = common.iter().map(|(yaw, _)| yaw).sum::<f64>() / count;
+    [0, 1, 2].map(|axis| {
+        let mean = common.iter().map(|(_, angle)| angle[axis]).sum::<f64>() / count;
+        let [mut yaws, mut angles, mut products] = [0.0; 3];
+        for (yaw, angle) in &common {
+            let (yaw, angle) = (yaw - mean_yaw, angle[axis] - mean);
+            yaws += yaw * yaw;
+            angles += angle * angle;
+            products += yaw * angle;
+        }
+        let correlation = products / (yaws * angles).sqrt();
+        Peak {
+            late_s,
+            axis,
+            // Of what does not turn there is none.
+            correlation: if correlation.is_finite() {
+                correlation
+            } else {
+                0.0
+            },
+            turns: common.len(),
+        }
+    })
+}

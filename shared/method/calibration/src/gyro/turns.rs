@@ -1,0 +1,36 @@
+//! The turns of the radar.
+
+/// Time over which a turn is taken, s: longer than a scan, to average the noise of headings.
+pub(super) const BASELINE_S: f64 = 1.0;
+
+/// A turn of the radar.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Turn {
+    /// Start and end, s since the first scan.
+    pub(super) from_s: f64,
+    pub(super) to_s: f64,
+    /// The angle, counter-clockwise, rad.
+    pub(super) yaw_rad: f64,
+}
+
+/// The turns from each scan to the first that is [`BASELINE_S`] later.
+pub(super) fn turns(stamps: &[i64], headings: &[f64], starts: &[bool]) -> Vec<Turn> {
+    let since = |k: usize| (stamps[k] - stamps[0]) as f64 * 1e-9;
+    let ends = (0..stamps.len()).map(|from| {
+        let wanted_s = since(from) + BASELINE_S - 1e-3;
+        let apart = (from..stamps.len()).position(|to| since(to) >= wanted_s);
+        apart.map(|scans| from + scans)
+    });
+    let unbroken = |(from, to): &(usize, usize)| !starts[from + 1..=*to].contains(&true);
+    ends.enumerate()
+        .filter_map(|(from, to)| Some((from, to?)))
+        .filter(unbroken)
+        .map(|(from, to)| Turn {
+            from_s: since(from),
+            to_s: since(to),
+            yaw_rad: (from + 1..=to)
+                .map(|k| gyre_geometry::wrap_angle(headings[k] - headings[k - 1]))
+                .sum(),
+        })
+        .collect()
+}
