@@ -9,12 +9,11 @@ use std::{
 };
 
 use gyre_configuration::radar_constants;
-use gyre_radar::{DatasetOptions, ReadError, ScanSamples, ScanSlot, SweepGeometry};
-use gyre_samples::Sample;
+use gyre_radar::{DatasetOptions, ScanSamples};
 use numpy::PyArray1;
 use pyo3::{exceptions::PyIndexError, prelude::*, types::PyTuple};
 
-use crate::{config::Config, errors, lock::Guarded, scan::Scan};
+use crate::{config::Config, errors, lock::Guarded, opened::Opened, scan::Scan};
 
 /// Damaged scans in a row that are skipped: the default of `source.max_unreadable` of a run.
 const MAX_UNREADABLE: usize = 10;
@@ -22,7 +21,7 @@ const MAX_UNREADABLE: usize = 10;
 /// Opens a recording: a folder of a format that Gyre knows, an MCAP file of `gyre record`, or a bag
 /// of ROS 2.
 ///
-/// Its scans have the samples of the gyro that the section `gyro` of `config` names, if it does.
+/// With a section `gyro` in `config` the scans have the samples of the gyro that it names.
 ///
 /// The constants of the radar are those of the section `dataset` of `config`. Without one they are
 /// those of the format, or of the recording's `dataset.toml`, as `Config.of` takes them. Raises
@@ -63,44 +62,6 @@ pub fn open(
 #[pyfunction]
 pub fn find_ground_truth(data: PathBuf) -> Option<PathBuf> {
     gyre_radar::find_ground_truth(&data)
-}
-
-/// An open recording.
-pub struct Opened {
-    /// The scans.
-    pub scans: Box<dyn gyre_radar::Dataset>,
-    /// What other sensors measured meanwhile.
-    pub samples: ScanSamples,
-}
-
-impl Opened {
-    /// Decodes a scan, and returns the samples that come with it.
-    pub fn read(
-        &mut self,
-        index: usize,
-        slot: ScanSlot<'_>,
-    ) -> Result<(SweepGeometry, Vec<Sample>), ReadError> {
-        let ScanSlot {
-            bytes,
-            azimuth_rad,
-            stamp_ns,
-            flags,
-        } = slot;
-        let geometry = self.scans.read(
-            index,
-            ScanSlot {
-                bytes,
-                azimuth_rad,
-                stamp_ns: &mut *stamp_ns,
-                flags,
-            },
-        )?;
-        let stamps = stamp_ns[..geometry.azimuths].iter().copied();
-        let first = stamps.clone().min().unwrap_or(geometry.stamp_ns);
-        let last = stamps.max().unwrap_or(geometry.stamp_ns);
-        let samples = self.samples.of(self.scans.as_ref(), [first, last]);
-        Ok((geometry, samples.to_vec()))
-    }
 }
 
 /// The scans of a recording, ordered by time.

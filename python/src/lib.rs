@@ -18,6 +18,7 @@ mod lock;
 mod masker;
 mod numpy_arrays;
 mod odometry;
+mod opened;
 mod pose;
 mod registered;
 mod scan;

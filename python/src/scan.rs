@@ -13,10 +13,10 @@ use pyo3::{
 };
 
 use crate::{
-    dataset::Opened,
     errors,
     lock::Guarded,
     numpy_arrays::{converted, given, readable},
+    opened::Opened,
 };
 
 const POWER: &str = "a C-contiguous array of uint8 with shape (azimuths, range bins)";
@@ -39,8 +39,8 @@ const FLAGS: &str = "one uint8 for each azimuth";
 /// a turn. azimuth_flags: uint8 (azimuths,), what is known of each azimuth: 1 measured, 2 rising
 /// chirp, 4 the chirp is known; without them all are measured. range_offset_m: m; the centre of bin
 /// b is at (b + 0.5) * range_resolution_m + range_offset_m. doppler_s: metres to add to a range for
-/// each m/s of closing speed; 0: unknown. gyro: what a gyro has measured since the end of the sweep
-/// before: pairs of a time, ns, and a yaw rate, rad/s, counter-clockwise, in the order of their
+/// each m/s of closing speed; 0: unknown. gyro: the samples of a gyro since a turn before the
+/// sweep: pairs of a time, ns, and a yaw rate, rad/s, counter-clockwise, in the order of their
 /// times.
 ///
 /// Arrays that are written to while a scan is registered by another thread give undefined motions.
@@ -349,7 +349,7 @@ impl Scan {
         self.geometry.sense == Sense::Clockwise
     }
 
-    /// What the gyro has measured since the end of the sweep before: pairs of a time, ns, and a yaw
+    /// The samples of the gyro that come with the scan: pairs of a time, ns, and a yaw
     /// rate, rad/s, counter-clockwise, with its bias.
     #[getter]
     fn gyro(&self) -> Vec<(i64, f64)> {

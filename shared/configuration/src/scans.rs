@@ -47,7 +47,7 @@ pub struct Played {
     pub dataset: Box<dyn Dataset>,
     /// `ground_truth.tum` of a simulation that is played without being stored.
     pub truth: Option<Vec<u8>>,
-    /// What other sensors measured meanwhile.
+    /// The samples of a gyro.
     pub samples: ScanSamples,
 }
 

@@ -35,8 +35,8 @@ enum Queue {
 pub struct ScanView<'a> {
     /// The scan.
     pub scan: &'a Received<Scan>,
-    /// The velocity for its motion compensation: of the motion of the scan `lag` scans earlier, with
-    /// the yaw rate of the gyro; `None` without such a motion.
+    /// The velocity for its motion compensation: of the motion of the scan `lag` scans earlier,
+    /// with the yaw rate of the gyro; `None` without such a motion.
     pub twist: Option<Twist>,
     /// The turn since the scan before by the gyro.
     pub turn: Option<GyroTurn>,
@@ -177,8 +177,8 @@ impl Scans {
         found.iter().all(Option::is_some)
     }
 
-    /// Hands the samples of the current scan to the gyro, once; before it those of the previous scan,
-    /// if that came with a restart, and of the scans that were dropped since.
+    /// Hands the samples of the current scan to the gyro, once; before it those of the previous
+    /// scan, if that came with a restart, and of the scans that were dropped since.
     fn take_samples(&mut self, starts_chain: bool) -> Result<(), StageError> {
         let (scans, dropped) = match &mut self.queue {
             Queue::Lossless(queue) => ([queue.previous(), queue.current()], Vec::new()),

@@ -36,7 +36,7 @@ message!(
     [Header]
 );
 
-/// What an inertial sensor measures. Covariances are 3 x 3, by rows; the first element is -1 where
+/// A sample of an inertial sensor. Covariances are 3 x 3, by rows; the first element is -1 where
 /// there is no such measurement.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Imu {
@@ -44,15 +44,15 @@ pub struct Imu {
     pub header: Header,
     /// The orientation.
     pub orientation: Quaternion,
-    /// Its covariance.
+    /// Covariance of the orientation.
     pub orientation_covariance: [f64; 9],
     /// Rates about the axes, rad/s.
     pub angular_velocity: Vector3,
-    /// Their covariance.
+    /// Covariance of the rates.
     pub angular_velocity_covariance: [f64; 9],
     /// Acceleration along the axes, m/s².
     pub linear_acceleration: Vector3,
-    /// Its covariance.
+    /// Covariance of the acceleration.
     pub linear_acceleration_covariance: [f64; 9],
 }
 message!(

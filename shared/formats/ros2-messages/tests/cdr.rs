@@ -165,7 +165,7 @@ proptest! {
     }
 }
 
-/// What an inertial sensor measures, as rosbags 0.11.9 serialises it.
+/// A sample of an inertial sensor, as rosbags 0.11.9 serialises it.
 const IMU: &str = "\
     0001000030eb625c0700000004000000696d7500000000000000000000000000\
     000000000000000000000000000000000000f03f000000000000f0bf00000000\

@@ -25,7 +25,6 @@ mod oxford;
 mod png_image;
 mod radiate;
 mod row_order;
-mod samples;
 mod sensor_clock;
 
 mod stale;
@@ -46,7 +45,6 @@ pub use image_size::ImageSize;
 pub use image_source::ImageSource;
 pub use options::{AzimuthSource, DatasetOptions, LostAzimuthOption};
 pub use radiate::frame_stamps;
-pub use samples::ScanSamples;
 pub use stamp::{DEFAULT_TURN_NS, middle_ns, parse_seconds, to_ns as stamp_to_ns, turn_ns};
 
 /// The scans of one recording, ordered by time.
@@ -122,8 +120,8 @@ pub trait Dataset: Send {
     /// sweep, a slot that is too small.
     fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError>;
 
-    /// Reads the samples of a gyro that the recording itself has, on the topic of this name, else on
-    /// the only one: in the gyro's own axes and on its own clock, in the order of the recording.
+    /// Reads the samples of a gyro that the recording itself has, on the topic of this name, else
+    /// on the only one: in the gyro's own axes and on its own clock, in the order of the recording.
     /// `None` without one.
     ///
     /// # Errors

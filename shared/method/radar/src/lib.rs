@@ -24,15 +24,16 @@ pub mod points;
 mod quoted;
 pub mod raster;
 pub mod scan;
+mod scan_samples;
 pub mod trajectory;
 
 pub use chain::{MAX_INTERVAL_NS, continues};
 pub use clock::{ClockOffset, MAX_OFFSET_S, clock_offset};
 pub use dataset::{
     AzimuthSource, DEFAULT_TURN_NS, Dataset, DatasetOptions, EncoderTurn, FIRST_TURNS, FileList,
-    Format, ImageSize, ImageSource, LostAzimuthOption, OpenError, ReadError, ScanSamples,
-    correct_eccentricity, encoder_counts, foreign, frame_stamps, middle_ns, open, open_resolved,
-    open_source, parse_seconds, reopen, stamp_to_ns, stored_options, turn_ns,
+    Format, ImageSize, ImageSource, LostAzimuthOption, OpenError, ReadError, correct_eccentricity,
+    encoder_counts, foreign, frame_stamps, middle_ns, open, open_resolved, open_source,
+    parse_seconds, reopen, stamp_to_ns, stored_options, turn_ns,
 };
 pub use fingerprint::Fingerprint;
 pub use ground_truth::{
@@ -49,4 +50,5 @@ pub use raster::{RasterConfig, RasterError, Rasteriser, Sampling};
 pub use scan::{
     MAX_AZIMUTHS, OwnedScan, PolarScan, ScanError, ScanLimits, ScanSlot, Sense, SweepGeometry,
 };
+pub use scan_samples::ScanSamples;
 pub use trajectory::Trajectory;

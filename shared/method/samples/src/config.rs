@@ -22,8 +22,8 @@ pub struct GyroConfig {
     /// of a bag; `/imu/data` of a live radar.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub topic: Option<String>,
-    /// The address and port at which datagrams of a live gyro are received: lines of a stamp (ns since
-    /// 1970) and the rates about x, y and z (rad/s), with commas between.
+    /// The address and port at which datagrams of a live gyro are received: lines of a stamp (ns
+    /// since 1970) and the rates about x, y and z (rad/s), with commas between.
     pub listen: String,
     /// Longest time for which a scan of a live radar waits for its samples, ms.
     pub max_wait_ms: f64,
@@ -162,9 +162,9 @@ impl Default for GyroConfig {
 pub struct GyroConfigError {
     /// The key.
     pub key: &'static str,
-    /// Its value.
+    /// The value.
     pub value: f64,
-    /// What it must be.
+    /// The values that it may have.
     pub expected: &'static str,
 }
 

@@ -8,13 +8,13 @@ use crate::{GyroConfig, Sample, SampleKind};
 /// Turn of the radar that is taken for a scan whose azimuths all have the same time, ns.
 const MIN_TURN_NS: i64 = 250_000_000;
 
-/// What the gyro says of the turn of the sensor from one scan to the next, counter-clockwise.
+/// The turn of the sensor from one scan to the next by the gyro, counter-clockwise.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct GyroTurn {
     /// From the stamp of the scan before to that of the scan, rad, with the bias.
     pub yaw_rad: f64,
-    /// Its variance but for the bias, rad².
+    /// Variance but for the bias, rad².
     pub variance_rad2: f64,
     /// The time between both, s.
     pub interval_s: f64,
@@ -24,7 +24,7 @@ pub struct GyroTurn {
 
 /// Integrates the yaw rate between scans.
 ///
-/// What it says of a scan depends on the samples that came with it and with the scan before, and on
+/// The result for a scan depends on the samples that came with it and with the scan before, and on
 /// nothing else: so a process that is restarted at the scan before says the same.
 #[derive(Clone, Debug, Default)]
 pub struct Gyro {

@@ -1,4 +1,4 @@
-//! What other sensors measure between the scans of the radar.
+//! Samples of other sensors than the radar.
 //!
 //! A [`Sample`] is one measurement with its stamp on the radar's clock. The source hands each scan
 //! the samples whose *stamps* fall into its interval, so that what a scan is registered with never

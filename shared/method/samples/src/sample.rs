@@ -8,11 +8,11 @@ use bytemuck::{Pod, Zeroable};
 pub struct Sample {
     /// When it was measured, ns since 1970 on the radar's clock.
     pub stamp_ns: i64,
-    /// What was measured: a number of [`SampleKind`].
+    /// The quantity: a number of [`SampleKind`].
     pub kind: u32,
     /// Zero.
     pub reserved: u32,
-    /// What [`SampleKind`] says; unused ones are zero.
+    /// The values that [`SampleKind`] names; unused ones are zero.
     pub values: [f64; 6],
 }
 
@@ -23,7 +23,7 @@ pub const MAX_SAMPLES: usize = 1024;
 /// gyros of this kind.
 pub const MAX_RATE_RADPS: f64 = 35.0;
 
-/// What a sample measures.
+/// The quantity that a sample measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum SampleKind {

@@ -186,8 +186,8 @@ impl Refiner {
         }
     }
 
-    /// Forgets the map and the tracker state but for the bias of the gyro: the next scan starts a new
-    /// chain of motions.
+    /// Forgets the map and the tracker state but for the bias of the gyro: the next scan starts a
+    /// new chain of motions.
     pub fn reset(&mut self) {
         self.map.clear();
         let mut heading = self.state.heading.take();

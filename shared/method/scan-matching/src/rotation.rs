@@ -144,8 +144,8 @@ impl RotationSearch {
         Ok(())
     }
 
-    /// Finds the angle between two scans from their spectra; near the turn that a gyro has measured,
-    /// rad, if it is given.
+    /// Finds the angle between two scans from their spectra; near the turn that a gyro has
+    /// measured, rad, if it is given.
     ///
     /// # Errors
     /// If a spectrum is another search's.

@@ -343,10 +343,7 @@ mod tests {
         header.set_samples(bytes, &samples, 4);
         assert_eq!((header.samples, header.samples_left_out), (2, 5));
         assert_eq!(header.samples(bytes), Some(&samples[..2]));
-        assert_eq!(
-            header.read_samples(bytes),
-            Some(samples[..2].to_vec())
-        );
+        assert_eq!(header.read_samples(bytes), Some(samples[..2].to_vec()));
         assert_eq!(Scan::content_bytes(&header), Some(192));
         assert!(
             header

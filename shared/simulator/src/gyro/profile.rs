@@ -69,7 +69,7 @@ impl GyroProfile {
         match self {
             Self::None => None,
             Self::Exact => Some(exact),
-            // BST-BMI088-DS001, gyroscope: output noise 0.014 °/s/√Hz, zero-rate offset ±1 °/s and
+            // After BST-BMI088-DS001: output noise 0.014 °/s/√Hz, zero-rate offset ±1 °/s and
             // ±0.015 °/s/K, cross axis ±1 %, sensitivity ±1 %, 16 bits for ±125 °/s. It has no bias
             // instability; Bosch's flyer says below 2 °/h.
             Self::Bmi088 => Some(GyroFigures {
@@ -81,8 +81,9 @@ impl GyroProfile {
                 step_radps: 125.0 / 32768.0 * DEG,
                 ..exact
             }),
-            // DocID031239: rate noise 5 mdps/√Hz, bias instability 3 °/h, zero-rate level ±1 °/s
-            // and ±0.005 °/s/K, 4.37 mdps a step at ±125 °/s. Sensitivity as that of the BMI088.
+            // After DocID031239: rate noise 5 mdps/√Hz, bias instability 3 °/h, zero-rate level ±1
+            // °/s and ±0.005 °/s/K, 4.37 mdps a step at ±125 °/s. Sensitivity as that of the
+            // BMI088.
             Self::Asm330lhh => Some(GyroFigures {
                 rate_hz: 104.0,
                 noise_rad_per_sqrt_s: 0.005 * DEG,
@@ -93,9 +94,9 @@ impl GyroProfile {
                 step_radps: 0.00437 * DEG,
                 ..exact
             }),
-            // ADIS16495: angle random walk 0.09 °/√h, in-run bias stability 0.8 °/h, bias
-            // repeatability 0.07 °/s, sensitivity 0.2 %, axes to the frame 0.25°, 32 bits of which
-            // the upper ones are 0.00625 °/s. The bias is compensated for temperature.
+            // After its data sheet: angle random walk 0.09 °/√h, in-run bias stability 0.8 °/h,
+            // bias repeatability 0.07 °/s, sensitivity 0.2 %, axes to the frame 0.25°, 32 bits of
+            // which the upper ones are 0.00625 °/s. The bias is compensated for temperature.
             Self::Adis16495 => Some(GyroFigures {
                 rate_hz: 200.0,
                 noise_rad_per_sqrt_s: 0.09 * DEG / HOUR_S.sqrt(),

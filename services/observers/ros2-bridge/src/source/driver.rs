@@ -136,7 +136,7 @@ pub struct Driver {
     /// Of a driver before 2024.
     older: Subscription<RadarConfigurationMessage>,
     azimuths: Option<Azimuths>,
-    /// What an inertial sensor measures. Azimuths wake often enough for it.
+    /// Samples of an inertial sensor. Azimuths wake often enough for them.
     gyro: Option<Subscription<Imu>>,
 }
 
@@ -259,8 +259,8 @@ impl Driver {
         self.node.type_of(&self.configuration_dds_name) == Some(form.dds_name())
     }
 
-    /// Takes the next sample of the gyro. Messages that cannot be read, or have no rates, are passed
-    /// over.
+    /// Takes the next sample of the gyro. Messages that cannot be read, or have no rates, are
+    /// passed over.
     pub fn gyro_sample(&self) -> Option<Sample> {
         let gyro = self.gyro.as_ref()?;
         loop {

@@ -1,4 +1,4 @@
-//! What an inertial sensor measures, in bags.
+//! Samples of inertial sensors in bags.
 
 use gyre_ros2_messages::{geometry_msgs::Vector3, sensor_msgs::Imu, std_msgs::Header};
 

@@ -21,7 +21,7 @@ const TILT_RAD_PER_SQRT_S: f64 = 2.5e-4;
 /// composed as if independent.
 const BIAS_TIME_S: f64 = 30.0;
 
-/// What is known of the gyro.
+/// The bias of the gyro, and the steady error of the radar.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Heading {
     /// Bias of the gyro, rad/s.
@@ -37,7 +37,7 @@ pub struct Heading {
 pub struct GyroBias {
     /// The bias, rad/s.
     pub rate_radps: f64,
-    /// Its standard deviation, rad/s.
+    /// Standard deviation, rad/s.
     pub sigma_radps: f64,
 }
 
@@ -46,14 +46,14 @@ pub struct GyroBias {
 pub(super) struct PredictedTurn {
     /// Turn since the scan before, rad.
     pub yaw_rad: f64,
-    /// Its variance, rad².
+    /// Variance of that, rad².
     pub variance_rad2: f64,
     /// Rate during the sweep, rad/s.
     pub sweep_rate_radps: f64,
 }
 
 impl Heading {
-    /// What a configuration says before the first scan.
+    /// Creates the state before the first scan.
     pub(super) fn new(config: &GyroConfig) -> Self {
         let variances = Vector3::new(0.0, config.bias_sigma_radps.powi(2), LEAN_SIGMA_RAD.powi(2));
         Self {

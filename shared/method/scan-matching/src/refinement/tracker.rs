@@ -29,11 +29,11 @@ pub struct TrackerState {
     pub unmatched: u32,
     /// The place where the vehicle stands, for the reported motions.
     pub standstill: Standstill,
-    /// What is known of the gyro; `None` until it has measured a turn.
+    /// The bias of the gyro, and the like; `None` until it has measured a turn.
     pub heading: Option<Heading>,
 }
 
-/// What is known of the next scan before it is registered.
+/// The time and the turn since the scan before.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Step {
     /// Time since the scan before, s.

@@ -4,8 +4,10 @@ use std::path::Path;
 
 use gyre_samples::{GyroConfig, GyroKind, Sample, interval_of};
 
-use super::{Dataset, Format};
-use crate::gyro_log::{GyroLog, LogError, SampleTrack};
+use crate::{
+    dataset::{Dataset, Format},
+    gyro_log::{GyroLog, LogError, SampleTrack},
+};
 
 /// The samples of other sensors that come with the scans of a dataset: by their stamps alone.
 #[derive(Debug)]
@@ -65,8 +67,8 @@ impl ScanSamples {
         Ok(Self::Log(track))
     }
 
-    /// Returns the samples that come with the scan that was read last, in the order of their stamps,
-    /// from the times of its first and its last azimuth: [`interval_of`].
+    /// Returns the samples that come with the scan that was read last, in the order of their
+    /// stamps, from the times of its first and its last azimuth: [`interval_of`].
     pub fn of<'a>(&'a self, dataset: &'a dyn Dataset, span_ns: [i64; 2]) -> &'a [Sample] {
         match self {
             Self::None => &[],

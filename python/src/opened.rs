@@ -1,0 +1,42 @@
+//! A recording, and what other sensors measured meanwhile.
+
+use gyre_radar::{Dataset, ReadError, ScanSamples, ScanSlot, SweepGeometry};
+use gyre_samples::Sample;
+
+/// An open recording.
+pub struct Opened {
+    /// The scans.
+    pub scans: Box<dyn Dataset>,
+    /// Samples of a gyro, by the section `gyro` of a configuration.
+    pub samples: ScanSamples,
+}
+
+impl Opened {
+    /// Decodes a scan, and returns the samples that come with it.
+    pub fn read(
+        &mut self,
+        index: usize,
+        slot: ScanSlot<'_>,
+    ) -> Result<(SweepGeometry, Vec<Sample>), ReadError> {
+        let ScanSlot {
+            bytes,
+            azimuth_rad,
+            stamp_ns,
+            flags,
+        } = slot;
+        let geometry = self.scans.read(
+            index,
+            ScanSlot {
+                bytes,
+                azimuth_rad,
+                stamp_ns: &mut *stamp_ns,
+                flags,
+            },
+        )?;
+        let stamps = stamp_ns[..geometry.azimuths].iter().copied();
+        let first = stamps.clone().min().unwrap_or(geometry.stamp_ns);
+        let last = stamps.max().unwrap_or(geometry.stamp_ns);
+        let samples = self.samples.of(self.scans.as_ref(), [first, last]);
+        Ok((geometry, samples.to_vec()))
+    }
+}
