@@ -15,8 +15,8 @@ use crate::{
 };
 
 /// A polar scan: the power of azimuth `a` at range bin `b` is byte `first_byte + a * stride + b` of
-/// the payload. What other sensors have measured since the scan before follows in the payload's
-/// next block: [`ScanHeader::samples`].
+/// the payload. The samples of other sensors follow in the payload's next
+/// block: [`ScanHeader::samples`].
 #[derive(Debug)]
 pub enum Scan {}
 
@@ -91,7 +91,7 @@ pub struct ScanHeader {
     pub doppler_s: f32,
     /// Number of samples of other sensors after the powers: see [`ScanHeader::samples`].
     pub samples: u32,
-    /// Number of their samples that were measured since the scan before, but cannot be used.
+    /// Number of samples since the scan before that were left out: late, or unusable.
     pub samples_left_out: u32,
     /// Time of each row, ns since 1970.
     pub azimuth_stamp_ns: [i64; MAX_AZIMUTHS],
