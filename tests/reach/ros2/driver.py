@@ -69,7 +69,8 @@ gain, offset = struct.unpack(">2f", payload[12:20])
 def configure():
     if publishes == "older":
         numbers = [struct.pack(">H", number) for number in (samples, counts, bins, rotation)]
-        numbers.insert(2, struct.pack(">Q", bin_size))
+        # The driver copies the double as its computer has it.
+        numbers.insert(2, struct.pack("<d", float(bin_size)))
         configurations.write(ros.RadarConfigurationMessage(now(), *numbers))
     elif not is_silent:
         configurations.write(ros.RadarConfigurationMsg(now(), samples, counts, 0, float(bin_size), bins, rotation, gain, offset))
