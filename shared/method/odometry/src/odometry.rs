@@ -59,8 +59,8 @@ impl Odometry {
     /// that is not later than the previous one, or by more than [`gyre_radar::MAX_INTERVAL_NS`],
     /// starts a new chain as after [`Odometry::restart`].
     ///
-    /// `samples` are those of other sensors since the last azimuth of the scan before; none, for
-    /// radar alone.
+    /// `samples` are those of a gyro that come with the scan, in the order of their stamps
+    /// ([`gyre_samples::interval_of`]); none, for radar alone.
     ///
     /// # Errors
     /// A scan that cannot be used. It is skipped: the next scan is registered against the one

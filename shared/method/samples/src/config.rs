@@ -120,18 +120,6 @@ impl UpAxis {
             Self::MinusZ => "-z",
         }
     }
-
-    /// Returns the rate about this axis, of the rates about x, y and z.
-    pub fn of(self, [x, y, z]: [f64; 3]) -> f64 {
-        match self {
-            Self::X => x,
-            Self::MinusX => -x,
-            Self::Y => y,
-            Self::MinusY => -y,
-            Self::Z => z,
-            Self::MinusZ => -z,
-        }
-    }
 }
 
 impl Default for GyroConfig {

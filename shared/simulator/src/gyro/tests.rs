@@ -340,7 +340,7 @@ fn the_named_axis_points_up_and_axes_are_right_handed() {
     use UpAxis::{MinusX, MinusY, MinusZ, X, Y, Z};
     for up in [X, MinusX, Y, MinusY, Z, MinusZ] {
         let vector = Vector3::new(0.1, 0.2, 0.3);
-        assert_eq!(up.of(in_axes(up, vector)), 0.3);
+        assert_eq!(up.in_vehicle(in_axes(up, vector))[2], 0.3);
         let columns = [Vector3::x(), Vector3::y(), Vector3::z()];
         let columns = columns.map(|axis| Vector3::from(in_axes(up, axis)));
         let determinant = Matrix3::from_columns(&columns).determinant();

@@ -92,7 +92,7 @@ impl Simulated {
                 UpAxis::Y | UpAxis::MinusY => 1,
                 UpAxis::Z | UpAxis::MinusZ => 2,
             };
-            let sign = self.up.of([1.0, 1.0, 1.0]);
+            let sign = self.up.in_vehicle([1.0; 3])[2];
             values[axis] = sign * measured + 2e-3 * noise(self.seed + 9, place);
             let late_s = self.late_s + self.drift * (time_s - self.duration_s / 2.0);
             Sample {

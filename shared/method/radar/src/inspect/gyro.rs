@@ -178,7 +178,7 @@ fn up_by_gravity(samples: &[Sample]) -> Option<UpAxis> {
         UpAxis::Z,
         UpAxis::MinusZ,
     ];
-    let is_up = |up: &UpAxis| up.of(mean) > UPRIGHT * norm;
+    let is_up = |up: &UpAxis| up.in_vehicle(mean)[2] > UPRIGHT * norm;
     axes.into_iter()
         .find(is_up)
         .filter(|_| GRAVITY_MPS2.contains(&norm))

@@ -26,6 +26,9 @@ pub(super) struct LiveGyro {
     max_wait: Duration,
     /// Lines of datagrams that are no samples.
     unreadable: usize,
+    /// Samples that were left out so far, and the number at which that is said next.
+    left_out: usize,
+    said_at: usize,
 }
 
 impl LiveGyro {
@@ -48,6 +51,8 @@ impl LiveGyro {
             datagram: vec![0; MAX_DATAGRAM],
             max_wait: Duration::from_secs_f64(config.max_wait_ms * 1e-3),
             unreadable: 0,
+            left_out: 0,
+            said_at: 1,
         }))
     }
 
@@ -97,8 +102,17 @@ impl LiveGyro {
     /// Stores the samples of a complete scan behind its powers.
     pub fn store(&mut self, header: &mut ScanHeader, bytes: &mut [u8]) {
         let (samples, left_out) = self.samples.of_scan(header.span_ns());
-        let unreadable = std::mem::take(&mut self.unreadable);
-        header.set_samples(bytes, samples, left_out + unreadable);
+        let left_out = left_out + std::mem::take(&mut self.unreadable);
+        header.set_samples(bytes, samples, left_out);
+        self.left_out += left_out;
+        if self.left_out >= self.said_at {
+            let so_far = self.left_out;
+            tracing::warn!(
+                so_far,
+                "samples of the gyro are late or unusable, and left out"
+            );
+            self.said_at = 2 * so_far;
+        }
     }
 }
 
