@@ -69,7 +69,8 @@ pub struct RecordingWriter {
     pending: (usize, Option<Instant>),
     /// The newest time of the sensor, which log lines are placed at.
     newest_ns: Option<i64>,
-    /// The time of the first message in this file.
+    /// The newest time of the sensor when this file had its first message, which may be of an
+    /// earlier scan: topics lag behind `scan`.
     first_ns: Option<i64>,
     /// Log lines that came before the first message.
     early: EarlyLines,
@@ -215,7 +216,7 @@ impl RecordingWriter {
         self.missed(topic, message.missed);
         self.skipped.extend(message.skipped.map(|it| (topic, it)));
         self.newest_ns = self.newest_ns.max(Some(item.stamp_ns));
-        self.first_ns.get_or_insert(item.stamp_ns);
+        self.first_ns = self.first_ns.or(self.newest_ns);
         for line in mem::take(&mut self.early).into_lines() {
             self.try_add_log(&line)?;
         }
@@ -287,8 +288,8 @@ impl RecordingWriter {
         self.disk.complete_bytes()
     }
 
-    /// Returns the time from the first message of the file to the newest one on the sensor's clock,
-    /// ns.
+    /// Returns the time from the newest scan when the file was begun to the newest one now, on the
+    /// sensor's clock, ns.
     pub(crate) fn span_ns(&self) -> i64 {
         let newest_ns = self.newest_ns.zip(self.first_ns);
         newest_ns.map_or(0, |(newest, first)| newest.saturating_sub(first))

@@ -208,6 +208,33 @@ fn a_part_of_another_recording_in_the_middle_ends_none() {
     assert_eq!(recording.missed(), [("pose", 10)].into());
 }
 
+/// The pose of a scan may come when later scans are long there: it must not count as the start of
+/// a part, or each part would be over at once.
+#[test]
+fn a_part_is_as_long_as_it_is_to_be_although_poses_lag_behind_the_scans() {
+    const LAG: u64 = 4;
+    let folder = tempfile::tempdir().unwrap();
+    let to = folder.path().join("drive.mcap");
+    let split = Split {
+        bytes: None,
+        span_ns: Some(750_000_000),
+    };
+    let mut writer =
+        SplitWriter::create(to.clone(), head("a", 1), split, None, Positions::new()).unwrap();
+    for seq in 0..12_u64 {
+        if let Some(behind) = seq.checked_sub(LAG) {
+            writer.add(&pose(behind)).unwrap();
+        }
+        writer.add(&scan(seq)).unwrap();
+    }
+    writer.finish().unwrap();
+    assert_eq!(
+        gyre_recording::parts(&to).len(),
+        4,
+        "of three or four scans"
+    );
+}
+
 #[test]
 fn a_ledger_knows_what_is_in_the_parts_that_were_moved_away() {
     let folder = tempfile::tempdir().unwrap();
