@@ -54,7 +54,8 @@ pub(crate) struct Session<'a> {
     pub outputs: Vec<Recorded>,
     /// The topics whose publishers it has notified.
     notified: BTreeSet<&'static str>,
-    /// The last time at which each item was sent.
+    /// The first time at which each item was sent: what a sink has journalled in one life and sends
+    /// in the next has the stamps of the first.
     sent_ns: BTreeMap<u64, i64>,
     progress: Instant,
 }
@@ -297,7 +298,8 @@ impl<'a> Session<'a> {
         self.about(seq).next().is_some()
     }
 
-    /// Returns the time from when an item was sent to when the first answer to it was read, ns.
+    /// Returns the time from when an item was first sent to when the first answer to it was read,
+    /// ns.
     pub(crate) fn answer_ns(&self, seq: u64) -> Option<i64> {
         let (sent_ns, answer) = (self.sent_ns.get(&seq)?, self.about(seq).next()?);
         Some(answer.received_ns.saturating_sub(*sent_ns))

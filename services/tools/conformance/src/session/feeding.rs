@@ -46,7 +46,7 @@ impl Session<'_> {
     /// Sends an item on all topics that lead forward.
     pub(crate) fn send_inputs(&mut self, seq: u64) -> Result<(), ConformanceError> {
         if self.harness.topics().copied().is_some() {
-            self.sent_ns.insert(seq, clock::now_ns());
+            self.sent_ns.entry(seq).or_insert_with(clock::now_ns);
         }
         for topic in self.harness.topics().leading(Direction::Forward) {
             if let Some(message) = self.reference.get(topic, seq) {
