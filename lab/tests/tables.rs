@@ -243,6 +243,7 @@ fn an_ablation_has_a_learned_mask_where_the_network_fits_the_raster() {
 }
 
 #[test]
+#[ignore = "nightly: many runs"]
 fn an_ablation_leads_from_the_papers_form_to_each_sequences_own_configuration() {
     let folder = lab_folder();
     let ended = Ended::of(ablation(folder.path()));
