@@ -5,8 +5,8 @@ use std::{num::NonZeroUsize, path::PathBuf};
 use clap::{Args, Parser, Subcommand};
 
 use crate::{
-    corrupt::CorruptArguments, localisation::LocalisationArguments, places::PlacesArguments,
-    sequence::SequenceArguments, slam::SlamArguments,
+    corrupt::CorruptArguments, gnss::GnssArguments, localisation::LocalisationArguments,
+    places::PlacesArguments, sequence::SequenceArguments, slam::SlamArguments,
 };
 
 /// Gyre's laboratory: what research on radar odometry needs, and a robot does not.
@@ -36,6 +36,8 @@ pub enum Command {
     Places(PlacesArguments),
     /// Close the loops of a run, correct its trajectory, and compare both with the ground truth.
     Slam(SlamArguments),
+    /// Cut holes out of the fixes of GNSS of a run, and measure how SLAM bridges them.
+    Gnss(GnssArguments),
     /// Measure localisation in a map: the first fix by each scan alone, whole and half hidden, and
     /// tracking.
     Localisation(LocalisationArguments),

@@ -5,6 +5,7 @@ mod cli;
 mod corrupt;
 mod drive;
 mod export_pairs;
+mod gnss;
 mod localisation;
 mod models;
 mod places;
@@ -30,6 +31,7 @@ fn main() -> ExitCode {
         Command::ExportPairs(arguments) => export_pairs::export_pairs(&arguments),
         Command::Places(arguments) => places::places(&arguments),
         Command::Slam(arguments) => slam::slam(&arguments),
+        Command::Gnss(arguments) => gnss::gnss(&arguments),
         Command::Localisation(arguments) => localisation::localisation(&arguments),
     };
     gyre_terminal::report("gyre-lab", result)

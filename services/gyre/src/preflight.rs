@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use gyre_configuration::{Configuration, Played, open};
+use gyre_configuration::{Configuration, Played, gnss_log, open};
 use gyre_live_radar::Settings;
 use gyre_maps::localise::searched_map;
 use gyre_masking::Masker;
@@ -111,6 +111,7 @@ pub fn check(configuration: &Configuration) -> Result<Preflight, Failure> {
         &configuration.odometry.points,
         &configuration.odometry.masking,
     )?;
+    gnss_log(configuration)?;
     if configuration.slam.is_localised() {
         searched_map::open(&configuration.slam.map, configuration)?;
     }

@@ -18,6 +18,7 @@ use gyre_run::{
     Budget, LinkConfig, Mode, PlayedFrom, RecordConfig, RunConfig, Scenario, Side, SourceConfig,
     SourceKind, StageConfig,
 };
+use gyre_samples::GnssConfig;
 use gyre_scan_matching::RefinementKind;
 use gyre_simulator::{OutputFormat, SimulationConfig};
 use gyre_slam::SlamConfig;
@@ -50,6 +51,9 @@ pub struct Configuration {
     pub odometry: OdometryConfig,
     /// The correction of the trajectory at places that are seen again.
     pub slam: SlamConfig,
+    /// The fixes of GNSS that the corrected trajectory is made with. Odometry does not depend on
+    /// them.
+    pub gnss: GnssConfig,
     /// The limits that `gyre stress` checks: limits for all scenarios, and in `[budget.NAME]` for
     /// one of them. A scenario whose purpose is a fault (`slow-stage`, `stopped`, `kills`) is
     /// judged by `recovery_ms` and by its own limits alone, and `bursts` by drops only if it names
@@ -142,6 +146,7 @@ impl Configuration {
             },
             odometry: method.odometry,
             slam: method.slam,
+            gnss: method.gnss,
             budget: budget(&mut table)?,
             record: strict::section(&mut table, "record")?,
             link: strict::section(&mut table, "link")?,
@@ -214,6 +219,7 @@ impl Configuration {
             Some(Side::Robot) => {
                 self.link.keyframes |= self.slam.is_on();
                 self.slam = SlamConfig::default();
+                self.gnss = GnssConfig::default();
             }
             Some(Side::Base) => {
                 self.simulation = None;

@@ -33,4 +33,6 @@ pub use error::ConfigurationError;
 pub use masks::{describe_masks, describe_masks_in_process};
 pub use method::MethodConfig;
 #[cfg(feature = "run")]
-pub use scans::{Played, SourceError, fingerprint, open, simulated_samples, with_stored_options};
+pub use scans::{
+    Played, SourceError, fingerprint, gnss_log, open, simulated_samples, with_stored_options,
+};

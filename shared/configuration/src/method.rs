@@ -2,6 +2,7 @@
 
 use gyre_odometry::OdometryConfig;
 use gyre_radar::DatasetOptions;
+use gyre_samples::GnssConfig;
 use gyre_slam::SlamConfig;
 use serde::Serialize;
 use toml::Table;
@@ -22,11 +23,13 @@ pub struct MethodConfig {
     pub odometry: OdometryConfig,
     /// The correction of the trajectory at places that are seen again.
     pub slam: SlamConfig,
+    /// The fixes that the corrected trajectory is made with.
+    pub gnss: GnssConfig,
 }
 
 impl MethodConfig {
     /// The names of the sections.
-    pub const SECTIONS: [&str; 11] = [
+    pub const SECTIONS: [&str; 12] = [
         "dataset",
         "raster",
         "points",
@@ -38,6 +41,7 @@ impl MethodConfig {
         "refinement",
         "gyro",
         "slam",
+        "gnss",
     ];
 
     /// The names of the other sections of a configuration, which are for a run of processes.
@@ -70,6 +74,7 @@ impl MethodConfig {
                 gyro: section(table, "gyro")?,
             },
             slam: section(table, "slam")?,
+            gnss: section(table, "gnss")?,
         })
     }
 
@@ -87,6 +92,7 @@ impl MethodConfig {
         within("exhaustive", odometry.exhaustive.validate())?;
         within("refinement", odometry.refinement.validate())?;
         within("gyro", odometry.gyro.validate())?;
-        within("slam.places", self.slam.validate())
+        within("slam.places", self.slam.validate())?;
+        within("gnss", self.gnss.validate())
     }
 }

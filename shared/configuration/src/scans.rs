@@ -3,9 +3,11 @@
 
 use std::path::Path;
 
-use gyre_radar::{Dataset, Fingerprint, GyroLog, LogError, OpenError, ScanSamples};
+use gyre_radar::{
+    Dataset, Fingerprint, GnssLog, GnssLogError, GyroLog, LogError, OpenError, ScanSamples,
+};
 use gyre_run::PlayedFrom;
-use gyre_samples::{GyroConfig, GyroKind};
+use gyre_samples::{GnssKind, GyroConfig, GyroKind};
 use gyre_simulator::{SimulatedDrive, SimulatorError};
 use thiserror::Error;
 
@@ -34,6 +36,14 @@ pub enum SourceError {
     /// The log of the gyro cannot be used.
     #[error(transparent)]
     Gyro(#[from] LogError),
+    /// The log of the GNSS receiver cannot be used.
+    #[error(transparent)]
+    Gnss(#[from] GnssLogError),
+    /// A simulation, which has no fixes.
+    #[error(
+        "gnss.kind is `auto`, but a simulation has no log beside its scans: name one with gnss.kind = \"log\" and gnss.file, or set gnss.kind = \"none\""
+    )]
+    NoGnss,
     /// A simulation without a gyro.
     #[error(
         "gyro.kind is `auto`, but the simulation has no gyro: give it one in [simulation.gyro], or set gyro.kind = \"none\""
@@ -102,6 +112,18 @@ pub fn simulated_samples(
         gyro,
         dataset,
     )?)
+}
+
+/// Returns the log of the fixes that the corrected trajectory is made with; `None` without GNSS.
+///
+/// # Errors
+/// No log, or one that cannot be used.
+pub fn gnss_log(configuration: &Configuration) -> Result<Option<GnssLog>, SourceError> {
+    let config = &configuration.gnss;
+    if config.kind == GnssKind::Auto && configuration.streamed().is_some() {
+        return Err(SourceError::NoGnss);
+    }
+    Ok(GnssLog::open(config, &configuration.source.data)?)
 }
 
 /// Returns the configuration with the options of the recording's `dataset.toml` where it has none.

@@ -4,10 +4,12 @@
 //! - [`write`](write()): all results, made from the journal in one pass;
 //! - [`odometry`]: the rows of `odometry.csv`; [`Summary`]: `summary.json`; [`judgement`]: the
 //!   evaluation in it;
+//! - [`georeference`]: the place of a run on the earth;
 //! - [`Identity`]: what the run was begun with;
 //! - [`evaluate`]: the report on a trajectory beside ground truth.
 
 pub mod evaluate;
+mod georeference;
 mod identity;
 pub mod judgement;
 pub mod machine;
@@ -17,10 +19,11 @@ mod poses;
 mod results;
 mod summary;
 
+pub use georeference::georeference;
 pub use identity::{Holds, Identity, Programs};
 pub use out::{Out, OutError, absolute};
 pub use results::{Results, SIMULATED_TRUTH, SUMMARY, map_options, write};
 pub use summary::{
-    Counter, Counts, Course, Form, LostCounts, Measured, MotionCounts, Problem, Session,
-    SlamSummary, Summary,
+    Counter, Counts, Course, Form, GnssSummary, LostCounts, Measured, MotionCounts, Problem,
+    Session, SlamSummary, Summary,
 };

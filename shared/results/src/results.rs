@@ -26,7 +26,7 @@ use gyre_terminal::{Failure, print};
 use crate::{
     judgement::{Judgement, judge, judge_motions, note_time_offset},
     out::Out,
-    summary::{Measured, Session, SlamSummary, Summary},
+    summary::{GnssSummary, Measured, Session, SlamSummary, Summary},
 };
 use estimate::Estimate;
 use files::Files;
@@ -112,6 +112,10 @@ pub fn write(
         let png = map::map_png(configuration, out, slam, &trajectory)?;
         png.map_or(Ok(()), |png| files.add("map.png", png))?;
     }
+    let gnss = slam.as_mut().map(Slam::gnss).transpose()?.flatten();
+    if let Some(refusal) = gnss.as_ref().and_then(GnssSummary::refusal) {
+        print::note(format_args!("the fixes of GNSS are not used: {refusal}"));
+    }
     let judgement = truth.and_then(|truth| judged(&truth, &read.estimate));
     for (name, plot) in plots(&read.sketch, judgement.as_ref())? {
         files.add(name, plot)?;
@@ -129,6 +133,7 @@ pub fn write(
         latency,
         evaluation: judgement,
         slam: corrected,
+        gnss,
     };
     let summary = Summary::new(configuration, out.path(), session, measured);
     files.add(SUMMARY, serde_json::to_string_pretty(&summary)?)?;

@@ -2,6 +2,7 @@
 
 mod counts;
 mod ending;
+mod gnss;
 mod slam;
 
 use std::{collections::BTreeMap, fmt, path::Path, time::Duration};
@@ -17,6 +18,7 @@ use thiserror::Error;
 use crate::{judgement::Judgement, machine::Machine};
 
 pub use counts::{Counter, Counts, Course, LostCounts, MotionCounts};
+pub use gnss::GnssSummary;
 pub use slam::SlamSummary;
 
 /// This session of a run.
@@ -99,6 +101,8 @@ pub struct Measured {
     pub evaluation: Option<Judgement>,
     /// The loops, with SLAM.
     pub slam: Option<SlamSummary>,
+    /// The fixes of GNSS, where there are some.
+    pub gnss: Option<GnssSummary>,
 }
 
 /// The summary of a run: `summary.json`.
@@ -143,6 +147,9 @@ pub struct Summary {
     /// `None`: the trajectory is not corrected by loops.
     #[serde(skip_serializing_if = "Option::is_none")]
     slam: Option<SlamSummary>,
+    /// `None`: the trajectory is not corrected by GNSS.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    gnss: Option<GnssSummary>,
 }
 
 /// The forms of a summary.
@@ -192,6 +199,7 @@ impl Summary {
             latency,
             evaluation,
             slam,
+            gnss,
         } = measured;
         let (wall_s, report) = (session.wall.as_secs_f64(), session.report);
         Self {
@@ -229,6 +237,7 @@ impl Summary {
             latency,
             evaluation,
             slam,
+            gnss,
         }
     }
 }
@@ -303,6 +312,9 @@ impl fmt::Display for Summary {
         }
         if let Some(slam) = &self.slam {
             writeln!(f, "\n{slam}")?;
+        }
+        if let Some(gnss) = &self.gnss {
+            writeln!(f, "{gnss}")?;
         }
         let corrected = match self.slam {
             Some(_) => ", trajectory_slam.tum, loops.csv, graph.g2o, map.png",

@@ -1,18 +1,23 @@
-//! The trajectory that agrees with the loops: fuses the motions between keyframes and the loops
-//! among them.
+//! The trajectory that agrees with the loops: fuses the motions between keyframes, the loops among
+//! them and the fixes of GNSS.
 //!
-//! It follows `journal/keyframes.log` and `journal/loops.log` and has no file of its own. While the
-//! run goes on, new loops are taken into the standing estimate, which may depend a little on when
-//! they came. When both logs have ended the poses are solved anew: the last correction is a
-//! function of the logs, and that of the results, which the supervisor makes from the same logs.
+//! It follows `journal/keyframes.log` and `journal/loops.log` and has no file of its own. The log of
+//! the fixes is complete when it starts; a fix counts once both keyframes around it have come. While
+//! the run goes on, new loops and fixes are taken into the standing estimate, which may depend a
+//! little on when they came. When both logs have ended the poses are solved anew: the last
+//! correction is a function of the logs, and that of the results, which the supervisor makes from
+//! the same logs.
 
 use std::path::PathBuf;
 
 use gyre_geometry::{UncertainMotion, covariance, xy_yaw};
 use gyre_messages::{Correction, CorrectionHeader, Item};
+use gyre_radar::GnssLog;
+use gyre_run::SourceConfig;
+use gyre_samples::GnssConfig;
 use gyre_slam::{
-    EstimatorKind, Keyframe, LoopVerdict, Query, RecordReader, SlamConfig, TrajectoryEstimator,
-    TrajectoryOptions,
+    EstimatorKind, Fixes, Keyframe, LoopVerdict, Query, RecordReader, SlamConfig,
+    TrajectoryEstimator, TrajectoryOptions,
 };
 use gyre_stage::{
     Follower, Launch, StageCounters, StageError,
@@ -31,14 +36,25 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let kind = slam.kind.estimator().ok_or_else(|| {
         StageError::Configuration("slam.kind is none: there is no trajectory to correct".to_owned())
     })?;
-    let mut trajectory = Trajectory::open(&launch.manifest.out, kind)?;
+    let mut trajectory = Trajectory::open(&launch.manifest.out, kind, fixes(launch)?)?;
     follower::run(launch, &mut trajectory)
+}
+
+/// Returns the fixes of GNSS of the run; none without `[gnss]`.
+fn fixes(launch: &Launch) -> Result<Fixes, StageError> {
+    let config: GnssConfig = launch.section("gnss")?;
+    let source: SourceConfig = launch.section("source")?;
+    let log = GnssLog::open(&config, &source.data).map_err(input)?;
+    let fixes = log.map(|log| log.on_radar(&config)).unwrap_or_default();
+    Ok(Fixes::new(fixes, &config))
 }
 
 struct Trajectory {
     /// The folder of the results.
     out: PathBuf,
     kind: EstimatorKind,
+    /// The fixes, of which no keyframe has one yet.
+    fixes: Fixes,
     keyframes: RecordReader<Keyframe>,
     queries: RecordReader<Query>,
     estimator: TrajectoryEstimator,
@@ -56,7 +72,7 @@ struct Trajectory {
 }
 
 impl Trajectory {
-    fn open(out: &std::path::Path, kind: EstimatorKind) -> Result<Self, StageError> {
+    fn open(out: &std::path::Path, kind: EstimatorKind, fixes: Fixes) -> Result<Self, StageError> {
         let options = TrajectoryOptions {
             kind,
             ..TrajectoryOptions::default()
@@ -66,7 +82,8 @@ impl Trajectory {
             kind,
             keyframes: RecordReader::open(out)?,
             queries: RecordReader::open(out)?,
-            estimator: TrajectoryEstimator::new(options),
+            estimator: TrajectoryEstimator::new(options).with_fixes(fixes.clone()),
+            fixes,
             newest: None,
             read: [0, 0],
             corrected: None,
@@ -86,7 +103,7 @@ impl Trajectory {
             .zip(unchanged)
             .any(|(read, unchanged)| unchanged < *read);
         if was_cut {
-            *self = Self::open(&self.out.clone(), self.kind)?;
+            *self = Self::open(&self.out.clone(), self.kind, self.fixes.clone())?;
         }
         Ok(())
     }
@@ -96,9 +113,11 @@ impl Trajectory {
         let [keyframes, queries] = self.read;
         if keyframes < self.keyframes.len() {
             let keyframe = self.keyframes.read_without_points(keyframes)?;
+            let fixes = self.estimator.fixes().taken();
             self.estimator.push(&keyframe).map_err(input)?;
-            // Without a new loop the poses before stay where they are.
-            self.corrected = self.corrected.map(|last| last.then(&keyframe.motion));
+            // Without a new loop or fix the poses before stay where they are.
+            let standing = self.corrected.map(|last| last.then(&keyframe.motion));
+            self.corrected = standing.filter(|_| self.estimator.fixes().taken() == fixes);
             self.newest = Some(keyframe);
             self.read[0] += 1;
         } else if queries < self.queries.len() {

@@ -79,7 +79,7 @@ impl Logs {
     }
 
     fn trajectory(&self) -> Trajectory {
-        Trajectory::open(self.out.path(), EstimatorKind::Graph).unwrap()
+        Trajectory::open(self.out.path(), EstimatorKind::Graph, self.fixes.clone()).unwrap()
     }
 }
 

@@ -65,6 +65,7 @@ pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
         Some(&mut configuration.source.data),
         configuration.run.ground_truth.as_mut(),
         Some(&mut configuration.slam.map),
+        configuration.gnss.file.as_mut(),
         Some(&mut configuration.link.ca),
         Some(&mut configuration.link.certificate),
         Some(&mut configuration.link.key),

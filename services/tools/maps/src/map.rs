@@ -17,7 +17,7 @@ use gyre_mapping::{
     Drawing, Evidence, MapOptions, Origin, write_geotiff, write_pgm, write_web_tiles,
 };
 use gyre_radar::{Trajectory, ground_truth::read_trajectory};
-use gyre_results::{Out, map_options};
+use gyre_results::{Out, georeference, map_options};
 use gyre_slam::{Keyframe, RecordReader, records_path};
 use gyre_storage::StorageError;
 use gyre_terminal::{Failure, print};
@@ -72,7 +72,7 @@ fn draw_run(arguments: &MapArguments) -> Result<Drawing, Failure> {
             trajectory.display()
         ));
     }
-    let (out, origin) = (&arguments.out, arguments.origin);
+    let (out, origin) = (&arguments.out, origin(arguments)?);
     if arguments.format.contains(&MapFormat::Folder) {
         let placed = keyframes::placed(&mut keyframes, &poses)?;
         folder::write(out, &placed, drawing.evidence(), origin)?;
@@ -98,6 +98,17 @@ pub fn evidence(run: &Path, folder: &Path, placed: &Pose) -> Result<Evidence, Fa
         }
     }
     Ok(evidence)
+}
+
+/// Returns the place of the map on the earth: the one that was given, else that of the run by GNSS.
+/// Another trajectory has a frame of its own, and so has odometry once fixes have corrected it.
+fn origin(arguments: &MapArguments) -> Result<Option<Origin>, Failure> {
+    let is_corrected = trajectory_of(&arguments.run).ends_with(CORRECTED);
+    let is_of_run = arguments.trajectory.is_none() && is_corrected;
+    match arguments.origin {
+        None if is_of_run => georeference(&arguments.run),
+        given => Ok(given),
+    }
 }
 
 /// Returns the trajectory of a run: the corrected one, if it has one.

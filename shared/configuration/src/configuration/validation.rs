@@ -4,7 +4,9 @@ use gyre_colossus::Address;
 use gyre_messages::StageId;
 use gyre_ros2_messages::Domain;
 use gyre_run::{Limits, Mode, PlayedFrom, Rate, Side, SourceConfig, SourceKind, StageConfig};
+use gyre_samples::GnssKind;
 use gyre_simulator::OutputFormat;
+use gyre_slam::SlamKind;
 
 use super::Configuration;
 use crate::{
@@ -20,6 +22,7 @@ impl Configuration {
             dataset: self.dataset,
             odometry: self.odometry.clone(),
             slam: self.slam.clone(),
+            gnss: self.gnss.clone(),
         };
         method.validate()?;
         within("run", self.window(None, 1).validate())?;
@@ -49,6 +52,7 @@ impl Configuration {
             let reason = "map is set, but the keyframes that are found in it are those of slam: set kind to `graph`";
             return Err(value("slam", reason));
         }
+        self.validate_gnss()?;
         self.validate_radar()?;
         self.validate_budget()?;
         self.validate_record()?;
@@ -64,6 +68,24 @@ impl Configuration {
             return Err(value("run", reason));
         }
         Ok(())
+    }
+
+    /// Fixes are constraints of a graph, and of a recording: their log is complete when it begins.
+    fn validate_gnss(&self) -> Result<(), ConfigurationError> {
+        let reason = match self.gnss.kind {
+            GnssKind::None => return Ok(()),
+            _ if self.slam.kind != SlamKind::Graph => {
+                "kind is set, but fixes are constraints of the graph of slam: set slam.kind to `graph`"
+            }
+            GnssKind::Log if self.gnss.file.is_none() => {
+                "kind is `log`, but no file is named: set file, or kind to `auto`"
+            }
+            GnssKind::Auto if self.is_radar() => {
+                "kind is `auto`, but the log of a live radar does not lie beside its scans: name one with kind = \"log\" and file"
+            }
+            _ => return Ok(()),
+        };
+        Err(value("gnss", reason))
     }
 
     /// A recording that takes the place of stages is a recording of a run, and has the topic of a

@@ -9,6 +9,9 @@ use crate::EstimationError;
 /// gate of loops.
 pub const CHI_SQUARE_99_9: f64 = 16.266;
 
+/// The 99.9 % quantile with two degrees of freedom: the gate of positions.
+pub const CHI_SQUARE_99_9_PLANE: f64 = 13.816;
+
 /// A measured relative pose of two keyframes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Constraint {

@@ -57,6 +57,14 @@ pub enum EstimationError {
         /// The keyframe that is measured.
         to: usize,
     },
+    /// A measured position cannot be weighted.
+    #[error(
+        "the position measured at keyframe {keyframe} is not finite, or its variance or share is not above zero"
+    )]
+    Position {
+        /// The keyframe.
+        keyframe: usize,
+    },
     /// The trajectory filter is full.
     #[error(
         "the trajectory filter is full: it holds {limit} keyframes, with a covariance of {} MB. Use the pose graph for a longer \

@@ -4,6 +4,7 @@ mod cholesky;
 mod covariance;
 mod dogleg;
 mod edge;
+mod positions;
 mod solve;
 mod system;
 
@@ -16,6 +17,8 @@ use crate::kernel::Kernel;
 use crate::relative::Relative;
 use crate::{CHI_SQUARE_99_9, Constraint, EstimationError, Kind, Outcome, Verdict};
 use edge::Edge;
+use positions::Measured;
+pub use positions::{Position, WeightedPosition, align};
 use solve::Weights;
 use system::System;
 
@@ -58,15 +61,25 @@ impl Default for GraphOptions {
 /// the kernel when the graph is solved.
 pub struct PoseGraph {
     options: GraphOptions,
-    poses: Vec<Pose>,
+    state: State,
     odometry: Vec<Edge>,
     loops: Vec<Closing>,
     /// Number of loops of each group.
     groups: BTreeMap<u64, usize>,
+    positions: Vec<Measured>,
     /// The normal equations of the present constraints; `None` after a constraint was added.
     system: Option<System>,
     /// True if the system is factorised, undamped, at the present poses.
     factorised: bool,
+}
+
+/// What is estimated.
+#[derive(Clone)]
+struct State {
+    poses: Vec<Pose>,
+    /// The pose of the graph's frame in that of the positions; `None` without positions that tell
+    /// it. In the equations it follows the poses.
+    frame: Option<Pose>,
 }
 
 /// A loop that passed the gate.
@@ -110,10 +123,14 @@ impl PoseGraph {
     pub fn new(start: Pose, options: GraphOptions) -> Self {
         Self {
             options,
-            poses: vec![start],
+            state: State {
+                poses: vec![start],
+                frame: None,
+            },
             odometry: Vec::new(),
             loops: Vec::new(),
             groups: BTreeMap::new(),
+            positions: Vec::new(),
             system: None,
             factorised: false,
         }
@@ -132,8 +149,8 @@ impl PoseGraph {
             return self.apply_tested(constraint, tested.chi_square);
         };
         let edge = self.edge(constraint)?;
-        let end = self.poses[constraint.from] * constraint.motion.motion;
-        self.poses.push(end);
+        let end = self.state.poses[constraint.from] * constraint.motion.motion;
+        self.state.poses.push(end);
         self.odometry.push(edge);
         self.forget_system();
         Ok(Verdict {
@@ -185,7 +202,7 @@ impl PoseGraph {
     /// Returns the poses of all keyframes, as last solved; those added since continue from there by
     /// odometry.
     pub fn poses(&self) -> &[Pose] {
-        &self.poses
+        &self.state.poses
     }
 
     /// Moves all poses, for instance to those of a file, as the start of the next solution. The
@@ -194,13 +211,13 @@ impl PoseGraph {
     /// # Errors
     /// There is not one pose for each keyframe.
     pub fn start_from(&mut self, poses: &[Pose]) -> Result<(), EstimationError> {
-        if poses.len() != self.poses.len() {
+        if poses.len() != self.state.poses.len() {
             return Err(EstimationError::StartPoses {
                 poses: poses.len(),
-                keyframes: self.poses.len(),
+                keyframes: self.state.poses.len(),
             });
         }
-        self.poses.copy_from_slice(poses);
+        self.state.poses.copy_from_slice(poses);
         self.factorised = false;
         Ok(())
     }
@@ -208,7 +225,7 @@ impl PoseGraph {
     /// Returns half the sum of the squared normalised residuals at the present poses, those of
     /// loops after the kernel.
     pub fn cost(&self) -> f64 {
-        0.5 * self.chi_square(&self.poses, Weights::Kernel)
+        0.5 * self.chi_square(&self.state, Weights::Kernel)
     }
 
     /// Returns all loops that passed the gate, in the order in which they came, or by keyframes
@@ -219,7 +236,7 @@ impl PoseGraph {
             WeightedLoop {
                 from,
                 to,
-                chi_square: closing.edge.chi_square(&self.poses),
+                chi_square: closing.edge.chi_square(&self.state.poses),
                 weight: closing.weight,
             }
         })
@@ -246,7 +263,7 @@ impl PoseGraph {
 
     /// Returns the edge of a constraint that the graph can take.
     fn edge(&self, constraint: &Constraint) -> Result<Edge, EstimationError> {
-        constraint.check(self.poses.len())?;
+        constraint.check(self.state.poses.len())?;
         let &Constraint {
             from, to, motion, ..
         } = constraint;

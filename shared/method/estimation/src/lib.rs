@@ -8,7 +8,7 @@
 //! - [`TrajectoryFilter`]: the extended Kalman filter of Checchin et al. over the poses of all
 //!   keyframes, for short trajectories;
 //! - [`PoseGraph`]: sparse least squares, for days of driving and many loops; [`Kernel`]: what it
-//!   does with wrong loops;
+//!   does with wrong loops; [`Position`]: measured positions in a frame of their own;
 //! - [`G2o`]: pose graphs as files of other programs;
 //! - [`places`]: recognises places that are visited again, and measures the loops between them.
 //!
@@ -52,9 +52,11 @@ mod kernel;
 pub mod places;
 mod relative;
 
-pub use constraint::{CHI_SQUARE_99_9, Constraint, Kind, Outcome, Verdict};
+pub use constraint::{CHI_SQUARE_99_9, CHI_SQUARE_99_9_PLANE, Constraint, Kind, Outcome, Verdict};
 pub use error::EstimationError;
 pub use filter::{FilterOptions, TrajectoryFilter};
 pub use g2o::{G2o, G2oError};
-pub use graph::{GraphOptions, PoseGraph, Solution, WeightedLoop};
+pub use graph::{
+    GraphOptions, PoseGraph, Position, Solution, WeightedLoop, WeightedPosition, align,
+};
 pub use kernel::Kernel;

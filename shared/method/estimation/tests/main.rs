@@ -10,4 +10,5 @@ mod filter;
 mod g2o;
 mod graph;
 mod places;
+mod positions;
 mod wrong_loops;

@@ -6,10 +6,10 @@
 //! - [`SampleTrack`]: its samples in the vehicle's axes on the radar's clock;
 //! - `faults`: what is wrong with the samples, and which of them are left out.
 
-mod columns;
+pub(crate) mod columns;
 mod error;
 mod faults;
-mod table;
+pub(crate) mod table;
 mod track;
 mod twist;
 
@@ -92,11 +92,7 @@ impl GyroLog {
     /// # Errors
     /// No log, or only one of which the ground truth was made.
     pub fn find(folder: &Path) -> Result<PathBuf, LogError> {
-        let name = folder.file_name().and_then(|name| name.to_str());
-        let is_of_images = name.is_some_and(|name| IMAGES.contains(&name));
-        let above = folder.parent().filter(|_| is_of_images);
-        let roots = [Some(folder), above];
-        let roots = || roots.into_iter().flatten();
+        let roots = || roots(folder);
         let found = roots()
             .flat_map(|root| PLACES.iter().map(|place| root.join(place)))
             .find(|path| path.is_file() || (path.is_dir() && twist::is_one(path)));
@@ -125,6 +121,15 @@ impl GyroLog {
             path: path.to_owned(),
         })
     }
+}
+
+/// Returns the folders in which the logs of a dataset are looked for: its own, and the one above
+/// that of the images.
+pub(crate) fn roots(folder: &Path) -> impl Iterator<Item = &Path> {
+    let name = folder.file_name().and_then(|name| name.to_str());
+    let is_of_images = name.is_some_and(|name| IMAGES.contains(&name));
+    let above = folder.parent().filter(|_| is_of_images);
+    [Some(folder), above].into_iter().flatten()
 }
 
 /// The samples of a file as they stand there.

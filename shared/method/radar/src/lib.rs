@@ -14,6 +14,7 @@ mod chain;
 mod clock;
 pub mod dataset;
 pub mod fingerprint;
+mod gnss_log;
 pub mod ground_truth;
 mod gyro_log;
 pub mod inspect;
@@ -36,6 +37,7 @@ pub use dataset::{
     parse_seconds, reopen, stamp_to_ns, stored_options, turn_ns,
 };
 pub use fingerprint::Fingerprint;
+pub use gnss_log::{GnssFaults, GnssLog, GnssLogError, LoggedFix};
 pub use ground_truth::{
     TrajectoryError, find_ground_truth, parse_trajectory, read_trajectory, write_kitti, write_tum,
 };

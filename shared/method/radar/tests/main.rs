@@ -5,6 +5,7 @@
 mod common;
 
 mod frames;
+mod gnss_logs;
 mod gyro_logs;
 mod inspect;
 mod real_scans;

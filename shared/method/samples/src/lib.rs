@@ -8,17 +8,23 @@
 //! - [`Sample`]: one measurement, as it travels with a scan;
 //! - [`GyroConfig`]: the section `[gyro]`;
 //! - [`Gyro`]: integrates the yaw rate between two scans, to a [`GyroTurn`];
-//! - [`LiveSamples`]: what has arrived of a live gyro.
+//! - [`LiveSamples`]: what has arrived of a live gyro;
+//! - [`GnssConfig`]: the section `[gnss]`, and [`GnssFix`], which goes with no scan;
+//! - [`LocalPlane`]: places on the earth as coordinates in a plane.
 //!
 //! Axes are those of the vehicle by REP-103: x forward, y left, z up. Rates are in rad/s, stamps in
 //! ns since 1970 on the radar's clock.
 
 mod config;
+mod geodesy;
+mod gnss;
 mod gyro;
 mod live;
 mod sample;
 
 pub use config::{GyroConfig, GyroConfigError, GyroKind, UpAxis};
+pub use geodesy::{Geographic, LocalPlane};
+pub use gnss::{GnssConfig, GnssConfigError, GnssFix, GnssKind};
 pub use gyro::{Gyro, GyroTurn, interval_of, with_yaw_rate};
 pub use live::LiveSamples;
 pub use sample::{MAX_RATE_RADPS, MAX_SAMPLES, Sample, SampleKind};

@@ -8,6 +8,7 @@
 //!   with their verdicts;
 //! - [`RecordLog`]: the files of keyframes, places and queries of a run; [`RecordReader`] follows
 //!   them;
+//! - [`Fixes`]: the fixes of GNSS of a drive;
 //! - [`TrajectoryEstimator`]: the poses of all keyframes from odometry and loops;
 //! - [`Correction`]: the poses of all scans.
 
@@ -16,6 +17,7 @@ mod config;
 mod consistency;
 mod correction;
 mod exact;
+mod fixes;
 mod keyframe;
 mod keyframe_builder;
 mod loops;
@@ -28,6 +30,7 @@ mod verdict;
 pub use closing::{ClosingError, KeyframeSource, LoopCloser, LoopOptions};
 pub use config::{SlamConfig, SlamKind};
 pub use correction::Correction;
+pub use fixes::{FixCounts, FixRefusal, Fixes};
 pub use keyframe::Keyframe;
 pub use keyframe_builder::{KeyframeBuilder, ScanPose};
 pub use loops::{LoopCandidate, LoopOutcome, Query};

@@ -2,12 +2,13 @@
 
 use gyre_estimation::{
     Constraint, EstimationError, FilterOptions, GraphOptions, Kind, Outcome, PoseGraph,
-    TrajectoryFilter, Verdict,
+    TrajectoryFilter, Verdict, WeightedPosition,
 };
 use gyre_geometry::{Pose, UncertainMotion};
 use nalgebra::Matrix3;
 
 use crate::consistency::{DeadReckoning, Speakers};
+use crate::fixes::{Fixes, Stamped};
 use crate::{Correction, JudgedLoop, Keyframe, LoopVerdict, Query, variance};
 
 /// All loops are judged anew when their number has grown by this share of it: that takes time in
@@ -59,6 +60,11 @@ pub struct TrajectoryEstimator {
     /// at that time.
     speakers: Speakers,
     judged: usize,
+    /// The fixes of GNSS, and the number of them when all were judged and when the standing
+    /// estimate was made.
+    fixes: Fixes,
+    judged_fixes: usize,
+    given_fixes: usize,
     /// Of the covariances of the poses.
     scale: f64,
     estimator: Estimator,
@@ -67,10 +73,20 @@ pub struct TrajectoryEstimator {
 /// A keyframe with its pose by odometry.
 struct Corrected {
     seq: u64,
+    stamp_ns: i64,
     odometry: Pose,
     motion: UncertainMotion,
     noise: Matrix3<f64>,
     path_m: f64,
+}
+
+impl Corrected {
+    fn stamped(&self) -> Stamped {
+        Stamped {
+            stamp_ns: self.stamp_ns,
+            odometry: self.odometry,
+        }
+    }
 }
 
 enum Estimator {
@@ -120,8 +136,19 @@ impl TrajectoryEstimator {
             loops: Vec::new(),
             speakers: Speakers::default(),
             judged: 0,
+            fixes: Fixes::default(),
+            judged_fixes: 0,
+            given_fixes: 0,
             scale: 1.0,
         }
+    }
+
+    /// Uses these fixes of GNSS: each when both keyframes around it have come. The filter ignores
+    /// them.
+    #[must_use]
+    pub fn with_fixes(mut self, fixes: Fixes) -> Self {
+        self.fixes = fixes;
+        self
     }
 
     /// Takes the next keyframe. The first one stays where odometry has it. Until the next solution,
@@ -142,11 +169,16 @@ impl TrajectoryEstimator {
         self.odometry.push(&keyframe.motion);
         self.keyframes.push(Corrected {
             seq: keyframe.seq,
+            stamp_ns: keyframe.stamp_ns,
             odometry: keyframe.pose.motion,
             motion: keyframe.motion,
             noise: keyframe.noise,
             path_m: keyframe.path_m,
         });
+        if let [.., from, to] = self.keyframes.as_slice() {
+            let from_index = self.keyframes.len() - 2;
+            self.fixes.advance(from_index, from.stamped(), to.stamped());
+        }
         Ok(())
     }
 
@@ -182,6 +214,7 @@ impl TrajectoryEstimator {
         match self.options.kind {
             EstimatorKind::Graph => {
                 self.judge_all();
+                self.compare_clocks();
                 self.solve_graph()
             }
             EstimatorKind::Filter => self.filter(),
@@ -251,6 +284,36 @@ impl TrajectoryEstimator {
         motions.map(|(last, keyframe)| Constraint::odometry(last, keyframe.motion))
     }
 
+    /// Returns the fixes of GNSS, and what became of them.
+    pub fn fixes(&self) -> &Fixes {
+        &self.fixes
+    }
+
+    /// Returns the fixes that the keyframes have, with their weights as of the last solution; none
+    /// if they were refused, and in the filter.
+    pub fn positions(&self) -> Vec<WeightedPosition> {
+        match &self.estimator {
+            Estimator::Graph(graph) => graph.positions().collect(),
+            Estimator::Filter(_) => Vec::new(),
+        }
+    }
+
+    /// Returns the pose of the frame of the first scan in that of the fixes, east and north, with
+    /// its covariance; `None` without fixes that tell it.
+    ///
+    /// # Errors
+    /// The constraints do not determine the poses.
+    pub fn east_north_from_map(&mut self) -> Result<Option<UncertainMotion>, EstimationError> {
+        let frame = match &mut self.estimator {
+            Estimator::Graph(graph) => graph.uncertain_frame()?,
+            Estimator::Filter(_) => None,
+        };
+        Ok(frame.map(|frame| UncertainMotion {
+            covariance: frame.covariance * self.scale,
+            ..frame
+        }))
+    }
+
     /// Returns the correction of the poses of all scans.
     pub fn correction(&self) -> Correction {
         let keyframes = self.keyframes.iter().map(|it| (it.seq, it.odometry));
@@ -311,33 +374,60 @@ impl TrajectoryEstimator {
         }
     }
 
-    /// Solves the graph with all loops that are used, from the odometry.
+    /// Compares the clock of the fixes with that of the keyframes.
+    fn compare_clocks(&mut self) {
+        let stamped: Vec<Stamped> = self.keyframes.iter().map(Corrected::stamped).collect();
+        self.fixes.compare_clocks(&stamped);
+        self.judged_fixes = self.fixes.taken();
+    }
+
+    /// Solves the graph with all loops that are used and all fixes, from the odometry. If most of
+    /// the fixes contradict the solution it is made without them.
     fn solve_graph(&mut self) -> Result<(), EstimationError> {
         let Estimator::Graph(graph) = &mut self.estimator else {
             return Ok(());
         };
         graph.clear_loops();
+        graph.clear_positions();
         for it in &mut self.loops {
             it.is_taken = it.is_used();
             if it.is_taken {
                 graph.apply_tested(&it.constraint, it.chi_square)?;
             }
         }
+        self.given_fixes = self.fixes.taken();
+        let has_fixes = self.given_fixes > 0 && self.fixes.refusal().is_none();
+        if has_fixes {
+            self.fixes.give(graph, 0)?;
+        }
         graph.solve_anew()?;
+        if has_fixes {
+            self.fixes.check(graph);
+        }
+        if has_fixes && self.fixes.refusal().is_some() {
+            graph.clear_positions();
+            graph.solve_anew()?;
+        }
         self.weigh();
         Ok(())
     }
 
-    /// Solves the graph with the loops that are new and used, from the standing poses.
+    /// Solves the graph with the loops and fixes that are new and used, from the standing poses.
     fn update_graph(&mut self) -> Result<(), EstimationError> {
-        match self.loops.len() > self.judged + self.judged / GROWTH {
+        let has_grown = |now: usize, judged: usize| now > judged + judged / GROWTH;
+        match has_grown(self.loops.len(), self.judged) {
             true => self.judge_all(),
             false => self.compare(|it| it.is_used() && !it.is_taken),
         }
         let standing = self.loops.iter().filter(|it| it.is_taken).count();
         let new = |it: &&mut JudgedLoop| it.is_used() && !it.is_taken;
         let is_withdrawn = self.loops.iter().any(|it| it.is_taken && !it.is_used());
-        if is_withdrawn || self.loops.iter_mut().filter(new).count() > standing {
+        let are_fixes_judged = has_grown(self.fixes.taken(), self.judged_fixes);
+        if are_fixes_judged {
+            self.compare_clocks();
+        }
+        if are_fixes_judged || is_withdrawn || self.loops.iter_mut().filter(new).count() > standing
+        {
             return self.solve_graph();
         }
         let Estimator::Graph(graph) = &mut self.estimator else {
@@ -347,6 +437,10 @@ impl TrajectoryEstimator {
             graph.apply_tested(&it.constraint, it.chi_square)?;
             it.is_taken = true;
         }
+        if self.fixes.refusal().is_none() {
+            self.fixes.give(graph, self.given_fixes)?;
+        }
+        self.given_fixes = self.fixes.taken();
         graph.solve()?;
         self.weigh();
         Ok(())

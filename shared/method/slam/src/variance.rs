@@ -48,13 +48,15 @@ pub fn scale(
 }
 
 /// The residuals of all constraints. There are as many more constraints than poses as there are
-/// groups of loops.
+/// groups of loops, and two for each fix that counts, less three for the frame of the fixes.
 fn whole(graph: &PoseGraph, loops: &[JudgedLoop]) -> Residuals {
     let used = loops.iter().filter(|it| it.is_used());
     let groups: BTreeSet<Kind> = used.map(|it| it.constraint.kind).collect();
+    let fixes = graph.positions().filter(|it| it.weight > 0.0);
+    let fixes: f64 = fixes.map(|it| it.position.share).sum();
     Residuals {
         sum: 2.0 * graph.cost() / 3.0,
-        expected: groups.len() as f64,
+        expected: groups.len() as f64 + (2.0 * fixes / 3.0 - 1.0).max(0.0),
     }
 }
 

@@ -5,4 +5,5 @@
 mod common;
 
 mod closing;
+mod fixes;
 mod trajectory;

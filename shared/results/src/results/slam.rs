@@ -3,20 +3,23 @@
 
 use std::fmt::{self, Write};
 
-use gyre_configuration::Configuration;
+use gyre_configuration::{Configuration, gnss_log};
 use gyre_estimation::{Constraint, EstimationError, G2o};
 use gyre_evaluation::{BandSample, Bands, LoopErrors, TruthSigma, loop_errors};
 use gyre_geometry::{Pose, xy_yaw};
 use gyre_journal as journal;
 use gyre_messages::flag;
-use gyre_radar::Trajectory;
+use gyre_radar::{GnssLog, Trajectory};
 use gyre_slam::{
-    Correction, Keyframe, LoopOutcome, LoopVerdict, Query, RecordReader, TrajectoryEstimator,
-    TrajectoryOptions, records_path,
+    Correction, Fixes, Keyframe, LoopOutcome, LoopVerdict, Query, RecordReader,
+    TrajectoryEstimator, TrajectoryOptions, records_path,
 };
 use gyre_terminal::Failure;
 
-use crate::{out::Out, summary::SlamSummary};
+use crate::{
+    out::Out,
+    summary::{GnssSummary, SlamSummary},
+};
 
 /// Keyframes whose covariance is computed, at most: each takes a millisecond in a long drive.
 const DRAWN: usize = 1000;
@@ -30,6 +33,8 @@ pub struct Slam {
     queries: Vec<Query>,
     /// The scan and the time of each keyframe.
     keyframes: Vec<(u64, i64)>,
+    /// The log of the fixes, where there is one.
+    gnss: Option<GnssLog>,
 }
 
 /// Checks that a run without keyframes has no poses either: the first one has a keyframe.
@@ -61,10 +66,14 @@ impl Slam {
             return require_no_poses(out).map(|()| None);
         }
         let queries = queries(out)?;
+        let gnss = gnss_log(configuration)?;
+        let config = &configuration.gnss;
+        let fixes = gnss.as_ref().map(|log| log.on_radar(config));
         let mut estimator = TrajectoryEstimator::new(TrajectoryOptions {
             kind,
             ..TrajectoryOptions::default()
-        });
+        })
+        .with_fixes(Fixes::new(fixes.unwrap_or_default(), config));
         let mut known = Vec::new();
         for index in 0..keyframes.len() {
             // With its points: the checksum is that of the whole record.
@@ -82,6 +91,7 @@ impl Slam {
             estimator,
             queries,
             keyframes: known,
+            gnss,
         }))
     }
 
@@ -150,6 +160,18 @@ impl Slam {
             self.estimator.poses(),
             self.estimator.odometry().chain(self.used()),
         )
+    }
+
+    /// Returns what became of the fixes of GNSS, and the place on the earth; `None` without them.
+    ///
+    /// # Errors
+    /// Constraints that do not determine the poses.
+    pub fn gnss(&mut self) -> Result<Option<GnssSummary>, Failure> {
+        let Some(log) = &self.gnss else {
+            return Ok(None);
+        };
+        self.estimator.scale_covariances()?;
+        Ok(Some(GnssSummary::of(log, &mut self.estimator)?))
     }
 
     /// Returns the errors of the corrected keyframes with what their covariances say, against the

@@ -174,6 +174,7 @@ mod tests {
             },
             evaluation: None,
             slam: None,
+            gnss: None,
         };
         Summary::new(&configuration, "out/radiate".as_ref(), &session, measured)
     }

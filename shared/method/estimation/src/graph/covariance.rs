@@ -20,10 +20,10 @@ impl PoseGraph {
     /// # Errors
     /// There is no such keyframe, or the constraints do not determine the poses.
     pub fn pose(&mut self, keyframe: usize) -> Result<UncertainMotion, EstimationError> {
-        keyframe_exists(keyframe, self.poses.len())?;
+        keyframe_exists(keyframe, self.state.poses.len())?;
         let covariance = self.project(&[(keyframe, Matrix3::identity())])?;
         Ok(UncertainMotion {
-            motion: self.poses[keyframe],
+            motion: self.state.poses[keyframe],
             covariance,
         })
     }
@@ -35,8 +35,8 @@ impl PoseGraph {
     /// # Errors
     /// As [`PoseGraph::pose`].
     pub fn predict(&mut self, from: usize, to: usize) -> Result<UncertainMotion, EstimationError> {
-        keyframe_exists(from.max(to), self.poses.len())?;
-        let relative = Relative::predict(&self.poses[from], &self.poses[to]);
+        keyframe_exists(from.max(to), self.state.poses.len())?;
+        let relative = Relative::predict(&self.state.poses[from], &self.state.poses[to]);
         let covariance = self.project(&[(from, relative.by_from), (to, relative.by_to)])?;
         Ok(UncertainMotion {
             motion: relative.motion,
@@ -45,7 +45,7 @@ impl PoseGraph {
     }
 
     /// Returns the covariance of the sum of poses times their Jacobians: J inv(H) J'.
-    fn project(
+    pub(super) fn project(
         &mut self,
         jacobians: &[(usize, Matrix3<f64>)],
     ) -> Result<Matrix3<f64>, EstimationError> {

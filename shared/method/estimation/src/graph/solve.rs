@@ -7,7 +7,7 @@ use nalgebra::DVector;
 use super::dogleg::Dogleg;
 use super::edge::Edge;
 use super::system::System;
-use super::{Closing, PoseGraph, Solution};
+use super::{Closing, PoseGraph, Solution, State};
 use crate::EstimationError;
 use crate::relative::corrected;
 
@@ -43,13 +43,14 @@ impl PoseGraph {
     /// The equations have no solution within the range of numbers, or do not fit into memory. The
     /// poses are then those before.
     pub fn solve(&mut self) -> Result<Solution, EstimationError> {
-        let before = self.poses.clone();
+        let before = self.state.clone();
+        self.place_frame();
         let solved = self.descend(Weights::Kept, COARSE).and_then(|(first, _)| {
             let (then, converged) = self.descend(Weights::Kernel, self.options.tolerance)?;
             Ok((first + then, converged))
         });
         self.factorised = solved.is_ok();
-        let (iterations, converged) = solved.inspect_err(|_| self.poses = before)?;
+        let (iterations, converged) = solved.inspect_err(|_| self.state = before)?;
         Ok(Solution {
             cost: self.cost(),
             iterations,
@@ -65,7 +66,7 @@ impl PoseGraph {
     pub fn solve_anew(&mut self) -> Result<Solution, EstimationError> {
         for edge in &self.odometry {
             let [from, to] = edge.ends;
-            self.poses[to] = self.poses[from] * edge.motion.motion;
+            self.state.poses[to] = self.state.poses[from] * edge.motion.motion;
         }
         for closing in &mut self.loops {
             closing.weight = self.options.kernel.weight(closing.gate_chi_square);
@@ -80,8 +81,15 @@ impl PoseGraph {
             };
             a.edge.ends.cmp(&b.edge.ends).then_with(by_motion)
         });
+        self.state.frame = None;
         self.system = None;
         self.factorised = false;
+        self.place_frame();
+        if self.state.frame.is_some() {
+            let before = self.state.clone();
+            let chosen = self.choose_positions();
+            chosen.inspect_err(|_| self.state = before)?;
+        }
         self.solve()
     }
 
@@ -90,9 +98,13 @@ impl PoseGraph {
         let system = match self.system.take() {
             Some(system) => system,
             None => {
-                let ends: Vec<_> = self.edges().map(|edge| edge.ends).collect();
-                let keyframes = self.poses.len();
-                System::new(keyframes, &ends).map_err(|_| EstimationError::Memory { keyframes })?
+                let keyframes = self.state.poses.len();
+                let positions = self.positions.iter().filter(|_| self.state.frame.is_some());
+                let positions = positions.map(|measured| measured.ends(keyframes));
+                let ends = self.edges().map(|edge| edge.ends).chain(positions);
+                let nodes = keyframes + usize::from(self.state.frame.is_some());
+                System::new(nodes, &ends.collect::<Vec<_>>())
+                    .map_err(|_| EstimationError::Memory { keyframes })?
             }
         };
         Ok(self.system.insert(system))
@@ -124,20 +136,20 @@ impl PoseGraph {
 
     /// Moves the poses until a full Gauss-Newton step lowers the cost by less than `tolerance` of
     /// it. Returns the number of linearisations, and whether this was reached.
-    fn descend(
+    pub(super) fn descend(
         &mut self,
         weights: Weights,
         tolerance: f64,
     ) -> Result<(usize, bool), EstimationError> {
-        let mut cost = self.chi_square(&self.poses, weights);
+        let mut cost = self.chi_square(&self.state, weights);
         let mut radius = f64::INFINITY;
         for iteration in 1..=self.options.max_iterations {
             let gradient = self.linearise(weights)?;
             let dogleg = Dogleg::new(self.factorise()?, gradient);
-            let Some((poses, lower)) = self.step(&dogleg, weights, cost, &mut radius)? else {
+            let Some((state, lower)) = self.step(&dogleg, weights, cost, &mut radius)? else {
                 return Ok((iteration, true));
             };
-            self.poses = poses;
+            self.state = state;
             if dogleg.full_length() <= radius && cost - lower <= tolerance * cost {
                 return Ok((iteration, true));
             }
@@ -146,7 +158,7 @@ impl PoseGraph {
         Ok((self.options.max_iterations, false))
     }
 
-    /// Returns poses whose cost is not above `cost`, with their cost; `None` if there are none
+    /// Returns a state whose cost is not above `cost`, with their cost; `None` if there are none
     /// nearby. Adapts the trust radius.
     fn step(
         &mut self,
@@ -154,11 +166,11 @@ impl PoseGraph {
         weights: Weights,
         cost: f64,
         radius: &mut f64,
-    ) -> Result<Option<(Vec<Pose>, f64)>, EstimationError> {
+    ) -> Result<Option<(State, f64)>, EstimationError> {
         while *radius > SHORTEST_STEP {
             let step = dogleg.within(*radius);
-            let poses = self.moved(&step);
-            let lower = self.chi_square(&poses, weights);
+            let state = self.moved(&step);
+            let lower = self.chi_square(&state, weights);
             let gain = (cost - lower) / dogleg.predicted(self.prepare()?, &step);
             if lower <= cost {
                 if gain > GOOD_GAIN {
@@ -166,7 +178,7 @@ impl PoseGraph {
                 } else if gain < POOR_GAIN {
                     *radius = 0.5 * step.norm();
                 }
-                return Ok(Some((poses, lower)));
+                return Ok(Some((state, lower)));
             }
             *radius = 0.25 * step.norm();
         }
@@ -186,9 +198,10 @@ impl PoseGraph {
             .collect();
         let Self {
             system: Some(system),
-            poses,
+            state: State { poses, frame },
             odometry,
             loops,
+            positions,
             options,
             ..
         } = self
@@ -210,11 +223,30 @@ impl PoseGraph {
             let weight = share * closing.weight;
             system.add(number, closing.edge.ends, &linear, weight, &mut side);
         }
+        let Some(frame) = frame else {
+            return Ok(side);
+        };
+        for (number, measured) in positions.iter_mut().enumerate() {
+            let linear = measured.linearise(poses, frame);
+            if weights == Weights::Kernel {
+                measured.weigh(&options.kernel, linear.chi_square);
+            }
+            let number = odometry.len() + loops.len() + number;
+            let weight = measured.share() * measured.weight;
+            system.add(
+                number,
+                measured.ends(poses.len()),
+                &linear,
+                weight,
+                &mut side,
+            );
+        }
         Ok(side)
     }
 
-    /// Returns the sum of the squared normalised residuals at `poses`, those of loops weighted.
-    pub(super) fn chi_square(&self, poses: &[Pose], weights: Weights) -> f64 {
+    /// Returns the sum of the squared normalised residuals in a state, those of loops and positions
+    /// weighted.
+    pub(super) fn chi_square(&self, State { poses, frame }: &State, weights: Weights) -> f64 {
         let odometry = self.odometry.iter().map(|edge| edge.chi_square(poses));
         let loops = self.loops.iter().map(|closing| {
             let chi_square = closing.edge.chi_square(poses);
@@ -224,14 +256,24 @@ impl PoseGraph {
                     Weights::Kernel => self.options.kernel.cost(chi_square),
                 }
         });
-        odometry.chain(loops).sum()
+        let positions = frame.iter().flat_map(|frame| {
+            self.positions.iter().map(move |measured| {
+                let chi_square = measured.chi_square(poses, frame);
+                measured.share() * measured.cost(chi_square, weights, &self.options.kernel)
+            })
+        });
+        odometry.chain(loops).chain(positions).sum()
     }
 
-    fn moved(&self, step: &DVector<f64>) -> Vec<Pose> {
-        let moved = |(keyframe, pose)| match System::row(keyframe) {
+    fn moved(&self, step: &DVector<f64>) -> State {
+        let moved = |(node, pose): (usize, &Pose)| match System::row(node) {
             Some(row) => corrected(pose, &step.fixed_rows::<3>(row).into_owned()),
             None => *pose,
         };
-        self.poses.iter().enumerate().map(moved).collect()
+        let State { poses, frame } = &self.state;
+        State {
+            poses: poses.iter().enumerate().map(moved).collect(),
+            frame: frame.as_ref().map(|frame| moved((poses.len(), frame))),
+        }
     }
 }

@@ -21,7 +21,7 @@ const MAX_NS: i64 = i64::MAX / 2;
 
 /// The unit of stamps.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum StampUnit {
+pub(crate) enum StampUnit {
     /// An integer number of so many ns.
     Ns(i64),
     /// Decimal seconds.
@@ -32,7 +32,7 @@ pub(super) enum StampUnit {
 
 impl StampUnit {
     /// Returns the time of a stamp, ns.
-    pub(super) fn ns(self, text: &str) -> Option<i64> {
+    pub(crate) fn ns(self, text: &str) -> Option<i64> {
         let ns = match self {
             Self::Ns(unit) => text.parse::<i64>().ok()?.checked_mul(unit),
             Self::Seconds => parse_seconds(text),
@@ -202,14 +202,15 @@ impl Columns {
 }
 
 /// A name of a column with what programs write in different ways made equal.
-fn plain(name: &str) -> String {
+pub(crate) fn plain(name: &str) -> String {
     let name = name.trim().trim_start_matches(['%', '#']);
     let name = name.strip_prefix("field.").unwrap_or(name).trim();
     let name = name.to_lowercase().replace([' ', '.', '/', '['], "_");
     name.replace(']', "").replace("__", "_").replace("^2", "2")
 }
 
-fn stamp_unit(name: &str) -> Option<StampUnit> {
+/// Returns the unit of a column of stamps by its name; `None` for another column.
+pub(crate) fn stamp_unit(name: &str) -> Option<StampUnit> {
     let with_unit = |(unit, meaning): &(&str, StampUnit)| {
         let named = name.strip_suffix(unit)?;
         STAMPS.contains(&named).then_some(*meaning)

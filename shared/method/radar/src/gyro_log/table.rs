@@ -24,17 +24,22 @@ pub(super) fn read(path: &Path) -> Result<Raw, LogError> {
     })
 }
 
-fn parse(text: &str) -> Result<Raw, String> {
+/// Returns a reader of the rows, the first one among them.
+pub(crate) fn reader(text: &str) -> csv::Reader<&[u8]> {
     let first = text.lines().next().unwrap_or_default();
     let mark = MARKS
         .into_iter()
         .find(|mark| first.as_bytes().contains(mark));
-    let mut reader = csv::ReaderBuilder::new()
+    csv::ReaderBuilder::new()
         .has_headers(false)
         .flexible(true)
         .trim(csv::Trim::All)
         .delimiter(mark.unwrap_or(b','))
-        .from_reader(text.as_bytes());
+        .from_reader(text.as_bytes())
+}
+
+fn parse(text: &str) -> Result<Raw, String> {
+    let mut reader = reader(text);
     let mut row = StringRecord::new();
     let mut next = |row: &mut StringRecord| reader.read_record(row).map_err(|e| e.to_string());
     if !next(&mut row)? {

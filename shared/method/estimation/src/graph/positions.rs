@@ -1,0 +1,284 @@
+//! Measured positions of keyframes in a frame of their own, as those of GNSS, and the pose of the
+//! graph's frame in it.
+
+use gyre_geometry::{Pose, UncertainMotion};
+use nalgebra::{Matrix2x3, Matrix3, Vector2};
+
+use super::edge::{Ends, Linear};
+use super::solve::Weights;
+use super::{PoseGraph, State};
+use crate::EstimationError;
+use crate::constraint::{CHI_SQUARE_99_9_PLANE, keyframe_exists};
+use crate::kernel::Kernel;
+
+/// The heading of the graph's frame must be known to this standard deviation before positions move
+/// any pose, rad: linearised equations hold within it.
+const MAX_YAW_SIGMA: f64 = 0.2;
+/// Scales of the kernel, each half of the one before, at most: from 10^18 times the gate.
+const MAX_SCALES: usize = 60;
+/// The tolerance of the descents between them.
+const COARSE: f64 = 0.1;
+
+/// A measured position of a point that a keyframe carries, as of an antenna.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Position {
+    /// The keyframe, counted from 0.
+    pub keyframe: usize,
+    /// The point in the frame of the keyframe, m.
+    pub lever_m: Vector2<f64>,
+    /// The measured position in the frame of the positions, m.
+    pub position_m: Vector2<f64>,
+    /// Variance along each axis, m².
+    pub variance_m2: f64,
+    /// How much it counts, above 0 up to 1: less than 1 if its error depends on those of others.
+    pub share: f64,
+}
+
+/// A position with what the last solution makes of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WeightedPosition {
+    /// The measurement.
+    pub position: Position,
+    /// Squared normalised difference from the estimate; 2 is expected of a right one.
+    pub chi_square: f64,
+    /// The kernel's weight, 0 to 1; 0 if it is beyond the gate.
+    pub weight: f64,
+}
+
+/// A position in a graph.
+pub(super) struct Measured {
+    it: Position,
+    /// The kernel's weight.
+    pub(super) weight: f64,
+    /// It contradicts the others.
+    is_refused: bool,
+}
+
+impl Measured {
+    pub(super) fn share(&self) -> f64 {
+        self.it.share
+    }
+
+    pub(super) fn ends(&self, keyframes: usize) -> Ends {
+        [self.it.keyframe, keyframes]
+    }
+
+    /// Weighs it by the kernel.
+    pub(super) fn weigh(&mut self, kernel: &Kernel, chi_square: f64) {
+        self.weight = match self.is_refused {
+            true => 0.0,
+            false => kernel.weight(chi_square),
+        };
+    }
+
+    /// Returns its part of the cost, times two, without its share.
+    pub(super) fn cost(&self, chi_square: f64, weights: Weights, kernel: &Kernel) -> f64 {
+        match weights {
+            _ if self.is_refused => 0.0,
+            Weights::Kept => self.weight * chi_square,
+            Weights::Kernel => kernel.cost(chi_square),
+        }
+    }
+
+    /// Returns the squared normalised difference of the measured position from that by the poses.
+    pub(super) fn chi_square(&self, poses: &[Pose], frame: &Pose) -> f64 {
+        let in_graph = poses[self.it.keyframe] * nalgebra::Point2::from(self.it.lever_m);
+        let residual = self.it.position_m - (frame * in_graph).coords;
+        residual.norm_squared() / self.it.variance_m2
+    }
+
+    /// Linearises the cost at `poses`: of the keyframe, then of the frame.
+    pub(super) fn linearise(&self, poses: &[Pose], frame: &Pose) -> Linear {
+        let pose = &poses[self.it.keyframe];
+        let along = pose.rotation * self.it.lever_m;
+        let in_graph = pose.translation.vector + along;
+        let turn = frame.rotation.to_rotation_matrix().into_inner();
+        let turned = |lever: Vector2<f64>| turn * Vector2::new(-lever.y, lever.x);
+        let rows = |by_place: nalgebra::Matrix2<f64>, by_yaw: Vector2<f64>| {
+            Matrix2x3::from_columns(&[
+                by_place.column(0).into_owned(),
+                by_place.column(1).into_owned(),
+                by_yaw,
+            ])
+        };
+        let a = rows(turn, turned(along));
+        let b = rows(nalgebra::Matrix2::identity(), turned(in_graph));
+        let residual = self.it.position_m - (turn * in_graph + frame.translation.vector);
+        let information = 1.0 / self.it.variance_m2;
+        Linear {
+            blocks: [
+                information * a.transpose() * a,
+                information * b.transpose() * b,
+            ],
+            between: information * a.transpose() * b,
+            sides: [
+                information * a.transpose() * residual,
+                information * b.transpose() * residual,
+            ],
+            chi_square: information * residual.norm_squared(),
+        }
+    }
+}
+
+impl PoseGraph {
+    /// Takes a measured position. Positions move no pose until [`PoseGraph::solve`], nor before
+    /// they tell the heading of the frame.
+    ///
+    /// # Errors
+    /// An unknown keyframe, values that are not finite, a variance or a share that is not above
+    /// zero.
+    pub fn measure(&mut self, position: Position) -> Result<(), EstimationError> {
+        let keyframe = position.keyframe;
+        keyframe_exists(keyframe, self.state.poses.len())?;
+        let is_finite = |vector: &Vector2<f64>| vector.iter().all(|it| it.is_finite());
+        let is_usable = is_finite(&position.lever_m)
+            && is_finite(&position.position_m)
+            && (f64::MIN_POSITIVE..f64::INFINITY).contains(&position.variance_m2)
+            && (f64::MIN_POSITIVE..=1.0).contains(&position.share);
+        if !is_usable {
+            return Err(EstimationError::Position { keyframe });
+        }
+        self.positions.push(Measured {
+            it: position,
+            weight: 1.0,
+            is_refused: false,
+        });
+        self.forget_system();
+        Ok(())
+    }
+
+    /// Removes all positions, and the pose of the frame in theirs.
+    pub fn clear_positions(&mut self) {
+        self.positions.clear();
+        self.state.frame = None;
+        self.forget_system();
+    }
+
+    /// Returns the pose of the graph's frame in the frame of the positions; `None` if they do not
+    /// tell it.
+    pub fn frame(&self) -> Option<Pose> {
+        self.state.frame
+    }
+
+    /// Returns that pose with its covariance.
+    ///
+    /// # Errors
+    /// The constraints do not determine it.
+    pub fn uncertain_frame(&mut self) -> Result<Option<UncertainMotion>, EstimationError> {
+        let Some(motion) = self.state.frame else {
+            return Ok(None);
+        };
+        let node = self.state.poses.len();
+        let covariance = self.project(&[(node, Matrix3::identity())])?;
+        Ok(Some(UncertainMotion { motion, covariance }))
+    }
+
+    /// Returns all positions in the order in which they came; none have weight before the frame is
+    /// known.
+    pub fn positions(&self) -> impl Iterator<Item = WeightedPosition> + '_ {
+        let State { poses, frame } = &self.state;
+        self.positions.iter().map(move |measured| WeightedPosition {
+            position: measured.it,
+            chi_square: frame.map_or(f64::NAN, |frame| measured.chi_square(poses, &frame)),
+            weight: frame.map_or(0.0, |_| measured.weight),
+        })
+    }
+
+    /// Finds the pose of the frame by the present poses, unless it is known.
+    pub(super) fn place_frame(&mut self) {
+        if self.state.frame.is_none() {
+            let positions = self.positions.iter().map(|measured| &measured.it);
+            self.state.frame = align(&self.state.poses, positions);
+            if self.state.frame.is_some() {
+                self.forget_system();
+            }
+        }
+    }
+
+    /// Weighs the positions against each other and the rest, from poses that know nothing of them:
+    /// graduated non-convexity (Yang et al., RA-L 2020). With a wide kernel all count alike, and
+    /// the poses follow most of them; as it narrows those that contradict lose their weight. What
+    /// is beyond the gate at the end is not used.
+    ///
+    /// # Errors
+    /// The equations have no solution.
+    pub(super) fn choose_positions(&mut self) -> Result<(), EstimationError> {
+        for measured in &mut self.positions {
+            (measured.weight, measured.is_refused) = (1.0, false);
+        }
+        self.descend(Weights::Kept, COARSE)?;
+        let widest = self.chi_squares().fold(CHI_SQUARE_99_9_PLANE, f64::max);
+        let mut scale = widest;
+        for _ in 0..MAX_SCALES {
+            let kernel = Kernel::GemanMcClure { scale };
+            self.reweigh(|chi_square| kernel.weight(chi_square));
+            self.descend(Weights::Kept, COARSE)?;
+            if scale <= CHI_SQUARE_99_9_PLANE {
+                break;
+            }
+            scale = (0.5 * scale).max(CHI_SQUARE_99_9_PLANE);
+        }
+        let chi_squares: Vec<f64> = self.chi_squares().collect();
+        let kernel = self.options.kernel;
+        for (measured, chi_square) in self.positions.iter_mut().zip(chi_squares) {
+            measured.is_refused = chi_square > CHI_SQUARE_99_9_PLANE;
+            measured.weigh(&kernel, chi_square);
+        }
+        Ok(())
+    }
+
+    fn reweigh(&mut self, weight: impl Fn(f64) -> f64) {
+        let chi_squares: Vec<f64> = self.chi_squares().collect();
+        for (measured, chi_square) in self.positions.iter_mut().zip(chi_squares) {
+            measured.weight = weight(chi_square);
+        }
+    }
+
+    /// The chi-squares of the positions; none without a frame.
+    fn chi_squares(&self) -> impl Iterator<Item = f64> + '_ {
+        let State { poses, frame } = &self.state;
+        let frames = frame.iter();
+        frames.flat_map(move |frame| {
+            let positions = self.positions.iter();
+            positions.map(move |measured| measured.chi_square(poses, frame))
+        })
+    }
+}
+
+/// Returns the pose of the poses' frame in that of the positions that fits best, by weighted least
+/// squares (Umeyama, PAMI 1991, without scale); `None` if its heading is not known well enough.
+///
+/// # Panics
+/// A position is of an unknown keyframe.
+pub fn align<'a>(
+    poses: &[Pose],
+    positions: impl IntoIterator<Item = &'a Position>,
+) -> Option<Pose> {
+    let pair = |it: &Position| {
+        let pose = &poses[it.keyframe];
+        let at = pose.translation.vector + pose.rotation * it.lever_m;
+        (it.share / it.variance_m2, at, it.position_m)
+    };
+    let pairs: Vec<(f64, Vector2<f64>, Vector2<f64>)> = positions.into_iter().map(pair).collect();
+    let total: f64 = pairs.iter().map(|(weight, ..)| weight).sum();
+    if !(total > 0.0 && total.is_finite()) {
+        return None;
+    }
+    let mean = |of: fn(&(f64, Vector2<f64>, Vector2<f64>)) -> Vector2<f64>| {
+        let sum: Vector2<f64> = pairs.iter().map(|pair| pair.0 * of(pair)).sum();
+        sum / total
+    };
+    let (from, to) = (mean(|pair| pair.1), mean(|pair| pair.2));
+    let (mut cos, mut sin, mut spread) = (0.0, 0.0, 0.0);
+    for (weight, at, position) in &pairs {
+        let (a, b) = (at - from, position - to);
+        cos += weight * a.dot(&b);
+        sin += weight * a.perp(&b);
+        spread += weight * a.norm_squared();
+    }
+    if spread * MAX_YAW_SIGMA * MAX_YAW_SIGMA < 1.0 {
+        return None;
+    }
+    let rotation = nalgebra::UnitComplex::new(sin.atan2(cos));
+    Some(Pose::from_parts((to - rotation * from).into(), rotation))
+}

@@ -1,0 +1,46 @@
+//! Errors of logs. Each message says what is wrong, where, and what to do.
+
+use std::{io, path::PathBuf};
+
+use crate::OpenError;
+use thiserror::Error;
+
+/// A log that cannot be used.
+#[derive(Debug, Error)]
+pub enum GnssLogError {
+    /// No log beside the scans.
+    #[error(
+        "no log of a GNSS receiver lies beside the scans in {folder}: name one with gnss.kind = \"log\" and gnss.file, or set gnss.kind = \"none\""
+    )]
+    None {
+        /// The folder of the dataset.
+        folder: PathBuf,
+    },
+    /// A file that cannot be read.
+    #[error("cannot read the log of the GNSS receiver {path}: {source}")]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// The cause.
+        source: io::Error,
+    },
+    /// A table that has no fixes.
+    #[error("{path} is no log of a GNSS receiver: {reason}")]
+    Unknown {
+        /// The file.
+        path: PathBuf,
+        /// The finding, and the remedy.
+        reason: String,
+    },
+    /// A log whose fixes cannot be used.
+    #[error("the log of the GNSS receiver {path} cannot be used: {reason}")]
+    Unusable {
+        /// The file.
+        path: PathBuf,
+        /// The finding, and the remedy.
+        reason: String,
+    },
+    /// The list of the times of RADIATE's files.
+    #[error(transparent)]
+    List(#[from] OpenError),
+}

@@ -1,0 +1,180 @@
+//! Faults of the fixes of a log, and which fixes are left out.
+
+use std::{iter, ops::Range};
+
+use gyre_samples::LocalPlane;
+use serde::Serialize;
+
+use super::{LoggedFix, Raw, RawFix};
+
+/// No vehicle that carries a spinning radar is faster, m/s.
+const MAX_SPEED_MPS: f64 = 70.0;
+/// A step of fixes by less is noise, m.
+const SLACK_M: f64 = 10.0;
+/// The stated accuracy, in standard deviations, by which a step may be longer.
+const SLACK_SIGMAS: f64 = 5.0;
+/// Stretches between jumps that are looked back over: behind so many the fixes are noise.
+const LOOK_BACK: usize = 200;
+
+/// Faults of a log. What is counted is not among its fixes, but what came out of order.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct GnssFaults {
+    /// Rows that are none of the table, as one that was cut off.
+    pub unreadable: usize,
+    /// Line (of a folder of files: number) of the first of them.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub first_unreadable: usize,
+    /// Fixes with a coordinate that is not finite.
+    pub not_a_number: usize,
+    /// Fixes that are on no place of the earth.
+    pub off_the_earth: usize,
+    /// Fixes at latitude 0, longitude 0: what receivers write without a fix.
+    pub zero: usize,
+    /// Fixes with the stamp of another one.
+    pub repeated: usize,
+    /// Fixes with a stamp before that of an earlier one: sorted.
+    pub out_of_order: usize,
+    /// Fixes that jump away from the others faster than a vehicle.
+    pub jumps: usize,
+}
+
+fn is_zero(count: &usize) -> bool {
+    *count == 0
+}
+
+impl GnssFaults {
+    /// Returns the number of rows that are not among the fixes.
+    pub fn left_out(&self) -> usize {
+        self.unreadable
+            + self.not_a_number
+            + self.off_the_earth
+            + self.zero
+            + self.repeated
+            + self.jumps
+    }
+
+    /// Returns the counts that are not zero, with what was counted.
+    pub fn named(&self) -> Vec<(usize, &'static str)> {
+        let all = [
+            (self.unreadable, "unreadable"),
+            (self.not_a_number, "not a number"),
+            (self.off_the_earth, "off the earth"),
+            (self.zero, "at 0, 0"),
+            (self.repeated, "repeated"),
+            (self.out_of_order, "out of order"),
+            (self.jumps, "jump faster than a vehicle"),
+        ];
+        all.into_iter().filter(|(count, _)| *count > 0).collect()
+    }
+}
+
+/// The fixes that can be used, the plane that they are in, and the faults.
+type Examined = (Vec<LoggedFix>, Option<LocalPlane>, GnssFaults);
+
+/// Leaves out and sorts what the faults name, and counts it.
+///
+/// # Errors
+/// What is wrong with a log without a usable fix, or most of whose rows cannot be read.
+pub(super) fn examine(raw: Raw) -> Result<Examined, String> {
+    let all = raw.rows.len() + raw.unreadable;
+    let mut faults = GnssFaults {
+        unreadable: raw.unreadable,
+        first_unreadable: raw.first_unreadable,
+        ..GnssFaults::default()
+    };
+    if 2 * raw.unreadable > all {
+        return Err(format!(
+            "{} of its {all} rows cannot be read, the first in line {}: are its stamps, decimal points and columns those that its header names?",
+            raw.unreadable, raw.first_unreadable
+        ));
+    }
+    let mut rows = raw.rows;
+    faults.not_a_number = leave_out(&mut rows, |row| row.at.iter().any(|it| !it.is_finite()));
+    if !raw.is_plane {
+        faults.zero = leave_out(&mut rows, |row| row.at == [0.0, 0.0]);
+        faults.off_the_earth = leave_out(&mut rows, |row| {
+            row.at[0].abs() > 89.9 || row.at[1].abs() > 360.0
+        });
+    }
+    sort(&mut rows, &mut faults);
+    let plane_at = |row: &RawFix| LocalPlane::new(row.geographic(), finite_or_zero(row.altitude_m));
+    let first = rows.first().filter(|_| !raw.is_plane);
+    let fixes = in_plane(&rows, first.map(plane_at).as_ref());
+    let kept = without_jumps(&fixes);
+    faults.jumps = rows.len() - kept.len();
+    let rows: Vec<RawFix> = kept.into_iter().map(|k| rows[k]).collect();
+    let plane = rows.first().filter(|_| !raw.is_plane).map(plane_at);
+    match rows.is_empty() {
+        true => Err(format!("none of its {all} rows is a usable fix")),
+        false => Ok((in_plane(&rows, plane.as_ref()), plane, faults)),
+    }
+}
+
+fn finite_or_zero(value: f64) -> f64 {
+    if value.is_finite() { value } else { 0.0 }
+}
+
+/// Removes such rows, and counts them.
+fn leave_out(rows: &mut Vec<RawFix>, is_bad: impl Fn(&RawFix) -> bool) -> usize {
+    let before = rows.len();
+    rows.retain(|row| !is_bad(row));
+    before - rows.len()
+}
+
+/// Sorts fixes by their stamps, each of which is used once: the one that was written first.
+fn sort(rows: &mut Vec<RawFix>, faults: &mut GnssFaults) {
+    let before = rows.len();
+    let mut latest_ns = i64::MIN;
+    for row in rows.iter() {
+        faults.out_of_order += usize::from(row.stamp_ns < latest_ns);
+        latest_ns = latest_ns.max(row.stamp_ns);
+    }
+    rows.sort_by_key(|row| row.stamp_ns);
+    rows.dedup_by_key(|row| row.stamp_ns);
+    faults.repeated = before - rows.len();
+}
+
+fn in_plane(rows: &[RawFix], plane: Option<&LocalPlane>) -> Vec<LoggedFix> {
+    let fix = |row: &RawFix| LoggedFix {
+        stamp_ns: row.stamp_ns,
+        east_north_m: plane.map_or(row.at, |plane| plane.east_north(row.geographic())),
+        sigma_m: Some(row.sigma_m).filter(|sigma| sigma.is_finite() && *sigma > 0.0),
+    };
+    rows.iter().map(fix).collect()
+}
+
+/// Returns the indices of the fixes that are left without those that a vehicle cannot have reached:
+/// of the stretches between jumps the chain that has the most fixes.
+fn without_jumps(fixes: &[LoggedFix]) -> Vec<usize> {
+    let jumps = (1..fixes.len()).filter(|k| !is_reachable(&fixes[k - 1], &fixes[*k]));
+    let ends = (!fixes.is_empty()).then_some(fixes.len());
+    let bounds: Vec<usize> = iter::once(0).chain(jumps).chain(ends).collect();
+    let stretches: Vec<Range<usize>> = bounds.windows(2).map(|pair| pair[0]..pair[1]).collect();
+    // The fixes of the best chain that ends with a stretch, and the stretch before that.
+    let mut best: Vec<(usize, Option<usize>)> = Vec::new();
+    for (k, stretch) in stretches.iter().enumerate() {
+        let reaches = |earlier: &usize| {
+            is_reachable(&fixes[stretches[*earlier].end - 1], &fixes[stretch.start])
+        };
+        let before = (k.saturating_sub(LOOK_BACK)..k)
+            .filter(reaches)
+            .max_by_key(|earlier| best[*earlier].0);
+        best.push((stretch.len() + before.map_or(0, |k| best[k].0), before));
+    }
+    let mut at = (0..best.len()).max_by_key(|k| best[*k].0);
+    let mut chain = Vec::new();
+    while let Some(k) = at {
+        chain.push(stretches[k].clone());
+        at = best[k].1;
+    }
+    chain.into_iter().rev().flatten().collect()
+}
+
+/// Returns whether a vehicle can have driven from one fix to a later one.
+fn is_reachable(from: &LoggedFix, to: &LoggedFix) -> bool {
+    let seconds = (to.stamp_ns.saturating_sub(from.stamp_ns)) as f64 * 1e-9;
+    let [east, north] = [0, 1].map(|axis| to.east_north_m[axis] - from.east_north_m[axis]);
+    let sigma_m = [from, to].map(|fix| fix.sigma_m.unwrap_or_default());
+    let slack_m = SLACK_M + SLACK_SIGMAS * sigma_m[0].hypot(sigma_m[1]);
+    east.hypot(north) <= MAX_SPEED_MPS * seconds + slack_m
+}

@@ -1,0 +1,337 @@
+//! Fixes of GNSS in the graph: holes, reflections, wrong clocks, and what does not depend on when
+//! they came.
+
+use gyre_geometry::{Pose, Twist, UncertainMotion, interpolate, pose};
+use gyre_samples::{GnssConfig, GnssFix};
+use gyre_slam::{FixRefusal, Fixes, Keyframe, TrajectoryEstimator, TrajectoryOptions};
+use nalgebra::{Matrix3, Point2, Vector3};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+const SECOND_NS: i64 = 1_000_000_000;
+/// Standard deviations of a motion of 2 m.
+const SIGMA: [f64; 3] = [0.02, 0.01, 0.001];
+const LEVER_M: [f64; 2] = [-1.5, 0.5];
+const SIGMA_M: f64 = 1.0;
+
+fn east_north_from_map() -> Pose {
+    pose(12.0, -7.0, 1.9)
+}
+
+/// A drive through bends at 4 to 12 m/s, with a stop in the middle: keyframes each 2 m.
+struct Drive {
+    stamps: Vec<i64>,
+    truth: Vec<Pose>,
+    keyframes: Vec<Keyframe>,
+}
+
+impl Drive {
+    fn new(keyframes: usize, seed: u64) -> Self {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let covariance = Matrix3::from_diagonal(&Vector3::from(SIGMA.map(|sigma| sigma * sigma)));
+        let (mut stamps, mut truth, mut keyframes_) = (vec![0], vec![Pose::identity()], Vec::new());
+        let mut reckoned = UncertainMotion::identity();
+        for k in 0..keyframes {
+            let mut motion = UncertainMotion::identity();
+            if k > 0 {
+                let along = k as f64 / 25.0;
+                let exact = pose(2.0, 0.0, 0.04 * (along.sin() + 0.6 * (0.37 * along).cos()));
+                let error: [f64; 3] = SIGMA.map(|sigma| {
+                    let normal: f64 = StandardNormal.sample(&mut random);
+                    sigma * normal
+                });
+                let measured = exact * pose(error[0], error[1], error[2]);
+                motion = UncertainMotion {
+                    motion: measured,
+                    covariance,
+                };
+                let speed_mps = 8.0 + 4.0 * (0.07 * k as f64).sin();
+                let stop_s = if k == keyframes / 2 { 20.0 } else { 0.0 };
+                stamps.push(stamps[k - 1] + ((2.0 / speed_mps + stop_s) * 1e9) as i64);
+                truth.push(truth[k - 1] * exact);
+            }
+            reckoned = reckoned.then(&motion).normalized();
+            keyframes_.push(Keyframe {
+                seq: k as u64,
+                scan: k as u64,
+                stamp_ns: stamps[k],
+                pose: reckoned,
+                motion: motion.normalized(),
+                noise: Matrix3::zeros(),
+                twist: Twist::default(),
+                path_m: 2.0 * k as f64,
+                points: Vec::new(),
+            });
+        }
+        Self {
+            stamps,
+            truth,
+            keyframes: keyframes_,
+        }
+    }
+
+    /// The true pose in the map: at the stop the vehicle stands at the earlier keyframe, and then
+    /// drives on within a quarter of a second.
+    fn at(&self, stamp_ns: i64) -> Pose {
+        let next = self.stamps.partition_point(|it| *it <= stamp_ns);
+        let next = next.clamp(1, self.stamps.len() - 1);
+        let (from, to) = (self.stamps[next - 1], self.stamps[next]);
+        let from = from.max(to - SECOND_NS / 4).min(to - 1);
+        let share = ((stamp_ns - from) as f64 / (to - from) as f64).max(0.0);
+        interpolate(&self.truth[next - 1], &self.truth[next], share)
+    }
+
+    /// Fixes at 10 Hz, white.
+    fn fixes(&self, seed: u64) -> Vec<GnssFix> {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let last_ns = self.stamps[self.stamps.len() - 1];
+        let stamps = (-20..).map(|k| k * SECOND_NS / 10 + 1_234_567);
+        let stamps = stamps.take_while(|stamp_ns| *stamp_ns < last_ns + 2 * SECOND_NS);
+        let mut noise = || -> f64 { StandardNormal.sample(&mut random) };
+        stamps
+            .map(|stamp_ns| {
+                let at = east_north_from_map() * self.at(stamp_ns) * Point2::from(LEVER_M);
+                GnssFix {
+                    stamp_ns,
+                    east_m: at.x + SIGMA_M * noise(),
+                    north_m: at.y + SIGMA_M * noise(),
+                    sigma_m: SIGMA_M,
+                }
+            })
+            .collect()
+    }
+
+    fn with(&self, fixes: Vec<GnssFix>) -> TrajectoryEstimator {
+        let config = GnssConfig {
+            lever_m: LEVER_M,
+            correlation_s: 0.0,
+            ..GnssConfig::default()
+        };
+        let estimator = TrajectoryEstimator::new(TrajectoryOptions::default());
+        estimator.with_fixes(Fixes::new(fixes, &config))
+    }
+
+    fn solved(&self, fixes: Vec<GnssFix>) -> TrajectoryEstimator {
+        let mut estimator = self.with(fixes);
+        self.keyframes
+            .iter()
+            .for_each(|it| estimator.push(it).unwrap());
+        estimator.solve().unwrap();
+        estimator
+    }
+
+    /// The error of a keyframe on the earth, m.
+    fn error_m(&self, estimator: &mut TrajectoryEstimator, keyframe: usize) -> f64 {
+        let frame = estimator.east_north_from_map().unwrap().unwrap().motion;
+        let found = frame * estimator.poses()[keyframe];
+        let truth = east_north_from_map() * self.truth[keyframe];
+        (found.translation.vector - truth.translation.vector).norm()
+    }
+}
+
+fn used(estimator: &TrajectoryEstimator) -> usize {
+    let positions = estimator.positions();
+    positions.iter().filter(|it| it.weight >= 0.25).count()
+}
+
+#[test]
+fn the_drive_lies_where_the_fixes_say_and_drifts_no_more() {
+    let drive = Drive::new(900, 1);
+    let mut estimator = drive.solved(drive.fixes(2));
+    let reckoned = drive.keyframes[899].pose.motion;
+    let drift_m = (reckoned.translation.vector - drive.truth[899].translation.vector).norm();
+    assert!(drift_m > 3.0, "{drift_m}");
+    for keyframe in [0, 200, 450, 700, 899] {
+        let error_m = drive.error_m(&mut estimator, keyframe);
+        assert!(error_m < 0.6, "{keyframe}: {error_m}");
+    }
+    assert!(estimator.fixes().refusal().is_none());
+    assert!(
+        estimator
+            .fixes()
+            .clock()
+            .is_some_and(|clock| clock.late_s.abs() < 0.15)
+    );
+}
+
+#[test]
+fn all_fixes_are_counted_once() {
+    let drive = Drive::new(300, 1);
+    let fixes = drive.fixes(2);
+    let all = fixes.len();
+    let estimator = drive.solved(fixes);
+    let counts = estimator.fixes().counts();
+    assert_eq!(
+        counts.outside + counts.thinned + counts.far + counts.taken,
+        all
+    );
+    // Two seconds before and after, and the stop of 20 s.
+    assert!((38..=42).contains(&counts.outside), "{counts:?}");
+    assert!(counts.far > 150 && counts.taken > 200, "{counts:?}");
+    assert_eq!(estimator.fixes().positions().len(), counts.taken);
+}
+
+#[test]
+fn holes_are_bridged() {
+    let drive = Drive::new(900, 3);
+    for start_s in [20, 60, 100] {
+        let hole = start_s * SECOND_NS..(start_s + 20) * SECOND_NS;
+        let fixes = drive.fixes(4);
+        let kept = fixes
+            .into_iter()
+            .filter(|fix| !hole.contains(&fix.stamp_ns));
+        let mut estimator = drive.solved(kept.collect());
+        let middle = drive
+            .stamps
+            .partition_point(|it| *it < (start_s + 10) * SECOND_NS);
+        let error_m = drive.error_m(&mut estimator, middle);
+        assert!(error_m < 0.8, "{start_s}: {error_m}");
+    }
+}
+
+#[test]
+fn a_reflection_is_refused() {
+    let drive = Drive::new(900, 5);
+    let mut fixes = drive.fixes(6);
+    let reflected = 40 * SECOND_NS..55 * SECOND_NS;
+    for fix in fixes
+        .iter_mut()
+        .filter(|fix| reflected.contains(&fix.stamp_ns))
+    {
+        fix.east_m += 16.0;
+        fix.north_m -= 12.0;
+    }
+    let mut estimator = drive.solved(fixes);
+    let taken = estimator.fixes().taken();
+    let middle = drive.stamps.partition_point(|it| *it < 47 * SECOND_NS);
+    let error_m = drive.error_m(&mut estimator, middle);
+    assert!(error_m < 0.8, "{error_m}");
+    let refused = taken - used(&estimator);
+    let inside = estimator
+        .fixes()
+        .positions()
+        .iter()
+        .filter(|it| reflected.contains(&it.0));
+    let inside = inside.count();
+    assert!(
+        refused.abs_diff(inside) <= inside / 10,
+        "{refused} of {inside}"
+    );
+}
+
+#[test]
+fn single_wrong_fixes_are_refused() {
+    let drive = Drive::new(600, 7);
+    let mut fixes = drive.fixes(8);
+    for fix in fixes.iter_mut().step_by(9) {
+        fix.east_m -= 25.0;
+    }
+    let mut estimator = drive.solved(fixes);
+    for keyframe in [100, 300, 500] {
+        let error_m = drive.error_m(&mut estimator, keyframe);
+        assert!(error_m < 0.8, "{keyframe}: {error_m}");
+    }
+}
+
+#[test]
+fn a_clock_that_is_wrong_is_told_and_its_fixes_are_not_used() {
+    let drive = Drive::new(900, 9);
+    let without = drive.solved(Vec::new());
+    for late_s in [-60, -5, 1, 60] {
+        let mut fixes = drive.fixes(10);
+        fixes
+            .iter_mut()
+            .for_each(|fix| fix.stamp_ns += late_s * SECOND_NS);
+        let mut estimator = drive.solved(fixes);
+        match estimator.fixes().refusal() {
+            Some(FixRefusal::Clock(clock)) => {
+                assert!(
+                    (clock.late_s - late_s as f64).abs() < 0.1,
+                    "{late_s}: {clock}"
+                );
+            }
+            // A second is within the noise of a fix.
+            None if late_s == 1 => continue,
+            other => panic!("{late_s}: {other:?}"),
+        }
+        assert_eq!(estimator.poses(), without.poses(), "{late_s}");
+        assert!(estimator.east_north_from_map().unwrap().is_none());
+        assert_eq!(used(&estimator), 0);
+    }
+}
+
+#[test]
+fn fixes_of_another_drive_are_refused_as_a_whole() {
+    let drive = Drive::new(500, 9);
+    let without = drive.solved(Vec::new());
+    // Places that have nothing to do with the drive.
+    let mut fixes = drive.fixes(10);
+    for (k, fix) in fixes.iter_mut().enumerate() {
+        let along = k as f64 / 40.0;
+        (fix.east_m, fix.north_m) = (150.0 * along.cos(), 90.0 * (2.3 * along).sin());
+    }
+    let estimator = drive.solved(fixes);
+    assert!(estimator.fixes().refusal().is_some());
+    assert_eq!(estimator.poses(), without.poses());
+    let later = drive.fixes(10).into_iter().map(|fix| GnssFix {
+        stamp_ns: fix.stamp_ns + 3600 * SECOND_NS,
+        ..fix
+    });
+    let estimator = drive.solved(later.collect());
+    assert_eq!(estimator.fixes().refusal(), Some(&FixRefusal::Elsewhere));
+    assert_eq!(estimator.poses(), without.poses());
+}
+
+#[test]
+fn a_log_that_ends_early_leaves_the_rest_to_odometry() {
+    let drive = Drive::new(900, 11);
+    let mut fixes = drive.fixes(12);
+    fixes.retain(|fix| fix.stamp_ns < 60 * SECOND_NS);
+    let mut estimator = drive.solved(fixes);
+    assert!(drive.error_m(&mut estimator, 200) < 0.6);
+    let sigma_m = |estimator: &mut TrajectoryEstimator, keyframe| {
+        estimator.pose(keyframe).unwrap().covariance[(0, 0)].sqrt()
+    };
+    assert!(sigma_m(&mut estimator, 899) > 2.0 * sigma_m(&mut estimator, 200));
+    let last = estimator.poses()[898].inv_mul(&estimator.poses()[899]);
+    let motion = drive.keyframes[899].motion.motion;
+    assert!((last.translation.vector - motion.translation.vector).norm() < 1e-6);
+}
+
+#[test]
+fn the_solution_does_not_depend_on_when_it_was_asked_for() {
+    let drive = Drive::new(400, 13);
+    let at_once = drive.solved(drive.fixes(14));
+    let mut followed = drive.with(drive.fixes(14));
+    for keyframe in &drive.keyframes {
+        followed.push(keyframe).unwrap();
+        followed.update().unwrap();
+    }
+    let apart = |a: &Pose, b: &Pose| (a.translation.vector - b.translation.vector).norm();
+    let most = followed
+        .poses()
+        .iter()
+        .zip(at_once.poses())
+        .map(|(a, b)| apart(a, b));
+    let most = most.fold(0.0, f64::max);
+    assert!(most < 0.2, "{most}");
+    followed.solve().unwrap();
+    assert_eq!(followed.poses(), at_once.poses());
+    assert_eq!(followed.positions(), at_once.positions());
+}
+
+#[test]
+fn without_fixes_nothing_changes() {
+    let drive = Drive::new(100, 15);
+    let plain = {
+        let mut estimator = TrajectoryEstimator::new(TrajectoryOptions::default());
+        drive
+            .keyframes
+            .iter()
+            .for_each(|it| estimator.push(it).unwrap());
+        estimator.solve().unwrap();
+        estimator
+    };
+    assert_eq!(plain.poses(), drive.solved(Vec::new()).poses());
+}

@@ -1,0 +1,157 @@
+//! The part of the summary about GNSS.
+
+use std::fmt;
+
+use gyre_estimation::EstimationError;
+use gyre_geometry::{UncertainMotion, xy_yaw};
+use gyre_mapping::Origin;
+use gyre_radar::{GnssFaults, GnssLog};
+use gyre_slam::TrajectoryEstimator;
+use serde::Serialize;
+
+/// Fixes with a smaller weight count as refused: they pull less than a quarter as hard.
+const LEAST_WEIGHT: f64 = 0.25;
+
+/// The fixes of GNSS in the summary, and the place of the run on the earth.
+#[derive(Debug, Serialize)]
+pub struct GnssSummary {
+    /// The log.
+    log: String,
+    /// Fixes of the log without those of its faults.
+    fixes: usize,
+    /// What is wrong with the log.
+    faults: GnssFaults,
+    /// Fixes before the first keyframe or after the last.
+    outside: usize,
+    /// Fixes beside another one that is nearer to the same keyframe.
+    thinned: usize,
+    /// Fixes too far from a keyframe for odometry to say where the vehicle was.
+    far: usize,
+    /// Fixes that the corrected trajectory is made with.
+    used: usize,
+    /// Fixes that contradict the others, the odometry or the loops.
+    refused: usize,
+    /// Why none are used.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    refusal: Option<String>,
+    /// Time by which the fixes are late by their speeds, beyond `gnss.late_s`, s; `None` where the
+    /// drive does not tell it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    late_s: Option<f64>,
+    /// Root mean square of the distances of the used fixes from the corrected trajectory, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    residual_rms_m: Option<f64>,
+    /// The pose of the frame of `trajectory_slam.tum` in the plane of the fixes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    east_north: Option<EastNorth>,
+    /// Where that plane touches the earth: latitude and longitude (WGS 84), degrees.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    plane: Option<[f64; 2]>,
+    /// The place of the frame of `trajectory_slam.tum` on the earth.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    origin: Option<Origin>,
+}
+
+/// A pose in the plane of the fixes, with its standard deviations.
+#[derive(Debug, Serialize)]
+struct EastNorth {
+    /// Place, m.
+    east_m: f64,
+    north_m: f64,
+    /// Direction of the x axis, counter-clockwise from east, degrees.
+    yaw_deg: f64,
+    east_sigma_m: f64,
+    north_sigma_m: f64,
+    yaw_sigma_deg: f64,
+}
+
+impl EastNorth {
+    fn of(pose: &UncertainMotion) -> Self {
+        let [east_m, north_m, yaw_rad] = xy_yaw(&pose.motion);
+        let sigma = |axis: usize| pose.covariance[(axis, axis)].max(0.0).sqrt();
+        Self {
+            east_m,
+            north_m,
+            yaw_deg: yaw_rad.to_degrees(),
+            east_sigma_m: sigma(0),
+            north_sigma_m: sigma(1),
+            yaw_sigma_deg: sigma(2).to_degrees(),
+        }
+    }
+}
+
+impl GnssSummary {
+    /// Takes what the last solution says of the fixes of a log.
+    ///
+    /// # Errors
+    /// Constraints that do not determine the poses.
+    pub fn of(log: &GnssLog, estimator: &mut TrajectoryEstimator) -> Result<Self, EstimationError> {
+        let positions = estimator.positions();
+        let used = positions.iter().filter(|it| it.weight >= LEAST_WEIGHT);
+        let squares: Vec<f64> = used
+            .map(|it| it.chi_square * it.position.variance_m2)
+            .collect();
+        let rms_m = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+        let frame = estimator.east_north_from_map()?;
+        let origin = frame.zip(log.plane).map(|(frame, plane)| {
+            let [east_m, north_m, yaw_rad] = xy_yaw(&frame.motion);
+            let place = plane.place([east_m, north_m]);
+            Origin {
+                latitude_deg: place.latitude_deg,
+                longitude_deg: place.longitude_deg,
+                heading_deg: plane.heading_deg([east_m, north_m], yaw_rad),
+            }
+        });
+        let fixes = estimator.fixes();
+        let counts = fixes.counts();
+        Ok(Self {
+            log: log.path.display().to_string(),
+            fixes: log.fixes.len(),
+            faults: log.faults.clone(),
+            outside: counts.outside,
+            thinned: counts.thinned,
+            far: counts.far,
+            used: squares.len(),
+            refused: counts.taken - squares.len(),
+            refusal: fixes.refusal().map(ToString::to_string),
+            late_s: fixes.clock().map(|clock| clock.late_s),
+            residual_rms_m: (!squares.is_empty()).then_some(rms_m),
+            east_north: frame.as_ref().map(EastNorth::of),
+            plane: log.plane.map(|plane| {
+                let origin = plane.origin();
+                [origin.latitude_deg, origin.longitude_deg]
+            }),
+            origin,
+        })
+    }
+
+    /// Returns why no fix is used.
+    pub fn refusal(&self) -> Option<&str> {
+        self.refusal.as_deref()
+    }
+}
+
+impl fmt::Display for GnssSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { used, refused, .. } = self;
+        write!(f, "gnss          {used} fixes used, {refused} refused")?;
+        if let Some(rms_m) = self.residual_rms_m {
+            write!(f, "; they lie {rms_m:.2} m rms from the trajectory")?;
+        }
+        for (count, what) in self.faults.named() {
+            write!(f, "\n              {count} rows of the log {what}")?;
+        }
+        if let (Some(origin), Some(east_north)) = (&self.origin, &self.east_north) {
+            let across_m = east_north.east_sigma_m.max(east_north.north_sigma_m);
+            write!(
+                f,
+                "\n              begins at {:.6}, {:.6}, heading {:.2} deg; +- {across_m:.2} m, {:.2} deg",
+                origin.latitude_deg,
+                origin.longitude_deg,
+                origin.heading_deg,
+                east_north.yaw_sigma_deg
+            )?;
+        }
+        Ok(())
+    }
+}
