@@ -1,5 +1,7 @@
 //! `gyre-lab gnss`: cuts holes out of the fixes of a run, and measures how SLAM bridges them.
 
+mod lever;
+
 use std::{ops::Range, path::PathBuf, process::ExitCode};
 
 use clap::Args;
@@ -7,7 +9,7 @@ use gyre_configuration::{Configuration, gnss_log};
 use gyre_estimation::{Position, align};
 use gyre_geometry::Pose;
 use gyre_radar::median;
-use gyre_samples::GnssFix;
+use gyre_samples::{GnssConfig, GnssFix};
 use gyre_slam::{Fixes, Keyframe, Query, RecordReader, TrajectoryEstimator, TrajectoryOptions};
 use gyre_terminal::Failure;
 use nalgebra::{Point2, Vector2};
@@ -31,6 +33,9 @@ pub struct GnssArguments {
     /// Holes of each duration, evenly spaced over the drive. One is cut at a time.
     #[arg(long, default_value = "10")]
     pub places: usize,
+    /// Fit the lever arm of the antenna to the fixes outside each hole.
+    #[arg(long)]
+    pub fit_lever: bool,
     /// Leave out the loops.
     #[arg(long)]
     pub without_loops: bool,
@@ -44,8 +49,13 @@ struct Drive {
     keyframes: Vec<Keyframe>,
     queries: Vec<Query>,
     fixes: Vec<GnssFix>,
-    configuration: Configuration,
+    config: GnssConfig,
+    /// The poses of SLAM by the radar alone.
+    without: Vec<Pose>,
 }
+
+/// The fixes that keyframes have, with their times.
+type Positions = Vec<(i64, Position)>;
 
 /// An estimate of the poses of keyframes in the plane of the fixes.
 struct Placed {
@@ -60,28 +70,35 @@ struct Placed {
 pub fn gnss(arguments: &GnssArguments) -> Result<ExitCode, Failure> {
     let drive = Drive::read(arguments)?;
     make_folder(&arguments.out)?;
-    let (whole, positions) = drive.with_fixes(&drive.fixes)?;
-    let without = drive.estimate(&[])?.poses().to_vec();
+    let positions = drive.positions(drive.config.lever_m)?;
+    let fitted = lever::fit_with_sigma(&drive.without, &places(&positions));
+    let whole = match arguments.fit_lever {
+        true => drive.with_lever(|_| true)?,
+        false => drive.config.clone(),
+    };
+    let positions = drive.positions(whole.lever_m)?;
+    let whole = drive.placed(&drive.fixes, &whole)?;
     let mut rows = Vec::new();
     for seconds in &arguments.seconds {
-        let holes = drive.holes(*seconds, arguments.places);
-        let holes: Result<Vec<_>, Failure> = holes
-            .into_iter()
-            .map(|hole| drive.hole(hole, &positions, &whole, &without))
-            .collect();
-        rows.push((
-            format!("{seconds} s"),
-            holes?.into_iter().flatten().collect(),
-        ));
+        let mut holes = Vec::new();
+        for hole in drive.holes(*seconds, arguments.places) {
+            holes.extend(drive.hole(hole, &whole, arguments.fit_lever)?);
+        }
+        rows.push((format!("{seconds} s"), holes));
     }
     let all: Vec<Hole> = rows.iter().flat_map(|(_, holes)| holes).copied().collect();
     rows.push(("all".to_owned(), all));
     let tables = [
-        fit_table(&whole, &without, &positions),
+        lever_table(&drive.config, fitted.as_ref()),
+        fit_table(&whole, &drive.without, &positions),
         holes_table(rows.iter().map(|(name, holes)| row(name, holes)).collect()),
     ];
     publish("gnss", &tables, &arguments.out)?;
     Ok(ExitCode::SUCCESS)
+}
+
+fn places(positions: &[(i64, Position)]) -> Vec<Position> {
+    positions.iter().map(|it| it.1).collect()
 }
 
 impl Drive {
@@ -92,25 +109,33 @@ impl Drive {
         let log = log.ok_or("the run has no fixes: add --set gnss.kind=auto")?;
         let mut keyframes = RecordReader::<Keyframe>::open(run)?;
         let mut queries = RecordReader::<Query>::open(run)?;
-        let count = if arguments.without_loops {
-            0
-        } else {
-            queries.len()
+        let loops = match arguments.without_loops {
+            true => 0,
+            false => queries.len(),
         };
-        Ok(Self {
+        let mut drive = Self {
             keyframes: (0..keyframes.len())
                 .map(|index| keyframes.read_without_points(index))
                 .collect::<Result<_, _>>()?,
-            queries: (0..count)
+            queries: (0..loops)
                 .map(|index| queries.read(index))
                 .collect::<Result<_, _>>()?,
             fixes: log.on_radar(&configuration.gnss),
-            configuration,
-        })
+            config: configuration.gnss,
+            without: Vec::new(),
+        };
+        let mut radar_alone = drive.estimator(&[], &drive.config)?;
+        radar_alone.solve()?;
+        drive.without = radar_alone.poses().to_vec();
+        Ok(drive)
     }
 
-    fn estimate(&self, fixes: &[GnssFix]) -> Result<TrajectoryEstimator, Failure> {
-        let fixes = Fixes::new(fixes.to_vec(), &self.configuration.gnss);
+    fn estimator(
+        &self,
+        fixes: &[GnssFix],
+        config: &GnssConfig,
+    ) -> Result<TrajectoryEstimator, Failure> {
+        let fixes = Fixes::new(fixes.to_vec(), config);
         let mut estimator =
             TrajectoryEstimator::new(TrajectoryOptions::default()).with_fixes(fixes);
         for keyframe in &self.keyframes {
@@ -119,22 +144,44 @@ impl Drive {
         for query in &self.queries {
             estimator.close(query)?;
         }
-        estimator.solve()?;
         Ok(estimator)
     }
 
-    /// Estimates the poses with these fixes; with the fixes that the keyframes have.
-    fn with_fixes(&self, fixes: &[GnssFix]) -> Result<(Placed, Vec<(i64, Position)>), Failure> {
-        let mut estimator = self.estimate(fixes)?;
+    /// Returns all fixes that keyframes have, with this lever arm.
+    fn positions(&self, lever_m: [f64; 2]) -> Result<Positions, Failure> {
+        let config = GnssConfig {
+            lever_m,
+            ..self.config.clone()
+        };
+        let estimator = self.estimator(&self.fixes, &config)?;
+        Ok(estimator.fixes().positions().to_vec())
+    }
+
+    /// Returns the configuration with the lever arm that fits the fixes of some times best.
+    fn with_lever(&self, some: impl Fn(i64) -> bool) -> Result<GnssConfig, Failure> {
+        let mut positions = self.positions(self.config.lever_m)?;
+        positions.retain(|it| some(it.0));
+        let lever = lever::fit(&self.without, &places(&positions));
+        let lever = lever.ok_or("the drive does not tell the lever arm")?;
+        let [forward, left] = self.config.lever_m;
+        Ok(GnssConfig {
+            lever_m: [forward + lever.x, left + lever.y],
+            ..self.config.clone()
+        })
+    }
+
+    /// Estimates the poses with these fixes.
+    fn placed(&self, fixes: &[GnssFix], config: &GnssConfig) -> Result<Placed, Failure> {
+        let mut estimator = self.estimator(fixes, config)?;
+        estimator.solve()?;
         if let Some(refusal) = estimator.fixes().refusal() {
             return Err(refusal.to_string().into());
         }
         let frame = estimator.east_north_from_map()?;
-        let placed = Placed {
+        Ok(Placed {
             east_north_from_map: frame.ok_or("the fixes do not tell the heading")?.motion,
             poses: estimator.poses().to_vec(),
-        };
-        Ok((placed, estimator.fixes().positions().to_vec()))
+        })
     }
 
     /// Returns holes of a duration, evenly spaced over the drive, ns.
@@ -152,37 +199,42 @@ impl Drive {
     fn hole(
         &self,
         hole: Range<i64>,
-        positions: &[(i64, Position)],
         whole: &Placed,
-        without: &[Pose],
+        fit_lever: bool,
     ) -> Result<Option<Hole>, Failure> {
-        let inside = |stamp_ns: &i64| hole.contains(stamp_ns);
-        let cut: Vec<&(i64, Position)> = positions.iter().filter(|it| inside(&it.0)).collect();
-        let Some((_, last)) = cut.last() else {
+        let config = match fit_lever {
+            true => self.with_lever(|stamp_ns| !hole.contains(&stamp_ns))?,
+            false => self.config.clone(),
+        };
+        let positions = self.positions(config.lever_m)?;
+        let (cut, kept): (Positions, Positions) =
+            positions.into_iter().partition(|it| hole.contains(&it.0));
+        let before = kept.iter().rev().find(|it| it.0 < hole.start);
+        let (Some(before), [first, .., last]) = (before, cut.as_slice()) else {
             return Ok(None);
         };
+        let path_m =
+            self.keyframes[last.1.keyframe].path_m - self.keyframes[first.1.keyframe].path_m;
         let middle_ns = hole.start + (hole.end - hole.start) / 2;
         let middle = cut.iter().min_by_key(|it| it.0.abs_diff(middle_ns));
-        let middle = middle.map_or(*last, |it| it.1);
-        let path_m =
-            self.keyframes[last.keyframe].path_m - self.keyframes[cut[0].1.keyframe].path_m;
-        let before = positions.iter().rev().find(|it| it.0 < hole.start);
-        let Some((_, before)) = before.filter(|_| path_m >= SHORTEST_M) else {
+        let Some(middle) = middle.filter(|_| path_m >= SHORTEST_M) else {
             return Ok(None);
         };
-        let fixes = self.fixes.iter().filter(|fix| !inside(&fix.stamp_ns));
-        let fixes: Vec<GnssFix> = fixes.copied().collect();
-        let (bridged, _) = self.with_fixes(&fixes)?;
-        let outside = positions.iter().filter(|it| !inside(&it.0));
-        let frame = align(without, outside.map(|it| &it.1));
+        let outside = self
+            .fixes
+            .iter()
+            .filter(|fix| !hole.contains(&fix.stamp_ns));
+        let outside: Vec<GnssFix> = outside.copied().collect();
+        let bridged = self.placed(&outside, &config)?;
+        let frame = align(&self.without, kept.iter().map(|it| &it.1));
         let aligned = Placed {
             east_north_from_map: frame.ok_or("the fixes do not tell the heading")?,
-            poses: without.to_vec(),
+            poses: self.without.clone(),
         };
         let of = |placed: &Placed| Errors {
-            middle_m: placed.error(&middle).norm(),
-            end_m: placed.error(last).norm(),
-            since_start_m: (placed.error(last) - placed.error(before)).norm(),
+            middle_m: placed.error(&middle.1).norm(),
+            end_m: placed.error(&last.1).norm(),
+            since_start_m: (placed.error(&last.1) - placed.error(&before.1)).norm(),
         };
         Ok(Some(Hole {
             path_m,
@@ -301,6 +353,29 @@ fn fit_table(whole: &Placed, without: &[Pose], positions: &[(i64, Position)]) ->
             ("most_m", "most m", 2),
         ],
         rows,
+        ..Table::default()
+    }
+}
+
+/// The lever arm that the fixes of the whole drive tell.
+fn lever_table(config: &GnssConfig, fitted: Option<&lever::Lever>) -> Table {
+    let [forward, left] = config.lever_m;
+    let row = fitted.map(|it| {
+        record(json!({
+            "forward_m": forward + it.forward_left_m.x, "forward_sigma_m": it.sigma_m.x,
+            "left_m": left + it.forward_left_m.y, "left_sigma_m": it.sigma_m.y,
+        }))
+    });
+    Table {
+        title: "Lever arm".to_owned(),
+        columns: vec![
+            ("forward_m", "forward m", 2),
+            ("forward_sigma_m", "+-", 2),
+            ("left_m", "left m", 2),
+            ("left_sigma_m", "+-", 2),
+        ],
+        rows: row.into_iter().collect(),
+        legend: "The antenna in the frame of the radar that fits all fixes best, with SLAM by the radar alone; standard deviations by the jackknife over 12 blocks of the drive.".to_owned(),
         ..Table::default()
     }
 }

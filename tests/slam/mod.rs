@@ -2,6 +2,7 @@
 
 mod extended_maps;
 mod followers;
+mod gnss;
 mod keyframes;
 mod localise;
 mod loops;

@@ -39,9 +39,9 @@ pub enum SourceError {
     /// The log of the GNSS receiver cannot be used.
     #[error(transparent)]
     Gnss(#[from] GnssLogError),
-    /// A simulation, which has no fixes.
+    /// Scans that lie in no folder, as those of a simulation.
     #[error(
-        "gnss.kind is `auto`, but a simulation has no log beside its scans: name one with gnss.kind = \"log\" and gnss.file, or set gnss.kind = \"none\""
+        "gnss.kind is `auto`, but these scans lie in no folder, so that no log lies beside them: name one with gnss.kind = \"log\" and gnss.file, or set gnss.kind = \"none\""
     )]
     NoGnss,
     /// A simulation without a gyro.
@@ -119,11 +119,12 @@ pub fn simulated_samples(
 /// # Errors
 /// No log, or one that cannot be used.
 pub fn gnss_log(configuration: &Configuration) -> Result<Option<GnssLog>, SourceError> {
-    let config = &configuration.gnss;
-    if config.kind == GnssKind::Auto && configuration.streamed().is_some() {
-        return Err(SourceError::NoGnss);
+    let (config, data) = (&configuration.gnss, &configuration.source.data);
+    let is_in_folder = configuration.streamed().is_none() && !data.as_os_str().is_empty();
+    match config.kind == GnssKind::Auto && !is_in_folder {
+        true => Err(SourceError::NoGnss),
+        false => Ok(GnssLog::open(config, data)?),
     }
-    Ok(GnssLog::open(config, &configuration.source.data)?)
 }
 
 /// Returns the configuration with the options of the recording's `dataset.toml` where it has none.

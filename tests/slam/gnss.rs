@@ -1,0 +1,188 @@
+//! GNSS: fixes move no byte of odometry, whatever is killed the corrected trajectory is the same,
+//! and the map lies where they say.
+
+use std::{fs, path::PathBuf, thread, time::Duration};
+
+use gyre_mapping::{Map, Origin};
+use gyre_messages::FollowerId;
+use gyre_radar::{Trajectory, read_trajectory};
+use gyre_samples::{Geographic, LocalPlane};
+use rand::{Rng, SeedableRng, rngs::StdRng};
+use rustix::process::Signal;
+
+use crate::common::{
+    Ended, Run, gyre,
+    recording::{SCANS_AROUND as SCANS, around_a_block},
+    send,
+};
+
+const TRAJECTORY: &str = FollowerId::Trajectory.name();
+/// Where the world of the simulation lies.
+const PLACE: Geographic = Geographic {
+    latitude_deg: 51.75,
+    longitude_deg: -1.26,
+};
+/// The heading of its x axis, counter-clockwise from east.
+const TURNED_RAD: f64 = 0.7;
+const SIGMA_M: f64 = 0.4;
+/// The antenna, ahead and to the left of the radar, m.
+const LEVER_M: [f64; 2] = [-1.0, 0.3];
+
+fn truth() -> Trajectory {
+    read_trajectory(&around_a_block().join("ground_truth.tum")).unwrap()
+}
+
+/// The log of a receiver at 5 Hz whose clock is late by this, with rows without a fix and a
+/// reflection.
+fn log(late_s: f64) -> String {
+    let (truth, mut random) = (truth(), StdRng::seed_from_u64(7));
+    let plane = LocalPlane::new(PLACE, 0.0);
+    let (first_ns, last_ns) = truth.span_ns().unwrap();
+    let mut text = "stamp_ns,latitude_deg,longitude_deg,sigma_m\n".to_owned();
+    let (sin, cos) = TURNED_RAD.sin_cos();
+    for (k, stamp_ns) in (first_ns..last_ns).step_by(200_000_000).enumerate() {
+        let pose = truth.at(stamp_ns).unwrap();
+        let antenna = pose * nalgebra::Point2::from(LEVER_M);
+        let mut noise = || SIGMA_M * 3f64.sqrt() * random.random_range(-1.0..1.0);
+        let reflected = if (60..75).contains(&k) { 20.0 } else { 0.0 };
+        let place = plane.place([
+            cos * antenna.x - sin * antenna.y + noise() + reflected,
+            sin * antenna.x + cos * antenna.y + noise(),
+        ]);
+        let (mut latitude, mut longitude) = (place.latitude_deg, place.longitude_deg);
+        if k == 3 {
+            (latitude, longitude) = (0.0, 0.0);
+        }
+        let stamp_ns = stamp_ns + (late_s * 1e9) as i64;
+        text += &format!("{stamp_ns},{latitude:.9},{longitude:.9},{SIGMA_M}\n");
+    }
+    text
+}
+
+fn without() -> Run {
+    Run::small().data(around_a_block()).set("slam.kind=graph")
+}
+
+/// A run with the log of a receiver whose clock is late by this.
+fn run(late_s: f64) -> Run {
+    let run = without();
+    let file = run.folder().join("gnss.csv");
+    fs::write(&file, log(late_s)).unwrap();
+    run.set("gnss.kind=log")
+        .set(&format!("gnss.file={}", file.display()))
+        .set("gnss.correlation_s=0")
+        .set(&format!("gnss.lever_m=[{}, {}]", LEVER_M[0], LEVER_M[1]))
+}
+
+/// What must be the same to the byte.
+fn left(run: &Run) -> [String; 3] {
+    let gnss = &mut run.summary()["gnss"];
+    // The folder of each run is another one.
+    gnss["log"] = "".into();
+    let results = ["trajectory_slam.tum", "loops.csv"].map(|name| run.result(name));
+    let [trajectory, loops] = results;
+    [trajectory, loops, gnss.to_string()]
+}
+
+fn origin(run: &Run) -> Origin {
+    serde_json::from_value(run.summary()["gnss"]["origin"].clone()).unwrap()
+}
+
+/// The first pose of the truth on the earth.
+fn true_origin() -> Origin {
+    let plane = LocalPlane::new(PLACE, 0.0);
+    let first = nalgebra::UnitComplex::new(TURNED_RAD) * truth().poses[0];
+    let at = first.translation.vector.into();
+    let place = plane.place(at);
+    Origin {
+        latitude_deg: place.latitude_deg,
+        longitude_deg: place.longitude_deg,
+        heading_deg: plane.heading_deg(at, first.rotation.angle()),
+    }
+}
+
+fn apart(a: &Origin, b: &Origin) -> (f64, f64) {
+    let place = |it: &Origin| Geographic {
+        latitude_deg: it.latitude_deg,
+        longitude_deg: it.longitude_deg,
+    };
+    let [east, north] = LocalPlane::new(place(a), 0.0).east_north(place(b));
+    let turn = (a.heading_deg - b.heading_deg + 540.0).rem_euclid(360.0) - 180.0;
+    (east.hypot(north), turn)
+}
+
+fn draw(run: &Run) -> PathBuf {
+    let map = run.folder().join("map");
+    let mut command = gyre();
+    command.arg("map").arg(run.out()).arg("--out").arg(&map);
+    Ended::of(command).succeeded();
+    map
+}
+
+#[test]
+fn odometry_is_the_same_and_the_map_lies_where_the_fixes_say() {
+    let (run, without) = (run(0.0), without());
+    assert_eq!(run.complete(), without.complete());
+    let gnss = &run.summary()["gnss"];
+    assert_eq!(gnss["faults"]["zero"], 1, "{gnss}");
+    let [used, refused] = ["used", "refused"].map(|name| gnss[name].as_u64().unwrap());
+    // The reflection is beside eight keyframes.
+    assert!(used > 60 && (6..=12).contains(&refused), "{gnss}");
+    let (metres, degrees) = apart(&origin(&run), &true_origin());
+    assert!(metres < 1.0 && degrees.abs() < 1.0, "{metres} m, {degrees} deg");
+    let drawn = Map::open(&draw(&run)).unwrap();
+    assert_eq!(drawn.origin(), Some(origin(&run)));
+    assert_eq!(Map::open(&draw(&without)).unwrap().origin(), None);
+    assert!(without.summary().get("gnss").is_none());
+}
+
+#[test]
+fn a_trajectory_that_is_killed_leaves_the_same() {
+    let undisturbed = run(0.0);
+    undisturbed.complete();
+    for seed in 0..2 {
+        let mut random = StdRng::seed_from_u64(seed);
+        let run = run(0.0).rate("6");
+        let mut running = run.start();
+        for _ in 0..3 {
+            running.await_poses_or_end(random.random_range(1..SCANS));
+            thread::sleep(Duration::from_micros(random.random_range(0..50_000)));
+            if let Some(pid) = running.stages().get(TRAJECTORY) {
+                send(*pid, Signal::KILL);
+            }
+        }
+        running.finish().succeeded();
+        assert_eq!(left(&run), left(&undisturbed), "seed {seed}");
+    }
+}
+
+#[test]
+fn a_clock_that_is_wrong_is_refused_and_told() {
+    let (run, without) = (run(6.0), without());
+    let ended = run.finish();
+    ended.succeeded();
+    without.complete();
+    assert!(
+        ended.stderr.contains("the fixes of GNSS are not used")
+            && ended.stderr.contains("gnss.late_s"),
+        "{}",
+        ended.stderr
+    );
+    let corrected = |run: &Run| run.result("trajectory_slam.tum");
+    assert_eq!(corrected(&run), corrected(&without));
+    let gnss = &run.summary()["gnss"];
+    assert_eq!(gnss["used"], 0, "{gnss}");
+    assert!(gnss.get("origin").is_none(), "{gnss}");
+}
+
+#[test]
+fn what_cannot_be_used_is_refused_before_the_run() {
+    let missing = without().set("gnss.kind=log").set("gnss.file=nowhere.csv");
+    missing.finish().refused_with(&["nowhere.csv"]);
+    let beside = without().set("gnss.kind=auto");
+    beside.finish().refused_with(&["no log of a GNSS receiver lies beside"]);
+    let without_graph = Run::small().set("gnss.kind=auto");
+    without_graph.finish().refused_with(&["gnss", "set slam.kind to `graph`"]);
+    let nameless = without().set("gnss.kind=log");
+    nameless.finish().refused_with(&["no file is named"]);
+}
