@@ -210,7 +210,8 @@ impl Drive {
         let (cut, kept): (Positions, Positions) =
             positions.into_iter().partition(|it| hole.contains(&it.0));
         let before = kept.iter().rev().find(|it| it.0 < hole.start);
-        let (Some(before), [first, .., last]) = (before, cut.as_slice()) else {
+        let after = kept.iter().find(|it| it.0 >= hole.end);
+        let (Some(before), Some(after), [first, .., last]) = (before, after, cut.as_slice()) else {
             return Ok(None);
         };
         let path_m =
@@ -231,10 +232,16 @@ impl Drive {
             east_north_from_map: frame.ok_or("the fixes do not tell the heading")?,
             poses: self.without.clone(),
         };
-        let of = |placed: &Placed| Errors {
-            middle_m: placed.error(&middle.1).norm(),
-            end_m: placed.error(&last.1).norm(),
-            since_start_m: (placed.error(&last.1) - placed.error(&before.1)).norm(),
+        let share = (middle.0 - before.0) as f64 / (after.0 - before.0) as f64;
+        let of = |placed: &Placed| {
+            let error = |it: &(i64, Position)| placed.error(&it.1);
+            let tied = error(before).lerp(&error(after), share);
+            Errors {
+                middle_m: error(middle).norm(),
+                end_m: error(last).norm(),
+                since_start_m: (error(last) - error(before)).norm(),
+                tied_m: (error(middle) - tied).norm(),
+            }
         };
         Ok(Some(Hole {
             path_m,
@@ -260,6 +267,8 @@ struct Errors {
     end_m: f64,
     /// The change of the error from the last fix before the hole to the end.
     since_start_m: f64,
+    /// The error in the middle less that of the fixes before and after the hole, by time.
+    tied_m: f64,
 }
 
 #[derive(Clone, Copy)]
@@ -286,6 +295,9 @@ fn row(name: &str, holes: &[Hole]) -> Record {
         "grown_m": middle(&|hole| hole.bridged.since_start_m),
         "grown_percent": percent(|hole| hole.bridged.since_start_m),
         "most_percent": most.reduce(f64::max),
+        "tied_m": middle(&|hole| hole.bridged.tied_m),
+        "tied_percent": percent(|hole| hole.bridged.tied_m),
+        "without_tied_percent": percent(|hole| hole.without.tied_m),
         "without_middle_m": middle(&|hole| hole.without.middle_m),
         "without_end_m": middle(&|hole| hole.without.end_m),
         "without_grown_percent": percent(|hole| hole.without.since_start_m),
@@ -307,16 +319,19 @@ fn holes_table(rows: Vec<Record>) -> Table {
             ("grown_m", "since start m", 2),
             ("grown_percent", "since start %", 2),
             ("most_percent", "most %", 2),
+            ("tied_m", "middle, tied m", 2),
+            ("tied_percent", "tied %", 2),
             ("without_middle_m", "without GNSS: middle m", 2),
             ("without_end_m", "end m", 2),
             ("without_grown_percent", "since start %", 2),
+            ("without_tied_percent", "tied %", 2),
             ("uncut_end_m", "nothing cut: end m", 2),
             ("uncut_grown_percent", "since start %", 2),
         ],
         rows,
         legend: format!(
             "Medians against the fixes that were cut out, over the holes in which the vehicle drove {SHORTEST_M} m or more. \
-             `since start` is the error at the end less that at the last fix before the hole, as vectors; `%` of the path in the hole. \
+             `since start` is the error at the end less that at the last fix before the hole, as vectors; `tied` the one in the middle less those of the last fix before and the first after, by time; `%` of the path in the hole. \
              Without GNSS: SLAM by the radar alone, laid onto the fixes outside the hole. Nothing cut: the same fixes, with the estimate that uses them."
         ),
         ..Table::default()
