@@ -338,7 +338,7 @@ fn holes_table(rows: Vec<Record>) -> Table {
     }
 }
 
-/// How far all fixes lie from the estimates, m.
+/// The distances of all fixes from the estimates, m.
 fn fit_table(whole: &Placed, without: &[Pose], positions: &[(i64, Position)]) -> Table {
     let aligned = align(without, positions.iter().map(|it| &it.1)).map(|frame| Placed {
         east_north_from_map: frame,

@@ -74,7 +74,7 @@ fn run(late_s: f64) -> Run {
         .set(&format!("gnss.lever_m=[{}, {}]", LEVER_M[0], LEVER_M[1]))
 }
 
-/// What must be the same to the byte.
+/// The results that must be the same to the byte.
 fn left(run: &Run) -> [String; 3] {
     let gnss = &mut run.summary()["gnss"];
     // The folder of each run is another one.
@@ -129,7 +129,10 @@ fn odometry_is_the_same_and_the_map_lies_where_the_fixes_say() {
     // The reflection is beside eight keyframes.
     assert!(used > 60 && (6..=12).contains(&refused), "{gnss}");
     let (metres, degrees) = apart(&origin(&run), &true_origin());
-    assert!(metres < 1.0 && degrees.abs() < 1.0, "{metres} m, {degrees} deg");
+    assert!(
+        metres < 1.0 && degrees.abs() < 1.0,
+        "{metres} m, {degrees} deg"
+    );
     let drawn = Map::open(&draw(&run)).unwrap();
     assert_eq!(drawn.origin(), Some(origin(&run)));
     assert_eq!(Map::open(&draw(&without)).unwrap().origin(), None);
@@ -180,9 +183,13 @@ fn what_cannot_be_used_is_refused_before_the_run() {
     let missing = without().set("gnss.kind=log").set("gnss.file=nowhere.csv");
     missing.finish().refused_with(&["nowhere.csv"]);
     let beside = without().set("gnss.kind=auto");
-    beside.finish().refused_with(&["no log of a GNSS receiver lies beside"]);
+    beside
+        .finish()
+        .refused_with(&["no log of a GNSS receiver lies beside"]);
     let without_graph = Run::small().set("gnss.kind=auto");
-    without_graph.finish().refused_with(&["gnss", "set slam.kind to `graph`"]);
+    without_graph
+        .finish()
+        .refused_with(&["gnss", "set slam.kind to `graph`"]);
     let nameless = without().set("gnss.kind=log");
     nameless.finish().refused_with(&["no file is named"]);
 }

@@ -1,10 +1,10 @@
 //! The trajectory that agrees with the loops: fuses the motions between keyframes, the loops among
 //! them and the fixes of GNSS.
 //!
-//! It follows `journal/keyframes.log` and `journal/loops.log` and has no file of its own. The log of
-//! the fixes is complete when it starts; a fix counts once both keyframes around it have come. While
-//! the run goes on, new loops and fixes are taken into the standing estimate, which may depend a
-//! little on when they came. When both logs have ended the poses are solved anew: the last
+//! It follows `journal/keyframes.log` and `journal/loops.log` and has no file of its own. The log
+//! of the fixes is complete when it starts; a fix counts once both keyframes around it have come.
+//! While the run goes on, new loops and fixes are taken into the standing estimate, which may
+//! depend a little on when they came. When both logs have ended the poses are solved anew: the last
 //! correction is a function of the logs, and that of the results, which the supervisor makes from
 //! the same logs.
 

@@ -1,6 +1,7 @@
 #![allow(clippy::unwrap_used)]
 
 use gyre_geometry::{Twist, UncertainMotion, pose};
+use gyre_samples::GnssFix;
 use gyre_slam::{LoopCandidate, LoopOutcome, RecordLog};
 use nalgebra::{Matrix3, Vector3};
 
@@ -55,6 +56,7 @@ fn query(keyframe: usize) -> Query {
 
 struct Logs {
     out: tempfile::TempDir,
+    fixes: Fixes,
     keyframes: RecordLog<Keyframe>,
     queries: RecordLog<Query>,
 }
@@ -65,6 +67,7 @@ impl Logs {
         Self {
             keyframes: RecordLog::open(out.path()).unwrap(),
             queries: RecordLog::open(out.path()).unwrap(),
+            fixes: Fixes::default(),
             out,
         }
     }
@@ -159,4 +162,46 @@ fn what_is_cut_off_the_logs_is_taken_back() {
     let (restarted, _) = follow(&mut logs.trajectory());
     assert_eq!(bytes(correction), bytes(restarted));
     assert_eq!(correction.unwrap().keyframes, 81);
+}
+
+/// A fix at each keyframe of the laps as they are, without the error of odometry.
+fn fixes() -> Fixes {
+    let step = pose(3.0, 0.0, std::f64::consts::TAU / 40.0);
+    let poses = std::iter::successors(Some(pose(70.0, -20.0, 1.0)), |at| Some(at * step));
+    let fix = |(index, at): (i64, gyre_geometry::Pose)| GnssFix {
+        stamp_ns: 7 * index,
+        east_m: at.translation.x,
+        north_m: at.translation.y,
+        sigma_m: 0.1,
+    };
+    let fixes = (0..120).zip(poses).map(fix).collect();
+    Fixes::new(fixes, &GnssConfig::default())
+}
+
+#[test]
+fn fixes_correct_as_keyframes_come_and_the_last_correction_is_that_of_the_results() {
+    let mut logs = Logs {
+        fixes: fixes(),
+        ..Logs::new()
+    };
+    let mut trajectory = logs.trajectory();
+    for keyframes in [10, 50, 90, 119] {
+        logs.append(keyframes, 0);
+        follow(&mut trajectory);
+    }
+    let turned = |correction: Option<CorrectionHeader>| correction.unwrap().yaw_rad;
+    logs.append(120, 120);
+    let standing = follow(&mut trajectory).0;
+    // Odometry turns by 0.0005 rad too little at each keyframe.
+    assert!(
+        (turned(standing) - 0.06).abs() < 0.02,
+        "{}",
+        turned(standing)
+    );
+    logs.keyframes.end().unwrap();
+    logs.queries.end().unwrap();
+    let (correction, has_ended) = follow(&mut trajectory);
+    assert!(has_ended);
+    let (restarted, _) = follow(&mut logs.trajectory());
+    assert_eq!(bytes(restarted), bytes(correction));
 }

@@ -73,7 +73,7 @@ pub struct PoseGraph {
     factorised: bool,
 }
 
-/// What is estimated.
+/// The estimate.
 #[derive(Clone)]
 struct State {
     poses: Vec<Pose>,

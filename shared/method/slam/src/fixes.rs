@@ -6,8 +6,8 @@ use gyre_radar::{ClockOffset, Trajectory, clock_offset, median};
 use gyre_samples::{GnssConfig, GnssFix};
 use nalgebra::{Point2, Vector2};
 
-/// How vehicles brake, m/s²: between two keyframes a place is known as well as if they had moved
-/// evenly, but for this.
+/// The acceleration of vehicles that brake, m/s²: between two keyframes a place is known as well as
+/// if they had moved evenly, but for this.
 const ACCELERATION_MPS2: f64 = 2.0;
 /// A place that is known worse than this and than the fix itself says nothing, m.
 const FAR_M: f64 = 1.0;
@@ -58,7 +58,7 @@ impl std::fmt::Display for FixRefusal {
     }
 }
 
-/// What became of the fixes of a log. The first three and `taken` are all fixes.
+/// The fixes of a log by what became of them. The first three and `taken` are all fixes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FixCounts {
     /// Before the first keyframe or after the last.

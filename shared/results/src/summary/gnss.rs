@@ -19,7 +19,7 @@ pub struct GnssSummary {
     log: String,
     /// Fixes of the log without those of its faults.
     fixes: usize,
-    /// What is wrong with the log.
+    /// The faults of the log.
     faults: GnssFaults,
     /// Fixes before the first keyframe or after the last.
     outside: usize,

@@ -30,7 +30,8 @@ pub struct Position {
     pub position_m: Vector2<f64>,
     /// Variance along each axis, m².
     pub variance_m2: f64,
-    /// How much it counts, above 0 up to 1: less than 1 if its error depends on those of others.
+    /// The factor of its information, above 0 up to 1: less than 1 if its error depends on those of
+    /// others.
     pub share: f64,
 }
 

@@ -28,7 +28,7 @@ fn a_log_without_faults_keeps_all() {
     assert!((east_m - 590.0).abs() < 1.0, "{east_m}");
 }
 
-/// What is done to a row, how often, and the count that must say so.
+/// A change of rows with its name, the count that must report it, and that count.
 type Fault = (
     &'static str,
     fn(usize, &mut [String; 3]),
