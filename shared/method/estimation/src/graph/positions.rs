@@ -246,6 +246,13 @@ impl PoseGraph {
     }
 }
 
+/// A measured point in both frames.
+struct Pair {
+    weight: f64,
+    at: Vector2<f64>,
+    position: Vector2<f64>,
+}
+
 /// Returns the pose of the poses' frame in that of the positions that fits best, by weighted least
 /// squares (Umeyama, PAMI 1991, without scale); `None` if its heading is not known well enough.
 ///
@@ -257,25 +264,28 @@ pub fn align<'a>(
 ) -> Option<Pose> {
     let pair = |it: &Position| {
         let pose = &poses[it.keyframe];
-        let at = pose.translation.vector + pose.rotation * it.lever_m;
-        (it.share / it.variance_m2, at, it.position_m)
+        Pair {
+            weight: it.share / it.variance_m2,
+            at: pose.translation.vector + pose.rotation * it.lever_m,
+            position: it.position_m,
+        }
     };
-    let pairs: Vec<(f64, Vector2<f64>, Vector2<f64>)> = positions.into_iter().map(pair).collect();
-    let total: f64 = pairs.iter().map(|(weight, ..)| weight).sum();
+    let pairs: Vec<Pair> = positions.into_iter().map(pair).collect();
+    let total: f64 = pairs.iter().map(|pair| pair.weight).sum();
     if !(total > 0.0 && total.is_finite()) {
         return None;
     }
-    let mean = |of: fn(&(f64, Vector2<f64>, Vector2<f64>)) -> Vector2<f64>| {
-        let sum: Vector2<f64> = pairs.iter().map(|pair| pair.0 * of(pair)).sum();
+    let mean = |of: fn(&Pair) -> Vector2<f64>| {
+        let sum: Vector2<f64> = pairs.iter().map(|pair| pair.weight * of(pair)).sum();
         sum / total
     };
-    let (from, to) = (mean(|pair| pair.1), mean(|pair| pair.2));
+    let (from, to) = (mean(|pair| pair.at), mean(|pair| pair.position));
     let (mut cos, mut sin, mut spread) = (0.0, 0.0, 0.0);
-    for (weight, at, position) in &pairs {
-        let (a, b) = (at - from, position - to);
-        cos += weight * a.dot(&b);
-        sin += weight * a.perp(&b);
-        spread += weight * a.norm_squared();
+    for pair in &pairs {
+        let (a, b) = (pair.at - from, pair.position - to);
+        cos += pair.weight * a.dot(&b);
+        sin += pair.weight * a.perp(&b);
+        spread += pair.weight * a.norm_squared();
     }
     if spread * MAX_YAW_SIGMA * MAX_YAW_SIGMA < 1.0 {
         return None;
