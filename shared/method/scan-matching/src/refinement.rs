@@ -151,14 +151,15 @@ impl Refiner {
         searched: &Pose,
         interval_s: f64,
     ) -> Refined {
+        // Stamps that do not advance give no velocity: a second is assumed.
+        let interval_s = if interval_s > 0.0 { interval_s } else { 1.0 };
         let scan = Scan {
             id: scan,
             points: later,
             searched: self.state.pose * searched,
             step: Step {
-                // Stamps that do not advance give no velocity: a second is assumed.
-                interval_s: if interval_s > 0.0 { interval_s } else { 1.0 },
-                turn: self.predict_turn(),
+                interval_s,
+                turn: self.predict_turn(interval_s),
             },
         };
         let predictions = self.ensure_map(&scan, earlier);
@@ -244,9 +245,13 @@ impl Refiner {
         self.insert_keyframe(id, earlier, &pose, &twist);
     }
 
-    /// Predicts the turn since the scan before by the gyro.
-    fn predict_turn(&mut self) -> Option<PredictedTurn> {
-        let turn = self.turn?;
+    /// Predicts the turn since the scan before by the gyro, if that has measured it.
+    fn predict_turn(&mut self, interval_s: f64) -> Option<PredictedTurn> {
+        let Some(turn) = self.turn else {
+            let heading = self.state.heading.iter_mut();
+            heading.for_each(|heading| heading.wait(interval_s, &self.gyro));
+            return None;
+        };
         let heading = self.state.heading.get_or_insert(Heading::new(&self.gyro));
         Some(heading.predict(&turn, &self.gyro))
     }
@@ -278,6 +283,9 @@ impl Refiner {
         let Some(covariance) = covariance.filter(|_| best.is_plausible) else {
             let [motion, _] = self.state.predict(&scan.step);
             let covariance = uncertainty.of_prediction();
+            if let (None, Some(heading)) = (scan.step.turn, &mut self.state.heading) {
+                heading.guess(covariance[(2, 2)]);
+            }
             return (Outcome::Predicted, UncertainMotion { motion, covariance });
         };
         let by_azimuths = uncertainty::by_azimuths(&best.alignment, self.azimuth_variance_rad2);
@@ -299,8 +307,11 @@ impl Refiner {
         scan: &Scan<'_>,
         registered: UncertainMotion,
     ) -> UncertainMotion {
-        let (Some(turn), Some(heading)) = (scan.step.turn, &mut self.state.heading) else {
+        let Some(heading) = &mut self.state.heading else {
             return registered;
+        };
+        let Some(turn) = scan.step.turn else {
+            return heading.adopt(&registered, &self.state.pose);
         };
         let drift_share = uncertainty::drift_share(self.map.len(), &self.config);
         heading.weigh(&registered, &self.state.pose, &turn, drift_share)

@@ -74,23 +74,54 @@ impl Heading {
     /// Predicts the heading of the next scan.
     pub(super) fn predict(&mut self, turn: &GyroTurn, config: &GyroConfig) -> PredictedTurn {
         let time_s = turn.interval_s;
-        let kept = (-time_s / LEAN_TIME_S).exp();
-        let step = Matrix3::new(1.0, -time_s, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, kept);
         let turn_rad2 = turn.variance_rad2 + TILT_RAD_PER_SQRT_S.powi(2) * time_s;
-        let noise = Vector3::new(
-            turn_rad2,
-            config.bias_walk_radps_per_sqrt_s.powi(2) * time_s,
-            LEAN_SIGMA_RAD.powi(2) * (1.0 - kept * kept),
-        );
-        self.covariance =
-            step * self.covariance * step.transpose() + Matrix3::from_diagonal(&noise);
-        self.lean_rad *= kept;
+        let by_bias_s = Matrix3::new(1.0, -time_s, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0);
+        self.covariance = by_bias_s * self.covariance * by_bias_s.transpose();
+        self.covariance[(0, 0)] += turn_rad2;
+        self.wait(time_s, config);
         let by_bias = self.covariance[(1, 1)] * time_s * BIAS_TIME_S.max(time_s);
         PredictedTurn {
             yaw_rad: turn.yaw_rad - self.bias_radps * time_s,
             variance_rad2: turn_rad2 + by_bias,
             sweep_rate_radps: turn.sweep_rate_radps - self.bias_radps,
         }
+    }
+
+    /// Lets a time pass whose turn the gyro has not measured: bias and lean change, and the heading
+    /// is another one. Either [`adopt`](Self::adopt) or [`guess`](Self::guess) says which.
+    pub(super) fn wait(&mut self, time_s: f64, config: &GyroConfig) {
+        let kept = (-time_s / LEAN_TIME_S).exp();
+        let step = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, kept));
+        self.covariance = step * self.covariance * step;
+        self.covariance[(1, 1)] += config.bias_walk_radps_per_sqrt_s.powi(2) * time_s;
+        self.covariance[(2, 2)] += LEAN_SIGMA_RAD.powi(2) * (1.0 - kept * kept);
+        self.lean_rad *= kept;
+    }
+
+    /// Takes the heading of a pose that was registered with the map, whatever it was before: the
+    /// gyro has not measured the turn. That is the correction of a prediction without any
+    /// certainty, so that the lean alone is taken off. The error is that of the lean, which the
+    /// bias may share, and the noise of registration. The place moves along as in
+    /// [`weigh`](Self::weigh).
+    pub(super) fn adopt(
+        &mut self,
+        registered: &UncertainMotion,
+        previous: &Pose,
+    ) -> UncertainMotion {
+        let variance_rad2 = registered.covariance[(2, 2)];
+        let step = Matrix3::new(0.0, 0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0);
+        self.covariance = step * self.covariance * step.transpose();
+        self.covariance[(0, 0)] += variance_rad2;
+        UncertainMotion {
+            motion: turned(registered, previous, -self.lean_rad),
+            ..*registered
+        }
+    }
+
+    /// Takes a heading that neither the gyro nor the map has measured: one that is predicted from
+    /// the motions before, with this variance.
+    pub(super) fn guess(&mut self, variance_rad2: f64) {
+        self.covariance[(0, 0)] += variance_rad2;
     }
 
     /// Weighs the heading of a pose that was registered with the map against the predicted one. The
@@ -105,16 +136,14 @@ impl Heading {
     ) -> UncertainMotion {
         let covariance = registered.covariance;
         let variance_rad2 = covariance[(2, 2)];
-        let [x_m, y_m, yaw_rad] = xy_yaw(&registered.motion);
+        let yaw_rad = registered.motion.rotation.angle();
         let apart = wrap_angle(yaw_rad - previous.rotation.angle() - turn.yaw_rad);
-        let by_yaw = covariance.column(2) / variance_rad2;
-        let step = by_yaw * (self.correct(apart, variance_rad2) - apart);
-        // The covariance is along the axes of the scan before, the pose along those of the map.
-        let shift = previous.rotation * step.xy();
+        let step_rad = self.correct(apart, variance_rad2) - apart;
         // The gyro's error accumulates whole.
         let kept = variance_rad2.min(turn.variance_rad2 / drift_share) - variance_rad2;
+        let by_yaw = covariance.column(2) / variance_rad2;
         UncertainMotion {
-            motion: pose(x_m + shift.x, y_m + shift.y, yaw_rad + step.z),
+            motion: turned(registered, previous, step_rad),
             covariance: covariance + by_yaw * by_yaw.transpose() * kept,
         }
     }
@@ -128,7 +157,10 @@ impl Heading {
         let step = gain * (apart_rad - self.lean_rad);
         self.bias_radps += step[1];
         self.lean_rad += step[2];
-        self.covariance = (Matrix3::identity() - gain * seen) * self.covariance;
+        // Joseph's form stays symmetric and positive.
+        let kept = Matrix3::identity() - gain * seen;
+        self.covariance =
+            kept * self.covariance * kept.transpose() + gain * gain.transpose() * variance_rad2;
         step[0]
     }
 
@@ -146,93 +178,16 @@ impl Heading {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const INTERVAL_S: f64 = 0.25;
-    const BIAS_RADPS: f64 = 0.004;
-    /// Standard deviation of registered headings, rad.
-    const NOISE_RAD: f64 = 2e-3;
-
-    /// Weighs a drive of `scans` scans that turns at a rate, with a gyro that has a bias. Each scan
-    /// becomes a keyframe, unless the vehicle stands.
-    fn drive(scans: u32, rate_radps: f64, keyframes: Option<usize>) -> (Heading, f64) {
-        let config = GyroConfig::default();
-        let mut heading = Heading::new(&config);
-        let (mut at, mut truth) = (Pose::identity(), 0.0);
-        for scan in 0..scans {
-            truth += rate_radps * INTERVAL_S;
-            let turn = GyroTurn {
-                yaw_rad: (rate_radps + BIAS_RADPS) * INTERVAL_S,
-                variance_rad2: 1e-10,
-                interval_s: INTERVAL_S,
-                sweep_rate_radps: rate_radps + BIAS_RADPS,
-            };
-            // Noise without a mean, and without a generator.
-            let noise = NOISE_RAD * (f64::from(scan) * 2.4).sin() * 2f64.sqrt();
-            let registered = UncertainMotion {
-                motion: pose(0.0, 0.0, truth + noise),
-                covariance: Matrix3::from_diagonal_element(NOISE_RAD * NOISE_RAD),
-            };
-            let predicted = heading.predict(&turn, &config);
-            at = heading.weigh(&registered, &at, &predicted, 0.1).motion;
-            if let Some(keyframes) = keyframes {
-                heading.follow(keyframes);
-            }
-        }
-        (heading, wrap_angle(at.rotation.angle() - truth))
-    }
-
-    #[test]
-    fn a_standing_vehicle_shows_the_bias() {
-        let (heading, off_rad) = drive(120, 0.0, None);
-        let off_radps = heading.bias_radps - BIAS_RADPS;
-        assert!(off_radps.abs() < 2e-5, "{off_radps} rad/s");
-        assert!(off_rad.abs() < 5e-4, "{off_rad} rad");
-        let sigma_radps = heading.covariance[(1, 1)].sqrt();
-        assert!(off_radps.abs() < 3.0 * sigma_radps, "{sigma_radps} rad/s");
-    }
-
-    #[test]
-    fn on_the_road_the_bias_is_never_better_known_than_the_radar_leans() {
-        let [stood, driven] = [None, Some(10)].map(|keyframes| {
-            let (heading, off_rad) = drive(400, 0.1, keyframes);
-            assert!(off_rad.abs() < 2.0 * NOISE_RAD, "{off_rad} rad");
-            heading.covariance[(1, 1)].sqrt()
-        });
-        // A map of ten keyframes follows the lean by 2/11 a scan.
-        let floor_radps = LEAN_SIGMA_RAD * 2.0 / 11.0 / INTERVAL_S;
-        assert!(
-            driven > floor_radps && driven > 2.0 * stood,
-            "{driven}, {stood} rad/s"
-        );
-    }
-
-    #[test]
-    fn the_place_moves_along_with_the_heading() {
-        let config = GyroConfig::default();
-        let mut heading = Heading::new(&GyroConfig {
-            bias_sigma_radps: 0.0,
-            ..config.clone()
-        });
-        let turn = GyroTurn {
-            interval_s: INTERVAL_S,
-            variance_rad2: 1e-12,
-            ..GyroTurn::default()
-        };
-        // Along the axes of the scan before, which looks to the left.
-        let previous = pose(0.0, 0.0, std::f64::consts::FRAC_PI_2);
-        let covariance = Matrix3::new(1.0, 0.0, 0.5, 0.0, 1.0, 0.0, 0.5, 0.0, 1.0) * 1e-4;
-        let registered = UncertainMotion {
-            motion: pose(0.0, 2.0, previous.rotation.angle() + 0.01),
-            covariance,
-        };
-        let predicted = heading.predict(&turn, &config);
-        let fused = heading.weigh(&registered, &previous, &predicted, 1.0);
-        let [x_m, y_m, yaw_rad] = xy_yaw(&fused.motion);
-        let off = [x_m, y_m - 1.995, yaw_rad - previous.rotation.angle()];
-        assert!(off.iter().all(|off| off.abs() < 1e-4), "{off:?}");
-        assert!(fused.covariance[(2, 2)] < 2e-8 && fused.covariance[(0, 0)] < 0.8e-4);
-    }
+/// The pose that was registered, turned by an angle: the place moves along as far as its error
+/// depends on that of the heading. Its covariance is along the axes of the scan before, whose pose
+/// is `previous`, and the pose along those of the map.
+fn turned(registered: &UncertainMotion, previous: &Pose, angle_rad: f64) -> Pose {
+    let covariance = registered.covariance;
+    let step = covariance.column(2) * (angle_rad / covariance[(2, 2)]);
+    let shift = previous.rotation * step.xy();
+    let [x_m, y_m, yaw_rad] = xy_yaw(&registered.motion);
+    pose(x_m + shift.x, y_m + shift.y, yaw_rad + angle_rad)
 }
+
+#[cfg(test)]
+mod tests;
