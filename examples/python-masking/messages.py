@@ -87,8 +87,13 @@ class GyroTurn(Message):
     _fields_ = [(name, c_double) for name in ("yaw_rad", "variance_rad2", "interval_s", "sweep_rate_radps")]
 
 
+class WheelDistance(Message):
+    NAME = "gyre_wheel_distance_v1"
+    _fields_ = [(name, c_double) for name in ("distance_m", "variance_m2", "side_variance_m2", "interval_s")]
+
+
 class MaskedHeader(Message):
-    NAME = "gyre_masked_header_v6"
+    NAME = "gyre_masked_header_v7"
     _fields_ = [
         ("item", Item),
         ("n", c_uint32),
@@ -101,6 +106,8 @@ class MaskedHeader(Message):
         ("azimuth_variance_rad2", c_float),
         ("gyro", GyroTurn),
         ("has_gyro", c_uint64),
+        ("wheels", WheelDistance),
+        ("has_wheels", c_uint64),
     ]
 
 
@@ -113,7 +120,7 @@ class RotationEstimate(Message):
 
 
 class RefinementRecord(Message):
-    NAME = "gyre_refinement_v3"
+    NAME = "gyre_refinement_v4"
     _fields_ = [
         ("outcome", c_uint32),
         ("initial_guess", c_uint32),
@@ -123,11 +130,14 @@ class RefinementRecord(Message):
         ("gyro", c_uint64),
         ("gyro_bias_radps", c_double),
         ("gyro_bias_sigma_radps", c_double),
+        ("wheels", c_uint64),
+        ("wheel_scale", c_double),
+        ("wheel_scale_sigma", c_double),
     ]
 
 
 class MotionEstimate(Message):
-    NAME = "gyre_motion_estimate_v5"
+    NAME = "gyre_motion_estimate_v6"
     _fields_ = [
         ("x_m", c_double),
         ("y_m", c_double),
@@ -145,12 +155,12 @@ class MotionEstimate(Message):
 
 
 class MotionHeader(Message):
-    NAME = "gyre_motion_header_v8"
+    NAME = "gyre_motion_header_v9"
     _fields_ = [("item", Item), ("motion", MotionEstimate)]
 
 
 class PoseHeader(Message):
-    NAME = "gyre_pose_header_v8"
+    NAME = "gyre_pose_header_v9"
     _fields_ = [
         ("item", Item),
         ("motion", MotionEstimate),
@@ -185,12 +195,13 @@ SIZES = {
     Item: 320,
     ScanHeader: 13672,
     GyroTurn: 32,
-    MaskedHeader: 400,
+    WheelDistance: 32,
+    MaskedHeader: 440,
     RotationEstimate: 40,
-    RefinementRecord: 56,
-    MotionEstimate: 232,
-    MotionHeader: 552,
-    PoseHeader: 680,
+    RefinementRecord: 80,
+    MotionEstimate: 256,
+    MotionHeader: 576,
+    PoseHeader: 704,
     ByteBlock: 64,
     FloatBlock: 64,
 }

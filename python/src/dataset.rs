@@ -21,7 +21,7 @@ const MAX_UNREADABLE: usize = 10;
 /// Opens a recording: a folder of a format that Gyre knows, an MCAP file of `gyre record`, or a bag
 /// of ROS 2.
 ///
-/// With a section `gyro` in `config` the scans have the samples of the gyro that it names.
+/// With a section `gyro` or `wheels` in `config` the scans have the samples that it names.
 ///
 /// The constants of the radar are those of the section `dataset` of `config`. Without one they are
 /// those of the format, or of the recording's `dataset.toml`, as `Config.of` takes them. Raises
@@ -43,8 +43,9 @@ pub fn open(
             }
         };
         let mut scans = gyre_recording::open(&data, &options).map_err(errors::open)?;
-        let samples = ScanSamples::open(&method.odometry.gyro, &data, scans.as_mut());
-        let samples = samples.map_err(errors::gyro)?;
+        let (gyro, wheels) = (&method.odometry.gyro, &method.odometry.wheels);
+        let samples = ScanSamples::open(gyro, wheels, &data, scans.as_mut());
+        let samples = samples.map_err(errors::log)?;
         Ok(Opened { scans, samples })
     })?;
     let scans = &opened.scans;

@@ -55,8 +55,8 @@ pub fn open(error: OpenError) -> PyErr {
     }
 }
 
-/// A log of a gyro.
-pub fn gyro(error: LogError) -> PyErr {
+/// A log of a gyro or of wheels.
+pub fn log(error: LogError) -> PyErr {
     match error {
         LogError::None { .. } | LogError::Live => config(error),
         error => read(error),

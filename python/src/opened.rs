@@ -7,7 +7,7 @@ use gyre_samples::Sample;
 pub struct Opened {
     /// The scans.
     pub scans: Box<dyn Dataset>,
-    /// Samples of a gyro, by the section `gyro` of a configuration.
+    /// Samples of a gyro and of wheels, by the sections `gyro` and `wheels` of a configuration.
     pub samples: ScanSamples,
 }
 
@@ -37,6 +37,6 @@ impl Opened {
         let first = stamps.clone().min().unwrap_or(geometry.stamp_ns);
         let last = stamps.max().unwrap_or(geometry.stamp_ns);
         let samples = self.samples.of(self.scans.as_ref(), [first, last]);
-        Ok((geometry, samples.to_vec()))
+        Ok((geometry, samples.into_owned()))
     }
 }

@@ -1,7 +1,7 @@
 //! Scans, whose memory is that of numpy arrays.
 
 use gyre_radar::{PolarScan, ReadError, ScanSlot, Sense, SweepGeometry, scan::flag};
-use gyre_samples::{MAX_RATE_RADPS, Sample};
+use gyre_samples::{MAX_RATE_RADPS, MAX_SPEED_MPS, Sample, SampleKind};
 use ndarray::{Ix1, Ix2, IxDyn};
 use numpy::{
     PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArrayDyn, PyUntypedArrayMethods,
@@ -41,7 +41,7 @@ const FLAGS: &str = "one uint8 for each azimuth";
 /// b is at (b + 0.5) * range_resolution_m + range_offset_m. doppler_s: metres to add to a range for
 /// each m/s of closing speed; 0: unknown. gyro: the samples of a gyro since a turn before the
 /// sweep: pairs of a time, ns, and a yaw rate, rad/s, counter-clockwise, in the order of their
-/// times.
+/// times. wheels: the same of the wheels' speed, m/s.
 ///
 /// Arrays that are written to while a scan is registered by another thread give undefined motions.
 #[pyclass(module = "gyre", frozen)]
@@ -54,7 +54,7 @@ pub struct Scan {
     azimuth_stamp_ns: Py<PyAny>,
     azimuth_flags: Py<PyAny>,
     index: Option<usize>,
-    /// Of a gyro, since the scan before.
+    /// Of a gyro and of wheels, since a turn before the sweep.
     samples: Vec<Sample>,
 }
 
@@ -106,7 +106,7 @@ impl Scan {
         }))
     }
 
-    /// Returns the samples of the gyro.
+    /// Returns the samples of the gyro and of the wheels.
     pub fn samples(&self) -> &[Sample] {
         &self.samples
     }
@@ -190,21 +190,39 @@ fn even_stamps_ns(stamp_ns: i64, sweep_s: f64, azimuths: usize) -> PyResult<Vec<
     Ok(stamps.collect())
 }
 
-/// Returns the samples of a gyro: times, ns, and yaw rates, rad/s.
-fn gyro_samples(pairs: Vec<(i64, f64)>) -> PyResult<Vec<Sample>> {
-    let sample = |(stamp_ns, rate_radps): (i64, f64)| Sample::yaw_rate(stamp_ns, rate_radps);
-    let samples: Vec<Sample> = pairs.into_iter().map(sample).collect();
+/// Times, ns, and values, as a keyword of this name has them.
+type Pairs = (&'static str, Vec<(i64, f64)>);
+
+/// Returns the samples of a gyro and of wheels.
+fn samples((gyro, rates): Pairs, (wheels, speeds): Pairs) -> PyResult<Vec<Sample>> {
+    let rates = rates.into_iter().map(|(ns, radps)| Sample::yaw_rate(ns, radps));
+    let speeds = speeds.into_iter().map(|(ns, mps)| Sample::speed(ns, mps));
+    let expected = format!("rates are at most {MAX_RATE_RADPS} rad/s");
+    let mut samples = checked(gyro, rates.collect(), &expected)?;
+    let expected = format!("speeds are at most {MAX_SPEED_MPS} m/s");
+    samples.extend(checked(wheels, speeds.collect(), &expected)?);
+    samples.sort_by_key(Sample::order);
+    Ok(samples)
+}
+
+fn checked(name: &str, samples: Vec<Sample>, expected: &str) -> PyResult<Vec<Sample>> {
     let is_later = |pair: &[Sample]| pair[0].stamp_ns < pair[1].stamp_ns;
     if !samples.windows(2).all(is_later) {
-        return Err(errors::scan("the times of gyro must increase"));
+        return Err(errors::scan(format!("the times of {name} must increase")));
     }
-    match samples.iter().find(|sample| !sample.is_valid()) {
+    match samples.iter().position(|sample| !sample.is_valid()) {
         None => Ok(samples),
-        Some(sample) => Err(errors::scan(format!(
-            "gyro has a yaw rate of {} rad/s, but rates are finite, and at most {MAX_RATE_RADPS} rad/s",
-            sample.values[2]
+        Some(at) => Err(errors::scan(format!(
+            "{name} is no finite number, or too large, in pair {at}: {expected}"
         ))),
     }
+}
+
+/// The pairs of samples of a kind: times, ns, and one of their values.
+fn pairs(samples: &[Sample], kind: SampleKind, value: usize) -> Vec<(i64, f64)> {
+    let of_kind = samples.iter().filter(|sample| sample.is(kind));
+    let pair = |sample: &Sample| (sample.stamp_ns, sample.values[value]);
+    of_kind.map(pair).collect()
 }
 
 fn even_angles_rad(azimuths: usize) -> Vec<f32> {
@@ -218,7 +236,7 @@ fn even_angles_rad(azimuths: usize) -> Vec<f32> {
 impl Scan {
     #[new]
     #[pyo3(signature = (power, *, stamp_ns, range_resolution_m, clockwise, azimuth_stamp_ns=None, sweep_s=None, azimuth_rad=None,
-        azimuth_flags=None, range_offset_m=0.0, doppler_s=0.0, gyro=None))]
+        azimuth_flags=None, range_offset_m=0.0, doppler_s=0.0, gyro=None, wheels=None))]
     #[allow(clippy::too_many_arguments)] // They are keywords.
     fn new(
         power: &Bound<'_, PyAny>,
@@ -232,6 +250,7 @@ impl Scan {
         range_offset_m: f32,
         doppler_s: f32,
         gyro: Option<Vec<(i64, f64)>>,
+        wheels: Option<Vec<(i64, f64)>>,
     ) -> PyResult<Self> {
         let py = power.py();
         let array = given::<u8, Ix2>(power, "power", POWER)?;
@@ -286,7 +305,10 @@ impl Scan {
             azimuth_stamp_ns: stamps.into_any().unbind(),
             azimuth_flags: flags.into_any().unbind(),
             index: None,
-            samples: gyro_samples(gyro.unwrap_or_default())?,
+            samples: samples(
+                ("gyro", gyro.unwrap_or_default()),
+                ("wheels", wheels.unwrap_or_default()),
+            )?,
         };
         scan.check(py)?;
         Ok(scan)
@@ -353,8 +375,13 @@ impl Scan {
     /// rate, rad/s, counter-clockwise, with its bias.
     #[getter]
     fn gyro(&self) -> Vec<(i64, f64)> {
-        let pair = |sample: &Sample| (sample.stamp_ns, sample.values[2]);
-        self.samples.iter().map(pair).collect()
+        pairs(&self.samples, SampleKind::Gyro, 2)
+    }
+
+    /// The samples of the wheels that come with the scan: pairs of a time, ns, and a speed, m/s.
+    #[getter]
+    fn wheels(&self) -> Vec<(i64, f64)> {
+        pairs(&self.samples, SampleKind::Wheels, 0)
     }
 
     /// The index in the dataset; None for a scan of arrays.

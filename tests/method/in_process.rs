@@ -26,7 +26,7 @@ fn register_all(run: &Run) -> Vec<Registered> {
             scan.geometry = dataset.read(index, scan.slot()).unwrap();
             let scan = scan.view();
             let samples = samples.of(dataset.as_ref(), scan.span_ns());
-            odometry.register(&scan, samples).unwrap()
+            odometry.register(&scan, &samples).unwrap()
         })
         .collect()
 }

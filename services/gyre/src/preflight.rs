@@ -44,6 +44,11 @@ pub enum PreflightError {
         "gyro.kind is of a recording, but the radar is live: set it to `udp`, to `ros2` for a radar behind its driver in ROS 2, or to `none`"
     )]
     LiveGyro,
+    /// Wheels beside a live radar.
+    #[error(
+        "wheels.kind is of a recording, but the radar is live: set it to `none`"
+    )]
+    LiveWheels,
     /// The segments would not fit.
     #[error(
         "shared memory at /dev/shm has {free_mb:.1} MB free, but the run needs {footprint}: enlarge it (containers: --shm-size), \
@@ -123,7 +128,7 @@ pub fn check(configuration: &Configuration) -> Result<Preflight, Failure> {
         cell_m: configuration.odometry.raster.cell_m,
         rasters: masker.scans(),
         points: configuration.odometry.points.capacity,
-        samples: match configuration.odometry.gyro.is_used() {
+        samples: match configuration.odometry.has_samples() {
             true => MAX_SAMPLES,
             false => 0,
         },
@@ -221,6 +226,9 @@ impl Scans {
         };
         if !can_come {
             return Err(PreflightError::LiveGyro.into());
+        }
+        if configuration.odometry.wheels.is_used() {
+            return Err(PreflightError::LiveWheels.into());
         }
         configuration.dataset.check()?;
         let (source, options) = (&configuration.source, &configuration.dataset);

@@ -137,7 +137,8 @@ fn play(launch: &Launch) -> Result<StageCounters, StageError> {
     let options: DatasetOptions = launch.section("dataset")?;
     let drive = SimulatedDrive::new(&simulation).map_err(|error| input(&error))?;
     let mut dataset = drive.open(&options).map_err(|error| input(&error))?;
-    let samples = simulated_samples(&drive, &launch.section("gyro")?, dataset.as_mut());
+    let (gyro, wheels) = (launch.section("gyro")?, launch.section("wheels")?);
+    let samples = simulated_samples(&drive, (&gyro, &wheels), dataset.as_mut());
     let samples = samples.map_err(|error| input(&error))?;
     gyre_radar_replay::play(launch, dataset, samples, Pace::OnDemand)
 }

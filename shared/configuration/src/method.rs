@@ -18,7 +18,7 @@ use crate::{
 pub struct MethodConfig {
     /// The format of the recording, and the constants of its radar.
     pub dataset: DatasetOptions,
-    /// The settings of the method: the sections from `raster` to `gyro`.
+    /// The settings of the method: the sections from `raster` to `wheels`.
     #[serde(flatten)]
     pub odometry: OdometryConfig,
     /// The correction of the trajectory at places that are seen again.
@@ -29,7 +29,7 @@ pub struct MethodConfig {
 
 impl MethodConfig {
     /// The names of the sections.
-    pub const SECTIONS: [&str; 12] = [
+    pub const SECTIONS: [&str; 13] = [
         "dataset",
         "raster",
         "points",
@@ -40,6 +40,7 @@ impl MethodConfig {
         "exhaustive",
         "refinement",
         "gyro",
+        "wheels",
         "slam",
         "gnss",
     ];
@@ -72,6 +73,7 @@ impl MethodConfig {
                 exhaustive: section(table, "exhaustive")?,
                 refinement: section(table, "refinement")?,
                 gyro: section(table, "gyro")?,
+                wheels: section(table, "wheels")?,
             },
             slam: section(table, "slam")?,
             gnss: section(table, "gnss")?,
@@ -92,6 +94,7 @@ impl MethodConfig {
         within("exhaustive", odometry.exhaustive.validate())?;
         within("refinement", odometry.refinement.validate())?;
         within("gyro", odometry.gyro.validate())?;
+        within("wheels", odometry.wheels.validate())?;
         within("slam.places", self.slam.validate())?;
         within("gnss", self.gnss.validate())
     }

@@ -10,7 +10,7 @@ use toml::{Table, Value};
 use crate::{ConfigurationError, strict};
 
 /// The keys that name files or folders.
-const KEYS: [&str; 13] = [
+const KEYS: [&str; 14] = [
     "run.ground_truth",
     "source.data",
     "simulation.drive.file",
@@ -19,6 +19,7 @@ const KEYS: [&str; 13] = [
     "masking.runtime",
     "slam.map",
     "gyro.file",
+    "wheels.file",
     "gnss.file",
     RECORDING,
     "link.ca",

@@ -5,9 +5,10 @@ use std::path::Path;
 
 use gyre_radar::{
     Dataset, Fingerprint, GnssLog, GnssLogError, GyroLog, LogError, OpenError, ScanSamples,
+    WheelLog,
 };
 use gyre_run::PlayedFrom;
-use gyre_samples::{GnssKind, GyroConfig, GyroKind};
+use gyre_samples::{GnssKind, GyroConfig, GyroKind, WheelsConfig, WheelsKind};
 use gyre_simulator::{SimulatedDrive, SimulatorError};
 use thiserror::Error;
 
@@ -33,9 +34,9 @@ pub enum SourceError {
     /// The recording cannot be opened.
     #[error(transparent)]
     Open(#[from] OpenError),
-    /// The log of the gyro cannot be used.
+    /// The log of the gyro or of the wheels cannot be used.
     #[error(transparent)]
-    Gyro(#[from] LogError),
+    Log(#[from] LogError),
     /// The log of the GNSS receiver cannot be used.
     #[error(transparent)]
     Gnss(#[from] GnssLogError),
@@ -49,6 +50,11 @@ pub enum SourceError {
         "gyro.kind is `auto`, but the simulation has no gyro: give it one in [simulation.gyro], or set gyro.kind = \"none\""
     )]
     NoGyro,
+    /// A simulation without wheels.
+    #[error(
+        "wheels.kind is `auto`, but the simulation has no wheels that measure: give them a rate in [simulation.wheels], or set wheels.kind = \"none\""
+    )]
+    NoWheels,
 }
 
 /// An open recording or simulation.
@@ -57,7 +63,7 @@ pub struct Played {
     pub dataset: Box<dyn Dataset>,
     /// `ground_truth.tum` of a simulation that is played without being stored.
     pub truth: Option<Vec<u8>>,
-    /// The samples of a gyro.
+    /// The samples of a gyro and of wheels.
     pub samples: ScanSamples,
 }
 
@@ -67,7 +73,7 @@ pub struct Played {
 /// No dataset is named, or it cannot be opened.
 pub fn open(configuration: &Configuration) -> Result<Played, SourceError> {
     let (data, options) = (&configuration.source.data, &configuration.dataset);
-    let gyro = &configuration.odometry.gyro;
+    let method = &configuration.odometry;
     if configuration.is_radar() {
         return Err(SourceError::Radar {
             radar: configuration.data(),
@@ -77,7 +83,7 @@ pub fn open(configuration: &Configuration) -> Result<Played, SourceError> {
         let drive = SimulatedDrive::new(simulation)?;
         let mut dataset = drive.open(options)?;
         return Ok(Played {
-            samples: simulated_samples(&drive, gyro, dataset.as_mut())?,
+            samples: simulated_samples(&drive, (&method.gyro, &method.wheels), dataset.as_mut())?,
             dataset,
             truth: Some(drive.ground_truth_tum()),
         });
@@ -87,31 +93,38 @@ pub fn open(configuration: &Configuration) -> Result<Played, SourceError> {
     }
     let mut dataset = gyre_recording::open(data, options)?;
     Ok(Played {
-        samples: ScanSamples::open(gyro, data, dataset.as_mut())?,
+        samples: ScanSamples::open(&method.gyro, &method.wheels, data, dataset.as_mut())?,
         dataset,
         truth: None,
     })
 }
 
-/// Returns the samples that go with the scans of a simulation: of its own gyro, unless another log
-/// is named.
+/// Returns the samples that go with the scans of a simulation: of its own gyro and wheels, unless
+/// other logs are named.
 ///
 /// # Errors
-/// The simulation has no gyro, or a log that cannot be used.
+/// The simulation has no gyro or no wheels, or a log that cannot be used.
 pub fn simulated_samples(
     drive: &SimulatedDrive,
-    gyro: &GyroConfig,
+    (gyro, wheels): (&GyroConfig, &WheelsConfig),
     dataset: &mut dyn Dataset,
 ) -> Result<ScanSamples, SourceError> {
-    if gyro.kind != GyroKind::Auto {
-        return Ok(ScanSamples::open(gyro, Path::new(""), dataset)?);
-    }
-    let samples = drive.gyro_samples().ok_or(SourceError::NoGyro)?;
-    Ok(ScanSamples::of_log(
-        &GyroLog::of(samples, Path::new("simulation"))?,
-        gyro,
-        dataset,
-    )?)
+    let path = Path::new("simulation");
+    let turns = match gyro.kind {
+        GyroKind::Auto => {
+            let samples = drive.gyro_samples().ok_or(SourceError::NoGyro)?;
+            ScanSamples::of_gyro(&GyroLog::of(samples, path)?, gyro, dataset)?
+        }
+        _ => ScanSamples::open(gyro, &WheelsConfig::default(), Path::new(""), dataset)?,
+    };
+    let speeds = match wheels.kind {
+        WheelsKind::Auto => {
+            let samples = drive.wheel_samples().ok_or(SourceError::NoWheels)?;
+            ScanSamples::of_wheels(&WheelLog::of(samples, path)?, wheels, dataset)?
+        }
+        _ => ScanSamples::open(&GyroConfig::default(), wheels, Path::new(""), dataset)?,
+    };
+    Ok(turns.and(speeds))
 }
 
 /// Returns the log of the fixes that the corrected trajectory is made with; `None` without GNSS.

@@ -285,6 +285,18 @@ impl fmt::Display for Summary {
                 gyro.bias_sigma_radps
             )?;
         }
+        if let Some(wheels) = &c.wheels {
+            writeln!(
+                f,
+                "distances by the wheels {} of {}  slips {}  predicted {}  scale {:.4} +- {:.4}",
+                wheels.motions,
+                c.processed.saturating_sub(1 + c.breaks),
+                wheels.slips,
+                wheels.predicted,
+                wheels.scale,
+                wheels.scale_sigma
+            )?;
+        }
         if let Some(mask) = &self.mask {
             writeln!(f, "masks of {} by {}", mask.model, mask.backend.name())?;
         }

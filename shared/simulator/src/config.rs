@@ -14,6 +14,7 @@ use crate::sensor::{Effects, SensorConfig};
 use crate::town::TownConfig;
 use crate::traffic::TrafficConfig;
 use crate::weather::WeatherConfig;
+use crate::wheels::SimulatedWheelsConfig;
 
 /// Maximum number of scans.
 pub(crate) const MAX_SCANS: usize = 100_000;
@@ -30,7 +31,7 @@ pub struct SimulationConfig {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scans: Option<usize>,
     /// The seed of all randomness that has no seed of its own: `town.seed`, `town.changes_seed`,
-    /// `traffic.seed`, `sensor.seed`, `gyro.seed`.
+    /// `traffic.seed`, `sensor.seed`, `gyro.seed`, `wheels.seed`.
     pub seed: u64,
     /// The likeness to a real road: switches of `[simulation.effects]`, `town.belts` and
     /// `sensor.gain_db` that are left out are as it says. Default: `plain`.
@@ -49,6 +50,9 @@ pub struct SimulationConfig {
     /// The gyro beside the radar. Default: none.
     #[serde(skip_serializing_if = "SimulatedGyroConfig::is_default")]
     pub gyro: SimulatedGyroConfig,
+    /// The speed by the vehicle's wheels. Default: none.
+    #[serde(skip_serializing_if = "SimulatedWheelsConfig::is_default")]
+    pub wheels: SimulatedWheelsConfig,
     /// The weather, section by section of the drive. Default: clear.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub weather: Vec<WeatherConfig>,
@@ -68,6 +72,7 @@ impl Default for SimulationConfig {
             sensor: SensorConfig::default(),
             effects: Effects::default(),
             gyro: SimulatedGyroConfig::default(),
+            wheels: SimulatedWheelsConfig::default(),
             weather: Vec::new(),
             output: OutputConfig::default(),
         }
@@ -88,6 +93,7 @@ impl SimulationConfig {
         self.traffic.validate()?;
         self.sensor.validate()?;
         self.gyro.validate()?;
+        self.wheels.validate()?;
         self.weather.iter().try_for_each(WeatherConfig::validate)
     }
 
@@ -126,6 +132,11 @@ impl SimulationConfig {
     /// The seed of the gyro's errors and of its clock.
     pub fn gyro_seed(&self) -> u64 {
         self.gyro.seed.unwrap_or(self.seed)
+    }
+
+    /// The seed of the errors of the wheels.
+    pub fn wheels_seed(&self) -> u64 {
+        self.wheels.seed.unwrap_or(self.seed)
     }
 
     /// Returns the options with which a reader gets the ranges and angles of the simulated radar.

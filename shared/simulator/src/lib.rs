@@ -13,7 +13,8 @@
 //!   points,
 //! - [`relief`]: the height of the ground,
 //! - [`profile`]: the radars; [`weather`]: rain, fog and snow,
-//! - [`sensor`]: the measurement of one sweep; [`gyro`]: what a gyro beside the radar measures,
+//! - [`sensor`]: the measurement of one sweep; [`gyro`], [`wheels`]: what a gyro beside the radar
+//!   and the wheels measure,
 //! - [`simulator`]: single scans with their exact poses,
 //! - [`output`], [`simulated_drive`], [`truth`]: the drive in a dataset format,
 //! - [`writer`]: the same on a disk.
@@ -59,6 +60,7 @@ pub mod town;
 pub mod traffic;
 pub mod truth;
 pub mod weather;
+pub mod wheels;
 pub mod world;
 pub mod writer;
 
@@ -76,5 +78,6 @@ pub use sensor::{Effects, Scene, Sensor, SensorConfig, SweepTime};
 pub use simulated_drive::{Renderer, SimulatedDrive};
 pub use simulator::{SimulatedScan, Simulator};
 pub use streets::{Street, Streets};
+pub use wheels::SimulatedWheelsConfig;
 pub use world::World;
 pub use writer::{Summary, remove_dataset, write_dataset, write_dataset_on};

@@ -18,6 +18,7 @@ use crate::sensor::Sensor;
 use crate::sensor::effects::is_on;
 use crate::simulator::Simulator;
 use crate::truth;
+use crate::wheels;
 
 /// A simulated drive in a dataset format.
 #[derive(Clone)]
@@ -144,6 +145,12 @@ impl SimulatedDrive {
         self.simulator.gyro_samples()
     }
 
+    /// The samples of the wheels, by their stamps, as `wheels.csv` has them. `None` without wheels
+    /// that measure.
+    pub fn wheel_samples(&self) -> Option<Vec<Sample>> {
+        self.simulator.wheel_samples()
+    }
+
     /// All files beside the images.
     pub(crate) fn side_files(&self) -> Vec<SideFile> {
         let mut files = match self.output {
@@ -163,6 +170,10 @@ impl SimulatedDrive {
         files.extend(
             self.gyro_samples()
                 .map(|samples| (log::FILE.into(), log::csv(&samples))),
+        );
+        files.extend(
+            self.wheel_samples()
+                .map(|samples| (wheels::FILE.into(), wheels::csv(&samples))),
         );
         files
     }

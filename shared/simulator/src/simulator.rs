@@ -21,6 +21,7 @@ use crate::streets::Streets;
 use crate::town;
 use crate::traffic::Traffic;
 use crate::weather::WeatherConfig;
+use crate::wheels;
 use crate::world::World;
 
 /// Stamp of the first azimuth of the first scan, microseconds since 1970 (2019-01-10 15:00 UTC).
@@ -162,9 +163,19 @@ impl Simulator {
         let nods = config.effects.elevation;
         let pitch_roll = nods.then(|| PitchRoll::new(config.sensor_seed()));
         let vehicle = Vehicle::new(self.path(), self.world.relief(), pitch_roll);
+        log::samples(&config.gyro, config.gyro_seed(), &vehicle, self.span())
+    }
+
+    /// The samples of the wheels, by their stamps. `None` without wheels that measure.
+    pub fn wheel_samples(&self) -> Option<Vec<Sample>> {
+        let seed = self.config.wheels_seed();
+        wheels::samples(&self.config.wheels, seed, self.path(), self.span())
+    }
+
+    /// The start of the drive, ns since 1970, and its duration, s.
+    fn span(&self) -> (i64, f64) {
         let end_s = self.scans as f64 * self.sampling.period_us as f64 * 1e-6;
-        let drive = (EPOCH_US * 1000, end_s);
-        log::samples(&config.gyro, config.gyro_seed(), &vehicle, drive)
+        (EPOCH_US * 1000, end_s)
     }
 
     /// A new sensor for [`Simulator::render_into`].

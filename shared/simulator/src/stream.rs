@@ -35,6 +35,10 @@ pub(crate) enum Stream {
     GyroClock,
     /// Stalls of the gyro's host.
     GyroStalls,
+    /// Scale, noise and losses of the wheels.
+    WheelErrors,
+    /// Slips of the wheels.
+    WheelSlips,
 }
 
 impl Stream {
@@ -60,6 +64,8 @@ impl Stream {
             Self::GyroErrors => 1 << 48,
             Self::GyroClock => 1 << 49,
             Self::GyroStalls => 1 << 50,
+            Self::WheelErrors => 1 << 51,
+            Self::WheelSlips => 1 << 52,
             Self::PitchRoll => u64::MAX - 1,
             Self::FixedEchoes => u64::MAX,
         }
@@ -94,8 +100,10 @@ mod tests {
             Stream::GyroErrors,
             Stream::GyroClock,
             Stream::GyroStalls,
+            Stream::WheelErrors,
+            Stream::WheelSlips,
         ];
         let numbers: BTreeSet<u64> = counted.chain(single).map(Stream::number).collect();
-        assert_eq!(numbers.len(), 400_010);
+        assert_eq!(numbers.len(), 400_012);
     }
 }

@@ -22,6 +22,14 @@ pub struct WeatherConfig {
     pub fog_g_m3: f64,
     /// Snow as melted water, millimetres an hour: 1 light, 5 heavy.
     pub snow_mm_h: f64,
+    /// Two-way loss of a radome that mud, ice or slush covers, decibels: from 60 on the radar is
+    /// blind.
+    #[serde(skip_serializing_if = "is_none")]
+    pub blocked_db: f64,
+}
+
+fn is_none(loss_db: &f64) -> bool {
+    *loss_db == 0.0
 }
 
 impl WeatherConfig {
@@ -33,7 +41,8 @@ impl WeatherConfig {
         require_within("weather.from_s", self.from_s, 0.0, 1e6)?;
         require_within("weather.rain_mm_h", self.rain_mm_h, 0.0, 200.0)?;
         require_within("weather.fog_g_m3", self.fog_g_m3, 0.0, 5.0)?;
-        require_within("weather.snow_mm_h", self.snow_mm_h, 0.0, 50.0)
+        require_within("weather.snow_mm_h", self.snow_mm_h, 0.0, 50.0)?;
+        require_within("weather.blocked_db", self.blocked_db, 0.0, 200.0)
     }
 
     /// The weather at a time of the drive; clear before the first section.
@@ -58,9 +67,11 @@ impl WeatherConfig {
         (rain + fog_db_km * self.fog_g_m3 + snow * self.snow_mm_h) / 1000.0
     }
 
-    /// Two-way loss of the wet (or snow-covered) radome, decibels.
+    /// Two-way loss of the wet (or covered) radome, decibels.
     pub fn radome_db(&self) -> f64 {
-        2.5 * (self.rain_mm_h / 10.0).min(3.0).sqrt() + 1.5 * (self.snow_mm_h / 3.0).min(2.0).sqrt()
+        let rain = 2.5 * (self.rain_mm_h / 10.0).min(3.0).sqrt();
+        let snow = 1.5 * (self.snow_mm_h / 3.0).min(2.0).sqrt();
+        rain + snow + self.blocked_db
     }
 
     /// Backscattering cross-section of a cubic metre of air, square metres.

@@ -211,7 +211,7 @@ fn outcome_of_preflight(error: &PreflightError) -> DriveOutcome {
         PreflightError::SharedMemory { .. }
         | PreflightError::OpenFiles { .. }
         | PreflightError::NoSharedMemory(_) => DriveOutcome::Machine,
-        PreflightError::LiveGyro => DriveOutcome::Configuration,
+        PreflightError::LiveGyro | PreflightError::LiveWheels => DriveOutcome::Configuration,
     }
 }
 

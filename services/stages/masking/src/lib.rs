@@ -137,6 +137,7 @@ impl Stage for Masking {
         let azimuths = input.scan.header().azimuths as usize;
         header.azimuth_variance_rad2 = self.azimuths.last().variance_rad2(azimuths);
         header.set_turn(input.turn);
+        header.set_distance(input.distance);
         Ok(())
     }
 

@@ -3,7 +3,7 @@
 use gyre_geometry::Twist;
 use gyre_messages::{Item, Scan, SearchedMotion, Window, flag};
 use gyre_radar::LostAzimuths;
-use gyre_samples::{Gyro, GyroTurn, with_yaw_rate};
+use gyre_samples::{Gyro, GyroTurn, Sample, WheelDistance, Wheels, with_yaw_rate};
 use gyre_stage::{
     Launch, Listener, StageError,
     inputs::{Action, Inputs},
@@ -17,6 +17,7 @@ pub struct Scans {
     queue: Queue,
     motions: Motions,
     gyro: Gyro,
+    wheels: Wheels,
     /// The scan whose samples it has taken last.
     sampled: Option<u64>,
     window: Window,
@@ -40,6 +41,8 @@ pub struct ScanView<'a> {
     pub twist: Option<Twist>,
     /// The turn since the scan before by the gyro.
     pub turn: Option<GyroTurn>,
+    /// The distance since the scan before by the wheels.
+    pub distance: Option<WheelDistance>,
     /// Where its azimuths were lost, if it has a pose from before a restart.
     pub lost: Option<LostAzimuths>,
     /// The previous scan, if the mask takes two; `None` where the chain starts.
@@ -69,6 +72,7 @@ impl Inputs for Scans {
             queue,
             motions,
             gyro: Gyro::new(&launch.section("gyro")?),
+            wheels: Wheels::new(&launch.section("wheels")?),
             sampled: None,
             window: launch.manifest.window,
             found: [None; 2],
@@ -126,6 +130,7 @@ impl Inputs for Scans {
             scan: scan?,
             twist: twist(motion, rate),
             turn: self.gyro.turn(),
+            distance: self.wheels.distance(),
             lost,
             previous,
         })
@@ -177,8 +182,8 @@ impl Scans {
         found.iter().all(Option::is_some)
     }
 
-    /// Hands the samples of the current scan to the gyro, once; before it those of the previous
-    /// scan, if that came with a restart, and of the scans that were dropped since.
+    /// Hands the samples of the current scan to gyro and wheels, once; before it those of the
+    /// previous scan, if that came with a restart, and of the scans that were dropped since.
     fn take_samples(&mut self, starts_chain: bool) -> Result<(), StageError> {
         let (scans, dropped) = match &mut self.queue {
             Queue::Lossless(queue) => ([queue.previous(), queue.current()], Vec::new()),
@@ -193,11 +198,23 @@ impl Scans {
             return Ok(());
         };
         match previous {
-            _ if starts_chain => self.gyro.clear(),
-            Some(previous) => push(&mut self.gyro, previous)?,
-            None => self.gyro.drop_scan(&dropped),
+            _ if starts_chain => {
+                self.gyro.clear();
+                self.wheels.clear();
+            }
+            Some(previous) => {
+                let (samples, stamp_ns, span_ns) = samples_of(previous)?;
+                self.gyro.push(samples, stamp_ns, span_ns);
+                self.wheels.push(samples, stamp_ns, span_ns);
+            }
+            None => {
+                self.gyro.drop_scan(&dropped);
+                self.wheels.drop_scan(&dropped);
+            }
         }
-        push(&mut self.gyro, current)?;
+        let (samples, stamp_ns, span_ns) = samples_of(current)?;
+        self.gyro.push(samples, stamp_ns, span_ns);
+        self.wheels.push(samples, stamp_ns, span_ns);
         self.sampled = Some(current.item().published);
         Ok(())
     }
@@ -210,12 +227,12 @@ impl Scans {
     }
 }
 
-/// Hands the samples of a scan to the gyro.
-fn push(gyro: &mut Gyro, received: &Received<Scan>) -> Result<(), StageError> {
+/// Returns the samples that come with a scan, its stamp, and the times of its first and last
+/// azimuth.
+fn samples_of(received: &Received<Scan>) -> Result<(&[Sample], i64, [i64; 2]), StageError> {
     let (header, bytes) = (received.header(), received.values());
     let parts = header.view(bytes).zip(header.samples(bytes));
     let (scan, samples) =
         parts.ok_or_else(|| received.malformed("its payload is shorter than its header says"))?;
-    gyro.push(samples, scan.geometry.stamp_ns, scan.span_ns());
-    Ok(())
+    Ok((samples, scan.geometry.stamp_ns, scan.span_ns()))
 }

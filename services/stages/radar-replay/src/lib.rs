@@ -12,7 +12,7 @@ use std::{error::Error, num::NonZeroUsize, ops::Range, path::Path, time::Duratio
 use gyre_messages::{ScanHeader, StageId};
 use gyre_radar::{Dataset, DatasetOptions, ScanSamples};
 use gyre_run::{PlayedFrom, SourceConfig};
-use gyre_samples::GyroConfig;
+use gyre_samples::{GyroConfig, WheelsConfig};
 use gyre_stage::{
     Launch, Source, StageCounters, StageError,
     source::{self, Tolerance, Unreadable},
@@ -52,7 +52,8 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     match source::open(launch, &tolerance(&config), open)? {
         Some(mut dataset) => {
             let gyro: GyroConfig = launch.section("gyro")?;
-            let samples = ScanSamples::open(&gyro, &config.data, dataset.as_mut());
+            let wheels: WheelsConfig = launch.section("wheels")?;
+            let samples = ScanSamples::open(&gyro, &wheels, &config.data, dataset.as_mut());
             let samples = samples.map_err(|error| StageError::Input(error.to_string()))?;
             play(launch, dataset, samples, Pace::Sensor)
         }
@@ -158,7 +159,7 @@ impl Source for Replay {
             false => Unreadable::Damaged(error.to_string()),
         })?);
         let samples = self.samples.of(self.dataset.as_ref(), header.span_ns());
-        header.set_samples(bytes, samples, 0);
+        header.set_samples(bytes, &samples, 0);
         header.shift_times(shift_ns, bytes);
         Ok(())
     }

@@ -4,7 +4,7 @@ use gyre_geometry::SparsePoint;
 use gyre_journal::checkpoint::{self, Checkpoint, CheckpointError};
 use gyre_messages::{Item, Masked, Motion, Refined, StageId, flag};
 use gyre_radar::PointsConfig;
-use gyre_samples::GyroConfig;
+use gyre_samples::{GyroConfig, WheelsConfig};
 use gyre_scan_matching::{RefinementConfig, Refiner};
 use gyre_stage::{
     Launch, Stage, StageCounters, StageError,
@@ -22,9 +22,11 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let points: PointsConfig = launch.section("points")?;
     let config: RefinementConfig = launch.section("refinement")?;
     let gyro: GyroConfig = launch.section("gyro")?;
+    let wheels: WheelsConfig = launch.section("wheels")?;
     let refiner = Refiner::new(&config, points.capacity)
         .map_err(|error| StageError::Configuration(error.to_string()))?
-        .with_gyro(&gyro);
+        .with_gyro(&gyro)
+        .with_wheels(&wheels);
     if !launch.take_place()? {
         return Ok(StageCounters::default());
     }
@@ -67,6 +69,7 @@ impl Stage for RefinementStage {
                 self.refiner
                     .expect_azimuth_errors(masked.azimuth_variance_rad2);
                 self.refiner.expect_turn(masked.turn());
+                self.refiner.expect_distance(masked.distance());
                 let refined = self.refiner.refine(
                     item.seq,
                     points(input.pair.current)?,
@@ -93,7 +96,8 @@ impl RefinementStage {
         if self.next != Some(item.seq) {
             let before = item.seq.saturating_sub(1);
             let restored = self.checkpoint.restore(before, &mut self.refiner);
-            // A chain goes on with the bias of the gyro alone, which the first one has not.
+            // A chain goes on with the bias of the gyro and the scale of the wheels alone, which the
+            // first one has not.
             restored.or_else(|error| match starts_chain {
                 true => Ok(()),
                 false => Err(unusable(error)),

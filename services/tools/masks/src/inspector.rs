@@ -118,7 +118,7 @@ impl MaskInspector {
         }
         let scan = self.spare.view();
         let samples = self.samples.of(self.dataset.as_ref(), scan.span_ns());
-        let registered = self.odometry.register(&scan, samples);
+        let registered = self.odometry.register(&scan, &samples);
         let registered = registered.map_err(|error| format!("scan {number}: {error}"))?;
         self.last.swap(0, 1);
         std::mem::swap(&mut self.last[0], &mut self.spare);

@@ -33,8 +33,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut dataset = gyre_radar::open(Path::new(folder), &config.dataset)?;
     let mut scan = OwnedScan::with_limits(dataset.limits());
     let mut odometry = Odometry::new(&config.odometry)?;
-    let gyro = &config.odometry.gyro;
-    let samples = ScanSamples::open(gyro, Path::new(folder), dataset.as_mut())?;
+    let (gyro, wheels) = (&config.odometry.gyro, &config.odometry.wheels);
+    let samples = ScanSamples::open(gyro, wheels, Path::new(folder), dataset.as_mut())?;
     let (mut stamps, mut poses) = (Vec::new(), Vec::new());
     for index in 0..dataset.len() {
         match dataset.read(index, scan.slot()) {
@@ -45,7 +45,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             }
         }
         let samples = samples.of(dataset.as_ref(), scan.view().span_ns());
-        let registered = odometry.register(&scan.view(), samples)?;
+        let registered = odometry.register(&scan.view(), &samples)?;
         stamps.push(scan.geometry.stamp_ns);
         poses.push(registered.pose.motion);
     }

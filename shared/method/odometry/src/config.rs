@@ -2,7 +2,7 @@
 
 use gyre_masking::MaskingConfig;
 use gyre_radar::{PointsConfig, RasterConfig};
-use gyre_samples::GyroConfig;
+use gyre_samples::{GyroConfig, WheelsConfig};
 use gyre_scan_matching::{ExhaustiveConfig, RefinementConfig, RotationConfig, TranslationConfig};
 use serde::{Deserialize, Serialize};
 
@@ -29,6 +29,15 @@ pub struct OdometryConfig {
     pub refinement: RefinementConfig,
     /// The gyro, if there is one.
     pub gyro: GyroConfig,
+    /// The wheels, if their speed is known.
+    pub wheels: WheelsConfig,
+}
+
+impl OdometryConfig {
+    /// Returns whether samples of other sensors come with the scans.
+    pub fn has_samples(&self) -> bool {
+        self.gyro.is_used() || self.wheels.is_used()
+    }
 }
 
 /// The section `[search]`.

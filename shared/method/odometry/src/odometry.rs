@@ -2,7 +2,7 @@
 
 use gyre_geometry::{ComposedMotion, OdometryMotion, SparsePoint, Twist, UncertainMotion};
 use gyre_radar::{LostAzimuthFinder, LostAzimuths, PlacedRows, PolarScan};
-use gyre_samples::{Gyro, Sample, with_yaw_rate};
+use gyre_samples::{Gyro, Sample, Wheels, with_yaw_rate};
 use gyre_scan_matching::{JointMatch, Refined};
 use ndarray::{ArrayView2, ArrayViewMut2};
 
@@ -18,6 +18,7 @@ pub struct Odometry {
     refiner: Option<Box<dyn Refine>>,
     twists: LaggedTwists,
     gyro: Gyro,
+    wheels: Wheels,
     finder: LostAzimuthFinder,
     lost: LostAzimuths,
     rows: PlacedRows,
@@ -48,6 +49,7 @@ impl Odometry {
             refiner: parts.refiner,
             twists: LaggedTwists::new(config.masking.feedback_lag()),
             gyro: Gyro::new(&config.gyro),
+            wheels: Wheels::new(&config.wheels),
             finder: LostAzimuthFinder::default(),
             lost: LostAzimuths::default(),
             rows: PlacedRows::default(),
@@ -59,8 +61,8 @@ impl Odometry {
     /// that is not later than the previous one, or by more than [`gyre_radar::MAX_INTERVAL_NS`],
     /// starts a new chain as after [`Odometry::restart`].
     ///
-    /// `samples` are those of a gyro that come with the scan, in the order of their stamps
-    /// ([`gyre_samples::interval_of`]); none, for radar alone.
+    /// `samples` are those of a gyro and of wheels that come with the scan
+    /// ([`gyre_samples::interval_of`]), in the order of [`Sample::order`]; none, for radar alone.
     ///
     /// # Errors
     /// A scan that cannot be used. It is skipped: the next scan is registered against the one
@@ -75,14 +77,17 @@ impl Odometry {
         if !self.pair.is_continued_at(scan.geometry.stamp_ns) {
             self.restart();
         }
-        self.gyro
-            .push(samples, scan.geometry.stamp_ns, scan.span_ns());
+        let (stamp_ns, span_ns) = (scan.geometry.stamp_ns, scan.span_ns());
+        self.gyro.push(samples, stamp_ns, span_ns);
+        self.wheels.push(samples, stamp_ns, span_ns);
         self.pair.expect_turn(self.gyro.turn());
+        self.pair.expect_distance(self.wheels.distance());
         let [_, rate] = self.gyro.sweep_rates_radps();
         let masked = self.mask(scan, with_yaw_rate(self.twists.next(), rate));
         if masked.is_err() {
             // The next turn would be from the scan that is skipped.
             self.gyro.clear();
+            self.wheels.clear();
         }
         masked?;
         let searched = self.search()?;
@@ -160,6 +165,7 @@ impl Odometry {
         self.pair.restart();
         self.twists.clear();
         self.gyro.clear();
+        self.wheels.clear();
         self.finder.reset();
         if let Some(refiner) = &mut self.refiner {
             refiner.reset();

@@ -3,7 +3,7 @@
 use gyre_geometry::{SparsePoint, Twist};
 use gyre_masking::Sweep;
 use gyre_radar::{PolarScan, continues};
-use gyre_samples::GyroTurn;
+use gyre_samples::{GyroTurn, WheelDistance};
 use ndarray::{Array2, ArrayView2, ArrayViewMut2};
 
 use crate::{Mask, OdometryError, Rasters};
@@ -17,6 +17,7 @@ pub struct Pair {
     seq: u64,
     /// From the earlier scan to the later one.
     turn: Option<GyroTurn>,
+    distance: Option<WheelDistance>,
 }
 
 /// The products of a scan.
@@ -97,6 +98,16 @@ impl Pair {
         self.turn = turn;
     }
 
+    /// Returns the distance from the earlier scan to the later one, as the wheels have measured it.
+    pub fn distance(&self) -> Option<WheelDistance> {
+        self.distance
+    }
+
+    /// Sets the distance from the earlier scan to the one that comes.
+    pub(crate) fn expect_distance(&mut self, distance: Option<WheelDistance>) {
+        self.distance = distance;
+    }
+
     pub(crate) fn new(n: usize, capacity: usize, masked_scans: usize) -> Self {
         Self {
             later: Frame::new(n, capacity),
@@ -104,6 +115,7 @@ impl Pair {
             earlier_for_pair: (masked_scans == 2).then(|| Array2::zeros((n, n))),
             seq: 0,
             turn: None,
+            distance: None,
         }
     }
 

@@ -119,7 +119,9 @@ fn refiner(config: &OdometryConfig) -> Result<Option<Box<dyn Refine>>, SetupErro
         RefinementKind::None => Ok(None),
         RefinementKind::LocalMap if capacity == 0 => Err(SetupError::NoPoints),
         RefinementKind::LocalMap => {
-            let refiner = Refiner::new(&config.refinement, capacity)?.with_gyro(&config.gyro);
+            let refiner = Refiner::new(&config.refinement, capacity)?
+                .with_gyro(&config.gyro)
+                .with_wheels(&config.wheels);
             Ok(Some(Box::new(refiner)))
         }
     }
@@ -131,6 +133,7 @@ impl Refine for Refiner {
         let interval_s = pair.interval_ns() as f64 * 1e-9;
         self.expect_azimuth_errors(pair.azimuth_variance_rad2());
         self.expect_turn(pair.turn());
+        self.expect_distance(pair.distance());
         Refiner::refine(self, pair.seq(), later, earlier, searched, interval_s)
     }
 

@@ -8,7 +8,7 @@
 
 pub(crate) mod columns;
 mod error;
-mod faults;
+pub(crate) mod faults;
 pub(crate) mod table;
 mod track;
 mod twist;
@@ -19,7 +19,7 @@ pub use error::LogError;
 pub use faults::{LogFaults, LogGap};
 pub use track::SampleTrack;
 
-use gyre_samples::Sample;
+use gyre_samples::{Sample, SampleKind};
 
 /// Logs relative to the root of a dataset, in order of precedence.
 const PLACES: [&str; 12] = [
@@ -71,9 +71,9 @@ impl GyroLog {
     pub fn read(path: &Path) -> Result<Self, LogError> {
         let raw = match path.is_dir() {
             true => twist::read(path)?,
-            false => table::read(path)?,
+            false => table::read::<columns::Columns>(path)?,
         };
-        let (samples, faults) = faults::examine(raw, path)?;
+        let (samples, faults) = faults::examine(raw, path, &faults::RATES)?;
         Ok(Self {
             samples,
             faults,
@@ -100,6 +100,7 @@ impl GyroLog {
         found.ok_or_else(|| match in_truth().find(|path| path.is_file()) {
             Some(path) => LogError::InTruth { path },
             None => LogError::None {
+                of: SampleKind::Gyro,
                 folder: folder.to_owned(),
             },
         })
@@ -110,11 +111,8 @@ impl GyroLog {
     /// # Errors
     /// Stamps or rates that cannot be those of a gyro.
     pub fn of(samples: Vec<Sample>, path: &Path) -> Result<Self, LogError> {
-        let raw = Raw {
-            samples,
-            ..Raw::default()
-        };
-        let (samples, faults) = faults::examine(raw, path)?;
+        let raw = Raw::of(samples);
+        let (samples, faults) = faults::examine(raw, path, &faults::RATES)?;
         Ok(Self {
             samples,
             faults,
@@ -134,11 +132,21 @@ pub(crate) fn roots(folder: &Path) -> impl Iterator<Item = &Path> {
 
 /// The samples of a file as they stand there.
 #[derive(Debug, Default)]
-struct Raw {
+pub(crate) struct Raw {
     samples: Vec<Sample>,
     /// Rows that are none of the table, and the line of the first.
     unreadable: usize,
     first_unreadable: usize,
     /// The unit of the rates is named nowhere.
     unit_is_assumed: bool,
+}
+
+impl Raw {
+    /// Samples that are of no file.
+    pub(crate) fn of(samples: Vec<Sample>) -> Self {
+        Self {
+            samples,
+            ..Self::default()
+        }
+    }
 }

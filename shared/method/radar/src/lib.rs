@@ -27,6 +27,7 @@ pub mod raster;
 pub mod scan;
 mod scan_samples;
 pub mod trajectory;
+mod wheel_log;
 
 pub use chain::{MAX_INTERVAL_NS, continues};
 pub use clock::{ClockOffset, MAX_OFFSET_S, clock_offset};
@@ -54,3 +55,4 @@ pub use scan::{
 };
 pub use scan_samples::ScanSamples;
 pub use trajectory::Trajectory;
+pub use wheel_log::WheelLog;

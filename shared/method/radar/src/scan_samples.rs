@@ -1,10 +1,13 @@
 //! The samples of other sensors that go with each scan of a dataset.
 
-use std::path::Path;
+use std::{borrow::Cow, path::Path};
 
-use gyre_samples::{GyroConfig, GyroKind, Sample, interval_of};
+use gyre_samples::{
+    GyroConfig, GyroKind, Sample, SampleKind, WheelsConfig, WheelsKind, interval_of,
+};
 
 use crate::{
+    WheelLog,
     dataset::{Dataset, Format},
     gyro_log::{GyroLog, LogError, SampleTrack},
 };
@@ -14,45 +17,102 @@ use crate::{
 pub enum ScanSamples {
     /// There are none.
     None,
-    /// From a log.
+    /// From logs.
     Log(SampleTrack),
-    /// With the scans of the recording of a run, whatever their stamps.
-    Recorded,
+    /// With the scans of the recording of a run, whatever their stamps: those of these kinds.
+    Recorded(Vec<SampleKind>),
 }
 
 impl ScanSamples {
-    /// Opens what the section `[gyro]` names for the dataset in this folder, or for this bag.
+    /// Opens what the sections `[gyro]` and `[wheels]` name for the dataset in this folder, or for
+    /// this bag.
     ///
     /// # Errors
     /// No log beside the scans, or one that cannot be read.
     pub fn open(
-        config: &GyroConfig,
+        gyro: &GyroConfig,
+        wheels: &WheelsConfig,
         folder: &Path,
         dataset: &mut dyn Dataset,
     ) -> Result<Self, LogError> {
-        let log = match (config.kind, dataset.format()) {
-            (GyroKind::None, _) => return Ok(Self::None),
-            (_, Format::Mcap) => return Ok(Self::Recorded),
-            (GyroKind::Auto, _) => match dataset.gyro(config.topic.as_deref())? {
+        if dataset.format() == Format::Mcap {
+            return Ok(Self::recorded(gyro, wheels));
+        }
+        let turns = match gyro.kind {
+            GyroKind::None => None,
+            GyroKind::Auto => Some(match dataset.gyro(gyro.topic.as_deref())? {
                 Some(samples) => GyroLog::of(samples, folder)?,
                 None => GyroLog::read(&GyroLog::find(folder)?)?,
-            },
-            (GyroKind::Udp | GyroKind::Ros2, _) => return Err(LogError::Live),
-            (GyroKind::Log, _) => GyroLog::read(&config.file.clone().unwrap_or_default())?,
+            }),
+            GyroKind::Udp | GyroKind::Ros2 => return Err(LogError::Live),
+            GyroKind::Log => Some(GyroLog::read(&gyro.file.clone().unwrap_or_default())?),
         };
-        Self::of_log(&log, config, dataset)
+        let speeds = match wheels.kind {
+            WheelsKind::None => None,
+            WheelsKind::Auto => Some(WheelLog::read(&WheelLog::find(folder)?)?),
+            WheelsKind::Log => Some(WheelLog::read(&wheels.file.clone().unwrap_or_default())?),
+        };
+        let of_gyro = turns.map(|log| Self::of_gyro(&log, gyro, dataset));
+        let of_wheels = speeds.map(|log| Self::of_wheels(&log, wheels, dataset));
+        let none = || Ok(Self::None);
+        Ok(of_gyro
+            .unwrap_or_else(none)?
+            .and(of_wheels.unwrap_or_else(none)?))
     }
 
-    /// Takes the samples of a log.
+    /// Takes the samples of the log of a gyro.
     ///
     /// # Errors
     /// It has none from the first scan to the last.
-    pub fn of_log(
+    pub fn of_gyro(
         log: &GyroLog,
         config: &GyroConfig,
         dataset: &dyn Dataset,
     ) -> Result<Self, LogError> {
         let track = SampleTrack::new(log, config);
+        Self::of_track(track, (SampleKind::Gyro, &log.path), dataset)
+    }
+
+    /// Takes the samples of the log of the wheels.
+    ///
+    /// # Errors
+    /// It has none from the first scan to the last.
+    pub fn of_wheels(
+        log: &WheelLog,
+        config: &WheelsConfig,
+        dataset: &dyn Dataset,
+    ) -> Result<Self, LogError> {
+        let track = SampleTrack::of_wheels(log, config);
+        Self::of_track(track, (SampleKind::Wheels, &log.path), dataset)
+    }
+
+    /// Joins the samples of two logs.
+    #[must_use]
+    pub fn and(self, other: Self) -> Self {
+        match (self, other) {
+            (Self::Log(one), Self::Log(other)) => Self::Log(one.and(other)),
+            (Self::None, other) => other,
+            (one, _) => one,
+        }
+    }
+
+    /// The samples that a recording has, of the kinds that are used.
+    fn recorded(gyro: &GyroConfig, wheels: &WheelsConfig) -> Self {
+        let used = [
+            gyro.is_used().then_some(SampleKind::Gyro),
+            wheels.is_used().then_some(SampleKind::Wheels),
+        ];
+        match used.iter().flatten().count() {
+            0 => Self::None,
+            _ => Self::Recorded(used.into_iter().flatten().collect()),
+        }
+    }
+
+    fn of_track(
+        track: SampleTrack,
+        (of, path): (SampleKind, &Path),
+        dataset: &dyn Dataset,
+    ) -> Result<Self, LogError> {
         let last = dataset.len().saturating_sub(1);
         let [first_ns, last_ns] =
             [dataset.first(), last].map(|index| dataset.nominal_stamp_ns(index));
@@ -60,22 +120,29 @@ impl ScanSamples {
             && track.between(first_ns, last_ns).is_empty()
         {
             return Err(LogError::Elsewhere {
-                path: log.path.clone(),
+                of,
+                path: path.to_owned(),
                 after_s: (span_ns[0] - first_ns) as f64 * 1e-9,
             });
         }
         Ok(Self::Log(track))
     }
 
-    /// Returns the samples that come with the scan that was read last, in the order of their
-    /// stamps, from the times of its first and its last azimuth: [`interval_of`].
-    pub fn of<'a>(&'a self, dataset: &'a dyn Dataset, span_ns: [i64; 2]) -> &'a [Sample] {
+    /// Returns the samples that come with the scan that was read last, in the order of
+    /// [`Sample::order`], from the times of its first and its last azimuth: [`interval_of`].
+    pub fn of<'a>(&'a self, dataset: &'a dyn Dataset, span_ns: [i64; 2]) -> Cow<'a, [Sample]> {
         match self {
-            Self::None => &[],
-            Self::Recorded => dataset.samples(),
+            Self::None => Cow::Borrowed(&[]),
+            Self::Recorded(kinds) => {
+                let is_used = |sample: &Sample| kinds.iter().any(|kind| sample.is(*kind));
+                match dataset.samples() {
+                    samples if samples.iter().all(is_used) => Cow::Borrowed(samples),
+                    samples => samples.iter().copied().filter(is_used).collect(),
+                }
+            }
             Self::Log(track) => {
                 let [after_ns, until_ns] = interval_of(span_ns);
-                track.between(after_ns, until_ns)
+                Cow::Borrowed(track.between(after_ns, until_ns))
             }
         }
     }

@@ -3,9 +3,11 @@
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
-use crate::Sample;
+use crate::{
+    Sample,
+    bounds::{Bounds, SampleConfigError},
+};
 
 /// Configuration of the gyro: section `[gyro]`.
 ///
@@ -144,18 +146,6 @@ impl Default for GyroConfig {
     }
 }
 
-/// A setting of `[gyro]` out of its bounds.
-#[derive(Clone, Debug, PartialEq, Error)]
-#[error("gyro.{key} is {value}, but must be {expected}")]
-pub struct GyroConfigError {
-    /// The key.
-    pub key: &'static str,
-    /// The value.
-    pub value: f64,
-    /// The values that it may have.
-    pub expected: &'static str,
-}
-
 impl GyroConfig {
     /// Returns whether a gyro is used.
     pub fn is_used(&self) -> bool {
@@ -185,60 +175,24 @@ impl GyroConfig {
     ///
     /// # Errors
     /// The first key that is out of its bounds.
-    pub fn validate(&self) -> Result<(), GyroConfigError> {
-        let within = |key, value: f64, [least, most]: [f64; 2], expected| match (least..=most)
-            .contains(&value)
-        {
-            true => Ok(()),
-            false => Err(GyroConfigError {
-                key,
-                value,
-                expected,
-            }),
-        };
+    pub fn validate(&self) -> Result<(), SampleConfigError> {
+        let bounds = Bounds("gyro");
         let rate = "a rate in rad/s, at most 1";
-        within(
-            "late_s",
-            self.late_s,
-            [-1e6, 1e6],
-            "seconds, at most a million",
-        )?;
-        within(
+        bounds.late_s(self.late_s)?;
+        bounds.within(
             "max_wait_ms",
             self.max_wait_ms,
             [0.0, 1000.0],
             "milliseconds, 0 to 1000",
         )?;
-        within("scale", self.scale, [0.5, 2.0], "a factor, 0.5 to 2")?;
-        within(
-            "scale_sigma",
-            self.scale_sigma,
-            [0.0, 1.0],
-            "a share, 0 to 1",
+        bounds.scale([self.scale, self.scale_sigma])?;
+        bounds.within("bias_radps", self.bias_radps, [-1.0, 1.0], rate)?;
+        bounds.within("bias_sigma_radps", self.bias_sigma_radps, [0.0, 1.0], rate)?;
+        bounds.noise("noise_rad_per_sqrt_s", self.noise_rad_per_sqrt_s)?;
+        bounds.noise(
+            "bias_walk_radps_per_sqrt_s",
+            self.bias_walk_radps_per_sqrt_s,
         )?;
-        within("bias_radps", self.bias_radps, [-1.0, 1.0], rate)?;
-        within("bias_sigma_radps", self.bias_sigma_radps, [0.0, 1.0], rate)?;
-        let noise = [
-            ("noise_rad_per_sqrt_s", self.noise_rad_per_sqrt_s),
-            (
-                "bias_walk_radps_per_sqrt_s",
-                self.bias_walk_radps_per_sqrt_s,
-            ),
-        ];
-        for (key, value) in noise {
-            within(key, value, [0.0, 1.0], "0 to 1")?;
-        }
-        within(
-            "time_sigma_s",
-            self.time_sigma_s,
-            [0.0, 1.0],
-            "seconds, 0 to 1",
-        )?;
-        within(
-            "max_gap_s",
-            self.max_gap_s,
-            [1e-3, 10.0],
-            "seconds, 0.001 to 10",
-        )
+        bounds.times([self.time_sigma_s, self.max_gap_s])
     }
 }

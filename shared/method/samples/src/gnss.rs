@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
+
+use crate::{SampleConfigError, bounds::Bounds};
 
 /// Configuration of GNSS: section `[gnss]`.
 ///
@@ -67,55 +68,17 @@ impl GnssConfig {
     ///
     /// # Errors
     /// The first key that is out of its bounds.
-    pub fn validate(&self) -> Result<(), GnssConfigError> {
-        let [forward, left] = self.lever_m;
-        let lever = "metres, at most 100";
-        let bounds = [
-            (
-                "late_s",
-                self.late_s,
-                [-1e6, 1e6],
-                "seconds, at most a million",
-            ),
-            ("lever_m", forward, [-100.0, 100.0], lever),
-            ("lever_m", left, [-100.0, 100.0], lever),
-            (
-                "sigma_m",
-                self.sigma_m,
-                [1e-3, 1e3],
-                "metres, 0.001 to 1000",
-            ),
-            (
-                "correlation_s",
-                self.correlation_s,
-                [0.0, 1e4],
-                "seconds, 0 to 10000",
-            ),
-        ];
-        let outside = bounds
-            .into_iter()
-            .find(|(_, value, [least, most], _)| !(*least..=*most).contains(value));
-        match outside {
-            Some((key, value, _, expected)) => Err(GnssConfigError {
-                key,
-                value,
-                expected,
-            }),
-            None => Ok(()),
+    pub fn validate(&self) -> Result<(), SampleConfigError> {
+        let bounds = Bounds("gnss");
+        bounds.late_s(self.late_s)?;
+        for metres in self.lever_m {
+            bounds.within("lever_m", metres, [-100.0, 100.0], "metres, at most 100")?;
         }
+        let expected = "metres, 0.001 to 1000";
+        bounds.within("sigma_m", self.sigma_m, [1e-3, 1e3], expected)?;
+        let expected = "seconds, 0 to 10000";
+        bounds.within("correlation_s", self.correlation_s, [0.0, 1e4], expected)
     }
-}
-
-/// A setting of `[gnss]` out of its bounds.
-#[derive(Clone, Debug, PartialEq, Error)]
-#[error("gnss.{key} is {value}, but must be {expected}")]
-pub struct GnssConfigError {
-    /// The key.
-    pub key: &'static str,
-    /// The value.
-    pub value: f64,
-    /// The values that it may have.
-    pub expected: &'static str,
 }
 
 /// A fix of a GNSS receiver in a plane that touches the earth: where its antenna was.

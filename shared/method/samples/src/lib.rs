@@ -6,8 +6,10 @@
 //!
 //! Reading order:
 //! - [`Sample`]: one measurement, as it travels with a scan;
-//! - [`GyroConfig`]: the section `[gyro]`;
+//! - [`GyroConfig`], [`WheelsConfig`]: the sections `[gyro]` and `[wheels]`;
+//! - `integral`: what a rate comes to between two scans;
 //! - [`Gyro`]: integrates the yaw rate between two scans, to a [`GyroTurn`];
+//! - [`Wheels`]: integrates the speed, to a [`WheelDistance`];
 //! - [`LiveSamples`]: what has arrived of a live gyro;
 //! - [`GnssConfig`]: the section `[gnss]`, and [`GnssFix`], which goes with no scan;
 //! - [`LocalPlane`]: places on the earth as coordinates in a plane.
@@ -15,16 +17,24 @@
 //! Axes are those of the vehicle by REP-103: x forward, y left, z up. Rates are in rad/s, stamps in
 //! ns since 1970 on the radar's clock.
 
+mod bounds;
 mod config;
 mod geodesy;
 mod gnss;
 mod gyro;
+mod integral;
 mod live;
 mod sample;
+mod wheels;
+mod wheels_config;
 
-pub use config::{GyroConfig, GyroConfigError, GyroKind, UpAxis};
+pub use bounds::SampleConfigError;
+pub use config::{GyroConfig, GyroKind, UpAxis};
 pub use geodesy::{Geographic, LocalPlane};
-pub use gnss::{GnssConfig, GnssConfigError, GnssFix, GnssKind};
-pub use gyro::{Gyro, GyroTurn, interval_of, with_yaw_rate};
+pub use gnss::{GnssConfig, GnssFix, GnssKind};
+pub use gyro::{Gyro, GyroTurn, with_yaw_rate};
+pub use integral::interval_of;
 pub use live::LiveSamples;
-pub use sample::{MAX_RATE_RADPS, MAX_SAMPLES, Sample, SampleKind};
+pub use sample::{MAX_RATE_RADPS, MAX_SAMPLES, MAX_SPEED_MPS, Sample, SampleKind};
+pub use wheels::{WheelDistance, Wheels};
+pub use wheels_config::{WheelsConfig, WheelsKind};

@@ -19,6 +19,9 @@ pub struct Sample {
 /// The most samples that travel with one scan: those of a second at 1000 Hz.
 pub const MAX_SAMPLES: usize = 1024;
 
+/// The largest speed of a sample, m/s: no vehicle on wheels with a radar drives faster.
+pub const MAX_SPEED_MPS: f64 = 150.0;
+
 /// The largest angular velocity of a sample, rad/s: 2000 degrees a second, the widest range of
 /// gyros of this kind.
 pub const MAX_RATE_RADPS: f64 = 35.0;
@@ -29,6 +32,18 @@ pub const MAX_RATE_RADPS: f64 = 35.0;
 pub enum SampleKind {
     /// Angular velocity about x, y, z (rad/s), then acceleration along them (m/s²).
     Gyro = 1,
+    /// Speed along x (m/s), negative backwards.
+    Wheels = 2,
+}
+
+impl SampleKind {
+    /// Returns the name of its section in configurations.
+    pub fn section(self) -> &'static str {
+        match self {
+            Self::Gyro => "gyro",
+            Self::Wheels => "wheels",
+        }
+    }
 }
 
 impl Sample {
@@ -42,12 +57,30 @@ impl Sample {
         }
     }
 
+    /// Creates a sample of the wheels, m/s.
+    pub fn speed(stamp_ns: i64, speed_mps: f64) -> Self {
+        Self {
+            stamp_ns,
+            kind: SampleKind::Wheels as u32,
+            reserved: 0,
+            values: [speed_mps, 0.0, 0.0, 0.0, 0.0, 0.0],
+        }
+    }
+
     /// Returns whether its kind is known, all its values are finite, and its rates are within
-    /// [`MAX_RATE_RADPS`].
+    /// [`MAX_RATE_RADPS`], its speed within [`MAX_SPEED_MPS`].
     pub fn is_valid(&self) -> bool {
-        let is_rate = |rate: &f64| rate.abs() <= MAX_RATE_RADPS;
+        let within = |values: &[f64], most: f64| values.iter().all(|value| value.abs() <= most);
         let are_finite = self.values.iter().all(|value| value.is_finite());
-        self.is(SampleKind::Gyro) && are_finite && self.values[..3].iter().all(is_rate)
+        let is_measured = (self.is(SampleKind::Gyro) && within(&self.values[..3], MAX_RATE_RADPS))
+            || (self.is(SampleKind::Wheels) && within(&self.values[..1], MAX_SPEED_MPS));
+        are_finite && is_measured
+    }
+
+    /// Returns the place in the order in which samples travel: by their stamps, and of one stamp by
+    /// their kinds. No two have the same.
+    pub fn order(&self) -> (i64, u32) {
+        (self.stamp_ns, self.kind)
     }
 
     /// Returns whether it is of this kind.

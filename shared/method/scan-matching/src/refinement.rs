@@ -13,6 +13,7 @@
 //! - `tracker`: the last poses, what is predicted from them, and which poses a vehicle can have
 //!   reached;
 //! - `heading`: with a gyro, the heading and the gyro's bias;
+//! - `wheels`: with wheels, their scale, and the motions of scans that match nothing;
 //! - `uncertainty`: covariances, and the shares of them that accumulate;
 //! - `standstill`: the pose of a standing vehicle is held;
 //! - [`Submap`]: the points of a keyframe and of those around it;
@@ -33,10 +34,11 @@ mod standstill;
 mod submap;
 mod tracker;
 mod uncertainty;
+mod wheels;
 
 pub use config::{RefinementConfig, RefinementKind};
 use gyre_geometry::{OdometryMotion, Pose, SparsePoint, Twist, UncertainMotion};
-use gyre_samples::{GyroConfig, GyroTurn};
+use gyre_samples::{GyroConfig, GyroTurn, WheelDistance, WheelsConfig};
 pub use heading::{GyroBias, Heading};
 pub use initial_guess::InitialGuess;
 pub use keyframe_aligner::KeyframeAligner;
@@ -44,6 +46,7 @@ pub use local_map::Keyframe;
 pub use standstill::Standstill;
 pub use submap::Submap;
 pub use tracker::{Anchor, TrackerState};
+pub use wheels::{WheelScale, WheelState};
 
 use crate::ConfigError;
 use heading::PredictedTurn;
@@ -53,6 +56,7 @@ use registration::{Candidate, Registration, Scan};
 use standstill::{Estimate, Report};
 use tracker::Step;
 use uncertainty::Uncertainty;
+use wheels::{PredictedDistance, Registered};
 
 /// After this many doubtful scans in a row a plausible match is accepted.
 const MAX_DOUBTFUL: u32 = 2;
@@ -85,6 +89,8 @@ pub struct Refined {
     pub stationary: bool,
     /// The bias of the gyro; `None` where it has not measured the turn.
     pub gyro: Option<GyroBias>,
+    /// The scale of the wheels; `None` where they have not measured the distance.
+    pub wheels: Option<WheelScale>,
 }
 
 /// Refines motions scan by scan against a map of the last keyframes.
@@ -94,11 +100,13 @@ pub struct Refined {
 pub struct Refiner {
     config: RefinementConfig,
     gyro: GyroConfig,
+    wheels: WheelsConfig,
     map: LocalMap,
     state: TrackerState,
     points: DeskewedPoints,
     azimuth_variance_rad2: f64,
     turn: Option<GyroTurn>,
+    distance: Option<WheelDistance>,
 }
 
 impl Refiner {
@@ -112,10 +120,12 @@ impl Refiner {
             map: LocalMap::new(config),
             config: config.clone(),
             gyro: GyroConfig::default(),
+            wheels: WheelsConfig::default(),
             state: TrackerState::default(),
             points: DeskewedPoints::with_capacity(capacity),
             azimuth_variance_rad2: 0.0,
             turn: None,
+            distance: None,
         })
     }
 
@@ -124,6 +134,19 @@ impl Refiner {
     pub fn with_gyro(mut self, gyro: &GyroConfig) -> Self {
         self.gyro = gyro.clone();
         self
+    }
+
+    /// Uses the distances of wheels of this kind: [`Refiner::expect_distance`].
+    #[must_use]
+    pub fn with_wheels(mut self, wheels: &WheelsConfig) -> Self {
+        self.wheels = wheels.clone();
+        self
+    }
+
+    /// Sets the distance from the earlier scan to the later one that the wheels have measured;
+    /// `None` where they have not.
+    pub fn expect_distance(&mut self, distance: Option<WheelDistance>) {
+        self.distance = distance;
     }
 
     /// Sets the turn from the earlier scan to the later one that the gyro has measured; `None`
@@ -160,12 +183,15 @@ impl Refiner {
             step: Step {
                 interval_s,
                 turn: self.predict_turn(interval_s),
+                distance: self.predict_distance(interval_s),
             },
         };
         let predictions = self.ensure_map(&scan, earlier);
-        let uncertainty = Uncertainty::before(&scan, &self.map, predictions, &self.config);
+        let uncertainty =
+            Uncertainty::before(&scan, &self.map, &self.state, predictions, &self.config);
         let best = self.registration(&scan).best();
         let (outcome, estimate) = self.accept_or_predict(&scan, &best, &uncertainty);
+        let wheels = self.distance.and(self.state.wheels);
         let report = self.hold_standstill(&scan, outcome, estimate);
         self.update(&scan, &best, outcome, &estimate.motion);
         Refined {
@@ -184,17 +210,18 @@ impl Refiner {
             outcome,
             stationary: report.stationary,
             gyro: scan.step.turn.and(self.state.heading).map(|it| it.bias()),
+            wheels: wheels.map(|it| it.known()),
         }
     }
 
-    /// Forgets the map and the tracker state but for the bias of the gyro: the next scan starts a
-    /// new chain of motions.
+    /// Forgets the map and the tracker state but for the bias of the gyro and the scale of the
+    /// wheels: the next scan starts a new chain of motions.
     pub fn reset(&mut self) {
         self.map.clear();
-        let mut heading = self.state.heading.take();
-        heading.iter_mut().for_each(Heading::start_map);
+        self.state.leave_map();
         self.state = TrackerState {
-            heading,
+            heading: self.state.heading,
+            wheels: self.state.wheels,
             ..TrackerState::default()
         };
     }
@@ -256,6 +283,18 @@ impl Refiner {
         Some(heading.predict(&turn, &self.gyro))
     }
 
+    /// Predicts the distance since the scan before by the wheels, if those have measured it and do
+    /// not slip.
+    fn predict_distance(&mut self, interval_s: f64) -> Option<PredictedDistance> {
+        let measured = self.distance;
+        if measured.is_some() {
+            self.state.wheels.get_or_insert(WheelState::new(&self.wheels));
+        }
+        let wheels = self.state.wheels.as_mut()?;
+        wheels.wait(interval_s, &self.wheels);
+        wheels.predict(&measured?, &self.wheels)
+    }
+
     fn registration<'a>(&'a mut self, scan: &'a Scan<'a>) -> Registration<'a> {
         Registration {
             scan,
@@ -281,15 +320,11 @@ impl Refiner {
             &self.config,
         );
         let Some(covariance) = covariance.filter(|_| best.is_plausible) else {
-            let [motion, _] = self.state.predict(&scan.step);
-            let covariance = uncertainty.of_prediction();
-            if let (None, Some(heading)) = (scan.step.turn, &mut self.state.heading) {
-                heading.guess(covariance[(2, 2)]);
-            }
-            return (Outcome::Predicted, UncertainMotion { motion, covariance });
+            return (Outcome::Predicted, self.predicted(scan, uncertainty));
         };
         let by_azimuths = uncertainty::by_azimuths(&best.alignment, self.azimuth_variance_rad2);
-        let is_firm = self.is_firm(scan, best) || self.state.doubtful >= MAX_DOUBTFUL;
+        let is_certain = self.is_firm(scan, best);
+        let is_firm = is_certain || self.state.doubtful >= MAX_DOUBTFUL;
         let (outcome, factor) = match is_firm {
             true => (Outcome::Refined, 1.0),
             false => (Outcome::Weak, uncertainty::WEAK_FACTOR),
@@ -298,7 +333,58 @@ impl Refiner {
             motion: best.alignment.pose,
             covariance: (covariance + by_azimuths) * factor,
         };
+        if !self.weigh_distance(scan, &registered, is_certain) {
+            return (Outcome::Predicted, self.predicted(scan, uncertainty));
+        }
         (outcome, self.with_gyro_heading(scan, registered))
+    }
+
+    /// Returns the predicted pose and the covariance of its motion.
+    fn predicted(&mut self, scan: &Scan<'_>, uncertainty: &Uncertainty) -> UncertainMotion {
+        let [motion, _] = self.state.predict(&scan.step);
+        let covariance = uncertainty.of_prediction();
+        if let (None, Some(heading)) = (scan.step.turn, &mut self.state.heading) {
+            heading.guess(covariance[(2, 2)]);
+        }
+        if let Some(wheels) = &mut self.state.wheels {
+            match self.distance.filter(|_| scan.step.distance.is_some()) {
+                Some(measured) => wheels.carry(&measured),
+                None => wheels.guess(covariance[(0, 0)]),
+            }
+            let alone = UncertainMotion {
+                motion: self.state.pose.inv_mul(&motion),
+                covariance,
+            };
+            wheels.miss(&alone, scan.step.interval_s);
+        }
+        UncertainMotion { motion, covariance }
+    }
+
+    /// Compares a registered pose with the distance of the wheels, if there is one: they slip where
+    /// it disagrees. Returns false if they are believed instead, since the match is not certain.
+    fn weigh_distance(
+        &mut self,
+        scan: &Scan<'_>,
+        registered: &UncertainMotion,
+        is_certain: bool,
+    ) -> bool {
+        let Some(wheels) = &mut self.state.wheels else {
+            return true;
+        };
+        let motion = UncertainMotion {
+            motion: self.state.pose.inv_mul(&registered.motion),
+            ..*registered
+        };
+        let drift_share = uncertainty::drift_share(self.map.len(), &self.config);
+        let registered = Registered::of(&motion, drift_share, &self.wheels);
+        match &self.distance {
+            Some(measured) if wheels.agrees(measured, &registered) => {
+                wheels.correct(measured, &registered);
+            }
+            Some(_) if scan.step.distance.is_some() && !is_certain => return false,
+            measured => wheels.adopt(&registered, measured.is_some()),
+        }
+        true
     }
 
     /// Weighs the heading of a registered pose against that of the gyro, if there is one.
@@ -339,6 +425,7 @@ impl Refiner {
             pose,
             previous: self.state.pose,
             outcome,
+            rolls: scan.step.distance.is_some_and(|it| it.is_certain()),
             interval_s: scan.step.interval_s,
         };
         match self.config.hold_standstill {
@@ -355,9 +442,7 @@ impl Refiner {
         if self.state.unmatched >= config.max_unmatched {
             // A new map starts with this scan at the next call, and so on until two scans match.
             self.map.clear();
-            if let Some(heading) = &mut self.state.heading {
-                heading.start_map();
-            }
+            self.state.leave_map();
         } else if outcome == Outcome::Refined && self.map.needs_keyframe(pose, config) {
             self.insert_keyframe(scan.id, scan.points, pose, &twist);
             if let Some(heading) = &mut self.state.heading {

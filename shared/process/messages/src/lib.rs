@@ -57,7 +57,7 @@ pub use motion::{Motion, MotionEstimate, MotionHeader, SearchedMotion};
 pub use numbering::{GivenAnew, NumberedBy};
 pub use pose::{Pose, PoseHeader};
 pub use refined::Refined;
-pub use refinement::{RefinementRecord, initial_guess, outcome};
+pub use refinement::{RefinementRecord, initial_guess, outcome, wheels};
 pub use rotation::{Rotation, RotationEstimate, RotationHeader};
 pub use scan::{Scan, ScanHeader};
 pub use topics::{Footprint, Topic, WireType, topic, topics};

@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use gyre_geometry::{SparsePoint, Twist};
-use gyre_samples::GyroTurn;
+use gyre_samples::{GyroTurn, WheelDistance};
 use ndarray::{ArrayView2, ArrayViewMut2};
 
 use crate::{
@@ -53,7 +53,7 @@ impl Message for Masked {
             + (limits.points * size_of::<SparsePoint>()).div_ceil(ByteBlock::LEN)
     }
 }
-header!(MaskedHeader, "gyre_masked_header_v6");
+header!(MaskedHeader, "gyre_masked_header_v7");
 
 /// Values of [`MaskedHeader::mask`].
 pub mod mask_kind {
@@ -93,6 +93,10 @@ pub struct MaskedHeader {
     pub gyro: GyroTurn,
     /// 1 if it says so.
     pub has_gyro: u64,
+    /// The distance since the previous scan by the wheels: see [`MaskedHeader::distance`].
+    pub wheels: WheelDistance,
+    /// 1 if they say so.
+    pub has_wheels: u64,
 }
 
 /// The parts of a payload, to fill in: see [`MaskedHeader::split`].
@@ -152,14 +156,19 @@ impl MaskedHeader {
             "finite, 0 or more",
         )?;
         require(self.has_gyro <= 1, "has_gyro", self.has_gyro, "0 or 1")?;
-        let gyro = &self.gyro;
+        require(self.has_wheels <= 1, "has_wheels", self.has_wheels, "0 or 1")?;
+        let (gyro, wheels) = (&self.gyro, &self.wheels);
         finite([
             ("gyro.yaw_rad", gyro.yaw_rad),
             ("gyro.sweep_rate_radps", gyro.sweep_rate_radps),
+            ("wheels.distance_m", wheels.distance_m),
         ])?;
         for (key, value) in [
             ("gyro.variance_rad2", gyro.variance_rad2),
             ("gyro.interval_s", gyro.interval_s),
+            ("wheels.variance_m2", wheels.variance_m2),
+            ("wheels.side_variance_m2", wheels.side_variance_m2),
+            ("wheels.interval_s", wheels.interval_s),
         ] {
             require(
                 value >= 0.0 && value.is_finite(),
@@ -202,6 +211,18 @@ impl MaskedHeader {
     pub fn set_turn(&mut self, turn: Option<GyroTurn>) {
         self.gyro = turn.unwrap_or_default();
         self.has_gyro = turn.is_some().into();
+    }
+
+    /// Returns the distance from the previous scan to this one, as the wheels have measured it;
+    /// `None` where they have not.
+    pub fn distance(&self) -> Option<WheelDistance> {
+        (self.has_wheels == 1).then_some(self.wheels)
+    }
+
+    /// Sets it.
+    pub fn set_distance(&mut self, distance: Option<WheelDistance>) {
+        self.wheels = distance.unwrap_or_default();
+        self.has_wheels = distance.is_some().into();
     }
 
     /// Splits a payload into its parts, with `rasters` (1 or 2) of n x n cells. `None` if it is too

@@ -29,6 +29,16 @@ pub mod initial_guess {
     pub const YAW_OFFSET: u32 = 3;
 }
 
+/// Values of [`RefinementRecord::wheels`].
+pub mod wheels {
+    /// They have not measured the distance.
+    pub const NONE: u64 = 0;
+    /// They agree with the registered motion, or the motion is predicted by them.
+    pub const USED: u64 = 1;
+    /// They slip: they disagree with the registered motion, or with the last one.
+    pub const SLIP: u64 = 2;
+}
+
 /// The result of a refinement; all zero without one.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -50,6 +60,12 @@ pub struct RefinementRecord {
     pub gyro_bias_radps: f64,
     /// Standard deviation of that bias, rad/s.
     pub gyro_bias_sigma_radps: f64,
+    /// The part of the wheels: see [`wheels`].
+    pub wheels: u64,
+    /// True distance over that of the wheels, after the scan; zero without wheels.
+    pub wheel_scale: f64,
+    /// Standard deviation of that scale.
+    pub wheel_scale_sigma: f64,
 }
 
 impl RefinementRecord {
@@ -79,11 +95,14 @@ impl RefinementRecord {
             "0 or 1",
         )?;
         require(self.gyro <= 1, "gyro", self.gyro, "0 or 1")?;
+        require(self.wheels <= wheels::SLIP, "wheels", self.wheels, "0 to 2")?;
         finite([
             ("overlap", self.overlap),
             ("support", self.support),
             ("gyro_bias_radps", self.gyro_bias_radps),
             ("gyro_bias_sigma_radps", self.gyro_bias_sigma_radps),
+            ("wheel_scale", self.wheel_scale),
+            ("wheel_scale_sigma", self.wheel_scale_sigma),
         ])
     }
 }
@@ -107,6 +126,13 @@ impl From<&gyre_scan_matching::Refined> for RefinementRecord {
             gyro: refined.gyro.is_some().into(),
             gyro_bias_radps: refined.gyro.map_or(0.0, |bias| bias.rate_radps),
             gyro_bias_sigma_radps: refined.gyro.map_or(0.0, |bias| bias.sigma_radps),
+            wheels: match refined.wheels {
+                None => wheels::NONE,
+                Some(of) if of.slip => wheels::SLIP,
+                Some(_) => wheels::USED,
+            },
+            wheel_scale: refined.wheels.map_or(0.0, |of| of.scale),
+            wheel_scale_sigma: refined.wheels.map_or(0.0, |of| of.sigma),
         }
     }
 }

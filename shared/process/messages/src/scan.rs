@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 use gyre_radar::{MAX_AZIMUTHS, PolarScan, ScanSlot, Sense, SweepGeometry};
-use gyre_samples::Sample;
+use gyre_samples::{MAX_RATE_RADPS, MAX_SPEED_MPS, Sample};
 
 use crate::{
     block::ByteBlock,
@@ -175,12 +175,12 @@ impl ScanHeader {
         if let Some(index) = samples.iter().position(|sample| !sample.is_valid()) {
             let sample = samples[index];
             return Err(Violation(format!(
-                "sample {index} is {sample:?}, but must be of a known kind, finite, and at most 35 rad/s"
+                "sample {index} is {sample:?}, but must be of a known kind, finite, and at most {MAX_RATE_RADPS} rad/s or {MAX_SPEED_MPS} m/s"
             )));
         }
         let disorder = samples
             .windows(2)
-            .position(|pair| pair[0].stamp_ns >= pair[1].stamp_ns);
+            .position(|pair| pair[0].order() >= pair[1].order());
         disorder.map_or(Ok(()), |index| {
             Err(Violation(format!(
                 "sample {} is not later than the one before",
@@ -203,7 +203,7 @@ impl ScanHeader {
         self.power_bytes()?.checked_next_multiple_of(ByteBlock::LEN)
     }
 
-    /// Views the samples, in the order of their stamps; `None` if the payload is shorter than the
+    /// Views the samples, in the order of [`Sample::order`]; `None` if the payload is shorter than the
     /// header says.
     pub fn samples<'a>(&self, bytes: &'a [u8]) -> Option<&'a [Sample]> {
         if self.samples == 0 {

@@ -1,6 +1,6 @@
 //! Counts of scans and motions.
 
-use gyre_messages::{Item, MotionEstimate, PoseHeader, flag, initial_guess, outcome};
+use gyre_messages::{Item, MotionEstimate, PoseHeader, flag, initial_guess, outcome, wheels};
 use serde::Serialize;
 
 /// Largest share of unreadable scans of a run that succeeds. With more, motions span more than one
@@ -34,6 +34,9 @@ pub struct Counts {
     /// `None`: no gyro has measured a turn.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gyro: Option<GyroCounts>,
+    /// `None`: no wheels have measured a distance.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wheels: Option<WheelCounts>,
 }
 
 /// The path that was driven.
@@ -84,6 +87,37 @@ impl GyroCounts {
             self.bias_radps = refinement.gyro_bias_radps;
             self.bias_sigma_radps = refinement.gyro_bias_sigma_radps;
         }
+    }
+}
+
+/// The contribution of wheels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct WheelCounts {
+    /// Motions whose distance they measured.
+    pub motions: u64,
+    /// Those in which they slipped: the distance was another one than that of the radar, or had
+    /// last been.
+    pub slips: u64,
+    /// Those that were predicted by them, since the radar saw nothing that matched.
+    pub predicted: u64,
+    /// True distance over that of the wheels, after the last of them.
+    pub scale: f64,
+    /// Standard deviation of that scale.
+    pub scale_sigma: f64,
+}
+
+impl WheelCounts {
+    fn add(&mut self, motion: &MotionEstimate) {
+        let refinement = &motion.refinement;
+        if refinement.wheels == wheels::NONE {
+            return;
+        }
+        let is_used = refinement.wheels == wheels::USED;
+        self.motions += 1;
+        self.slips += u64::from(!is_used);
+        self.predicted += u64::from(is_used && refinement.outcome == outcome::PREDICTED);
+        self.scale = refinement.wheel_scale;
+        self.scale_sigma = refinement.wheel_scale_sigma;
     }
 }
 
@@ -141,6 +175,7 @@ pub struct Counter {
     lost: LostCounts,
     motions: MotionCounts,
     gyro: GyroCounts,
+    wheels: WheelCounts,
 }
 
 impl Counter {
@@ -154,6 +189,7 @@ impl Counter {
         self.lost.add(&pose.item);
         self.motions.add(&pose.motion);
         self.gyro.add(&pose.motion);
+        self.wheels.add(&pose.motion);
     }
 
     /// Returns the path, which is so long.
@@ -186,6 +222,7 @@ impl Counter {
             lost: (self.lost.scans > 0).then_some(self.lost),
             motions: refines.then_some(self.motions),
             gyro: (self.gyro.motions > 0).then_some(self.gyro),
+            wheels: (self.wheels.motions > 0).then_some(self.wheels),
         }
     }
 }

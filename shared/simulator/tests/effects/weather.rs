@@ -11,6 +11,7 @@ const RAIN: WeatherConfig = WeatherConfig {
     rain_mm_h: 100.0,
     fog_g_m3: 0.0,
     snow_mm_h: 0.0,
+    blocked_db: 0.0,
 };
 const FOG: WeatherConfig = WeatherConfig {
     rain_mm_h: 0.0,

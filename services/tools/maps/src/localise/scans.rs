@@ -81,7 +81,7 @@ impl Scans {
                     self.scan.geometry = geometry;
                     let scan = self.scan.view();
                     let samples = self.samples.of(self.dataset.as_ref(), scan.span_ns());
-                    let registered = self.odometry.register(&scan, samples);
+                    let registered = self.odometry.register(&scan, &samples);
                     registered.map_err(|error| format!("scan {number}: {error}"))
                 }
                 Err(error) => Err(error.to_string()),

@@ -201,7 +201,7 @@ impl Columns {
     }
 }
 
-/// A name of a column with what programs write in different ways made equal.
+/// Returns a name of a column with what programs write in different ways made equal.
 pub(crate) fn plain(name: &str) -> String {
     let name = name.trim().trim_start_matches(['%', '#']);
     let name = name.strip_prefix("field.").unwrap_or(name).trim();

@@ -3,6 +3,7 @@
 use std::{io, path::PathBuf};
 
 use crate::OpenError;
+use gyre_samples::SampleKind;
 use thiserror::Error;
 
 /// The log of the INS that Boreas' ground truth was computed from.
@@ -13,9 +14,13 @@ pub(super) const IN_TRUTH: &str = "applanix/imu.csv";
 pub enum LogError {
     /// No log beside the scans.
     #[error(
-        "no log of a gyro lies beside the scans in {folder}: name one with gyro.kind = \"log\" and gyro.file, or set gyro.kind = \"none\""
+        "no log of {} lies beside the scans in {folder}: name one with {section}.kind = \"log\" and {section}.file, or set {section}.kind = \"none\"",
+        one(*of),
+        section = of.section()
     )]
     None {
+        /// The sensor whose log is missing.
+        of: SampleKind,
         /// The folder of the dataset.
         folder: PathBuf,
     },
@@ -33,24 +38,30 @@ pub enum LogError {
     )]
     Live,
     /// A file that cannot be read.
-    #[error("cannot read the log of the gyro {path}: {source}")]
+    #[error("cannot read the log of the {} {path}: {source}", of.section())]
     Io {
+        /// The sensor.
+        of: SampleKind,
         /// The file.
         path: PathBuf,
         /// The cause.
         source: io::Error,
     },
-    /// A table that is no log of a gyro.
-    #[error("{path} is no log of a gyro: {reason}")]
+    /// A table that is no log of this sensor.
+    #[error("{path} is no log of {}: {reason}", one(*of))]
     Unknown {
+        /// The sensor.
+        of: SampleKind,
         /// The file.
         path: PathBuf,
         /// The finding, and the remedy.
         reason: String,
     },
-    /// A log whose stamps or rates cannot be those of a gyro.
-    #[error("the log of the gyro {path} cannot be used: {reason}")]
+    /// A log whose stamps or values cannot be those of the sensor.
+    #[error("the log of the {} {path} cannot be used: {reason}", of.section())]
     Unusable {
+        /// The sensor.
+        of: SampleKind,
         /// The file.
         path: PathBuf,
         /// The finding, and the remedy.
@@ -58,9 +69,12 @@ pub enum LogError {
     },
     /// A log of another time than the scans.
     #[error(
-        "the log of the gyro {path} has no sample while the scans were measured: it begins {after_s:.1} s after the first of them. It is of another drive, or gyro.late_s is wrong"
+        "the log of the {section} {path} has no sample while the scans were measured: it begins {after_s:.1} s after the first of them. It is of another drive, or {section}.late_s is wrong",
+        section = of.section()
     )]
     Elsewhere {
+        /// The sensor.
+        of: SampleKind,
         /// The log.
         path: PathBuf,
         /// From the first scan to its first sample, s.
@@ -69,4 +83,12 @@ pub enum LogError {
     /// The list of the times of RADIATE's files.
     #[error(transparent)]
     List(#[from] OpenError),
+}
+
+/// A sensor of this kind, in words.
+fn one(of: SampleKind) -> &'static str {
+    match of {
+        SampleKind::Gyro => "a gyro",
+        SampleKind::Wheels => "the wheels",
+    }
 }

@@ -9,7 +9,7 @@ use crate::median;
 use serde::Serialize;
 
 use super::{LogError, Raw};
-use gyre_samples::Sample;
+use gyre_samples::{Sample, SampleKind};
 
 /// Rates beyond this one are no vehicle's, rad/s.
 const ABSURD_RADPS: f64 = 10.0;
@@ -131,9 +131,35 @@ impl LogFaults {
     }
 }
 
+/// What values a sensor can measure on a vehicle.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Plausible {
+    /// The sensor.
+    pub of: SampleKind,
+    /// The number of values of a sample that count.
+    pub values: usize,
+    /// The largest of them.
+    pub most: f64,
+    /// That in words, and the remedy where many are beyond.
+    pub beyond: &'static str,
+}
+
+/// The rates of a gyro.
+pub(super) const RATES: Plausible = Plausible {
+    of: SampleKind::Gyro,
+    values: 3,
+    most: ABSURD_RADPS,
+    beyond: "have rates beyond 10 rad/s, at which no vehicle turns: if they are in deg/s, name the columns so, as gyro_z_degps",
+};
+
 /// Leaves out and sorts what the faults name, and counts it.
-pub(super) fn examine(raw: Raw, path: &Path) -> Result<(Vec<Sample>, LogFaults), LogError> {
+pub(crate) fn examine(
+    raw: Raw,
+    path: &Path,
+    plausible: &Plausible,
+) -> Result<(Vec<Sample>, LogFaults), LogError> {
     let unusable = |reason: String| LogError::Unusable {
+        of: plausible.of,
         path: path.to_owned(),
         reason,
     };
@@ -151,14 +177,18 @@ pub(super) fn examine(raw: Raw, path: &Path) -> Result<(Vec<Sample>, LogFaults),
         )));
     }
     let mut samples = raw.samples;
-    faults.not_a_number = leave_out(&mut samples, |rate| !rate.is_finite());
-    let finite = samples.len();
-    faults.absurd = leave_out(&mut samples, |rate| rate.abs() > ABSURD_RADPS);
-    if faults.absurd as f64 > ABSURD_SHARE * finite as f64 {
-        return Err(unusable(format!(
-            "{} of its {finite} samples have rates beyond {ABSURD_RADPS} rad/s, at which no vehicle turns: if they are in deg/s, name the columns so, as gyro_z_degps",
-            faults.absurd
-        )));
+    let mut leave_out = |is_bad: &dyn Fn(f64) -> bool| {
+        let before = samples.len();
+        let is_bad = |sample: &Sample| sample.values[..plausible.values].iter().any(|it| is_bad(*it));
+        samples.retain(|sample| !is_bad(sample));
+        (before, before - samples.len())
+    };
+    (_, faults.not_a_number) = leave_out(&|value| !value.is_finite());
+    let (finite, absurd) = leave_out(&|value| value.abs() > plausible.most);
+    faults.absurd = absurd;
+    if absurd as f64 > ABSURD_SHARE * finite as f64 {
+        let beyond = plausible.beyond;
+        return Err(unusable(format!("{absurd} of its {finite} samples {beyond}")));
     }
     let samples = breaks::repair(samples, &mut faults).map_err(unusable)?;
     let samples = order::sort(&samples, &mut faults);
@@ -167,13 +197,6 @@ pub(super) fn examine(raw: Raw, path: &Path) -> Result<(Vec<Sample>, LogFaults),
     }
     faults.gaps = gaps(&samples);
     Ok((samples, faults))
-}
-
-/// Removes samples with such a rate, and counts them.
-fn leave_out(samples: &mut Vec<Sample>, is_bad: impl Fn(f64) -> bool) -> usize {
-    let before = samples.len();
-    samples.retain(|sample| !sample.values[..3].iter().any(|rate| is_bad(*rate)));
-    before - samples.len()
 }
 
 /// Times without samples, of samples in the order of their stamps.

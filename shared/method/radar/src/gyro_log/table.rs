@@ -13,12 +13,33 @@ const MAX_BYTES: u64 = 4 << 30;
 /// Marks between columns that are looked for in the first row.
 const MARKS: [u8; 3] = [b',', b';', b'\t'];
 
-pub(super) fn read(path: &Path) -> Result<Raw, LogError> {
+/// The columns of a table in which each row is a sample.
+pub(crate) trait SampleColumns: Sized {
+    /// The sensor.
+    const OF: SampleKind;
+
+    /// Finds the columns by the first row.
+    ///
+    /// # Errors
+    /// What is missing, and the remedy.
+    fn of(first: &StringRecord) -> Result<Self, String>;
+
+    /// The unit of the values is named nowhere.
+    fn unit_is_assumed(&self) -> bool;
+
+    /// Reads a row; `None` if a field is missing or no number. `nan` is one.
+    fn sample(&self, row: &StringRecord) -> Option<Sample>;
+}
+
+/// Reads a table.
+pub(crate) fn read<C: SampleColumns>(path: &Path) -> Result<Raw, LogError> {
     let text = storage::read_text(path, MAX_BYTES).map_err(|source| LogError::Io {
+        of: C::OF,
         path: path.to_owned(),
         source,
     })?;
-    parse(&text).map_err(|reason| LogError::Unknown {
+    parse::<C>(&text).map_err(|reason| LogError::Unknown {
+        of: C::OF,
         path: path.to_owned(),
         reason,
     })
@@ -38,21 +59,21 @@ pub(crate) fn reader(text: &str) -> csv::Reader<&[u8]> {
         .from_reader(text.as_bytes())
 }
 
-fn parse(text: &str) -> Result<Raw, String> {
+fn parse<C: SampleColumns>(text: &str) -> Result<Raw, String> {
     let mut reader = reader(text);
     let mut row = StringRecord::new();
     let mut next = |row: &mut StringRecord| reader.read_record(row).map_err(|e| e.to_string());
     if !next(&mut row)? {
         return Err("it is empty".to_owned());
     }
-    let columns = Columns::of(&row)?;
+    let columns = C::of(&row)?;
     let count = row.len();
     let mut raw = Raw {
-        unit_is_assumed: columns.unit_is_assumed,
+        unit_is_assumed: columns.unit_is_assumed(),
         ..Raw::default()
     };
     // Without a header the first row is a sample.
-    let mut is_sample = columns.is_sample(&row);
+    let mut is_sample = row.iter().all(|field| field.parse::<f64>().is_ok());
     loop {
         if is_sample {
             match columns.sample(&row).filter(|_| row.len() == count) {
@@ -76,12 +97,17 @@ impl Raw {
     }
 }
 
-impl Columns {
-    fn is_sample(&self, row: &StringRecord) -> bool {
-        row.iter().all(|field| field.parse::<f64>().is_ok())
+impl SampleColumns for Columns {
+    const OF: SampleKind = SampleKind::Gyro;
+
+    fn of(first: &StringRecord) -> Result<Self, String> {
+        Self::of(first)
     }
 
-    /// Reads a row; `None` if a field is missing or no number. `nan` is one.
+    fn unit_is_assumed(&self) -> bool {
+        self.unit_is_assumed
+    }
+
     fn sample(&self, row: &StringRecord) -> Option<Sample> {
         let (column, unit) = self.stamp;
         let stamp_ns = unit.ns(row.get(column)?)?;

@@ -1,10 +1,12 @@
 //! Samples of a log on the radar's clock.
 
-use gyre_samples::{GyroConfig, Sample};
+use gyre_samples::{GyroConfig, Sample, WheelsConfig};
 
 use super::GyroLog;
+use crate::WheelLog;
 
-/// Samples in the vehicle's axes on the radar's clock, in the order of their stamps.
+/// Samples in the vehicle's axes on the radar's clock, in the order in which they travel
+/// ([`Sample::order`]).
 #[derive(Clone, Debug, Default)]
 pub struct SampleTrack(Vec<Sample>);
 
@@ -14,6 +16,21 @@ impl SampleTrack {
     pub fn new(log: &GyroLog, config: &GyroConfig) -> Self {
         let taken = log.samples.iter().map(|sample| config.on_radar(sample));
         Self(taken.collect())
+    }
+
+    /// Takes the samples of a log of the wheels over to the radar's clock:
+    /// [`WheelsConfig::on_radar`].
+    pub fn of_wheels(log: &WheelLog, config: &WheelsConfig) -> Self {
+        let taken = log.samples.iter().map(|sample| config.on_radar(sample));
+        Self(taken.collect())
+    }
+
+    /// Returns the samples of both tracks.
+    #[must_use]
+    pub fn and(mut self, other: Self) -> Self {
+        self.0.extend(other.0);
+        self.0.sort_by_key(Sample::order);
+        self
     }
 
     /// Returns the samples with stamps after one time and up to another, which is included.

@@ -10,7 +10,7 @@ use crate::frame_stamps;
 use gyre_storage as storage;
 
 use super::{LogError, Raw, table::sample};
-use gyre_samples::Sample;
+use gyre_samples::{Sample, SampleKind};
 
 /// Lines of the angular rates and of the accelerations, from 0.
 const RATES: usize = 5;
@@ -27,6 +27,7 @@ pub(super) fn read(folder: &Path) -> Result<Raw, LogError> {
     let list = folder.with_extension("txt");
     if !list.is_file() {
         return Err(LogError::Unknown {
+            of: SampleKind::Gyro,
             path: folder.to_owned(),
             reason: format!(
                 "a folder of samples, as RADIATE's GPS_IMU_Twist, needs the list of their times beside it, {}",
@@ -45,6 +46,7 @@ pub(super) fn read(folder: &Path) -> Result<Raw, LogError> {
     let is_empty = raw.samples.is_empty();
     match is_empty && fs::read_dir(folder).is_ok_and(|mut files| files.next().is_none()) {
         true => Err(LogError::Unknown {
+            of: SampleKind::Gyro,
             path: folder.to_owned(),
             reason: "the folder is empty: unpack the recording anew".to_owned(),
         }),

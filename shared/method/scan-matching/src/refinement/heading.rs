@@ -50,6 +50,21 @@ pub(super) struct PredictedTurn {
     pub variance_rad2: f64,
     /// Rate during the sweep, rad/s.
     pub sweep_rate_radps: f64,
+    /// The part of the variance that is not of the bias.
+    noise_rad2: f64,
+    /// Variance of the bias, rad²/s².
+    bias_radps2: f64,
+    interval_s: f64,
+}
+
+impl PredictedTurn {
+    /// Returns the variance after a time, s, in which all turns were the gyro's, such that those of
+    /// all of them add up, rad². The error of the bias is that of all: its square grows with the
+    /// square of the time.
+    pub fn variance_after_rad2(&self, time_s: f64) -> f64 {
+        let since_s2 = self.interval_s * (self.interval_s + 2.0 * time_s);
+        self.noise_rad2 + self.bias_radps2 * since_s2
+    }
 }
 
 impl Heading {
@@ -84,6 +99,9 @@ impl Heading {
             yaw_rad: turn.yaw_rad - self.bias_radps * time_s,
             variance_rad2: turn_rad2 + by_bias,
             sweep_rate_radps: turn.sweep_rate_radps - self.bias_radps,
+            noise_rad2: turn_rad2,
+            bias_radps2: self.covariance[(1, 1)],
+            interval_s: time_s,
         }
     }
 

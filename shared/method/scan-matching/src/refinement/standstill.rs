@@ -61,6 +61,8 @@ pub(super) struct Estimate {
     /// The estimate of the scan before.
     pub previous: Pose,
     pub outcome: Outcome,
+    /// The wheels say that the vehicle has moved since the scan before.
+    pub rolls: bool,
     /// Time since the scan before, s.
     pub interval_s: f64,
 }
@@ -130,10 +132,10 @@ impl Standstill {
     }
 
     /// Returns whether the vehicle is no longer at the anchor. A prediction cannot tell, and
-    /// continues what was.
+    /// continues what was, unless the wheels turn.
     fn is_left_by(&self, estimate: &Estimate) -> bool {
         match estimate.outcome {
-            Outcome::Predicted => !self.stands(),
+            Outcome::Predicted => estimate.rolls || !self.stands(),
             Outcome::Refined | Outcome::Weak => {
                 let variance = 1.0 + 1.0 / f64::from(self.scans.min(MEAN_SCANS));
                 squared_distance(&self.anchor, estimate)

@@ -4,7 +4,10 @@
 use gyre_geometry::{Pose, Twist};
 use nalgebra::UnitComplex;
 
-use super::{Heading, Outcome, RefinementConfig, Standstill, heading::PredictedTurn};
+use super::{
+    Heading, Outcome, RefinementConfig, Standstill, WheelState, heading::PredictedTurn,
+    wheels::PredictedDistance,
+};
 
 /// Weight of the newest velocity, which jitters with each match, in its running mean.
 const TWIST_GAIN: f64 = 0.5;
@@ -31,15 +34,19 @@ pub struct TrackerState {
     pub standstill: Standstill,
     /// The bias of the gyro, and the like; `None` until it has measured a turn.
     pub heading: Option<Heading>,
+    /// The scale of the wheels, and the like; `None` until they have measured a distance.
+    pub wheels: Option<WheelState>,
 }
 
-/// The time and the turn since the scan before.
+/// The time, the turn and the distance since the scan before.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Step {
     /// Time since the scan before, s.
     pub interval_s: f64,
     /// The turn since then, by the gyro.
     pub turn: Option<PredictedTurn>,
+    /// The distance since then, by wheels that do not slip.
+    pub distance: Option<PredictedDistance>,
 }
 
 /// A refined scan from which the next poses are predicted.
@@ -64,6 +71,7 @@ impl Default for TrackerState {
             unmatched: 0,
             standstill: Standstill::default(),
             heading: None,
+            wheels: None,
         }
     }
 }
@@ -118,12 +126,23 @@ impl Anchor {
 
 impl TrackerState {
     /// The poses after the interval at constant velocity, predicted from each anchor; the last pose
-    /// if there is none.
+    /// if there is none. With wheels the first is as far from the last pose as they say.
     pub(super) fn predict(&self, step: &Step) -> [Pose; 2] {
         let heading = self.heading_at(step);
         let from = |anchor: &Anchor| anchor.predict(step.interval_s, heading);
         let first = self.anchors[0].as_ref().map_or(self.pose, from);
-        [first, self.anchors[1].as_ref().map_or(first, from)]
+        let second = self.anchors[1].as_ref().map_or(first, from);
+        let Some(distance) = &step.distance else {
+            return [first, second];
+        };
+        let yaw_rad = self.pose.rotation.rotation_to(&first.rotation).angle();
+        [self.pose * distance.motion([yaw_rad, 0.0]).motion, second]
+    }
+
+    /// The turn to the pose that is predicted first, rad.
+    pub(super) fn predicted_turn_rad(&self, step: &Step) -> f64 {
+        let [predicted, _] = self.predict(step);
+        self.pose.rotation.rotation_to(&predicted.rotation).angle()
     }
 
     /// The heading of a scan by the gyro.
@@ -166,6 +185,16 @@ impl TrackerState {
                 .any(|anchor| anchor.can_reach(pose, interval_s, heading, jitter_share, config))
     }
 
+    /// Leaves the map: a new one starts with the last scan, or a later one. Where wheels have led
+    /// to that, the scans of the map say nothing more of where the vehicle can be.
+    pub(super) fn leave_map(&mut self) {
+        self.heading.iter_mut().for_each(Heading::start_map);
+        self.wheels.iter_mut().for_each(WheelState::start_map);
+        if self.anchors[0].is_some_and(|anchor| anchor.age_s == 0.0) {
+            self.anchors[1] = None;
+        }
+    }
+
     /// Updates the state with the pose of the next scan.
     pub(super) fn update(
         &mut self,
@@ -178,6 +207,7 @@ impl TrackerState {
         let interval_s = step.interval_s;
         match outcome {
             Outcome::Refined => self.push_anchor(pose, step, config),
+            Outcome::Predicted if step.distance.is_some() => self.carry_anchor(pose, step),
             _ => self
                 .anchors
                 .iter_mut()
@@ -199,6 +229,25 @@ impl TrackerState {
             0
         };
         self.pose = pose;
+    }
+
+    /// Makes `pose`, to which wheels lead, the newest anchor. The last refined scan stays behind it,
+    /// in case they slip meanwhile.
+    fn carry_anchor(&mut self, pose: Pose, step: &Step) {
+        let interval_s = step.interval_s;
+        let twist = self.mean_twist_to(&pose, interval_s);
+        let [first, second] = self.anchors;
+        let refined = if self.unmatched == 0 { first } else { second };
+        let aged = refined.map(|anchor| Anchor {
+            age_s: anchor.age_s + interval_s,
+            ..anchor
+        });
+        let carried = Anchor {
+            pose,
+            twist,
+            age_s: 0.0,
+        };
+        self.anchors = [Some(carried), aged];
     }
 
     /// Makes `pose` the newest anchor. An anchor from which it cannot be reached was wrong and is
@@ -249,6 +298,7 @@ mod tests {
     const STEP: Step = Step {
         interval_s: 0.25,
         turn: None,
+        distance: None,
     };
 
     fn after(poses: &[(f64, f64)]) -> TrackerState {

@@ -4,8 +4,8 @@ use gyre_geometry::Pose;
 use nalgebra::{Matrix3, Vector3};
 
 use super::{
-    Outcome, RefinementConfig, alignment::Alignment, local_map::LocalMap, points::DeskewedPoints,
-    registration::Scan, standstill::Report, tracker::Step,
+    Outcome, RefinementConfig, TrackerState, alignment::Alignment, local_map::LocalMap,
+    points::DeskewedPoints, registration::Scan, standstill::Report, tracker::Step,
 };
 
 /// Factor on the covariance of a weak match.
@@ -21,6 +21,8 @@ pub(super) struct Uncertainty {
     of_prediction: Matrix3<f64>,
     /// Predictions in a row whose error a match takes back.
     predictions: u32,
+    /// The covariance of all of these.
+    of_predictions: Matrix3<f64>,
     /// The share of a match's covariance by which the map drifts.
     of_map: f64,
 }
@@ -30,12 +32,19 @@ impl Uncertainty {
     pub fn before(
         scan: &Scan<'_>,
         map: &LocalMap,
+        state: &TrackerState,
         predictions: u32,
         config: &RefinementConfig,
     ) -> Self {
+        let of_prediction = of_prediction(state, &scan.step, config);
+        let of_predictions = match &state.wheels {
+            Some(wheels) if predictions > 0 => wheels.unmatched,
+            _ => of_prediction * f64::from(predictions),
+        };
         Self {
-            of_prediction: of_prediction(&scan.step, config),
+            of_prediction,
             predictions,
+            of_predictions,
             of_map: drift_share(map.len(), config),
         }
     }
@@ -51,7 +60,7 @@ impl Uncertainty {
         let covariance = report.motion.covariance;
         match report.stationary {
             true => covariance,
-            false => covariance + self.of_prediction * f64::from(self.predictions),
+            false => covariance + self.of_predictions,
         }
     }
 
@@ -128,8 +137,12 @@ pub(super) fn drift_share(keyframes: usize, config: &RefinementConfig) -> f64 {
 }
 
 /// The covariance of a motion predicted at constant velocity, whose acceleration is within the
-/// limits; of its turn, by the gyro if there is one.
-fn of_prediction(step: &Step, config: &RefinementConfig) -> Matrix3<f64> {
+/// limits; of its turn, by the gyro if there is one; of its distance, by the wheels.
+fn of_prediction(
+    state: &TrackerState,
+    step: &Step,
+    config: &RefinementConfig,
+) -> Matrix3<f64> {
     let interval_s = step.interval_s;
     let variance =
         |jitter: f64, acceleration: f64| (jitter + acceleration * interval_s.powi(2)).powi(2) / 3.0;
@@ -138,6 +151,13 @@ fn of_prediction(step: &Step, config: &RefinementConfig) -> Matrix3<f64> {
         config.jitter_deg.to_radians(),
         config.yaw_acceleration_degps2.to_radians(),
     );
+    if let Some(distance) = &step.distance {
+        let by_gyro = step.turn.map(|it| it.variance_after_rad2(distance.dead_s));
+        let yaw_rad = state.predicted_turn_rad(step);
+        return distance
+            .motion([yaw_rad, by_gyro.map_or(turn, |it| it.min(turn))])
+            .covariance;
+    }
     let turn = step.turn.map_or(turn, |it| it.variance_rad2.min(turn));
     Matrix3::from_diagonal(&Vector3::new(shift, shift, turn))
 }

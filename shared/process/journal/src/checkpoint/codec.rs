@@ -2,23 +2,27 @@
 //! checksum of the rest.
 
 use gyre_geometry::Twist;
-use gyre_scan_matching::{Anchor, Heading, Keyframe, Standstill, TrackerState};
+use gyre_scan_matching::{Anchor, Heading, Keyframe, Standstill, TrackerState, WheelState};
 use gyre_storage::Checksum;
-use nalgebra::{Complex, Isometry2, Matrix3, Translation2, UnitComplex};
+use nalgebra::{Complex, Isometry2, Matrix2, Matrix3, Translation2, UnitComplex};
 
 /// Words of a state's slot before the names of its keyframes: the checksum; the item, the checksum
 /// of its motion, the number of keyframes; the tracker state.
 const STATE_WORDS: usize = 1 + 3 + TRACKER_WORDS;
 const NAME_WORDS: usize = 2;
-const TRACKER_WORDS: usize = HEADING + HEADING_WORDS;
+const TRACKER_WORDS: usize = WHEELS + WHEEL_WORDS;
 const STANDSTILL_WORDS: usize = 4 + 4 + 4;
 /// A word that says whether there is one; bias, lean, covariance.
 const HEADING_WORDS: usize = 1 + 1 + 1 + 9;
+/// A word that says whether there are any; scale, offset, both dead reckonings; both
+/// covariances; whether they slip.
+const WHEEL_WORDS: usize = 1 + 5 + 4 + 9;
 const ANCHOR_WORDS: usize = 9;
-/// Where the means and counts of a tracker state begin, its standstill, and its heading.
+/// Where the means and counts of a tracker state begin, its standstill, its heading, and its wheels.
 const REST: usize = 4 + 2 * ANCHOR_WORDS;
 const STANDSTILL: usize = REST + 4;
 const HEADING: usize = STANDSTILL + STANDSTILL_WORDS;
+const WHEELS: usize = HEADING + HEADING_WORDS;
 /// Words of a keyframe's slot before its cells: checksum, id, pose, corners of both levels.
 pub(super) const KEYFRAME_WORDS: usize = 2 + 4 + 4;
 /// The checksum of an empty slot. No content has it.
@@ -105,7 +109,10 @@ fn tracker_words(state: &TrackerState) -> [u64; TRACKER_WORDS] {
     words[REST..STANDSTILL].copy_from_slice(&rest);
     words[STANDSTILL..HEADING].copy_from_slice(&standstill_words(&state.standstill));
     if let Some(heading) = &state.heading {
-        words[HEADING..].copy_from_slice(&heading_words(heading));
+        words[HEADING..WHEELS].copy_from_slice(&heading_words(heading));
+    }
+    if let Some(wheels) = &state.wheels {
+        words[WHEELS..].copy_from_slice(&wheel_words(wheels));
     }
     words
 }
@@ -125,6 +132,34 @@ fn heading_from(words: &[u64]) -> Option<Heading> {
         bias_radps: value(1),
         lean_rad: value(2),
         covariance: Matrix3::from_fn(|row, column| value(3 + row + 3 * column)),
+    })
+}
+
+fn wheel_words(wheels: &WheelState) -> [u64; WHEEL_WORDS] {
+    let mut words = [1; WHEEL_WORDS];
+    let state = [
+        wheels.scale,
+        wheels.offset_m,
+        wheels.dead_m,
+        wheels.dead_s,
+    ];
+    let covariances = wheels.covariance.iter().chain(&wheels.unmatched);
+    let values = state.iter().chain(covariances).map(|it| it.to_bits());
+    let values = values.chain([wheels.slips.into()]);
+    words[1..].iter_mut().zip(values).for_each(|(word, value)| *word = value);
+    words
+}
+
+fn wheels_from(words: &[u64]) -> Option<WheelState> {
+    let value = |k: usize| f64::from_bits(words[k]);
+    (words[0] == 1).then(|| WheelState {
+        scale: value(1),
+        offset_m: value(2),
+        dead_m: value(3),
+        dead_s: value(4),
+        covariance: Matrix2::from_fn(|row, column| value(5 + row + 2 * column)),
+        unmatched: Matrix3::from_fn(|row, column| value(9 + row + 3 * column)),
+        slips: words[18] == 1,
     })
 }
 
@@ -177,6 +212,7 @@ fn tracker_from(words: &[u64; TRACKER_WORDS]) -> TrackerState {
         unmatched: rest[3] as u32,
         standstill: standstill_from(&words[STANDSTILL..]),
         heading: heading_from(&words[HEADING..]),
+        wheels: wheels_from(&words[WHEELS..]),
     }
 }
 

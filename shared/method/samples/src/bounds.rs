@@ -1,0 +1,62 @@
+//! Bounds of what sections about sensors beside the radar can say.
+
+use thiserror::Error;
+
+/// A setting of `[gyro]`, `[wheels]` or `[gnss]` out of its bounds.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[error("{section}.{key} is {value}, but must be {expected}")]
+pub struct SampleConfigError {
+    /// The section.
+    pub section: &'static str,
+    /// The key.
+    pub key: &'static str,
+    /// The value.
+    pub value: f64,
+    /// The values that it may have.
+    pub expected: &'static str,
+}
+
+/// Checks the values of the section of this name.
+pub(crate) struct Bounds(pub &'static str);
+
+impl Bounds {
+    pub fn within(
+        &self,
+        key: &'static str,
+        value: f64,
+        [least, most]: [f64; 2],
+        expected: &'static str,
+    ) -> Result<(), SampleConfigError> {
+        match (least..=most).contains(&value) {
+            true => Ok(()),
+            false => Err(SampleConfigError {
+                section: self.0,
+                key,
+                value,
+                expected,
+            }),
+        }
+    }
+
+    pub fn late_s(&self, value: f64) -> Result<(), SampleConfigError> {
+        let expected = "seconds, at most a million";
+        self.within("late_s", value, [-1e6, 1e6], expected)
+    }
+
+    /// Checks a scale and its standard deviation.
+    pub fn scale(&self, [scale, sigma]: [f64; 2]) -> Result<(), SampleConfigError> {
+        self.within("scale", scale, [0.5, 2.0], "a factor, 0.5 to 2")?;
+        self.within("scale_sigma", sigma, [0.0, 1.0], "a share, 0 to 1")
+    }
+
+    pub fn noise(&self, key: &'static str, value: f64) -> Result<(), SampleConfigError> {
+        self.within(key, value, [0.0, 1.0], "0 to 1")
+    }
+
+    /// Checks the standard deviation of the times of samples, and their longest gap.
+    pub fn times(&self, [sigma_s, max_gap_s]: [f64; 2]) -> Result<(), SampleConfigError> {
+        self.within("time_sigma_s", sigma_s, [0.0, 1.0], "seconds, 0 to 1")?;
+        let expected = "seconds, 0.001 to 10";
+        self.within("max_gap_s", max_gap_s, [1e-3, 10.0], expected)
+    }
+}

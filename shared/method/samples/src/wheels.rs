@@ -1,0 +1,123 @@
+//! From samples of the wheels' speed to the distance between two scans.
+
+use bytemuck::{Pod, Zeroable};
+
+use crate::{Sample, SampleKind, WheelsConfig, integral::Integrator};
+
+/// The distance from one scan to the next by the wheels, along the vehicle's path.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct WheelDistance {
+    /// From the stamp of the scan before to that of the scan, m; negative backwards.
+    pub distance_m: f64,
+    /// Variance but for the scale, m².
+    pub variance_m2: f64,
+    /// Variance of the place across the path, m².
+    pub side_variance_m2: f64,
+    /// The time between both, s.
+    pub interval_s: f64,
+}
+
+/// Integrates the speed of the wheels between scans.
+///
+/// The result for a scan depends on the samples that came with it and with the scan before, and on
+/// nothing else: so a process that is restarted at the scan before says the same.
+#[derive(Clone, Debug)]
+pub struct Wheels {
+    config: WheelsConfig,
+    speed: Integrator,
+}
+
+impl Wheels {
+    /// Creates an integrator without samples.
+    pub fn new(config: &WheelsConfig) -> Self {
+        Self {
+            speed: Integrator::new(SampleKind::Wheels, 0, config.max_gap_s),
+            config: config.clone(),
+        }
+    }
+
+    /// Takes the samples that come with the next scan, in the order of their stamps, and the times
+    /// of its stamp and of its first and last azimuth.
+    pub fn push(&mut self, samples: &[Sample], stamp_ns: i64, span_ns: [i64; 2]) {
+        self.speed.push(samples, stamp_ns, span_ns);
+    }
+
+    /// Takes the samples of a scan that is dropped: they count as those of the next one.
+    pub fn drop_scan(&mut self, samples: &[Sample]) {
+        self.speed.drop_scan(samples);
+    }
+
+    /// Forgets all samples.
+    pub fn clear(&mut self) {
+        self.speed.clear();
+    }
+
+    /// Returns the distance from the stamp of the scan before to that of the scan; `None` where
+    /// samples are missing.
+    pub fn distance(&self) -> Option<WheelDistance> {
+        let integral = self.speed.integral()?;
+        let of_rolling = self.config.noise_m_per_sqrt_m.powi(2) * integral.sum.abs();
+        // What a speed is rounded by stays while the speed does.
+        let by_speed = self.config.noise_mps * integral.interval_s;
+        let by_time = self.config.time_sigma_s * integral.change;
+        Some(WheelDistance {
+            distance_m: integral.sum,
+            variance_m2: of_rolling + by_speed * by_speed + by_time * by_time,
+            side_variance_m2: of_rolling,
+            interval_s: integral.interval_s,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const MS: i64 = 1_000_000;
+
+    fn wheels(samples: [&[Sample]; 2]) -> Wheels {
+        let mut wheels = Wheels::new(&WheelsConfig::default());
+        for (sweep, samples) in (0..).zip(samples) {
+            let [start, end] = [sweep * 250 * MS, (sweep + 1) * 250 * MS];
+            wheels.push(samples, start + 125 * MS, [start, end]);
+        }
+        wheels
+    }
+
+    proptest! {
+        /// A speed that grows evenly is integrated exactly, and samples of a gyro between are not
+        /// looked at.
+        #[test]
+        fn the_distance_is_the_integral_of_the_speed(
+            first in 0i64..100, every in 1usize..100, speed in -30.0..30.0f64,
+        ) {
+            let sample = |ms: i64| {
+                let speed_mps = speed * (1.0 + 1e-3 * ms as f64);
+                [Sample::yaw_rate(ms * MS, 9.0), Sample::speed(ms * MS, speed_mps)]
+            };
+            let all: Vec<Sample> = (first..=501).step_by(every).flat_map(sample).collect();
+            let (before, after) = all.split_at(all.partition_point(|it| it.stamp_ns <= 250 * MS));
+            let distance = wheels([before, after]).distance().unwrap_or_default();
+            prop_assert!((distance.distance_m - 0.25 * speed * 1.25).abs() < 1e-9, "{distance:?}");
+            let config = WheelsConfig::default();
+            let least = config.noise_m_per_sqrt_m.powi(2) * distance.distance_m.abs();
+            prop_assert!(distance.variance_m2 > least && distance.side_variance_m2 == least);
+        }
+    }
+
+    #[test]
+    fn nothing_is_made_up_where_samples_are_missing() {
+        let sample = |ms: i64| Sample::speed(ms * MS, 5.0);
+        let without = |lost: std::ops::Range<i64>| {
+            let kept = (0..=500).step_by(20).filter(|ms| !lost.contains(ms));
+            let all: Vec<Sample> = kept.map(sample).collect();
+            let (before, after) = all.split_at(all.partition_point(|it| it.stamp_ns <= 250 * MS));
+            wheels([before, after]).distance()
+        };
+        assert!(without(0..0).is_some() && without(150..300).is_some());
+        assert_eq!(without(0..500), None);
+        assert_eq!(without(100..400), None);
+    }
+}

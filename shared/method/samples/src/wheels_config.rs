@@ -1,0 +1,110 @@
+//! Configuration of the wheels.
+
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    Sample,
+    bounds::{Bounds, SampleConfigError},
+};
+
+/// Configuration of the wheels' speed: section `[wheels]`.
+///
+/// The defaults are those of a car, whose speed is of its own bus.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct WheelsConfig {
+    /// Whose speed is used.
+    pub kind: WheelsKind,
+    /// The log, for `kind = "log"`: a table as CSV whose first row names its columns.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub file: Option<PathBuf>,
+    /// Time by which the stamps of the speed are late against the radar's, s: it is taken off them.
+    pub late_s: f64,
+    /// Distance by which the radar is ahead of the axle that does not steer, m.
+    pub radar_ahead_m: f64,
+    /// True speed over the measured one.
+    pub scale: f64,
+    /// Standard deviation of that scale: tyres wear and warm, and a tachometer may show too much.
+    pub scale_sigma: f64,
+    /// Random walk of the scale, /√s.
+    pub scale_walk_per_sqrt_s: f64,
+    /// Noise of the distance and of the place across the path, m/√m.
+    pub noise_m_per_sqrt_m: f64,
+    /// Standard deviation of a speed by the step to which it is rounded, m/s.
+    pub noise_mps: f64,
+    /// Standard deviation of the time of a sample against the radar's clock, s.
+    pub time_sigma_s: f64,
+    /// Longest time between two samples over which the speed is interpolated, s.
+    pub max_gap_s: f64,
+}
+
+/// Whose speed is used.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum WheelsKind {
+    /// None's: the radar alone says how far the vehicle drives.
+    #[default]
+    None,
+    /// The log that lies beside the scans, or what comes with them; without one it is an error.
+    Auto,
+    /// The log that `file` names.
+    Log,
+}
+
+impl Default for WheelsConfig {
+    fn default() -> Self {
+        Self {
+            kind: WheelsKind::None,
+            file: None,
+            late_s: 0.0,
+            radar_ahead_m: 0.0,
+            scale: 1.0,
+            scale_sigma: 0.02,
+            scale_walk_per_sqrt_s: 1e-5,
+            noise_m_per_sqrt_m: 0.01,
+            noise_mps: 0.02,
+            time_sigma_s: 0.01,
+            max_gap_s: 0.25,
+        }
+    }
+}
+
+impl WheelsConfig {
+    /// Returns whether the wheels are used.
+    pub fn is_used(&self) -> bool {
+        self.kind != WheelsKind::None
+    }
+
+    /// Takes a sample over to the radar's clock: the delay is taken off its stamp, and the scale is
+    /// applied.
+    pub fn on_radar(&self, sample: &Sample) -> Sample {
+        let late_ns = (self.late_s * 1e9).round() as i64;
+        let speed_mps = sample.values[0] * self.scale;
+        Sample::speed(sample.stamp_ns.saturating_sub(late_ns), speed_mps)
+    }
+
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// The first key that is out of its bounds.
+    pub fn validate(&self) -> Result<(), SampleConfigError> {
+        let bounds = Bounds("wheels");
+        bounds.late_s(self.late_s)?;
+        let expected = "metres, -10 to 10";
+        bounds.within(
+            "radar_ahead_m",
+            self.radar_ahead_m,
+            [-10.0, 10.0],
+            expected,
+        )?;
+        bounds.scale([self.scale, self.scale_sigma])?;
+        bounds.noise("scale_walk_per_sqrt_s", self.scale_walk_per_sqrt_s)?;
+        bounds.noise("noise_m_per_sqrt_m", self.noise_m_per_sqrt_m)?;
+        bounds.noise("noise_mps", self.noise_mps)?;
+        bounds.times([self.time_sigma_s, self.max_gap_s])
+    }
+}

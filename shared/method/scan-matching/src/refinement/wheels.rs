@@ -1,0 +1,276 @@
+//! The distance by the wheels beside that of the radar: a Kalman filter over the place along the
+//! path against the map, and the scale of the wheels.
+//!
+//! Where the radar sees, it says how far the vehicle has driven, and so what the scale is: the
+//! motions of a drive share it, and the noise of one registration is taken back by the next. A
+//! registered distance that is too far from that of the wheels says that they slip; they are not
+//! used then. Where the radar sees nothing, or little that does not agree, the motion is that of an
+//! arc: as long as the wheels say, turned as the gyro says.
+
+use gyre_geometry::{Pose, Twist, UncertainMotion, pose};
+use gyre_samples::{WheelDistance, WheelsConfig};
+use nalgebra::{Matrix2, Matrix3, RowVector3, Vector2, Vector3};
+
+/// Squared distance between wheels and radar, over its variance, beyond which the wheels slip: four
+/// standard deviations.
+const GATE: f64 = 16.0;
+
+/// What is known of the wheels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WheelState {
+    /// True distance over the one that is measured.
+    pub scale: f64,
+    /// Error of the last pose along the path, against the map, m.
+    pub offset_m: f64,
+    /// Covariance of the errors of that offset and of the scale.
+    pub covariance: Matrix2<f64>,
+    /// The last registered distance was another one than that of the wheels.
+    pub slips: bool,
+    /// Since the last registered scan: the distance by the wheels, m, and the time, s.
+    pub dead_m: f64,
+    /// See `dead_m`.
+    pub dead_s: f64,
+    /// Covariance of the predicted motions since then together, or since a new map was started:
+    /// along the axes of the last scan.
+    pub unmatched: Matrix3<f64>,
+}
+
+/// The scale of the wheels, as it is known after a scan.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WheelScale {
+    /// True distance over the one that is measured.
+    pub scale: f64,
+    /// Standard deviation.
+    pub sigma: f64,
+    /// They disagree with the registered motion, or have last done so: they are not used.
+    pub slip: bool,
+}
+
+/// The distance that the wheels predict, against the scan before.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PredictedDistance {
+    /// Distance since the scan before, m; negative backwards.
+    pub distance_m: f64,
+    /// Variance of that, m², such that those of the motions since the last registered one add up.
+    pub variance_m2: f64,
+    /// Variance across the path, m².
+    pub side_variance_m2: f64,
+    /// Distance by which the radar is ahead of the axle that does not steer, m.
+    pub radar_ahead_m: f64,
+    /// Time since the last registered scan, at the scan before, s.
+    pub dead_s: f64,
+}
+
+/// A registered motion along the path.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Registered {
+    /// Distance that the axle has driven, m.
+    distance_m: f64,
+    variance_m2: f64,
+    /// The share of the variance that accumulates.
+    drift_share: f64,
+}
+
+impl Registered {
+    /// Takes the part along the path of a motion in the axes of the scan before.
+    pub fn of(motion: &UncertainMotion, drift_share: f64, config: &WheelsConfig) -> Self {
+        let ahead = pose(config.radar_ahead_m, 0.0, 0.0);
+        let axle = ahead * motion.motion * ahead.inverse();
+        let (sin, cos) = (0.5 * motion.motion.rotation.angle()).sin_cos();
+        let along = Vector3::new(cos, sin, 0.0);
+        Self {
+            distance_m: Twist::from_motion(&axle, 1.0).vx_mps,
+            variance_m2: (along.transpose() * motion.covariance * along)[0],
+            drift_share,
+        }
+    }
+
+    /// The variance of the place of one of its poses, and that of the drift.
+    fn noise_and_drift_m2(&self) -> [f64; 2] {
+        let drift = self.drift_share * self.variance_m2;
+        [0.5 * (self.variance_m2 - drift), drift]
+    }
+}
+
+/// A measured distance against a registered one.
+struct Innovation {
+    apart_m: f64,
+    /// The covariance of the errors of the offset before, the scale, and the offset after.
+    before: Matrix3<f64>,
+    seen: RowVector3<f64>,
+    variance_m2: f64,
+    /// The part of that which is of no state.
+    noise_m2: f64,
+}
+
+impl WheelState {
+    /// Creates the state before the first scan.
+    pub(super) fn new(config: &WheelsConfig) -> Self {
+        Self {
+            scale: 1.0,
+            offset_m: 0.0,
+            covariance: Matrix2::new(0.0, 0.0, 0.0, config.scale_sigma.powi(2)),
+            slips: false,
+            dead_m: 0.0,
+            dead_s: 0.0,
+            unmatched: Matrix3::zeros(),
+        }
+    }
+
+    /// Returns what is known of the scale.
+    pub(super) fn known(&self) -> WheelScale {
+        WheelScale {
+            scale: self.scale,
+            sigma: self.covariance[(1, 1)].max(0.0).sqrt(),
+            slip: self.slips,
+        }
+    }
+
+    /// Lets time pass: the scale changes.
+    pub(super) fn wait(&mut self, time_s: f64, config: &WheelsConfig) {
+        self.covariance[(1, 1)] += config.scale_walk_per_sqrt_s.powi(2) * time_s;
+    }
+
+    /// Predicts the distance of the next scan; `None` while the wheels slip.
+    pub(super) fn predict(
+        &self,
+        measured: &WheelDistance,
+        config: &WheelsConfig,
+    ) -> Option<PredictedDistance> {
+        let step_m = measured.distance_m;
+        // The error of the scale is that of all motions since the last registered one: its square
+        // grows with the square of the whole distance.
+        let since_m2 = (step_m * (step_m + 2.0 * self.dead_m)).max(step_m * step_m);
+        (!self.slips).then_some(PredictedDistance {
+            distance_m: self.scale * step_m,
+            variance_m2: measured.variance_m2 + self.covariance[(1, 1)] * since_m2,
+            side_variance_m2: measured.side_variance_m2,
+            radar_ahead_m: config.radar_ahead_m,
+            dead_s: self.dead_s,
+        })
+    }
+
+    /// Returns whether a registered distance is as far from the measured one as noise can bring it.
+    pub(super) fn agrees(&self, measured: &WheelDistance, registered: &Registered) -> bool {
+        let innovation = self.innovation(measured, registered);
+        innovation.apart_m.powi(2) <= GATE * innovation.variance_m2
+    }
+
+    fn innovation(&self, measured: &WheelDistance, registered: &Registered) -> Innovation {
+        let [noise_m2, drift_m2] = registered.noise_and_drift_m2();
+        let mut before = Matrix3::zeros();
+        before.fixed_view_mut::<2, 2>(0, 0).copy_from(&self.covariance);
+        before[(2, 2)] = noise_m2;
+        let seen = RowVector3::new(-1.0, measured.distance_m, 1.0);
+        let noise_m2 = measured.variance_m2 + drift_m2;
+        Innovation {
+            apart_m: registered.distance_m - self.scale * measured.distance_m + self.offset_m,
+            variance_m2: (seen * before * seen.transpose())[0] + noise_m2,
+            before,
+            seen,
+            noise_m2,
+        }
+    }
+
+    /// Takes a registered distance that agrees with the measured one.
+    pub(super) fn correct(&mut self, measured: &WheelDistance, registered: &Registered) {
+        let Innovation {
+            apart_m,
+            before,
+            seen,
+            variance_m2,
+            noise_m2,
+        } = self.innovation(measured, registered);
+        let gain = before * seen.transpose() / variance_m2;
+        // Joseph's form stays symmetric and positive.
+        let kept = Matrix3::identity() - gain * seen;
+        let after = kept * before * kept.transpose() + gain * gain.transpose() * noise_m2;
+        self.scale += gain[1] * apart_m;
+        self.offset_m = gain[2] * apart_m;
+        // The offset of the last scan takes the place of that of the scan before.
+        self.covariance = Matrix2::new(after[(2, 2)], after[(2, 1)], after[(1, 2)], after[(1, 1)]);
+        self.slips = false;
+        self.see();
+    }
+
+    /// Takes a registered pose whose distance the wheels have not measured, or where they slip.
+    pub(super) fn adopt(&mut self, registered: &Registered, slips: bool) {
+        let [noise_m2, _] = registered.noise_and_drift_m2();
+        self.offset_m = 0.0;
+        self.covariance = Matrix2::new(noise_m2, 0.0, 0.0, self.covariance[(1, 1)]);
+        self.slips = slips;
+        self.see();
+    }
+
+    fn see(&mut self) {
+        (self.dead_m, self.dead_s) = (0.0, 0.0);
+        self.unmatched = Matrix3::zeros();
+    }
+
+    /// Takes a pose that is predicted by the wheels.
+    pub(super) fn carry(&mut self, measured: &WheelDistance) {
+        let step = Matrix2::new(1.0, -measured.distance_m, 0.0, 1.0);
+        self.covariance = step * self.covariance * step.transpose();
+        self.covariance[(0, 0)] += measured.variance_m2;
+        self.dead_m += measured.distance_m;
+    }
+
+    /// Takes a pose that is predicted from the motions before, with this variance.
+    pub(super) fn guess(&mut self, variance_m2: f64) {
+        self.covariance[(0, 0)] += variance_m2;
+    }
+
+    /// Adds a predicted motion to those whose error the next match takes back.
+    pub(super) fn miss(&mut self, predicted: &UncertainMotion, time_s: f64) {
+        let before = UncertainMotion {
+            motion: Pose::identity(),
+            covariance: self.unmatched,
+        };
+        let turn = predicted.motion.rotation.inverse().to_rotation_matrix();
+        let turn = turn.to_homogeneous();
+        self.unmatched = turn * before.then(predicted).covariance * turn.transpose();
+        self.dead_s += time_s;
+    }
+
+    /// A new map starts with the scan before: its place is that of the map.
+    pub(super) fn start_map(&mut self) {
+        self.offset_m = 0.0;
+        self.covariance = Matrix2::new(0.0, 0.0, 0.0, self.covariance[(1, 1)]);
+        self.unmatched = Matrix3::zeros();
+    }
+}
+
+impl PredictedDistance {
+    /// Returns the motion to the next scan, which turns by an angle with a variance: the axle that
+    /// does not steer drives along an arc.
+    pub(super) fn motion(&self, [yaw_rad, variance_rad2]: [f64; 2]) -> UncertainMotion {
+        let arc = Twist {
+            vx_mps: self.distance_m,
+            vy_mps: 0.0,
+            yaw_rate_radps: yaw_rad,
+        };
+        let ahead = pose(self.radar_ahead_m, 0.0, 0.0);
+        let axle = arc.pose_at(1.0);
+        let (sin, cos) = (0.5 * yaw_rad).sin_cos();
+        let along = Vector3::new(cos, sin, 0.0);
+        let across = Vector3::new(-sin, cos, 0.0);
+        // The chord turns by half of an error of the turn, and the radar about the axle by all of
+        // it.
+        let lever = axle.rotation * Vector2::new(0.0, self.radar_ahead_m);
+        let turn = across * (0.5 * self.distance_m) + Vector3::new(lever.x, lever.y, 1.0);
+        UncertainMotion {
+            motion: ahead.inverse() * axle * ahead,
+            covariance: along * along.transpose() * self.variance_m2
+                + across * across.transpose() * self.side_variance_m2
+                + turn * turn.transpose() * variance_rad2,
+        }
+    }
+
+    /// Returns whether the vehicle has certainly moved.
+    pub(super) fn is_certain(&self) -> bool {
+        self.distance_m.powi(2) > GATE * self.variance_m2
+    }
+}
+
+#[cfg(test)]
+mod tests;
