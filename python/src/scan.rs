@@ -195,7 +195,9 @@ type Pairs = (&'static str, Vec<(i64, f64)>);
 
 /// Returns the samples of a gyro and of wheels.
 fn samples((gyro, rates): Pairs, (wheels, speeds): Pairs) -> PyResult<Vec<Sample>> {
-    let rates = rates.into_iter().map(|(ns, radps)| Sample::yaw_rate(ns, radps));
+    let rates = rates
+        .into_iter()
+        .map(|(ns, radps)| Sample::yaw_rate(ns, radps));
     let speeds = speeds.into_iter().map(|(ns, mps)| Sample::speed(ns, mps));
     let expected = format!("rates are at most {MAX_RATE_RADPS} rad/s");
     let mut samples = checked(gyro, rates.collect(), &expected)?;

@@ -1,9 +1,11 @@
-//! Runs with a gyro: its samples travel with the scans, so that no kill, rate or replay changes a
-//! byte.
+//! Runs with a gyro and wheels: their samples travel with the scans, so that no kill, rate or
+//! replay changes a byte.
 
 use std::path::PathBuf;
 
-use gyre_simulator::{GyroProfile, OutputFormat, Profile, SimulationConfig};
+use gyre_simulator::{
+    GyroProfile, OutputFormat, Profile, SimulationConfig, weather::WeatherConfig,
+};
 
 use crate::{
     common::{Run, STAGES, recording},
@@ -13,8 +15,11 @@ use crate::{
 /// Time by which the log is late, s.
 const LATE_S: f64 = 0.75;
 
+/// Time by which that of the wheels is, s.
+const WHEELS_LATE_S: f64 = 0.2;
+
 /// A recording as RADIATE has them, with the log of a gyro whose clock is late and whose host
-/// stalls and loses samples.
+/// stalls and loses samples, and that of wheels, which slip; the radar is blind for a while.
 fn with_log() -> PathBuf {
     let mut config = SimulationConfig {
         scans: Some(recording::SCANS),
@@ -29,7 +34,18 @@ fn with_log() -> PathBuf {
     config.gyro.stall_every_s = 2.0;
     config.gyro.stall_s = 0.06;
     config.gyro.lost = 0.02;
-    recording::of("gyro", &config)
+    config.wheels.rate_hz = 20.0;
+    config.wheels.late_s = WHEELS_LATE_S;
+    config.wheels.lost = 0.02;
+    config.wheels.slip_every_s = 4.0;
+    config.wheels.slip_s = 0.5;
+    let blind = |from_s, blocked_db| WeatherConfig {
+        from_s,
+        blocked_db,
+        ..WeatherConfig::default()
+    };
+    config.weather = vec![blind(2.5, 100.0), blind(4.0, 0.0)];
+    recording::of("gyro-and-wheels", &config)
 }
 
 fn radar_alone() -> Run {
@@ -41,12 +57,21 @@ fn with_gyro() -> Run {
     run.set(&format!("gyro.late_s={LATE_S}"))
 }
 
+fn with_both() -> Run {
+    let run = with_gyro().set("wheels.kind=auto");
+    run.set(&format!("wheels.late_s={WHEELS_LATE_S}"))
+}
+
 /// The undisturbed result.
 fn undisturbed() -> String {
-    let run = with_gyro();
+    let run = with_both();
     run.complete();
-    let gyro = &run.summary()["gyro"];
+    let summary = run.summary();
+    let gyro = &summary["gyro"];
     assert!(gyro["motions"].as_u64() > Some(15), "{gyro}");
+    let wheels = &summary["wheels"];
+    assert!(wheels["motions"].as_u64() > Some(15), "{wheels}");
+    assert!(wheels["predicted"].as_u64() > Some(3), "{wheels}");
     run.odometry()
 }
 
@@ -56,8 +81,12 @@ fn whatever_is_killed_the_result_is_the_undisturbed_one() {
     let alone = radar_alone();
     alone.complete();
     assert_ne!(alone.odometry(), undisturbed);
+    let by_gyro = with_gyro();
+    by_gyro.complete();
+    assert_ne!(by_gyro.odometry(), undisturbed);
+    assert!(by_gyro.summary().get("wheels").is_none());
     for stage in STAGES {
-        let run = with_gyro().rate("6");
+        let run = with_both().rate("6");
         let mut running = run.start();
         running.await_poses(recording::SCANS / 3).kill(stage);
         running.finish().succeeded();
@@ -67,7 +96,7 @@ fn whatever_is_killed_the_result_is_the_undisturbed_one() {
 
 #[test]
 fn a_run_that_is_continued_has_the_same_result() {
-    let run = with_gyro().rate("6");
+    let run = with_both().rate("6");
     let mut running = run.start();
     running.await_poses(recording::SCANS / 2);
     running.kill_supervisor();
@@ -77,13 +106,27 @@ fn a_run_that_is_continued_has_the_same_result() {
 
 #[test]
 fn a_recording_holds_what_was_used_and_replays_to_the_same_bytes() {
-    let run = recorded(&with_gyro()).set("run.window=32");
+    let run = recorded(&with_both()).set("run.window=32");
     run.complete();
     assert_eq!(run.odometry(), undisturbed());
-    // The log is not there any more, and its delay is in the samples already.
+    // The logs are not there any more, and their delays are in the samples already.
     assert_eq!(replay(&file(&run), &[]), undisturbed());
-    let alone = replay(&file(&run), &["--set", "gyro.kind=none"]);
-    assert_ne!(alone, undisturbed());
+    let by_gyro = with_gyro();
+    by_gyro.complete();
+    let without = replay(&file(&run), &["--set", "wheels.kind=none"]);
+    assert_eq!(without, by_gyro.odometry());
+}
+
+#[test]
+fn a_log_of_the_wheels_of_another_time_or_without_speeds_is_refused() {
+    let run = with_both().set("wheels.late_s=600");
+    let words = ["the log of the wheels", "wheels.late_s is wrong"];
+    run.finish().refused_with(&words);
+    let log = with_log().join("imu.csv");
+    let run = radar_alone().set("wheels.kind=log");
+    let run = run.set(&format!("wheels.file='{}'", log.display()));
+    let words = ["is no log of the wheels", "stamp_ns,speed_m_s"];
+    run.finish().refused_with(&words);
 }
 
 #[test]
@@ -97,5 +140,8 @@ fn a_log_of_another_time_is_refused() {
 fn a_recording_without_a_log_is_refused() {
     let run = Run::of_recording().set("gyro.kind=auto");
     let words = ["no log of a gyro lies beside the scans", "gyro.kind"];
+    run.finish().refused_with(&words);
+    let run = Run::of_recording().set("wheels.kind=auto");
+    let words = ["no log of the wheels lies beside the scans", "wheels.kind"];
     run.finish().refused_with(&words);
 }

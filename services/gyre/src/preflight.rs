@@ -45,9 +45,7 @@ pub enum PreflightError {
     )]
     LiveGyro,
     /// Wheels beside a live radar.
-    #[error(
-        "wheels.kind is of a recording, but the radar is live: set it to `none`"
-    )]
+    #[error("wheels.kind is of a recording, but the radar is live: set it to `none`")]
     LiveWheels,
     /// The segments would not fit.
     #[error(

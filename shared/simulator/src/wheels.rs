@@ -1,4 +1,4 @@
-//! The speed of the vehicle's wheels: the section `[simulation.wheels]`, and the log that it leaves.
+//! The speed of the wheels: the section `[simulation.wheels]`, and the log that it leaves.
 
 use std::fmt::Write as _;
 
@@ -28,6 +28,8 @@ pub struct SimulatedWheelsConfig {
     pub seed: Option<u64>,
     /// Standard deviation of the scale, a share: what a drive has is drawn from the seed.
     pub scale_sigma: f64,
+    /// Noise of the distance, m/√m: tyres creep, and the road is not even.
+    pub noise_m_per_sqrt_m: f64,
     /// Standard deviation of each sample, m/s.
     pub noise_mps: f64,
     /// Step to which speeds are rounded, m/s; 0 for none.
@@ -53,6 +55,7 @@ impl Default for SimulatedWheelsConfig {
             rate_hz: 0.0,
             seed: None,
             scale_sigma: 0.01,
+            noise_m_per_sqrt_m: 0.01,
             noise_mps: 0.02,
             step_mps: 0.01 / 3.6,
             slip_every_s: 0.0,
@@ -78,6 +81,12 @@ impl SimulatedWheelsConfig {
     pub fn validate(&self) -> Result<(), SimulatorError> {
         require_within("wheels.rate_hz", self.rate_hz, 0.0, 1000.0)?;
         require_within("wheels.scale_sigma", self.scale_sigma, 0.0, 0.1)?;
+        require_within(
+            "wheels.noise_m_per_sqrt_m",
+            self.noise_m_per_sqrt_m,
+            0.0,
+            1.0,
+        )?;
         require_within("wheels.noise_mps", self.noise_mps, 0.0, 1.0)?;
         require_within("wheels.step_mps", self.step_mps, 0.0, 10.0)?;
         require_within("wheels.slip_every_s", self.slip_every_s, 0.0, 1e6)?;
@@ -150,11 +159,15 @@ impl<'a> Wheels<'a> {
     /// The speed that is measured from one time of the drive to another, m/s; `None` if it is lost.
     fn measure(&mut self, span_s: [f64; 2]) -> Option<f64> {
         let config = self.config;
-        let noise_mps = config.noise_mps * self.rng.sample::<f64, _>(StandardNormal);
+        let [noise, creep] = [0, 1].map(|_| self.rng.sample::<f64, _>(StandardNormal));
         let is_lost = self.rng.random::<f64>() < config.lost;
         let [before, after] = span_s.map(|time_s| self.axle(time_s));
-        let driven = Twist::from_motion(&before.inv_mul(&after), span_s[1] - span_s[0]);
-        let turned = self.scale * driven.vx_mps * (1.0 + self.slip(span_s[0])) + noise_mps;
+        let duration_s = span_s[1] - span_s[0];
+        let driven_mps = Twist::from_motion(&before.inv_mul(&after), duration_s).vx_mps;
+        let creep_m = config.noise_m_per_sqrt_m * (driven_mps.abs() * duration_s).sqrt() * creep;
+        let rolled_mps = driven_mps + creep_m / duration_s;
+        let turned =
+            self.scale * rolled_mps * (1.0 + self.slip(span_s[0])) + config.noise_mps * noise;
         let speed_mps = match config.step_mps > 0.0 {
             // Adding zero turns a negative one into a positive one.
             true => (turned / config.step_mps).round() * config.step_mps + 0.0,
@@ -206,6 +219,7 @@ mod tests {
         SimulatedWheelsConfig {
             rate_hz: 50.0,
             scale_sigma: 0.0,
+            noise_m_per_sqrt_m: 0.0,
             noise_mps: 0.0,
             step_mps: 0.0,
             ..SimulatedWheelsConfig::default()
@@ -231,7 +245,10 @@ mod tests {
                 (to - from).norm()
             })
             .sum();
-        assert!((measured_m - driven_m).abs() < 1e-3 * driven_m, "{measured_m} {driven_m}");
+        assert!(
+            (measured_m - driven_m).abs() < 1e-3 * driven_m,
+            "{measured_m} {driven_m}"
+        );
     }
 
     #[test]
@@ -243,10 +260,19 @@ mod tests {
             slip_share: 0.25,
             ..exact()
         });
-        let ratios = rolling.iter().zip(&slipping).map(|(a, b)| b.values[0] / a.values[0]);
+        let ratios = rolling
+            .iter()
+            .zip(&slipping)
+            .map(|(a, b)| b.values[0] / a.values[0]);
         let ratios: Vec<f64> = ratios.collect();
-        let slips = ratios.iter().filter(|ratio| (*ratio - 1.25).abs() < 1e-9).count();
-        let rolls = ratios.iter().filter(|ratio| (*ratio - 1.0).abs() < 1e-9).count();
+        let slips = ratios
+            .iter()
+            .filter(|ratio| (*ratio - 1.25).abs() < 1e-9)
+            .count();
+        let rolls = ratios
+            .iter()
+            .filter(|ratio| (*ratio - 1.0).abs() < 1e-9)
+            .count();
         assert_eq!(slips + rolls, ratios.len());
         // A quarter of ten seconds.
         assert!((115..=135).contains(&slips), "{slips}");
@@ -256,7 +282,10 @@ mod tests {
     fn a_log_has_the_numbers_of_its_samples() {
         let (_, samples) = simulated(SimulatedWheelsConfig {
             lost: 0.1,
-            ..SimulatedWheelsConfig { rate_hz: 50.0, ..SimulatedWheelsConfig::default() }
+            ..SimulatedWheelsConfig {
+                rate_hz: 50.0,
+                ..SimulatedWheelsConfig::default()
+            }
         });
         assert!((400..500).contains(&samples.len()));
         let text = String::from_utf8(csv(&samples)).expect("text");

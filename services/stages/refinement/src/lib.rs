@@ -96,8 +96,8 @@ impl RefinementStage {
         if self.next != Some(item.seq) {
             let before = item.seq.saturating_sub(1);
             let restored = self.checkpoint.restore(before, &mut self.refiner);
-            // A chain goes on with the bias of the gyro and the scale of the wheels alone, which the
-            // first one has not.
+            // A chain goes on with what is known of gyro and wheels alone, which the first one has
+            // not.
             restored.or_else(|error| match starts_chain {
                 true => Ok(()),
                 false => Err(unusable(error)),

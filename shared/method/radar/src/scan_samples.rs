@@ -82,8 +82,7 @@ impl ScanSamples {
         config: &WheelsConfig,
         dataset: &dyn Dataset,
     ) -> Result<Self, LogError> {
-        let track = SampleTrack::of_wheels(log, config);
-        Self::of_track(track, (SampleKind::Wheels, &log.path), dataset)
+        Self::of_track(log.track(config), (SampleKind::Wheels, &log.path), dataset)
     }
 
     /// Joins the samples of two logs.

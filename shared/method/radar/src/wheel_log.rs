@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use csv::StringRecord;
-use gyre_samples::{Sample, SampleKind};
+use gyre_samples::{Sample, SampleKind, WheelsConfig};
 
 use crate::{
-    LogError, LogFaults,
+    LogError, LogFaults, SampleTrack,
     gyro_log::{
         Raw,
         columns::{StampUnit, plain, stamp_unit},
@@ -18,12 +18,7 @@ use crate::{
 };
 
 /// Logs relative to the root of a dataset, in order of precedence.
-const PLACES: [&str; 4] = [
-    "wheels.csv",
-    "wheel_speed.csv",
-    "speed.csv",
-    "odometer.csv",
-];
+const PLACES: [&str; 4] = ["wheels.csv", "wheel_speed.csv", "speed.csv", "odometer.csv"];
 
 /// The speeds of a vehicle on wheels.
 const SPEEDS: Plausible = Plausible {
@@ -74,6 +69,11 @@ impl WheelLog {
     /// Stamps or speeds that cannot be those of wheels.
     pub fn of(samples: Vec<Sample>, path: &Path) -> Result<Self, LogError> {
         Self::examined(Raw::of(samples), path)
+    }
+
+    /// Takes its samples over to the radar's clock: [`WheelsConfig::on_radar`].
+    pub fn track(&self, config: &WheelsConfig) -> SampleTrack {
+        SampleTrack::of(self.samples.iter().map(|sample| config.on_radar(sample)))
     }
 
     fn examined(raw: Raw, path: &Path) -> Result<Self, LogError> {
@@ -128,8 +128,8 @@ impl SampleColumns for SpeedColumns {
         let stamp = columns().find_map(|(k, name)| Some((k, stamp_unit(name)?)));
         let speed = columns().find_map(|(k, name)| Some((k, speed_unit(name)?)));
         let listed = || quoted(&names.join(","));
-        let (speed, unit) = speed
-            .ok_or_else(|| format!("its columns {} have no speed: {REMEDY}", listed()))?;
+        let (speed, unit) =
+            speed.ok_or_else(|| format!("its columns {} have no speed: {REMEDY}", listed()))?;
         Ok(Self {
             stamp: stamp
                 .ok_or_else(|| format!("its columns {} have no stamps: {REMEDY}", listed()))?,

@@ -11,7 +11,7 @@ use crate::{GyroConfig, Sample, SampleKind, integral::Integrator};
 pub struct GyroTurn {
     /// From the stamp of the scan before to that of the scan, rad, with the bias.
     pub yaw_rad: f64,
-    /// Variance but for the bias, rad².
+    /// Variance but for the bias and the scale, rad².
     pub variance_rad2: f64,
     /// The time between both, s.
     pub interval_s: f64,
@@ -59,12 +59,11 @@ impl Gyro {
     pub fn turn(&self) -> Option<GyroTurn> {
         let integral = self.yaw.integral()?;
         let [_, sweep] = self.yaw.means();
-        let by_scale = self.config.scale_sigma * integral.sum;
         let by_time = self.config.time_sigma_s * integral.change;
         let walk = self.config.noise_rad_per_sqrt_s.powi(2) * integral.interval_s;
         Some(GyroTurn {
             yaw_rad: integral.sum,
-            variance_rad2: walk + by_scale * by_scale + by_time * by_time,
+            variance_rad2: walk + by_time * by_time,
             interval_s: integral.interval_s,
             sweep_rate_radps: sweep?,
         })

@@ -23,7 +23,7 @@ pub(crate) struct Integrator {
     integral: Option<Integral>,
 }
 
-/// What a rate comes to from the stamp of one scan to that of the next.
+/// The integral of a rate from the stamp of one scan to that of the next.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Integral {
     pub sum: f64,

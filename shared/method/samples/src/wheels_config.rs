@@ -95,12 +95,7 @@ impl WheelsConfig {
         let bounds = Bounds("wheels");
         bounds.late_s(self.late_s)?;
         let expected = "metres, -10 to 10";
-        bounds.within(
-            "radar_ahead_m",
-            self.radar_ahead_m,
-            [-10.0, 10.0],
-            expected,
-        )?;
+        bounds.within("radar_ahead_m", self.radar_ahead_m, [-10.0, 10.0], expected)?;
         bounds.scale([self.scale, self.scale_sigma])?;
         bounds.noise("scale_walk_per_sqrt_s", self.scale_walk_per_sqrt_s)?;
         bounds.noise("noise_m_per_sqrt_m", self.noise_m_per_sqrt_m)?;

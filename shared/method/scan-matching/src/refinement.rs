@@ -288,7 +288,9 @@ impl Refiner {
     fn predict_distance(&mut self, interval_s: f64) -> Option<PredictedDistance> {
         let measured = self.distance;
         if measured.is_some() {
-            self.state.wheels.get_or_insert(WheelState::new(&self.wheels));
+            self.state
+                .wheels
+                .get_or_insert(WheelState::new(&self.wheels));
         }
         let wheels = self.state.wheels.as_mut()?;
         wheels.wait(interval_s, &self.wheels);
@@ -382,7 +384,10 @@ impl Refiner {
                 wheels.correct(measured, &registered);
             }
             Some(_) if scan.step.distance.is_some() && !is_certain => return false,
-            measured => wheels.adopt(&registered, measured.is_some()),
+            measured => {
+                let slips = measured.is_some() || wheels.slips;
+                wheels.adopt(&registered, slips);
+            }
         }
         true
     }

@@ -11,4 +11,5 @@ mod hostile_input;
 mod known_motions;
 mod refinement;
 mod refinement_faults;
+mod refinement_wheels;
 mod slow_sweeps;

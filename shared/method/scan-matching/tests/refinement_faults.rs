@@ -215,6 +215,27 @@ fn no_points_give_a_motion_that_is_not_finite() {
     }
 }
 
+/// The points of a radar that is nearly blind do not determine a pose, and rounding may
+/// make their covariance none.
+#[test]
+fn a_handful_of_points_gives_a_covariance() {
+    let (drive, good) = bend();
+    for points in [1, 2, 3, 5] {
+        for seed in 0..3 {
+            let mut scans = good[..40].to_vec();
+            for (k, scan) in scans.iter_mut().enumerate().skip(20) {
+                let mut few = noise(1000 * seed + k as u64);
+                few.truncate(points);
+                *scan = few;
+            }
+            for refined in refine(&drive, &scans).refined {
+                let covariance = refined.motion.covariance;
+                assert!(covariance.cholesky().is_some(), "{points}: {covariance}");
+            }
+        }
+    }
+}
+
 #[test]
 fn a_few_points_that_are_nan_change_little() {
     let (drive, mut scans) = bend();

@@ -156,7 +156,12 @@ impl MaskedHeader {
             "finite, 0 or more",
         )?;
         require(self.has_gyro <= 1, "has_gyro", self.has_gyro, "0 or 1")?;
-        require(self.has_wheels <= 1, "has_wheels", self.has_wheels, "0 or 1")?;
+        require(
+            self.has_wheels <= 1,
+            "has_wheels",
+            self.has_wheels,
+            "0 or 1",
+        )?;
         let (gyro, wheels) = (&self.gyro, &self.wheels);
         finite([
             ("gyro.yaw_rad", gyro.yaw_rad),

@@ -203,8 +203,8 @@ impl ScanHeader {
         self.power_bytes()?.checked_next_multiple_of(ByteBlock::LEN)
     }
 
-    /// Views the samples, in the order of [`Sample::order`]; `None` if the payload is shorter than the
-    /// header says.
+    /// Views the samples, in the order of [`Sample::order`]; `None` if the payload is shorter than
+    /// the header says.
     pub fn samples<'a>(&self, bytes: &'a [u8]) -> Option<&'a [Sample]> {
         if self.samples == 0 {
             return Some(&[]);

@@ -59,6 +59,24 @@ fn rain_attenuates_as_in_p_838() {
 }
 
 #[test]
+fn a_blocked_radome_makes_the_radar_blind() {
+    let blocked = |blocked_db| {
+        let weather = WeatherConfig {
+            blocked_db,
+            ..WeatherConfig::default()
+        };
+        let setup = Setup {
+            weather,
+            ..Setup::of(vec![post(50.0, 100.0, 1e3)], ON)
+        };
+        peak_db(&setup.scan(), 100, setup.bins(49.0..51.0))
+    };
+    let clear = blocked(0.0);
+    assert!((clear - blocked(10.0) - 10.0).abs() < 1.0);
+    assert!(clear - blocked(100.0) > 40.0);
+}
+
+#[test]
 fn fog_attenuates_as_in_p_840() {
     // 4.6 dB/km for each g/m3 at 76.5 GHz and 10 degrees.
     let loss = loss_db(FOG, ON);

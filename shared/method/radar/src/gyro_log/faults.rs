@@ -131,7 +131,7 @@ impl LogFaults {
     }
 }
 
-/// What values a sensor can measure on a vehicle.
+/// The values that a sensor can measure on a vehicle.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Plausible {
     /// The sensor.
@@ -179,7 +179,11 @@ pub(crate) fn examine(
     let mut samples = raw.samples;
     let mut leave_out = |is_bad: &dyn Fn(f64) -> bool| {
         let before = samples.len();
-        let is_bad = |sample: &Sample| sample.values[..plausible.values].iter().any(|it| is_bad(*it));
+        let is_bad = |sample: &Sample| {
+            sample.values[..plausible.values]
+                .iter()
+                .any(|it| is_bad(*it))
+        };
         samples.retain(|sample| !is_bad(sample));
         (before, before - samples.len())
     };
@@ -188,7 +192,9 @@ pub(crate) fn examine(
     faults.absurd = absurd;
     if absurd as f64 > ABSURD_SHARE * finite as f64 {
         let beyond = plausible.beyond;
-        return Err(unusable(format!("{absurd} of its {finite} samples {beyond}")));
+        return Err(unusable(format!(
+            "{absurd} of its {finite} samples {beyond}"
+        )));
     }
     let samples = breaks::repair(samples, &mut faults).map_err(unusable)?;
     let samples = order::sort(&samples, &mut faults);

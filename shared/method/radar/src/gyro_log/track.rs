@@ -1,9 +1,8 @@
 //! Samples of a log on the radar's clock.
 
-use gyre_samples::{GyroConfig, Sample, WheelsConfig};
+use gyre_samples::{GyroConfig, Sample};
 
 use super::GyroLog;
-use crate::WheelLog;
 
 /// Samples in the vehicle's axes on the radar's clock, in the order in which they travel
 /// ([`Sample::order`]).
@@ -18,11 +17,9 @@ impl SampleTrack {
         Self(taken.collect())
     }
 
-    /// Takes the samples of a log of the wheels over to the radar's clock:
-    /// [`WheelsConfig::on_radar`].
-    pub fn of_wheels(log: &WheelLog, config: &WheelsConfig) -> Self {
-        let taken = log.samples.iter().map(|sample| config.on_radar(sample));
-        Self(taken.collect())
+    /// Takes samples that are on the radar's clock, in their order.
+    pub(crate) fn of(samples: impl Iterator<Item = Sample>) -> Self {
+        Self(samples.collect())
     }
 
     /// Returns the samples of both tracks.

@@ -3,6 +3,7 @@
 
 mod faults;
 mod formats;
+mod wheels;
 
 use std::{fs, path::PathBuf};
 

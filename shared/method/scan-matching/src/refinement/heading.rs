@@ -1,5 +1,5 @@
 //! The heading by gyro and radar together: a Kalman filter over the heading against the map, the
-//! bias of the gyro, and the lean of the radar.
+//! bias of the gyro and its scale, and the lean of the radar.
 //!
 //! The gyro predicts the heading of the next scan, and registration measures it against the map.
 //! While the vehicle stands the map stays, so that the bias is seen well. While it drives, the map
@@ -8,7 +8,7 @@
 
 use gyre_geometry::{Pose, UncertainMotion, pose, wrap_angle, xy_yaw};
 use gyre_samples::{GyroConfig, GyroTurn};
-use nalgebra::{Matrix3, RowVector3, Vector3};
+use nalgebra::{Matrix4, RowVector4, Vector4};
 
 /// Standard deviation of the lean, rad, and the time over which it changes, s. On simulated roads
 /// 2.5e-4 rad leaves the bias unknown while the vehicle drives.
@@ -20,16 +20,26 @@ const TILT_RAD_PER_SQRT_S: f64 = 2.5e-4;
 /// Time over which an error of the bias counts as new, s: for covariances of motions, which are
 /// composed as if independent.
 const BIAS_TIME_S: f64 = 30.0;
+/// Angle over which an error of the scale counts as new, rad: that of a bend.
+const SCALE_TURN_RAD: f64 = std::f64::consts::FRAC_PI_2;
 
-/// The bias of the gyro, and the steady error of the radar.
+/// The states, in the order of the covariance.
+const HEADING: usize = 0;
+const BIAS: usize = 1;
+const LEAN: usize = 2;
+const SCALE: usize = 3;
+
+/// The bias and the scale of the gyro, and the steady error of the radar.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Heading {
     /// Bias of the gyro, rad/s.
     pub bias_radps: f64,
     /// Steady error of registered headings, rad.
     pub lean_rad: f64,
-    /// Covariance of the errors of the heading against the map, the bias and the lean.
-    pub covariance: Matrix3<f64>,
+    /// True turn over the one that is measured, but for the bias.
+    pub scale: f64,
+    /// Covariance of the errors of the heading against the map, the bias, the lean and the scale.
+    pub covariance: Matrix4<f64>,
 }
 
 /// The bias of the gyro, as it is known after a scan.
@@ -50,31 +60,40 @@ pub(super) struct PredictedTurn {
     pub variance_rad2: f64,
     /// Rate during the sweep, rad/s.
     pub sweep_rate_radps: f64,
-    /// The part of the variance that is not of the bias.
+    /// The part of the variance that is of neither bias nor scale.
     noise_rad2: f64,
-    /// Variance of the bias, rad²/s².
+    /// Variance of the bias, rad²/s², and of the scale.
     bias_radps2: f64,
+    scale_variance: f64,
     interval_s: f64,
 }
 
 impl PredictedTurn {
-    /// Returns the variance after a time, s, in which all turns were the gyro's, such that those of
-    /// all of them add up, rad². The error of the bias is that of all: its square grows with the
-    /// square of the time.
-    pub fn variance_after_rad2(&self, time_s: f64) -> f64 {
-        let since_s2 = self.interval_s * (self.interval_s + 2.0 * time_s);
-        self.noise_rad2 + self.bias_radps2 * since_s2
+    /// Returns the variance after a time, s, and an angle, rad, in which all turns were the gyro's,
+    /// such that those of all of them add up, rad². The errors of bias and scale are those of all:
+    /// their squares grow with the squares of the time and of the angle.
+    pub fn variance_after_rad2(&self, [time_s, angle_rad]: [f64; 2]) -> f64 {
+        self.noise_rad2
+            + self.bias_radps2 * grown(self.interval_s, time_s)
+            + self.scale_variance * grown(self.yaw_rad, angle_rad)
     }
+}
+
+/// By how much the square of a sum grows with a step, at least by the square of that.
+pub(super) fn grown(step: f64, sum: f64) -> f64 {
+    (step * (step + 2.0 * sum)).max(step * step)
 }
 
 impl Heading {
     /// Creates the state before the first scan.
     pub(super) fn new(config: &GyroConfig) -> Self {
-        let variances = Vector3::new(0.0, config.bias_sigma_radps.powi(2), LEAN_SIGMA_RAD.powi(2));
+        let [bias, scale] = [config.bias_sigma_radps, config.scale_sigma].map(|it| it * it);
+        let variances = Vector4::new(0.0, bias, LEAN_SIGMA_RAD.powi(2), scale);
         Self {
             bias_radps: config.bias_radps,
             lean_rad: 0.0,
-            covariance: Matrix3::from_diagonal(&variances),
+            scale: 1.0,
+            covariance: Matrix4::from_diagonal(&variances),
         }
     }
 
@@ -82,7 +101,7 @@ impl Heading {
     pub(super) fn bias(&self) -> GyroBias {
         GyroBias {
             rate_radps: self.bias_radps,
-            sigma_radps: self.covariance[(1, 1)].max(0.0).sqrt(),
+            sigma_radps: self.covariance[(BIAS, BIAS)].max(0.0).sqrt(),
         }
     }
 
@@ -90,17 +109,23 @@ impl Heading {
     pub(super) fn predict(&mut self, turn: &GyroTurn, config: &GyroConfig) -> PredictedTurn {
         let time_s = turn.interval_s;
         let turn_rad2 = turn.variance_rad2 + TILT_RAD_PER_SQRT_S.powi(2) * time_s;
-        let by_bias_s = Matrix3::new(1.0, -time_s, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0);
-        self.covariance = by_bias_s * self.covariance * by_bias_s.transpose();
-        self.covariance[(0, 0)] += turn_rad2;
+        let mut step = Matrix4::identity();
+        (step[(HEADING, BIAS)], step[(HEADING, SCALE)]) = (-time_s, turn.yaw_rad);
+        self.covariance = step * self.covariance * step.transpose();
+        self.covariance[(HEADING, HEADING)] += turn_rad2;
         self.wait(time_s, config);
-        let by_bias = self.covariance[(1, 1)] * time_s * BIAS_TIME_S.max(time_s);
+        let bias_radps2 = self.covariance[(BIAS, BIAS)];
+        let scale_variance = self.covariance[(SCALE, SCALE)];
+        let angle_rad = turn.yaw_rad.abs();
         PredictedTurn {
-            yaw_rad: turn.yaw_rad - self.bias_radps * time_s,
-            variance_rad2: turn_rad2 + by_bias,
-            sweep_rate_radps: turn.sweep_rate_radps - self.bias_radps,
+            yaw_rad: self.scale * turn.yaw_rad - self.bias_radps * time_s,
+            variance_rad2: turn_rad2
+                + bias_radps2 * time_s * BIAS_TIME_S.max(time_s)
+                + scale_variance * angle_rad * SCALE_TURN_RAD.max(angle_rad),
+            sweep_rate_radps: self.scale * turn.sweep_rate_radps - self.bias_radps,
             noise_rad2: turn_rad2,
-            bias_radps2: self.covariance[(1, 1)],
+            bias_radps2,
+            scale_variance,
             interval_s: time_s,
         }
     }
@@ -109,10 +134,10 @@ impl Heading {
     /// is another one. Either [`adopt`](Self::adopt) or [`guess`](Self::guess) says which.
     pub(super) fn wait(&mut self, time_s: f64, config: &GyroConfig) {
         let kept = (-time_s / LEAN_TIME_S).exp();
-        let step = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, kept));
+        let step = Matrix4::from_diagonal(&Vector4::new(1.0, 1.0, kept, 1.0));
         self.covariance = step * self.covariance * step;
-        self.covariance[(1, 1)] += config.bias_walk_radps_per_sqrt_s.powi(2) * time_s;
-        self.covariance[(2, 2)] += LEAN_SIGMA_RAD.powi(2) * (1.0 - kept * kept);
+        self.covariance[(BIAS, BIAS)] += config.bias_walk_radps_per_sqrt_s.powi(2) * time_s;
+        self.covariance[(LEAN, LEAN)] += LEAN_SIGMA_RAD.powi(2) * (1.0 - kept * kept);
         self.lean_rad *= kept;
     }
 
@@ -127,9 +152,10 @@ impl Heading {
         previous: &Pose,
     ) -> UncertainMotion {
         let variance_rad2 = registered.covariance[(2, 2)];
-        let step = Matrix3::new(0.0, 0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0);
+        let mut step = Matrix4::identity();
+        (step[(HEADING, HEADING)], step[(HEADING, LEAN)]) = (0.0, -1.0);
         self.covariance = step * self.covariance * step.transpose();
-        self.covariance[(0, 0)] += variance_rad2;
+        self.covariance[(HEADING, HEADING)] += variance_rad2;
         UncertainMotion {
             motion: turned(registered, previous, -self.lean_rad),
             ..*registered
@@ -139,7 +165,7 @@ impl Heading {
     /// Takes a heading that neither the gyro nor the map has measured: one that is predicted from
     /// the motions before, with this variance.
     pub(super) fn guess(&mut self, variance_rad2: f64) {
-        self.covariance[(0, 0)] += variance_rad2;
+        self.covariance[(HEADING, HEADING)] += variance_rad2;
     }
 
     /// Weighs the heading of a pose that was registered with the map against the predicted one. The
@@ -169,29 +195,30 @@ impl Heading {
     /// Takes a registered heading that differs by `apart_rad` from the predicted one. Returns the
     /// correction of the predicted one.
     fn correct(&mut self, apart_rad: f64, variance_rad2: f64) -> f64 {
-        let seen = RowVector3::new(1.0, 0.0, 1.0);
+        let seen = RowVector4::new(1.0, 0.0, 1.0, 0.0);
         let across = self.covariance * seen.transpose();
         let gain = across / ((seen * across)[0] + variance_rad2);
         let step = gain * (apart_rad - self.lean_rad);
-        self.bias_radps += step[1];
-        self.lean_rad += step[2];
+        self.bias_radps += step[BIAS];
+        self.lean_rad += step[LEAN];
+        self.scale += step[SCALE];
         // Joseph's form stays symmetric and positive.
-        let kept = Matrix3::identity() - gain * seen;
+        let kept = Matrix4::identity() - gain * seen;
         self.covariance =
             kept * self.covariance * kept.transpose() + gain * gain.transpose() * variance_rad2;
-        step[0]
+        step[HEADING]
     }
 
     /// A new map starts with the scan before: its heading is that of the map.
     pub(super) fn start_map(&mut self) {
-        let step = Matrix3::from_diagonal(&Vector3::new(0.0, 1.0, 1.0));
+        let step = Matrix4::from_diagonal(&Vector4::new(0.0, 1.0, 1.0, 1.0));
         self.covariance = step * self.covariance * step;
     }
 
     /// The map has a new keyframe, one of `keyframes`: its heading follows that of the scans.
     pub(super) fn follow(&mut self, keyframes: usize) {
         let kept = 1.0 - 2.0 / (keyframes as f64 + 1.0);
-        let step = Matrix3::from_diagonal(&Vector3::new(kept, 1.0, 1.0));
+        let step = Matrix4::from_diagonal(&Vector4::new(kept, 1.0, 1.0, 1.0));
         self.covariance = step * self.covariance * step;
     }
 }

@@ -231,8 +231,8 @@ impl TrackerState {
         self.pose = pose;
     }
 
-    /// Makes `pose`, to which wheels lead, the newest anchor. The last refined scan stays behind it,
-    /// in case they slip meanwhile.
+    /// Makes `pose`, to which wheels lead, the newest anchor. The last refined scan stays behind
+    /// it, in case they slip meanwhile.
     fn carry_anchor(&mut self, pose: Pose, step: &Step) {
         let interval_s = step.interval_s;
         let twist = self.mean_twist_to(&pose, interval_s);

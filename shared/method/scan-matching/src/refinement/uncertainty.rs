@@ -98,10 +98,9 @@ pub(super) fn of_alignment(
     let shape = turn * inverse * turn.transpose() * scale;
     let yaw = config.yaw_sigma_deg.to_radians().powi(2);
     let covariance = shape + Matrix3::from_diagonal(&Vector3::new(0.0, 0.0, yaw));
-    covariance
-        .iter()
-        .all(|v| v.is_finite())
-        .then_some(covariance)
+    // A few points along a line leave an inverse that rounding makes no covariance.
+    let is_one = covariance.iter().all(|v| v.is_finite()) && covariance.cholesky().is_some();
+    is_one.then_some(covariance)
 }
 
 /// The largest share in the variance of azimuths that their mean has, where one was lost anywhere
@@ -138,11 +137,7 @@ pub(super) fn drift_share(keyframes: usize, config: &RefinementConfig) -> f64 {
 
 /// The covariance of a motion predicted at constant velocity, whose acceleration is within the
 /// limits; of its turn, by the gyro if there is one; of its distance, by the wheels.
-fn of_prediction(
-    state: &TrackerState,
-    step: &Step,
-    config: &RefinementConfig,
-) -> Matrix3<f64> {
+fn of_prediction(state: &TrackerState, step: &Step, config: &RefinementConfig) -> Matrix3<f64> {
     let interval_s = step.interval_s;
     let variance =
         |jitter: f64, acceleration: f64| (jitter + acceleration * interval_s.powi(2)).powi(2) / 3.0;
@@ -152,7 +147,7 @@ fn of_prediction(
         config.yaw_acceleration_degps2.to_radians(),
     );
     if let Some(distance) = &step.distance {
-        let by_gyro = step.turn.map(|it| it.variance_after_rad2(distance.dead_s));
+        let by_gyro = step.turn.map(|it| it.variance_after_rad2(distance.dead));
         let yaw_rad = state.predicted_turn_rad(step);
         return distance
             .motion([yaw_rad, by_gyro.map_or(turn, |it| it.min(turn))])

@@ -7,6 +7,7 @@
 //! used then. Where the radar sees nothing, or little that does not agree, the motion is that of an
 //! arc: as long as the wheels say, turned as the gyro says.
 
+use super::heading::grown;
 use gyre_geometry::{Pose, Twist, UncertainMotion, pose};
 use gyre_samples::{WheelDistance, WheelsConfig};
 use nalgebra::{Matrix2, Matrix3, RowVector3, Vector2, Vector3};
@@ -15,7 +16,7 @@ use nalgebra::{Matrix2, Matrix3, RowVector3, Vector2, Vector3};
 /// standard deviations.
 const GATE: f64 = 16.0;
 
-/// What is known of the wheels.
+/// The scale of the wheels, and what they were used for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WheelState {
     /// True distance over the one that is measured.
@@ -26,10 +27,12 @@ pub struct WheelState {
     pub covariance: Matrix2<f64>,
     /// The last registered distance was another one than that of the wheels.
     pub slips: bool,
-    /// Since the last registered scan: the distance by the wheels, m, and the time, s.
+    /// The distance by the wheels since the last registered scan, m.
     pub dead_m: f64,
-    /// See `dead_m`.
+    /// The time since then, s.
     pub dead_s: f64,
+    /// The turn since then, rad.
+    pub dead_rad: f64,
     /// Covariance of the predicted motions since then together, or since a new map was started:
     /// along the axes of the last scan.
     pub unmatched: Matrix3<f64>,
@@ -57,8 +60,8 @@ pub(super) struct PredictedDistance {
     pub side_variance_m2: f64,
     /// Distance by which the radar is ahead of the axle that does not steer, m.
     pub radar_ahead_m: f64,
-    /// Time since the last registered scan, at the scan before, s.
-    pub dead_s: f64,
+    /// Time, s, and turn, rad, from the last registered scan to the scan before.
+    pub dead: [f64; 2],
 }
 
 /// A registered motion along the path.
@@ -113,6 +116,7 @@ impl WheelState {
             slips: false,
             dead_m: 0.0,
             dead_s: 0.0,
+            dead_rad: 0.0,
             unmatched: Matrix3::zeros(),
         }
     }
@@ -140,13 +144,13 @@ impl WheelState {
         let step_m = measured.distance_m;
         // The error of the scale is that of all motions since the last registered one: its square
         // grows with the square of the whole distance.
-        let since_m2 = (step_m * (step_m + 2.0 * self.dead_m)).max(step_m * step_m);
+        let since_m2 = grown(step_m, self.dead_m);
         (!self.slips).then_some(PredictedDistance {
             distance_m: self.scale * step_m,
             variance_m2: measured.variance_m2 + self.covariance[(1, 1)] * since_m2,
             side_variance_m2: measured.side_variance_m2,
             radar_ahead_m: config.radar_ahead_m,
-            dead_s: self.dead_s,
+            dead: [self.dead_s, self.dead_rad],
         })
     }
 
@@ -159,7 +163,9 @@ impl WheelState {
     fn innovation(&self, measured: &WheelDistance, registered: &Registered) -> Innovation {
         let [noise_m2, drift_m2] = registered.noise_and_drift_m2();
         let mut before = Matrix3::zeros();
-        before.fixed_view_mut::<2, 2>(0, 0).copy_from(&self.covariance);
+        before
+            .fixed_view_mut::<2, 2>(0, 0)
+            .copy_from(&self.covariance);
         before[(2, 2)] = noise_m2;
         let seen = RowVector3::new(-1.0, measured.distance_m, 1.0);
         let noise_m2 = measured.variance_m2 + drift_m2;
@@ -203,7 +209,7 @@ impl WheelState {
     }
 
     fn see(&mut self) {
-        (self.dead_m, self.dead_s) = (0.0, 0.0);
+        (self.dead_m, self.dead_s, self.dead_rad) = (0.0, 0.0, 0.0);
         self.unmatched = Matrix3::zeros();
     }
 
@@ -230,6 +236,7 @@ impl WheelState {
         let turn = turn.to_homogeneous();
         self.unmatched = turn * before.then(predicted).covariance * turn.transpose();
         self.dead_s += time_s;
+        self.dead_rad += predicted.motion.rotation.angle();
     }
 
     /// A new map starts with the scan before: its place is that of the map.

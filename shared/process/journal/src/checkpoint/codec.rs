@@ -4,7 +4,7 @@
 use gyre_geometry::Twist;
 use gyre_scan_matching::{Anchor, Heading, Keyframe, Standstill, TrackerState, WheelState};
 use gyre_storage::Checksum;
-use nalgebra::{Complex, Isometry2, Matrix2, Matrix3, Translation2, UnitComplex};
+use nalgebra::{Complex, Isometry2, Matrix2, Matrix3, Matrix4, Translation2, UnitComplex};
 
 /// Words of a state's slot before the names of its keyframes: the checksum; the item, the checksum
 /// of its motion, the number of keyframes; the tracker state.
@@ -12,13 +12,13 @@ const STATE_WORDS: usize = 1 + 3 + TRACKER_WORDS;
 const NAME_WORDS: usize = 2;
 const TRACKER_WORDS: usize = WHEELS + WHEEL_WORDS;
 const STANDSTILL_WORDS: usize = 4 + 4 + 4;
-/// A word that says whether there is one; bias, lean, covariance.
-const HEADING_WORDS: usize = 1 + 1 + 1 + 9;
-/// A word that says whether there are any; scale, offset, both dead reckonings; both
-/// covariances; whether they slip.
-const WHEEL_WORDS: usize = 1 + 5 + 4 + 9;
+/// A word that says whether there is one; bias, lean, scale, covariance.
+const HEADING_WORDS: usize = 1 + 3 + 16;
+/// A word that says whether there are any; scale, offset, three dead reckonings; both covariances;
+/// whether they slip.
+const WHEEL_WORDS: usize = 1 + 6 + 4 + 9;
 const ANCHOR_WORDS: usize = 9;
-/// Where the means and counts of a tracker state begin, its standstill, its heading, and its wheels.
+/// Where the means and counts of a tracker state begin, its standstill, its heading and its wheels.
 const REST: usize = 4 + 2 * ANCHOR_WORDS;
 const STANDSTILL: usize = REST + 4;
 const HEADING: usize = STANDSTILL + STANDSTILL_WORDS;
@@ -121,7 +121,8 @@ fn heading_words(heading: &Heading) -> [u64; HEADING_WORDS] {
     let mut words = [1; HEADING_WORDS];
     words[1] = heading.bias_radps.to_bits();
     words[2] = heading.lean_rad.to_bits();
-    let covariance = words[3..].iter_mut().zip(&heading.covariance);
+    words[3] = heading.scale.to_bits();
+    let covariance = words[4..].iter_mut().zip(&heading.covariance);
     covariance.for_each(|(word, value)| *word = value.to_bits());
     words
 }
@@ -131,7 +132,8 @@ fn heading_from(words: &[u64]) -> Option<Heading> {
     (words[0] == 1).then(|| Heading {
         bias_radps: value(1),
         lean_rad: value(2),
-        covariance: Matrix3::from_fn(|row, column| value(3 + row + 3 * column)),
+        scale: value(3),
+        covariance: Matrix4::from_fn(|row, column| value(4 + row + 4 * column)),
     })
 }
 
@@ -142,11 +144,15 @@ fn wheel_words(wheels: &WheelState) -> [u64; WHEEL_WORDS] {
         wheels.offset_m,
         wheels.dead_m,
         wheels.dead_s,
+        wheels.dead_rad,
     ];
     let covariances = wheels.covariance.iter().chain(&wheels.unmatched);
     let values = state.iter().chain(covariances).map(|it| it.to_bits());
     let values = values.chain([wheels.slips.into()]);
-    words[1..].iter_mut().zip(values).for_each(|(word, value)| *word = value);
+    words[1..]
+        .iter_mut()
+        .zip(values)
+        .for_each(|(word, value)| *word = value);
     words
 }
 
@@ -157,9 +163,10 @@ fn wheels_from(words: &[u64]) -> Option<WheelState> {
         offset_m: value(2),
         dead_m: value(3),
         dead_s: value(4),
-        covariance: Matrix2::from_fn(|row, column| value(5 + row + 2 * column)),
-        unmatched: Matrix3::from_fn(|row, column| value(9 + row + 3 * column)),
-        slips: words[18] == 1,
+        dead_rad: value(5),
+        covariance: Matrix2::from_fn(|row, column| value(6 + row + 2 * column)),
+        unmatched: Matrix3::from_fn(|row, column| value(10 + row + 3 * column)),
+        slips: words[19] == 1,
     })
 }
 

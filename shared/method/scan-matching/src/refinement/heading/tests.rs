@@ -1,3 +1,4 @@
+use nalgebra::Matrix3;
 use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -13,7 +14,11 @@ const NOISE_RAD: f64 = 2e-3;
 /// Weighs a drive of `scans` scans that turns at a rate, with a gyro that has a bias. Each scan
 /// becomes a keyframe, unless the vehicle stands.
 fn drive(scans: u32, rate_radps: f64, keyframes: Option<usize>) -> (Heading, f64) {
-    let config = GyroConfig::default();
+    // A turn that stays does not tell the scale from the bias.
+    let config = GyroConfig {
+        scale_sigma: 0.0,
+        ..GyroConfig::default()
+    };
     let mut heading = Heading::new(&config);
     let (mut at, mut truth) = (Pose::identity(), 0.0);
     for scan in 0..scans {
@@ -91,7 +96,7 @@ fn the_place_moves_along_with_the_heading() {
     assert!(fused.covariance[(2, 2)] < 2e-8 && fused.covariance[(0, 0)] < 0.8e-4);
 }
 
-/// What happens between two scans.
+/// An event between two scans.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Event {
     /// The gyro has measured the turn, and the scan is registered.
@@ -122,6 +127,8 @@ struct Drive {
     at: Pose,
     true_rad: f64,
     bias_radps: f64,
+    /// Measured turn over the true one.
+    measured: f64,
     lean_rad: f64,
 }
 
@@ -134,11 +141,12 @@ impl Drive {
     fn new(seed: u64) -> Self {
         let config = GyroConfig::default();
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let [bias, lean] = [0, 1].map(|_| rng.sample::<f64, _>(StandardNormal));
+        let [bias, lean, scale] = [0, 1, 2].map(|_| rng.sample::<f64, _>(StandardNormal));
         Self {
             rng,
             heading: Heading::new(&config),
             bias_radps: bias * config.bias_sigma_radps,
+            measured: 1.0 / (1.0 + scale * config.scale_sigma),
             config,
             at: Pose::identity(),
             true_rad: 0.0,
@@ -151,7 +159,7 @@ impl Drive {
     }
 
     fn step(&mut self, event: Event) {
-        let turn_rad = self.normal(0.05);
+        let turn_rad = self.normal(0.1);
         self.true_rad += turn_rad;
         let predicted_rad = match event.has_turn() {
             true => self.predicted(turn_rad),
@@ -182,7 +190,7 @@ impl Drive {
         let tilt_rad2 = TILT_RAD_PER_SQRT_S.powi(2) * INTERVAL_S;
         let noise_rad = self.normal((Self::TURN_RAD2 + tilt_rad2).sqrt());
         let turn = GyroTurn {
-            yaw_rad: turn_rad + self.bias_radps * INTERVAL_S + noise_rad,
+            yaw_rad: (turn_rad + self.bias_radps * INTERVAL_S + noise_rad) * self.measured,
             variance_rad2: Self::TURN_RAD2,
             interval_s: INTERVAL_S,
             sweep_rate_radps: 0.0,
@@ -221,7 +229,7 @@ fn events(rng: &mut ChaCha8Rng) -> impl Iterator<Item = Event> {
 #[test]
 fn the_variance_of_the_heading_is_true_through_gaps_of_the_log() {
     let mut sums = [(0.0, 0.0); 4];
-    let mut of_bias = 0.0;
+    let (mut of_bias, mut of_scale, mut scales_off) = (0.0, 0.0, 0.0);
     const DRIVES: u64 = 300;
     for seed in 0..DRIVES {
         let mut drive = Drive::new(seed);
@@ -232,13 +240,19 @@ fn the_variance_of_the_heading_is_true_through_gaps_of_the_log() {
             *count += 1.0;
         }
         let off = drive.heading.bias_radps - drive.bias_radps;
-        of_bias += off * off / drive.heading.covariance[(1, 1)] / DRIVES as f64;
+        of_bias += off * off / drive.heading.covariance[(BIAS, BIAS)] / DRIVES as f64;
+        let off = drive.heading.scale - 1.0 / drive.measured;
+        of_scale += off * off / drive.heading.covariance[(SCALE, SCALE)] / DRIVES as f64;
+        scales_off += off * off / DRIVES as f64;
     }
     for (event, (sum, count)) in sums.iter().enumerate() {
         let nees = sum / count;
         assert!((0.8..1.25).contains(&nees), "{event}: {nees} of {count}");
     }
     assert!((0.7..1.4).contains(&of_bias), "{of_bias}");
+    assert!((0.7..1.4).contains(&of_scale), "{of_scale}");
+    // A prior of 1 % has become less than half of that.
+    assert!(scales_off.sqrt() < 0.005, "{}", scales_off.sqrt());
 }
 
 proptest! {
@@ -258,7 +272,7 @@ proptest! {
                 _ => drive.heading.start_map(),
             }
             let covariance = drive.heading.covariance;
-            let scale = Matrix3::from_diagonal(&covariance.diagonal().map(|it| 1.0 / it.max(1e-30).sqrt()));
+            let scale = Matrix4::from_diagonal(&covariance.diagonal().map(|it| 1.0 / it.max(1e-30).sqrt()));
             let correlation = scale * covariance * scale;
             prop_assert!((correlation - correlation.transpose()).norm() < 1e-9, "{covariance}");
             prop_assert!(correlation.symmetric_eigenvalues().min() > -1e-9, "{covariance}");

@@ -133,10 +133,16 @@ fn the_scale_is_learnt_with_its_covariance_through_times_without_a_match() {
         (0..60).for_each(|_| rejected += usize::from(!drive.step(2.5)));
         off += (drive.true_scale - drive.wheels.scale).powi(2) / DRIVES as f64;
     }
-    assert!((0.8..1.25).contains(&seen) && (0.8..1.25).contains(&blind), "{seen} {blind}");
+    assert!(
+        (0.8..1.25).contains(&seen) && (0.8..1.25).contains(&blind),
+        "{seen} {blind}"
+    );
     // 200 m that are registered to 6 cm at their ends: a thousandth or less.
     assert!(off.sqrt() < 1.5e-3, "{}", off.sqrt());
-    assert!(rejected <= 8, "{rejected} of 36 000 by four standard deviations");
+    assert!(
+        rejected <= 8,
+        "{rejected} of 36 000 by four standard deviations"
+    );
 }
 
 #[test]
@@ -158,7 +164,11 @@ fn the_variance_of_a_time_without_a_match_grows_with_noise_and_scale() {
     }
     let ratio = squares / variance_m2;
     assert!((0.7..1.4).contains(&ratio), "{ratio}: {squares} m2");
-    assert!(variance_m2.sqrt() < 0.25, "{} m on 100 m", variance_m2.sqrt());
+    assert!(
+        variance_m2.sqrt() < 0.25,
+        "{} m on 100 m",
+        variance_m2.sqrt()
+    );
 }
 
 #[test]
@@ -193,7 +203,7 @@ fn distance(distance_m: f64, radar_ahead_m: f64) -> PredictedDistance {
         variance_m2: 1e-4,
         side_variance_m2: 4e-4,
         radar_ahead_m,
-        dead_s: 0.0,
+        dead: [0.0; 2],
     }
 }
 

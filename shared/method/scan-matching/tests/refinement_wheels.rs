@@ -1,0 +1,170 @@
+//! A vehicle with a gyro and wheels goes on where the radar is blind.
+
+use std::ops::Range;
+
+use crate::common::{Numbers, scenes::*};
+use gyre_geometry::{Pose, SparsePoint, pose};
+use gyre_samples::{GyroConfig, GyroTurn, WheelDistance, WheelsConfig};
+use gyre_scan_matching::{Outcome, Refined, Refiner};
+
+const NOISY: Sensor = Sensor {
+    noise_m: 0.1,
+    offset_m: 0.0,
+    doppler_s: 0.0,
+    hides_doppler: false,
+    seed: 1,
+};
+const SCANS: usize = 100;
+/// Six seconds.
+const BLIND: Range<usize> = 60..84;
+const BIAS_RADPS: f64 = 0.004;
+/// Measured distance over the true one.
+const SCALE: f64 = 0.99;
+
+/// Points unrelated to the scene, as strong as those of it.
+fn noise(seed: u64) -> Vec<SparsePoint> {
+    let mut numbers = Numbers(seed);
+    let mut values = || {
+        [
+            numbers.within(65.0),
+            numbers.within(65.0),
+            numbers.within(0.125),
+            0.65,
+            0.0,
+        ]
+    };
+    (0..900).map(|_| point(values())).collect()
+}
+
+/// The bend, and its scans.
+fn bend() -> (Drive, Vec<Vec<SparsePoint>>) {
+    let drive = Drive::steady(10.0, 2.0, SCANS);
+    let town = town([[-110.0, 300.0], [-110.0, 250.0]], 1);
+    (drive, scans(&town, &drive, &NOISY))
+}
+
+fn witnessed() -> Refiner {
+    let refiner = refiner().with_gyro(&GyroConfig::default());
+    refiner.with_wheels(&WheelsConfig::default())
+}
+
+/// Refines the motions to these scans, while the wheels measure the true distance times a factor.
+fn refine_with(
+    refiner: &mut Refiner,
+    (drive, scans): (&Drive, &[Vec<SparsePoint>]),
+    measured: impl Fn(usize) -> Option<f64>,
+    turns: bool,
+) -> Vec<Refined> {
+    let refine = |k: usize| {
+        let yaw_rad = drive.yaw_rate_radps * SWEEP_S;
+        let turn = GyroTurn {
+            yaw_rad: yaw_rad + BIAS_RADPS * SWEEP_S,
+            variance_rad2: 1e-9,
+            interval_s: SWEEP_S,
+            sweep_rate_radps: drive.yaw_rate_radps + BIAS_RADPS,
+        };
+        let [from_m, to_m] = [k - 1, k].map(|k| drive.length_m(k as f64 * SWEEP_S));
+        let distance = |factor: f64| WheelDistance {
+            distance_m: factor * (to_m - from_m),
+            variance_m2: 1e-4,
+            side_variance_m2: 1e-4,
+            interval_s: SWEEP_S,
+        };
+        refiner.expect_turn(turns.then_some(turn));
+        refiner.expect_distance(measured(k).map(distance));
+        // The search finds nothing where there is nothing.
+        let searched = match BLIND.contains(&k) || BLIND.contains(&(k - 1)) {
+            true => pose(-3.0, 4.0, 0.5),
+            false => drive.pose(k - 1).inv_mul(&drive.pose(k)),
+        };
+        refiner.refine(k as u64, &scans[k], &scans[k - 1], &searched, SWEEP_S)
+    };
+    (1..scans.len()).map(refine).collect()
+}
+
+/// The displacement over scans by the motions, against the true one: m along and across, rad.
+fn off(drive: &Drive, refined: &[Refined], over: Range<usize>) -> Pose {
+    let driven = refined[over.clone()]
+        .iter()
+        .fold(Pose::identity(), |at, it| at * it.motion.motion);
+    let truth = drive.pose(over.start).inv_mul(&drive.pose(over.end));
+    truth.inv_mul(&driven)
+}
+
+#[test]
+fn a_blind_radar_is_bridged_by_gyro_and_wheels_whatever_it_shows() {
+    let (drive, good) = bend();
+    for fault in ["nothing", "noise"] {
+        let mut scans = good.clone();
+        for k in BLIND {
+            scans[k] = match fault {
+                "nothing" => Vec::new(),
+                _ => noise(k as u64),
+            };
+        }
+        let both = refine_with(&mut witnessed(), (&drive, &scans), |_| Some(SCALE), true);
+        let around = BLIND.start - 2..BLIND.end + 2;
+        let off_by = off(&drive, &both, around.clone());
+        println!("{fault}: {off_by}");
+        // 70 m: half a percent.
+        assert!(off_by.translation.vector.norm() < 0.35, "{fault}: {off_by}");
+        for (k, refined) in (1..).zip(&both) {
+            // The scan after the blind ones starts a map, and the next one matches it.
+            let expected = match (BLIND.start..=BLIND.end).contains(&k) {
+                true => Outcome::Predicted,
+                false => Outcome::Refined,
+            };
+            assert_eq!(refined.outcome, expected, "{fault}, scan {k}");
+            assert!(refined.motion.covariance.cholesky().is_some());
+        }
+        // No jump where the radar sees again.
+        let seen = off(&drive, &both, BLIND.end..BLIND.end + 3);
+        assert!(seen.translation.vector.norm() < 0.15, "{fault}: {seen}");
+        let scale = both[SCANS - 2].wheels.unwrap();
+        let apart = scale.scale - 1.0 / SCALE;
+        assert!(
+            apart.abs() < 3.0 * scale.sigma && scale.sigma < 3e-3,
+            "{scale:?}"
+        );
+        let alone = refine_with(&mut witnessed(), (&drive, &scans), |_| None, false);
+        let alone = off(&drive, &alone, around);
+        assert!(alone.translation.vector.norm() > 1.0, "{fault}: {alone}");
+    }
+}
+
+#[test]
+fn wheels_that_slip_change_no_motion_while_the_radar_sees() {
+    let (drive, scans) = bend();
+    let slip = |k: usize| Some(if (40..46).contains(&k) { 1.5 } else { 1.0 });
+    let slipping = refine_with(&mut witnessed(), (&drive, &scans), slip, true);
+    let slips: Vec<usize> = (1..)
+        .zip(&slipping)
+        .filter(|(_, it)| it.wheels.is_some_and(|wheels| wheels.slip))
+        .map(|(k, _)| k)
+        .collect();
+    assert_eq!(slips, (40..46).collect::<Vec<_>>());
+    let whole = off(&drive, &slipping, 0..SCANS - 1);
+    assert!(whole.translation.vector.norm() < 0.5, "{whole}");
+    // Where the search finds nothing they are weak.
+    assert!(slipping.iter().all(|it| it.outcome != Outcome::Predicted));
+}
+
+#[test]
+fn a_vehicle_that_stands_drives_off_while_the_radar_is_blind() {
+    let standing = Drive::steady(0.0, 0.0, SCANS);
+    let town = town([[-110.0, 110.0], [-110.0, 110.0]], 1);
+    let mut scans = scans(&town, &standing, &NOISY);
+    scans[BLIND.start..].fill(Vec::new());
+    let moving = Drive::steady(4.0, 0.0, SCANS);
+    let measured = |k: usize| Some(if k < BLIND.start { 0.0 } else { 1.0 });
+    let refined = refine_with(&mut witnessed(), (&moving, &scans), measured, false);
+    let (stood, drove) = refined.split_at(BLIND.start - 1);
+    assert!(stood.iter().skip(8).all(|it| it.stationary));
+    assert!(drove.iter().all(|it| !it.stationary));
+    let driven_m: f64 = drove.iter().map(|it| it.motion.motion.translation.x).sum();
+    let expected_m = drove.len() as f64;
+    assert!(
+        (driven_m / expected_m - 1.0).abs() < 0.05,
+        "{driven_m} of {expected_m}"
+    );
+}
