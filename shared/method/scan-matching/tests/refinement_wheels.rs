@@ -36,10 +36,13 @@ fn noise(seed: u64) -> Vec<SparsePoint> {
     (0..900).map(|_| point(values())).collect()
 }
 
-/// The bend, and its scans.
-fn bend() -> (Drive, Vec<Vec<SparsePoint>>) {
-    let drive = Drive::steady(10.0, 2.0, SCANS);
-    let town = town([[-110.0, 300.0], [-110.0, 250.0]], 1);
+/// A vehicle that drives ever faster, so that its speed before tells little, and its scans.
+fn faster() -> (Drive, Vec<Vec<SparsePoint>>) {
+    let drive = Drive {
+        acceleration_mps2: 0.4,
+        ..Drive::steady(6.0, 0.0, SCANS)
+    };
+    let town = town([[-110.0, 400.0], [-110.0, 110.0]], 1);
     (drive, scans(&town, &drive, &NOISY))
 }
 
@@ -93,7 +96,7 @@ fn off(drive: &Drive, refined: &[Refined], over: Range<usize>) -> Pose {
 
 #[test]
 fn a_blind_radar_is_bridged_by_gyro_and_wheels_whatever_it_shows() {
-    let (drive, good) = bend();
+    let (drive, good) = faster();
     for fault in ["nothing", "noise"] {
         let mut scans = good.clone();
         for k in BLIND {
@@ -106,8 +109,8 @@ fn a_blind_radar_is_bridged_by_gyro_and_wheels_whatever_it_shows() {
         let around = BLIND.start - 2..BLIND.end + 2;
         let off_by = off(&drive, &both, around.clone());
         println!("{fault}: {off_by}");
-        // 70 m: half a percent.
-        assert!(off_by.translation.vector.norm() < 0.35, "{fault}: {off_by}");
+        // 80 m: half a percent.
+        assert!(off_by.translation.vector.norm() < 0.4, "{fault}: {off_by}");
         for (k, refined) in (1..).zip(&both) {
             // The scan after the blind ones starts a map, and the next one matches it.
             let expected = match (BLIND.start..=BLIND.end).contains(&k) {
@@ -134,7 +137,7 @@ fn a_blind_radar_is_bridged_by_gyro_and_wheels_whatever_it_shows() {
 
 #[test]
 fn wheels_that_slip_change_no_motion_while_the_radar_sees() {
-    let (drive, scans) = bend();
+    let (drive, scans) = faster();
     let slip = |k: usize| Some(if (40..46).contains(&k) { 1.5 } else { 1.0 });
     let slipping = refine_with(&mut witnessed(), (&drive, &scans), slip, true);
     let slips: Vec<usize> = (1..)
