@@ -13,6 +13,8 @@ use gyre_journal::{
     self as journal, Content, JournalError,
     checkpoint::{self, Checkpoint, CheckpointError},
     keyframes::{KeyframesError, complete_poses},
+    objects::LoggedObjects,
+    scans::{LoggedScan, complete_scans},
 };
 use gyre_messages::StageId;
 use gyre_recorder::Ledger;
@@ -36,7 +38,7 @@ pub enum Earlier {
     Nothing,
     /// The same run, begun and ended without a pose to go on from. Only its recording goes on.
     WithoutPoses(Identity),
-    /// A journal without its end, or of which the followers have not read all keyframes.
+    /// A journal without its end, or of which the followers have not read all keyframes or scans.
     Unfinished(Begun),
     /// A journal with its end, of which results have not been written.
     Ended(Begun),
@@ -99,7 +101,8 @@ impl Earlier {
             lost: content.poses - poses + content.torn,
             identity,
         };
-        let is_followed = !configuration.slam.is_on() || queries(out)?.has_ended();
+        let is_followed = (!configuration.slam.is_on() || queries(out)?.has_ended())
+            && (!configuration.objects.is_on() || has_all_objects(out)?);
         Ok(match (content.ended, poses) {
             (true, _) if is_followed => Self::Ended(begun),
             (true, _) => Self::Unfinished(begun),
@@ -201,6 +204,20 @@ fn queries(out: &Out) -> Result<RecordReader<Query>, Failure> {
     })
 }
 
+/// Returns whether the objects of all scans are known.
+///
+/// # Errors
+/// A file that cannot be read or is damaged.
+fn has_all_objects(out: &Out) -> Result<bool, Failure> {
+    let opened = RecordReader::<LoggedObjects>::open(out.path());
+    opened.map(|objects| objects.has_ended()).map_err(|error| match error {
+        LogError::Damaged { .. } => {
+            format!("{error}: remove it, and the same command tracks the objects anew").into()
+        }
+        _ => error.into(),
+    })
+}
+
 /// Keeps a second name of a damaged journal, which `--fresh` does not remove.
 fn kept(error: JournalError, path: &Path) -> Failure {
     if !matches!(error, JournalError::Damaged { .. }) {
@@ -232,6 +249,10 @@ fn known_poses(
     let complete = match slam.is_on() {
         true => complete_poses(out.path(), &slam.places, content.poses).map_err(damaged)?,
         false => content.poses,
+    };
+    let complete = match configuration.objects.is_on() {
+        true => complete_scans(out.path(), complete).map_err(|error| damaged(error.into()))?,
+        false => complete,
     };
     if !configuration.starts(StageId::Refinement) {
         return Ok(complete);
@@ -283,7 +304,7 @@ fn damaged(error: KeyframesError) -> Failure {
 }
 
 /// The files of a run's state.
-fn state(out: &Path) -> [PathBuf; 9] {
+fn state(out: &Path) -> [PathBuf; 11] {
     let [ledger, generations] = state_of_recording(out);
     [
         journal::path(out),
@@ -291,6 +312,8 @@ fn state(out: &Path) -> [PathBuf; 9] {
         records_path::<Keyframe>(out),
         records_path::<Place>(out),
         records_path::<Query>(out),
+        records_path::<LoggedScan>(out),
+        records_path::<LoggedObjects>(out),
         ledger,
         generations,
         out.join(BEGUN_WITH),

@@ -51,9 +51,11 @@ pub fn stage_plans(configuration: &Configuration, gyre: &Path) -> Vec<StagePlan>
         .into_iter()
         .filter(|stage| configuration.starts(*stage));
     let window = configuration.window(None, 1);
+    // With keyframes for the other side of a link there is no SLAM here.
     let has_slam = configuration.slam.is_on();
+    let is_here = |it: &FollowerId| has_slam || *it == FollowerId::Objects;
     let followers = FollowerId::ALL.into_iter();
-    let followers = followers.filter(|it| has_slam && it.is_in(&window));
+    let followers = followers.filter(|it| is_here(it) && it.is_in(&window));
     let followers = followers.map(FollowerId::name);
     stages
         .map(StageId::name)

@@ -149,9 +149,14 @@ impl Progress {
         let work = match FollowerId::by_name(follower) {
             Some(FollowerId::LoopClosure) => "loop closing",
             Some(FollowerId::Trajectory | FollowerId::Localisation) | None => follower,
+            Some(FollowerId::Objects) => "objects",
+        };
+        let records = match FollowerId::by_name(follower) {
+            Some(FollowerId::Objects) => "scans",
+            _ => "keyframes",
         };
         let Following { done, total } = progress;
-        let message = format!("{work}: {done} of {total} keyframes");
+        let message = format!("{work}: {done} of {total} {records}");
         match &self.bar {
             Some(bar) => bar.set_message(message),
             None if self.last_line.elapsed() >= EVERY => {

@@ -332,7 +332,7 @@ fn finish(
     // With all poses there may be loops to find, and a run that failed may not have kept them.
     let has_followed = match session.ending {
         Some(Ending::Complete) => true,
-        Some(_) => !configuration.slam.is_on(),
+        Some(_) => !configuration.window(None, 1).logs_points(),
         None => false,
     };
     earlier::end(out, written.poses, written.ended && has_followed)?;

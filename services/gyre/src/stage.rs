@@ -78,6 +78,7 @@ fn work_of_follower(follower: FollowerId) -> Work {
         FollowerId::LoopClosure => gyre_loop_closure::run,
         FollowerId::Trajectory => gyre_trajectory::run,
         FollowerId::Localisation => gyre_localisation_follower::run,
+        FollowerId::Objects => gyre_objects_follower::run,
     })
 }
 

@@ -12,6 +12,7 @@ use std::{
 
 use gyre_masking::MaskKind;
 use gyre_messages::{FollowerId, StageId, Window};
+use gyre_objects::ObjectsConfig;
 use gyre_odometry::{OdometryConfig, SearchKind};
 use gyre_radar::DatasetOptions;
 use gyre_run::{
@@ -54,6 +55,8 @@ pub struct Configuration {
     /// The fixes of GNSS that the corrected trajectory is made with. Odometry does not depend on
     /// them.
     pub gnss: GnssConfig,
+    /// The tracking of moving objects.
+    pub objects: ObjectsConfig,
     /// The limits that `gyre stress` checks: limits for all scenarios, and in `[budget.NAME]` for
     /// one of them. A scenario whose purpose is a fault (`slow-stage`, `stopped`, `kills`) is
     /// judged by `recovery_ms` and by its own limits alone, and `bursts` by drops only if it names
@@ -66,7 +69,7 @@ pub struct Configuration {
     pub link: LinkConfig,
     /// The command and the restarts of a stage: `radar-replay`, `masking`, `rotation-search`,
     /// `translation-search`, `joint-search`, `refinement`, `pose-integration`, `loop-closure`,
-    /// `trajectory` or `localisation`.
+    /// `trajectory`, `localisation` or `objects`.
     pub stages: BTreeMap<String, StageConfig>,
 }
 
@@ -147,6 +150,7 @@ impl Configuration {
             odometry: method.odometry,
             slam: method.slam,
             gnss: method.gnss,
+            objects: method.objects,
             budget: budget(&mut table)?,
             record: strict::section(&mut table, "record")?,
             link: strict::section(&mut table, "link")?,
@@ -199,6 +203,7 @@ impl Configuration {
             observers: self.run.observers,
             slam: self.slam.is_on() || self.link.keyframes,
             localises: self.slam.is_localised(),
+            objects: self.objects.is_on(),
         }
     }
 

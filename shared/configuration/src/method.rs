@@ -1,5 +1,6 @@
 //! The settings that decide what is computed.
 
+use gyre_objects::ObjectsConfig;
 use gyre_odometry::OdometryConfig;
 use gyre_radar::DatasetOptions;
 use gyre_samples::GnssConfig;
@@ -25,11 +26,13 @@ pub struct MethodConfig {
     pub slam: SlamConfig,
     /// The fixes that the corrected trajectory is made with.
     pub gnss: GnssConfig,
+    /// The tracking of moving objects.
+    pub objects: ObjectsConfig,
 }
 
 impl MethodConfig {
     /// The names of the sections.
-    pub const SECTIONS: [&str; 13] = [
+    pub const SECTIONS: [&str; 14] = [
         "dataset",
         "raster",
         "points",
@@ -43,6 +46,7 @@ impl MethodConfig {
         "wheels",
         "slam",
         "gnss",
+        "objects",
     ];
 
     /// The names of the other sections of a configuration, which are for a run of processes.
@@ -77,6 +81,7 @@ impl MethodConfig {
             },
             slam: section(table, "slam")?,
             gnss: section(table, "gnss")?,
+            objects: section(table, "objects")?,
         })
     }
 
@@ -96,6 +101,7 @@ impl MethodConfig {
         within("gyro", odometry.gyro.validate())?;
         within("wheels", odometry.wheels.validate())?;
         within("slam.places", self.slam.validate())?;
-        within("gnss", self.gnss.validate())
+        within("gnss", self.gnss.validate())?;
+        within("objects", self.objects.validate())
     }
 }

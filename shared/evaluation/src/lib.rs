@@ -1,5 +1,5 @@
 //! Metrics of planar odometry against ground truth: KITTI drift, ATE, RPE, segment error and NEES,
-//! with plots.
+//! with plots; and of tracked objects.
 //!
 //! The crate computes on slices of poses and stamps; files are read elsewhere. A
 //! [`Pose`](gyre_geometry::Pose) is that of the sensor in a fixed frame (REP-103: x forward, y
@@ -15,6 +15,7 @@
 //! - [`mod@loops`]: places that are seen again, against a trajectory or the ground truth itself;
 //! - [`motions`]: reported motions with covariances, associated with the ground truth;
 //! - [`mod@nees`], [`mod@bands`]: consistency of these covariances, as figures and over time;
+//! - [`objects`]: tracked objects against true ones;
 //! - [`plot`]: trajectory, errors and error bands as SVG.
 //!
 //! ```
@@ -45,6 +46,7 @@ mod matched;
 pub mod motions;
 mod mounting;
 pub mod nees;
+pub mod objects;
 pub mod plot;
 pub mod report;
 pub mod rpe;
@@ -64,6 +66,9 @@ pub use loops::{LoopErrors, loop_errors};
 pub use matched::{MatchedPoses, path_m};
 pub use motions::{MatchedMotions, Part, TimedMotion};
 pub use nees::{Nees, NeesFigure, NeesFigures, NeesLength, NeesOptions, nees};
+pub use objects::{
+    ObjectErrors, ObjectOptions, ObjectScan, TrackedObject, TrueObject, object_errors,
+};
 pub use plot::PlotError;
 pub use report::{Evaluation, Options, evaluate};
 pub use rpe::{PairError, Rpe, rpe};

@@ -1,6 +1,7 @@
 //! `gyre evaluate`: evaluates a trajectory against ground truth.
 
 mod arguments;
+mod objects;
 
 use std::{
     fs,
@@ -26,6 +27,9 @@ pub use arguments::EvaluateArguments;
 /// # Errors
 /// A file that cannot be read, trajectories that do not overlap.
 pub fn evaluate(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> {
+    if arguments.objects {
+        return evaluate_objects(arguments);
+    }
     let files = Files::of(arguments)?;
     let estimate = read_trajectory(&files.estimate)?;
     let truth = read_trajectory(&files.truth)?;
@@ -59,6 +63,19 @@ pub fn evaluate(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> {
         for (name, plot) in judgement.plots()? {
             gyre_storage::write(&directory.join(name), plot)?;
         }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Prints how well the objects of a run agree with the true ones.
+fn evaluate_objects(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> {
+    let (Some(run), Some(truth)) = (&arguments.estimate, &arguments.ground_truth) else {
+        return Err("name a run and the recording with its true objects: gyre evaluate --objects RUN RECORDING".into());
+    };
+    let errors = objects::evaluate(run, truth)?;
+    match arguments.json {
+        true => print::line(serde_json::to_string_pretty(&errors)?)?,
+        false => print::line(errors)?,
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -7,6 +7,7 @@
 mod estimate;
 mod files;
 mod map;
+mod objects;
 mod pass;
 mod sketch;
 mod slam;
@@ -42,9 +43,10 @@ pub const SUMMARY: &str = "summary.json";
 /// The ground truth of a simulation that is played without being stored.
 pub const SIMULATED_TRUTH: &str = "ground_truth.tum";
 /// All results.
-pub const FILES: [&str; 14] = [
+pub const FILES: [&str; 15] = [
     "odometry.csv",
     "poses.csv",
+    "objects.csv",
     "trajectory.tum",
     "trajectory.svg",
     "errors.svg",
@@ -111,6 +113,9 @@ pub fn write(
         let trajectory = read.corrected_sketch.path();
         let png = map::map_png(configuration, out, slam, &trajectory)?;
         png.map_or(Ok(()), |png| files.add("map.png", png))?;
+    }
+    if configuration.objects.is_on() {
+        files.add("objects.csv", objects::csv(out.path())?)?;
     }
     let gnss = slam.as_mut().map(Slam::gnss).transpose()?.flatten();
     if let Some(refusal) = gnss.as_ref().and_then(GnssSummary::refusal) {

@@ -16,7 +16,8 @@
 //! - [`sensor`]: the measurement of one sweep; [`gyro`], [`wheels`]: what a gyro beside the radar
 //!   and the wheels measure,
 //! - [`simulator`]: single scans with their exact poses,
-//! - [`output`], [`simulated_drive`], [`truth`]: the drive in a dataset format,
+//! - [`output`], [`simulated_drive`], [`truth`], `objects`: the drive in a dataset format, with the
+//!   truth about the sensor and about the road users,
 //! - [`writer`]: the same on a disk.
 //!
 //! `gallery/README.md` in the crate's folder shows each effect of the sensor off and on; `cargo run
@@ -43,6 +44,7 @@ mod interpolate;
 pub mod lanes;
 mod layout;
 mod limits;
+mod objects;
 pub mod occlusion;
 pub mod output;
 pub mod path;
@@ -78,6 +80,7 @@ pub use sensor::{Effects, Scene, Sensor, SensorConfig, SweepTime};
 pub use simulated_drive::{Renderer, SimulatedDrive};
 pub use simulator::{SimulatedScan, Simulator};
 pub use streets::{Street, Streets};
+pub use traffic::RoadUser;
 pub use wheels::SimulatedWheelsConfig;
 pub use world::World;
 pub use writer::{Summary, remove_dataset, write_dataset, write_dataset_on};

@@ -11,6 +11,7 @@ use crate::error::SimulatorError;
 use crate::gyro::log;
 use crate::layout::side_file::SideFile;
 use crate::layout::{boreas, oxford, radiate};
+use crate::objects;
 use crate::output::{HostStamps, OutputFormat};
 use crate::profile::Chirp;
 use crate::profile::METADATA_BYTES;
@@ -167,6 +168,8 @@ impl SimulatedDrive {
             "azimuth_poses.npy".into(),
             truth::azimuth_poses_npy(&self.simulator),
         ));
+        let stamps_ns = (0..self.scans()).map(|index| self.stamp_ns(index));
+        files.push((objects::FILE.into(), objects::csv(&self.simulator, stamps_ns)));
         files.extend(
             self.gyro_samples()
                 .map(|samples| (log::FILE.into(), log::csv(&samples))),

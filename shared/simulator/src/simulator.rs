@@ -19,7 +19,7 @@ use crate::sensor::effects::is_on;
 use crate::sensor::{PitchRoll, Scene, Sensor, SweepTime};
 use crate::streets::Streets;
 use crate::town;
-use crate::traffic::Traffic;
+use crate::traffic::{Observer, RoadUser, Traffic};
 use crate::weather::WeatherConfig;
 use crate::wheels;
 use crate::world::World;
@@ -31,6 +31,9 @@ const EPOCH_US: i64 = 1_547_132_400_000_000;
 
 /// Time between the places of a drive that are checked to lie on the town's streets, seconds.
 const CHECK_S: f64 = 0.5;
+/// Distance within which road users are reported, metres: a third more than where radars of this
+/// kind resolve a car.
+const REPORTED_M: f64 = 100.0;
 /// Number of scans of an endless drive, if none is given.
 const ENDLESS_SCANS: usize = 64;
 /// Duration of an endless drive along which streets are laid, seconds; its traffic is made for
@@ -154,6 +157,24 @@ impl Simulator {
     pub fn pose(&self, index: usize) -> Pose {
         let time = self.time(index);
         self.path.pose(time.drive_time_s(time.middle_us()))
+    }
+
+    /// The other road users within 100 m at the middle of scan `index`, with what the
+    /// radar can see of them.
+    pub fn road_users(&self, index: usize) -> Vec<RoadUser> {
+        self.road_users_at(index, self.time(index).middle_us() * 1000)
+    }
+
+    /// As [`Simulator::road_users`], at a time near the scan's.
+    pub(crate) fn road_users_at(&self, index: usize, stamp_ns: i64) -> Vec<RoadUser> {
+        let time_s = (stamp_ns - self.time(index).epoch_us * 1000) as f64 * 1e-9;
+        let place = Point2::from(self.path.pose(time_s).translation.vector);
+        let observer = Observer {
+            world: &self.world,
+            place,
+            receiver: &self.config.sensor.receiver(),
+        };
+        self.traffic.road_users(time_s, REPORTED_M, &observer)
     }
 
     /// The samples of the gyro, by their stamps: rates and accelerations in its own axes. `None`

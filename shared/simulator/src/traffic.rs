@@ -10,6 +10,7 @@ mod config;
 mod crossings;
 mod ego_route;
 mod kind;
+mod road_user;
 mod track;
 
 use std::sync::Arc;
@@ -18,6 +19,7 @@ use nalgebra::Point2;
 
 pub use actors::FIRST_BODY;
 pub use config::TrafficConfig;
+pub use road_user::{Observer, RoadUser};
 
 use crate::body::{Movers, Moving};
 use crate::lanes::DrivingSide;
@@ -75,6 +77,19 @@ impl Movers for Traffic {
         reach_m: f64,
         see: &mut dyn FnMut(Moving<'a>),
     ) {
+        self.visit_actors(time_s, centre, reach_m, &mut |_, moving| see(moving));
+    }
+}
+
+impl Traffic {
+    /// As [`Movers::visit`], with the road user that each body is of.
+    fn visit_actors<'a>(
+        &'a self,
+        time_s: f64,
+        centre: Point2<f64>,
+        reach_m: f64,
+        see: &mut dyn FnMut(&'a Actor, Moving<'a>),
+    ) {
         let ego = self.path.pose(time_s);
         for actor in self.actors.iter().filter(|actor| actor.is_visible(time_s)) {
             let Some(pose) = actor.track.pose(&self.route, time_s) else {
@@ -86,11 +101,15 @@ impl Movers for Traffic {
                 continue;
             }
             let velocity = actor.velocity(&self.route, time_s, &pose);
-            see(Moving {
-                body: &actor.body,
-                pose,
-                velocity,
-            });
+            let body = &actor.body;
+            see(
+                actor,
+                Moving {
+                    body,
+                    pose,
+                    velocity,
+                },
+            );
         }
     }
 }

@@ -113,6 +113,7 @@ mod tests {
             observers: 0,
             slam: false,
             localises: false,
+            objects: false,
         };
         let kept = |look_back, published, has_previous| {
             serves_only_as_previous(&window(look_back), &scan(published), Some(9), has_previous)

@@ -1,7 +1,8 @@
 //! The pose-integration stage: composes motions and their covariances to poses, and journals each
 //! pose before it is published.
 //!
-//! With SLAM it also selects the keyframes, and logs each of them before its pose is journalled.
+//! With SLAM it also selects the keyframes, and logs each of them before its pose is journalled; with
+//! objects it logs each scan.
 
 use std::path::PathBuf;
 
@@ -9,10 +10,12 @@ use gyre_geometry::SparsePoint;
 use gyre_journal::{
     self as journal, Journal, JournalError,
     keyframes::{Keyframes, KeyframesError},
+    scans::{Scans, ScansError},
 };
 use gyre_messages::{
     Item, Masked, Motion, MotionHeader, PoseHeader, Refined, StageId, compose, flag,
 };
+use gyre_objects::ObjectsConfig;
 use gyre_slam::SlamConfig;
 use gyre_stage::{
     Launch, Sink, StageCounters, StageError, clock,
@@ -36,12 +39,19 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
         last: None,
         out: out.clone(),
         slam: launch.section("slam")?,
+        objects: launch.section("objects")?,
         points: launch.manifest.limits.points,
         keyframes: None,
-        growth: None,
+        scans: None,
+        growth: Vec::new(),
     };
     if integration.slam.is_on() {
-        integration.growth = Some(Growth::of(launch, LogId::Keyframes)?);
+        let grown = Growth::of(launch, LogId::Keyframes)?;
+        integration.growth.push((LogId::Keyframes, grown));
+    }
+    if integration.objects.is_on() {
+        let grown = Growth::of(launch, LogId::Scans)?;
+        integration.growth.push((LogId::Scans, grown));
     }
     let counters = match launch.manifest.refines {
         true => sink::run::<Refined, _>(launch, &mut integration),
@@ -56,19 +66,22 @@ struct Integration {
     last: Option<PoseHeader>,
     out: PathBuf,
     slam: SlamConfig,
+    objects: ObjectsConfig,
     /// The most points of a scan.
     points: usize,
     /// Of a run with SLAM, from [`Sink::restore`] on.
     keyframes: Option<Keyframes>,
-    /// Wakes the followers of the keyframes.
-    growth: Option<Growth>,
+    /// Of a run with objects, likewise.
+    scans: Option<Scans>,
+    /// Wakes the followers of the logs that the run has.
+    growth: Vec<(LogId, Growth)>,
 }
 
 impl Sink for Integration {
     const HOP: StageId = StageId::PoseIntegration;
 
     fn takes_scans(&self) -> bool {
-        self.slam.is_on()
+        self.slam.is_on() || self.objects.is_on()
     }
 
     fn restore(&mut self, count: usize) -> Result<(Vec<PoseHeader>, bool), StageError> {
@@ -76,13 +89,17 @@ impl Sink for Integration {
         let (mut poses, ended) = self.journal.last(count.max(1)).map_err(unusable)?;
         self.last = poses.last().copied();
         poses.drain(..poses.len().saturating_sub(count));
+        let known = self.last.map_or(0, |last| last.item.seq.saturating_add(1));
         if self.slam.is_on() {
-            let known = self.last.map_or(0, |last| last.item.seq.saturating_add(1));
             let keyframes = Keyframes::open(&self.out, &self.slam.places, known, ended);
             let keyframes = self
                 .keyframes
                 .insert(keyframes.map_err(unusable_keyframes)?);
             keyframes.reserve(self.points);
+        }
+        if self.objects.is_on() {
+            let scans = Scans::open(&self.out, known, ended).map_err(unusable_scans)?;
+            self.scans.insert(scans).reserve(self.points);
         }
         Ok((poses, ended))
     }
@@ -97,8 +114,12 @@ impl Sink for Integration {
         if let (Some(keyframes), Some(scan)) = (&mut self.keyframes, scan) {
             let added = keyframes.add(&pose, points(scan)?);
             if added.map_err(unusable_keyframes)? {
-                self.wake_followers()?;
+                self.wake_followers(LogId::Keyframes)?;
             }
+        }
+        if let (Some(scans), Some(scan)) = (&mut self.scans, scan) {
+            scans.add(&pose, points(scan)?).map_err(unusable_scans)?;
+            self.wake_followers(LogId::Scans)?;
         }
         self.write(&pose)?;
         self.last = Some(pose);
@@ -108,7 +129,11 @@ impl Sink for Integration {
     fn end(&mut self, item: &Item) -> Result<(), StageError> {
         if let Some(keyframes) = &mut self.keyframes {
             keyframes.end().map_err(unusable_keyframes)?;
-            self.wake_followers()?;
+            self.wake_followers(LogId::Keyframes)?;
+        }
+        if let Some(scans) = &mut self.scans {
+            scans.end().map_err(unusable_scans)?;
+            self.wake_followers(LogId::Scans)?;
         }
         self.write(&PoseHeader {
             item: Item {
@@ -130,11 +155,14 @@ impl Integration {
         keyframes
             .map_or(Ok(()), Keyframes::sync)
             .map_err(unusable_keyframes)?;
+        let scans = self.scans.as_ref();
+        scans.map_or(Ok(()), Scans::sync).map_err(unusable_scans)?;
         self.journal.sync().map_err(unusable)
     }
 
-    fn wake_followers(&self) -> Result<(), StageError> {
-        self.growth.as_ref().map_or(Ok(()), Growth::notify)
+    fn wake_followers(&self, log: LogId) -> Result<(), StageError> {
+        let mut grown = self.growth.iter().filter(|(of, _)| *of == log);
+        grown.try_for_each(|(_, growth)| growth.notify())
     }
 
     fn write(&mut self, pose: &PoseHeader) -> Result<(), StageError> {
@@ -158,6 +186,13 @@ fn unusable(error: JournalError) -> StageError {
 fn unusable_keyframes(error: KeyframesError) -> StageError {
     match error {
         KeyframesError::Log(LogError::Busy(_)) => busy("open the keyframes", &error),
+        _ => StageError::Input(error.to_string()),
+    }
+}
+
+fn unusable_scans(error: ScansError) -> StageError {
+    match error {
+        ScansError::Log(LogError::Busy(_)) => busy("open the scans", &error),
         _ => StageError::Input(error.to_string()),
     }
 }

@@ -11,7 +11,8 @@ use clap::{Args, ValueEnum};
 use gyre_geometry::xy_yaw;
 use gyre_messages::{
     Correction, CorrectionHeader, Fix, FixHeader, Loop, LoopHeader, Masked, Message, Motion,
-    MotionEstimate, MotionHeader, Pose, PoseHeader, Refined, Rotation, Scan, fix_status,
+    MotionEstimate, MotionHeader, Objects, ObjectsHeader, Pose, PoseHeader, Refined, Rotation, Scan,
+    fix_status,
 };
 use gyre_stage::{
     StageError,
@@ -52,6 +53,8 @@ pub enum Topic {
     Correction,
     /// Places of keyframes in a map, in a run with SLAM that names one.
     Fix,
+    /// Numbers of moving objects, in a run that tracks them.
+    Objects,
 }
 
 /// Prints a line for each message of a topic, and how many were missed, until the run ends.
@@ -71,6 +74,7 @@ pub fn echo(arguments: &EchoArguments) -> Result<ExitCode, Failure> {
         Topic::Loop => observe::<Loop>(out, |message| closed(message.header())),
         Topic::Correction => observe::<Correction>(out, |message| correction(message.header())),
         Topic::Fix => observe::<Fix>(out, |message| fix(message.header())),
+        Topic::Objects => observe::<Objects>(out, |message| objects(message.header())),
     }
 }
 
@@ -234,6 +238,10 @@ fn fix(header: &FixHeader) -> String {
         fix_status::PREDICTED => format!("{place}, predicted"),
         _ => format!("{place}, correlation {:.3}", header.correlation),
     }
+}
+
+fn objects(header: &ObjectsHeader) -> String {
+    format!("{} objects, {} move", header.objects, header.moving)
 }
 
 fn place(x_m: f64, y_m: f64, yaw_rad: f64) -> String {

@@ -23,6 +23,7 @@ impl Configuration {
             odometry: self.odometry.clone(),
             slam: self.slam.clone(),
             gnss: self.gnss.clone(),
+            objects: self.objects.clone(),
         };
         method.validate()?;
         within("run", self.window(None, 1).validate())?;
@@ -53,6 +54,10 @@ impl Configuration {
             return Err(value("slam", reason));
         }
         self.validate_gnss()?;
+        if self.objects.is_on() && self.link.side.is_some() {
+            let reason = "kind is `tracks`, but a run that is split between two machines (link.side) logs no points: set kind to `none`";
+            return Err(value("objects", reason));
+        }
         self.validate_radar()?;
         self.validate_budget()?;
         self.validate_record()?;
@@ -230,6 +235,10 @@ impl Configuration {
         }
         if self.slam.is_on() {
             let reason = "points.capacity is 0, but keyframes of slam are made of points: it must be 1 or more";
+            return Err(value("points", reason));
+        }
+        if self.objects.is_on() {
+            let reason = "points.capacity is 0, but objects are made of points: it must be 1 or more";
             return Err(value("points", reason));
         }
         Ok(())

@@ -2,7 +2,7 @@
 
 use crate::limits::Window;
 
-/// The followers of a run with SLAM. They read durable logs at their own pace and are not in the
+/// The followers of a run. They read durable logs at their own pace and are not in the
 /// stream of scans, so they have no [`Hop`](crate::Hop) and give no credit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum FollowerId {
@@ -12,11 +12,18 @@ pub enum FollowerId {
     Trajectory,
     /// Finds the keyframes in the map of an earlier drive, in a run that names one.
     Localisation,
+    /// Tracks moving objects.
+    Objects,
 }
 
 impl FollowerId {
     /// All followers, in the order in which they read each other's logs.
-    pub const ALL: [Self; 3] = [Self::LoopClosure, Self::Trajectory, Self::Localisation];
+    pub const ALL: [Self; 4] = [
+        Self::LoopClosure,
+        Self::Trajectory,
+        Self::Localisation,
+        Self::Objects,
+    ];
 
     /// The name used in configurations, on the command line and in results.
     pub const fn name(self) -> &'static str {
@@ -24,6 +31,7 @@ impl FollowerId {
             Self::LoopClosure => "loop-closure",
             Self::Trajectory => "trajectory",
             Self::Localisation => "localisation",
+            Self::Objects => "objects",
         }
     }
 
@@ -32,6 +40,7 @@ impl FollowerId {
         match self {
             Self::LoopClosure | Self::Trajectory => window.slam,
             Self::Localisation => window.localises,
+            Self::Objects => window.objects,
         }
     }
 
@@ -40,6 +49,7 @@ impl FollowerId {
         match self {
             Self::LoopClosure | Self::Trajectory => "SLAM (slam.kind = \"graph\" or \"filter\")",
             Self::Localisation => "a map (slam.map, with slam.kind)",
+            Self::Objects => "objects (objects.kind = \"tracks\")",
         }
     }
 

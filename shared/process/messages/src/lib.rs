@@ -13,6 +13,7 @@
 //! | `loop` | [`LoopHeader`] | empty |
 //! | `correction` | [`CorrectionHeader`] | empty |
 //! | `fix` | [`FixHeader`] | empty |
+//! | `objects` | [`ObjectsHeader`] | empty |
 //!
 //! The last three exist only in runs with SLAM: [`FollowerId`]. All headers start with an [`Item`],
 //! which identifies the scan and carries the time stamps of each stage. Type names carry a version,
@@ -35,6 +36,7 @@ mod masked;
 mod message;
 mod motion;
 mod numbering;
+mod objects;
 mod pose;
 mod refined;
 mod refinement;
@@ -55,6 +57,7 @@ pub use masked::{Masked, MaskedHeader, MaskedParts, Pair, mask_kind};
 pub use message::{Element, Header, Message, Sender};
 pub use motion::{Motion, MotionEstimate, MotionHeader, SearchedMotion};
 pub use numbering::{GivenAnew, NumberedBy};
+pub use objects::{Objects, ObjectsHeader};
 pub use pose::{Pose, PoseHeader};
 pub use refined::Refined;
 pub use refinement::{RefinementRecord, initial_guess, outcome, wheels};

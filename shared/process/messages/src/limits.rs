@@ -36,6 +36,9 @@ pub struct Window {
     pub slam: bool,
     /// True in a run with SLAM that names the map of an earlier drive: the topic of fixes exists.
     pub localises: bool,
+    /// True in a run that tracks objects: pose-integration logs each scan with its points, and the
+    /// topic of objects exists.
+    pub objects: bool,
 }
 
 /// A window out of its bounds.
@@ -129,6 +132,11 @@ impl Window {
         self.look_back > 1
     }
 
+    /// Returns whether the last stage reads masked scans too, and logs their points.
+    pub fn logs_points(&self) -> bool {
+        self.slam || self.objects
+    }
+
     /// Returns the sizes of a topic's queues. A restarted reader first receives the history. Items
     /// that are already further down the stream can finish meanwhile and admit `scans` new ones, so
     /// a queue is longer than the history by the window.
@@ -192,6 +200,7 @@ mod tests {
         observers: 0,
         slam: false,
         localises: false,
+        objects: false,
     };
 
     #[test]

@@ -12,6 +12,7 @@ use crate::{
     masked::Masked,
     message::{Element, Header, Message, Sender},
     motion::Motion,
+    objects::Objects,
     pose::Pose,
     refined::Refined,
     rotation::Rotation,
@@ -86,7 +87,7 @@ const PAGES_PER_TOPIC: usize = 8;
 const PAGES_PER_SUBSCRIBER: usize = 4;
 
 /// All topics, in the order of the stream.
-const TOPICS: [Topic; 9] = [
+const TOPICS: [Topic; 10] = [
     Topic::of::<Scan>(),
     Topic::of::<Masked>(),
     Topic::of::<Rotation>(),
@@ -96,6 +97,7 @@ const TOPICS: [Topic; 9] = [
     Topic::of::<Loop>(),
     Topic::of::<Correction>(),
     Topic::of::<Fix>(),
+    Topic::of::<Objects>(),
 ];
 
 /// Returns the topics of a run, in the order of the stream.
@@ -173,6 +175,7 @@ mod tests {
         observers: 8,
         slam: false,
         localises: false,
+        objects: false,
     };
 
     #[test]
@@ -198,6 +201,12 @@ mod tests {
             ..slam
         };
         assert_eq!(names(&with_map)[6..], ["loop", "correction", "fix"]);
+        let with_objects = Window {
+            objects: true,
+            ..WINDOW
+        };
+        assert_eq!(names(&with_objects)[6..], ["objects"]);
+        assert_eq!(Masked::sizes(&with_objects), Masked::sizes(&slam));
         let added = Masked::sizes(&slam).samples() - Masked::sizes(&WINDOW).samples();
         assert_eq!(added, 3);
     }

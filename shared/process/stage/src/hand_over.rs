@@ -131,6 +131,7 @@ fn manifest(root: &RunRoot, out: &Path, bytes: usize, readers: usize) -> Manifes
             observers: readers,
             slam: false,
             localises: false,
+            objects: false,
         },
         limits: Limits {
             scan_bytes: bytes,

@@ -7,10 +7,12 @@ pub enum LogId {
     Keyframes,
     /// The loops, by loop-closure.
     Loops,
+    /// All scans with their points, by pose-integration.
+    Scans,
 }
 
 /// All of them.
-pub(crate) const LOGS: [LogId; 2] = [LogId::Keyframes, LogId::Loops];
+pub(crate) const LOGS: [LogId; 3] = [LogId::Keyframes, LogId::Loops, LogId::Scans];
 
 impl LogId {
     /// Returns the name of the event of its growth.
@@ -18,6 +20,7 @@ impl LogId {
         match self {
             Self::Keyframes => "keyframes_grown",
             Self::Loops => "loops_grown",
+            Self::Scans => "scans_grown",
         }
     }
 }

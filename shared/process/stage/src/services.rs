@@ -26,7 +26,7 @@ impl Services {
             events.extend(create_events(node, topic.name, &(topic.sizes)(window))?);
             topics.push((topic, Service::create(node, topic, window)?));
         }
-        if window.slam {
+        if window.logs_points() {
             let sizes = EventSizes {
                 listeners: FollowerId::ALL.len(),
                 notifiers: 1,

@@ -28,6 +28,7 @@ const WINDOW: Window = Window {
     observers: 2,
     slam: true,
     localises: true,
+    objects: true,
 };
 
 /// A run without processes: its services, and nodes for tests. Runs are isolated from each other.

@@ -10,7 +10,7 @@ mod recorded;
 use std::{collections::BTreeSet, fs, os::fd::BorrowedFd, path::PathBuf, time::Duration};
 
 use gyre_messages::{
-    Correction, Fix, Loop, Masked, Message, Motion, Pose, Refined, Rotation, Scan, StageId, Topic,
+    Correction, Fix, Loop, Masked, Message, Motion, Objects, Pose, Refined, Rotation, Scan, StageId, Topic,
 };
 use gyre_run::RestartPolicy;
 use gyre_stage::{
@@ -278,6 +278,7 @@ macro_rules! of_topic {
             Loop::TOPIC => $self.$method::<Loop>($($argument),*),
             Correction::TOPIC => $self.$method::<Correction>($($argument),*),
             Fix::TOPIC => $self.$method::<Fix>($($argument),*),
+            Objects::TOPIC => $self.$method::<Objects>($($argument),*),
             topic => Err(no_such(topic)),
         }
     };

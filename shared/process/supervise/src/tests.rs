@@ -35,6 +35,7 @@ pub(crate) fn manifest(out: &Path) -> Manifest {
             observers: 2,
             slam: false,
             localises: false,
+            objects: false,
         },
         limits: Limits {
             scan_bytes: 1000,

@@ -31,6 +31,10 @@ pub struct EvaluateArguments {
         conflicts_with = "ground_truth"
     )]
     pub named_ground_truth: Option<PathBuf>,
+    /// Evaluate the objects of a run against those of the recording that is named in the place of
+    /// the ground truth, a simulated one: its objects.csv and its ground_truth.tum.
+    #[arg(long, conflicts_with_all = ["find_time_offset", "plots", "odometry"])]
+    pub objects: bool,
     /// Find the time by which the clock of the ground truth differs, from the speeds and yaw rates
     /// of both, and take it out (UTC and GPS time: 18 s, UTC and TAI: 37 s).
     #[arg(long)]

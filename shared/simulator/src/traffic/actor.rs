@@ -4,6 +4,7 @@ use gyre_geometry::Pose;
 use nalgebra::Vector2;
 
 use super::ego_route::EgoRoute;
+use super::kind::Kind;
 use super::track::Track;
 use crate::body::Body;
 
@@ -13,6 +14,7 @@ pub const EGO_HALF_M: (f64, f64) = (2.2, 0.9);
 /// A road user.
 #[derive(Debug)]
 pub struct Actor {
+    pub kind: Kind,
     pub body: Body,
     pub half_m: (f64, f64),
     /// First and last time at which it can be visible, seconds.

@@ -36,6 +36,7 @@ impl Actors {
     pub fn add(&mut self, kind: Kind, visible_s: [f64; 2], track: Track, rng: &mut ChaCha8Rng) {
         let body = kind.body(FIRST_BODY + self.actors.len() as u32, rng);
         self.actors.push(Actor {
+            kind,
             body,
             half_m: kind.half_m(),
             visible_s,

@@ -2,7 +2,7 @@
 
 use crate::{Launch, StageError, log_id::LogId, transport::Notifier};
 
-/// Notifies the followers of a log. A run without SLAM has no such events.
+/// Notifies the followers of a log. A run without SLAM and objects has no such events.
 pub struct Growth {
     log: LogId,
     notifier: Notifier,

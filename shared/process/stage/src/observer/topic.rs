@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use gyre_messages::{
-    Correction, Fix, GivenAnew, Item, Loop, Masked, Message, Motion, Pose, Refined, Rotation, Scan,
+    Correction, Fix, GivenAnew, Item, Loop, Masked, Message, Motion, Objects, Pose, Refined, Rotation, Scan,
 };
 
 use super::{Next, ObservedRun, Observer};
@@ -63,6 +63,7 @@ impl ObservedRun {
             Loop::TOPIC => self.typed::<Loop>()?,
             Correction::TOPIC => self.typed::<Correction>()?,
             Fix::TOPIC => self.typed::<Fix>()?,
+            Objects::TOPIC => self.typed::<Objects>()?,
             _ => return Ok(None),
         }))
     }

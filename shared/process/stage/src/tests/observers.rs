@@ -3,7 +3,7 @@
 use std::{fs, rc::Rc, time::Duration};
 
 use gyre_messages::{
-    Correction, Fix, Footprint, Loop, Masked, Message, Motion, Pose, Refined, Rotation, Scan,
+    Correction, Fix, Footprint, Loop, Masked, Message, Motion, Objects, Pose, Refined, Rotation, Scan,
     Topic, flag, topics,
 };
 
@@ -92,6 +92,7 @@ fn the_footprint_is_what_the_segments_take() {
     let _poses = writer::<Pose>(manifest);
     let _of_slam = (writer::<Loop>(manifest), writer::<Correction>(manifest));
     let _of_localisation = writer::<Fix>(manifest);
+    let _of_objects = writer::<Objects>(manifest);
     let segments = fs::read_dir("/dev/shm").unwrap().flatten().filter(|file| {
         let name = file.file_name().to_string_lossy().into_owned();
         name.starts_with(&manifest.prefix) && name.ends_with(".data")

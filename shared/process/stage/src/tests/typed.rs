@@ -4,7 +4,7 @@
 use std::fmt;
 
 use gyre_messages::{
-    Correction, Element, Fix, Header, Item, Loop, Masked, Message, Motion, Pose, PoseHeader,
+    Correction, Element, Fix, Header, Item, Loop, Masked, Message, Motion, Objects, Pose, PoseHeader,
     Refined, Rotation, Scan,
 };
 use iceoryx2::{
@@ -77,6 +77,7 @@ fn a_typed_port_opens_every_topic() {
     open::<Loop>(&run);
     open::<Correction>(&run);
     open::<Fix>(&run);
+    open::<Objects>(&run);
 }
 
 #[test]

@@ -1,0 +1,135 @@
+//! Moving objects: tracks what moves around the vehicle, scan after scan.
+//!
+//! It follows `journal/scans.log`, which has each scan's points and pose, and keeps the objects of
+//! each scan in `journal/objects.log`, from which `objects.csv` is made. A restarted process works
+//! through the scans again from the first one, since an identity can be as old as the run, and
+//! appends what the log lacks. What it writes follows from the scans, whenever they come.
+
+use std::path::PathBuf;
+
+use gyre_journal::objects::LoggedObjects;
+use gyre_journal::scans::LoggedScan;
+use gyre_messages::{Item, Objects, ObjectsHeader};
+use gyre_objects::{ObjectTracker, ObjectsConfig, PlacedScan};
+use gyre_slam::{RecordLog, RecordReader};
+use gyre_stage::{
+    Follower, Launch, StageCounters, StageError,
+    follower::{self, LogId, Progress, Step},
+};
+
+/// Runs the follower to the end of the scans, or until SIGTERM.
+///
+/// # Errors
+/// Logs that cannot be used, an invalid configuration, or an error of [`follower::run`].
+pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
+    if !launch.take_place()? {
+        return Ok(StageCounters::default());
+    }
+    let config: ObjectsConfig = launch.section("objects")?;
+    let out = launch.manifest.out.clone();
+    let mut tracking = Tracking {
+        scans: RecordReader::open(&out)?,
+        tracked: RecordLog::open(&out)?,
+        tracker: tracker(&config)?,
+        config,
+        out,
+        read: 0,
+    };
+    tracking.leave_out_what_was_cut()?;
+    follower::run(launch, &mut tracking)
+}
+
+fn tracker(config: &ObjectsConfig) -> Result<ObjectTracker, StageError> {
+    ObjectTracker::new(config).map_err(|error| StageError::Configuration(error.to_string()))
+}
+
+struct Tracking {
+    /// The folder of the results.
+    out: PathBuf,
+    config: ObjectsConfig,
+    scans: RecordReader<LoggedScan>,
+    tracked: RecordLog<LoggedObjects>,
+    tracker: ObjectTracker,
+    /// Scans that were read.
+    read: usize,
+}
+
+impl Tracking {
+    /// Looks for new scans. If some of those that were read have been cut off, it begins anew.
+    fn look(&mut self) -> Result<(), StageError> {
+        self.scans.refresh()?;
+        if self.scans.unchanged() < self.read {
+            self.tracked.cut(self.scans.unchanged())?;
+            self.scans = RecordReader::open(&self.out)?;
+            self.tracker = tracker(&self.config)?;
+            self.read = 0;
+        }
+        Ok(())
+    }
+
+    /// Cuts off the objects of scans that are not there any more, and the end, if scans may follow.
+    fn leave_out_what_was_cut(&mut self) -> Result<(), StageError> {
+        if !self.scans.has_ended() || self.tracked.len() > self.scans.len() {
+            self.tracked.cut(self.scans.len())?;
+        }
+        Ok(())
+    }
+
+    /// Tracks the objects of the next scan. Returns the message about it, unless the log has them.
+    fn track_next(&mut self) -> Result<Option<ObjectsHeader>, StageError> {
+        let scan = self.scans.read(self.read)?;
+        let placed = PlacedScan {
+            stamp_ns: scan.stamp_ns,
+            pose: scan.pose,
+            twist: scan.twist,
+        };
+        let objects = self.tracker.update(&placed, &scan.points);
+        let known = self.read < self.tracked.len();
+        self.read += 1;
+        if known {
+            return Ok(None);
+        }
+        let header = ObjectsHeader {
+            item: Item {
+                seq: scan.seq,
+                scan: scan.scan,
+                previous_scan: scan.scan,
+                stamp_ns: scan.stamp_ns,
+                ..Item::default()
+            },
+            objects: objects.len() as u64,
+            moving: objects.iter().filter(|object| object.moving).count() as u64,
+        };
+        self.tracked.append(&LoggedObjects {
+            seq: scan.seq,
+            scan: scan.scan,
+            stamp_ns: scan.stamp_ns,
+            objects: objects.to_vec(),
+        })?;
+        Ok(Some(header))
+    }
+}
+
+impl Follower for Tracking {
+    type Output = Objects;
+    const LOGS: &'static [LogId] = &[LogId::Scans];
+
+    fn step(&mut self) -> Result<Step<ObjectsHeader>, StageError> {
+        self.look()?;
+        if self.read < self.scans.len() {
+            return Ok(Step::Worked(self.track_next()?));
+        }
+        if !self.scans.has_ended() {
+            return Ok(Step::Idle);
+        }
+        self.tracked.end()?;
+        Ok(Step::Ended)
+    }
+
+    fn progress(&self) -> Progress {
+        Progress {
+            done: self.read as u64,
+            total: self.scans.len() as u64,
+        }
+    }
+}

@@ -1,0 +1,359 @@
+//! Tracked objects against true ones: CLEAR MOT (Bernardin and Stiefelhagen, "Evaluating multiple
+//! object tracking performance", 2008) and the errors of position, velocity and heading.
+//!
+//! A scan's objects are compared in the frame of its sensor. Those that a tracker must have are
+//! *required*: vehicles that move, are near and have been seen in some scans. An object that
+//! matches one that is there but not required, as a pedestrian, counts neither for nor against.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use gyre_geometry::wrap_angle;
+use gyre_objects::assign;
+use nalgebra::{Matrix2, Point2, Vector2};
+use serde::Serialize;
+
+/// A true object at the time of a scan, in the frame of the sensor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrueObject {
+    /// Its identity.
+    pub id: u64,
+    /// Centre, m.
+    pub position: Point2<f64>,
+    /// Velocity over ground, m/s; `None` if it is not known.
+    pub velocity: Option<Vector2<f64>>,
+    /// Heading, rad.
+    pub yaw_rad: f64,
+    /// True for what a tracker must find: motor vehicles.
+    pub is_vehicle: bool,
+    /// True if the sensor can see it in this scan.
+    pub is_seen: bool,
+}
+
+/// A tracked object at the time of a scan, in the frame of the sensor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrackedObject {
+    /// Its identity.
+    pub id: u64,
+    /// Centre, m.
+    pub position: Point2<f64>,
+    /// Velocity over ground, m/s.
+    pub velocity: Vector2<f64>,
+    /// Covariance of the velocity, (m/s)².
+    pub velocity_covariance: Matrix2<f64>,
+    /// Heading, rad.
+    pub yaw_rad: f64,
+    /// True if it is said to move. The others are not judged.
+    pub moving: bool,
+}
+
+/// The objects of a scan.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ObjectScan {
+    /// The true ones.
+    pub truth: Vec<TrueObject>,
+    /// The tracked ones.
+    pub tracked: Vec<TrackedObject>,
+}
+
+/// Which objects are required and what matches.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ObjectOptions {
+    /// Largest range of a required object, m.
+    pub max_range_m: f64,
+    /// Lowest speed of a required object, m/s.
+    pub min_speed_mps: f64,
+    /// Scans within that range in which it has been seen, the present one included.
+    pub min_scans: usize,
+    /// Largest distance between the centres of a pair, m: the length of a car.
+    pub gate_m: f64,
+}
+
+impl Default for ObjectOptions {
+    fn default() -> Self {
+        Self {
+            max_range_m: 60.0,
+            min_speed_mps: 2.0,
+            min_scans: 3,
+            gate_m: 4.0,
+        }
+    }
+}
+
+/// The figures of a drive.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct ObjectErrors {
+    /// Scans.
+    pub scans: usize,
+    /// Required objects, each once.
+    pub objects: usize,
+    /// Required objects, once for each scan.
+    pub required: usize,
+    /// Those that were matched.
+    pub matched: usize,
+    /// Tracked objects that move, once for each scan, where nothing is.
+    pub false_positives: usize,
+    /// Times that a required object is matched by another identity than before.
+    pub switches: usize,
+    /// Share of the required ones that were matched.
+    pub recall: f64,
+    /// Share of the tracked ones that were matched.
+    pub precision: f64,
+    /// 1 less misses, false positives and switches over the required ones.
+    pub mota: f64,
+    /// Switches for each required object.
+    pub switches_per_object: f64,
+    /// Root mean square of the distance of the centres, m.
+    pub position_rmse_m: f64,
+    /// Root mean square of the difference of the velocities, m/s; over pairs whose true velocity is
+    /// known, as the next two.
+    pub velocity_rmse_mps: f64,
+    /// Root mean square of the difference of the headings, degrees.
+    pub heading_rmse_deg: f64,
+    /// Mean of the squared error of the velocity by its covariance, over its two dimensions: 1 if
+    /// the covariance is right.
+    pub velocity_nees: f64,
+}
+
+impl fmt::Display for ObjectErrors {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            scans,
+            objects,
+            required,
+            matched,
+            ..
+        } = self;
+        writeln!(f, "objects       {objects} in {scans} scans, {matched} of {required} matched")?;
+        writeln!(f, "recall        {:.1} %", 100.0 * self.recall)?;
+        let wrong = self.false_positives;
+        writeln!(f, "precision     {:.1} %, {wrong} false", 100.0 * self.precision)?;
+        writeln!(f, "MOTA          {:.3}", self.mota)?;
+        let (switches, each) = (self.switches, self.switches_per_object);
+        writeln!(f, "ID switches   {switches}, {each:.3} an object")?;
+        writeln!(f, "position      {:.2} m RMSE", self.position_rmse_m)?;
+        writeln!(f, "velocity      {:.2} m/s RMSE", self.velocity_rmse_mps)?;
+        writeln!(f, "heading       {:.1} deg RMSE", self.heading_rmse_deg)?;
+        write!(f, "velocity NEES {:.2}", self.velocity_nees)
+    }
+}
+
+/// Compares the tracked objects of a drive, scan by scan, with the true ones.
+pub fn object_errors(scans: &[ObjectScan], options: &ObjectOptions) -> ObjectErrors {
+    let mut count = Count::default();
+    for scan in scans {
+        count.add(scan, options);
+    }
+    count.errors(scans.len())
+}
+
+/// The sums over the scans so far.
+#[derive(Default)]
+struct Count {
+    /// Scans in which each true object was seen within the range.
+    seen: BTreeMap<u64, usize>,
+    /// The identity that each true object was last matched by.
+    matches: BTreeMap<u64, u64>,
+    objects: BTreeMap<u64, ()>,
+    required: usize,
+    matched: usize,
+    false_positives: usize,
+    switches: usize,
+    position_m2: f64,
+    moving_pairs: usize,
+    velocity_m2_s2: f64,
+    heading_rad2: f64,
+    nees: f64,
+}
+
+impl Count {
+    fn add(&mut self, scan: &ObjectScan, options: &ObjectOptions) {
+        let (required, others) = self.split(scan, options);
+        let tracked: Vec<TrackedObject> =
+            scan.tracked.iter().filter(|tracked| tracked.moving).copied().collect();
+        let pairs = self.pairs(&required, &tracked, options.gate_m);
+        for (truth, found) in &pairs {
+            self.add_pair(&required[*truth], &tracked[*found]);
+        }
+        self.required += required.len();
+        self.matched += pairs.len();
+        self.objects.extend(required.iter().map(|truth| (truth.id, ())));
+        let is_excused = |tracked: &TrackedObject| {
+            let range_m = tracked.position.coords.norm();
+            let near = |other: &TrueObject| distance_m(other, tracked) <= options.gate_m;
+            range_m > options.max_range_m || others.iter().any(near)
+        };
+        let unmatched = (0..tracked.len()).filter(|found| pairs.iter().all(|pair| pair.1 != *found));
+        self.false_positives += unmatched.filter(|found| !is_excused(&tracked[*found])).count();
+    }
+
+    /// Splits the true objects into those that are required and the others.
+    fn split(
+        &mut self,
+        scan: &ObjectScan,
+        options: &ObjectOptions,
+    ) -> (Vec<TrueObject>, Vec<TrueObject>) {
+        let is_required = |truth: &TrueObject| {
+            let is_near = truth.position.coords.norm() <= options.max_range_m;
+            let seen = self.seen.entry(truth.id).or_default();
+            *seen += usize::from(is_near && truth.is_seen);
+            let speed_mps = truth.velocity.map_or(f64::INFINITY, |velocity| velocity.norm());
+            is_near
+                && truth.is_seen
+                && truth.is_vehicle
+                && speed_mps > options.min_speed_mps
+                && *seen >= options.min_scans
+        };
+        scan.truth.iter().copied().partition(is_required)
+    }
+
+    /// Pairs true and tracked objects, by their places in the lists: those that were a pair before
+    /// and still fit, then the rest, so that as many as possible fit and the distances are least.
+    fn pairs(
+        &self,
+        truth: &[TrueObject],
+        tracked: &[TrackedObject],
+        gate_m: f64,
+    ) -> Vec<(usize, usize)> {
+        let within = |t: usize, f: usize| {
+            let distance_m = distance_m(&truth[t], &tracked[f]);
+            (distance_m <= gate_m).then_some(distance_m)
+        };
+        let kept = |t: usize| {
+            let id = self.matches.get(&truth[t].id)?;
+            let found = tracked.iter().position(|tracked| tracked.id == *id)?;
+            within(t, found).map(|_| (t, found))
+        };
+        let mut pairs: Vec<(usize, usize)> = Vec::new();
+        for pair in (0..truth.len()).filter_map(kept) {
+            if pairs.iter().all(|other| other.1 != pair.1) {
+                pairs.push(pair);
+            }
+        }
+        let free = |count: usize, of: &dyn Fn(&(usize, usize)) -> usize| -> Vec<usize> {
+            (0..count).filter(|index| pairs.iter().all(|pair| of(pair) != *index)).collect()
+        };
+        let (rows, columns) = (free(truth.len(), &|p| p.0), free(tracked.len(), &|p| p.1));
+        let costs = |t: &usize| columns.iter().map(|f| within(*t, *f)).collect();
+        let costs: Vec<Vec<Option<f64>>> = rows.iter().map(costs).collect();
+        for (row, column) in assign(&costs).into_iter().enumerate() {
+            pairs.extend(column.map(|column| (rows[row], columns[column])));
+        }
+        pairs
+    }
+
+    fn add_pair(&mut self, truth: &TrueObject, tracked: &TrackedObject) {
+        let before = self.matches.insert(truth.id, tracked.id);
+        self.switches += usize::from(before.is_some_and(|id| id != tracked.id));
+        self.position_m2 += distance_m(truth, tracked).powi(2);
+        let Some(velocity) = truth.velocity else {
+            return;
+        };
+        let error = tracked.velocity - velocity;
+        let inverse = tracked.velocity_covariance.try_inverse().unwrap_or_default();
+        self.moving_pairs += 1;
+        self.velocity_m2_s2 += error.norm_squared();
+        self.heading_rad2 += wrap_angle(tracked.yaw_rad - truth.yaw_rad).powi(2);
+        self.nees += (error.transpose() * inverse * error)[0] / 2.0;
+    }
+
+    fn errors(&self, scans: usize) -> ObjectErrors {
+        let share = |part: f64, whole: usize| part / whole.max(1) as f64;
+        let missed = self.required - self.matched;
+        let wrong = missed + self.false_positives + self.switches;
+        let rmse = |sum: f64, count: usize| share(sum, count).sqrt();
+        ObjectErrors {
+            scans,
+            objects: self.objects.len(),
+            required: self.required,
+            matched: self.matched,
+            false_positives: self.false_positives,
+            switches: self.switches,
+            recall: share(self.matched as f64, self.required),
+            precision: share(self.matched as f64, self.matched + self.false_positives),
+            mota: 1.0 - share(wrong as f64, self.required),
+            switches_per_object: share(self.switches as f64, self.objects.len()),
+            position_rmse_m: rmse(self.position_m2, self.matched),
+            velocity_rmse_mps: rmse(self.velocity_m2_s2, self.moving_pairs),
+            heading_rmse_deg: rmse(self.heading_rad2, self.moving_pairs).to_degrees(),
+            velocity_nees: share(self.nees, self.moving_pairs),
+        }
+    }
+}
+
+fn distance_m(truth: &TrueObject, tracked: &TrackedObject) -> f64 {
+    (truth.position - tracked.position).norm()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn truth(id: u64, x: f64) -> TrueObject {
+        TrueObject {
+            id,
+            position: Point2::new(x, 0.0),
+            velocity: Some(Vector2::new(10.0, 0.0)),
+            yaw_rad: 0.0,
+            is_vehicle: true,
+            is_seen: true,
+        }
+    }
+
+    fn tracked(id: u64, x: f64) -> TrackedObject {
+        TrackedObject {
+            id,
+            position: Point2::new(x, 0.0),
+            velocity: Vector2::new(9.0, 0.0),
+            velocity_covariance: Matrix2::identity(),
+            yaw_rad: 0.1,
+            moving: true,
+        }
+    }
+
+    fn scan(truth: &[TrueObject], tracked: &[TrackedObject]) -> ObjectScan {
+        ObjectScan {
+            truth: truth.to_vec(),
+            tracked: tracked.to_vec(),
+        }
+    }
+
+    #[test]
+    fn an_object_is_required_from_its_third_scan_on() {
+        let scans = vec![scan(&[truth(1, 20.0)], &[]); 5];
+        let errors = object_errors(&scans, &ObjectOptions::default());
+        assert_eq!((errors.objects, errors.required, errors.matched), (1, 3, 0));
+        let hidden = TrueObject { is_seen: false, ..truth(1, 20.0) };
+        let scans = vec![scan(&[hidden], &[]); 5];
+        assert_eq!(object_errors(&scans, &ObjectOptions::default()).required, 0);
+    }
+
+    #[test]
+    fn a_pair_is_kept_while_it_fits_and_another_identity_is_a_switch() {
+        let options = ObjectOptions { min_scans: 1, ..ObjectOptions::default() };
+        let scans = [
+            scan(&[truth(1, 20.0)], &[tracked(5, 21.0)]),
+            // A nearer one comes, and is false as long as the first one fits.
+            scan(&[truth(1, 20.0)], &[tracked(5, 21.0), tracked(6, 20.0)]),
+            scan(&[truth(1, 20.0)], &[tracked(6, 20.0)]),
+        ];
+        let errors = object_errors(&scans, &options);
+        assert_eq!((errors.matched, errors.false_positives, errors.switches), (3, 1, 1));
+        assert!((errors.mota - (1.0 - 2.0 / 3.0)).abs() < 1e-12, "{errors}");
+        assert!((errors.velocity_rmse_mps - 1.0).abs() < 1e-12);
+        assert!((errors.velocity_nees - 0.5).abs() < 1e-12);
+        assert!((errors.position_rmse_m - (2.0f64 / 3.0).sqrt()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_is_there_but_not_required_excuses_and_what_is_far_too() {
+        let options = ObjectOptions { min_scans: 1, ..ObjectOptions::default() };
+        let walker = TrueObject { is_vehicle: false, ..truth(2, -20.0) };
+        let found = [tracked(1, -21.0), tracked(2, 70.0), tracked(3, 20.0)];
+        let errors = object_errors(&[scan(&[walker], &found)], &options);
+        assert_eq!((errors.required, errors.false_positives), (0, 1));
+        let standing = TrackedObject { moving: false, ..tracked(3, 20.0) };
+        let errors = object_errors(&[scan(&[], &[standing])], &options);
+        assert_eq!(errors.false_positives, 0);
+    }
+}

@@ -1,0 +1,107 @@
+//! Length and width of an object, and its centre by what is seen of it.
+//!
+//! A radar sees the near end of a vehicle well, and the far end in part: the centre is half of the
+//! length behind the near end, not in the middle of the returns. Length and width begin as those of
+//! a car, and grow with what is seen.
+
+use nalgebra::{Point2, Vector2};
+
+use crate::returns::Return;
+
+/// Length and width of a car, m.
+const CAR_M: [f64; 2] = [4.4, 1.9];
+/// Length and width of the largest vehicle, an articulated lorry or bus, m.
+const LARGEST_M: [f64; 2] = [18.0, 2.6];
+/// Share of the returns at either end that is left out.
+const TRIM: f64 = 0.05;
+/// Share by which length and width approach what is seen in a scan.
+const GAIN: [f64; 2] = [0.2, 0.1];
+/// Cosine between the line of sight and an axis above which one end of the object is nearer.
+const END_ON: f64 = 0.35;
+
+/// The length and the width.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Extent {
+    /// Along the heading and across it, m.
+    pub size_m: [f64; 2],
+}
+
+/// An object as a scan shows it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Outline {
+    /// From one end to the other, along the heading and across it, relative to the centre as
+    /// predicted, m.
+    spans_m: [[f64; 2]; 2],
+}
+
+impl Extent {
+    /// That of a car.
+    pub fn car() -> Self {
+        Self { size_m: CAR_M }
+    }
+
+    /// Returns the outline of some returns, seen from a heading, relative to a centre.
+    pub fn outline(
+        returns: &[Return],
+        members: &[u32],
+        (centre, velocity): (&Point2<f64>, &Vector2<f64>),
+        heading: &Vector2<f64>,
+    ) -> Outline {
+        let side = Vector2::new(-heading.y, heading.x);
+        let mut along = Vec::with_capacity(members.len());
+        let mut across = Vec::with_capacity(members.len());
+        for member in members {
+            let at = returns[*member as usize].at_scan(velocity) - centre;
+            along.push(at.dot(heading));
+            across.push(at.dot(&side));
+        }
+        Outline {
+            spans_m: [trimmed_span(along), trimmed_span(across)],
+        }
+    }
+
+    /// Returns how far the centre of the object is from the one that the outline is relative to, m.
+    /// `direction` is the line of sight, a unit vector.
+    pub fn centre(
+        &self,
+        outline: &Outline,
+        heading: &Vector2<f64>,
+        direction: &Vector2<f64>,
+    ) -> Vector2<f64> {
+        let side = Vector2::new(-heading.y, heading.x);
+        let mut centre = Vector2::zeros();
+        for (axis, towards) in [*heading, side].iter().enumerate() {
+            let [low, high] = outline.spans_m[axis];
+            let seen_m = high - low;
+            let hidden_m = (self.size_m[axis] - seen_m).max(0.0);
+            // The end that is nearer to the sensor is where the returns end; the other one is
+            // hidden. From the side neither is.
+            let end_on = towards.dot(direction);
+            let share = (end_on / END_ON).clamp(-1.0, 1.0);
+            let middle = 0.5 * (low + high) + 0.5 * share * hidden_m;
+            centre += towards * middle;
+        }
+        centre
+    }
+
+    /// Takes what a scan shows.
+    pub fn update(&mut self, outline: &Outline) {
+        for axis in 0..2 {
+            let [low, high] = outline.spans_m[axis];
+            let excess_m = (high - low) - self.size_m[axis];
+            if excess_m > 0.0 {
+                self.size_m[axis] =
+                    (self.size_m[axis] + GAIN[axis] * excess_m).min(LARGEST_M[axis]);
+            }
+        }
+    }
+}
+
+/// The span of some values without those at its ends.
+fn trimmed_span(mut values: Vec<f64>) -> [f64; 2] {
+    values.sort_by(f64::total_cmp);
+    let last = values.len().saturating_sub(1);
+    let trimmed = (TRIM * last as f64).round() as usize;
+    let at = |index: usize| values.get(index).copied().unwrap_or_default();
+    [at(trimmed), at(last - trimmed)]
+}

@@ -1,0 +1,28 @@
+//! The results of the tracking.
+
+use nalgebra::{Matrix2, Point2, Vector2};
+
+/// A moving object at the time of a scan, in the frame of the odometry.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Object {
+    /// The identity: counted from 1, and given to no other object of the run.
+    pub id: u64,
+    /// The centre, m.
+    pub position: Point2<f64>,
+    /// The velocity over ground, m/s.
+    pub velocity: Vector2<f64>,
+    /// The heading: the direction of the velocity, and where it stands, that before; rad.
+    pub yaw_rad: f64,
+    /// The length along the heading, m.
+    pub length_m: f64,
+    /// The width across it, m.
+    pub width_m: f64,
+    /// False if its speed is not significantly above that of what stands.
+    pub moving: bool,
+    /// Scans since its first cluster, that one included.
+    pub age: u32,
+    /// Covariance of the centre, m².
+    pub position_covariance: Matrix2<f64>,
+    /// Covariance of the velocity, (m/s)².
+    pub velocity_covariance: Matrix2<f64>,
+}

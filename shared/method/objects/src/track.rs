@@ -1,0 +1,188 @@
+//! A track: an object from its birth to its death.
+
+use nalgebra::{Matrix2, Point2, Vector2};
+
+use crate::clusters::Measurement;
+use crate::extent::Extent;
+use crate::filter::Filter;
+use crate::returns::Return;
+use crate::{Object, ObjectsConfig};
+
+/// Speed above which the velocity is the heading, m/s.
+const HEADING_MPS: f64 = 1.0;
+/// Distance beyond its outline within which returns are an object's, m: a range cell and the
+/// smearing of the beam.
+const MARGIN_M: f64 = 0.7;
+
+/// An object that may be one.
+#[derive(Clone, Debug)]
+pub(crate) struct Track {
+    pub filter: Filter,
+    pub extent: Extent,
+    heading: Vector2<f64>,
+    /// Identity of an object that was moving once; before it has none.
+    pub id: Option<u64>,
+    /// Scans since its first cluster, that one included, and those with a cluster.
+    age: u32,
+    hits: u32,
+    /// Time since its last cluster, s.
+    unseen_s: f64,
+    moving: bool,
+}
+
+impl Track {
+    /// Begins a track at a cluster.
+    pub fn new(measured: &Measurement, noise: &Matrix2<f64>, config: &ObjectsConfig) -> Self {
+        Self {
+            filter: Filter::new(&measured.at, noise, config.speed_sigma_mps),
+            extent: Extent::car(),
+            heading: measured.direction,
+            id: None,
+            age: 1,
+            hits: 1,
+            unseen_s: 0.0,
+            moving: false,
+        }
+    }
+
+    /// Predicts it some seconds later.
+    pub fn predict(&mut self, dt_s: f64, config: &ObjectsConfig) {
+        let accelerations = [config.acceleration_mps2, config.lateral_acceleration_mps2];
+        self.filter.predict(dt_s, &self.heading, accelerations);
+        self.age = self.age.saturating_add(1);
+        self.unseen_s += dt_s;
+    }
+
+    /// Returns whether it has been confirmed as an object.
+    pub fn is_confirmed(&self) -> bool {
+        self.id.is_some()
+    }
+
+    /// Returns whether it is an object that moves.
+    pub fn is_moving(&self) -> bool {
+        self.is_confirmed() && self.moving
+    }
+
+    /// Returns the distance of a return from the predicted outline, in units of the margin around
+    /// it: up to 1 it belongs to the object.
+    pub fn distance(&self, found: &Return) -> f64 {
+        let place = found.at_scan(&self.filter.velocity()) - self.filter.position();
+        let side = Vector2::new(-self.heading.y, self.heading.x);
+        let [length_m, width_m] = self.extent.size_m;
+        let variance = self.filter.position_covariance();
+        let beyond = |axis: &Vector2<f64>, size_m: f64| {
+            let sigma_m = (axis.transpose() * variance * axis)[0].max(0.0).sqrt();
+            // The bearing of a single return is off by about its range over a hundred.
+            let margin_m = MARGIN_M + sigma_m + 0.01 * found.range_m;
+            (place.dot(axis).abs() - 0.5 * size_m).max(0.0) / margin_m
+        };
+        beyond(&self.heading, length_m).hypot(beyond(&side, width_m))
+    }
+
+    /// Returns where the centre is by a cluster, as it would be seen at the cluster's own time.
+    pub fn measured_centre(
+        &self,
+        returns: &[Return],
+        members: &[u32],
+        measured: &Measurement,
+    ) -> Point2<f64> {
+        let known = (&self.filter.position(), &self.filter.velocity());
+        let outline = Extent::outline(returns, members, known, &self.heading);
+        let centre = self.extent.centre(&outline, &self.heading, &measured.direction);
+        let away_mps = measured.direction.dot(known.1);
+        known.0
+            + centre
+            + known.1 * measured.time_s
+            + measured.direction * (measured.doppler_s * away_mps)
+    }
+
+    /// Updates it by a cluster.
+    pub fn update(
+        &mut self,
+        returns: &[Return],
+        members: &[u32],
+        measured: &Measurement,
+        noise: &Matrix2<f64>,
+    ) {
+        let at = match self.has_heading() {
+            true => self.measured_centre(returns, members, measured),
+            false => measured.at,
+        };
+        let innovation = self.filter.innovation(measured, &at, noise);
+        self.filter.update(&innovation);
+        self.unseen_s = 0.0;
+        self.hits = self.hits.saturating_add(1);
+        let velocity = self.filter.velocity();
+        if velocity.norm() > HEADING_MPS {
+            self.heading = velocity.normalize();
+        }
+        if self.has_heading() {
+            let known = (&self.filter.position(), &velocity);
+            let outline = Extent::outline(returns, members, known, &self.heading);
+            self.extent.update(&outline);
+        }
+    }
+
+    /// Returns whether the direction of its motion is known: from there on its centre is that of
+    /// its outline, before it is that of its returns.
+    pub fn has_heading(&self) -> bool {
+        self.is_confirmed()
+    }
+
+    /// Returns whether it has come to its end.
+    pub fn is_over(&self, config: &ObjectsConfig) -> bool {
+        match self.is_confirmed() {
+            true => self.unseen_s > config.coast_s,
+            false => {
+                let missed = self.age - self.hits;
+                missed > config.birth_scans - config.birth_hits || self.unseen_s > config.coast_s
+            }
+        }
+    }
+
+    /// Decides whether it moves: whether its speed is above that of what stands by more than its
+    /// uncertainty explains. Returns whether it becomes an object by that.
+    pub fn judge(&mut self, config: &ObjectsConfig) -> bool {
+        let (speed_mps, sigma_mps) = self.filter.speed();
+        let excess = speed_mps - config.standing_mps;
+        self.moving = excess > config.moving_sigmas * sigma_mps;
+        self.moving && !self.is_confirmed() && self.hits >= config.birth_hits
+    }
+
+    /// Makes it an object: from now on it is a box whose near end is seen.
+    pub fn confirm(&mut self, id: u64) {
+        self.id = Some(id);
+    }
+
+    /// Returns the object, if it is one.
+    pub fn object(&self) -> Option<Object> {
+        let [length_m, width_m] = self.extent.size_m;
+        Some(Object {
+            id: self.id?,
+            position: self.filter.position(),
+            velocity: self.filter.velocity(),
+            yaw_rad: self.heading.y.atan2(self.heading.x),
+            length_m,
+            width_m,
+            moving: self.moving,
+            age: self.age,
+            position_covariance: self.filter.position_covariance(),
+            velocity_covariance: self.filter.velocity_covariance(),
+        })
+    }
+
+    /// Returns the heading, a unit vector.
+    pub fn heading(&self) -> &Vector2<f64> {
+        &self.heading
+    }
+}
+
+impl Track {
+    /// Returns whether the centre of another track lies within its outline.
+    pub fn contains(&self, other: &Self) -> bool {
+        let apart = other.filter.position() - self.filter.position();
+        let side = Vector2::new(-self.heading.y, self.heading.x);
+        let [length_m, width_m] = self.extent.size_m;
+        apart.dot(&self.heading).abs() < 0.5 * length_m && apart.dot(&side).abs() < 0.5 * width_m
+    }
+}

@@ -1,0 +1,183 @@
+//! Tracking in written scenes: returns of walls and vehicles as a radar measures them, each at the
+//! time of its azimuth and moved by the Doppler shift.
+
+#![allow(clippy::unwrap_used)]
+
+use std::f64::consts::{PI, TAU};
+
+use gyre_geometry::{Pose, SparsePoint, Twist, pose};
+use gyre_objects::{Object, ObjectTracker, ObjectsConfig, PlacedScan};
+use nalgebra::{Point2, Vector2};
+
+const PERIOD_S: f64 = 0.25;
+const DOPPLER_S: f64 = 0.046;
+
+/// A box of returns with its near sides seen.
+#[derive(Clone, Copy)]
+struct Car {
+    at: Point2<f64>,
+    velocity: Vector2<f64>,
+}
+
+/// A vehicle that drives ahead at 8 m/s between two walls, and what is around it.
+struct Scene {
+    sensor_mps: f64,
+    tracker: ObjectTracker,
+    scan: u32,
+    /// True without the wall on the left.
+    is_open: bool,
+}
+
+impl Scene {
+    fn new() -> Self {
+        Self {
+            sensor_mps: 8.0,
+            tracker: ObjectTracker::new(&ObjectsConfig::default()).unwrap(),
+            scan: 0,
+            is_open: false,
+        }
+    }
+
+    fn time_s(&self) -> f64 {
+        f64::from(self.scan) * PERIOD_S
+    }
+
+    /// Measures the walls and these cars, and tracks.
+    fn step(&mut self, cars: &[Car]) -> Vec<Object> {
+        let mut points = Vec::new();
+        for post in 0..150 {
+            let x = -100.0 + 2.0 * f64::from(post);
+            for y in [-15.0, 15.0] {
+                if y < 0.0 || !self.is_open {
+                    let still = Vector2::zeros();
+                    (0..4).for_each(|k| {
+                        points.push((Point2::new(x + 0.5 * f64::from(k), y), still));
+                    });
+                }
+            }
+        }
+        for car in cars {
+            let heading = car.velocity.try_normalize(1e-9).unwrap_or_else(Vector2::x);
+            let side = Vector2::new(-heading.y, heading.x);
+            let centre = car.at + car.velocity * self.time_s();
+            for (a, b) in [(2.2, -0.9), (2.2, 0.0), (2.2, 0.9), (1.1, -0.9), (0.0, -0.9), (-1.1, -0.9), (-2.2, -0.9), (-2.2, 0.9), (0.0, 0.9)] {
+                points.push((centre + heading * a + side * b, car.velocity));
+            }
+        }
+        let placed = PlacedScan {
+            stamp_ns: (self.time_s() * 1e9) as i64,
+            pose: self.sensor(0.0),
+            twist: Twist { vx_mps: self.sensor_mps, ..Twist::default() },
+        };
+        let points: Vec<SparsePoint> =
+            points.iter().filter_map(|(at, velocity)| self.measured(at, velocity)).collect();
+        self.scan += 1;
+        self.tracker.update(&placed, &points).to_vec()
+    }
+
+    fn sensor(&self, after_s: f64) -> Pose {
+        pose(self.sensor_mps * (self.time_s() + after_s), 0.0, 0.0)
+    }
+
+    /// A return of what is `at` a place at the scan's time, seen when the beam passes it.
+    fn measured(&self, at: &Point2<f64>, velocity: &Vector2<f64>) -> Option<SparsePoint> {
+        let mut time_s = 0.0;
+        let mut seen = Point2::origin();
+        for _ in 0..5 {
+            seen = self.sensor(time_s).inverse() * (at + velocity * time_s);
+            let clockwise = (-seen.y.atan2(seen.x)).rem_euclid(TAU);
+            time_s = (clockwise / TAU - 0.5) * PERIOD_S;
+        }
+        let range_m = seen.coords.norm();
+        let closing = -(velocity - Vector2::new(self.sensor_mps, 0.0)).dot(&seen.coords) / range_m;
+        let shown = seen.coords * (1.0 - DOPPLER_S * closing / range_m);
+        (5.0..80.0).contains(&range_m).then(|| {
+            SparsePoint::from([shown.x as f32, shown.y as f32, time_s as f32, 1.0, DOPPLER_S as f32])
+        })
+    }
+}
+
+/// Scans of walls alone, as at the start of a drive.
+fn settled() -> Scene {
+    let mut scene = Scene::new();
+    for _ in 0..12 {
+        assert_eq!(scene.step(&[]), []);
+    }
+    scene
+}
+
+#[test]
+fn what_stands_is_no_object_from_a_vehicle_that_moves() {
+    let mut scene = settled();
+    let parked = Car { at: Point2::new(60.0, 5.0), velocity: Vector2::zeros() };
+    for _ in 0..40 {
+        assert!(scene.step(&[parked]).iter().all(|object| !object.moving));
+    }
+}
+
+#[test]
+fn an_oncoming_car_is_tracked_from_its_third_scan_without_bias_of_time_and_doppler() {
+    let mut scene = settled();
+    // Straight ahead, where the sweep begins and ends: its two sides are seen a quarter of a second
+    // apart.
+    let car = Car { at: Point2::new(140.0, 0.5), velocity: Vector2::new(-12.0, 0.0) };
+    let mut seen = 0;
+    let mut last = None;
+    for _ in 0..14 {
+        let centre = car.at + car.velocity * scene.time_s();
+        let ahead_m = centre.x - scene.sensor(0.0).translation.x;
+        let objects = scene.step(&[car]);
+        seen += i32::from(ahead_m < 65.0);
+        if seen > 3 {
+            assert_eq!(objects.len(), 1, "{ahead_m} m");
+            let object = objects[0];
+            assert!(object.moving && last.is_none_or(|id| id == object.id));
+            last = Some(object.id);
+        }
+        if seen > 6 {
+            let object = objects[0];
+            assert!((object.velocity - car.velocity).norm() < 0.8, "{object:?}");
+            assert!((object.position - centre).norm() < 1.0, "{object:?} at {centre}");
+            assert!((object.yaw_rad.abs() - PI).abs() < 0.1, "{object:?}");
+        }
+    }
+    assert!(seen > 6, "{seen}");
+}
+
+#[test]
+fn a_hidden_car_keeps_its_identity_and_ends_when_it_stays_hidden() {
+    let mut scene = settled();
+    let car = Car { at: Point2::new(0.0, 4.0), velocity: Vector2::new(10.0, 0.0) };
+    let before = (0..8).map(|_| scene.step(&[car])).next_back().unwrap();
+    assert_eq!(before.len(), 1);
+    (0..3).for_each(|_| assert_eq!(scene.step(&[])[0].id, before[0].id));
+    assert_eq!(scene.step(&[car])[0].id, before[0].id);
+    let after = (0..6).map(|_| scene.step(&[])).next_back().unwrap();
+    assert_eq!(after, []);
+}
+
+#[test]
+fn an_image_behind_a_wall_is_not_born_and_the_same_in_the_open_is() {
+    let tracked = |is_open: bool| {
+        let mut scene = Scene { is_open, ..Scene::new() };
+        let image = Car { at: Point2::new(-10.0, 24.0), velocity: Vector2::new(9.0, 0.0) };
+        (0..20).for_each(|scan| {
+            scene.step(if scan < 10 { &[] } else { std::slice::from_ref(&image) });
+        });
+        scene.step(&[image]).len()
+    };
+    assert_eq!((tracked(false), tracked(true)), (0, 1));
+}
+
+#[test]
+fn a_gap_in_time_ends_all_tracks_and_identities_are_not_given_again() {
+    let mut scene = settled();
+    let car = Car { at: Point2::new(0.0, 4.0), velocity: Vector2::new(10.0, 0.0) };
+    let first = (0..8).map(|_| scene.step(&[car])).next_back().unwrap()[0].id;
+    scene.scan += 40;
+    assert_eq!(scene.step(&[car]), []);
+    let car = Car { at: car.at - Vector2::new(1.0, 0.0) * 2.0 * scene.time_s(), velocity: Vector2::new(12.0, 0.0) };
+    let again = (0..12).map(|scan| scene.step(if scan < 6 { &[] } else { std::slice::from_ref(&car) }));
+    let again = again.last().unwrap();
+    assert!(again.iter().all(|object| object.id > first), "{again:?}");
+}

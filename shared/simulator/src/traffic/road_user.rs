@@ -1,0 +1,124 @@
+//! The road users at an instant, for ground truth.
+
+use gyre_geometry::Pose;
+use nalgebra::{Point2, Vector2};
+
+use super::actors::FIRST_BODY;
+use super::kind::Kind;
+use super::{Traffic, actor::Actor};
+use crate::body::{Moving, Wall};
+use crate::occlusion::crossing;
+use crate::profile::Receiver;
+use crate::world::World;
+
+/// A road user at an instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RoadUser {
+    /// Its number in the drive, from 0.
+    pub object: u32,
+    /// `car`, `van`, `lorry`, `bus`, `cyclist` or `pedestrian`.
+    pub kind: &'static str,
+    /// The pose of its centre in the world, x ahead.
+    pub pose: Pose,
+    /// Its velocity in the world, m/s.
+    pub velocity: Vector2<f64>,
+    /// Its length and width, m.
+    pub size_m: [f64; 2],
+    /// Two-way share of the power that buildings and other road users let pass to the part of it
+    /// that is seen best: 0 (hidden) to 1 (in the open).
+    pub visible: f64,
+    /// Its strongest echo as a scan shows it, counts of half a decibel, in clear weather and
+    /// without scintillation, speckle and the height of the beam.
+    pub counts: f64,
+}
+
+/// What sees a road user.
+pub struct Observer<'a> {
+    /// The standing world.
+    pub world: &'a World,
+    /// The place of the sensor.
+    pub place: Point2<f64>,
+    /// The receiver.
+    pub receiver: &'a Receiver,
+}
+
+impl Traffic {
+    /// Returns the road users around an observer at a time of the drive, in the order of their
+    /// numbers.
+    pub fn road_users(&self, time_s: f64, reach_m: f64, observer: &Observer<'_>) -> Vec<RoadUser> {
+        let mut there: Vec<(&Actor, Moving<'_>)> = Vec::new();
+        self.visit_actors(time_s, observer.place, reach_m, &mut |actor, moving| {
+            there.push((actor, moving));
+        });
+        let user = |(actor, moving): &(&Actor, Moving<'_>)| {
+            let (visible, power) = observer.best_echo(moving, there.iter().map(|other| &other.1));
+            let (length, width) = actor.half_m;
+            RoadUser {
+                object: number(moving) - FIRST_BODY,
+                kind: actor.kind.name(),
+                pose: moving.pose,
+                velocity: moving.velocity,
+                size_m: [2.0 * length, 2.0 * width],
+                visible,
+                counts: 20.0 * power.max(1.0).log10(),
+            }
+        };
+        there.iter().map(user).collect()
+    }
+}
+
+/// The number of a body.
+fn number(moving: &Moving<'_>) -> u32 {
+    moving.body.scatterers.first().map_or(FIRST_BODY, |scatterer| scatterer.body)
+}
+
+impl Observer<'_> {
+    /// Returns the largest share of the power that passes to a scatterer of a body, and the power
+    /// of its strongest echo, in the receiver's units.
+    fn best_echo<'a>(
+        &self,
+        moving: &Moving<'_>,
+        all: impl Iterator<Item = &'a Moving<'a>> + Clone,
+    ) -> (f64, f64) {
+        let own = number(moving);
+        let (mut visible, mut strongest) = (0.0f64, 0.0f64);
+        for scatterer in &moving.body.scatterers {
+            let there = scatterer.moved(&moving.pose);
+            let ray = self.place - there.position;
+            let range_m = ray.norm().max(1.0);
+            let walls = self.world.transmission(self.place, there.position, own, 1e-4);
+            let others = all.clone().filter(|other| number(other) != own);
+            let passed = others.fold(walls, |passed, other| {
+                passed * self.passed(other, &there.position)
+            });
+            let power = there.cross_section_m2
+                * there.aspect.gain(ray / range_m)
+                * self.receiver.sensitivity(range_m);
+            visible = visible.max(passed);
+            strongest = strongest.max(power * passed);
+        }
+        (visible, strongest)
+    }
+
+    /// Returns the share of the power that the walls of a road user let pass to a place.
+    fn passed(&self, moving: &Moving<'_>, place: &Point2<f64>) -> f64 {
+        let line = place - self.place;
+        let crosses = |wall: &Wall| crossing(self.place, line, &wall.moved(&moving.pose)).is_some();
+        let walls = moving.body.walls.iter().filter(|wall| crosses(wall));
+        walls.map(|wall| wall.transmission).product()
+    }
+}
+
+impl Kind {
+    /// Its name.
+    fn name(self) -> &'static str {
+        match self {
+            Self::Car => "car",
+            Self::Van => "van",
+            Self::Lorry => "lorry",
+            Self::Bus => "bus",
+            Self::Cyclist => "cyclist",
+            Self::Pedestrian => "pedestrian",
+        }
+    }
+}
