@@ -56,6 +56,7 @@ fn main() -> Outcome<()> {
     for name in &arguments {
         let scans = track(&simulated(name)?, &config)?;
         println!("{name}\n{}\n", object_errors(&scans, &ObjectOptions::default()));
+        dump(name, &scans)?;
         all.push(scans);
     }
     // Identities of one drive are not those of another.
@@ -69,6 +70,21 @@ fn main() -> Outcome<()> {
     let all: Vec<ObjectScan> = all.into_iter().flatten().collect();
     println!("all\n{}", object_errors(&all, &ObjectOptions::default()));
     Ok(())
+}
+
+fn dump(name: &str, scans: &[ObjectScan]) -> Outcome<()> {
+    let Some(folder) = env::var_os("OBJECTS_DUMP") else { return Ok(()) };
+    let mut text = String::new();
+    for (k, scan) in scans.iter().enumerate() {
+        for t in &scan.truth {
+            let v = t.velocity.unwrap_or_default();
+            text += &format!("T,{k},{},{},{},{},{},{},{}\n", t.id, t.position.x, t.position.y, v.x, v.y, t.is_vehicle as u8, t.is_seen as u8);
+        }
+        for t in &scan.tracked {
+            text += &format!("F,{k},{},{},{},{},{},{},{}\n", t.id, t.position.x, t.position.y, t.velocity.x, t.velocity.y, t.moving as u8, t.velocity_covariance.trace().sqrt());
+        }
+    }
+    Ok(fs::write(Path::new(&folder).join(name.replace(':', "-") + ".csv"), text)?)
 }
 
 /// Tracks the objects of a drive.
@@ -147,7 +163,7 @@ fn simulated(name: &str) -> Outcome<Vec<DriveScan>> {
     let profile = toml::from_str::<BTreeMap<String, _>>(&format!("profile = \"{radar}\""))?;
     simulation.sensor.profile = profile["profile"];
     simulation.drive.kind = DriveKind::Town;
-    simulation.drive.length_m = 4.0 * scans as f64;
+    simulation.drive.length_m = (4.0 * scans as f64).max(300.0);
     if weather.contains("rain") {
         simulation.weather.push(WeatherConfig {
             rain_mm_h: 10.0,

@@ -6,9 +6,9 @@ use crate::returns::Return;
 
 /// Largest distance along the beam between neighbouring returns of one object, m: the gap between
 /// the front and the rear axle is filled by the sides.
-const ALONG_M: f64 = 1.5;
+const ALONG_M: f64 = 3.2;
 /// Largest distance across the beam near the sensor, m,
-const ACROSS_M: f64 = 1.2;
+const ACROSS_M: f64 = 2.5;
 /// and its growth with the range, radians: two azimuths of 0.9 degrees.
 const ACROSS_RAD: f64 = 0.031;
 
@@ -40,8 +40,9 @@ fn are_neighbours(a: &Return, b: &Return) -> bool {
     let apart = b.at - a.at;
     let along_m = apart.dot(&a.direction);
     let across_m = apart.perp(&a.direction);
-    let across = ACROSS_M + ACROSS_RAD * a.range_m;
-    (along_m / ALONG_M).powi(2) + (across_m / across).powi(2) <= 1.0
+    let e = |k: &str, d: f64| std::env::var(k).ok().and_then(|v| v.parse().ok()).unwrap_or(d);
+    let across = e("EX", ACROSS_M) + ACROSS_RAD * a.range_m;
+    (along_m / e("EL", ALONG_M)).powi(2) + (across_m / across).powi(2) <= 1.0
 }
 
 /// A cluster as one measurement.
@@ -57,7 +58,9 @@ pub(crate) struct Measurement {
     pub direction: Vector2<f64>,
     /// Range, m.
     pub range_m: f64,
-    /// Number of returns.
+    /// Sum of the weights of the returns,
+    pub weight: f64,
+    /// and their number.
     pub returns: usize,
 }
 
@@ -77,16 +80,42 @@ impl Measurement {
             let found = &returns[*member as usize];
             sum + found.direction * found.weight
         });
+        let direction = mean
+            .try_normalize(1e-9)
+            .or(first.map(|found| found.direction))
+            .unwrap_or_else(Vector2::x);
+        let centroid = Point2::new(x, y) / weight;
+        let at = match std::env::var_os("EM") {
+            None => centroid + middle(returns, members, &centroid, &direction),
+            Some(_) => centroid,
+        };
         Self {
-            at: Point2::new(x, y) / weight,
+            at,
             time_s: time_s / weight,
             doppler_s: doppler_s / weight,
-            direction: mean
-                .try_normalize(1e-9)
-                .or(first.map(|found| found.direction))
-                .unwrap_or_else(Vector2::x),
+            direction,
             range_m: range_m / weight,
+            weight,
             returns: members.len(),
         }
     }
+}
+
+/// Returns how far the middle between the ends of some returns, along the line of sight and across
+/// it, is from a place: it depends less than their mean on which of them are strong.
+fn middle(
+    returns: &[Return],
+    members: &[u32],
+    place: &Point2<f64>,
+    direction: &Vector2<f64>,
+) -> Vector2<f64> {
+    let side = Vector2::new(-direction.y, direction.x);
+    let middle = |axis: &Vector2<f64>| {
+        let along = members.iter().map(|member| (returns[*member as usize].at - place).dot(axis));
+        let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), at| {
+            (low.min(at), high.max(at))
+        });
+        axis * (0.5 * (low + high))
+    };
+    middle(direction) + middle(&side)
 }

@@ -17,6 +17,9 @@ const CELL_M: f64 = 0.5;
 const SIDE: i32 = 512;
 /// Distance to the ends of the range within which a place is not reliably in view, m.
 const EDGE_M: f64 = 1.0;
+/// The last scans, as bits, in which a vehicle may have been at the place that it has now: one of
+/// 5 m that is faster than 7 m/s.
+const OWN_SCANS: u32 = 0b111;
 /// The range below which points are not extracted, m.
 const NEAREST_M: f64 = 5.0;
 
@@ -55,7 +58,8 @@ impl History {
     /// Returns the share of the views with a return; 1 if there are fewer views than `min_views`.
     pub fn share(&self, min_views: u32) -> f64 {
         match self.views >= min_views.max(1) {
-            true => f64::from(self.hits) / f64::from(self.views),
+            // A single return may be of what passed.
+            true => f64::from(self.hits.saturating_sub(1)) / f64::from(self.views),
             false => 1.0,
         }
     }
@@ -85,6 +89,8 @@ impl Evidence {
             let centre = found.at + side * (f64::from(step) * across_m / f64::from(steps.max(1)));
             hits |= self.hits_around(&centre);
         }
+        // What came a moment ago may be the same object.
+        let views = views & !OWN_SCANS;
         History {
             views: views.count_ones(),
             hits: (hits & views).count_ones(),
@@ -108,6 +114,11 @@ impl Evidence {
         let [x, y] = cell_at(place);
         let around = (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| [x + dx, y + dy]));
         around.fold(0, |bits, place| bits | self.hits(place))
+    }
+
+    /// Returns whether the newest scan that was added has a return at a place.
+    pub fn is_occupied(&self, place: &Point2<f64>) -> bool {
+        self.hits_around(place) & 1 != 0
     }
 
     /// Bit k: a return k scans before the newest one that was added.
@@ -157,6 +168,7 @@ impl Evidence {
         (0..steps).filter(stands).count() as u32
     }
 
+    pub fn scan(&self) -> u32 { self.scan }
     /// Forgets all scans.
     pub fn clear(&mut self) {
         self.cells.fill(Cell::default());

@@ -14,8 +14,9 @@ const CAR_M: [f64; 2] = [4.4, 1.9];
 const LARGEST_M: [f64; 2] = [18.0, 2.6];
 /// Share of the returns at either end that is left out.
 const TRIM: f64 = 0.05;
-/// Share by which length and width approach what is seen in a scan.
-const GAIN: [f64; 2] = [0.2, 0.1];
+/// Shares by which length and width approach what is seen in a scan, if that is more and if it is
+/// less.
+const GAIN: [f64; 2] = [0.1, 0.05];
 /// Cosine between the line of sight and an axis above which one end of the object is nearer.
 const END_ON: f64 = 0.35;
 
@@ -89,10 +90,9 @@ impl Extent {
         for axis in 0..2 {
             let [low, high] = outline.spans_m[axis];
             let excess_m = (high - low) - self.size_m[axis];
-            if excess_m > 0.0 {
-                self.size_m[axis] =
-                    (self.size_m[axis] + GAIN[axis] * excess_m).min(LARGEST_M[axis]);
-            }
+            let gain = if excess_m > 0.0 { GAIN[0] } else { GAIN[1] };
+            let size_m = self.size_m[axis] + gain * excess_m;
+            self.size_m[axis] = size_m.clamp(CAR_M[axis], LARGEST_M[axis]);
         }
     }
 }

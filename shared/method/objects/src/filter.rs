@@ -41,10 +41,17 @@ impl Innovation {
 }
 
 impl Filter {
-    /// Starts at a measurement, with an unknown velocity.
-    pub fn new(at: &Point2<f64>, noise: &Matrix2<f64>, speed_sigma_mps: f64) -> Self {
-        let mut covariance = Matrix4::from_diagonal_element(speed_sigma_mps.powi(2));
-        covariance.fixed_view_mut::<2, 2>(0, 0).copy_from(noise);
+    /// Starts at a measurement, with a velocity of zero that is as good as unknown: where it was at
+    /// the scan's time depends on it.
+    pub fn new(measured: &Measurement, noise: &Matrix2<f64>, speed_sigma_mps: f64) -> Self {
+        let at = &measured.at;
+        let (by_velocity, variance) = (by_velocity(measured), speed_sigma_mps.powi(2));
+        let mut covariance = Matrix4::from_diagonal_element(variance);
+        let position = noise + by_velocity * by_velocity.transpose() * variance;
+        covariance.fixed_view_mut::<2, 2>(0, 0).copy_from(&position);
+        let both = -by_velocity * variance;
+        covariance.fixed_view_mut::<2, 2>(0, 2).copy_from(&both);
+        covariance.fixed_view_mut::<2, 2>(2, 0).copy_from(&both.transpose());
         Self {
             state: Vector4::new(at.x, at.y, 0.0, 0.0),
             covariance,
@@ -105,12 +112,9 @@ impl Filter {
         at: &Point2<f64>,
         noise: &Matrix2<f64>,
     ) -> Innovation {
-        let away = measured.direction;
-        let by_velocity = Matrix2::identity() * measured.time_s
-            + away * away.transpose() * measured.doppler_s;
         let mut jacobian = Matrix2x4::zeros();
         jacobian.fixed_view_mut::<2, 2>(0, 0).copy_from(&Matrix2::identity());
-        jacobian.fixed_view_mut::<2, 2>(0, 2).copy_from(&by_velocity);
+        jacobian.fixed_view_mut::<2, 2>(0, 2).copy_from(&by_velocity(measured));
         Innovation {
             difference: at.coords - jacobian * self.state,
             covariance: jacobian * self.covariance * jacobian.transpose() + noise,
@@ -134,9 +138,11 @@ impl Filter {
             rest * self.covariance * rest.transpose() + gain * innovation.noise * gain.transpose();
     }
 
-    /// Moves the position, whose reference on the object has changed.
-    pub fn shift(&mut self, by: &Vector2<f64>) {
-        self.state[0] += by.x;
-        self.state[1] += by.y;
-    }
+}
+
+/// The change of a measured place by the velocity: it is seen at its own time, and lengthened or
+/// shortened by the Doppler shift.
+fn by_velocity(measured: &Measurement) -> Matrix2<f64> {
+    let away = measured.direction;
+    Matrix2::identity() * measured.time_s + away * away.transpose() * measured.doppler_s
 }

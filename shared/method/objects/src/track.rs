@@ -1,8 +1,12 @@
 //! A track: an object from its birth to its death.
 
+use std::collections::VecDeque;
+use std::f64::consts::TAU;
+
 use nalgebra::{Matrix2, Point2, Vector2};
 
 use crate::clusters::Measurement;
+use crate::evidence::Evidence;
 use crate::extent::Extent;
 use crate::filter::Filter;
 use crate::returns::Return;
@@ -10,6 +14,22 @@ use crate::{Object, ObjectsConfig};
 
 /// Speed above which the velocity is the heading, m/s.
 const HEADING_MPS: f64 = 1.0;
+/// Share of the scans in which an object is seen.
+const SEEN_SHARE: f64 = 0.8;
+/// The score from which on a track is an object: clutter reaches it once in ten thousand tracks.
+const CONFIRM_SCORE: f64 = 9.2;
+/// Scans of which the places of its returns are kept, and how many places of each.
+const TRAIL_SCANS: usize = 5;
+const TRAIL_POINTS: usize = 8;
+/// Distance from its outline at which it has left a place, m: two cells.
+const LEFT_M: f64 = 1.0;
+/// Share of the places that an object has left, and of those that clutter has, where something is
+/// seen.
+const TAKEN: [f64; 2] = [0.1, 0.5];
+/// The largest score.
+const MAX_SCORE: f64 = 20.0;
+/// Difference of the velocities of two ends of one object, m/s.
+const ALIKE_MPS: f64 = 3.0;
 /// Distance beyond its outline within which returns are an object's, m: a range cell and the
 /// smearing of the beam.
 const MARGIN_M: f64 = 0.7;
@@ -28,13 +48,18 @@ pub(crate) struct Track {
     /// Time since its last cluster, s.
     unseen_s: f64,
     moving: bool,
+    /// Where its returns were in the last scans, the newest first, m.
+    trail: VecDeque<Vec<Point2<f64>>>,
+    /// Logarithm of the likelihood of an object over that of clutter (Sittler; Blackman and Popoli,
+    /// "Design and Analysis of Modern Tracking Systems", 1999, Sec. 6.2).
+    score: f64,
 }
 
 impl Track {
     /// Begins a track at a cluster.
     pub fn new(measured: &Measurement, noise: &Matrix2<f64>, config: &ObjectsConfig) -> Self {
         Self {
-            filter: Filter::new(&measured.at, noise, config.speed_sigma_mps),
+            filter: Filter::new(measured, noise, config.speed_sigma_mps),
             extent: Extent::car(),
             heading: measured.direction,
             id: None,
@@ -42,6 +67,8 @@ impl Track {
             hits: 1,
             unseen_s: 0.0,
             moving: false,
+            score: 0.0,
+            trail: VecDeque::new(),
         }
     }
 
@@ -50,6 +77,9 @@ impl Track {
         let accelerations = [config.acceleration_mps2, config.lateral_acceleration_mps2];
         self.filter.predict(dt_s, &self.heading, accelerations);
         self.age = self.age.saturating_add(1);
+        if self.unseen_s > 0.0 {
+            self.score += (1.0 - SEEN_SHARE).ln();
+        }
         self.unseen_s += dt_s;
     }
 
@@ -103,6 +133,7 @@ impl Track {
         members: &[u32],
         measured: &Measurement,
         noise: &Matrix2<f64>,
+        clutter_per_m2: f64,
     ) {
         let at = match self.has_heading() {
             true => self.measured_centre(returns, members, measured),
@@ -110,6 +141,11 @@ impl Track {
         };
         let innovation = self.filter.innovation(measured, &at, noise);
         self.filter.update(&innovation);
+        let expected = TAU * innovation.covariance.determinant().max(1e-9).sqrt() * clutter_per_m2;
+        let gain = (SEEN_SHARE / expected).ln() - 0.5 * innovation.chi_square() + strength(measured.weight);
+        let e = |k: &str, d: f64| std::env::var(k).ok().and_then(|v| v.parse().ok()).unwrap_or(d);
+        self.score = (self.score + gain.max(e("EG", -2.0))).min(MAX_SCORE);
+        self.leave(returns, members);
         self.unseen_s = 0.0;
         self.hits = self.hits.saturating_add(1);
         let velocity = self.filter.velocity();
@@ -123,19 +159,52 @@ impl Track {
         }
     }
 
+    /// Notes where its returns are.
+    pub fn leave(&mut self, returns: &[Return], members: &[u32]) {
+        let step = members.len().div_ceil(TRAIL_POINTS);
+        let places = members.iter().step_by(step.max(1)).map(|member| returns[*member as usize].at);
+        self.trail.push_front(places.collect());
+        self.trail.truncate(TRAIL_SCANS);
+    }
+
+    /// Looks at what is now where it was: behind an object the way is free, while a surface that
+    /// has come into view, scan by scan, stays.
+    pub fn look_back(&mut self, evidence: &Evidence) {
+        let side = Vector2::new(-self.heading.y, self.heading.x);
+        let [length_m, width_m] = self.extent.size_m;
+        let has_left = |place: &&Point2<f64>| {
+            let from = *place - self.filter.position();
+            from.dot(&self.heading).abs() > 0.5 * length_m + LEFT_M
+                || from.dot(&side).abs() > 0.5 * width_m + LEFT_M
+        };
+        let left = self.trail.iter().flatten().filter(has_left);
+        let (count, taken) = left.fold((0, 0), |(count, taken), place| {
+            (count + 1, taken + usize::from(evidence.is_occupied(place)))
+        });
+        if count >= 2 {
+            let share = taken as f64 / f64::from(count);
+            let e = |k: &str, d: f64| std::env::var(k).ok().and_then(|v| v.parse().ok()).unwrap_or(d);
+            let gain = share * (TAKEN[0] / TAKEN[1]).ln()
+                + (1.0 - share) * ((1.0 - TAKEN[0]) / (1.0 - TAKEN[1])).ln();
+            self.score = (self.score + e("ET", 2.0) * gain).min(MAX_SCORE);
+        }
+    }
+
     /// Returns whether the direction of its motion is known: from there on its centre is that of
     /// its outline, before it is that of its returns.
     pub fn has_heading(&self) -> bool {
-        self.is_confirmed()
+        let (speed_mps, sigma_mps) = self.filter.speed();
+        self.is_confirmed() || std::env::var_os("EH").is_none() && self.hits > 2 && speed_mps > HEADING_MPS + 2.0 * sigma_mps
     }
 
     /// Returns whether it has come to its end.
     pub fn is_over(&self, config: &ObjectsConfig) -> bool {
+        let missed = self.age - self.hits;
         match self.is_confirmed() {
-            true => self.unseen_s > config.coast_s,
+            true => self.unseen_s > config.coast_s || self.score < 0.0,
             false => {
-                let missed = self.age - self.hits;
-                missed > config.birth_scans - config.birth_hits || self.unseen_s > config.coast_s
+                self.score < 0.0 && self.age > 1
+                    || missed > config.birth_scans - config.birth_hits
             }
         }
     }
@@ -146,7 +215,7 @@ impl Track {
         let (speed_mps, sigma_mps) = self.filter.speed();
         let excess = speed_mps - config.standing_mps;
         self.moving = excess > config.moving_sigmas * sigma_mps;
-        self.moving && !self.is_confirmed() && self.hits >= config.birth_hits
+        self.moving && !self.is_confirmed() && self.hits >= config.birth_hits && self.score > std::env::var("ES").ok().and_then(|v| v.parse().ok()).unwrap_or(CONFIRM_SCORE)
     }
 
     /// Makes it an object: from now on it is a box whose near end is seen.
@@ -177,12 +246,25 @@ impl Track {
     }
 }
 
+/// Logarithm of the likelihood of the weight of a cluster if it is of an object, over that if it
+/// is clutter: both are exponentially distributed.
+fn strength(weight: f64) -> f64 {
+    let e = |k: &str, d: f64| std::env::var(k).ok().and_then(|v| v.parse().ok()).unwrap_or(d);
+    let [object, clutter] = [e("EO", 4.0), 1.0];
+    (((clutter / object) as f64).ln() + weight * (1.0 / clutter - 1.0 / object)).min(2.0)
+}
+
 impl Track {
-    /// Returns whether the centre of another track lies within its outline.
-    pub fn contains(&self, other: &Self) -> bool {
+    /// Returns whether another track is of the same object: it lies within the outline or touches
+    /// it, and moves alike.
+    pub fn is_same(&self, other: &Self) -> bool {
         let apart = other.filter.position() - self.filter.position();
         let side = Vector2::new(-self.heading.y, self.heading.x);
         let [length_m, width_m] = self.extent.size_m;
-        apart.dot(&self.heading).abs() < 0.5 * length_m && apart.dot(&side).abs() < 0.5 * width_m
+        let reach_m = 0.5 * length_m + 0.5 * other.extent.size_m[0] * f64::from(u8::from(other.is_confirmed()));
+        let faster = other.filter.velocity() - self.filter.velocity();
+        apart.dot(&self.heading).abs() < reach_m.max(length_m)
+            && apart.dot(&side).abs() < width_m
+            && (apart.norm() < 0.5 * length_m || faster.norm() < ALIKE_MPS)
     }
 }

@@ -63,8 +63,8 @@ impl ObjectTracker {
         let own = self.own_clusters(&claims);
         let rest = self.assign(&own, &found);
         self.begin(scan, &found, &rest);
-        self.judge();
         self.remember(scan, &claims);
+        self.judge();
         self.objects.clear();
         self.objects.extend(self.tracks.iter().filter_map(Track::object));
         &self.objects
@@ -105,7 +105,7 @@ impl ObjectTracker {
         let moving: Vec<(usize, &Track)> =
             self.tracks.iter().enumerate().filter(|(_, track)| track.is_moving()).collect();
         let claim = |(found, share): (&Return, &f64)| {
-            if *share >= 0.5 {
+            if *share >= self.config.standing_share {
                 return None;
             }
             let distances = moving.iter().map(|(index, track)| (*index, track.distance(found)));
@@ -144,14 +144,21 @@ impl ObjectTracker {
             .iter()
             .map(|members| Measurement::of(&self.returns, members))
             .collect();
+        let e = |k: &str, d: f64| std::env::var(k).ok().and_then(|v| v.parse().ok()).unwrap_or(d);
+        let centres: Vec<Point2<f64>> = measured
+            .iter()
+            .filter(|it| it.weight >= e("EC", 0.1))
+            .map(|it| it.at)
+            .collect();
         for (index, members) in own.iter().enumerate() {
             if members.is_empty() {
                 seekers.push(index);
                 costs.push(self.costs(&self.tracks[index], found, &measured));
             } else {
                 let measured = Measurement::of(&self.returns, members);
-                let noise = self.noise(&measured);
-                self.tracks[index].update(&self.returns, members, &measured, &noise);
+                let noise = self.noise(&measured, true);
+                let clutter = clutter_per_m2(&centres, &measured.at);
+                self.tracks[index].update(&self.returns, members, &measured, &noise, clutter);
             }
         }
         let assigned = assign(&costs);
@@ -159,8 +166,15 @@ impl ObjectTracker {
         for (track, cluster) in seekers.into_iter().zip(assigned) {
             let Some(cluster) = cluster else { continue };
             is_left[cluster] = false;
-            let noise = self.noise(&measured[cluster]);
-            self.tracks[track].update(&self.returns, &found[cluster], &measured[cluster], &noise);
+            let noise = self.noise(&measured[cluster], self.tracks[track].is_confirmed());
+            let clutter = clutter_per_m2(&centres, &measured[cluster].at);
+            self.tracks[track].update(
+                &self.returns,
+                &found[cluster],
+                &measured[cluster],
+                &noise,
+                clutter,
+            );
         }
         (0..found.len()).filter(|cluster| is_left[*cluster]).collect()
     }
@@ -172,23 +186,36 @@ impl ObjectTracker {
         found: &[Members],
         measured: &[Measurement],
     ) -> Vec<Option<f64>> {
+        let e = |k: &str, d: f64| std::env::var(k).ok().and_then(|v| v.parse().ok()).unwrap_or(d);
         let cost = |(members, measured): (&Members, &Measurement)| {
+            if measured.weight < e("EC", 0.1) {
+                return None;
+            }
             let at = match track.has_heading() {
                 true => track.measured_centre(&self.returns, members, measured),
                 false => measured.at,
             };
-            let innovation = track.filter.innovation(measured, &at, &self.noise(measured));
+            let innovation = track.filter.innovation(measured, &at, &self.noise(measured, track.is_confirmed()));
             (innovation.chi_square() <= GATE).then(|| innovation.cost())
         };
         found.iter().zip(measured).map(cost).collect()
     }
 
+    /// Returns whether a cluster can begin a track.
+    fn is_strong(&self, measured: &Measurement) -> bool {
+        let e = |k: &str, d: f64| std::env::var(k).ok().and_then(|v| v.parse().ok()).unwrap_or(d);
+        measured.returns >= self.config.min_returns
+            && measured.weight >= e("EW", 0.8)
+            && measured.range_m >= e("ER", 8.0)
+    }
+
     /// The covariance of a cluster's position, m².
-    fn noise(&self, measured: &Measurement) -> Matrix2<f64> {
+    fn noise(&self, measured: &Measurement, known: bool) -> Matrix2<f64> {
         let along = measured.direction;
         let across = nalgebra::Vector2::new(-along.y, along.x);
         let bearing_m = self.config.bearing_sigma_deg.to_radians() * measured.range_m;
-        let range = self.config.range_sigma_m.powi(2);
+        let e = |k: &str, d: f64| std::env::var(k).ok().and_then(|v| v.parse().ok()).unwrap_or(d);
+        let range = self.config.range_sigma_m.powi(2) + if known { 0.0 } else { e("EN", 0.7f64).powi(2) };
         // Across as along there are scatterers that come and go.
         along * along.transpose() * range
             + across * across.transpose() * (range + bearing_m.powi(2))
@@ -199,15 +226,17 @@ impl ObjectTracker {
     fn begin(&mut self, scan: &PlacedScan, found: &[Members], rest: &[usize]) {
         let sensor = Point2::from(scan.pose.translation.vector);
         for members in rest.iter().map(|cluster| &found[*cluster]) {
-            if members.len() < self.config.min_returns {
+            let measured = Measurement::of(&self.returns, members);
+            if !self.is_strong(&measured) {
                 continue;
             }
-            let measured = Measurement::of(&self.returns, members);
             if self.evidence.standing_between(&sensor, &measured.at, 3.0, 0.6) >= MIRROR_CELLS {
                 continue;
             }
-            let noise = self.noise(&measured);
-            self.tracks.push(Track::new(&measured, &noise, &self.config));
+            let noise = self.noise(&measured, false);
+            let mut track = Track::new(&measured, &noise, &self.config);
+            track.leave(&self.returns, members);
+            self.tracks.push(track);
         }
     }
 
@@ -216,6 +245,7 @@ impl ObjectTracker {
         let config = &self.config;
         self.tracks.retain(|track| !track.is_over(config));
         for track in &mut self.tracks {
+            track.look_back(&self.evidence);
             if track.judge(&self.config) {
                 track.confirm(self.next_id);
                 self.next_id += 1;
@@ -229,7 +259,7 @@ impl ObjectTracker {
         let mut index = 0;
         while index < self.tracks.len() {
             let (older, rest) = self.tracks.split_at(index);
-            let is_within = |older: &Track| older.is_confirmed() && older.contains(&rest[0]);
+            let is_within = |older: &Track| older.is_confirmed() && older.is_same(&rest[0]);
             match older.iter().any(is_within) {
                 true => _ = self.tracks.remove(index),
                 false => index += 1,
@@ -243,6 +273,15 @@ impl ObjectTracker {
         let standing = self.returns.iter().zip(claims).filter(|(_, claim)| claim.is_none());
         self.evidence.add(sensor, standing.map(|(found, _)| found));
     }
+}
+
+/// Radius around a cluster in which others are counted, m.
+const CLUTTER_M: f64 = 20.0;
+
+/// The density of clusters around a place, which one may be the object's own, 1/m².
+fn clutter_per_m2(centres: &[Point2<f64>], place: &Point2<f64>) -> f64 {
+    let near = centres.iter().filter(|at| (*at - place).norm() < CLUTTER_M).count();
+    near.max(1) as f64 / (std::f64::consts::PI * CLUTTER_M * CLUTTER_M)
 }
 
 /// Cells of what stands on the way to a cluster that make it a mirror image.
