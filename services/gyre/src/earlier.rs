@@ -210,12 +210,14 @@ fn queries(out: &Out) -> Result<RecordReader<Query>, Failure> {
 /// A file that cannot be read or is damaged.
 fn has_all_objects(out: &Out) -> Result<bool, Failure> {
     let opened = RecordReader::<LoggedObjects>::open(out.path());
-    opened.map(|objects| objects.has_ended()).map_err(|error| match error {
-        LogError::Damaged { .. } => {
-            format!("{error}: remove it, and the same command tracks the objects anew").into()
-        }
-        _ => error.into(),
-    })
+    opened
+        .map(|objects| objects.has_ended())
+        .map_err(|error| match error {
+            LogError::Damaged { .. } => {
+                format!("{error}: remove it, and the same command tracks the objects anew").into()
+            }
+            _ => error.into(),
+        })
 }
 
 /// Keeps a second name of a damaged journal, which `--fresh` does not remove.

@@ -191,7 +191,9 @@ impl Scans {
             .into());
         }
         let refines = configuration.has(StageId::Refinement);
-        let topics = source.from.topics(refines, configuration.window(None, 1).logs_points());
+        let topics = source
+            .from
+            .topics(refines, configuration.window(None, 1).logs_points());
         let player = Player::open(source, topics)?;
         let stamps: Vec<i64> = player.stamps_ns().collect();
         Ok(Self {

@@ -11,6 +11,7 @@
 
 use std::collections::BTreeMap;
 use std::error::Error;
+use std::f64::consts::TAU;
 use std::path::Path;
 use std::{env, fs};
 
@@ -29,6 +30,8 @@ type Outcome<T> = Result<T, Box<dyn Error>>;
 
 /// Strongest echo of an object that is seen, counts: the threshold of the masks.
 const SEEN_COUNTS: f64 = 60.0;
+/// Time of a sweep of the annotated recording, s.
+const SWEEP_S: f64 = 0.25;
 /// Scans to either side of one between which the velocity of an annotated object is measured.
 const ANNOTATED_SPAN: usize = 2;
 
@@ -55,8 +58,10 @@ fn main() -> Outcome<()> {
     let mut all = Vec::new();
     for name in &arguments {
         let scans = track(&simulated(name)?, &config)?;
-        println!("{name}\n{}\n", object_errors(&scans, &ObjectOptions::default()));
-        dump(name, &scans)?;
+        println!(
+            "{name}\n{}\n",
+            object_errors(&scans, &ObjectOptions::default())
+        );
         all.push(scans);
     }
     // Identities of one drive are not those of another.
@@ -64,27 +69,14 @@ fn main() -> Outcome<()> {
         let offset = drive as u64 * 1_000_000;
         scans.iter_mut().for_each(|scan| {
             scan.truth.iter_mut().for_each(|truth| truth.id += offset);
-            scan.tracked.iter_mut().for_each(|tracked| tracked.id += offset);
+            scan.tracked
+                .iter_mut()
+                .for_each(|tracked| tracked.id += offset);
         });
     }
     let all: Vec<ObjectScan> = all.into_iter().flatten().collect();
     println!("all\n{}", object_errors(&all, &ObjectOptions::default()));
     Ok(())
-}
-
-fn dump(name: &str, scans: &[ObjectScan]) -> Outcome<()> {
-    let Some(folder) = env::var_os("OBJECTS_DUMP") else { return Ok(()) };
-    let mut text = String::new();
-    for (k, scan) in scans.iter().enumerate() {
-        for t in &scan.truth {
-            let v = t.velocity.unwrap_or_default();
-            text += &format!("T,{k},{},{},{},{},{},{},{}\n", t.id, t.position.x, t.position.y, v.x, v.y, t.is_vehicle as u8, t.is_seen as u8);
-        }
-        for t in &scan.tracked {
-            text += &format!("F,{k},{},{},{},{},{},{},{}\n", t.id, t.position.x, t.position.y, t.velocity.x, t.velocity.y, t.moving as u8, t.velocity_covariance.trace().sqrt());
-        }
-    }
-    Ok(fs::write(Path::new(&folder).join(name.replace(':', "-") + ".csv"), text)?)
 }
 
 /// Tracks the objects of a drive.
@@ -95,7 +87,10 @@ fn track(drive: &[DriveScan], config: &ObjectsConfig) -> Outcome<Vec<ObjectScan>
         let objects = tracker.update(&scan.placed, &scan.points);
         ObjectScan {
             truth: scan.truth.clone(),
-            tracked: objects.iter().map(|object| seen_from(&sensor, object)).collect(),
+            tracked: objects
+                .iter()
+                .map(|object| seen_from(&sensor, object))
+                .collect(),
         }
     };
     Ok(drive.iter().map(&mut scan).collect())
@@ -226,9 +221,28 @@ fn annotated(folder: &Path, config: Option<&str>) -> Outcome<Vec<DriveScan>> {
     let mut dataset = gyre_radar::open(folder, &config.dataset)?;
     let mut drive = registered(dataset.as_mut(), &config.odometry, folder)?;
     let text = fs::read_to_string(folder.join("objects.csv"))?;
-    let rows: Vec<Annotation> = text.lines().skip(1).map(annotation).collect::<Outcome<_>>()?;
-    let at = |row: &Annotation| -> Point2<f64> {
-        drive[row.frame - 1].placed.pose * Point2::new(row.x_m, row.y_m)
+    let rows: Vec<Annotation> = text
+        .lines()
+        .skip(1)
+        .map(annotation)
+        .collect::<Outcome<_>>()?;
+    // The boxes were drawn into the images: each at the time of its azimuth, and moved by the
+    // Doppler shift, as the returns in it.
+    let drawn = |row: &Annotation| {
+        let clockwise = (-row.y_m.atan2(row.x_m)).rem_euclid(TAU);
+        SparsePoint {
+            x_m: row.x_m as f32,
+            y_m: row.y_m as f32,
+            time_s: ((clockwise / TAU - 0.5) * SWEEP_S) as f32,
+            weight: 1.0,
+            doppler_s: config.dataset.doppler_s.unwrap_or_default(),
+        }
+    };
+    let at = |row: &Annotation| -> (f64, Point2<f64>) {
+        let placed = &drive[row.frame - 1].placed;
+        let (point, stamp_s) = (drawn(row), placed.stamp_ns as f64 * 1e-9);
+        let there = placed.pose * point.deskewed(&placed.twist);
+        (stamp_s + f64::from(point.time_s), there)
     };
     let truths: Vec<TrueObject> = rows
         .iter()
@@ -236,14 +250,17 @@ fn annotated(folder: &Path, config: Option<&str>) -> Outcome<Vec<DriveScan>> {
             let same = rows.iter().filter(|other| {
                 other.object == row.object && other.frame.abs_diff(row.frame) <= ANNOTATED_SPAN
             });
-            let seen: Vec<(f64, Point2<f64>)> = same
-                .map(|other| (drive[other.frame - 1].placed.stamp_ns as f64 * 1e-9, at(other)))
-                .collect();
-            let turn = drive[row.frame - 1].placed.pose.rotation.inverse();
+            let seen: Vec<(f64, Point2<f64>)> = same.map(at).collect();
+            let sensor = drive[row.frame - 1].placed.pose.inverse();
+            let (velocity, point) = (slope(&seen), drawn(row));
+            let place = sensor * at(row).1;
+            let own = sensor.rotation * velocity;
+            let away = place.coords.normalize();
+            let shift = away * (f64::from(point.doppler_s) * away.dot(&own));
             TrueObject {
                 id: row.object,
-                position: Point2::new(row.x_m, row.y_m),
-                velocity: Some(turn * slope(&seen)),
+                position: place - own * f64::from(point.time_s) - shift,
+                velocity: Some(own),
                 yaw_rad: row.heading_deg.to_radians(),
                 is_vehicle: true,
                 is_seen: true,
@@ -271,7 +288,10 @@ fn annotation(line: &str) -> Outcome<Annotation> {
 fn slope(seen: &[(f64, Point2<f64>)]) -> Vector2<f64> {
     let count = seen.len().max(1) as f64;
     let mean_s = seen.iter().map(|(time_s, _)| time_s).sum::<f64>() / count;
-    let squares: f64 = seen.iter().map(|(time_s, _)| (time_s - mean_s).powi(2)).sum();
+    let squares: f64 = seen
+        .iter()
+        .map(|(time_s, _)| (time_s - mean_s).powi(2))
+        .sum();
     let sum = seen.iter().fold(Vector2::zeros(), |sum, (time_s, at)| {
         sum + at.coords * (time_s - mean_s)
     });
@@ -288,7 +308,13 @@ fn show(scans: &[ObjectScan]) -> Outcome<()> {
                 let distance = |it: &TrackedObject| (it.position - at).norm();
                 distance(a).total_cmp(&distance(b))
             });
-            print!("  true {} at {:.1} {:.1}, {:.1} m/s", truth.id, at.x, at.y, speed.coords.norm());
+            print!(
+                "  true {} at {:.1} {:.1}, {:.1} m/s",
+                truth.id,
+                at.x,
+                at.y,
+                speed.coords.norm()
+            );
             match near.filter(|near| (near.position - at).norm() < 8.0) {
                 Some(near) => println!(
                     ": {} off by {:.2} m and {:.2} m/s, moving {}",
@@ -347,7 +373,10 @@ mod cache {
                 values.extend([truth.is_vehicle, truth.is_seen].map(|is| f64::from(u8::from(is))));
             }
         }
-        let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
+        let bytes: Vec<u8> = values
+            .iter()
+            .flat_map(|value| value.to_le_bytes())
+            .collect();
         Ok(fs::write(path, bytes)?)
     }
 
@@ -355,12 +384,20 @@ mod cache {
         let Some(bytes) = path(name).and_then(|path| fs::read(path).ok()) else {
             return Ok(None);
         };
-        let mut values = bytes.as_chunks::<8>().0.iter().map(|bytes| f64::from_le_bytes(*bytes));
+        let mut values = bytes
+            .as_chunks::<8>()
+            .0
+            .iter()
+            .map(|bytes| f64::from_le_bytes(*bytes));
         let mut drive = Vec::new();
         while let Some(stamp) = values.next() {
             let mut next = || values.next().unwrap_or_default();
             let pose = gyre_geometry::pose(next(), next(), next());
-            let twist = Twist { vx_mps: next(), vy_mps: next(), yaw_rate_radps: next() };
+            let twist = Twist {
+                vx_mps: next(),
+                vy_mps: next(),
+                yaw_rate_radps: next(),
+            };
             let [points, truths] = [next() as usize, next() as usize];
             let points = (0..points).map(|_| SparsePoint::from([(); 5].map(|()| next() as f32)));
             let points = points.collect();
@@ -373,8 +410,16 @@ mod cache {
                 is_seen: next() > 0.0,
             });
             let truth = truth.collect();
-            let placed = PlacedScan { stamp_ns: stamp.to_bits() as i64, pose, twist };
-            drive.push(DriveScan { placed, points, truth });
+            let placed = PlacedScan {
+                stamp_ns: stamp.to_bits() as i64,
+                pose,
+                twist,
+            };
+            drive.push(DriveScan {
+                placed,
+                points,
+                truth,
+            });
         }
         Ok(Some(drive))
     }

@@ -124,10 +124,17 @@ impl fmt::Display for ObjectErrors {
             matched,
             ..
         } = self;
-        writeln!(f, "objects       {objects} in {scans} scans, {matched} of {required} matched")?;
+        writeln!(
+            f,
+            "objects       {objects} in {scans} scans, {matched} of {required} matched"
+        )?;
         writeln!(f, "recall        {:.1} %", 100.0 * self.recall)?;
         let wrong = self.false_positives;
-        writeln!(f, "precision     {:.1} %, {wrong} false", 100.0 * self.precision)?;
+        writeln!(
+            f,
+            "precision     {:.1} %, {wrong} false",
+            100.0 * self.precision
+        )?;
         writeln!(f, "MOTA          {:.3}", self.mota)?;
         let (switches, each) = (self.switches, self.switches_per_object);
         writeln!(f, "ID switches   {switches}, {each:.3} an object")?;
@@ -169,22 +176,30 @@ struct Count {
 impl Count {
     fn add(&mut self, scan: &ObjectScan, options: &ObjectOptions) {
         let (required, others) = self.split(scan, options);
-        let tracked: Vec<TrackedObject> =
-            scan.tracked.iter().filter(|tracked| tracked.moving).copied().collect();
+        let tracked: Vec<TrackedObject> = scan
+            .tracked
+            .iter()
+            .filter(|tracked| tracked.moving)
+            .copied()
+            .collect();
         let pairs = self.pairs(&required, &tracked, options.gate_m);
         for (truth, found) in &pairs {
             self.add_pair(&required[*truth], &tracked[*found]);
         }
         self.required += required.len();
         self.matched += pairs.len();
-        self.objects.extend(required.iter().map(|truth| (truth.id, ())));
+        self.objects
+            .extend(required.iter().map(|truth| (truth.id, ())));
         let is_excused = |tracked: &TrackedObject| {
             let range_m = tracked.position.coords.norm();
             let near = |other: &TrueObject| distance_m(other, tracked) <= options.gate_m;
             range_m > options.max_range_m || others.iter().any(near)
         };
-        let unmatched = (0..tracked.len()).filter(|found| pairs.iter().all(|pair| pair.1 != *found));
-        self.false_positives += unmatched.filter(|found| !is_excused(&tracked[*found])).count();
+        let unmatched =
+            (0..tracked.len()).filter(|found| pairs.iter().all(|pair| pair.1 != *found));
+        self.false_positives += unmatched
+            .filter(|found| !is_excused(&tracked[*found]))
+            .count();
     }
 
     /// Splits the true objects into those that are required and the others.
@@ -197,7 +212,9 @@ impl Count {
             let is_near = truth.position.coords.norm() <= options.max_range_m;
             let seen = self.seen.entry(truth.id).or_default();
             *seen += usize::from(is_near && truth.is_seen);
-            let speed_mps = truth.velocity.map_or(f64::INFINITY, |velocity| velocity.norm());
+            let speed_mps = truth
+                .velocity
+                .map_or(f64::INFINITY, |velocity| velocity.norm());
             is_near
                 && truth.is_seen
                 && truth.is_vehicle
@@ -231,7 +248,9 @@ impl Count {
             }
         }
         let free = |count: usize, of: &dyn Fn(&(usize, usize)) -> usize| -> Vec<usize> {
-            (0..count).filter(|index| pairs.iter().all(|pair| of(pair) != *index)).collect()
+            (0..count)
+                .filter(|index| pairs.iter().all(|pair| of(pair) != *index))
+                .collect()
         };
         let (rows, columns) = (free(truth.len(), &|p| p.0), free(tracked.len(), &|p| p.1));
         let costs = |t: &usize| columns.iter().map(|f| within(*t, *f)).collect();
@@ -250,7 +269,10 @@ impl Count {
             return;
         };
         let error = tracked.velocity - velocity;
-        let inverse = tracked.velocity_covariance.try_inverse().unwrap_or_default();
+        let inverse = tracked
+            .velocity_covariance
+            .try_inverse()
+            .unwrap_or_default();
         self.moving_pairs += 1;
         self.velocity_m2_s2 += error.norm_squared();
         self.heading_rad2 += wrap_angle(tracked.yaw_rad - truth.yaw_rad).powi(2);
@@ -323,14 +345,20 @@ mod tests {
         let scans = vec![scan(&[truth(1, 20.0)], &[]); 5];
         let errors = object_errors(&scans, &ObjectOptions::default());
         assert_eq!((errors.objects, errors.required, errors.matched), (1, 3, 0));
-        let hidden = TrueObject { is_seen: false, ..truth(1, 20.0) };
+        let hidden = TrueObject {
+            is_seen: false,
+            ..truth(1, 20.0)
+        };
         let scans = vec![scan(&[hidden], &[]); 5];
         assert_eq!(object_errors(&scans, &ObjectOptions::default()).required, 0);
     }
 
     #[test]
     fn a_pair_is_kept_while_it_fits_and_another_identity_is_a_switch() {
-        let options = ObjectOptions { min_scans: 1, ..ObjectOptions::default() };
+        let options = ObjectOptions {
+            min_scans: 1,
+            ..ObjectOptions::default()
+        };
         let scans = [
             scan(&[truth(1, 20.0)], &[tracked(5, 21.0)]),
             // A nearer one comes, and is false as long as the first one fits.
@@ -338,7 +366,10 @@ mod tests {
             scan(&[truth(1, 20.0)], &[tracked(6, 20.0)]),
         ];
         let errors = object_errors(&scans, &options);
-        assert_eq!((errors.matched, errors.false_positives, errors.switches), (3, 1, 1));
+        assert_eq!(
+            (errors.matched, errors.false_positives, errors.switches),
+            (3, 1, 1)
+        );
         assert!((errors.mota - (1.0 - 2.0 / 3.0)).abs() < 1e-12, "{errors}");
         assert!((errors.velocity_rmse_mps - 1.0).abs() < 1e-12);
         assert!((errors.velocity_nees - 0.5).abs() < 1e-12);
@@ -347,12 +378,21 @@ mod tests {
 
     #[test]
     fn what_is_there_but_not_required_excuses_and_what_is_far_too() {
-        let options = ObjectOptions { min_scans: 1, ..ObjectOptions::default() };
-        let walker = TrueObject { is_vehicle: false, ..truth(2, -20.0) };
+        let options = ObjectOptions {
+            min_scans: 1,
+            ..ObjectOptions::default()
+        };
+        let walker = TrueObject {
+            is_vehicle: false,
+            ..truth(2, -20.0)
+        };
         let found = [tracked(1, -21.0), tracked(2, 70.0), tracked(3, 20.0)];
         let errors = object_errors(&[scan(&[walker], &found)], &options);
         assert_eq!((errors.required, errors.false_positives), (0, 1));
-        let standing = TrackedObject { moving: false, ..tracked(3, 20.0) };
+        let standing = TrackedObject {
+            moving: false,
+            ..tracked(3, 20.0)
+        };
         let errors = object_errors(&[scan(&[], &[standing])], &options);
         assert_eq!(errors.false_positives, 0);
     }

@@ -10,7 +10,8 @@ use crate::traffic::RoadUser;
 /// The file beside the scans.
 pub(crate) const FILE: &str = "objects.csv";
 /// The first row of the file. Poses and velocities are in the world of `ground_truth.tum`.
-const HEADER: &str = "scan,stamp_ns,object,kind,x_m,y_m,yaw_rad,vx_m_s,vy_m_s,length_m,width_m,visible,counts";
+const HEADER: &str =
+    "scan,stamp_ns,object,kind,x_m,y_m,yaw_rad,vx_m_s,vy_m_s,length_m,width_m,visible,counts";
 
 /// `objects.csv` as bytes: the road users within 100 m at the time of each scan.
 pub(crate) fn csv(simulator: &Simulator, stamps_ns: impl Iterator<Item = i64>) -> Vec<u8> {
@@ -27,7 +28,15 @@ fn write_row(text: &mut String, scan: usize, stamp_ns: i64, user: &RoadUser) {
     let [x, y, yaw] = xy_yaw(&user.pose);
     let (velocity, [length, width]) = (user.velocity, user.size_m);
     // Writing to memory cannot fail.
-    let _ = write!(text, "{scan},{stamp_ns},{},{},{x:.4},{y:.4},{yaw:.6},", user.object, user.kind);
-    let _ = write!(text, "{:.4},{:.4},{length:.2},{width:.2},", velocity.x, velocity.y);
+    let _ = write!(
+        text,
+        "{scan},{stamp_ns},{},{},{x:.4},{y:.4},{yaw:.6},",
+        user.object, user.kind
+    );
+    let _ = write!(
+        text,
+        "{:.4},{:.4},{length:.2},{width:.2},",
+        velocity.x, velocity.y
+    );
     let _ = writeln!(text, "{:.4},{:.1}", user.visible, user.counts);
 }

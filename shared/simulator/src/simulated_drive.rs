@@ -169,7 +169,10 @@ impl SimulatedDrive {
             truth::azimuth_poses_npy(&self.simulator),
         ));
         let stamps_ns = (0..self.scans()).map(|index| self.stamp_ns(index));
-        files.push((objects::FILE.into(), objects::csv(&self.simulator, stamps_ns)));
+        files.push((
+            objects::FILE.into(),
+            objects::csv(&self.simulator, stamps_ns),
+        ));
         files.extend(
             self.gyro_samples()
                 .map(|samples| (log::FILE.into(), log::csv(&samples))),

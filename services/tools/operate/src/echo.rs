@@ -11,8 +11,8 @@ use clap::{Args, ValueEnum};
 use gyre_geometry::xy_yaw;
 use gyre_messages::{
     Correction, CorrectionHeader, Fix, FixHeader, Loop, LoopHeader, Masked, Message, Motion,
-    MotionEstimate, MotionHeader, Objects, ObjectsHeader, Pose, PoseHeader, Refined, Rotation, Scan,
-    fix_status,
+    MotionEstimate, MotionHeader, Objects, ObjectsHeader, Pose, PoseHeader, Refined, Rotation,
+    Scan, fix_status,
 };
 use gyre_stage::{
     StageError,

@@ -238,7 +238,8 @@ impl Configuration {
             return Err(value("points", reason));
         }
         if self.objects.is_on() {
-            let reason = "points.capacity is 0, but objects are made of points: it must be 1 or more";
+            let reason =
+                "points.capacity is 0, but objects are made of points: it must be 1 or more";
             return Err(value("points", reason));
         }
         Ok(())

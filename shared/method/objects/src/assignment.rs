@@ -24,7 +24,9 @@ pub fn assign(costs: &[Vec<Option<f64>>]) -> Vec<Option<usize>> {
     // A row of its own for each track that gets nothing: rows must not exceed columns.
     let rows = costs.iter().map(|row| {
         let pairs = row.iter().map(|cost| cost.map_or(2 * none, scaled));
-        pairs.chain(std::iter::repeat_n(none, costs.len())).collect::<Vec<i64>>()
+        pairs
+            .chain(std::iter::repeat_n(none, costs.len()))
+            .collect::<Vec<i64>>()
     });
     let Ok(matrix) = Matrix::from_rows(rows) else {
         return vec![None; costs.len()];

@@ -40,9 +40,8 @@ fn are_neighbours(a: &Return, b: &Return) -> bool {
     let apart = b.at - a.at;
     let along_m = apart.dot(&a.direction);
     let across_m = apart.perp(&a.direction);
-    let e = |k: &str, d: f64| std::env::var(k).ok().and_then(|v| v.parse().ok()).unwrap_or(d);
-    let across = e("EX", ACROSS_M) + ACROSS_RAD * a.range_m;
-    (along_m / e("EL", ALONG_M)).powi(2) + (across_m / across).powi(2) <= 1.0
+    let across = ACROSS_M + ACROSS_RAD * a.range_m;
+    (along_m / ALONG_M).powi(2) + (across_m / across).powi(2) <= 1.0
 }
 
 /// A cluster as one measurement.
@@ -69,10 +68,18 @@ impl Measurement {
     pub fn of(returns: &[Return], members: &[u32]) -> Self {
         let mut sum = [0.0; 6];
         for found in members.iter().map(|member| &returns[*member as usize]) {
-            let (weight, at, ray) = (found.weight, found.at, found.direction * found.range_m);
-            let values = [1.0, at.x, at.y, found.time_s, found.doppler_s, found.range_m];
-            sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += weight * value);
-            debug_assert!(ray.norm() > 0.0);
+            let (weight, at) = (found.weight, found.at);
+            let values = [
+                1.0,
+                at.x,
+                at.y,
+                found.time_s,
+                found.doppler_s,
+                found.range_m,
+            ];
+            sum.iter_mut()
+                .zip(values)
+                .for_each(|(sum, value)| *sum += weight * value);
         }
         let [weight, x, y, time_s, doppler_s, range_m] = sum;
         let first = members.first().map(|member| &returns[*member as usize]);
@@ -85,10 +92,7 @@ impl Measurement {
             .or(first.map(|found| found.direction))
             .unwrap_or_else(Vector2::x);
         let centroid = Point2::new(x, y) / weight;
-        let at = match std::env::var_os("EM") {
-            None => centroid + middle(returns, members, &centroid, &direction),
-            Some(_) => centroid,
-        };
+        let at = centroid + middle(returns, members, &centroid, &direction);
         Self {
             at,
             time_s: time_s / weight,
@@ -111,7 +115,9 @@ fn middle(
 ) -> Vector2<f64> {
     let side = Vector2::new(-direction.y, direction.x);
     let middle = |axis: &Vector2<f64>| {
-        let along = members.iter().map(|member| (returns[*member as usize].at - place).dot(axis));
+        let along = members
+            .iter()
+            .map(|member| (returns[*member as usize].at - place).dot(axis));
         let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), at| {
             (low.min(at), high.max(at))
         });

@@ -30,7 +30,7 @@ pub struct ObjectsConfig {
     /// Scans that are remembered, at most 32. A vehicle of 4.5 m at walking pace leaves its place
     /// within them. Default 20: five seconds.
     pub memory_scans: u32,
-    /// Scans in which a place must have been in view before what appears there is new. Default 4.
+    /// Scans in which a place must have been in view before what appears there is new. Default 2.
     pub min_views: u32,
     /// Share of these scans with a return at a place, from which on it belongs to what stands.
     /// Default 0.2: weak edges of buildings return in every third to fifth scan.
@@ -73,7 +73,7 @@ impl Default for ObjectsConfig {
             kind: ObjectsKind::None,
             max_range_m: 70.0,
             memory_scans: 20,
-            min_views: 4,
+            min_views: 2,
             standing_share: 0.2,
             range_sigma_m: 0.4,
             bearing_sigma_deg: 0.6,
@@ -121,9 +121,19 @@ impl ObjectsConfig {
         };
         let sigma = (1e-3, 100.0);
         setting("max_range_m", self.max_range_m, (5.0, 120.0), "5 to 120")?;
-        setting("memory_scans", self.memory_scans.into(), (4.0, 32.0), "4 to 32")?;
+        setting(
+            "memory_scans",
+            self.memory_scans.into(),
+            (4.0, 32.0),
+            "4 to 32",
+        )?;
         setting("min_views", self.min_views.into(), (1.0, 32.0), "1 to 32")?;
-        setting("standing_share", self.standing_share, (0.01, 1.0), "0.01 to 1")?;
+        setting(
+            "standing_share",
+            self.standing_share,
+            (0.01, 1.0),
+            "0.01 to 1",
+        )?;
         for (key, value) in [
             ("range_sigma_m", self.range_sigma_m),
             ("bearing_sigma_deg", self.bearing_sigma_deg),
@@ -153,9 +163,27 @@ mod tests {
     fn the_defaults_are_within_their_bounds_and_the_first_fault_is_named() {
         assert_eq!(ObjectsConfig::default().validate(), Ok(()));
         for (faulty, key) in [
-            (ObjectsConfig { memory_scans: 33, ..ObjectsConfig::default() }, "memory_scans"),
-            (ObjectsConfig { coast_s: f64::NAN, ..ObjectsConfig::default() }, "coast_s"),
-            (ObjectsConfig { birth_scans: 2, ..ObjectsConfig::default() }, "birth_scans"),
+            (
+                ObjectsConfig {
+                    memory_scans: 33,
+                    ..ObjectsConfig::default()
+                },
+                "memory_scans",
+            ),
+            (
+                ObjectsConfig {
+                    coast_s: f64::NAN,
+                    ..ObjectsConfig::default()
+                },
+                "coast_s",
+            ),
+            (
+                ObjectsConfig {
+                    birth_scans: 2,
+                    ..ObjectsConfig::default()
+                },
+                "birth_scans",
+            ),
         ] {
             assert_eq!(faulty.validate().map_err(|error| error.key), Err(key));
         }

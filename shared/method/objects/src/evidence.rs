@@ -17,9 +17,9 @@ const CELL_M: f64 = 0.5;
 const SIDE: i32 = 512;
 /// Distance to the ends of the range within which a place is not reliably in view, m.
 const EDGE_M: f64 = 1.0;
-/// The last scans, as bits, in which a vehicle may have been at the place that it has now: one of
-/// 5 m that is faster than 7 m/s.
-const OWN_SCANS: u32 = 0b111;
+/// The last scans in which a vehicle may have been at the place that it has now: one of 5 m that is
+/// faster than 7 m/s. At the start of a drive, half of the scans.
+const OWN_SCANS: u32 = 3;
 /// The range below which points are not extracted, m.
 const NEAREST_M: f64 = 5.0;
 
@@ -90,7 +90,8 @@ impl Evidence {
             hits |= self.hits_around(&centre);
         }
         // What came a moment ago may be the same object.
-        let views = views & !OWN_SCANS;
+        let own = OWN_SCANS.min(self.sensors.len() as u32 / 2);
+        let views = views & (u32::MAX << own);
         History {
             views: views.count_ones(),
             hits: (hits & views).count_ones(),
@@ -162,13 +163,13 @@ impl Evidence {
         let stands = |step: &usize| {
             let at = sensor + ray * ((NEAREST_M + *step as f64 * CELL_M) / range_m);
             let (hits, views) = (self.hits(cell_at(&at)), self.views(&at));
-            let share = f64::from((hits & views).count_ones()) / f64::from(views.count_ones().max(1));
+            let share =
+                f64::from((hits & views).count_ones()) / f64::from(views.count_ones().max(1));
             share >= min_share
         };
         (0..steps).filter(stands).count() as u32
     }
 
-    pub fn scan(&self) -> u32 { self.scan }
     /// Forgets all scans.
     pub fn clear(&mut self) {
         self.cells.fill(Cell::default());
@@ -216,8 +217,14 @@ mod tests {
         }
         assert_eq!(evidence.history(&wall), History { views: 8, hits: 8 });
         assert_eq!(evidence.history(&car), History { views: 8, hits: 1 });
-        assert_eq!(evidence.history(&at(20.0, -9.0)), History { views: 8, hits: 0 });
-        assert_eq!(evidence.history(&at(80.0, 0.0)), History { views: 0, hits: 0 });
+        assert_eq!(
+            evidence.history(&at(20.0, -9.0)),
+            History { views: 8, hits: 0 }
+        );
+        assert_eq!(
+            evidence.history(&at(80.0, 0.0)),
+            History { views: 0, hits: 0 }
+        );
         // Across the beam a return may lie two standard deviations beside the place.
         let beside = wall.at + Vector2::new(-3.0, 20.0).normalize() * 0.6;
         assert_eq!(evidence.history(&at(beside.x, beside.y)).hits, 8);
@@ -229,7 +236,10 @@ mod tests {
     fn a_cell_that_stands_for_another_place_after_a_way_of_256_m_has_no_hits() {
         let mut evidence = Evidence::new(8, 70.0, 0.01);
         evidence.add(Point2::origin(), [at(20.0, 3.0)].iter());
-        let far = Return { range_m: 20.0, ..at(276.0, 3.0) };
+        let far = Return {
+            range_m: 20.0,
+            ..at(276.0, 3.0)
+        };
         assert_eq!(index(cell_at(&far.at)), index(cell_at(&at(20.0, 3.0).at)));
         assert_eq!(evidence.history(&far).hits, 0);
     }
@@ -240,7 +250,8 @@ mod tests {
         for _ in 0..8 {
             evidence.add(Point2::origin(), [at(20.25, 0.25)].iter());
         }
-        let between = |x| evidence.standing_between(&Point2::origin(), &Point2::new(x, 0.2), 2.0, 0.5);
+        let between =
+            |x| evidence.standing_between(&Point2::origin(), &Point2::new(x, 0.2), 2.0, 0.5);
         assert_eq!((between(40.0), between(18.0)), (1, 0));
     }
 }

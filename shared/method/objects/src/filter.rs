@@ -51,7 +51,9 @@ impl Filter {
         covariance.fixed_view_mut::<2, 2>(0, 0).copy_from(&position);
         let both = -by_velocity * variance;
         covariance.fixed_view_mut::<2, 2>(0, 2).copy_from(&both);
-        covariance.fixed_view_mut::<2, 2>(2, 0).copy_from(&both.transpose());
+        covariance
+            .fixed_view_mut::<2, 2>(2, 0)
+            .copy_from(&both.transpose());
         Self {
             state: Vector4::new(at.x, at.y, 0.0, 0.0),
             covariance,
@@ -96,10 +98,18 @@ impl Filter {
         let power = heading * heading.transpose() * along + side * side.transpose() * across;
         let mut noise = Matrix4::zeros();
         let block = |factor: f64| power * factor;
-        noise.fixed_view_mut::<2, 2>(0, 0).copy_from(&block(dt_s.powi(4) / 4.0));
-        noise.fixed_view_mut::<2, 2>(0, 2).copy_from(&block(dt_s.powi(3) / 2.0));
-        noise.fixed_view_mut::<2, 2>(2, 0).copy_from(&block(dt_s.powi(3) / 2.0));
-        noise.fixed_view_mut::<2, 2>(2, 2).copy_from(&block(dt_s.powi(2)));
+        noise
+            .fixed_view_mut::<2, 2>(0, 0)
+            .copy_from(&block(dt_s.powi(4) / 4.0));
+        noise
+            .fixed_view_mut::<2, 2>(0, 2)
+            .copy_from(&block(dt_s.powi(3) / 2.0));
+        noise
+            .fixed_view_mut::<2, 2>(2, 0)
+            .copy_from(&block(dt_s.powi(3) / 2.0));
+        noise
+            .fixed_view_mut::<2, 2>(2, 2)
+            .copy_from(&block(dt_s.powi(2)));
         self.state = step * self.state;
         self.covariance = step * self.covariance * step.transpose() + noise;
     }
@@ -113,8 +123,12 @@ impl Filter {
         noise: &Matrix2<f64>,
     ) -> Innovation {
         let mut jacobian = Matrix2x4::zeros();
-        jacobian.fixed_view_mut::<2, 2>(0, 0).copy_from(&Matrix2::identity());
-        jacobian.fixed_view_mut::<2, 2>(0, 2).copy_from(&by_velocity(measured));
+        jacobian
+            .fixed_view_mut::<2, 2>(0, 0)
+            .copy_from(&Matrix2::identity());
+        jacobian
+            .fixed_view_mut::<2, 2>(0, 2)
+            .copy_from(&by_velocity(measured));
         Innovation {
             difference: at.coords - jacobian * self.state,
             covariance: jacobian * self.covariance * jacobian.transpose() + noise,
@@ -137,7 +151,6 @@ impl Filter {
         self.covariance =
             rest * self.covariance * rest.transpose() + gain * innovation.noise * gain.transpose();
     }
-
 }
 
 /// The change of a measured place by the velocity: it is seen at its own time, and lengthened or

@@ -50,7 +50,11 @@ pub(crate) fn place(
     returns.clear();
     for point in points.iter().filter(|point| point.weight > 0.0) {
         let there = point.deskewed(&scan.twist);
-        let sensor = scan.twist.chord_pose_at(point.time_s.into()).translation.vector;
+        let sensor = scan
+            .twist
+            .chord_pose_at(point.time_s.into())
+            .translation
+            .vector;
         let ray = there.coords - sensor;
         let range_m = ray.norm();
         if !(range_m > 0.0 && range_m <= max_range_m) {

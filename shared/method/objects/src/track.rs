@@ -16,8 +16,9 @@ use crate::{Object, ObjectsConfig};
 const HEADING_MPS: f64 = 1.0;
 /// Share of the scans in which an object is seen.
 const SEEN_SHARE: f64 = 0.8;
-/// The score from which on a track is an object: clutter reaches it once in ten thousand tracks.
-const CONFIRM_SCORE: f64 = 9.2;
+/// The score from which on a track is an object. By 9.2 one track of clutter in ten thousand would
+/// pass if its clusters were independent; those of a hedge come back from scan to scan.
+const CONFIRM_SCORE: f64 = 16.0;
 /// Scans of which the places of its returns are kept, and how many places of each.
 const TRAIL_SCANS: usize = 5;
 const TRAIL_POINTS: usize = 8;
@@ -26,6 +27,10 @@ const LEFT_M: f64 = 1.0;
 /// Share of the places that an object has left, and of those that clutter has, where something is
 /// seen.
 const TAKEN: [f64; 2] = [0.1, 0.5];
+/// The largest loss of the score by one cluster: an object that brakes is one still.
+const LARGEST_LOSS: f64 = -2.0;
+/// Mean weights of the clusters of objects and of clutter, in the simulator's streets.
+const WEIGHTS: [f64; 2] = [4.0, 1.0];
 /// The largest score.
 const MAX_SCORE: f64 = 20.0;
 /// Difference of the velocities of two ends of one object, m/s.
@@ -118,7 +123,9 @@ impl Track {
     ) -> Point2<f64> {
         let known = (&self.filter.position(), &self.filter.velocity());
         let outline = Extent::outline(returns, members, known, &self.heading);
-        let centre = self.extent.centre(&outline, &self.heading, &measured.direction);
+        let centre = self
+            .extent
+            .centre(&outline, &self.heading, &measured.direction);
         let away_mps = measured.direction.dot(known.1);
         known.0
             + centre
@@ -142,9 +149,9 @@ impl Track {
         let innovation = self.filter.innovation(measured, &at, noise);
         self.filter.update(&innovation);
         let expected = TAU * innovation.covariance.determinant().max(1e-9).sqrt() * clutter_per_m2;
-        let gain = (SEEN_SHARE / expected).ln() - 0.5 * innovation.chi_square() + strength(measured.weight);
-        let e = |k: &str, d: f64| std::env::var(k).ok().and_then(|v| v.parse().ok()).unwrap_or(d);
-        self.score = (self.score + gain.max(e("EG", -2.0))).min(MAX_SCORE);
+        let gain = (SEEN_SHARE / expected).ln() - 0.5 * innovation.chi_square()
+            + strength(measured.weight);
+        self.score = (self.score + gain.max(LARGEST_LOSS)).min(MAX_SCORE);
         self.leave(returns, members);
         self.unseen_s = 0.0;
         self.hits = self.hits.saturating_add(1);
@@ -162,7 +169,10 @@ impl Track {
     /// Notes where its returns are.
     pub fn leave(&mut self, returns: &[Return], members: &[u32]) {
         let step = members.len().div_ceil(TRAIL_POINTS);
-        let places = members.iter().step_by(step.max(1)).map(|member| returns[*member as usize].at);
+        let places = members
+            .iter()
+            .step_by(step.max(1))
+            .map(|member| returns[*member as usize].at);
         self.trail.push_front(places.collect());
         self.trail.truncate(TRAIL_SCANS);
     }
@@ -183,10 +193,9 @@ impl Track {
         });
         if count >= 2 {
             let share = taken as f64 / f64::from(count);
-            let e = |k: &str, d: f64| std::env::var(k).ok().and_then(|v| v.parse().ok()).unwrap_or(d);
             let gain = share * (TAKEN[0] / TAKEN[1]).ln()
                 + (1.0 - share) * ((1.0 - TAKEN[0]) / (1.0 - TAKEN[1])).ln();
-            self.score = (self.score + e("ET", 2.0) * gain).min(MAX_SCORE);
+            self.score = (self.score + gain).min(MAX_SCORE);
         }
     }
 
@@ -194,7 +203,8 @@ impl Track {
     /// its outline, before it is that of its returns.
     pub fn has_heading(&self) -> bool {
         let (speed_mps, sigma_mps) = self.filter.speed();
-        self.is_confirmed() || std::env::var_os("EH").is_none() && self.hits > 2 && speed_mps > HEADING_MPS + 2.0 * sigma_mps
+        let is_sure = speed_mps > HEADING_MPS + 2.0 * sigma_mps;
+        self.is_confirmed() || (self.hits > 2 && is_sure)
     }
 
     /// Returns whether it has come to its end.
@@ -203,8 +213,7 @@ impl Track {
         match self.is_confirmed() {
             true => self.unseen_s > config.coast_s || self.score < 0.0,
             false => {
-                self.score < 0.0 && self.age > 1
-                    || missed > config.birth_scans - config.birth_hits
+                self.score < 0.0 && self.age > 1 || missed > config.birth_scans - config.birth_hits
             }
         }
     }
@@ -215,7 +224,10 @@ impl Track {
         let (speed_mps, sigma_mps) = self.filter.speed();
         let excess = speed_mps - config.standing_mps;
         self.moving = excess > config.moving_sigmas * sigma_mps;
-        self.moving && !self.is_confirmed() && self.hits >= config.birth_hits && self.score > std::env::var("ES").ok().and_then(|v| v.parse().ok()).unwrap_or(CONFIRM_SCORE)
+        self.moving
+            && !self.is_confirmed()
+            && self.hits >= config.birth_hits
+            && self.score > CONFIRM_SCORE
     }
 
     /// Makes it an object: from now on it is a box whose near end is seen.
@@ -249,9 +261,8 @@ impl Track {
 /// Logarithm of the likelihood of the weight of a cluster if it is of an object, over that if it
 /// is clutter: both are exponentially distributed.
 fn strength(weight: f64) -> f64 {
-    let e = |k: &str, d: f64| std::env::var(k).ok().and_then(|v| v.parse().ok()).unwrap_or(d);
-    let [object, clutter] = [e("EO", 4.0), 1.0];
-    (((clutter / object) as f64).ln() + weight * (1.0 / clutter - 1.0 / object)).min(2.0)
+    let [object, clutter] = WEIGHTS;
+    ((clutter / object).ln() + weight * (1.0 / clutter - 1.0 / object)).min(2.0)
 }
 
 impl Track {
@@ -261,7 +272,8 @@ impl Track {
         let apart = other.filter.position() - self.filter.position();
         let side = Vector2::new(-self.heading.y, self.heading.x);
         let [length_m, width_m] = self.extent.size_m;
-        let reach_m = 0.5 * length_m + 0.5 * other.extent.size_m[0] * f64::from(u8::from(other.is_confirmed()));
+        let reach_m = 0.5 * length_m
+            + 0.5 * other.extent.size_m[0] * f64::from(u8::from(other.is_confirmed()));
         let faster = other.filter.velocity() - self.filter.velocity();
         apart.dot(&self.heading).abs() < reach_m.max(length_m)
             && apart.dot(&side).abs() < width_m

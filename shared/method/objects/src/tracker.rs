@@ -66,7 +66,8 @@ impl ObjectTracker {
         self.remember(scan, &claims);
         self.judge();
         self.objects.clear();
-        self.objects.extend(self.tracks.iter().filter_map(Track::object));
+        self.objects
+            .extend(self.tracks.iter().filter_map(Track::object));
         &self.objects
     }
 
@@ -85,7 +86,9 @@ impl ObjectTracker {
             match dt_s > 0.0 && dt_s <= MAX_GAP_S {
                 true => {
                     let config = &self.config;
-                    self.tracks.iter_mut().for_each(|track| track.predict(dt_s, config));
+                    self.tracks
+                        .iter_mut()
+                        .for_each(|track| track.predict(dt_s, config));
                 }
                 false => self.restart(),
             }
@@ -102,15 +105,23 @@ impl ObjectTracker {
     /// Returns for each return the track of the moving object whose it is. What stands for most of
     /// the time is nobody's.
     fn claim(&self, shares: &[f64]) -> Vec<Option<usize>> {
-        let moving: Vec<(usize, &Track)> =
-            self.tracks.iter().enumerate().filter(|(_, track)| track.is_moving()).collect();
+        let moving: Vec<(usize, &Track)> = self
+            .tracks
+            .iter()
+            .enumerate()
+            .filter(|(_, track)| track.is_moving())
+            .collect();
         let claim = |(found, share): (&Return, &f64)| {
             if *share >= self.config.standing_share {
                 return None;
             }
-            let distances = moving.iter().map(|(index, track)| (*index, track.distance(found)));
+            let distances = moving
+                .iter()
+                .map(|(index, track)| (*index, track.distance(found)));
             let nearest = distances.min_by(|a, b| a.1.total_cmp(&b.1));
-            nearest.filter(|(_, distance)| *distance <= 1.0).map(|(index, _)| index)
+            nearest
+                .filter(|(_, distance)| *distance <= 1.0)
+                .map(|(index, _)| index)
         };
         self.returns.iter().zip(shares).map(claim).collect()
     }
@@ -144,10 +155,9 @@ impl ObjectTracker {
             .iter()
             .map(|members| Measurement::of(&self.returns, members))
             .collect();
-        let e = |k: &str, d: f64| std::env::var(k).ok().and_then(|v| v.parse().ok()).unwrap_or(d);
         let centres: Vec<Point2<f64>> = measured
             .iter()
-            .filter(|it| it.weight >= e("EC", 0.1))
+            .filter(|it| it.weight >= NEGLIGIBLE_WEIGHT)
             .map(|it| it.at)
             .collect();
         for (index, members) in own.iter().enumerate() {
@@ -176,7 +186,9 @@ impl ObjectTracker {
                 clutter,
             );
         }
-        (0..found.len()).filter(|cluster| is_left[*cluster]).collect()
+        (0..found.len())
+            .filter(|cluster| is_left[*cluster])
+            .collect()
     }
 
     /// The cost of each cluster for a track; `None` outside of its gate.
@@ -186,16 +198,18 @@ impl ObjectTracker {
         found: &[Members],
         measured: &[Measurement],
     ) -> Vec<Option<f64>> {
-        let e = |k: &str, d: f64| std::env::var(k).ok().and_then(|v| v.parse().ok()).unwrap_or(d);
         let cost = |(members, measured): (&Members, &Measurement)| {
-            if measured.weight < e("EC", 0.1) {
+            if measured.weight < NEGLIGIBLE_WEIGHT {
                 return None;
             }
             let at = match track.has_heading() {
                 true => track.measured_centre(&self.returns, members, measured),
                 false => measured.at,
             };
-            let innovation = track.filter.innovation(measured, &at, &self.noise(measured, track.is_confirmed()));
+            let innovation =
+                track
+                    .filter
+                    .innovation(measured, &at, &self.noise(measured, track.is_confirmed()));
             (innovation.chi_square() <= GATE).then(|| innovation.cost())
         };
         found.iter().zip(measured).map(cost).collect()
@@ -203,10 +217,9 @@ impl ObjectTracker {
 
     /// Returns whether a cluster can begin a track.
     fn is_strong(&self, measured: &Measurement) -> bool {
-        let e = |k: &str, d: f64| std::env::var(k).ok().and_then(|v| v.parse().ok()).unwrap_or(d);
         measured.returns >= self.config.min_returns
-            && measured.weight >= e("EW", 0.8)
-            && measured.range_m >= e("ER", 8.0)
+            && measured.weight >= MIN_WEIGHT
+            && measured.range_m >= OWN_M
     }
 
     /// The covariance of a cluster's position, m².
@@ -214,8 +227,8 @@ impl ObjectTracker {
         let along = measured.direction;
         let across = nalgebra::Vector2::new(-along.y, along.x);
         let bearing_m = self.config.bearing_sigma_deg.to_radians() * measured.range_m;
-        let e = |k: &str, d: f64| std::env::var(k).ok().and_then(|v| v.parse().ok()).unwrap_or(d);
-        let range = self.config.range_sigma_m.powi(2) + if known { 0.0 } else { e("EN", 0.7f64).powi(2) };
+        let range =
+            self.config.range_sigma_m.powi(2) + if known { 0.0 } else { UNKNOWN_CENTRE_M.powi(2) };
         // Across as along there are scatterers that come and go.
         along * along.transpose() * range
             + across * across.transpose() * (range + bearing_m.powi(2))
@@ -230,7 +243,11 @@ impl ObjectTracker {
             if !self.is_strong(&measured) {
                 continue;
             }
-            if self.evidence.standing_between(&sensor, &measured.at, 3.0, 0.6) >= MIRROR_CELLS {
+            if self
+                .evidence
+                .standing_between(&sensor, &measured.at, 3.0, 0.6)
+                >= MIRROR_CELLS
+            {
                 continue;
             }
             let noise = self.noise(&measured, false);
@@ -270,17 +287,32 @@ impl ObjectTracker {
     /// Adds the scan to what was seen, but for moving objects.
     fn remember(&mut self, scan: &PlacedScan, claims: &[Option<usize>]) {
         let sensor = Point2::from(scan.pose.translation.vector);
-        let standing = self.returns.iter().zip(claims).filter(|(_, claim)| claim.is_none());
+        let standing = self
+            .returns
+            .iter()
+            .zip(claims)
+            .filter(|(_, claim)| claim.is_none());
         self.evidence.add(sensor, standing.map(|(found, _)| found));
     }
 }
 
+/// Weight of a cluster that begins a track, and of one that counts at all: a return of full weight
+/// is 30 dB above the threshold of the masks.
+const MIN_WEIGHT: f64 = 0.8;
+const NEGLIGIBLE_WEIGHT: f64 = 0.1;
+/// Range within which no track begins, m: there the vehicle sees itself.
+const OWN_M: f64 = 8.0;
+/// Standard deviation of the centre of an object whose outline is not known yet, m.
+const UNKNOWN_CENTRE_M: f64 = 0.6;
 /// Radius around a cluster in which others are counted, m.
 const CLUTTER_M: f64 = 20.0;
 
 /// The density of clusters around a place, which one may be the object's own, 1/m².
 fn clutter_per_m2(centres: &[Point2<f64>], place: &Point2<f64>) -> f64 {
-    let near = centres.iter().filter(|at| (*at - place).norm() < CLUTTER_M).count();
+    let near = centres
+        .iter()
+        .filter(|at| (*at - place).norm() < CLUTTER_M)
+        .count();
     near.max(1) as f64 / (std::f64::consts::PI * CLUTTER_M * CLUTTER_M)
 }
 

@@ -14,8 +14,20 @@ const DOPPLER_S: f64 = 0.046;
 
 /// Returns of a car relative to its centre, along its heading and across it, m.
 const OUTLINE: [(f64, f64); 14] = [
-    (2.2, -0.9), (2.2, 0.0), (2.2, 0.9), (1.1, -0.9), (1.1, 0.9), (0.0, -0.9), (0.0, 0.9),
-    (-1.1, -0.9), (-1.1, 0.9), (-2.2, -0.9), (-2.2, 0.0), (-2.2, 0.9), (0.5, 0.0), (-0.5, 0.0),
+    (2.2, -0.9),
+    (2.2, 0.0),
+    (2.2, 0.9),
+    (1.1, -0.9),
+    (1.1, 0.9),
+    (0.0, -0.9),
+    (0.0, 0.9),
+    (-1.1, -0.9),
+    (-1.1, 0.9),
+    (-2.2, -0.9),
+    (-2.2, 0.0),
+    (-2.2, 0.9),
+    (0.5, 0.0),
+    (-0.5, 0.0),
 ];
 
 /// A car by its returns.
@@ -73,10 +85,15 @@ impl Scene {
         let placed = PlacedScan {
             stamp_ns: (self.time_s() * 1e9) as i64,
             pose: self.sensor(0.0),
-            twist: Twist { vx_mps: self.sensor_mps, ..Twist::default() },
+            twist: Twist {
+                vx_mps: self.sensor_mps,
+                ..Twist::default()
+            },
         };
-        let points: Vec<SparsePoint> =
-            points.iter().filter_map(|(at, velocity)| self.measured(at, velocity)).collect();
+        let points: Vec<SparsePoint> = points
+            .iter()
+            .filter_map(|(at, velocity)| self.measured(at, velocity))
+            .collect();
         self.scan += 1;
         self.tracker.update(&placed, &points).to_vec()
     }
@@ -98,7 +115,13 @@ impl Scene {
         let closing = -(velocity - Vector2::new(self.sensor_mps, 0.0)).dot(&seen.coords) / range_m;
         let shown = seen.coords * (1.0 - DOPPLER_S * closing / range_m);
         (5.0..80.0).contains(&range_m).then(|| {
-            SparsePoint::from([shown.x as f32, shown.y as f32, time_s as f32, 1.0, DOPPLER_S as f32])
+            SparsePoint::from([
+                shown.x as f32,
+                shown.y as f32,
+                time_s as f32,
+                1.0,
+                DOPPLER_S as f32,
+            ])
         })
     }
 }
@@ -115,7 +138,10 @@ fn settled() -> Scene {
 #[test]
 fn what_stands_is_no_object_from_a_vehicle_that_moves() {
     let mut scene = settled();
-    let parked = Car { at: Point2::new(60.0, 5.0), velocity: Vector2::zeros() };
+    let parked = Car {
+        at: Point2::new(60.0, 5.0),
+        velocity: Vector2::zeros(),
+    };
     for _ in 0..40 {
         assert!(scene.step(&[parked]).iter().all(|object| !object.moving));
     }
@@ -126,7 +152,10 @@ fn an_oncoming_car_is_tracked_from_its_third_scan_without_bias_of_time_and_doppl
     let mut scene = settled();
     // Straight ahead, where the sweep begins and ends: its two sides are seen a quarter of a second
     // apart.
-    let car = Car { at: Point2::new(140.0, 0.5), velocity: Vector2::new(-12.0, 0.0) };
+    let car = Car {
+        at: Point2::new(140.0, 0.5),
+        velocity: Vector2::new(-12.0, 0.0),
+    };
     let mut seen = 0;
     let mut last = None;
     for _ in 0..14 {
@@ -134,7 +163,20 @@ fn an_oncoming_car_is_tracked_from_its_third_scan_without_bias_of_time_and_doppl
         let ahead_m = centre.x - scene.sensor(0.0).translation.x;
         let objects = scene.step(&[car]);
         seen += i32::from(ahead_m < 65.0);
-        eprintln!("{ahead_m:.1} {centre:.2?} {:?}", objects.iter().map(|o| (o.id, o.position.x, o.position.y, o.velocity.x, o.length_m, o.age)).collect::<Vec<_>>());
+        eprintln!(
+            "{ahead_m:.1} {centre:.2?} {:?}",
+            objects
+                .iter()
+                .map(|o| (
+                    o.id,
+                    o.position.x,
+                    o.position.y,
+                    o.velocity.x,
+                    o.length_m,
+                    o.age
+                ))
+                .collect::<Vec<_>>()
+        );
         if seen > 3 {
             assert_eq!(objects.len(), 1, "{ahead_m} m");
             let object = objects[0];
@@ -144,7 +186,10 @@ fn an_oncoming_car_is_tracked_from_its_third_scan_without_bias_of_time_and_doppl
         if seen > 6 {
             let object = objects[0];
             assert!((object.velocity - car.velocity).norm() < 0.8, "{object:?}");
-            assert!((object.position - centre).norm() < 1.0, "{object:?} at {centre}");
+            assert!(
+                (object.position - centre).norm() < 1.0,
+                "{object:?} at {centre}"
+            );
             assert!((object.yaw_rad.abs() - PI).abs() < 0.1, "{object:?}");
         }
     }
@@ -154,7 +199,10 @@ fn an_oncoming_car_is_tracked_from_its_third_scan_without_bias_of_time_and_doppl
 #[test]
 fn a_hidden_car_keeps_its_identity_and_ends_when_it_stays_hidden() {
     let mut scene = settled();
-    let car = Car { at: Point2::new(15.0, 4.0), velocity: Vector2::new(10.0, 0.0) };
+    let car = Car {
+        at: Point2::new(15.0, 4.0),
+        velocity: Vector2::new(10.0, 0.0),
+    };
     let before = (0..8).map(|_| scene.step(&[car])).next_back().unwrap();
     assert_eq!(before.len(), 1);
     (0..3).for_each(|_| assert_eq!(scene.step(&[])[0].id, before[0].id));
@@ -166,10 +214,20 @@ fn a_hidden_car_keeps_its_identity_and_ends_when_it_stays_hidden() {
 #[test]
 fn an_image_behind_a_wall_is_not_born_and_the_same_in_the_open_is() {
     let tracked = |is_open: bool| {
-        let mut scene = Scene { is_open, ..Scene::new() };
-        let image = Car { at: Point2::new(-10.0, 24.0), velocity: Vector2::new(9.0, 0.0) };
+        let mut scene = Scene {
+            is_open,
+            ..Scene::new()
+        };
+        let image = Car {
+            at: Point2::new(-10.0, 24.0),
+            velocity: Vector2::new(9.0, 0.0),
+        };
         (0..20).for_each(|scan| {
-            scene.step(if scan < 10 { &[] } else { std::slice::from_ref(&image) });
+            scene.step(if scan < 10 {
+                &[]
+            } else {
+                std::slice::from_ref(&image)
+            });
         });
         scene.step(&[image]).len()
     };
@@ -179,12 +237,24 @@ fn an_image_behind_a_wall_is_not_born_and_the_same_in_the_open_is() {
 #[test]
 fn a_gap_in_time_ends_all_tracks_and_identities_are_not_given_again() {
     let mut scene = settled();
-    let car = Car { at: Point2::new(15.0, 4.0), velocity: Vector2::new(10.0, 0.0) };
+    let car = Car {
+        at: Point2::new(15.0, 4.0),
+        velocity: Vector2::new(10.0, 0.0),
+    };
     let first = (0..8).map(|_| scene.step(&[car])).next_back().unwrap()[0].id;
     scene.scan += 40;
     assert_eq!(scene.step(&[car]), []);
-    let car = Car { at: car.at - Vector2::new(1.0, 0.0) * 2.0 * scene.time_s(), velocity: Vector2::new(12.0, 0.0) };
-    let again = (0..12).map(|scan| scene.step(if scan < 6 { &[] } else { std::slice::from_ref(&car) }));
+    let car = Car {
+        at: car.at - Vector2::new(1.0, 0.0) * 2.0 * scene.time_s(),
+        velocity: Vector2::new(12.0, 0.0),
+    };
+    let again = (0..12).map(|scan| {
+        scene.step(if scan < 6 {
+            &[]
+        } else {
+            std::slice::from_ref(&car)
+        })
+    });
     let again = again.last().unwrap();
     assert!(again.iter().all(|object| object.id > first), "{again:?}");
 }

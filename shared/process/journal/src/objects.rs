@@ -68,7 +68,8 @@ impl Record for LoggedObjects {
             return None;
         }
         let objects = objects.chunks_exact(size_of::<FixedObject>());
-        let object = |bytes: &[u8]| Object::from(&bytemuck::pod_read_unaligned::<FixedObject>(bytes));
+        let object =
+            |bytes: &[u8]| Object::from(&bytemuck::pod_read_unaligned::<FixedObject>(bytes));
         Some(Self {
             seq: fixed.seq,
             scan: fixed.scan,

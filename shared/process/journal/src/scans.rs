@@ -154,7 +154,8 @@ impl Scans {
     /// Takes the memory for scans of up to so many points: none is allocated for each.
     pub fn reserve(&mut self, points: usize) {
         self.points.reserve(points);
-        self.log.reserve(size_of::<Fixed>() + points * size_of::<SparsePoint>());
+        self.log
+            .reserve(size_of::<Fixed>() + points * size_of::<SparsePoint>());
     }
 
     /// Appends the scan of the next pose, before that is journalled.
@@ -240,6 +241,9 @@ mod tests {
         assert_eq!(reader.refresh().unwrap(), 3);
         assert_eq!(complete_scans(out.path(), 9).unwrap(), 3);
         let missing = Scans::open(out.path(), 5, false).map(drop).unwrap_err();
-        assert!(missing.to_string().contains("has 3 scans of 5 poses"), "{missing}");
+        assert!(
+            missing.to_string().contains("has 3 scans of 5 poses"),
+            "{missing}"
+        );
     }
 }

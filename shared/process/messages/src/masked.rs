@@ -45,7 +45,10 @@ impl Message for Masked {
 
     /// In a run with SLAM pose-integration reads the points of keyframes.
     fn sizes(window: &Window) -> TopicSizes {
-        window.queues(Self::HISTORY, Self::READERS + usize::from(window.logs_points()))
+        window.queues(
+            Self::HISTORY,
+            Self::READERS + usize::from(window.logs_points()),
+        )
     }
 
     fn max_elements(limits: &Limits) -> usize {

@@ -10,7 +10,8 @@ mod recorded;
 use std::{collections::BTreeSet, fs, os::fd::BorrowedFd, path::PathBuf, time::Duration};
 
 use gyre_messages::{
-    Correction, Fix, Loop, Masked, Message, Motion, Objects, Pose, Refined, Rotation, Scan, StageId, Topic,
+    Correction, Fix, Loop, Masked, Message, Motion, Objects, Pose, Refined, Rotation, Scan,
+    StageId, Topic,
 };
 use gyre_run::RestartPolicy;
 use gyre_stage::{

@@ -77,9 +77,14 @@ pub fn evaluate(run: &Path, truth: &Path) -> Result<ObjectErrors, Failure> {
     for row in &poses {
         let Some(sensor) = true_poses.near(row.stamp_ns, Trajectory::ROUNDING_NS) else {
             let truth = folder.display();
-            return Err(format!("{truth} has no pose at {} ns, a scan of the run: name the recording that was run", row.stamp_ns).into());
+            return Err(format!(
+                "{truth} has no pose at {} ns, a scan of the run: name the recording that was run",
+                row.stamp_ns
+            )
+            .into());
         };
-        let near = row.stamp_ns - Trajectory::ROUNDING_NS..=row.stamp_ns + Trajectory::ROUNDING_NS;
+        let rounding_ns = Trajectory::ROUNDING_NS.cast_signed();
+        let near = row.stamp_ns - rounding_ns..=row.stamp_ns + rounding_ns;
         let there = true_objects.range(near).flat_map(|(_, rows)| rows);
         let found = tracked.get(&row.scan).into_iter().flatten();
         let own = pose(row.x_m, row.y_m, row.yaw_rad).inverse();
@@ -102,7 +107,9 @@ fn files(truth: &Path) -> (PathBuf, PathBuf) {
 fn rows<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>, Failure> {
     let file = gyre_storage::open(path)
         .map_err(|error| format!("cannot read {}: {error}", path.display()))?;
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(file);
+    let mut reader = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .from_reader(file);
     let rows: Result<Vec<T>, csv::Error> = reader.deserialize().collect();
     rows.map_err(|error| format!("{}: {error}", path.display()).into())
 }

@@ -34,13 +34,27 @@ fn write_object(rows: &mut String, object: &Object) -> fmt::Result {
     write!(rows, "{}", object.id)?;
     let (at, velocity) = (object.position, object.velocity);
     let [length_m, width_m] = [object.length_m, object.width_m];
-    for value in [at.x, at.y, object.yaw_rad, velocity.x, velocity.y, length_m, width_m] {
+    for value in [
+        at.x,
+        at.y,
+        object.yaw_rad,
+        velocity.x,
+        velocity.y,
+        length_m,
+        width_m,
+    ] {
         write!(rows, ",{value:.4}")?;
     }
     write!(rows, ",{},{}", u8::from(object.moving), object.age)?;
     let (position, velocity) = (object.position_covariance, object.velocity_covariance);
-    for value in [position.m11, position.m12, position.m22, velocity.m11, velocity.m12, velocity.m22]
-    {
+    for value in [
+        position.m11,
+        position.m12,
+        position.m22,
+        velocity.m11,
+        velocity.m12,
+        velocity.m22,
+    ] {
         write!(rows, ",{value:.6}")?;
     }
     writeln!(rows)

@@ -69,7 +69,11 @@ impl Traffic {
 
 /// The number of a body.
 fn number(moving: &Moving<'_>) -> u32 {
-    moving.body.scatterers.first().map_or(FIRST_BODY, |scatterer| scatterer.body)
+    moving
+        .body
+        .scatterers
+        .first()
+        .map_or(FIRST_BODY, |scatterer| scatterer.body)
 }
 
 impl Observer<'_> {
@@ -86,7 +90,9 @@ impl Observer<'_> {
             let there = scatterer.moved(&moving.pose);
             let ray = self.place - there.position;
             let range_m = ray.norm().max(1.0);
-            let walls = self.world.transmission(self.place, there.position, own, 1e-4);
+            let walls = self
+                .world
+                .transmission(self.place, there.position, own, 1e-4);
             let others = all.clone().filter(|other| number(other) != own);
             let passed = others.fold(walls, |passed, other| {
                 passed * self.passed(other, &there.position)

@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use gyre_messages::{
-    Correction, Fix, GivenAnew, Item, Loop, Masked, Message, Motion, Objects, Pose, Refined, Rotation, Scan,
+    Correction, Fix, GivenAnew, Item, Loop, Masked, Message, Motion, Objects, Pose, Refined,
+    Rotation, Scan,
 };
 
 use super::{Next, ObservedRun, Observer};

@@ -3,8 +3,8 @@
 use std::{fs, rc::Rc, time::Duration};
 
 use gyre_messages::{
-    Correction, Fix, Footprint, Loop, Masked, Message, Motion, Objects, Pose, Refined, Rotation, Scan,
-    Topic, flag, topics,
+    Correction, Fix, Footprint, Loop, Masked, Message, Motion, Objects, Pose, Refined, Rotation,
+    Scan, Topic, flag, topics,
 };
 
 use super::{Run, WINDOW, reader, send, writer};

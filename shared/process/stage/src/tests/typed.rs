@@ -4,8 +4,8 @@
 use std::fmt;
 
 use gyre_messages::{
-    Correction, Element, Fix, Header, Item, Loop, Masked, Message, Motion, Objects, Pose, PoseHeader,
-    Refined, Rotation, Scan,
+    Correction, Element, Fix, Header, Item, Loop, Masked, Message, Motion, Objects, Pose,
+    PoseHeader, Refined, Rotation, Scan,
 };
 use iceoryx2::{
     port::update_connections::UpdateConnections,
