@@ -6,6 +6,7 @@ mod full_disk;
 mod gyro;
 mod identity;
 mod killed_stages;
+mod objects;
 mod power_failure;
 mod results;
 mod shared_memory;

@@ -210,16 +210,17 @@ mod tests {
     fn a_place_has_the_views_and_hits_of_the_remembered_scans() {
         let mut evidence = Evidence::new(8, 70.0, 0.01);
         let (wall, car) = (at(20.0, 3.0), at(-15.0, 8.0));
+        // The last three scans do not count.
         for scan in 0..12 {
             let seen = [wall, car];
             let seen = &seen[..if scan == 6 { 2 } else { 1 }];
             evidence.add(Point2::origin(), seen.iter());
         }
-        assert_eq!(evidence.history(&wall), History { views: 8, hits: 8 });
-        assert_eq!(evidence.history(&car), History { views: 8, hits: 1 });
+        assert_eq!(evidence.history(&wall), History { views: 5, hits: 5 });
+        assert_eq!(evidence.history(&car), History { views: 5, hits: 1 });
         assert_eq!(
             evidence.history(&at(20.0, -9.0)),
-            History { views: 8, hits: 0 }
+            History { views: 5, hits: 0 }
         );
         assert_eq!(
             evidence.history(&at(80.0, 0.0)),
@@ -227,7 +228,7 @@ mod tests {
         );
         // Across the beam a return may lie two standard deviations beside the place.
         let beside = wall.at + Vector2::new(-3.0, 20.0).normalize() * 0.6;
-        assert_eq!(evidence.history(&at(beside.x, beside.y)).hits, 8);
+        assert_eq!(evidence.history(&at(beside.x, beside.y)).hits, 5);
         evidence.clear();
         assert_eq!(evidence.history(&wall), History { views: 0, hits: 0 });
     }

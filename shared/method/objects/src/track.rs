@@ -22,8 +22,8 @@ const CONFIRM_SCORE: f64 = 16.0;
 /// Scans of which the places of its returns are kept, and how many places of each.
 const TRAIL_SCANS: usize = 5;
 const TRAIL_POINTS: usize = 8;
-/// Distance from its outline at which it has left a place, m: two cells.
-const LEFT_M: f64 = 1.0;
+/// Distance from all of its returns at which it has left a place, m: beyond the neighbouring cells.
+const LEFT_M: f64 = 2.0;
 /// Share of the places that an object has left, and of those that clutter has, where something is
 /// seen.
 const TAKEN: [f64; 2] = [0.1, 0.5];
@@ -180,14 +180,12 @@ impl Track {
     /// Looks at what is now where it was: behind an object the way is free, while a surface that
     /// has come into view, scan by scan, stays.
     pub fn look_back(&mut self, evidence: &Evidence) {
-        let side = Vector2::new(-self.heading.y, self.heading.x);
-        let [length_m, width_m] = self.extent.size_m;
-        let has_left = |place: &&Point2<f64>| {
-            let from = *place - self.filter.position();
-            from.dot(&self.heading).abs() > 0.5 * length_m + LEFT_M
-                || from.dot(&side).abs() > 0.5 * width_m + LEFT_M
+        let Some(now) = self.trail.front().filter(|_| self.unseen_s == 0.0) else {
+            return;
         };
-        let left = self.trail.iter().flatten().filter(has_left);
+        let before = self.trail.iter().skip(1);
+        let has_left = |place: &&Point2<f64>| now.iter().all(|at| (at - *place).norm() > LEFT_M);
+        let left = before.flatten().filter(has_left);
         let (count, taken) = left.fold((0, 0), |(count, taken), place| {
             (count + 1, taken + usize::from(evidence.is_occupied(place)))
         });
@@ -213,7 +211,8 @@ impl Track {
         match self.is_confirmed() {
             true => self.unseen_s > config.coast_s || self.score < 0.0,
             false => {
-                self.score < 0.0 && self.age > 1 || missed > config.birth_scans - config.birth_hits
+                self.score < LARGEST_LOSS && self.age > 1
+                    || missed > config.birth_scans - config.birth_hits
             }
         }
     }
@@ -250,11 +249,6 @@ impl Track {
             position_covariance: self.filter.position_covariance(),
             velocity_covariance: self.filter.velocity_covariance(),
         })
-    }
-
-    /// Returns the heading, a unit vector.
-    pub fn heading(&self) -> &Vector2<f64> {
-        &self.heading
     }
 }
 

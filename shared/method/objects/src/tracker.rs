@@ -1,7 +1,9 @@
 //! The tracker: the whole method on one page.
 
+use std::f64::consts::PI;
+
 use gyre_geometry::SparsePoint;
-use nalgebra::{Matrix2, Point2};
+use nalgebra::{Matrix2, Point2, Vector2};
 
 use crate::assignment::assign;
 use crate::clusters::{Measurement, Members, clusters};
@@ -12,6 +14,9 @@ use crate::{Object, ObjectsConfig, ObjectsError};
 
 /// Chi-square of two degrees of freedom that one cluster in a thousand of its own track exceeds.
 const GATE: f64 = 13.8;
+/// Share of the last scans in which something was seen from which on a return stands, and belongs to
+/// no object: half. Where an object is expected less is new than elsewhere.
+const OWN_SHARE: f64 = 0.5;
 /// Time between two scans beyond which all tracks end, s.
 const MAX_GAP_S: f64 = 2.0;
 
@@ -112,7 +117,7 @@ impl ObjectTracker {
             .filter(|(_, track)| track.is_moving())
             .collect();
         let claim = |(found, share): (&Return, &f64)| {
-            if *share >= self.config.standing_share {
+            if *share >= OWN_SHARE {
                 return None;
             }
             let distances = moving
@@ -225,7 +230,7 @@ impl ObjectTracker {
     /// The covariance of a cluster's position, m².
     fn noise(&self, measured: &Measurement, known: bool) -> Matrix2<f64> {
         let along = measured.direction;
-        let across = nalgebra::Vector2::new(-along.y, along.x);
+        let across = Vector2::new(-along.y, along.x);
         let bearing_m = self.config.bearing_sigma_deg.to_radians() * measured.range_m;
         let range =
             self.config.range_sigma_m.powi(2) + if known { 0.0 } else { UNKNOWN_CENTRE_M.powi(2) };
@@ -313,7 +318,7 @@ fn clutter_per_m2(centres: &[Point2<f64>], place: &Point2<f64>) -> f64 {
         .iter()
         .filter(|at| (*at - place).norm() < CLUTTER_M)
         .count();
-    near.max(1) as f64 / (std::f64::consts::PI * CLUTTER_M * CLUTTER_M)
+    near.max(1) as f64 / (PI * CLUTTER_M * CLUTTER_M)
 }
 
 /// Cells of what stands on the way to a cluster that make it a mirror image.
