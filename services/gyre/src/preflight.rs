@@ -12,7 +12,7 @@ use gyre_radar_replay::{Listing, Player};
 use gyre_run::{MOST_OPEN_FILES, PlayedFrom, Side, SourceKind};
 use gyre_samples::{GyroKind, MAX_SAMPLES};
 use gyre_stage::run::free_shared_memory;
-use gyre_terminal::Failure;
+use gyre_terminal::{Failure, print};
 use rustix::process::{Resource, getrlimit};
 use thiserror::Error;
 
@@ -155,7 +155,15 @@ pub(crate) struct Scans {
 
 impl Scans {
     fn of_recording(configuration: &Configuration) -> Result<Self, Failure> {
-        let Played { dataset, truth, .. } = open(configuration)?;
+        let Played {
+            dataset,
+            samples,
+            truth,
+            ..
+        } = open(configuration)?;
+        for fault in samples.faults() {
+            print::note(fault);
+        }
         let count = configuration.source.stream_len(dataset.as_ref());
         if let Some(scans @ 0..2) = count {
             return Err(PreflightError::TooFew {

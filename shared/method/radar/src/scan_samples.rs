@@ -9,7 +9,7 @@ use gyre_samples::{
 use crate::{
     WheelLog,
     dataset::{Dataset, Format},
-    gyro_log::{GyroLog, LogError, SampleTrack},
+    gyro_log::{GyroLog, LogError, LogFaults, SampleTrack},
 };
 
 /// The samples of other sensors that come with the scans of a dataset: by their stamps alone.
@@ -18,7 +18,12 @@ pub enum ScanSamples {
     /// There are none.
     None,
     /// From logs.
-    Log(SampleTrack),
+    Log {
+        /// The samples.
+        track: SampleTrack,
+        /// A sentence for each kind of fault in a log, with its path.
+        faults: Vec<String>,
+    },
     /// With the scans of the recording of a run, whatever their stamps: those of these kinds.
     Recorded(Vec<SampleKind>),
 }
@@ -70,7 +75,7 @@ impl ScanSamples {
         dataset: &dyn Dataset,
     ) -> Result<Self, LogError> {
         let track = SampleTrack::new(log, config);
-        Self::of_track(track, (SampleKind::Gyro, &log.path), dataset)
+        Self::of_track(track, (SampleKind::Gyro, &log.path), &log.faults, dataset)
     }
 
     /// Takes the samples of the log of the wheels.
@@ -82,14 +87,25 @@ impl ScanSamples {
         config: &WheelsConfig,
         dataset: &dyn Dataset,
     ) -> Result<Self, LogError> {
-        Self::of_track(log.track(config), (SampleKind::Wheels, &log.path), dataset)
+        let track = log.track(config);
+        Self::of_track(track, (SampleKind::Wheels, &log.path), &log.faults, dataset)
     }
 
     /// Joins the samples of two logs.
     #[must_use]
     pub fn and(self, other: Self) -> Self {
         match (self, other) {
-            (Self::Log(one), Self::Log(other)) => Self::Log(one.and(other)),
+            (
+                Self::Log { track, mut faults },
+                Self::Log {
+                    track: other,
+                    faults: more,
+                },
+            ) => {
+                faults.extend(more);
+                let track = track.and(other);
+                Self::Log { track, faults }
+            }
             (Self::None, other) => other,
             (one, _) => one,
         }
@@ -110,6 +126,7 @@ impl ScanSamples {
     fn of_track(
         track: SampleTrack,
         (of, path): (SampleKind, &Path),
+        faults: &LogFaults,
         dataset: &dyn Dataset,
     ) -> Result<Self, LogError> {
         let last = dataset.len().saturating_sub(1);
@@ -124,7 +141,17 @@ impl ScanSamples {
                 after_s: (span_ns[0] - first_ns) as f64 * 1e-9,
             });
         }
-        Ok(Self::Log(track))
+        let named = |sentence| format!("{}: {sentence}", path.display());
+        let faults = faults.sentences().into_iter().map(named).collect();
+        Ok(Self::Log { track, faults })
+    }
+
+    /// Returns a sentence for each kind of fault in the logs, as of samples that are left out.
+    pub fn faults(&self) -> &[String] {
+        match self {
+            Self::Log { faults, .. } => faults,
+            _ => &[],
+        }
     }
 
     /// Returns the samples that come with the scan that was read last, in the order of
@@ -139,7 +166,7 @@ impl ScanSamples {
                     samples => samples.iter().copied().filter(is_used).collect(),
                 }
             }
-            Self::Log(track) => {
+            Self::Log { track, .. } => {
                 let [after_ns, until_ns] = interval_of(span_ns);
                 Cow::Borrowed(track.between(after_ns, until_ns))
             }
