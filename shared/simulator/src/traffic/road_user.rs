@@ -14,25 +14,25 @@ use crate::world::World;
 /// A road user at an instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RoadUser {
-    /// Its number in the drive, from 0.
+    /// The number in the drive, from 0.
     pub object: u32,
     /// `car`, `van`, `lorry`, `bus`, `cyclist` or `pedestrian`.
     pub kind: &'static str,
     /// The pose of its centre in the world, x ahead.
     pub pose: Pose,
-    /// Its velocity in the world, m/s.
+    /// The velocity in the world, m/s.
     pub velocity: Vector2<f64>,
-    /// Its length and width, m.
+    /// Length and width, m.
     pub size_m: [f64; 2],
     /// Two-way share of the power that buildings and other road users let pass to the part of it
     /// that is seen best: 0 (hidden) to 1 (in the open).
     pub visible: f64,
-    /// Its strongest echo as a scan shows it, counts of half a decibel, in clear weather and
+    /// The strongest echo as a scan shows it, counts of half a decibel, in clear weather and
     /// without scintillation, speckle and the height of the beam.
     pub counts: f64,
 }
 
-/// What sees a road user.
+/// The sensor that sees a road user, and what may be in the way.
 pub struct Observer<'a> {
     /// The standing world.
     pub world: &'a World,
@@ -116,7 +116,7 @@ impl Observer<'_> {
 }
 
 impl Kind {
-    /// Its name.
+    /// Returns the name.
     fn name(self) -> &'static str {
         match self {
             Self::Car => "car",
