@@ -16,7 +16,7 @@ use serde::Serialize;
 /// A true object at the time of a scan, in the frame of the sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrueObject {
-    /// Its identity.
+    /// The identity.
     pub id: u64,
     /// Centre, m.
     pub position: Point2<f64>,
@@ -33,7 +33,7 @@ pub struct TrueObject {
 /// A tracked object at the time of a scan, in the frame of the sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackedObject {
-    /// Its identity.
+    /// The identity.
     pub id: u64,
     /// Centre, m.
     pub position: Point2<f64>,

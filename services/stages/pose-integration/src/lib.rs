@@ -1,8 +1,8 @@
 //! The pose-integration stage: composes motions and their covariances to poses, and journals each
 //! pose before it is published.
 //!
-//! With SLAM it also selects the keyframes, and logs each of them before its pose is journalled; with
-//! objects it logs each scan.
+//! With SLAM it also selects the keyframes, and logs each of them before its pose is journalled;
+//! with objects it logs each scan.
 
 use std::path::PathBuf;
 

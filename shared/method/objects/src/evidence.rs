@@ -20,6 +20,10 @@ const EDGE_M: f64 = 1.0;
 /// The last scans in which a vehicle may have been at the place that it has now: one of 5 m that is
 /// faster than 7 m/s. At the start of a drive, half of the scans.
 const OWN_SCANS: u32 = 3;
+/// Distance before an object within which what stands does not hide it, m: a car is 5 m long.
+const CLEAR_M: f64 = 3.0;
+/// Share of the views with a return in a cell of what stands: a firm wall returns in most scans.
+const STANDING_SHARE: f64 = 0.6;
 /// The range below which points are not extracted, m.
 const NEAREST_M: f64 = 5.0;
 
@@ -148,26 +152,20 @@ impl Evidence {
         }
     }
 
-    /// Returns how many cells along the way from the sensor to a place, but for its last
-    /// `clear_m`, belong to what stands.
-    pub fn standing_between(
-        &self,
-        sensor: &Point2<f64>,
-        place: &Point2<f64>,
-        clear_m: f64,
-        min_share: f64,
-    ) -> u32 {
+    /// Returns whether something that stands is on the way from the sensor to a place, and not just
+    /// before it.
+    pub fn is_behind_standing(&self, sensor: &Point2<f64>, place: &Point2<f64>) -> bool {
         let ray = place - sensor;
         let range_m = ray.norm();
-        let steps = ((range_m - clear_m - NEAREST_M) / CELL_M).max(0.0) as usize;
-        let stands = |step: &usize| {
-            let at = sensor + ray * ((NEAREST_M + *step as f64 * CELL_M) / range_m);
+        let steps = ((range_m - CLEAR_M - NEAREST_M) / CELL_M).max(0.0) as usize;
+        let stands = |step: usize| {
+            let at = sensor + ray * ((NEAREST_M + step as f64 * CELL_M) / range_m);
             let (hits, views) = (self.hits(cell_at(&at)), self.views(&at));
             let share =
                 f64::from((hits & views).count_ones()) / f64::from(views.count_ones().max(1));
-            share >= min_share
+            share >= STANDING_SHARE
         };
-        (0..steps).filter(stands).count() as u32
+        (0..steps).any(stands)
     }
 
     /// Forgets all scans.
@@ -251,8 +249,7 @@ mod tests {
         for _ in 0..8 {
             evidence.add(Point2::origin(), [at(20.25, 0.25)].iter());
         }
-        let between =
-            |x| evidence.standing_between(&Point2::origin(), &Point2::new(x, 0.2), 2.0, 0.5);
-        assert_eq!((between(40.0), between(18.0)), (1, 0));
+        let is_behind = |x| evidence.is_behind_standing(&Point2::origin(), &Point2::new(x, 0.2));
+        assert!(is_behind(40.0) && !is_behind(18.0) && !is_behind(22.0));
     }
 }

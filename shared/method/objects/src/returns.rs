@@ -22,7 +22,7 @@ pub(crate) struct Return {
     pub at: Point2<f64>,
     /// Unit vector from the sensor to it.
     pub direction: Vector2<f64>,
-    /// Its range, m.
+    /// Range, m.
     pub range_m: f64,
     /// Time of its azimuth relative to the scan's, s.
     pub time_s: f64,

@@ -14,8 +14,8 @@ use crate::{Object, ObjectsConfig, ObjectsError};
 
 /// Chi-square of two degrees of freedom that one cluster in a thousand of its own track exceeds.
 const GATE: f64 = 13.8;
-/// Share of the last scans in which something was seen from which on a return stands, and belongs to
-/// no object: half. Where an object is expected less is new than elsewhere.
+/// Share of the last scans with something at a place from which on a return there stands, and
+/// belongs to no object. Where an object is expected, more is taken for new than elsewhere.
 const OWN_SHARE: f64 = 0.5;
 /// Time between two scans beyond which all tracks end, s.
 const MAX_GAP_S: f64 = 2.0;
@@ -248,11 +248,7 @@ impl ObjectTracker {
             if !self.is_strong(&measured) {
                 continue;
             }
-            if self
-                .evidence
-                .standing_between(&sensor, &measured.at, 3.0, 0.6)
-                >= MIRROR_CELLS
-            {
+            if self.evidence.is_behind_standing(&sensor, &measured.at) {
                 continue;
             }
             let noise = self.noise(&measured, false);
@@ -320,6 +316,3 @@ fn clutter_per_m2(centres: &[Point2<f64>], place: &Point2<f64>) -> f64 {
         .count();
     near.max(1) as f64 / (PI * CLUTTER_M * CLUTTER_M)
 }
-
-/// Cells of what stands on the way to a cluster that make it a mirror image.
-const MIRROR_CELLS: u32 = 4;

@@ -70,8 +70,8 @@ impl Scene {
     fn step(&mut self, cars: &[Car]) -> Vec<Object> {
         let mut points = Vec::new();
         for post in 0..150 {
-            let x = -100.0 + 2.0 * f64::from(post);
-            for y in [-15.0, 15.0] {
+            let x = -99.8 + 2.0 * f64::from(post);
+            for y in [-15.2, 15.2] {
                 if y < 0.0 || !self.is_open {
                     let still = Vector2::zeros();
                     (0..4).for_each(|k| {

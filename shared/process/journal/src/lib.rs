@@ -1,5 +1,6 @@
 //! The files that a run goes on from after a death or a power failure: the journal of its poses;
-//! with SLAM its [`keyframes`]; with objects its [`scans`], and the [`objects`] in each; and the [`checkpoint`] of its refinement.
+//! with SLAM its [`keyframes`]; with objects its [`scans`], and the [`objects`] in each; and the
+//! [`checkpoint`] of its refinement.
 //!
 //! The journal is a file of poses, each with its motion and a checksum, from which all results of a
 //! run are made. Each record is one `write`, before its pose is published. A record that is cut

@@ -56,8 +56,8 @@ struct PoseRow {
     yaw_rad: f64,
 }
 
-/// Compares the `objects.csv` of a run with that of the simulated recording in `truth`, in the frame
-/// of the sensor: by the run's own poses, and the recording's `ground_truth.tum`.
+/// Compares the `objects.csv` of a run with that of the simulated recording in `truth`, in the
+/// frame of the sensor: by the run's own poses, and the recording's `ground_truth.tum`.
 ///
 /// # Errors
 /// A file that cannot be read, or whose times are not those of the other.

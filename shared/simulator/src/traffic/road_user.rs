@@ -14,13 +14,13 @@ use crate::world::World;
 /// A road user at an instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RoadUser {
-    /// The number in the drive, from 0.
+    /// Number in the drive, from 0.
     pub object: u32,
     /// `car`, `van`, `lorry`, `bus`, `cyclist` or `pedestrian`.
     pub kind: &'static str,
-    /// The pose of its centre in the world, x ahead.
+    /// The pose of the centre in the world, x ahead.
     pub pose: Pose,
-    /// The velocity in the world, m/s.
+    /// Velocity in the world, m/s.
     pub velocity: Vector2<f64>,
     /// Length and width, m.
     pub size_m: [f64; 2],
@@ -32,7 +32,7 @@ pub struct RoadUser {
     pub counts: f64,
 }
 
-/// The sensor that sees a road user, and what may be in the way.
+/// A sensor that sees road users.
 pub struct Observer<'a> {
     /// The standing world.
     pub world: &'a World,
