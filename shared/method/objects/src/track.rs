@@ -185,7 +185,7 @@ impl Track {
         };
         let before = self.trail.iter().skip(1);
         let has_left = |place: &&Point2<f64>| now.iter().all(|at| (at - *place).norm() > LEFT_M);
-        let left = before.flatten().filter(has_left);
+        let left = self.trail.iter().skip(1).flatten().filter(has_left);
         let (count, taken) = left.fold((0, 0), |(count, taken), place| {
             (count + 1, taken + usize::from(evidence.is_occupied(place)))
         });

@@ -1,0 +1,106 @@
+"""`gyre evaluate --objects` against motmetrics."""
+
+import json
+import math
+import random
+from pathlib import Path
+
+import motmetrics  # type: ignore[import-untyped]
+import pytest
+from conftest import gyre_program
+
+SCANS, GATE_M = 40, 4.0
+TRUE = "scan,stamp_ns,object,kind,x_m,y_m,yaw_rad,vx_m_s,vy_m_s,length_m,width_m,visible,counts"
+TRACKED = (
+    "scan,stamp_ns,object,x_m,y_m,yaw_rad,vx_m_s,vy_m_s,length_m,width_m,moving,age,"
+    "cov_xx,cov_xy,cov_yy,cov_vxvx,cov_vxvy,cov_vyvy"
+)
+Places = dict[int, tuple[float, float]]
+
+
+def drawn(seed: int) -> list[tuple[Places, Places]]:
+    """True and tracked places by identity, scan by scan: some are missed, some false, some change their identity.
+
+    Near an object that is not required yet, in its first two scans, nothing is tracked.
+    """
+    draw = random.Random(seed)
+    ways = {number: (draw.uniform(-40, 40), draw.uniform(-40, 40), draw.uniform(3, 9)) for number in range(8)}
+    names = {number: 100 + number for number in ways}
+    seen: dict[int, int] = {}
+    scans = []
+    for scan in range(SCANS):
+        true = {number: (x + speed * 0.25 * scan - 20, y) for number, (x, y, speed) in ways.items()}
+        true = {number: place for number, place in true.items() if math.hypot(*place) < 50}
+        for number in true:
+            seen[number] = seen.get(number, 0) + 1
+        for number in list(names):
+            if draw.random() < 0.03:
+                names[number] = 1000 * (scan + 1) + number
+        found = {
+            names[number]: (x + draw.gauss(0, 1.5), y + draw.gauss(0, 1.5))
+            for number, (x, y) in true.items()
+            if draw.random() < 0.85
+        }
+        for number in range(draw.randrange(3)):
+            found[5000 + 10 * scan + number] = (draw.uniform(-40, 40), draw.uniform(-40, 40))
+        early = [place for number, place in true.items() if seen[number] < 3]
+        found = {
+            number: place for number, place in found.items() if all(math.dist(place, other) > GATE_M for other in early)
+        }
+        scans.append((true, found))
+    return scans
+
+
+def write(folder: Path, scans: list[tuple[Places, Places]]) -> tuple[Path, Path]:
+    """Writes a run and a recording with these objects; the sensor stands, and sees all of them."""
+    run, recording = folder / "run", folder / "recording"
+    run.mkdir()
+    recording.mkdir()
+    poses, truth, tracked, tum = ["scan,stamp_ns,x_m,y_m,yaw_rad"], [TRUE], [TRACKED], []
+    for scan, (true, found) in enumerate(scans):
+        at = 1_547_132_400_000_000_000 + 250_000_000 * scan
+        poses.append(f"{scan},{at},0,0,0")
+        tum.append(f"{at // 10**9}.{at % 10**9:09d} 0 0 0 0 0 0 1")
+        truth += [f"{scan},{at},{i},car,{x!r},{y!r},0,5,0,4.3,1.8,1,100" for i, (x, y) in true.items()]
+        tracked += [
+            f"{scan},{at},{i},{x!r},{y!r},0,5,0,4.3,1.8,1,9,1,0,1,1,0,1" for i, (x, y) in found.items()
+        ]
+    for file, lines in [
+        (run / "poses.csv", poses),
+        (run / "objects.csv", tracked),
+        (recording / "objects.csv", truth),
+        (recording / "ground_truth.tum", tum),
+    ]:
+        file.write_text("\n".join(lines) + "\n")
+    return run, recording
+
+
+def judged(scans: list[tuple[Places, Places]]) -> dict[str, float]:
+    """The figures of motmetrics; an object is required from its third scan on."""
+    seen: dict[int, int] = {}
+    accumulator = motmetrics.MOTAccumulator(auto_id=True)
+    for true, found in scans:
+        for number in true:
+            seen[number] = seen.get(number, 0) + 1
+        required = {number: place for number, place in true.items() if seen[number] >= 3}
+        distances = [
+            [d if (d := math.dist(a, b)) <= GATE_M else math.nan for b in found.values()] for a in required.values()
+        ]
+        accumulator.update(list(required), list(found), distances)
+    names = ["num_objects", "num_detections", "num_false_positives", "num_switches", "mota", "precision", "recall"]
+    return dict(motmetrics.metrics.create().compute(accumulator, metrics=names).iloc[0])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_figures_are_those_of_motmetrics(seed: int, tmp_path: Path) -> None:
+    scans = drawn(seed)
+    run, recording = write(tmp_path, scans)
+    ours = json.loads(gyre_program("evaluate", "--objects", run, recording, "--json"))
+    theirs = judged(scans)
+    assert theirs["num_switches"] > 0 and theirs["num_false_positives"] > 0
+    assert ours["required"] == theirs["num_objects"]
+    assert ours["matched"] == theirs["num_detections"]
+    assert ours["false_positives"] == theirs["num_false_positives"]
+    assert ours["switches"] == theirs["num_switches"]
+    for name in ("mota", "precision", "recall"):
+        assert ours[name] == pytest.approx(theirs[name], abs=1e-9)
