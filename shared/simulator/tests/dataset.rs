@@ -29,7 +29,28 @@ fn generate(config: &SimulationConfig) -> tempfile::TempDir {
 fn same_configuration_writes_the_same_bytes() {
     let (first, second) = (generate(&config(4)), generate(&config(4)));
     assert_eq!(all_files(first.path()), all_files(second.path()));
-    assert_eq!(all_files(first.path()).len(), 4 + 6);
+    assert_eq!(all_files(first.path()).len(), 4 + 7);
+}
+
+#[test]
+fn the_true_road_users_are_where_their_velocities_take_them() {
+    let simulator = Simulator::new(&config(40)).unwrap();
+    let (mut moved, mut hidden) = (0, 0);
+    for scan in 0..39 {
+        let later = simulator.road_users(scan + 1);
+        for user in simulator.road_users(scan) {
+            assert!((0.0..=1.0).contains(&user.visible) && user.counts >= 0.0);
+            hidden += usize::from(user.visible < 0.1);
+            let Some(next) = later.iter().find(|next| next.object == user.object) else {
+                continue;
+            };
+            let way = next.pose.translation.vector - user.pose.translation.vector;
+            let mean = (user.velocity + next.velocity) * 0.5;
+            assert!((way / 0.25 - mean).norm() < 0.3, "{user:?} to {next:?}");
+            moved += usize::from(mean.norm() > 2.0);
+        }
+    }
+    assert!(moved > 20 && hidden > 20, "{moved} {hidden}");
 }
 
 #[test]
