@@ -183,7 +183,6 @@ impl Track {
         let Some(now) = self.trail.front().filter(|_| self.unseen_s == 0.0) else {
             return;
         };
-        let before = self.trail.iter().skip(1);
         let has_left = |place: &&Point2<f64>| now.iter().all(|at| (at - *place).norm() > LEFT_M);
         let left = self.trail.iter().skip(1).flatten().filter(has_left);
         let (count, taken) = left.fold((0, 0), |(count, taken), place| {
