@@ -67,13 +67,16 @@ fn a_blocked_radome_makes_the_radar_blind() {
         };
         let setup = Setup {
             weather,
-            ..Setup::of(vec![post(50.0, 100.0, 1e3)], ON)
+            ..Setup::of(vec![post(50.0, 100.0, 30.0)], ON)
         };
         peak_db(&setup.scan(), 100, setup.bins(49.0..51.0))
     };
-    let clear = blocked(0.0);
-    assert!((clear - blocked(10.0) - 10.0).abs() < 1.0);
-    assert!(clear - blocked(100.0) > 40.0);
+    let [clear, muddy, blind] = [0.0, 10.0, 100.0].map(blocked);
+    assert!(
+        (clear - muddy - 10.0).abs() < 1.0,
+        "{clear} dB and {muddy} dB"
+    );
+    assert!(clear - blind > 30.0, "{clear} dB and {blind} dB");
 }
 
 #[test]
