@@ -305,17 +305,30 @@ def test_rows_of_scans_that_lost_azimuths_lie_where_odometry_has_them(radiate: P
     assert 6 < as_recorded < 20
 
 
-def test_samples_of_a_gyro_are_finite_and_in_order() -> None:
-    def with_gyro(pairs: list[tuple[int, float]]) -> gyre.Scan:
-        return gyre.Scan(noise(), stamp_ns=STAMP_NS, range_resolution_m=0.175, clockwise=True, sweep_s=0.25, gyro=pairs)
+def test_samples_of_gyro_and_wheels_are_finite_and_in_order() -> None:
+    def with_samples(
+        gyro: list[tuple[int, float]] | None = None, wheels: list[tuple[int, float]] | None = None
+    ) -> gyre.Scan:
+        return gyre.Scan(
+            noise(),
+            stamp_ns=STAMP_NS,
+            range_resolution_m=0.175,
+            clockwise=True,
+            sweep_s=0.25,
+            gyro=gyro,
+            wheels=wheels,
+        )
 
     pairs = [(STAMP_NS - 50_000_000, 0.1), (STAMP_NS, 0.2)]
-    assert with_gyro(pairs).gyro == pairs
-    assert scan(noise()).gyro == []
+    both = with_samples(pairs, pairs[1:])
+    assert both.gyro == pairs and both.wheels == pairs[1:]
+    assert scan(noise()).gyro == [] and scan(noise()).wheels == []
     for wrong, sentence in [
-        ([(STAMP_NS, 0.1), (STAMP_NS, 0.2)], "the times of gyro must increase"),
-        ([(STAMP_NS, float("nan"))], "gyro has a yaw rate of NaN"),
-        ([(STAMP_NS, 57.0)], "gyro has a yaw rate of 57 rad/s"),
+        ([(STAMP_NS, 0.1), (STAMP_NS, 0.2)], "the times of {} must increase"),
+        ([(STAMP_NS, float("nan"))], "{} is no finite number, or too large, in pair 0"),
+        ([(STAMP_NS, 1e4)], "{} is no finite number, or too large, in pair 0"),
     ]:
-        with pytest.raises(gyre.ScanError, match=sentence):
-            with_gyro(wrong)
+        with pytest.raises(gyre.ScanError, match=sentence.format("gyro")):
+            with_samples(gyro=wrong)
+        with pytest.raises(gyre.ScanError, match=sentence.format("wheels")):
+            with_samples(wheels=wrong)
