@@ -75,6 +75,8 @@ pub struct Log {
     records: Records,
     /// Number of changes that were counted.
     changes: u64,
+    /// Their number when the last record was appended.
+    appended: u64,
     buffer: Vec<u8>,
 }
 
@@ -102,6 +104,7 @@ impl Log {
             file,
             records,
             changes: 0,
+            appended: 0,
             buffer: Vec::new(),
         })
     }
@@ -139,6 +142,7 @@ impl Log {
             .write_at(&self.buffer, self.records.end())?;
         self.file.file().require_name()?;
         self.records.push(header);
+        self.appended = self.changes + 1;
         self.count()
     }
 
@@ -149,7 +153,7 @@ impl Log {
     /// # Errors
     /// A file that cannot be synchronised.
     pub fn rely(&mut self) -> Result<(), LogError> {
-        match self.file.safe() == Some(self.changes) {
+        match self.file.safe() >= Some(self.appended) {
             true => Ok(()),
             false => self.count(),
         }
