@@ -18,7 +18,7 @@ pub(super) struct Gyro {
 
 impl Gyro {
     /// Reads the log that is named, or else that which lies beside the scans. One that lies there
-    /// and cannot be used is told, and left alone.
+    /// and cannot be used is named, and left alone.
     ///
     /// # Errors
     /// A log that is named and cannot be used.

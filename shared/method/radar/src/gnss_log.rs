@@ -16,7 +16,7 @@ pub use faults::GnssFaults;
 
 use gyre_samples::{Geographic, GnssConfig, GnssFix, GnssKind, LocalPlane};
 
-use crate::gyro_log::roots;
+use crate::{gps_imu_twist::has_list, gyro_log::roots};
 
 /// Logs relative to the root of a dataset, in order of precedence.
 const PLACES: [&str; 8] = [
@@ -84,7 +84,7 @@ impl GnssLog {
         };
         roots(folder)
             .flat_map(|root| PLACES.iter().map(|place| root.join(place)))
-            .find(|path| path.is_file() || (path.is_dir() && radiate::is_one(path)))
+            .find(|path| path.is_file() || (path.is_dir() && has_list(path)))
             .ok_or_else(|| GnssLogError::None {
                 folder: folder.to_owned(),
             })

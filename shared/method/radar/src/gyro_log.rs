@@ -21,6 +21,8 @@ pub use track::SampleTrack;
 
 use gyre_samples::{Sample, SampleKind};
 
+use crate::gps_imu_twist::has_list;
+
 /// Logs relative to the root of a dataset, in order of precedence.
 const PLACES: [&str; 12] = [
     "imu_as_logged.csv",
@@ -95,7 +97,7 @@ impl GyroLog {
         let roots = || roots(folder);
         let found = roots()
             .flat_map(|root| PLACES.iter().map(|place| root.join(place)))
-            .find(|path| path.is_file() || (path.is_dir() && twist::is_one(path)));
+            .find(|path| path.is_file() || (path.is_dir() && has_list(path)));
         let in_truth = || roots().map(|root| root.join(error::IN_TRUTH));
         found.ok_or_else(|| match in_truth().find(|path| path.is_file()) {
             Some(path) => LogError::InTruth { path },

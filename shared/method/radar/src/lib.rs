@@ -15,6 +15,7 @@ mod clock;
 pub mod dataset;
 pub mod fingerprint;
 mod gnss_log;
+mod gps_imu_twist;
 pub mod ground_truth;
 mod gyro_log;
 pub mod inspect;
@@ -26,6 +27,7 @@ mod quoted;
 pub mod raster;
 pub mod scan;
 mod scan_samples;
+mod stretches;
 pub mod trajectory;
 mod wheel_log;
 

@@ -1,11 +1,10 @@
 //! Faults of the fixes of a log, and which fixes are left out.
 
-use std::{iter, ops::Range};
-
 use gyre_samples::LocalPlane;
 use serde::Serialize;
 
 use super::{LoggedFix, Raw, RawFix};
+use crate::stretches::{between, longest_chain};
 
 /// No vehicle that carries a spinning radar is faster, m/s.
 const MAX_SPEED_MPS: f64 = 70.0;
@@ -74,7 +73,7 @@ type Examined = (Vec<LoggedFix>, Option<LocalPlane>, GnssFaults);
 /// Leaves out and sorts what the faults name, and counts it.
 ///
 /// # Errors
-/// What is wrong with a log without a usable fix, or most of whose rows cannot be read.
+/// A log without a usable fix, or most of whose rows cannot be read.
 pub(super) fn examine(raw: Raw) -> Result<Examined, String> {
     let all = raw.rows.len() + raw.unreadable;
     let mut faults = GnssFaults {
@@ -147,27 +146,15 @@ fn in_plane(rows: &[RawFix], plane: Option<&LocalPlane>) -> Vec<LoggedFix> {
 /// of the stretches between jumps the chain that has the most fixes.
 fn without_jumps(fixes: &[LoggedFix]) -> Vec<usize> {
     let jumps = (1..fixes.len()).filter(|k| !is_reachable(&fixes[k - 1], &fixes[*k]));
-    let ends = (!fixes.is_empty()).then_some(fixes.len());
-    let bounds: Vec<usize> = iter::once(0).chain(jumps).chain(ends).collect();
-    let stretches: Vec<Range<usize>> = bounds.windows(2).map(|pair| pair[0]..pair[1]).collect();
-    // The fixes of the best chain that ends with a stretch, and the stretch before that.
-    let mut best: Vec<(usize, Option<usize>)> = Vec::new();
-    for (k, stretch) in stretches.iter().enumerate() {
-        let reaches = |earlier: &usize| {
-            is_reachable(&fixes[stretches[*earlier].end - 1], &fixes[stretch.start])
-        };
-        let before = (k.saturating_sub(LOOK_BACK)..k)
-            .filter(reaches)
-            .max_by_key(|earlier| best[*earlier].0);
-        best.push((stretch.len() + before.map_or(0, |k| best[k].0), before));
-    }
-    let mut at = (0..best.len()).max_by_key(|k| best[*k].0);
-    let mut chain = Vec::new();
-    while let Some(k) = at {
-        chain.push(stretches[k].clone());
-        at = best[k].1;
-    }
-    chain.into_iter().rev().flatten().collect()
+    let stretches = between(fixes.len(), jumps);
+    let follows = |earlier: usize, k: usize| {
+        is_reachable(
+            &fixes[stretches[earlier].end - 1],
+            &fixes[stretches[k].start],
+        )
+    };
+    let chain = longest_chain(&stretches, LOOK_BACK, follows);
+    chain.into_iter().flatten().collect()
 }
 
 /// Returns whether a vehicle can have driven from one fix to a later one.

@@ -21,7 +21,7 @@ pub(crate) trait SampleColumns: Sized {
     /// Finds the columns by the first row.
     ///
     /// # Errors
-    /// What is missing, and the remedy.
+    /// A column that is missing, and the remedy.
     fn of(first: &StringRecord) -> Result<Self, String>;
 
     /// The unit of the values is named nowhere.

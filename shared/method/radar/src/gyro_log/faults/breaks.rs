@@ -1,8 +1,9 @@
 //! Clocks that were set: stretches of samples whose stamps belong together.
 
-use std::{iter, ops::Range};
+use std::ops::Range;
 
 use super::LogFaults;
+use crate::stretches::{between, longest_chain};
 use gyre_samples::Sample;
 
 /// A step of the stamps by more than this, ns, parts stretches; back it is no disorder but a step
@@ -24,8 +25,7 @@ pub(super) fn repair(samples: Vec<Sample>, faults: &mut LogFaults) -> Result<Vec
         return Ok(samples);
     }
     let starts = steps.filter(|(_, ns)| ns.abs() > STEP_NS).map(|(k, _)| k);
-    let bounds: Vec<usize> = iter::once(0).chain(starts).chain([samples.len()]).collect();
-    let stretches: Vec<_> = bounds.windows(2).map(|pair| pair[0]..pair[1]).collect();
+    let stretches = between(samples.len(), starts);
     let kept = match stretches.len() <= MAX_STRETCHES {
         true => most(&stretches, &samples),
         false => Vec::new(),
@@ -54,21 +54,7 @@ fn most(stretches: &[Range<usize>], samples: &[Sample]) -> Vec<Range<usize>> {
         (stamps.clone().min(), stamps.max())
     };
     let spans: Vec<_> = stretches.iter().map(span).collect();
-    // The samples of the best chain that ends with a stretch, and the stretch before that.
-    let mut best: Vec<(usize, Option<usize>)> = Vec::new();
-    for (k, stretch) in stretches.iter().enumerate() {
-        let follows = |earlier: &usize| spans[*earlier].1 < spans[k].0;
-        let before = (0..k)
-            .filter(follows)
-            .max_by_key(|earlier| best[*earlier].0);
-        best.push((stretch.len() + before.map_or(0, |k| best[k].0), before));
-    }
-    let mut at = (0..best.len()).max_by_key(|k| best[*k].0);
-    let mut chain = Vec::new();
-    while let Some(k) = at {
-        chain.push(stretches[k].clone());
-        at = best[k].1;
-    }
-    chain.reverse();
-    chain
+    longest_chain(stretches, MAX_STRETCHES, |earlier, k| {
+        spans[earlier].1 < spans[k].0
+    })
 }
