@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use rustfft::{FftDirection, FftPlanner, num_complex::Complex32};
+use gyre_fourier::{Complex32, FftDirection};
 
 use crate::fft::{BLOCK, Columns, RowPass, Transform};
 use crate::kernels;
@@ -34,14 +34,13 @@ impl KeptCorrelation {
     /// Plans correlations of n x n images by transforms of `size` a side. `shifts` are the rows of
     /// the transform to keep.
     pub fn new(n: usize, size: usize, shifts: Arc<[usize]>) -> Self {
-        let mut planner = FftPlanner::new();
         Self {
             n,
             size,
-            rows: RowPass::new(&mut planner, size),
-            columns: Transform::new(&mut planner, size, FftDirection::Forward),
-            inverse_columns: Transform::new(&mut planner, size, FftDirection::Inverse),
-            inverse_row: Transform::new(&mut planner, size, FftDirection::Inverse),
+            rows: RowPass::new(size),
+            columns: Transform::new(size, FftDirection::Forward),
+            inverse_columns: Transform::new(size, FftDirection::Inverse),
+            inverse_row: Transform::new(size, FftDirection::Inverse),
             block: vec![Complex32::default(); BLOCK * size],
             plane: Columns::new(size, size),
             kept: Columns::new(size, size),

@@ -5,8 +5,7 @@
 
 use std::sync::Arc;
 
-use realfft::{ComplexToReal, RealFftPlanner};
-use rustfft::{Fft, FftDirection, FftPlanner, num_complex::Complex32};
+use gyre_fourier::{Complex32, ComplexToReal, Fft, FftDirection};
 
 use crate::kernels;
 
@@ -112,8 +111,8 @@ pub(crate) struct Transform {
 }
 
 impl Transform {
-    pub fn new(planner: &mut FftPlanner<f32>, size: usize, direction: FftDirection) -> Self {
-        let fft = planner.plan_fft(size, direction);
+    pub fn new(size: usize, direction: FftDirection) -> Self {
+        let fft = gyre_fourier::complex(size, direction);
         let scratch = fft
             .get_inplace_scratch_len()
             .max(fft.get_immutable_scratch_len());
@@ -149,8 +148,8 @@ pub(crate) struct RowPass {
 }
 
 impl RowPass {
-    pub fn new(planner: &mut FftPlanner<f32>, size: usize) -> Self {
-        let row = Transform::new(planner, size, FftDirection::Forward);
+    pub fn new(size: usize) -> Self {
+        let row = Transform::new(size, FftDirection::Forward);
         Self {
             row,
             block: vec![Complex32::default(); BLOCK * size],
@@ -191,7 +190,7 @@ pub(crate) struct RealLines {
 impl RealLines {
     pub fn new(size: usize) -> Self {
         Self {
-            transform: Transform::new(&mut FftPlanner::new(), size, FftDirection::Forward),
+            transform: Transform::new(size, FftDirection::Forward),
             lines: [vec![0.0; size], vec![0.0; size]],
             both: vec![Complex32::default(); size],
         }
@@ -233,7 +232,7 @@ impl RealSpectrum {
     pub fn new(size: usize, kept: usize) -> Self {
         Self {
             rows: RealLines::new(size),
-            columns: Transform::new(&mut FftPlanner::new(), size, FftDirection::Forward),
+            columns: Transform::new(size, FftDirection::Forward),
             block: vec![Complex32::default(); BLOCK * kept],
             plane: Columns::new(kept, size),
         }
@@ -279,13 +278,12 @@ pub(crate) struct PairSpectrum {
 impl PairSpectrum {
     /// Transforms of `size` (even) a side.
     pub fn new(size: usize) -> Self {
-        let mut planner = FftPlanner::new();
-        let inverse_row = RealFftPlanner::new().plan_fft_inverse(size);
+        let inverse_row = gyre_fourier::real_inverse(size);
         Self {
             size,
-            rows: RowPass::new(&mut planner, size),
-            columns: Transform::new(&mut planner, size, FftDirection::Forward),
-            inverse_columns: Transform::new(&mut planner, size, FftDirection::Inverse),
+            rows: RowPass::new(size),
+            columns: Transform::new(size, FftDirection::Forward),
+            inverse_columns: Transform::new(size, FftDirection::Inverse),
             scratch: inverse_row.make_scratch_vec(),
             inverse_row,
             block: vec![Complex32::default(); BLOCK * (size / 2 + 1)],

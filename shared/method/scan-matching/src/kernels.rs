@@ -5,8 +5,8 @@
 // position is clamped to the image right before it is read.
 #![allow(unsafe_code)]
 
+use gyre_fourier::Complex32;
 use gyre_simd::simd;
-use rustfft::num_complex::Complex32;
 
 /// Number of partial sums, so that a sum can be vectorised.
 const LANES: usize = 16;

@@ -4,9 +4,8 @@ use std::f64::consts::PI;
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 
+use gyre_fourier::{Complex32, ComplexToReal, RealToComplex};
 use ndarray::ArrayView2;
-use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
-use rustfft::num_complex::Complex32;
 use serde::{Deserialize, Serialize};
 
 use crate::config::{ConfigError, Peak, RotationConfig, RotationForm};
@@ -82,10 +81,9 @@ impl RotationSearch {
         let size = fast_size(n);
         let (angles, harmonics) = (config.angles, config.angles / 2 + 1);
         let grid = PolarGrid::new(n, size, config);
-        let mut planner = RealFftPlanner::new();
         let (forward, inverse) = (
-            planner.plan_fft_forward(angles),
-            planner.plan_fft_inverse(angles),
+            gyre_fourier::real(angles),
+            gyre_fourier::real_inverse(angles),
         );
         let scratch = forward.get_scratch_len().max(inverse.get_scratch_len());
         let step = PI / angles as f64;

@@ -1,7 +1,7 @@
 //! The part of a scan that a rotation search keeps.
 
+use gyre_fourier::Complex32;
 use ndarray::ArrayView2;
-use rustfft::num_complex::Complex32;
 
 use crate::{ShapeError, expect_shape, kernels};
 

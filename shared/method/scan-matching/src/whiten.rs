@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use rustfft::{Fft, FftPlanner, num_complex::Complex32};
+use gyre_fourier::{Complex32, Fft, FftDirection};
 
 /// Sets the modulus to one and keeps the phase; zero stays zero.
 pub(crate) fn to_unit(z: &mut Complex32) {
@@ -26,7 +26,7 @@ pub(crate) struct Whitening {
 
 impl Whitening {
     pub fn new(radii: usize, harmonics: usize) -> Self {
-        let fft = FftPlanner::new().plan_fft_forward(radii);
+        let fft = gyre_fourier::complex(radii, FftDirection::Forward);
         let scratch = vec![Complex32::default(); fft.get_inplace_scratch_len()];
         Self {
             harmonics,

@@ -1,8 +1,8 @@
 //! The descriptor of a place.
 
+use gyre_fourier::Complex32;
 use gyre_scan_matching::{Magnitude, PolarSpectrum, RotationConfig, RotationSearch, Submap, Taper};
 use ndarray::{Array2, ArrayView2, ArrayView3};
-use realfft::num_complex::Complex32;
 
 use super::{CELL_M, PLANNED, RASTER_CELLS};
 

@@ -3,10 +3,10 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
+use gyre_fourier::{Complex32, ComplexToReal};
 use gyre_geometry::wrap_angle;
 use gyre_scan_matching::{Peak, line_peak};
 use gyre_simd::simd;
-use realfft::{ComplexToReal, RealFftPlanner, num_complex::Complex32};
 
 use super::descriptor::{Descriptor, HARMONICS, SPECTRUM_BYTES};
 
@@ -190,7 +190,7 @@ impl PlaceIndex {
 
 impl Query {
     fn new(places: usize) -> Self {
-        let inverse = RealFftPlanner::new().plan_fft_inverse(ANGLES);
+        let inverse = gyre_fourier::real_inverse(ANGLES);
         Self {
             distances: Vec::with_capacity(places),
             cross: inverse.make_input_vec(),
