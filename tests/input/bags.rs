@@ -137,6 +137,7 @@ fn odometry_transforms_and_the_map_are_those_of_the_run_to_another_reader() {
 }
 
 #[test]
+#[ignore = "nightly: a bag of a recording of a run"]
 fn a_recorded_run_becomes_the_same_bag() {
     let whole = completed();
     let run = Run::small().data(whole.path());

@@ -378,6 +378,7 @@ fn the_program_of_a_killed_shadow_ends_and_the_run_does_not_notice() {
 }
 
 #[test]
+#[ignore = "nightly: a stage in Python beside a run"]
 fn python_masking_beside_the_own_one_is_compared() {
     if !python_stage::can_start() {
         return;

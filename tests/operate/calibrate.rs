@@ -39,6 +39,7 @@ fn range_offset_m(settings: &str) -> f64 {
 }
 
 #[test]
+#[ignore = "nightly: calibrates a drive"]
 fn a_wrong_range_offset_is_named_and_put_right_by_the_file() {
     let recording = recording::around_a_block();
     let out = tempfile::tempdir().unwrap();

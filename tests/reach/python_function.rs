@@ -330,6 +330,7 @@ fn one_that_changes_neither_goes_on_nor_passes_for_the_one_before() {
 }
 
 #[test]
+#[ignore = "nightly: begins a stage and holds it to its contract"]
 fn a_begun_mask_keeps_the_contract_and_drives() {
     begun_keep_the_contract_and_drive(&[("masking", "mask")]);
 }
