@@ -4,7 +4,7 @@
 //! `cargo run --release -p gyre-radar --example lost_bench`
 
 use gyre_geometry::Twist;
-use gyre_radar::{DatasetOptions, LostAzimuthFinder, OwnedScan, lost::stale_rows};
+use gyre_radar::{DatasetOptions, LostAzimuthFinder, LostAzimuths, OwnedScan, lost::stale_rows};
 use std::error::Error;
 use std::path::Path;
 use std::time::Instant;
@@ -46,22 +46,27 @@ fn measure(folder: &Path, speed_mps: f64) -> Result<(Vec<f64>, Vec<f64>), Box<dy
         ..Twist::default()
     };
     let mut scan = OwnedScan::with_limits(dataset.limits());
+    let mut previous: Option<(OwnedScan, LostAzimuths)> = None;
     let mut finder = LostAzimuthFinder::default();
     let (mut lossy, mut whole) = (Vec::new(), Vec::new());
     for index in 0..dataset.len() {
         scan.geometry = dataset.read(index, scan.slot())?;
-        let scan = scan.view();
+        let view = scan.view();
+        let mut found = LostAzimuths::default();
         let mut times: [f64; REPETITIONS] = std::array::from_fn(|_| {
-            let mut finder = finder.clone();
+            match &previous {
+                Some((before, lost)) => finder.set_previous(&before.view(), lost),
+                None => finder.reset(),
+            }
             let start = Instant::now();
-            std::hint::black_box(finder.find(&scan, Some(twist)));
+            found = finder.find(std::hint::black_box(&view), Some(twist));
             start.elapsed().as_secs_f64() * 1e3
         });
-        finder.find(&scan, Some(twist));
-        match stale_rows(&scan) {
+        match stale_rows(&view) {
             0 => whole.push(median(&mut times)),
             _ => lossy.push(median(&mut times)),
         }
+        previous = Some((scan.clone(), found));
     }
     Ok((lossy, whole))
 }

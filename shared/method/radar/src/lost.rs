@@ -133,7 +133,7 @@ impl LostAzimuthFinder {
                 if continues(previous.stamp_ns, scan.geometry.stamp_ns)
                     && previous.echoes.layout == Layout::of(scan)
                     && scan.geometry.azimuths >= MIN_AZIMUTHS
-                    && previous.echoes.layout.cells > 0 =>
+                    && previous.echoes.layout.cells > 1 =>
             {
                 self.alignment.begin();
                 for faster_mps in FASTER_MPS {

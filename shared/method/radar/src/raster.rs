@@ -15,7 +15,7 @@
 
 mod bearing_table;
 mod cells;
-mod kernels;
+pub(crate) mod kernels;
 mod polar_image;
 mod sweep_motion;
 

@@ -2,7 +2,12 @@
 //! rows agree with predictions. Going along the rows the number never decreases; before the rows
 //! are compared, no place is likelier than another.
 
+mod passes;
+
+use gyre_simd::simd;
+
 use super::{LostAzimuths, MAX_LOST, echoes::Echoes, prediction::Prediction};
+use passes::{pass_backward, pass_forward};
 
 /// Azimuths by which the whole scan may be turned against a prediction, to either side.
 const TURN: usize = 3;
@@ -16,6 +21,8 @@ const BESIDE: usize = 1;
 const LEAST_NOISE: f32 = 1e-3;
 /// Likelihood of a row that is not as predicted, whatever number it has: of something that moves.
 const OUTLIER: f32 = 1e-3;
+/// Logarithm of a likelihood, relative to the highest of a row, that is none.
+const LEAST_LOGARITHM: f32 = -20.0;
 /// Numbers of lost azimuths before a row, from none to all.
 const NUMBERS: usize = MAX_LOST + 1;
 /// The most azimuths with which a row is compared, a multiple of what a processor takes at once.
@@ -24,8 +31,9 @@ const WIDTH: usize = azimuths(MAX_LOST).next_multiple_of(8);
 /// processor takes at once.
 type Turns<T> = [T; TURNS.next_multiple_of(8)];
 const TURNS: usize = 2 * TURN * STEPS + 1;
-/// Steps with which a row is compared at most, as many as the turns of the largest number reach.
-const MOST_STEPS: usize = STEPS * MAX_LOST + TURNS.next_multiple_of(8);
+/// Steps with which a row is compared at most, as many as the turns of the largest number reach,
+/// and some that make it a power of two.
+const MOST_STEPS: usize = (STEPS * MAX_LOST + TURNS.next_multiple_of(8)).next_power_of_two();
 
 /// Aligns the rows of scans with predictions.
 #[derive(Clone, Debug, Default)]
@@ -76,10 +84,24 @@ impl Alignment {
     /// Adds what a prediction says of where `count` azimuths of the scan were lost.
     pub fn add(&mut self, prediction: &Prediction, scan: &Echoes, count: usize) {
         let rows = scan.layout.azimuths - count;
-        self.compare(prediction, scan, rows, count);
-        let likelihood = self.weigh(prediction, count);
-        let turns = self.pass_forward(count);
-        let all = self.pass_backward(count);
+        self.products.clear();
+        self.products.resize(rows, [0.0; WIDTH]);
+        multiply(prediction, scan, &mut self.products);
+        let (gain, common) = self.gain(prediction, count);
+        if self.noise == 0.0 {
+            let measured = scan.energy();
+            let noise = measured - gain * common;
+            self.noise = noise.max(LEAST_NOISE * measured).max(1.0) / rows as f32;
+        }
+        self.likelihoods.resize(rows, [0.0; MOST_STEPS]);
+        let weights = Weights {
+            gain,
+            scale: gain / self.noise,
+            steps: STEPS * (azimuths(count) + 1 - AMID.len()),
+        };
+        let likelihood = weigh(&self.products, prediction, &weights, &mut self.likelihoods);
+        let turns = pass_forward(&self.likelihoods, count, &mut self.forward);
+        let all = pass_backward(&self.likelihoods, &self.forward, count);
         for (places, turn) in all.iter().zip(turns).take(TURNS) {
             let likelihood = likelihood + turn;
             self.places.add(&Places {
@@ -101,28 +123,6 @@ impl Alignment {
         }))
     }
 
-    fn compare(&mut self, prediction: &Prediction, scan: &Echoes, rows: usize, count: usize) {
-        let width = azimuths(count).next_multiple_of(8);
-        self.products.clear();
-        self.products.resize(rows, [0.0; WIDTH]);
-        for echo in &scan.echoes {
-            let row = echo.at as usize;
-            let predicted = prediction.from(usize::from(echo.cell), azimuth(row, 0));
-            let products = self.products[row][..width].as_chunks_mut::<8>().0;
-            for (products, predicted) in products.iter_mut().zip(predicted.as_chunks::<8>().0) {
-                for (product, predicted) in products.iter_mut().zip(predicted) {
-                    *product += echo.power * predicted;
-                }
-            }
-        }
-        if self.noise == 0.0 {
-            let measured: f32 = scan.echoes.iter().map(|echo| echo.power * echo.power).sum();
-            let (gain, common) = self.gain(prediction, count);
-            let noise = measured - gain * common;
-            self.noise = noise.max(LEAST_NOISE * measured).max(1.0) / rows as f32;
-        }
-    }
-
     /// Returns by how much the rows are stronger than predicted, each where it agrees best, and the
     /// sum of its products there.
     fn gain(&self, prediction: &Prediction, count: usize) -> (f32, f32) {
@@ -136,126 +136,133 @@ impl Alignment {
                 }
             });
             common += products[best];
-            energy += prediction.energy(azimuth(row, best));
+            energy += prediction.energies::<1>(azimuth(row, best))[0];
         }
         (common / energy, common)
     }
+}
 
-    /// Determines the likelihoods, and returns the sum of the logarithms of the highest. A row is
-    /// the prediction times a gain, and noise: neighbouring cells differ together, so that a
-    /// row counts as one measurement.
-    fn weigh(&mut self, prediction: &Prediction, count: usize) -> f64 {
-        let (gain, _) = self.gain(prediction, count);
-        let scale = gain / self.noise;
-        let mut highest = 0.0;
-        self.likelihoods.clear();
-        for (row, products) in self.products.iter_mut().enumerate() {
-            let products = &mut products[..azimuths(count)];
-            for (k, product) in products.iter_mut().enumerate() {
-                *product = scale * (*product - 0.5 * gain * prediction.energy(azimuth(row, k)));
+/// Adds the products of each row's echoes with the predicted azimuths around it.
+#[simd]
+fn multiply(prediction: &Prediction, scan: &Echoes, products: &mut [[f32; WIDTH]]) {
+    for row in scan.rows() {
+        let index = row.at as usize;
+        let mut sums = [0.0; WIDTH];
+        for (cell, power) in row.cells.iter().zip(row.powers) {
+            let predicted = prediction.from::<WIDTH>(*cell, azimuth(index, 0));
+            for (sum, predicted) in sums.iter_mut().zip(predicted) {
+                *sum += power * predicted;
             }
-            let mut steps = [f32::NEG_INFINITY; MOST_STEPS];
-            for (around, pair) in products
-                .windows(AMID.len())
-                .zip(steps.chunks_exact_mut(STEPS))
-            {
-                let amid = AMID
-                    .iter()
-                    .zip(around)
-                    .map(|(weight, score)| weight * score);
-                pair.copy_from_slice(&[around[BESIDE], amid.sum()]);
-            }
-            let best = steps.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-            highest += f64::from(best);
-            self.likelihoods.push(steps.map(|step| match step - best {
-                // Beside that nothing is left of it.
-                ..-20.0 => OUTLIER,
-                relative => OUTLIER + relative.exp(),
-            }));
         }
-        highest
-    }
-
-    /// Passes along the rows, and returns the logarithm of their likelihood for each turn.
-    fn pass_forward(&mut self, count: usize) -> Turns<f64> {
-        self.forward.clear();
-        let mut likelihood = Turns::default();
-        let mut product = [1.0; _];
-        let mut before = [Turns::default(); NUMBERS];
-        before[0] = [1.0; _];
-        for (row, steps) in self.likelihoods.iter().enumerate() {
-            let mut reached = Turns::<f32>::default();
-            for (number, before) in before[..=count].iter_mut().enumerate() {
-                let of_turns = likelihoods(steps, number);
-                for ((reached, before), likelihood) in reached.iter_mut().zip(before).zip(of_turns)
-                {
-                    *reached += *before;
-                    *before = *reached * likelihood;
-                }
-            }
-            let sums = normalise(&mut before[..=count]);
-            for (product, sum) in product.iter_mut().zip(sums) {
-                *product *= f64::from(sum);
-            }
-            // Logarithms are slow, and a row's likelihood is at least that of an outlier.
-            if row % 64 == 63 {
-                add_logarithms(&mut likelihood, &mut product);
-            }
-            self.forward.extend_from_slice(&before[..=count]);
-        }
-        add_logarithms(&mut likelihood, &mut product);
-        likelihood
-    }
-
-    /// Passes back along the rows, and returns the places for each turn.
-    fn pass_backward(&self, count: usize) -> Turns<Places> {
-        let mut places = Turns::<Places>::default();
-        // What is lost behind the last row shows in none.
-        let mut behind = [[1.0; _]; NUMBERS];
-        let forward = self.forward.chunks_exact(count + 1);
-        for (row, (forward, steps)) in forward.zip(&self.likelihoods).enumerate().rev() {
-            let mut now = [Turns::default(); NUMBERS];
-            for ((now, forward), behind) in now.iter_mut().zip(forward).zip(&behind) {
-                *now = std::array::from_fn(|turn| forward[turn] * behind[turn]);
-            }
-            normalise(&mut now[..=count]);
-            // A place lies behind this row as long as fewer azimuths were lost.
-            let mut fewer = Turns::<f64>::default();
-            for (place, probability) in now[..count].iter().enumerate() {
-                for ((fewer, probability), places) in
-                    fewer.iter_mut().zip(probability).zip(&mut places)
-                {
-                    *fewer += f64::from(*probability);
-                    places.mean[place] += *fewer;
-                    places.mean_square[place] += (2 * row + 1) as f64 * *fewer;
-                }
-            }
-            let mut further = Turns::<f32>::default();
-            for (number, behind) in behind[..=count].iter_mut().enumerate().rev() {
-                let of_turns = likelihoods(steps, number);
-                for ((further, behind), likelihood) in further.iter_mut().zip(behind).zip(of_turns)
-                {
-                    *further += *behind * likelihood;
-                    *behind = *further;
-                }
-            }
-            normalise(&mut behind[..=count]);
-        }
-        places
+        products[index] = sums;
     }
 }
 
-/// Returns the likelihoods of a row if a number of azimuths was lost before it.
-fn likelihoods(steps: &[f32; MOST_STEPS], number: usize) -> &[f32] {
-    &steps[STEPS * number..][..TURNS.next_multiple_of(8)]
+/// The numbers that make likelihoods from products. A row is the prediction times a gain, and
+/// noise: neighbouring cells differ together, so that a row counts as one measurement.
+#[derive(Clone, Copy, Debug)]
+struct Weights {
+    gain: f32,
+    /// The gain over the noise.
+    scale: f32,
+    /// Steps with which a row is compared.
+    steps: usize,
 }
 
-/// Adds the logarithms of products, and begins them anew.
-fn add_logarithms(sums: &mut Turns<f64>, products: &mut Turns<f64>) {
-    for (sum, product) in sums.iter_mut().zip(products) {
-        *sum += product.ln();
-        *product = 1.0;
+/// Determines the likelihoods, and returns the sum of the logarithms of the highest.
+#[simd]
+fn weigh(
+    products: &[[f32; WIDTH]],
+    prediction: &Prediction,
+    weights: &Weights,
+    likelihoods: &mut [[f32; MOST_STEPS]],
+) -> f64 {
+    let mut highest = 0.0;
+    for (row, (products, likelihoods)) in products.iter().zip(likelihoods).enumerate() {
+        let energies = prediction.energies::<WIDTH>(azimuth(row, 0));
+        let scores: [f32; WIDTH] = std::array::from_fn(|k| {
+            weights.scale * (products[k] - 0.5 * weights.gain * energies[k])
+        });
+        let amid: [f32; MOST_STEPS / STEPS] = std::array::from_fn(|k| amid(&scores, k));
+        let mut steps: [f32; MOST_STEPS] = std::array::from_fn(|step| match step % STEPS {
+            0 => scores[step / STEPS + BESIDE],
+            _ => amid[step / STEPS],
+        });
+        for (step, score) in steps.iter_mut().enumerate() {
+            let is_compared = step < weights.steps;
+            *score = if is_compared {
+                *score
+            } else {
+                f32::NEG_INFINITY
+            };
+        }
+        let best = highest_of(&steps);
+        highest += f64::from(best);
+        for (likelihood, step) in likelihoods.iter_mut().zip(&steps) {
+            let relative = step - best;
+            // Beside that nothing is left of it.
+            let is_none = relative < LEAST_LOGARITHM;
+            let of_step = exponential(relative.max(LEAST_LOGARITHM));
+            *likelihood = OUTLIER + if is_none { 0.0 } else { of_step };
+        }
     }
+    highest
+}
+
+/// Returns the highest score, without a chain of comparisons.
+#[inline(always)]
+fn highest_of(steps: &[f32; MOST_STEPS]) -> f32 {
+    let mut best = *steps;
+    let mut half = MOST_STEPS / 2;
+    while half > 0 {
+        let (low, high) = best.split_at_mut(half);
+        for (low, high) in low.iter_mut().zip(high) {
+            *low = if *high > *low { *high } else { *low };
+        }
+        half /= 2;
+    }
+    best[0]
+}
+
+/// Returns the value amid the second and the third of four scores from the `k`-th on.
+#[inline(always)]
+fn amid(scores: &[f32; WIDTH], k: usize) -> f32 {
+    AMID[0] * scores[k]
+        + AMID[1] * scores[k + 1]
+        + AMID[2] * scores[k + 2]
+        + AMID[3] * scores[k + 3]
+}
+
+/// Returns e to the power of a number from -87 to 0, with a relative error below 2e-7. That of the
+/// C library takes one number at a time.
+#[inline(always)]
+fn exponential(x: f32) -> f32 {
+    use std::f32::consts::LOG2_E;
+    // Adding this leaves no digits behind the point.
+    const ROUND: f32 = (3 << 22) as f32;
+    // ln 2, the first part with so few digits that its multiples are exact.
+    const LN_2: [f32; 2] = [0.693_359_4, -2.121_944_4e-4];
+    // 1 / 7!, ..., 1 / 1!, 1 / 0!
+    const SERIES: [f32; 8] = [
+        1.0 / 5040.0,
+        1.0 / 720.0,
+        1.0 / 120.0,
+        1.0 / 24.0,
+        1.0 / 6.0,
+        0.5,
+        1.0,
+        1.0,
+    ];
+    let shifted = x * LOG2_E + ROUND;
+    let halvings = shifted - ROUND;
+    let rest = x - halvings * LN_2[0] - halvings * LN_2[1];
+    let mut sum = 0.0;
+    for term in SERIES {
+        sum = sum * rest + term;
+    }
+    // The integer in the last digits goes into the exponent.
+    let power = shifted.to_bits().wrapping_add(127) << 23;
+    sum * f32::from_bits(power)
 }
 
 /// Azimuths with which a row is compared.
@@ -264,23 +271,22 @@ const fn azimuths(count: usize) -> usize {
 }
 
 /// The `k`-th azimuth with which a row is compared.
+#[inline(always)]
 const fn azimuth(row: usize, k: usize) -> isize {
     (row + k) as isize - (TURN + BESIDE) as isize
 }
 
-/// Divides the values of each turn by their sum, and returns the sums.
-fn normalise(numbers: &mut [Turns<f32>]) -> Turns<f32> {
-    let mut sums = [f32::MIN_POSITIVE; _];
-    for turns in &*numbers {
-        for (sum, value) in sums.iter_mut().zip(turns) {
-            *sum += value;
+#[cfg(test)]
+mod tests {
+    use super::exponential;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn the_exponential_is_that_of_double_precision(x in -20.0..=0.0_f32) {
+            let expected = f64::from(x).exp();
+            let relative = (f64::from(exponential(x)) - expected) / expected;
+            prop_assert!(relative.abs() < 2e-7, "{x}: {relative}");
         }
     }
-    let shares = sums.map(f32::recip);
-    for turns in numbers {
-        for (value, share) in turns.iter_mut().zip(shares) {
-            *value *= share;
-        }
-    }
-    sums
 }

@@ -1,7 +1,9 @@
 //! Echoes of a scan, which are aligned: its powers above a floor in cells of range.
 
+use gyre_simd::simd;
+
 use super::LostAzimuths;
-use crate::scan::PolarScan;
+use crate::{raster::kernels::window::sum_pieces, scan::PolarScan};
 
 /// Depth of a cell, m: about that of a pulse's echo on a wall.
 const CELL_M: f32 = 0.7;
@@ -9,6 +11,10 @@ const CELL_M: f32 = 0.7;
 const NEAR_M: f32 = 4.0;
 /// Mean power of a cell without a return.
 const FLOOR: f32 = 60.0;
+/// The most bins of a cell: their sum must fit 16 bits.
+const MAX_BINS_PER_CELL: usize = 128;
+/// Cells that are passed over together where none of them has a return.
+const BLOCK: usize = 16;
 
 /// The cells of a turn.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -27,7 +33,7 @@ impl Layout {
     pub fn of(scan: &PolarScan<'_>) -> Self {
         let geometry = &scan.geometry;
         let bin_m = geometry.range_resolution_m;
-        let bins_per_cell = ((CELL_M / bin_m).round() as usize).max(1);
+        let bins_per_cell = ((CELL_M / bin_m).round() as usize).clamp(1, MAX_BINS_PER_CELL);
         let first_bin = ((NEAR_M - geometry.range_offset_m) / bin_m).max(0.0) as usize;
         let first_bin = first_bin.min(geometry.bins);
         Self {
@@ -41,67 +47,139 @@ impl Layout {
     }
 }
 
-/// A cell with a return.
+/// The echoes of a row, or of an azimuth that lies between two.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Echo {
-    /// Row, or azimuth in steps of the turn.
+pub(super) struct EchoRow<'a> {
+    /// The row, or its azimuth in steps of the turn.
     pub at: f32,
-    pub cell: u16,
-    pub power: f32,
+    /// The cells with a return, in order.
+    pub cells: &'a [u16],
+    /// Their powers above the floor.
+    pub powers: &'a [f32],
 }
 
-/// The echoes of a scan, by row.
+/// The echoes of a scan, row by row. Rows without any are left out.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Echoes {
     pub layout: Layout,
-    pub echoes: Vec<Echo>,
+    /// Each row, and the number of echoes up to its end.
+    rows: Vec<(f32, usize)>,
+    cells: Vec<u16>,
+    powers: Vec<f32>,
+    /// The bins and the cells of a row that is read.
+    bins: Vec<u8>,
+    sums: Vec<u16>,
 }
 
 impl Echoes {
     /// Reads the measured rows of a scan.
     pub fn read(&mut self, scan: &PolarScan<'_>) {
-        self.layout = Layout::of(scan);
-        self.echoes.clear();
-        for row in 0..self.layout.azimuths - super::stale_rows(scan) {
-            let bins = &scan.row(row)[self.layout.first_bin..];
-            let cells = bins.chunks_exact(self.layout.bins_per_cell);
-            for (cell, bins) in cells.take(self.layout.cells).enumerate() {
-                let sum: u32 = bins.iter().map(|bin| u32::from(*bin)).sum();
-                let power = sum as f32 / bins.len() as f32 - FLOOR;
-                if power > 0.0 {
-                    self.echoes.push(Echo {
-                        at: row as f32,
-                        cell: cell as u16,
-                        power,
-                    });
-                }
-            }
+        self.begin(Layout::of(scan));
+        let Layout {
+            azimuths,
+            cells,
+            bins_per_cell,
+            first_bin,
+            ..
+        } = self.layout;
+        let bins = cells * bins_per_cell;
+        self.bins.resize(bins, 0);
+        let room = cells.next_multiple_of(BLOCK);
+        self.sums.clear();
+        self.sums.resize(room, 0);
+        for row in 0..azimuths - super::stale_rows(scan) {
+            let powers = &scan.row(row)[first_bin..][..bins];
+            sum_pieces(
+                powers,
+                0,
+                bins_per_cell,
+                &mut self.bins,
+                &mut self.sums[..cells],
+            );
+            let start = self.powers.len();
+            self.cells.resize(start + room, 0);
+            self.powers.resize(start + room, 0.0);
+            let (cells, powers) = (&mut self.cells[start..], &mut self.powers[start..]);
+            let count = above_floor(&self.sums, bins_per_cell, cells, powers);
+            self.end_row(row as f32, start + count);
         }
     }
 
     /// Sets the echoes to those of the rows, at their azimuths. An azimuth that was lost has half
     /// the power of the rows on both sides.
     pub fn place(&mut self, rows: &Self, lost: &LostAzimuths) {
-        self.layout = rows.layout;
-        self.echoes.clear();
-        for row in rows.echoes.chunk_by(|a, b| a.at == b.at) {
-            let [before, at, after] =
-                [-1.0, 0.0, 1.0].map(|step| lost.azimuth_of(row[0].at + step));
-            let mut place = |at: f32, share: f32| {
-                let placed = row.iter().map(|echo| Echo {
-                    at,
-                    power: share * echo.power,
-                    ..*echo
-                });
-                self.echoes.extend(placed);
-            };
-            place(at, 1.0);
+        self.begin(rows.layout);
+        for row in rows.rows() {
+            let [before, at, after] = [-1.0, 0.0, 1.0].map(|step| lost.azimuth_of(row.at + step));
+            self.add(at, &row, 1.0);
             if at - before > 1.5 {
-                place(at - 1.0, 0.5);
+                self.add(at - 1.0, &row, 0.5);
             }
             if after - at > 1.5 {
-                place(at + 1.0, 0.5);
+                self.add(at + 1.0, &row, 0.5);
             }
         }
     }
+
+    /// Returns the rows that have echoes.
+    pub fn rows(&self) -> impl Iterator<Item = EchoRow<'_>> {
+        let mut start = 0;
+        self.rows.iter().map(move |(at, end)| {
+            let echoes = start..*end;
+            start = *end;
+            EchoRow {
+                at: *at,
+                cells: &self.cells[echoes.clone()],
+                powers: &self.powers[echoes],
+            }
+        })
+    }
+
+    /// Returns the sum of the squares of all powers.
+    pub fn energy(&self) -> f32 {
+        self.powers.iter().map(|power| power * power).sum()
+    }
+
+    fn begin(&mut self, layout: Layout) {
+        self.layout = layout;
+        self.rows.clear();
+        self.cells.clear();
+        self.powers.clear();
+    }
+
+    fn add(&mut self, at: f32, row: &EchoRow<'_>, share: f32) {
+        self.cells.extend_from_slice(row.cells);
+        self.powers
+            .extend(row.powers.iter().map(|power| share * power));
+        self.end_row(at, self.powers.len());
+    }
+
+    /// Ends a row with so many echoes up to its end, if it has any.
+    fn end_row(&mut self, at: f32, end: usize) {
+        self.cells.truncate(end);
+        self.powers.truncate(end);
+        if self.rows.last().is_none_or(|(_, before)| *before < end) && end > 0 {
+            self.rows.push((at, end));
+        }
+    }
+}
+
+/// Writes the cells of a row whose mean power is above the floor, and by how much, to the starts of
+/// `cells` and `powers`, which have room for all. Returns their number. `sums` are of `bins` each,
+/// whole blocks.
+#[simd]
+fn above_floor(sums: &[u16], bins: usize, cells: &mut [u16], powers: &mut [f32]) -> usize {
+    let mut count = 0;
+    for (block, first) in sums.as_chunks::<BLOCK>().0.iter().zip((0..).step_by(BLOCK)) {
+        let above = block.map(|sum| f32::from(sum) / bins as f32 - FLOOR);
+        // Far away most blocks have none.
+        if !above.iter().fold(false, |any, power| any | (*power > 0.0)) {
+            continue;
+        }
+        for (power, cell) in above.into_iter().zip(first..) {
+            (cells[count], powers[count]) = (cell, power);
+            count += usize::from(power > 0.0);
+        }
+    }
+    count
 }

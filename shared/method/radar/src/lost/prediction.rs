@@ -3,15 +3,21 @@
 use std::f32::consts::TAU;
 
 use gyre_geometry::{Pose, Twist};
+use gyre_simd::simd;
 use nalgebra::Vector2;
 
-use super::echoes::{Echoes, Layout};
-use crate::scan::{PolarScan, Sense};
+use super::echoes::{EchoRow, Echoes, Layout};
+use crate::{
+    raster::kernels::integer_below,
+    scan::{PolarScan, Sense},
+};
 
 /// Range at which the time between two looks in one direction is determined, m.
 const TYPICAL_M: f32 = 30.0;
 /// Azimuths beyond the turn, to either side, that a prediction has.
 const BEYOND: usize = 32;
+/// Echoes that are located at once.
+const BLOCK: usize = 16;
 
 /// The motion of the sensor from one turn to the next: at a constant velocity, so between two looks
 /// at the same azimuth by the same motion.
@@ -73,6 +79,7 @@ struct Moved {
 impl Moved {
     /// Returns by how much further along the turn the sensor sees what it saw in that direction at
     /// a range, rad, and its range, m.
+    #[inline(always)]
     fn sees(&self, range_m: f32) -> (f32, f32) {
         let along = (range_m - self.x_m * self.cos - self.y_m * self.sin).max(0.1);
         let across = self.x_m * self.sin - self.y_m * self.cos;
@@ -97,48 +104,15 @@ impl Prediction {
     /// Draws the echoes of the scan before where the sensor sees them now.
     pub fn make(&mut self, before: &Echoes, motion: &Motion) {
         self.layout = before.layout;
-        let Layout {
-            azimuths,
-            cells,
-            first_m,
-            cell_m,
-            ..
-        } = self.layout;
-        let per_rad = azimuths as f32 / TAU;
+        let per_rad = self.layout.azimuths as f32 / TAU;
         self.powers.clear();
-        self.powers.resize(self.width() * cells, 0.0);
-        let mut from = (f32::NAN, motion.seen_from(0.0));
-        for echo in &before.echoes {
-            if from.0 != echo.at {
-                from = (echo.at, motion.seen_from(echo.at / per_rad));
-            }
-            let (turned_rad, range_m) = from.1.sees(first_m + f32::from(echo.cell) * cell_m);
-            let azimuth = echo.at + turned_rad * per_rad;
-            self.draw(azimuth, (range_m - first_m) / cell_m, echo.power);
+        self.powers.resize(self.width() * self.layout.cells, 0.0);
+        let frame = Frame::new(&self.layout, self.width());
+        for row in before.rows() {
+            let from = motion.seen_from(row.at / per_rad);
+            draw(&row, &from, &frame, &mut self.powers);
         }
         self.close();
-    }
-
-    /// Distributes a power over the azimuths and cells on both sides.
-    fn draw(&mut self, azimuth: f32, cell: f32, power: f32) {
-        if cell < 0.0 || cell >= (self.layout.cells - 1) as f32 {
-            return;
-        }
-        let azimuths = self.layout.azimuths as f32;
-        let azimuth = match azimuth {
-            ..0.0 => azimuth + azimuths,
-            _ if azimuth >= azimuths => azimuth - azimuths,
-            _ => azimuth,
-        };
-        let (low, near) = (azimuth as usize, cell as usize);
-        let (share, depth) = (azimuth - low as f32, cell - near as f32);
-        let width = self.width();
-        for (cell, depth) in [(near, 1.0 - depth), (near + 1, depth)] {
-            // The azimuth behind the last is one beyond the turn.
-            let around = &mut self.powers[cell * width + BEYOND + low..][..2];
-            around[0] += power * depth * (1.0 - share);
-            around[1] += power * depth * share;
-        }
     }
 
     /// Repeats the turn's ends beyond it, and sums the energies.
@@ -150,10 +124,8 @@ impl Prediction {
             powers[BEYOND] += powers[BEYOND + azimuths];
             powers.copy_within(BEYOND..2 * BEYOND, BEYOND + azimuths);
             powers.copy_within(azimuths..azimuths + BEYOND, 0);
-            for (energy, power) in self.energies.iter_mut().zip(&*powers) {
-                *energy += power * power;
-            }
         }
+        add_squares(&self.powers, &mut self.energies);
     }
 
     /// Azimuths of the turn and beyond it.
@@ -161,14 +133,150 @@ impl Prediction {
         self.layout.azimuths + 2 * BEYOND
     }
 
-    /// Returns the powers of a cell at an azimuth and those behind it.
-    pub fn from(&self, cell: usize, azimuth: isize) -> &[f32] {
+    /// Returns the powers of a cell at an azimuth and at those behind it.
+    #[inline(always)]
+    pub fn from<const WIDTH: usize>(&self, cell: u16, azimuth: isize) -> &[f32; WIDTH] {
         let width = self.width();
-        &self.powers[cell * width..][..width][(azimuth + BEYOND as isize) as usize..]
+        around(&self.powers[usize::from(cell) * width..][..width], azimuth)
     }
 
-    /// Returns the sum of the squares of an azimuth's powers.
-    pub fn energy(&self, azimuth: isize) -> f32 {
-        self.energies[(azimuth + BEYOND as isize) as usize]
+    /// Returns the sums of the squares of the powers of an azimuth and of those behind it.
+    #[inline(always)]
+    pub fn energies<const WIDTH: usize>(&self, azimuth: isize) -> &[f32; WIDTH] {
+        around(&self.energies, azimuth)
+    }
+}
+
+/// Returns the values at an azimuth and behind it, of those from [`BEYOND`] before the turn on.
+#[inline(always)]
+fn around<const WIDTH: usize>(values: &[f32], azimuth: isize) -> &[f32; WIDTH] {
+    let from = (azimuth + BEYOND as isize) as usize;
+    let chunk = values[from..].first_chunk();
+    chunk.expect("the turn and what is beyond it hold all that a row is compared with")
+}
+
+/// The numbers that lead from a position to its place among the predicted powers.
+#[derive(Clone, Copy, Debug)]
+struct Frame {
+    first_m: f32,
+    cell_m: f32,
+    per_rad: f32,
+    azimuths: f32,
+    /// The last cell with one behind it.
+    last_cell: f32,
+    width: u32,
+}
+
+impl Frame {
+    fn new(layout: &Layout, width: usize) -> Self {
+        Self {
+            first_m: layout.first_m,
+            cell_m: layout.cell_m,
+            per_rad: layout.azimuths as f32 / TAU,
+            azimuths: layout.azimuths as f32,
+            last_cell: layout.cells as f32 - 1.0,
+            width: width as u32,
+        }
+    }
+
+    /// Returns the azimuth in the turn, from one that may lie a turn beside it.
+    #[inline(always)]
+    fn in_turn(&self, azimuth: f32) -> f32 {
+        if azimuth < 0.0 {
+            azimuth + self.azimuths
+        } else if azimuth >= self.azimuths {
+            azimuth - self.azimuths
+        } else {
+            azimuth
+        }
+    }
+}
+
+/// Powers that are distributed over the azimuths and cells on both sides.
+#[derive(Clone, Copy, Debug, Default)]
+struct Places {
+    /// The first azimuth in the nearer cell. The azimuth behind the last is one beyond the turn.
+    first: [u32; BLOCK],
+    /// What the nearer cell gets, at this azimuth and at the one behind it.
+    near: [[f32; BLOCK]; 2],
+    far: [[f32; BLOCK]; 2],
+}
+
+/// Draws the echoes of a row into the powers.
+#[simd]
+fn draw(row: &EchoRow, from: &Moved, frame: &Frame, powers: &mut [f32]) {
+    let ((cells, rest), (of_cells, of_rest)) = (
+        row.cells.as_chunks::<BLOCK>(),
+        row.powers.as_chunks::<BLOCK>(),
+    );
+    for (cells, of_cells) in cells.iter().zip(of_cells) {
+        add(
+            &locate(row.at, cells, of_cells, from, frame),
+            BLOCK,
+            frame,
+            powers,
+        );
+    }
+    let (mut cells, mut of_cells) = ([0; BLOCK], [0.0; BLOCK]);
+    cells[..rest.len()].copy_from_slice(rest);
+    of_cells[..rest.len()].copy_from_slice(of_rest);
+    add(
+        &locate(row.at, &cells, &of_cells, from, frame),
+        rest.len(),
+        frame,
+        powers,
+    );
+}
+
+#[inline(always)]
+fn locate(
+    at: f32,
+    cells: &[u16; BLOCK],
+    powers: &[f32; BLOCK],
+    from: &Moved,
+    frame: &Frame,
+) -> Places {
+    let mut places = Places::default();
+    for k in 0..BLOCK {
+        let (turned_rad, range_m) = from.sees(frame.first_m + f32::from(cells[k]) * frame.cell_m);
+        let azimuth = frame.in_turn(at + turned_rad * frame.per_rad);
+        let cell = (range_m - frame.first_m) / frame.cell_m;
+        // What lies in no cell adds nothing to the first.
+        let is_inside = cell >= 0.0 && cell < frame.last_cell;
+        let (cell, power) = if is_inside {
+            (cell, powers[k])
+        } else {
+            (0.0, 0.0)
+        };
+        let low = integer_below(azimuth).min(frame.azimuths as i32);
+        let near = integer_below(cell);
+        let (share, depth) = (azimuth - low as f32, cell - near as f32);
+        places.first[k] = near as u32 * frame.width + BEYOND as u32 + low as u32;
+        let (near, far) = (power * (1.0 - depth), power * depth);
+        (places.near[0][k], places.near[1][k]) = (near * (1.0 - share), near * share);
+        (places.far[0][k], places.far[1][k]) = (far * (1.0 - share), far * share);
+    }
+    places
+}
+
+#[inline(always)]
+fn add(places: &Places, count: usize, frame: &Frame, powers: &mut [f32]) {
+    let width = frame.width as usize;
+    for k in 0..count.min(BLOCK) {
+        let sums = &mut powers[places.first[k] as usize..][..width + 2];
+        sums[0] += places.near[0][k];
+        sums[1] += places.near[1][k];
+        sums[width] += places.far[0][k];
+        sums[width + 1] += places.far[1][k];
+    }
+}
+
+/// Adds the squares of the powers of each cell to the sums of the azimuths.
+#[simd]
+fn add_squares(powers: &[f32], sums: &mut [f32]) {
+    for powers in powers.chunks_exact(sums.len()) {
+        for (sum, power) in sums.iter_mut().zip(powers) {
+            *sum += power * power;
+        }
     }
 }

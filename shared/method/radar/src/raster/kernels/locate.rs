@@ -3,6 +3,7 @@
 use super::super::bearing_table::{BearingTable, NODES};
 use super::super::cells::{BLOCK, Block, CellRow};
 use super::super::sweep_motion::SweepMotion;
+use super::integer_below;
 use super::window::UNIT;
 use gyre_simd::simd;
 use std::array::from_fn;
@@ -139,16 +140,6 @@ fn interpolate(table: &[f32; NODES + 1], turns: f32) -> f32 {
     below + (place - node as f32) * (above - below)
 }
 
-/// The integer below `value`; at an integer, that or the previous one, which interpolates alike.
-/// Valid in `[0, 2^22]`, and in `[0, 2^23)` for any input. A cast takes ten times longer, since it
-/// handles overflow and NaN.
-#[inline(always)]
-fn integer_below(value: f32) -> i32 {
-    const MANTISSA: u32 = (1 << 23) - 1;
-    let rounded = (value - 0.5).max(0.0) + (1 << 23) as f32;
-    (rounded.to_bits() & MANTISSA) as i32
-}
-
 /// atan2(z, x) in turns, `[0, 1]`, accurate to 1e-8 turns before rounding: a minimax polynomial in
 /// the ratio of the smaller coordinate to the larger.
 #[inline(always)]
@@ -187,29 +178,6 @@ mod tests {
         fn turns_are_the_arctangent(x in -200.0..200.0f32, z in -200.0..200.0f32) {
             let expected = (f64::from(z).atan2(f64::from(x)) / TAU).rem_euclid(1.0);
             prop_assert!((f64::from(turns(x, z)) - expected).abs() < 1.5e-7);
-        }
-    }
-
-    proptest! {
-        #[test]
-        fn integers_below_are_within_one(value in 0.0..4e6f32) {
-            let past = value - integer_below(value) as f32;
-            prop_assert!((0.0..=1.0).contains(&past));
-        }
-    }
-
-    #[test]
-    fn integer_below_is_defined_for_all_floats() {
-        for value in [
-            0.0,
-            0.25,
-            -1.0,
-            f32::NAN,
-            f32::INFINITY,
-            f32::NEG_INFINITY,
-            f32::MAX,
-        ] {
-            assert!((0..1 << 23).contains(&integer_below(value)));
         }
     }
 
