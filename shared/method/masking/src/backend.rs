@@ -18,7 +18,7 @@ pub enum Backend {
     Auto,
     /// ONNX Runtime, which is opened at run time.
     OnnxRuntime,
-    /// rten, which is built in: pure Rust, and slower.
+    /// What is built in: rten, or of 8-bit integers Gyre itself.
     Rten,
 }
 

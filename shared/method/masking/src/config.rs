@@ -23,8 +23,9 @@ pub struct MaskingConfig {
     /// SHA-256 of the network, to refuse another one. Default: the one of its card.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sha256: Option<String>,
-    /// The library that computes the network: `onnxruntime`; `rten`, which is built in and slower;
-    /// or `auto`: ONNX Runtime where it is found, else rten.
+    /// The library that computes the network: `onnxruntime`; `rten`, which is built in and slower,
+    /// and leaves networks of one scan in 8 bits to Gyre itself; or `auto`: ONNX Runtime where it
+    /// is found, else rten.
     #[serde(deserialize_with = "backend::deserialize")]
     pub backend: Backend,
     /// The library of ONNX Runtime, or its folder. Default: it is searched for, see docs/masks.md.

@@ -1,11 +1,14 @@
-//! A learned mask: a network in ONNX Runtime or in rten.
+//! A learned mask: a network in ONNX Runtime, in rten, or of 8-bit integers without either.
 
+mod integers;
 mod onnx_runtime;
 mod rten;
+mod tensors;
 
 use std::path::PathBuf;
 
 use gyre_radar::raster::RasterConfig;
+use gyre_simd::simd;
 use ndarray::{Array3, ArrayView3, ArrayViewMut3, Axis};
 use thiserror::Error;
 
@@ -14,6 +17,7 @@ use crate::{
     model::{Model, ModelError},
     runtime::RuntimeError,
 };
+use integers::Integers;
 use onnx_runtime::OnnxRuntime;
 use rten::Rten;
 
@@ -96,6 +100,7 @@ pub struct Network {
 enum Engine {
     OnnxRuntime(OnnxRuntime),
     Rten(Rten),
+    Integers(Integers),
 }
 
 impl Network {
@@ -105,15 +110,13 @@ impl Network {
     /// A model that does not fit, or a backend that is missing or rejects it.
     pub fn load(config: &MaskingConfig, raster: &RasterConfig) -> Result<Self, NetworkError> {
         let model = Model::read(config, raster)?;
-        let mut engine = match Library::find(config)? {
+        let (mut engine, inputs, outputs) = match Library::find(config)? {
             Library::OnnxRuntime(path) => {
-                Engine::OnnxRuntime(OnnxRuntime::load(&path, &model, config)?)
+                let engine = OnnxRuntime::load(&path, &model, config)?;
+                let (inputs, outputs) = (engine.inputs(), engine.outputs());
+                (Engine::OnnxRuntime(engine), inputs, outputs)
             }
-            Library::Rten => Engine::Rten(Rten::load(&model)?),
-        };
-        let (inputs, outputs) = match &engine {
-            Engine::OnnxRuntime(engine) => (engine.inputs(), engine.outputs()),
-            Engine::Rten(engine) => (engine.inputs(), engine.outputs()),
+            Library::Rten => built_in(&model)?,
         };
         let shape = [1, model.card.model.inputs, raster.n, raster.n];
         check("takes", INPUT, &inputs, shape, &model)?;
@@ -144,15 +147,12 @@ impl Network {
         match &mut self.engine {
             Engine::OnnxRuntime(engine) => engine.run(rasters, self.masks.view_mut()),
             Engine::Rten(engine) => engine.run(rasters, self.masks.view_mut()),
+            Engine::Integers(engine) => {
+                engine.run(rasters, self.masks.view_mut());
+                Ok(())
+            }
         }?;
-        match self.masks.iter().filter(|mask| mask.is_nan()).count() {
-            0 => Ok(self.masks.view()),
-            count => Err(NetworkError::Run(format!(
-                "{count} of {} factors are NaN, so the model or its execution provider is broken; \
-                 get the model again, or set masking.provider to `cpu`",
-                self.masks.len()
-            ))),
-        }
+        Ok(self.masks.view())
     }
 
     /// Returns the masks of the last [`Network::run`], scans x n x n.
@@ -161,20 +161,45 @@ impl Network {
     }
 }
 
+/// Loads a model without ONNX Runtime. Returns the engine, and what the model takes and gives.
+fn built_in(model: &Model) -> Result<(Engine, Vec<String>, Vec<String>), NetworkError> {
+    let file = rten::parse(model)?;
+    let (inputs, outputs) = (rten::inputs(&file), rten::outputs(&file));
+    let read = |graph| rten::guarded(|| Integers::read(graph).ok_or("it has other steps")).ok();
+    let engine = match file.graph.as_ref().and_then(read) {
+        Some(engine) => Engine::Integers(engine),
+        None => Engine::Rten(Rten::load(model, file)?),
+    };
+    Ok((engine, inputs, outputs))
+}
+
 /// Copies computed factors, clamped to 0 to 1.
 fn fill(mut masks: ArrayViewMut3<'_, f32>, computed: &[f32]) -> Result<(), NetworkError> {
-    if masks.len() != computed.len() {
+    let cells = masks.len();
+    let Some(masks) = masks.as_slice_mut().filter(|_| cells == computed.len()) else {
         return Err(NetworkError::Run(format!(
-            "{} values instead of {}",
+            "{} values instead of {cells}",
             computed.len(),
-            masks.len()
         )));
+    };
+    match clamp(computed, masks) {
+        0 => Ok(()),
+        count => Err(NetworkError::Run(format!(
+            "{count} of {cells} factors are NaN, so the model or its execution provider is broken; \
+             get the model again, or set masking.provider to `cpu`",
+        ))),
     }
-    masks
-        .iter_mut()
-        .zip(computed)
-        .for_each(|(mask, value)| *mask = value.clamp(0.0, 1.0));
-    Ok(())
+}
+
+/// Writes values clamped to 0 to 1, and returns how many are NaN.
+#[simd]
+fn clamp(values: &[f32], clamped: &mut [f32]) -> u32 {
+    let mut broken = 0;
+    for (clamped, value) in clamped.iter_mut().zip(values) {
+        *clamped = value.clamp(0.0, 1.0);
+        broken += u32::from(value.is_nan());
+    }
+    broken
 }
 
 /// Checks that the inputs or outputs of a network are exactly the expected tensor.

@@ -23,52 +23,50 @@ const OPSET: i64 = 26;
 pub(super) struct Rten {
     network: Box<rten::Model>,
     thread: Arc<ThreadPool>,
-    inputs: Vec<String>,
-    outputs: Vec<String>,
+}
+
+/// Reads the file of a model.
+pub(super) fn parse(model: &Model) -> Result<ModelProto, NetworkError> {
+    let file = guarded(|| ModelProto::parse_buf(&model.bytes)).map_err(|error| {
+        let reason = format!("it is not a model in ONNX, or is damaged: {error}");
+        rejected(model, reason)
+    })?;
+    let opset = newest_operators(&file);
+    if opset > OPSET {
+        return Err(NetworkError::Opset {
+            path: model.file.clone(),
+            opset,
+            by: Backend::Rten,
+            known: OPSET.to_string(),
+        });
+    }
+    match file.graph {
+        Some(_) => Ok(file),
+        None => Err(rejected(model, "it has no graph".to_owned())),
+    }
+}
+
+fn rejected(model: &Model, reason: String) -> NetworkError {
+    NetworkError::Load {
+        by: Backend::Rten,
+        path: model.file.clone(),
+        reason,
+    }
 }
 
 impl Rten {
-    /// Loads a model.
-    pub fn load(model: &Model) -> Result<Self, NetworkError> {
-        let rejected = |reason| NetworkError::Load {
-            by: Backend::Rten,
-            path: model.file.clone(),
-            reason,
-        };
-        let mut file = guarded(|| ModelProto::parse_buf(&model.bytes)).map_err(|error| {
-            rejected(format!("it is not a model in ONNX, or is damaged: {error}"))
-        })?;
-        let opset = newest_operators(&file);
-        if opset > OPSET {
-            return Err(NetworkError::Opset {
-                path: model.file.clone(),
-                opset,
-                by: Backend::Rten,
-                known: OPSET.to_string(),
-            });
+    /// Loads a model from its file as it was [parsed](parse).
+    pub fn load(model: &Model, mut file: ModelProto) -> Result<Self, NetworkError> {
+        if let Some(graph) = &mut file.graph {
+            state_kernel_sizes(graph);
         }
-        let graph = file.graph.as_mut();
-        let graph = graph.ok_or_else(|| rejected("it has no graph".to_owned()))?;
-        let (inputs, outputs) = (inputs(graph), graph.output.iter().map(describe).collect());
-        state_kernel_sizes(graph);
+        let rejected = |reason| rejected(model, reason);
         let bytes = guarded(|| file.write_buf()).map_err(rejected)?;
         let network = guarded(|| ModelOptions::with_all_ops().load(bytes)).map_err(rejected)?;
         Ok(Self {
             network: Box::new(network),
             thread: Arc::new(ThreadPool::with_num_threads(1)),
-            inputs,
-            outputs,
         })
-    }
-
-    /// Returns the name, type and shape of each input.
-    pub fn inputs(&self) -> Vec<String> {
-        self.inputs.clone()
-    }
-
-    /// Returns the name, type and shape of each output.
-    pub fn outputs(&self) -> Vec<String> {
-        self.outputs.clone()
     }
 
     /// Computes the masks of empty rasters. Only now does rten find operators that do not fit each
@@ -106,9 +104,9 @@ fn failed(error: impl Display) -> NetworkError {
     NetworkError::Run(one_line(&error.to_string()))
 }
 
-/// Calls rten. A model may have what rten does not expect, and then it panics: this becomes an
-/// error too.
-fn guarded<T, E: Display>(call: impl FnOnce() -> Result<T, E>) -> Result<T, String> {
+/// Calls rten, or what reads a model. A model may have what that does not expect, and then it
+/// panics: this becomes an error too.
+pub(super) fn guarded<T, E: Display>(call: impl FnOnce() -> Result<T, E>) -> Result<T, String> {
     match catch_unwind(AssertUnwindSafe(call)) {
         Ok(result) => result.map_err(|error| one_line(&error.to_string())),
         Err(_) => Err("it fails on this model".to_owned()),
@@ -149,14 +147,23 @@ fn state_kernel_sizes(graph: &mut GraphProto) {
     }
 }
 
-/// Returns the inputs of a graph. Old files list weights among them.
-fn inputs(graph: &GraphProto) -> Vec<String> {
+/// Returns the name, type and shape of each input. Old files list weights among them.
+pub(super) fn inputs(file: &ModelProto) -> Vec<String> {
+    let Some(graph) = &file.graph else {
+        return Vec::new();
+    };
     let is_weight = |input: &&ValueInfoProto| {
         let mut weights = graph.initializer.iter();
         weights.any(|weight| weight.name == input.name)
     };
     let inputs = graph.input.iter().filter(|input| !is_weight(input));
     inputs.map(describe).collect()
+}
+
+/// Returns the name, type and shape of each output.
+pub(super) fn outputs(file: &ModelProto) -> Vec<String> {
+    let outputs = file.graph.iter().flat_map(|graph| &graph.output);
+    outputs.map(describe).collect()
 }
 
 fn describe(tensor: &ValueInfoProto) -> String {
