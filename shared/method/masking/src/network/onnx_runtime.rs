@@ -10,7 +10,7 @@ use ort::{
     value::{Outlet, TensorRef, ValueType},
 };
 
-use super::{NetworkError, fill, one_line};
+use super::{NetworkError, fill, fold, one_line};
 use crate::{Backend, MaskingConfig, Provider, model::Model, runtime};
 
 /// A session of ONNX Runtime.
@@ -23,8 +23,9 @@ impl OnnxRuntime {
     /// Opens the library at `path` and loads a model.
     pub fn load(path: &Path, model: &Model, config: &MaskingConfig) -> Result<Self, NetworkError> {
         let environment = runtime::open(path)?;
+        let folded = fold::folded(&model.bytes);
         let session = builder(&environment, config)?
-            .commit_from_memory(&model.bytes)
+            .commit_from_memory(folded.as_ref().unwrap_or(&model.bytes))
             .map_err(|error| rejected(model, error.message()))?;
         Ok(Self { session })
     }
