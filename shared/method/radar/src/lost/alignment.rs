@@ -128,14 +128,14 @@ impl Alignment {
     fn gain(&self, prediction: &Prediction, count: usize) -> (f32, f32) {
         let (mut common, mut energy) = (0.0, f32::MIN_POSITIVE);
         for (row, products) in self.products.iter().enumerate() {
-            let numbers = BESIDE + TURN..=BESIDE + TURN + count;
-            let best = numbers.fold(BESIDE + TURN, |best, k| {
-                match products[k] > products[best] {
-                    true => k,
-                    false => best,
-                }
-            });
-            common += products[best];
+            let (mut best, mut highest) = (BESIDE + TURN, products[BESIDE + TURN]);
+            for (k, product) in (best..).zip(&products[BESIDE + TURN..][..=count]) {
+                // Which it is cannot be foreseen: no branch.
+                let is_higher = *product > highest;
+                best = if is_higher { k } else { best };
+                highest = if is_higher { *product } else { highest };
+            }
+            common += highest;
             energy += prediction.energies::<1>(azimuth(row, best))[0];
         }
         (common / energy, common)

@@ -1,5 +1,7 @@
 //! Echoes of a scan, which are aligned: its powers above a floor in cells of range.
 
+use std::f32::consts::TAU;
+
 use gyre_simd::simd;
 
 use super::LostAzimuths;
@@ -52,6 +54,8 @@ impl Layout {
 pub(super) struct EchoRow<'a> {
     /// The row, or its azimuth in steps of the turn.
     pub at: f32,
+    /// Sine and cosine of that azimuth, if it is one.
+    pub direction: [f32; 2],
     /// The cells with a return, in order.
     pub cells: &'a [u16],
     /// Their powers above the floor.
@@ -62,13 +66,20 @@ pub(super) struct EchoRow<'a> {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Echoes {
     pub layout: Layout,
-    /// Each row, and the number of echoes up to its end.
-    rows: Vec<(f32, usize)>,
+    rows: Vec<Row>,
     cells: Vec<u16>,
     powers: Vec<f32>,
     /// The bins and the cells of a row that is read.
     bins: Vec<u8>,
     sums: Vec<u16>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Row {
+    at: f32,
+    direction: [f32; 2],
+    /// Echoes up to its end.
+    end: usize,
 }
 
 impl Echoes {
@@ -101,7 +112,7 @@ impl Echoes {
             self.powers.resize(start + room, 0.0);
             let (cells, powers) = (&mut self.cells[start..], &mut self.powers[start..]);
             let count = above_floor(&self.sums, bins_per_cell, cells, powers);
-            self.end_row(row as f32, start + count);
+            self.end_row(row as f32, [0.0; 2], start + count);
         }
     }
 
@@ -124,11 +135,12 @@ impl Echoes {
     /// Returns the rows that have echoes.
     pub fn rows(&self) -> impl Iterator<Item = EchoRow<'_>> {
         let mut start = 0;
-        self.rows.iter().map(move |(at, end)| {
-            let echoes = start..*end;
-            start = *end;
+        self.rows.iter().map(move |row| {
+            let echoes = start..row.end;
+            start = row.end;
             EchoRow {
-                at: *at,
+                at: row.at,
+                direction: row.direction,
                 cells: &self.cells[echoes.clone()],
                 powers: &self.powers[echoes],
             }
@@ -151,15 +163,16 @@ impl Echoes {
         self.cells.extend_from_slice(row.cells);
         self.powers
             .extend(row.powers.iter().map(|power| share * power));
-        self.end_row(at, self.powers.len());
+        let (sin, cos) = (at / (self.layout.azimuths as f32 / TAU)).sin_cos();
+        self.end_row(at, [sin, cos], self.powers.len());
     }
 
     /// Ends a row with so many echoes up to its end, if it has any.
-    fn end_row(&mut self, at: f32, end: usize) {
+    fn end_row(&mut self, at: f32, direction: [f32; 2], end: usize) {
         self.cells.truncate(end);
         self.powers.truncate(end);
-        if self.rows.last().is_none_or(|(_, before)| *before < end) && end > 0 {
-            self.rows.push((at, end));
+        if self.rows.last().map_or(0, |row| row.end) < end {
+            self.rows.push(Row { at, direction, end });
         }
     }
 }

@@ -48,9 +48,9 @@ impl Motion {
         }
     }
 
-    /// Returns the sensor at the time when it sees again what it saw in a direction.
-    fn seen_from(&self, bearing_rad: f32) -> Moved {
-        let (sin, cos) = bearing_rad.sin_cos();
+    /// Returns the sensor at the time when it sees again what it saw in a direction, of which it
+    /// takes sine and cosine.
+    fn seen_from(&self, [sin, cos]: [f32; 2]) -> Moved {
         let after = |later_s: f64| {
             let at_m = self.pose.translation.vector + self.velocity_mps * later_s;
             Moved {
@@ -104,12 +104,11 @@ impl Prediction {
     /// Draws the echoes of the scan before where the sensor sees them now.
     pub fn make(&mut self, before: &Echoes, motion: &Motion) {
         self.layout = before.layout;
-        let per_rad = self.layout.azimuths as f32 / TAU;
         self.powers.clear();
         self.powers.resize(self.width() * self.layout.cells, 0.0);
         let frame = Frame::new(&self.layout, self.width());
         for row in before.rows() {
-            let from = motion.seen_from(row.at / per_rad);
+            let from = motion.seen_from(row.direction);
             draw(&row, &from, &frame, &mut self.powers);
         }
         self.close();
