@@ -18,7 +18,7 @@ pub enum Backend {
     Auto,
     /// ONNX Runtime, which is opened at run time.
     OnnxRuntime,
-    /// What is built in: rten, or of 8-bit integers Gyre itself.
+    /// The built-in ones: rten, or for 8-bit integers Gyre itself.
     Rten,
 }
 

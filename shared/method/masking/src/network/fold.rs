@@ -1,5 +1,5 @@
-//! Networks that fold blocks of cells into channels, written so that ONNX Runtime moves the cells at
-//! once.
+//! Networks that fold blocks of cells into channels, written so that ONNX Runtime moves the cells
+//! at once.
 
 use rten_onnx::onnx::{AttributeProto, AttributeType, GraphProto, ModelProto, NodeProto};
 
@@ -55,7 +55,8 @@ fn is_quantisation(node: &NodeProto) -> bool {
     matches!(kind, Some("QuantizeLinear" | "DequantizeLinear"))
 }
 
-/// Returns the operators from one to the end of the folding, each the only reader of the one before.
+/// Returns the operators from one to the end of the folding, each the only reader of the one
+/// before.
 fn chain(graph: &GraphProto, first: usize) -> Option<Vec<usize>> {
     let mut chain = vec![first];
     let mut folding = FOLDING[1..].iter();

@@ -196,7 +196,7 @@ impl Frame {
 struct Places {
     /// The first azimuth in the nearer cell. The azimuth behind the last is one beyond the turn.
     first: [u32; BLOCK],
-    /// What the nearer cell gets, at this azimuth and at the one behind it.
+    /// The shares of the nearer cell, at this azimuth and at the one behind it.
     near: [[f32; BLOCK]; 2],
     far: [[f32; BLOCK]; 2],
 }

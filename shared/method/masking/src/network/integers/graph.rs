@@ -19,7 +19,7 @@ use layout::Layout;
 /// Integers in 32-bit floating-point numbers are exact below this.
 const EXACT: f32 = (1 << 24) as f32;
 
-/// What a floating-point tensor of the network is.
+/// The meaning of a floating-point tensor.
 #[derive(Clone)]
 enum Float {
     /// The raster over a divisor.
@@ -40,7 +40,7 @@ enum Float {
     Factors,
 }
 
-/// What a tensor of integers is.
+/// The meaning of a tensor of integers.
 #[derive(Clone)]
 enum Integer {
     Of(Layout),
@@ -141,7 +141,8 @@ impl<'a> Reader<'a> {
                 let layout = self.layout(node, 0)?;
                 let [_, channels, rows, columns] = layout.shape[..].try_into().ok()?;
                 let sizes = self.constants.sizes(node.input.get(3)?)?;
-                (sizes == [1, channels, 2 * rows, 2 * columns]).then(|| Float::Enlarged(layout))?
+                (sizes == [1, channels, 2 * rows, 2 * columns])
+                    .then_some(Float::Enlarged(layout))?
             }
             "Concat" if attributes.integer("axis") == Some(1) && node.input.len() == 2 => {
                 Float::Joined([self.layout(node, 0)?, self.layout(node, 1)?])
@@ -208,7 +209,7 @@ impl<'a> Reader<'a> {
             Float::Convolved(layout, weights, bias) => {
                 let kernel = kernel(&layout, &weights, &bias, to)?;
                 let shape = |[_, rows, columns]: [usize; 3]| [kernel.offsets.len(), rows, columns];
-                let (from, image, layout) = self.from_image(&layout, to, shape)?;
+                let (from, image, layout) = self.made_from(&layout, to, shape)?;
                 self.steps.push(Step::Convolve {
                     from,
                     to: image,
@@ -219,14 +220,14 @@ impl<'a> Reader<'a> {
             Float::Pooled(layout) if layout.quantisation == to => {
                 let shape =
                     |[channels, rows, columns]: [usize; 3]| [channels, rows / 2, columns / 2];
-                let (from, image, layout) = self.from_image(&layout, to, shape)?;
+                let (from, image, layout) = self.made_from(&layout, to, shape)?;
                 self.steps.push(Step::Pool { from, to: image });
                 layout
             }
             Float::Enlarged(layout) if layout.quantisation == to && to.zero == 0.0 => {
                 let shape =
                     |[channels, rows, columns]: [usize; 3]| [channels, 2 * rows, 2 * columns];
-                let (from, image, layout) = self.from_image(&layout, to, shape)?;
+                let (from, image, layout) = self.made_from(&layout, to, shape)?;
                 self.steps.push(Step::Enlarge { from, to: image });
                 layout
             }
@@ -241,7 +242,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Adds an image that is made from another one. Returns the numbers of both and the values.
-    fn from_image(
+    fn made_from(
         &mut self,
         from: &Layout,
         to: Quantisation,

@@ -20,7 +20,7 @@ const ROUND: f32 = (3 << 22) as f32;
 pub struct Kernel {
     /// Block of outputs x input x row and column x output.
     pub weights: Vec<[[f32; OUTPUTS]; 9]>,
-    /// What is added to the sum of each output.
+    /// An addend of the sum of each output.
     pub offsets: Vec<f32>,
     /// Steps of a value in a step of its sum.
     pub factors: Vec<f32>,
@@ -39,8 +39,8 @@ pub fn quantise(values: &mut [f32], divisor: f32, step: f32) {
 /// Returns the integer next to a number, plus `zero`, from 0 to [`MOST`].
 #[inline(always)]
 fn rounded(value: f32, zero: f32) -> f32 {
-    let near = value.max(-MOST).min(2.0 * MOST);
-    ((near + ROUND - ROUND) + zero).max(0.0).min(MOST)
+    let near = value.clamp(-MOST, 2.0 * MOST);
+    ((near + ROUND - ROUND) + zero).clamp(0.0, MOST)
 }
 
 /// A convolution of an image.
