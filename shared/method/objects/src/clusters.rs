@@ -4,9 +4,9 @@ use nalgebra::{Point2, Vector2};
 
 use crate::returns::Return;
 
-/// Largest distance along the beam between neighbouring returns of one object, m: the gap between
-/// the front and the rear axle is filled by the sides.
-const ALONG_M: f64 = 3.2;
+/// Largest distance along the beam between neighbouring returns of one object, m: the two ends of a
+/// van, with nothing between them.
+const ALONG_M: f64 = 5.0;
 /// Largest distance across the beam near the sensor, m,
 const ACROSS_M: f64 = 2.5;
 /// and its growth with the range, radians: two azimuths of 0.9 degrees.

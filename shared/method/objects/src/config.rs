@@ -17,8 +17,8 @@ pub enum ObjectsKind {
 
 /// The tracking of moving objects: the section `[objects]`.
 ///
-/// The constants are those of road vehicles and of radars that turn four times a second; none is
-/// fitted to a recording.
+/// The constants are those of road vehicles and of radars that turn four times a second; those of
+/// the score were fitted to simulated drives.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ObjectsConfig {
@@ -27,22 +27,27 @@ pub struct ObjectsConfig {
     /// Maximum range of what is tracked, m. Beyond it a beam of 1.8 degrees is wider than a car.
     /// Default 70.
     pub max_range_m: f64,
-    /// Scans that are remembered, at most 32. A vehicle of 4.5 m at walking pace leaves its place
+    /// Minimum range of a new object, m: nearer, the vehicle sees itself. Default 8.
+    pub min_range_m: f64,
+    /// Weight of a return over the mean weight of the range cells around it from which on it
+    /// stands out: what does not is taken for the reverberation of a strong echo. Default 2.
+    pub contrast: f64,
+    /// Scans that are remembered, at most 64. A vehicle of 4.5 m at walking pace leaves its place
     /// within them. Default 20: five seconds.
     pub memory_scans: u32,
-    /// Scans in which a place must have been in view before what appears there is new. Default 2.
-    pub min_views: u32,
-    /// Share of these scans with a return at a place, from which on it belongs to what stands.
-    /// Default 0.2: weak edges of buildings return in every third to fifth scan.
+    /// Expected share of the scans with a return at a place, from which on it belongs to what
+    /// stands; what has never been in view has 0.5. Default 0.4: three scans that saw a place free
+    /// make it 0.08, and a vehicle that has just passed 0.1 to 0.3.
     pub standing_share: f64,
     /// Standard deviation of a cluster's range, m: three range cells of 0.17 m, and scatterers that
-    /// come and go. Default 0.4.
+    /// come and go. Default 0.5.
     pub range_sigma_m: f64,
     /// Standard deviation of its bearing, degrees: half of an azimuth of 0.9 and of the noise in
     /// which azimuth of a beam is the strongest. Default 0.6.
     pub bearing_sigma_deg: f64,
     /// Standard deviation of an object's acceleration along its way, m/s²: vehicles brake and
-    /// accelerate with 1 to 3. Default 1.5.
+    /// accelerate with 1 to 3. It is up to four times that while the object is not where it is
+    /// predicted, as is the next. Default 1.5.
     pub acceleration_mps2: f64,
     /// Standard deviation of its acceleration across its way, m/s²: bends are driven with up to
     /// 2 to 3. Default 1.5.
@@ -54,10 +59,16 @@ pub struct ObjectsConfig {
     /// wind moves. Default 0.8.
     pub standing_mps: f64,
     /// Standard deviations by which the speed must exceed `standing_mps` for an object to be
-    /// moving. Default 3: one in 740 of those that stand would pass.
+    /// moving. Default 1.5: the score tells what stands as well.
     pub moving_sigmas: f64,
     /// Returns of a cluster that begins a track, at least. Default 3.
     pub min_returns: usize,
+    /// Sum of their weights, at least; that of a return 30 dB above the threshold of the masks is
+    /// 1. Default 0.8.
+    pub min_weight: f64,
+    /// The score from which on a track is an object: the logarithm of the likelihood of an object
+    /// over that of clutter. More finds less, and less that is false. Default 2.
+    pub confirm_score: f64,
     /// Scans with a cluster, of the first `birth_scans`, that confirm a track. Default 3.
     pub birth_hits: u32,
     /// The scans in which a track is confirmed, or given up. Default 4.
@@ -72,17 +83,20 @@ impl Default for ObjectsConfig {
         Self {
             kind: ObjectsKind::None,
             max_range_m: 70.0,
+            min_range_m: 8.0,
+            contrast: 2.0,
             memory_scans: 20,
-            min_views: 2,
-            standing_share: 0.2,
-            range_sigma_m: 0.4,
+            standing_share: 0.4,
+            range_sigma_m: 0.5,
             bearing_sigma_deg: 0.6,
             acceleration_mps2: 1.5,
             lateral_acceleration_mps2: 1.5,
             speed_sigma_mps: 8.0,
             standing_mps: 0.8,
-            moving_sigmas: 3.0,
+            moving_sigmas: 1.5,
             min_returns: 3,
+            min_weight: 0.8,
+            confirm_score: 2.0,
             birth_hits: 3,
             birth_scans: 4,
             coast_s: 1.0,
@@ -124,10 +138,11 @@ impl ObjectsConfig {
         setting(
             "memory_scans",
             self.memory_scans.into(),
-            (4.0, 32.0),
-            "4 to 32",
+            (4.0, 64.0),
+            "4 to 64",
         )?;
-        setting("min_views", self.min_views.into(), (1.0, 32.0), "1 to 32")?;
+        setting("min_range_m", self.min_range_m, (0.0, 120.0), "0 to 120")?;
+        setting("contrast", self.contrast, (0.0, 100.0), "0 to 100")?;
         setting(
             "standing_share",
             self.standing_share,
@@ -147,6 +162,8 @@ impl ObjectsConfig {
         }
         let returns = self.min_returns as f64;
         setting("min_returns", returns, (1.0, 1000.0), "1 to 1000")?;
+        setting("min_weight", self.min_weight, (0.0, 1000.0), "0 to 1000")?;
+        setting("confirm_score", self.confirm_score, (0.0, 8.0), "0 to 8")?;
         setting("birth_hits", self.birth_hits.into(), (2.0, 32.0), "2 to 32")?;
         let scans = f64::from(self.birth_scans);
         let hits = f64::from(self.birth_hits);
@@ -165,7 +182,7 @@ mod tests {
         for (faulty, key) in [
             (
                 ObjectsConfig {
-                    memory_scans: 33,
+                    memory_scans: 65,
                     ..ObjectsConfig::default()
                 },
                 "memory_scans",

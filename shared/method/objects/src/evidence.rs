@@ -1,11 +1,13 @@
-//! Where the last scans saw something.
+//! Where the last scans saw something, and where they saw that nothing is.
 //!
 //! A grid that wraps around covers the surroundings of the sensor. Each cell remembers in which of
-//! the last 32 scans it had a return. A place that was in view of these scans and had none was
-//! free. What an obstacle hides counts as in view too: a vehicle that appears behind another one is
-//! new, and its speed has to tell that it stands.
+//! the last 64 scans it had a return. A place that some of these scans had in view, and that had no
+//! return in them, was free. In view is what the beam reaches: up to the first strong return of its
+//! direction, or beyond it up to the last return, for a radar sees over what is low and through
+//! what is thin. What is hidden behind is neither free nor taken.
 
 use std::collections::VecDeque;
+use std::f64::consts::TAU;
 
 use nalgebra::{Point2, Vector2};
 
@@ -15,8 +17,18 @@ use crate::returns::Return;
 const CELL_M: f64 = 0.5;
 /// Cells a side: 256 m, twice the largest range and the way of the remembered scans.
 const SIDE: i32 = 512;
-/// Distance to the ends of the range within which a place is not reliably in view, m.
+/// Distance to the ends of what a beam reaches within which a place is not reliably in view, m.
 const EDGE_M: f64 = 1.0;
+/// Directions of which the reach is kept: 0.9 degrees each.
+const SECTORS: usize = 400;
+/// Directions to either side of a return in which it is seen: the half width of a beam.
+const BEAM_SECTORS: usize = 2;
+/// Weight of a return that may hide what is behind it: 9 dB above the threshold of the masks.
+const HIDING_WEIGHT: f64 = 0.3;
+/// Weight of a return by which the beam goes on.
+const BEYOND_WEIGHT: f64 = 0.15;
+/// Standard deviations of the bearing within which a place may be that of a return.
+const ACROSS_SIGMAS: f64 = 1.5;
 /// The last scans in which a vehicle may have been at the place that it has now: one of 5 m that is
 /// faster than 7 m/s. At the start of a drive, half of the scans.
 const OWN_SCANS: u32 = 3;
@@ -31,8 +43,8 @@ const NEAREST_M: f64 = 5.0;
 #[derive(Clone, Debug)]
 pub(crate) struct Evidence {
     cells: Vec<Cell>,
-    /// Positions of the sensor in the last scans, the newest first.
-    sensors: VecDeque<Point2<f64>>,
+    /// The last scans, the newest first.
+    views: VecDeque<View>,
     memory_scans: u32,
     max_range_m: f64,
     /// Standard deviation of a return's bearing, rad.
@@ -40,12 +52,20 @@ pub(crate) struct Evidence {
     scan: u32,
 }
 
+/// What a scan had in view.
+#[derive(Clone, Debug)]
+struct View {
+    sensor: Point2<f64>,
+    /// Range up to which each direction of the odometry's frame was seen, m.
+    reach_m: Vec<f64>,
+}
+
 #[derive(Clone, Copy, Debug, Default)]
 struct Cell {
     /// The place that it stands for, by its cells from the origin.
     place: [i32; 2],
     /// Bit k is set if there was a return k scans before `scan`.
-    hits: u32,
+    hits: u64,
     scan: u32,
 }
 
@@ -59,21 +79,61 @@ pub(crate) struct History {
 }
 
 impl History {
-    /// Returns the share of the views with a return; 1 if there are fewer views than `min_views`.
-    pub fn share(&self, min_views: u32) -> f64 {
-        match self.views >= min_views.max(1) {
-            // A single return may be of what passed.
-            true => f64::from(self.hits.saturating_sub(1)) / f64::from(self.views),
-            false => 1.0,
+    /// Returns the expected share of the views with a return, for a share that is beta-distributed
+    /// before anything is seen: see [`PRIOR`].
+    pub fn share(&self) -> f64 {
+        let [returns, views] = PRIOR;
+        (f64::from(self.hits) + returns) / (f64::from(self.views) + views)
+    }
+}
+
+/// Returns and views that are added to those of a place: of what has never been in view half may be
+/// taken.
+const PRIOR: [f64; 2] = [0.3, 0.6];
+
+impl View {
+    /// Takes the returns of a scan.
+    fn new(sensor: Point2<f64>, returns: &[Return], max_range_m: f64) -> Self {
+        let mut first_m = vec![max_range_m; SECTORS];
+        let mut last_m = vec![0.0f64; SECTORS];
+        for found in returns {
+            let seen = sector(&(found.at - sensor));
+            for step in 0..=2 * BEAM_SECTORS {
+                let around = (seen + SECTORS + step - BEAM_SECTORS) % SECTORS;
+                if found.weight >= HIDING_WEIGHT {
+                    first_m[around] = first_m[around].min(found.range_m);
+                }
+                if found.weight >= BEYOND_WEIGHT {
+                    last_m[around] = last_m[around].max(found.range_m);
+                }
+            }
+        }
+        let reach = first_m.iter().zip(&last_m);
+        Self {
+            sensor,
+            reach_m: reach.map(|(first, last)| first.max(*last)).collect(),
         }
     }
+
+    /// Returns whether a place was in view.
+    fn sees(&self, place: &Point2<f64>) -> bool {
+        let ray = place - self.sensor;
+        let reach_m = self.reach_m[sector(&ray)];
+        (NEAREST_M + EDGE_M..reach_m - EDGE_M).contains(&ray.norm())
+    }
+}
+
+/// Returns the number of a direction.
+fn sector(ray: &Vector2<f64>) -> usize {
+    let turn = ray.y.atan2(ray.x).rem_euclid(TAU) / TAU;
+    (turn * SECTORS as f64) as usize % SECTORS
 }
 
 impl Evidence {
     pub fn new(memory_scans: u32, max_range_m: f64, bearing_sigma_rad: f64) -> Self {
         Self {
             cells: vec![Cell::default(); (SIDE * SIDE) as usize],
-            sensors: VecDeque::with_capacity(memory_scans as usize + 1),
+            views: VecDeque::with_capacity(memory_scans as usize + 1),
             memory_scans,
             max_range_m,
             bearing_sigma_rad,
@@ -83,9 +143,8 @@ impl Evidence {
 
     /// Returns what the scans before saw where a return is, within its uncertainty.
     pub fn history(&self, found: &Return) -> History {
-        let views = self.views(&found.at);
-        // Two standard deviations of the bearing across, and one cell for the rest.
-        let across_m = 2.0 * self.bearing_sigma_rad * found.range_m;
+        // The bearing across, and one cell for the rest.
+        let across_m = ACROSS_SIGMAS * self.bearing_sigma_rad * found.range_m;
         let steps = (across_m / CELL_M).ceil() as i32;
         let side = Vector2::new(-found.direction.y, found.direction.x);
         let mut hits = 0;
@@ -94,40 +153,41 @@ impl Evidence {
             hits |= self.hits_around(&centre);
         }
         // What came a moment ago may be the same object.
-        let own = OWN_SCANS.min(self.sensors.len() as u32 / 2);
-        let views = views & (u32::MAX << own);
+        let own = OWN_SCANS.min(self.views.len() as u32 / 2);
+        let before = u64::MAX << own;
+        let (hits, views) = (hits & before, self.views(&found.at) & before);
+        // A return shows that the place was in view.
         History {
-            views: views.count_ones(),
-            hits: (hits & views).count_ones(),
+            views: (views | hits).count_ones(),
+            hits: hits.count_ones(),
         }
     }
 
     /// The scans in which a place was in view, as the bits of a cell.
-    fn views(&self, place: &Point2<f64>) -> u32 {
-        let in_view = |sensor: &Point2<f64>| {
-            let range_m = (place - sensor).norm();
-            (NEAREST_M + EDGE_M..self.max_range_m - EDGE_M).contains(&range_m)
-        };
-        let views = self.sensors.iter().enumerate();
-        views.fold(0, |bits, (ago, sensor)| {
-            bits | (u32::from(in_view(sensor)) << ago)
+    fn views(&self, place: &Point2<f64>) -> u64 {
+        let views = self.views.iter().enumerate();
+        views.fold(0, |bits, (ago, view)| {
+            bits | (u64::from(view.sees(place)) << ago)
         })
     }
 
     /// The scans with a return in a cell or one beside it.
-    fn hits_around(&self, place: &Point2<f64>) -> u32 {
+    fn hits_around(&self, place: &Point2<f64>) -> u64 {
         let [x, y] = cell_at(place);
         let around = (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| [x + dx, y + dy]));
         around.fold(0, |bits, place| bits | self.hits(place))
     }
 
-    /// Returns whether the newest scan that was added has a return at a place.
-    pub fn is_occupied(&self, place: &Point2<f64>) -> bool {
-        self.hits_around(place) & 1 != 0
+    /// Returns whether the newest scan that was added has a return at a place; `None` if it is
+    /// not in view.
+    pub fn is_occupied(&self, place: &Point2<f64>) -> Option<bool> {
+        let taken = self.hits_around(place) & 1 != 0;
+        let is_seen = taken || self.views.front()?.sees(place);
+        is_seen.then_some(taken)
     }
 
     /// Bit k: a return k scans before the newest one that was added.
-    fn hits(&self, place: [i32; 2]) -> u32 {
+    fn hits(&self, place: [i32; 2]) -> u64 {
         let cell = &self.cells[index(place)];
         let ago = self.scan.wrapping_sub(cell.scan);
         match cell.place == place && ago < self.memory_scans {
@@ -136,19 +196,18 @@ impl Evidence {
         }
     }
 
-    /// Adds a scan: the returns that do not belong to moving objects.
-    pub fn add<'a>(&mut self, sensor: Point2<f64>, standing: impl Iterator<Item = &'a Return>) {
+    /// Adds a scan: its returns, and which of them do not belong to moving objects.
+    pub fn add(&mut self, sensor: Point2<f64>, returns: &[Return], stands: impl Fn(usize) -> bool) {
         self.scan += 1;
-        self.sensors.push_front(sensor);
-        self.sensors.truncate(self.memory_scans as usize);
-        for found in standing {
-            let place = cell_at(&found.at);
-            let hits = self.hits(place) | 1;
-            self.cells[index(place)] = Cell {
-                place,
-                hits,
-                scan: self.scan,
-            };
+        self.views
+            .push_front(View::new(sensor, returns, self.max_range_m));
+        self.views.truncate(self.memory_scans as usize);
+        for (number, found) in returns.iter().enumerate() {
+            if stands(number) {
+                let place = cell_at(&found.at);
+                let (hits, scan) = (self.hits(place) | 1, self.scan);
+                self.cells[index(place)] = Cell { place, hits, scan };
+            }
         }
     }
 
@@ -160,9 +219,9 @@ impl Evidence {
         let steps = ((range_m - CLEAR_M - NEAREST_M) / CELL_M).max(0.0) as usize;
         let stands = |step: usize| {
             let at = sensor + ray * ((NEAREST_M + step as f64 * CELL_M) / range_m);
-            let (hits, views) = (self.hits(cell_at(&at)), self.views(&at));
-            let share =
-                f64::from((hits & views).count_ones()) / f64::from(views.count_ones().max(1));
+            let hits = self.hits(cell_at(&at));
+            let views = self.views(&at) | hits;
+            let share = f64::from(hits.count_ones()) / f64::from(views.count_ones().max(1));
             share >= STANDING_SHARE
         };
         (0..steps).any(stands)
@@ -171,7 +230,7 @@ impl Evidence {
     /// Forgets all scans.
     pub fn clear(&mut self) {
         self.cells.fill(Cell::default());
-        self.sensors.clear();
+        self.views.clear();
         self.scan = 0;
     }
 }
@@ -184,8 +243,8 @@ fn index([x, y]: [i32; 2]) -> usize {
     (x.rem_euclid(SIDE) * SIDE + y.rem_euclid(SIDE)) as usize
 }
 
-fn mask(scans: u32) -> u32 {
-    u32::MAX >> (32 - scans)
+fn mask(scans: u32) -> u64 {
+    u64::MAX >> (64 - scans)
 }
 
 #[cfg(test)]
@@ -201,7 +260,13 @@ mod tests {
             time_s: 0.0,
             doppler_s: 0.0,
             weight: 1.0,
+            stands_out: true,
+            share: 1.0,
         }
+    }
+
+    fn add(evidence: &mut Evidence, returns: &[Return]) {
+        evidence.add(Point2::origin(), returns, |_| true);
     }
 
     #[test]
@@ -211,8 +276,7 @@ mod tests {
         // The last three scans do not count.
         for scan in 0..12 {
             let seen = [wall, car];
-            let seen = &seen[..if scan == 6 { 2 } else { 1 }];
-            evidence.add(Point2::origin(), seen.iter());
+            add(&mut evidence, &seen[..if scan == 6 { 2 } else { 1 }]);
         }
         assert_eq!(evidence.history(&wall), History { views: 5, hits: 5 });
         assert_eq!(evidence.history(&car), History { views: 5, hits: 1 });
@@ -224,7 +288,7 @@ mod tests {
             evidence.history(&at(80.0, 0.0)),
             History { views: 0, hits: 0 }
         );
-        // Across the beam a return may lie two standard deviations beside the place.
+        // Across the beam a return may lie beside the place.
         let beside = wall.at + Vector2::new(-3.0, 20.0).normalize() * 0.6;
         assert_eq!(evidence.history(&at(beside.x, beside.y)).hits, 5);
         evidence.clear();
@@ -232,9 +296,30 @@ mod tests {
     }
 
     #[test]
+    fn what_an_obstacle_hides_is_not_free_and_what_is_seen_beyond_it_is() {
+        let behind = |beyond: &[Return]| {
+            let mut evidence = Evidence::new(8, 70.0, 0.01);
+            for _ in 0..8 {
+                add(&mut evidence, &[&[at(20.0, 3.0)], beyond].concat());
+            }
+            evidence.history(&at(30.0, 4.5)).views
+        };
+        assert_eq!(behind(&[]), 0);
+        assert_eq!(behind(&[at(50.0, 7.5)]), 5);
+        assert_eq!(behind(&[at(50.0, -7.5)]), 0);
+        let weak = Return {
+            weight: 0.1,
+            ..at(50.0, 7.5)
+        };
+        assert_eq!(behind(&[weak]), 0);
+        let unseen = History { views: 0, hits: 0 };
+        assert_eq!(unseen.share(), 0.5);
+    }
+
+    #[test]
     fn a_cell_that_stands_for_another_place_after_a_way_of_256_m_has_no_hits() {
         let mut evidence = Evidence::new(8, 70.0, 0.01);
-        evidence.add(Point2::origin(), [at(20.0, 3.0)].iter());
+        add(&mut evidence, &[at(20.0, 3.0)]);
         let far = Return {
             range_m: 20.0,
             ..at(276.0, 3.0)
@@ -247,7 +332,7 @@ mod tests {
     fn a_wall_stands_between_the_sensor_and_what_is_behind_it() {
         let mut evidence = Evidence::new(8, 70.0, 0.01);
         for _ in 0..8 {
-            evidence.add(Point2::origin(), [at(20.25, 0.25)].iter());
+            add(&mut evidence, &[at(20.25, 0.25)]);
         }
         let is_behind = |x| evidence.is_behind_standing(&Point2::origin(), &Point2::new(x, 0.2));
         assert!(is_behind(40.0) && !is_behind(18.0) && !is_behind(22.0));

@@ -1,8 +1,9 @@
 //! Length and width of an object, and its centre by what is seen of it.
 //!
-//! A radar sees the near end of a vehicle well, and the far end in part: the centre is half of the
-//! length behind the near end, not in the middle of the returns. Length and width begin as those of
-//! a car, and grow with what is seen.
+//! A radar sees the ends of a vehicle, in one scan the near one, in another both, and at times only
+//! the far one: the centre is half of the length behind the one, or before the other, and what is
+//! seen is what fits the prediction. Length and width begin as those of a car, and grow with what
+//! is seen.
 
 use nalgebra::{Point2, Vector2};
 
@@ -16,7 +17,13 @@ const LARGEST_M: [f64; 2] = [18.0, 2.6];
 const TRIM: f64 = 0.05;
 /// Shares by which length and width approach what is seen in a scan, if that is more and if it is
 /// less.
-const GAIN: [f64; 2] = [0.1, 0.05];
+const GAIN: [f64; 2] = [0.3, 0.1];
+/// Share of the size that is missing from which on only one end is seen, and says nothing about it.
+const ONE_END: f64 = 0.35;
+/// Length and width of the smallest vehicle, m.
+const SMALLEST_M: [f64; 2] = [4.0, 1.7];
+/// Distance from the prediction by which the near end is preferred to the far one and the whole, m.
+const DOUBT_M: f64 = 1.0;
 /// Cosine between the line of sight and an axis above which one end of the object is nearer.
 const END_ON: f64 = 0.35;
 
@@ -73,14 +80,17 @@ impl Extent {
         let mut centre = Vector2::zeros();
         for (axis, towards) in [*heading, side].iter().enumerate() {
             let [low, high] = outline.spans_m[axis];
-            let seen_m = high - low;
-            let hidden_m = (self.size_m[axis] - seen_m).max(0.0);
-            // The end that is nearer to the sensor is where the returns end; the other one is
-            // hidden. From the side neither is.
-            let end_on = towards.dot(direction);
-            let share = (end_on / END_ON).clamp(-1.0, 1.0);
-            let middle = 0.5 * (low + high) + 0.5 * share * hidden_m;
-            centre += towards * middle;
+            let hidden_m = (self.size_m[axis] - (high - low)).max(0.0);
+            let middle = 0.5 * (low + high);
+            // What is seen is the near end, or the far one, or the whole: that which is nearest to
+            // the prediction, and rather the near end.
+            let end_on = (towards.dot(direction) / END_ON).clamp(-1.0, 1.0);
+            let near = middle + 0.5 * end_on * hidden_m;
+            let far = middle - 0.5 * end_on * hidden_m;
+            let choices = [(near, 0.0), (middle, DOUBT_M), (far, DOUBT_M)];
+            let cost = |(at, doubt): &(f64, f64)| at.abs() + doubt;
+            let best = choices.iter().min_by(|a, b| cost(a).total_cmp(&cost(b)));
+            centre += towards * best.map_or(middle, |best| best.0);
         }
         centre
     }
@@ -90,9 +100,13 @@ impl Extent {
         for axis in 0..2 {
             let [low, high] = outline.spans_m[axis];
             let excess_m = (high - low) - self.size_m[axis];
-            let gain = if excess_m > 0.0 { GAIN[0] } else { GAIN[1] };
+            let gain = match excess_m / self.size_m[axis] {
+                excess if excess > 0.0 => GAIN[0],
+                excess if excess > -ONE_END => GAIN[1],
+                _ => 0.0,
+            };
             let size_m = self.size_m[axis] + gain * excess_m;
-            self.size_m[axis] = size_m.clamp(CAR_M[axis], LARGEST_M[axis]);
+            self.size_m[axis] = size_m.clamp(SMALLEST_M[axis], LARGEST_M[axis]);
         }
     }
 }

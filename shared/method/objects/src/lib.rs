@@ -9,6 +9,7 @@
 //! - `clusters`: returns where nothing was before, merged to clusters,
 //! - `filter`: the Kalman filter of a track, constant velocity with the time of each return,
 //! - `extent`: length and width, and the centre of what is seen from one side,
+//! - `score`: how likely a track is an object, and not clutter,
 //! - `track`: birth, confirmation, coasting and death,
 //! - `assignment`: which cluster belongs to which track.
 //!
@@ -24,6 +25,7 @@ mod extent;
 mod filter;
 mod object;
 mod returns;
+mod score;
 mod track;
 mod tracker;
 

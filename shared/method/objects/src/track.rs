@@ -1,7 +1,6 @@
 //! A track: an object from its birth to its death.
 
 use std::collections::VecDeque;
-use std::f64::consts::TAU;
 
 use nalgebra::{Matrix2, Point2, Vector2};
 
@@ -10,29 +9,30 @@ use crate::evidence::Evidence;
 use crate::extent::Extent;
 use crate::filter::Filter;
 use crate::returns::Return;
-use crate::{Object, ObjectsConfig};
+use crate::{Object, ObjectsConfig, score};
 
 /// Speed above which the velocity is the heading, m/s.
 const HEADING_MPS: f64 = 1.0;
 /// Share of the scans in which an object is seen.
 const SEEN_SHARE: f64 = 0.8;
-/// The score from which on a track is an object. By 9.2 one track of clutter in ten thousand would
-/// pass if its clusters were independent; those of a hedge come back from scan to scan.
-const CONFIRM_SCORE: f64 = 16.0;
 /// Scans of which the places of its returns are kept, and how many places of each.
 const TRAIL_SCANS: usize = 5;
 const TRAIL_POINTS: usize = 8;
 /// Distance from all of its returns at which it has left a place, m: beyond the neighbouring cells.
 const LEFT_M: f64 = 2.0;
-/// Share of the places that an object has left, and of those that clutter has, where something is
-/// seen.
-const TAKEN: [f64; 2] = [0.1, 0.5];
-/// The largest loss of the score by one cluster: an object that brakes is one still.
-const LARGEST_LOSS: f64 = -2.0;
-/// Mean weights of the clusters of objects and of clutter, in the simulator's streets.
-const WEIGHTS: [f64; 2] = [4.0, 1.0];
-/// The largest score.
-const MAX_SCORE: f64 = 20.0;
+/// The largest score, and the one below which a track that is not an object is given up.
+const MAX_SCORE: f64 = 8.0;
+const MIN_SCORE: f64 = -3.0;
+/// Share of the mean misfit that is kept from scan to scan.
+const KEPT: f64 = 0.5;
+/// Factors on the accelerations for each unit of the mean misfit, and the largest: an object that
+/// turns or brakes is farther from its prediction than straight driving explains.
+const MANOEUVRE: f64 = 2.0;
+const MAX_MANOEUVRE: f64 = 4.0;
+/// Largest misfit of a scan.
+const MAX_MISFIT: f64 = 10.0;
+/// Length in which returns are an object's, while its own is not known to be longer, m: a van.
+const CLAIMED_M: f64 = 5.6;
 /// Difference of the velocities of two ends of one object, m/s.
 const ALIKE_MPS: f64 = 3.0;
 /// Distance beyond its outline within which returns are an object's, m: a range cell and the
@@ -55,8 +55,10 @@ pub(crate) struct Track {
     moving: bool,
     /// Where its returns were in the last scans, the newest first, m.
     trail: VecDeque<Vec<Point2<f64>>>,
-    /// Logarithm of the likelihood of an object over that of clutter (Sittler; Blackman and Popoli,
-    /// "Design and Analysis of Modern Tracking Systems", 1999, Sec. 6.2).
+    /// Running mean of half of the squared Mahalanobis distance between measurement and prediction:
+    /// 1 where the motion is as expected.
+    misfit: f64,
+    /// Logarithm of the likelihood of an object over that of clutter: see [`score`].
     score: f64,
 }
 
@@ -73,13 +75,16 @@ impl Track {
             unseen_s: 0.0,
             moving: false,
             score: 0.0,
+            misfit: 0.0,
             trail: VecDeque::new(),
         }
     }
 
     /// Predicts it some seconds later.
     pub fn predict(&mut self, dt_s: f64, config: &ObjectsConfig) {
-        let accelerations = [config.acceleration_mps2, config.lateral_acceleration_mps2];
+        let manoeuvre = (MANOEUVRE * self.misfit).clamp(1.0, MAX_MANOEUVRE);
+        let accelerations = [config.acceleration_mps2, config.lateral_acceleration_mps2]
+            .map(|sigma| sigma * manoeuvre);
         self.filter.predict(dt_s, &self.heading, accelerations);
         self.age = self.age.saturating_add(1);
         if self.unseen_s > 0.0 {
@@ -111,7 +116,7 @@ impl Track {
             let margin_m = MARGIN_M + sigma_m + 0.01 * found.range_m;
             (place.dot(axis).abs() - 0.5 * size_m).max(0.0) / margin_m
         };
-        beyond(&self.heading, length_m).hypot(beyond(&side, width_m))
+        beyond(&self.heading, length_m.max(CLAIMED_M)).hypot(beyond(&side, width_m))
     }
 
     /// Returns where the centre is by a cluster, as it would be seen at the cluster's own time.
@@ -140,18 +145,16 @@ impl Track {
         members: &[u32],
         measured: &Measurement,
         noise: &Matrix2<f64>,
-        clutter_per_m2: f64,
     ) {
         let at = match self.has_heading() {
             true => self.measured_centre(returns, members, measured),
             false => measured.at,
         };
         let innovation = self.filter.innovation(measured, &at, noise);
+        let misfit = (0.5 * innovation.chi_square()).min(MAX_MISFIT);
+        self.misfit = KEPT * self.misfit + (1.0 - KEPT) * misfit;
         self.filter.update(&innovation);
-        let expected = TAU * innovation.covariance.determinant().max(1e-9).sqrt() * clutter_per_m2;
-        let gain = (SEEN_SHARE / expected).ln() - 0.5 * innovation.chi_square()
-            + strength(measured.weight);
-        self.score = (self.score + gain.max(LARGEST_LOSS)).min(MAX_SCORE);
+        self.add(score::of_cluster(returns, members, innovation.chi_square()));
         self.leave(returns, members);
         self.unseen_s = 0.0;
         self.hits = self.hits.saturating_add(1);
@@ -185,15 +188,17 @@ impl Track {
         };
         let has_left = |place: &&Point2<f64>| now.iter().all(|at| (at - *place).norm() > LEFT_M);
         let left = self.trail.iter().skip(1).flatten().filter(has_left);
-        let (count, taken) = left.fold((0, 0), |(count, taken), place| {
-            (count + 1, taken + usize::from(evidence.is_occupied(place)))
+        let seen = left.filter_map(|place| evidence.is_occupied(place));
+        let (count, taken) = seen.fold((0, 0), |(count, taken), is_taken| {
+            (count + 1, taken + usize::from(is_taken))
         });
         if count >= 2 {
-            let share = taken as f64 / f64::from(count);
-            let gain = share * (TAKEN[0] / TAKEN[1]).ln()
-                + (1.0 - share) * ((1.0 - TAKEN[0]) / (1.0 - TAKEN[1])).ln();
-            self.score = (self.score + gain).min(MAX_SCORE);
+            self.add(score::of_places_left(taken as f64 / f64::from(count)));
         }
+    }
+
+    fn add(&mut self, evidence: f64) {
+        self.score = (self.score + evidence).min(MAX_SCORE);
     }
 
     /// Returns whether the direction of its motion is known: from there on its centre is that of
@@ -210,7 +215,7 @@ impl Track {
         match self.is_confirmed() {
             true => self.unseen_s > config.coast_s || self.score < 0.0,
             false => {
-                self.score < LARGEST_LOSS && self.age > 1
+                self.score < MIN_SCORE && self.age > 1
                     || missed > config.birth_scans - config.birth_hits
             }
         }
@@ -225,7 +230,7 @@ impl Track {
         self.moving
             && !self.is_confirmed()
             && self.hits >= config.birth_hits
-            && self.score > CONFIRM_SCORE
+            && self.score > config.confirm_score
     }
 
     /// Makes it an object: from now on it is a box whose near end is seen.
@@ -249,13 +254,6 @@ impl Track {
             velocity_covariance: self.filter.velocity_covariance(),
         })
     }
-}
-
-/// Logarithm of the likelihood of the weight of a cluster if it is of an object, over that if it
-/// is clutter: both are exponentially distributed.
-fn strength(weight: f64) -> f64 {
-    let [object, clutter] = WEIGHTS;
-    ((clutter / object).ln() + weight * (1.0 / clutter - 1.0 / object)).min(2.0)
 }
 
 impl Track {

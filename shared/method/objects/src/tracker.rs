@@ -1,7 +1,5 @@
 //! The tracker: the whole method on one page.
 
-use std::f64::consts::PI;
-
 use gyre_geometry::SparsePoint;
 use nalgebra::{Matrix2, Point2, Vector2};
 
@@ -16,7 +14,7 @@ use crate::{Object, ObjectsConfig, ObjectsError};
 const GATE: f64 = 13.8;
 /// Share of the last scans with something at a place from which on a return there stands, and
 /// belongs to no object. Where an object is expected, more is taken for new than elsewhere.
-const OWN_SHARE: f64 = 0.5;
+const OWN_SHARE: f64 = 0.7;
 /// Time between two scans beyond which all tracks end, s.
 const MAX_GAP_S: f64 = 2.0;
 
@@ -60,10 +58,11 @@ impl ObjectTracker {
     /// A scan that is not later than the one before, or by more than two seconds, ends all tracks.
     pub fn update(&mut self, scan: &PlacedScan, points: &[SparsePoint]) -> &[Object] {
         self.predict(scan.stamp_ns);
-        place(scan, points, self.config.max_range_m, &mut self.returns);
-        let shares = self.standing_shares();
-        let claims = self.claim(&shares);
-        let fresh = self.fresh(&shares, &claims);
+        let limits = (self.config.max_range_m, self.config.contrast);
+        place(scan, points, limits, &mut self.returns);
+        self.compare();
+        let claims = self.claim();
+        let fresh = self.fresh(&claims);
         let found = clusters(&self.returns, &fresh);
         let own = self.own_clusters(&claims);
         let rest = self.assign(&own, &found);
@@ -101,23 +100,24 @@ impl ObjectTracker {
         self.stamp_ns = Some(stamp_ns);
     }
 
-    /// Returns for each return the share of the last scans that saw something there.
-    fn standing_shares(&self) -> Vec<f64> {
-        let share = |found| self.evidence.history(found).share(self.config.min_views);
-        self.returns.iter().map(share).collect()
+    /// Compares the returns with what the last scans saw where they are.
+    fn compare(&mut self) {
+        for found in &mut self.returns {
+            found.share = self.evidence.history(found).share();
+        }
     }
 
     /// Returns for each return the track of the moving object whose it is. What stands for most of
     /// the time is nobody's.
-    fn claim(&self, shares: &[f64]) -> Vec<Option<usize>> {
+    fn claim(&self) -> Vec<Option<usize>> {
         let moving: Vec<(usize, &Track)> = self
             .tracks
             .iter()
             .enumerate()
             .filter(|(_, track)| track.is_moving())
             .collect();
-        let claim = |(found, share): (&Return, &f64)| {
-            if *share >= OWN_SHARE {
+        let claim = |found: &Return| {
+            if !found.stands_out || found.share >= OWN_SHARE {
                 return None;
             }
             let distances = moving
@@ -128,14 +128,16 @@ impl ObjectTracker {
                 .filter(|(_, distance)| *distance <= 1.0)
                 .map(|(index, _)| index)
         };
-        self.returns.iter().zip(shares).map(claim).collect()
+        self.returns.iter().map(claim).collect()
     }
 
     /// Returns what nobody claims and was free before.
-    fn fresh(&self, shares: &[f64], claims: &[Option<usize>]) -> Vec<u32> {
+    fn fresh(&self, claims: &[Option<usize>]) -> Vec<u32> {
         let is_fresh = |index: &u32| {
             let index = *index as usize;
-            claims[index].is_none() && shares[index] < self.config.standing_share
+            claims[index].is_none()
+                && self.returns[index].stands_out
+                && self.returns[index].share < self.config.standing_share
         };
         (0..self.returns.len() as u32).filter(is_fresh).collect()
     }
@@ -160,11 +162,6 @@ impl ObjectTracker {
             .iter()
             .map(|members| Measurement::of(&self.returns, members))
             .collect();
-        let centres: Vec<Point2<f64>> = measured
-            .iter()
-            .filter(|it| it.weight >= NEGLIGIBLE_WEIGHT)
-            .map(|it| it.at)
-            .collect();
         for (index, members) in own.iter().enumerate() {
             if members.is_empty() {
                 seekers.push(index);
@@ -172,8 +169,7 @@ impl ObjectTracker {
             } else {
                 let measured = Measurement::of(&self.returns, members);
                 let noise = self.noise(&measured, true);
-                let clutter = clutter_per_m2(&centres, &measured.at);
-                self.tracks[index].update(&self.returns, members, &measured, &noise, clutter);
+                self.tracks[index].update(&self.returns, members, &measured, &noise);
             }
         }
         let assigned = assign(&costs);
@@ -182,14 +178,7 @@ impl ObjectTracker {
             let Some(cluster) = cluster else { continue };
             is_left[cluster] = false;
             let noise = self.noise(&measured[cluster], self.tracks[track].is_confirmed());
-            let clutter = clutter_per_m2(&centres, &measured[cluster].at);
-            self.tracks[track].update(
-                &self.returns,
-                &found[cluster],
-                &measured[cluster],
-                &noise,
-                clutter,
-            );
+            self.tracks[track].update(&self.returns, &found[cluster], &measured[cluster], &noise);
         }
         (0..found.len())
             .filter(|cluster| is_left[*cluster])
@@ -223,8 +212,8 @@ impl ObjectTracker {
     /// Returns whether a cluster can begin a track.
     fn is_strong(&self, measured: &Measurement) -> bool {
         measured.returns >= self.config.min_returns
-            && measured.weight >= MIN_WEIGHT
-            && measured.range_m >= OWN_M
+            && measured.weight >= self.config.min_weight
+            && measured.range_m >= self.config.min_range_m
     }
 
     /// The covariance of a cluster's position, m².
@@ -288,31 +277,12 @@ impl ObjectTracker {
     /// Adds the scan to what was seen, but for moving objects.
     fn remember(&mut self, scan: &PlacedScan, claims: &[Option<usize>]) {
         let sensor = Point2::from(scan.pose.translation.vector);
-        let standing = self
-            .returns
-            .iter()
-            .zip(claims)
-            .filter(|(_, claim)| claim.is_none());
-        self.evidence.add(sensor, standing.map(|(found, _)| found));
+        let stands = |index: usize| claims[index].is_none();
+        self.evidence.add(sensor, &self.returns, stands);
     }
 }
 
-/// Weight of a cluster that begins a track, and of one that counts at all: a return of full weight
-/// is 30 dB above the threshold of the masks.
-const MIN_WEIGHT: f64 = 0.8;
+/// Weight below which a cluster counts for nothing.
 const NEGLIGIBLE_WEIGHT: f64 = 0.1;
-/// Range within which no track begins, m: there the vehicle sees itself.
-const OWN_M: f64 = 8.0;
-/// Standard deviation of the centre of an object whose outline is not known yet, m.
-const UNKNOWN_CENTRE_M: f64 = 0.6;
-/// Radius around a cluster in which others are counted, m.
-const CLUTTER_M: f64 = 20.0;
-
-/// The density of clusters around a place, which one may be the object's own, 1/m².
-fn clutter_per_m2(centres: &[Point2<f64>], place: &Point2<f64>) -> f64 {
-    let near = centres
-        .iter()
-        .filter(|at| (*at - place).norm() < CLUTTER_M)
-        .count();
-    near.max(1) as f64 / (PI * CLUTTER_M * CLUTTER_M)
-}
+/// Standard deviation of the centre of an object whose outline is not known yet, m: half of a car.
+const UNKNOWN_CENTRE_M: f64 = 1.0;

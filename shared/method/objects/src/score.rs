@@ -1,0 +1,109 @@
+//! The score of a track: the logarithm of the likelihood of an object over that of clutter
+//! (Sittler; Blackman and Popoli, "Design and Analysis of Modern Tracking Systems", 1999,
+//! Sec. 6.2).
+//!
+//! The terms are those of a logistic regression over the clusters of the simulated drives that
+//! [docs/objects.md](../../../../docs/objects.md) calls tuned. Clutter comes back from scan to scan
+//! at the same places, so that a scan counts half of what it would by itself.
+
+use nalgebra::{Point2, Vector2};
+
+use crate::returns::Return;
+
+/// Weight of a scan's evidence: successive ones are not independent.
+const INDEPENDENCE: f64 = 0.5;
+/// The largest evidence of a cluster for and against an object, before that.
+const LARGEST: f64 = 4.0;
+/// The evidence of a cluster of full weight, at a new place, with nothing around it.
+const BASE: f64 = 4.0;
+/// Its growth with the logarithm of the mean weight of the returns: vehicles have strong edges,
+/// hedges have none.
+const STRENGTH: f64 = 2.0;
+/// Its loss if the place has returned in all scans before.
+const BEFORE: f64 = 4.5;
+/// Its loss with the logarithm of the weight around the cluster over its own: vehicles stand free.
+const AROUND: f64 = 1.2;
+/// Radius in which that is, m: more than a car is long.
+const AROUND_M: f64 = 5.0;
+/// Its loss with the squared Mahalanobis distance from the prediction, up to 20.
+const MISFIT: f64 = 0.1;
+const LARGEST_MISFIT: f64 = 20.0;
+/// The evidence where all places that the object has left are free, and its loss where all are
+/// taken.
+const LEFT: [f64; 2] = [2.8, 4.4];
+
+/// Returns the evidence of a cluster.
+pub(crate) fn of_cluster(returns: &[Return], members: &[u32], chi_square: f64) -> f64 {
+    let own = || members.iter().map(|member| &returns[*member as usize]);
+    let count = members.len().max(1) as f64;
+    let weight: f64 = own().map(|found| found.weight).sum();
+    let before: f64 = own().map(|found| found.weight * found.share).sum();
+    let sum = own().fold(Vector2::zeros(), |sum, found| sum + found.at.coords);
+    let centre = Point2::from(sum / count);
+    let near = |found: &&Return| (found.at - centre).norm() < AROUND_M;
+    let all: f64 = returns.iter().filter(near).map(|found| found.weight).sum();
+    let inner: f64 = own().filter(near).map(|found| found.weight).sum();
+    let around = (all - inner).max(0.0) / weight;
+    let evidence = BASE + STRENGTH * (weight / count).ln()
+        - BEFORE * before / weight
+        - AROUND * (1.0 + around).ln()
+        - MISFIT * chi_square.min(LARGEST_MISFIT);
+    INDEPENDENCE * evidence.clamp(-LARGEST, LARGEST)
+}
+
+/// Returns the evidence of the places that the object has left, by the share of them where
+/// something is.
+pub(crate) fn of_places_left(taken: f64) -> f64 {
+    let [free, loss] = LEFT;
+    INDEPENDENCE * (free - loss * taken)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(x: f64, weight: f64, share: f64) -> Return {
+        Return {
+            at: Point2::new(x, 10.0),
+            direction: Vector2::y(),
+            range_m: 10.0,
+            time_s: 0.0,
+            doppler_s: 0.0,
+            weight,
+            stands_out: true,
+            share,
+        }
+    }
+
+    #[test]
+    fn what_is_new_strong_and_free_around_speaks_for_an_object_and_each_fault_against_it() {
+        let good = [at(0.0, 0.6, 0.05), at(1.0, 0.6, 0.05)];
+        let score = |returns: &[Return], chi_square| of_cluster(returns, &[0, 1], chi_square);
+        let best = score(&good, 1.0);
+        assert!(best > 0.5, "{best}");
+        let weak = good.map(|found| Return {
+            weight: 0.1,
+            ..found
+        });
+        let standing = good.map(|found| Return {
+            share: 0.9,
+            ..found
+        });
+        let surrounded = [good[0], good[1], at(2.0, 1.0, 0.9), at(-2.0, 1.0, 0.9)];
+        for (worse, chi_square) in [
+            (&weak[..], 1.0),
+            (&standing, 1.0),
+            (&surrounded, 1.0),
+            (&good, 12.0),
+        ] {
+            assert!(score(worse, chi_square) < best, "{worse:?}");
+        }
+        let far = [good[0], good[1], at(9.0, 1.0, 0.9), at(-9.0, 1.0, 0.9)];
+        assert_eq!(score(&far, 1.0), best);
+    }
+
+    #[test]
+    fn free_places_behind_speak_for_an_object_and_taken_ones_against_it() {
+        assert!(of_places_left(0.0) > 1.0 && of_places_left(1.0) < -0.5);
+    }
+}
