@@ -52,7 +52,7 @@ pub(crate) struct Evidence {
     scan: u32,
 }
 
-/// What a scan had in view.
+/// The view of a scan.
 #[derive(Clone, Debug)]
 struct View {
     sensor: Point2<f64>,

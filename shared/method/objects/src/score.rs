@@ -16,16 +16,16 @@ const INDEPENDENCE: f64 = 0.5;
 const LARGEST: f64 = 4.0;
 /// The evidence of a cluster of full weight, at a new place, with nothing around it.
 const BASE: f64 = 4.0;
-/// Its growth with the logarithm of the mean weight of the returns: vehicles have strong edges,
+/// The growth with the logarithm of the mean weight of the returns: vehicles have strong edges,
 /// hedges have none.
 const STRENGTH: f64 = 2.0;
-/// Its loss if the place has returned in all scans before.
+/// The loss if the place has returned in all scans before.
 const BEFORE: f64 = 4.5;
-/// Its loss with the logarithm of the weight around the cluster over its own: vehicles stand free.
+/// The loss with the logarithm of the weight around the cluster over its own: vehicles stand free.
 const AROUND: f64 = 1.2;
 /// Radius in which that is, m: more than a car is long.
 const AROUND_M: f64 = 5.0;
-/// Its loss with the squared Mahalanobis distance from the prediction, up to 20.
+/// The loss with the squared Mahalanobis distance from the prediction, up to 20.
 const MISFIT: f64 = 0.1;
 const LARGEST_MISFIT: f64 = 20.0;
 /// The evidence where all places that the object has left are free, and its loss where all are
