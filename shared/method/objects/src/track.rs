@@ -15,6 +15,8 @@ use crate::{Object, ObjectsConfig, score};
 const HEADING_MPS: f64 = 1.0;
 /// Share of the scans in which an object is seen.
 const SEEN_SHARE: f64 = 0.8;
+/// Evidence of a scan without a cluster that had the place of the object in view.
+const MISSED_IN_VIEW: f64 = -1.5;
 /// Scans of which the places of its returns are kept, and how many places of each.
 const TRAIL_SCANS: usize = 5;
 const TRAIL_POINTS: usize = 8;
@@ -184,6 +186,10 @@ impl Track {
     /// has come into view, scan by scan, stays.
     pub fn look_back(&mut self, evidence: &Evidence) {
         let Some(now) = self.trail.front().filter(|_| self.unseen_s == 0.0) else {
+            // An obstacle may hide it, but it is not where the beam goes on.
+            if evidence.is_occupied(&self.filter.position()) == Some(false) {
+                self.add(MISSED_IN_VIEW);
+            }
             return;
         };
         let has_left = |place: &&Point2<f64>| now.iter().all(|at| (at - *place).norm() > LEFT_M);
