@@ -80,7 +80,9 @@ impl<'a> Constants<'a> {
             (DataType::INT64, None) => tensor.int64_data.iter().map(|it| *it as f64).collect(),
             _ => return None,
         };
-        (values.len() == dims(tensor)?.iter().product::<usize>()).then_some(values)
+        let mut sizes = dims(tensor)?.into_iter();
+        let count = sizes.try_fold(1_usize, usize::checked_mul)?;
+        (values.len() == count).then_some(values)
     }
 }
 

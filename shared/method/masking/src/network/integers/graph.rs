@@ -62,7 +62,8 @@ pub fn read(graph: &GraphProto) -> Option<Integers> {
     let [output] = &graph.output[..] else {
         return None;
     };
-    let cells: usize = tensors::shape_of(output)?.iter().product();
+    let mut sizes = tensors::shape_of(output)?.into_iter();
+    let cells = sizes.try_fold(1_usize, usize::checked_mul)?;
     let computed = reader.output.filter(|it| it.places.len() == cells)?;
     match reader.floats.get(output.name.as_deref()?)? {
         Float::Factors => Some(Integers {
@@ -328,6 +329,7 @@ fn kernel(from: &Layout, weights: &Weights, bias: &Weights, to: Quantisation) ->
         && (bias.scales.iter().zip(&weights.scales)).all(|(of_bias, of_weights)| {
             (of_bias - scale * of_weights).abs() <= 1e-5 * of_bias.abs()
         });
+    fits.then_some(())?;
     let mut kernel = Kernel {
         weights: vec![[[0.0; OUTPUTS]; 9]; outputs / OUTPUTS * inputs],
         offsets: bias.values.clone(),
@@ -354,5 +356,5 @@ fn kernel(from: &Layout, weights: &Weights, bias: &Weights, to: Quantisation) ->
             }
         }
     }
-    fits.then_some(kernel)
+    Some(kernel)
 }

@@ -160,6 +160,17 @@ fn a_network_that_has_something_else_is_not_read() {
 }
 
 #[test]
+fn a_network_with_another_number_of_channels_is_not_read() {
+    let mut graph = model("gyre-255.onnx").graph.unwrap();
+    let weights = graph.initializer.iter_mut();
+    let mut weights = weights.filter(|it| matches!(it.dims[..], [_, _, 3, 3]));
+    let dims = &mut weights.next().unwrap().dims;
+    let values = dims[0] * dims[1];
+    (dims[0], dims[1]) = (1, values);
+    assert!(Integers::read(&graph).is_none());
+}
+
+#[test]
 fn the_masks_are_factors_that_differ_from_cell_to_cell() {
     let mut network = Integers::read(&model("gyre-255.onnx").graph.unwrap()).unwrap();
     let mut numbers = Numbers(3);

@@ -113,6 +113,7 @@ impl Move {
     }
 
     fn reshape(from: Vec<usize>, shape: Vec<usize>) -> Option<Self> {
+        is_bounded(&shape).then_some(())?;
         let (before, after) = (Strides::of(&from), Strides::of(&shape));
         let fits = from.iter().product::<usize>() == shape.iter().product::<usize>();
         let source: Source = Box::new(move |at| Some(before.index(after.offset(at), &from)));
@@ -137,7 +138,7 @@ impl Move {
         let (start, end) = pads.split_at_checked(from.len())?;
         let (start, wide) = (start.to_vec(), from.iter().zip(start).zip(end));
         let shape = wide
-            .map(|((size, start), end)| start + size + end)
+            .map(|((size, start), end)| start.saturating_add(*size).saturating_add(*end))
             .collect();
         let source: Source = Box::new(move |at| {
             let inside = |((at, start), size): ((&usize, &usize), &usize)| {
