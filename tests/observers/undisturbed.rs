@@ -26,11 +26,15 @@ fn observers_change_nothing(run: &Run, undisturbed: &str) {
     let scans = odometry::rows(undisturbed).len() as u64 + 1;
     let mut running = run.start();
     running.await_stage("pose-integration");
-    let attached = |topic| Watch::start(run, topic).await_message();
-    let lookers = ["scan", "pose"].map(attached);
-    let stopped = ["masked", "pose"].map(attached);
+    // All start at once: one after the other takes longer than the run on a busy machine.
+    let started = |topic| Watch::start(run, topic);
+    let lookers = ["scan", "pose"].map(started);
+    let stopped = ["masked", "pose"].map(started);
+    let killed = ["scan", "motion"].map(started);
+    let [lookers, stopped, killed] =
+        [lookers, stopped, killed].map(|of| of.map(Watch::await_message));
     stopped.iter().for_each(|watch| watch.signal(Signal::STOP));
-    drop(["scan", "motion"].map(attached).map(Watch::kill));
+    drop(killed.map(Watch::kill));
     for milliseconds in (0..40).step_by(4) {
         let guests = ["masked", "refined"].map(|topic| Watch::start(run, topic));
         thread::sleep(Duration::from_millis(milliseconds));
