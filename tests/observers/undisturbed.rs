@@ -15,6 +15,8 @@ const PLACES: usize = 8;
 
 /// The recording's thirty seconds in four.
 const MODERATE: &str = "8";
+/// In ten: two dozen observers start one after the other meanwhile.
+const SLOW: &str = "3";
 
 fn around() -> Run {
     Run::small().data(around_a_block())
@@ -60,7 +62,7 @@ fn observers_change_nothing(run: &Run, undisturbed: &str) {
 
 #[test]
 fn observers_that_look_on_stop_die_come_and_go_change_nothing() {
-    observers_change_nothing(&around().rate(MODERATE), &around().complete());
+    observers_change_nothing(&around().rate(SLOW), &around().complete());
 }
 
 #[test]
@@ -73,7 +75,7 @@ fn observers_of_a_real_recording_change_nothing() {
         let run = Run::of_file(&configuration).data(&data);
         run.set(&format!("source.scans={SCANS}"))
     };
-    observers_change_nothing(&run().rate(MODERATE), &run().complete());
+    observers_change_nothing(&run().rate(SLOW), &run().complete());
 }
 
 #[test]
