@@ -84,7 +84,7 @@ test_training() {
 }
 
 test_package() {
-    GYRE_PROGRAM="$target/debug/gyre" "$GYRE_PYTHON" -m pytest -q python lab
+    GYRE_PROGRAM="$target/debug/gyre" "$GYRE_PYTHON" -m pytest -q -n 2 --dist loadfile python lab
 }
 
 demo() {

@@ -86,7 +86,11 @@ impl Exports {
             .tempdir()
             .unwrap();
         fs::write(folder.path().join("small.toml"), SMALL).unwrap();
-        let simulated = format!("{SMALL}[simulation]\nscans = {}\n", recording::SCANS);
+        let simulated = format!(
+            "{SMALL}[simulation]\nscans = {}\n{}",
+            recording::SCANS,
+            recording::SENSOR
+        );
         fs::write(folder.path().join("simulated.toml"), simulated).unwrap();
         Self { folder }
     }

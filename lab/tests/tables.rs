@@ -217,6 +217,7 @@ fn masked_rows_are_timed_and_run_with_the_networks_that_there_are() {
 }
 
 #[test]
+#[ignore = "nightly: many runs"]
 fn an_ablation_has_a_learned_mask_where_the_network_fits_the_raster() {
     if !runtime_is_installed() {
         return;

@@ -350,7 +350,9 @@ def folder(tmp_path):
         pytest.skip(f"there is no {PROGRAM}: build it, or name another by GYRE_PROGRAM")
     for name, changes in (("small", ["scans=24"]), ("single", ["scans=1"]), ("other", ["scans=8", "seed=7", "traffic.vehicles_per_km=0"])):
         changes = [argument for change in changes for argument in ("--set", f"simulation.{change}")]
-        command = [PROGRAM, "simulate", ROOT / "configs/demo.toml", "--out", tmp_path / name, *changes]
+        # A radar of few bins.
+        radar = ["--set", "simulation.sensor.profile=cts350x-radiate", "--format", "oxford"]
+        command = [PROGRAM, "simulate", ROOT / "configs/demo.toml", "--out", tmp_path / name, *radar, *changes]
         subprocess.run(command, check=True, capture_output=True)
     (tmp_path / "small.toml").write_text("[raster]\nn = 127\ncell_m = 0.8\n")
     return tmp_path
@@ -416,7 +418,7 @@ def test_one_drive_is_closer_to_itself_than_to_another(tmp_path):
     radiate, oxford = data / "radiate-2019-02-12", data / "oxford-2019-01-10-14-36-48"
     if not os.environ.get("GYRE_DATA") or not radiate.is_dir() or not oxford.is_dir():
         pytest.skip("there are no real scans: GYRE_DATA names no folder with radiate-2019-02-12 and an Oxford drive")
-    for name, source in (("first.toml", "scans = 233"), ("second.toml", "first = 233")):
+    for name, source in (("first.toml", "scans = 80"), ("second.toml", "first = 300\nscans = 80")):
         (tmp_path / name).write_text(f'[dataset]\nformat = "radiate"\nrange_offset_m = -0.15\n[source]\n{source}\n')
     configs = ["--sim-config", "first.toml", "--real-config", "second.toml", "--search-scans", "0"]
     rows, _ = rows_of(tmp_path, radiate, radiate, "--between", oxford, *configs)

@@ -18,6 +18,10 @@ use super::Run;
 /// Scans of the small recording.
 pub const SCANS: usize = 24;
 
+/// The radar of the small recordings in a section `[simulation]`. It has a sixth of the default
+/// one's bins: what happens between processes does not depend on them.
+pub const SENSOR: &str = "sensor.profile = 'cts350x-radiate'\noutput.format = 'oxford'\n";
+
 /// The small recording.
 pub fn small() -> &'static Path {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
@@ -43,10 +47,10 @@ pub fn around_a_block() -> &'static Path {
     FOLDER.get_or_init(|| of_a_block(SCANS_AROUND))
 }
 
-/// The drive of the demo.
+/// The drive of the demo, with another radar.
 pub fn demo() -> &'static Path {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
-    FOLDER.get_or_init(|| simulated("demo", &SimulationConfig::default()))
+    FOLDER.get_or_init(|| configured("demo", SENSOR))
 }
 
 /// The recording of a drive with this section `[simulation]`.
@@ -71,11 +75,7 @@ pub fn of(name: &str, config: &SimulationConfig) -> PathBuf {
 }
 
 fn of_a_block(scans: usize) -> PathBuf {
-    let config = SimulationConfig {
-        scans: Some(scans),
-        ..SimulationConfig::default()
-    };
-    simulated(&scans.to_string(), &config)
+    configured(&scans.to_string(), &format!("scans = {scans}\n{SENSOR}"))
 }
 
 /// A recording as RADIATE has them, whose host loses azimuths or not.

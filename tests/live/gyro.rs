@@ -22,10 +22,8 @@ pub const SCANS: usize = 12;
 
 /// A recording with the log of a gyro, all rows of which are measured: a radar sends no others.
 pub fn with_log() -> TempDir {
-    let mut config = SimulationConfig {
-        scans: Some(SCANS),
-        ..SimulationConfig::default()
-    };
+    let simulation = format!("scans = {SCANS}\n{}", recording::SENSOR);
+    let mut config: SimulationConfig = toml::from_str(&simulation).unwrap();
     config.gyro.profile = GyroProfile::Asm330lhh;
     let drive = recording::of("live-gyro", &config);
     let whole = recording::linked(&drive, |_| true);

@@ -88,6 +88,7 @@ fn assert_lacks_little(run: &Run) {
 }
 
 #[test]
+#[ignore = "nightly: kills at many moments"]
 fn a_recording_is_of_the_results_after_masking_was_killed() {
     let run = played();
     let mut running = run.start();

@@ -40,6 +40,7 @@ fn a_killed_tracker_of_objects_finds_the_same_ones_and_odometry_does_not_depend_
 }
 
 #[test]
+#[ignore = "nightly: kills at many moments"]
 fn objects_follow_a_run_that_is_interrupted_and_a_killed_pose_integration() {
     let undisturbed = tracking();
     undisturbed.complete();

@@ -12,6 +12,7 @@ fn drive(town: u64, seed: u64) -> Run {
     let run = Run::configured("[simulation]\n[raster]\nn = 255\ncell_m = 0.4\n")
         .set(&format!("simulation.town.seed={town}"))
         .set(&format!("simulation.seed={seed}"))
+        .set("simulation.sensor.profile=cts350x-radiate")
         .set("slam.kind=graph");
     run.set("simulation.scans=40")
 }
@@ -99,6 +100,7 @@ fn a_second_drive_is_placed_in_the_map_and_goes_on_beyond_it() {
 }
 
 #[test]
+#[ignore = "nightly: a drive in another town"]
 fn a_drive_through_another_town_is_refused_and_the_map_is_kept() {
     let (first, map) = first();
     let elsewhere = drive(5, 9);

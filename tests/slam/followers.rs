@@ -1,7 +1,7 @@
 //! The followers of a run with SLAM: whatever happens to them, odometry does not notice, and what
 //! they write is the same to the byte.
 
-use std::{fs, sync::OnceLock, thread, time::Duration};
+use std::{fs, ops::Range, sync::OnceLock, thread, time::Duration};
 
 use gyre_messages::FollowerId;
 use gyre_slam::{Keyframe, Query, RecordReader, records_path};
@@ -89,7 +89,17 @@ fn a_drive_round_a_block_closes_its_loops_and_has_the_same_odometry() {
 
 #[test]
 fn followers_killed_at_random_moments_are_restarted_alone() {
-    for seed in 0..3 {
+    assert_restarted_alone(0..1);
+}
+
+#[test]
+#[ignore = "nightly: kills at many moments"]
+fn followers_killed_at_many_moments_are_restarted_alone() {
+    assert_restarted_alone(1..6);
+}
+
+fn assert_restarted_alone(seeds: Range<u64>) {
+    for seed in seeds {
         let mut random = StdRng::seed_from_u64(seed);
         let run = run().rate(MODERATE);
         let mut running = run.start();
@@ -195,19 +205,27 @@ fn a_run_that_goes_on_without_a_follower_can_be_interrupted() {
 
 #[test]
 fn a_follower_that_hangs_is_restarted_when_the_run_waits_for_it() {
-    for follower in [LOOP_CLOSURE, TRAJECTORY] {
-        let run = run().rate(MODERATE).set("run.stall_timeout_s=3");
-        let mut running = run.start();
-        send(running.await_stage(follower), Signal::STOP);
-        let ended = running.finish();
-        ended.succeeded();
-        // While the stream goes on its heartbeat tells, and then its progress.
-        let sentences = ["hangs", "has made no progress"];
-        let said = sentences.map(|it| ended.stderr.contains(&format!("{follower} {it}")));
-        assert!(said.contains(&true), "{}", ended.stderr);
-        assert_undisturbed(&run, follower);
-        assert!(restarts(&run, follower) > 0);
-    }
+    assert_restarted_when_it_hangs(TRAJECTORY);
+}
+
+#[test]
+#[ignore = "nightly: the same of the other follower"]
+fn loop_closure_that_hangs_is_restarted_when_the_run_waits_for_it() {
+    assert_restarted_when_it_hangs(LOOP_CLOSURE);
+}
+
+fn assert_restarted_when_it_hangs(follower: &str) {
+    let run = run().rate(MODERATE).set("run.stall_timeout_s=3");
+    let mut running = run.start();
+    send(running.await_stage(follower), Signal::STOP);
+    let ended = running.finish();
+    ended.succeeded();
+    // While the stream goes on its heartbeat tells, and then its progress.
+    let sentences = ["hangs", "has made no progress"];
+    let said = sentences.map(|it| ended.stderr.contains(&format!("{follower} {it}")));
+    assert!(said.contains(&true), "{}", ended.stderr);
+    assert_undisturbed(&run, follower);
+    assert!(restarts(&run, follower) > 0);
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! The log of keyframes of a run with SLAM: odometry is the same with it, and it is the same bytes
 //! whatever is killed.
 
-use std::{fs, sync::OnceLock, thread, time::Duration};
+use std::{fs, ops::Range, sync::OnceLock, thread, time::Duration};
 
 use gyre_journal as journal;
 use gyre_slam::{Keyframe, RecordLog, RecordReader, records_path};
@@ -101,7 +101,17 @@ fn a_run_with_slam_is_not_resumed_without() {
 
 #[test]
 fn keyframes_are_the_same_after_kills_at_random_moments() {
-    for seed in 0..6 {
+    assert_same_after_kills(0..2);
+}
+
+#[test]
+#[ignore = "nightly: kills at many moments"]
+fn keyframes_are_the_same_after_kills_at_many_moments() {
+    assert_same_after_kills(2..12);
+}
+
+fn assert_same_after_kills(seeds: Range<u64>) {
+    for seed in seeds {
         let mut random = StdRng::seed_from_u64(seed);
         let run = run().rate("6");
         let mut running = run.start();

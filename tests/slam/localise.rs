@@ -42,7 +42,10 @@ fn drive(town: u64, day: Day) -> PathBuf {
             "seed = 9\nweather = [{{ rain_mm_h = 10.0 }}]\n[town]\nseed = {town}\nchanges_seed = 5\n"
         ),
     };
-    recording::configured(&format!("town-{town}-{day:?}"), &settings)
+    recording::configured(
+        &format!("town-{town}-{day:?}"),
+        &format!("{}{settings}", recording::SENSOR),
+    )
 }
 
 /// A run of a drive with SLAM, and its map in the run's folder.

@@ -10,12 +10,17 @@ use tempfile::TempDir;
 
 use crate::common::{Run, real_data, recording, runtime_is_installed};
 
+/// The interval of the scans of all drives, s.
+pub const PERIOD_S: f64 = 0.25;
+
 /// A recording and the configuration of its runs.
 pub struct Drive {
     recording: PathBuf,
     /// Scans of the recording.
     pub scans: usize,
     configured: fn() -> Run,
+    /// The rate of its runs.
+    pub rate: &'static str,
     undisturbed: OnceLock<Undisturbed>,
 }
 
@@ -47,12 +52,24 @@ impl Results {
 }
 
 impl Drive {
-    /// A simulated recording with loops.
-    pub fn small() -> Self {
+    /// A simulated recording without loops, in a second and a half.
+    pub fn short() -> Self {
+        Self {
+            recording: recording::small().to_owned(),
+            scans: recording::SCANS,
+            configured: Run::small,
+            rate: "4",
+            undisturbed: OnceLock::new(),
+        }
+    }
+
+    /// A simulated recording with loops, as fast as it goes.
+    pub fn with_loops() -> Self {
         Self {
             recording: recording::around_a_block().to_owned(),
             scans: recording::SCANS_AROUND,
             configured: Run::small,
+            rate: "max",
             undisturbed: OnceLock::new(),
         }
     }
@@ -69,18 +86,26 @@ impl Drive {
             scans: recording::images(&recording).len(),
             recording,
             configured,
+            rate: "max",
             undisturbed: OnceLock::new(),
         })
     }
 
-    /// A run of the drive as fast as it goes, with results of its own.
+    /// A run of the drive, with results of its own.
     pub fn run(&self) -> Run {
-        self.run_of(&self.recording)
+        self.run_of(&self.recording, self.rate)
     }
 
     /// A run of another recording of the same kind, with SLAM.
-    pub fn run_of(&self, recording: &Path) -> Run {
-        (self.configured)().data(recording).set("slam.kind=graph")
+    pub fn run_of(&self, recording: &Path, rate: &str) -> Run {
+        let run = (self.configured)().data(recording).rate(rate);
+        run.set("slam.kind=graph")
+    }
+
+    /// A run of the drive in so many seconds.
+    pub fn run_in(&self, seconds: f64) -> Run {
+        let rate = self.scans as f64 * PERIOD_S / seconds;
+        self.run_of(&self.recording, &format!("{rate:.3}"))
     }
 
     /// A copy of the recording that may be damaged, with the images that are kept by their numbers.

@@ -5,8 +5,8 @@ use std::{fs, path::Path};
 use rand::Rng;
 
 use super::{
-    drive::Results,
-    scene::{Outcome, PERIOD_S, Scene},
+    drive::{PERIOD_S, Results},
+    scene::{Outcome, Scene},
 };
 
 /// Scans are missing, one long gap among them, during which the watchdog must not lose patience. A
@@ -21,15 +21,12 @@ pub fn gaps(scene: &mut Scene) -> Option<Outcome> {
     let recording = scene
         .drive
         .copy(|scan| !(first..first + gap).contains(&scan) && !missing.contains(&scan));
-    let alone = scene.drive.run_of(recording.path());
+    let alone = scene.drive.run_of(recording.path(), "max");
     alone.complete();
 
     let gap_s = 2.0;
     let rate = (gap as f64 * PERIOD_S / gap_s).min(1000.0);
-    let run = scene
-        .drive
-        .run_of(recording.path())
-        .rate(&format!("{rate:.3}"));
+    let run = scene.drive.run_of(recording.path(), &format!("{rate:.3}"));
     let run = run.set("run.stall_timeout_s=1");
     let mut running = run.start();
     scene.moment(&mut running)?;
@@ -43,7 +40,7 @@ pub fn vanishes(scene: &mut Scene) -> Option<Outcome> {
     let recording = scene.drive.copy(|_| true);
     let images = folder_of_images(recording.path());
     let away = recording.path().join("away");
-    let run = scene.drive.run_of(recording.path());
+    let run = scene.drive.run_of(recording.path(), scene.drive.rate);
     let mut running = run.start();
     running.await_poses_or_end(1);
     scene.moment(&mut running)?;

@@ -2,8 +2,8 @@
 //! end. A run finishes with the results of the undisturbed one, or ends with a sentence and the
 //! same command resumes to them, or is refused with a sentence.
 //!
-//! One fault of each kind, on a small simulated recording, belongs to the tests of every change.
-//! All of them, on a real drive with refinement and learned masks:
+//! One fault of each kind, on a short simulated drive, belongs to the tests of every change. All of
+//! them, on a real drive with refinement and learned masks:
 //!
 //! ```sh
 //! cargo test --release -p gyre --test pipeline on_a_real_drive -- --ignored --nocapture
@@ -14,7 +14,7 @@
 //!
 //! `GYRE_FAULTS_KIND` selects one kind by its name, `GYRE_FAULTS_SEED` the first seed,
 //! `GYRE_FAULTS_EVENTS` the number of faults of each kind. So a fault is repeated by its kind, its
-//! seed and 1. The small recording takes the first two as well.
+//! seed and 1. The short drive takes the first two as well.
 
 mod drive;
 mod environment;
@@ -62,7 +62,7 @@ macro_rules! kinds {
 
         $(#[test]
         fn $name() {
-            one_on_the_small_recording(stringify!($name));
+            one_on_the_short_drive(stringify!($name));
         })*
     };
 }
@@ -127,7 +127,7 @@ fn strike(kind: &Kind, drive: &Drive, seed: u64) -> Outcome {
         .unwrap_or_else(|| panic!("{ATTEMPTS} runs ended before the fault"))
 }
 
-fn one_on_the_small_recording(name: &str) {
+fn one_on_the_short_drive(name: &str) {
     static DRIVE: OnceLock<Drive> = OnceLock::new();
     let kind = KINDS.iter().find(|kind| kind.name == name).unwrap();
     if !selected(kind) || lacking(kind).is_some() {
@@ -135,7 +135,7 @@ fn one_on_the_small_recording(name: &str) {
     }
     let seed = number("GYRE_FAULTS_SEED", 1);
     println!("GYRE_FAULTS_KIND={name} GYRE_FAULTS_SEED={seed}");
-    strike(kind, DRIVE.get_or_init(Drive::small), seed);
+    strike(kind, DRIVE.get_or_init(Drive::short), seed);
 }
 
 #[test]
@@ -148,8 +148,8 @@ fn all_kinds_on_a_real_drive() {
 
 #[test]
 #[ignore = "takes a quarter of an hour; see the head of this file"]
-fn all_kinds_on_the_small_recording() {
-    all_kinds(&Drive::small());
+fn all_kinds_on_a_drive_with_loops() {
+    all_kinds(&Drive::with_loops());
 }
 
 fn all_kinds(drive: &Drive) {

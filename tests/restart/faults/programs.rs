@@ -59,14 +59,13 @@ const ROADS: [&str; 6] = [
 
 /// A second run with the same results is refused, by whatever road it comes. The first goes on.
 pub fn second_run(scene: &mut Scene) -> Option<Outcome> {
-    let run = scene.run();
-    let place = run.folder().join("place");
     let road = *ROADS.choose(&mut scene.rng)?;
     println!("{road}");
     if road == "at once" {
-        return Some(both_at_once(scene, &run));
+        return Some(both_at_once(scene, &scene.run()));
     }
-    let run = run.rate(&scene.pace(4.0));
+    let run = scene.drive.run_in(4.0);
+    let place = run.folder().join("place");
     let mut running = run.start();
     running.await_poses_or_end(scene.rng.random_range(1..scene.drive.scans / 2));
     let _mount = (road == "mount").then(|| Mount::bind(run.out(), &place));

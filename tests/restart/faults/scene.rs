@@ -12,9 +12,6 @@ use rustix::process::Signal;
 use super::drive::{Drive, Results};
 use crate::common::{Ended, Pid, Run, Running, send};
 
-/// The interval of the scans of both drives, s.
-pub const PERIOD_S: f64 = 0.25;
-
 /// The end of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
@@ -72,11 +69,6 @@ impl<'a> Scene<'a> {
     /// A run of the drive.
     pub fn run(&self) -> Run {
         self.drive.run()
-    }
-
-    /// The rate at which the drive takes so many seconds.
-    pub fn pace(&self, seconds: f64) -> String {
-        format!("{:.3}", self.drive.scans as f64 * PERIOD_S / seconds)
     }
 
     /// True in one of `of` cases.
