@@ -13,6 +13,7 @@ use crate::realism::Realism;
 use crate::sensor::{Effects, SensorConfig};
 use crate::town::TownConfig;
 use crate::traffic::TrafficConfig;
+use crate::tunnel::TunnelConfig;
 use crate::weather::WeatherConfig;
 use crate::wheels::SimulatedWheelsConfig;
 
@@ -56,6 +57,9 @@ pub struct SimulationConfig {
     /// The weather, section by section of the drive. Default: clear.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub weather: Vec<WeatherConfig>,
+    /// The tunnels, stretch by stretch of the drive. Default: none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub tunnels: Vec<TunnelConfig>,
     /// The format of the dataset.
     pub output: OutputConfig,
 }
@@ -74,6 +78,7 @@ impl Default for SimulationConfig {
             gyro: SimulatedGyroConfig::default(),
             wheels: SimulatedWheelsConfig::default(),
             weather: Vec::new(),
+            tunnels: Vec::new(),
             output: OutputConfig::default(),
         }
     }
@@ -94,7 +99,8 @@ impl SimulationConfig {
         self.sensor.validate()?;
         self.gyro.validate()?;
         self.wheels.validate()?;
-        self.weather.iter().try_for_each(WeatherConfig::validate)
+        self.weather.iter().try_for_each(WeatherConfig::validate)?;
+        self.tunnels.iter().try_for_each(TunnelConfig::validate)
     }
 
     /// Returns the configuration with all that its realism decides written out.

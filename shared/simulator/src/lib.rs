@@ -8,7 +8,7 @@
 //! - [`config`]: the configuration,
 //! - [`drive`], [`path`]: the path of the sensor, a pose for every instant,
 //! - [`lanes`], [`streets`]: the network of streets,
-//! - [`town`], [`traffic`]: what stands along them and what moves on them,
+//! - [`town`], [`tunnel`], [`traffic`]: what stands along them and what moves on them,
 //! - [`body`], [`world`], [`occlusion`]: scatterers and walls, and which walls lie between two
 //!   points,
 //! - [`relief`]: the height of the ground,
@@ -61,6 +61,7 @@ pub mod streets;
 pub mod town;
 pub mod traffic;
 pub mod truth;
+pub mod tunnel;
 pub mod weather;
 pub mod wheels;
 pub mod world;
@@ -81,6 +82,7 @@ pub use simulated_drive::{Renderer, SimulatedDrive};
 pub use simulator::{SimulatedScan, Simulator};
 pub use streets::{Street, Streets};
 pub use traffic::RoadUser;
+pub use tunnel::TunnelConfig;
 pub use wheels::SimulatedWheelsConfig;
 pub use world::World;
 pub use writer::{Summary, remove_dataset, write_dataset, write_dataset_on};

@@ -20,6 +20,7 @@ use crate::sensor::{PitchRoll, Scene, Sensor, SweepTime};
 use crate::streets::Streets;
 use crate::town;
 use crate::traffic::{Observer, RoadUser, Traffic};
+use crate::tunnel;
 use crate::weather::WeatherConfig;
 use crate::wheels;
 use crate::world::World;
@@ -65,6 +66,7 @@ impl Simulator {
     ///
     /// # Errors
     /// As [`SimulationConfig::validate`] and [`crate::drive::DriveConfig::path`];
+    /// [`SimulatorError::Config`] if the drive ends before a tunnel;
     /// [`SimulatorError::TooManyScans`] if the drive has fewer scans than are wanted,
     /// [`SimulatorError::OffStreets`] if it leaves the town's streets.
     pub fn new(config: &SimulationConfig) -> Result<Self, SimulatorError> {
@@ -95,7 +97,9 @@ impl Simulator {
             true => Relief::hills(config.town_seed()),
             false => Relief::LEVEL,
         };
-        let town = town::build(&config.town, &streets, config.town_seed());
+        let (seed, keep) = (config.town_seed(), config.drive.keep);
+        let mut town = town::build(&config.town, &streets, seed);
+        tunnel::build(&config.tunnels, &mut town, path.as_ref(), keep, seed)?;
         Ok(Self {
             config: config.clone(),
             scans,

@@ -39,6 +39,8 @@ pub(crate) enum Stream {
     WheelErrors,
     /// Slips of the wheels.
     WheelSlips,
+    /// The lining of a tunnel, by its number.
+    Tunnel(u64),
 }
 
 impl Stream {
@@ -66,6 +68,7 @@ impl Stream {
             Self::GyroStalls => 1 << 50,
             Self::WheelErrors => 1 << 51,
             Self::WheelSlips => 1 << 52,
+            Self::Tunnel(number) => (1 << 53) + number,
             Self::PitchRoll => u64::MAX - 1,
             Self::FixedEchoes => u64::MAX,
         }
@@ -102,8 +105,9 @@ mod tests {
             Stream::GyroStalls,
             Stream::WheelErrors,
             Stream::WheelSlips,
+            Stream::Tunnel(0),
         ];
         let numbers: BTreeSet<u64> = counted.chain(single).map(Stream::number).collect();
-        assert_eq!(numbers.len(), 400_012);
+        assert_eq!(numbers.len(), 400_013);
     }
 }

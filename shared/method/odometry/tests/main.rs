@@ -6,3 +6,4 @@ mod examples;
 mod lost_azimuths;
 mod standing_pair;
 mod stop_and_go;
+mod tunnel;

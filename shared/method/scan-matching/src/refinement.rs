@@ -31,6 +31,7 @@ mod normal_equations;
 mod points;
 mod registration;
 mod standstill;
+mod structure;
 mod submap;
 mod tracker;
 mod uncertainty;
@@ -43,12 +44,14 @@ pub use heading::{GyroBias, Heading};
 pub use initial_guess::InitialGuess;
 pub use keyframe_aligner::KeyframeAligner;
 pub use local_map::Keyframe;
+use nalgebra::UnitVector2;
 pub use standstill::Standstill;
 pub use submap::Submap;
 pub use tracker::{Anchor, TrackerState};
 pub use wheels::{WheelScale, WheelState};
 
 use crate::ConfigError;
+use alignment::Alignment;
 use heading::PredictedTurn;
 use local_map::LocalMap;
 use points::DeskewedPoints;
@@ -87,10 +90,21 @@ pub struct Refined {
     pub guess: InitialGuess,
     /// The vehicle stands: the motion is zero.
     pub stationary: bool,
+    /// The radar does not see how far the vehicle has driven along walls without structure: the
+    /// wheels say it, or the motions before.
+    pub slides: bool,
     /// The bias of the gyro; `None` where it has not measured the turn.
     pub gyro: Option<GyroBias>,
     /// The scale of the wheels; `None` where they have not measured the distance.
     pub wheels: Option<WheelScale>,
+}
+
+/// An estimated pose, with the covariance of the motion to it.
+struct Accepted {
+    outcome: Outcome,
+    pose: UncertainMotion,
+    /// The radar does not see how far the vehicle has driven.
+    slides: bool,
 }
 
 /// Refines motions scan by scan against a map of the last keyframes.
@@ -190,10 +204,11 @@ impl Refiner {
         let uncertainty =
             Uncertainty::before(&scan, &self.map, &self.state, predictions, &self.config);
         let best = self.registration(&scan).best();
-        let (outcome, estimate) = self.accept_or_predict(&scan, &best, &uncertainty);
+        let accepted = self.accept_or_predict(&scan, &best, &uncertainty);
+        let outcome = accepted.outcome;
         let wheels = self.distance.and(self.state.wheels);
-        let report = self.hold_standstill(&scan, outcome, estimate);
-        self.update(&scan, &best, outcome, &estimate.motion);
+        let report = self.hold_standstill(&scan, &accepted);
+        self.update(&scan, &best, outcome, &accepted.pose.motion);
         Refined {
             motion: OdometryMotion {
                 motion: report.motion.motion,
@@ -209,6 +224,7 @@ impl Refiner {
             },
             outcome,
             stationary: report.stationary,
+            slides: accepted.slides,
             gyro: scan.step.turn.and(self.state.heading).map(|it| it.bias()),
             wheels: wheels.map(|it| it.known()),
         }
@@ -314,35 +330,112 @@ impl Refiner {
         scan: &Scan<'_>,
         best: &Candidate,
         uncertainty: &Uncertainty,
-    ) -> (Outcome, UncertainMotion) {
-        let covariance = uncertainty::of_alignment(
-            &best.alignment,
-            &self.points,
-            &self.state.pose,
-            &self.config,
-        );
-        let Some(covariance) = covariance.filter(|_| best.is_plausible) else {
-            return (Outcome::Predicted, self.predicted(scan, uncertainty));
+    ) -> Accepted {
+        let Some((registered, along)) = self.plausible_match(scan, best, uncertainty) else {
+            return self.predicted(scan, uncertainty);
         };
-        let by_azimuths = uncertainty::by_azimuths(&best.alignment, self.azimuth_variance_rad2);
-        let is_certain = self.is_firm(scan, best);
+        let is_certain = self.is_firm(scan, best, along);
         let is_firm = is_certain || self.state.doubtful >= MAX_DOUBTFUL;
         let (outcome, factor) = match is_firm {
             true => (Outcome::Refined, 1.0),
             false => (Outcome::Weak, uncertainty::WEAK_FACTOR),
         };
         let registered = UncertainMotion {
-            motion: best.alignment.pose,
-            covariance: (covariance + by_azimuths) * factor,
+            covariance: registered.covariance * factor,
+            ..registered
         };
-        if !self.weigh_distance(scan, &registered, is_certain) {
-            return (Outcome::Predicted, self.predicted(scan, uncertainty));
+        match along {
+            Some(_) => self.slide(scan),
+            None if self.weigh_distance(scan, &registered, is_certain) => self.state.sliding = 0,
+            None => return self.predicted(scan, uncertainty),
         }
-        (outcome, self.with_gyro_heading(scan, registered))
+        Accepted {
+            outcome,
+            pose: self.with_gyro_heading(scan, registered),
+            slides: along.is_some(),
+        }
+    }
+
+    /// Returns the pose of the best match with the covariance of its motion; `None` where it is not
+    /// plausible. Beside it the direction in which nothing determines the place, if there is one:
+    /// there the predicted place is taken, which has to be plausible instead.
+    fn plausible_match(
+        &mut self,
+        scan: &Scan<'_>,
+        best: &Candidate,
+        uncertainty: &Uncertainty,
+    ) -> Option<(UncertainMotion, Option<UnitVector2<f64>>)> {
+        let along = structure::undetermined_direction(&self.map, &self.points, &best.alignment);
+        let Some(along) = along.filter(|_| best.fits) else {
+            let registered = self.registered(&best.alignment)?;
+            return best.is_plausible.then_some((registered, None));
+        };
+        let [predicted, _] = self.state.predict(&scan.step);
+        let apart = predicted.translation.vector - best.alignment.pose.translation.vector;
+        let mut initial = best.alignment.pose;
+        initial.translation.vector += along.into_inner() * along.dot(&apart);
+        let mut registration = self.registration(scan);
+        let alignment = registration.align_across(&initial, along);
+        if !registration.is_reachable(&alignment.pose, best.support) {
+            return None;
+        }
+        let registered = self.registered(&alignment)?;
+        Some((self.slid(scan, registered, along, uncertainty), Some(along)))
+    }
+
+    /// Returns the pose of an alignment with the covariance of the motion to it; `None` if the
+    /// points do not determine it.
+    fn registered(&self, alignment: &Alignment) -> Option<UncertainMotion> {
+        let (points, previous) = (&self.points, &self.state.pose);
+        let covariance = uncertainty::of_alignment(alignment, points, previous, &self.config)?;
+        Some(UncertainMotion {
+            motion: alignment.pose,
+            covariance: covariance
+                + uncertainty::by_azimuths(alignment, self.azimuth_variance_rad2),
+        })
+    }
+
+    /// Returns a registered pose with the covariance that the prediction has in a direction in which
+    /// nothing else tells the place: by the wheels, or at constant velocity.
+    fn slid(
+        &self,
+        scan: &Scan<'_>,
+        registered: UncertainMotion,
+        along: UnitVector2<f64>,
+        uncertainty: &Uncertainty,
+    ) -> UncertainMotion {
+        let sliding = match scan.step.distance {
+            Some(_) => 0,
+            None => self.state.sliding,
+        };
+        let along = self.state.pose.rotation.inverse() * along.into_inner();
+        let variance = uncertainty.of_sliding(along, sliding);
+        // The error of the prediction accumulates whole.
+        let drift_share = uncertainty::drift_share(self.map.len(), &self.config);
+        let covariance = registered.covariance;
+        UncertainMotion {
+            covariance: uncertainty::with_variance(
+                &covariance,
+                along.push(0.0),
+                variance / drift_share,
+            ),
+            ..registered
+        }
+    }
+
+    /// Takes a scan whose place along the walls is the predicted one.
+    fn slide(&mut self, scan: &Scan<'_>) {
+        match (self.distance, scan.step.distance, &mut self.state.wheels) {
+            (Some(measured), Some(_), Some(wheels)) => {
+                wheels.slide(&measured);
+                self.state.sliding = 0;
+            }
+            _ => self.state.sliding = self.state.sliding.saturating_add(1),
+        }
     }
 
     /// Returns the predicted pose and the covariance of its motion.
-    fn predicted(&mut self, scan: &Scan<'_>, uncertainty: &Uncertainty) -> UncertainMotion {
+    fn predicted(&mut self, scan: &Scan<'_>, uncertainty: &Uncertainty) -> Accepted {
         let [motion, _] = self.state.predict(&scan.step);
         let covariance = uncertainty.of_prediction();
         if let (None, Some(heading)) = (scan.step.turn, &mut self.state.heading) {
@@ -359,7 +452,11 @@ impl Refiner {
             };
             wheels.miss(&alone, scan.step.interval_s);
         }
-        UncertainMotion { motion, covariance }
+        Accepted {
+            outcome: Outcome::Predicted,
+            pose: UncertainMotion { motion, covariance },
+            slides: false,
+        }
     }
 
     /// Compares a registered pose with the distance of the wheels, if there is one: they slip where
@@ -409,27 +506,36 @@ impl Refiner {
     }
 
     /// Returns whether the scan overlaps the map well, has enough points, and agrees with the
-    /// search.
-    fn is_firm(&self, scan: &Scan<'_>, best: &Candidate) -> bool {
+    /// search, but for a direction in which neither can tell.
+    fn is_firm(
+        &self,
+        scan: &Scan<'_>,
+        best: &Candidate,
+        undetermined: Option<UnitVector2<f64>>,
+    ) -> bool {
         let config = &self.config;
-        let apart = scan.searched.inv_mul(&best.alignment.pose);
+        let mut apart = scan.searched.inv_mul(&best.alignment.pose);
+        if let Some(along) = undetermined {
+            let along = scan.searched.rotation.inverse() * along.into_inner();
+            let shift = &mut apart.translation.vector;
+            *shift -= along * along.dot(shift);
+        }
         best.overlap >= config.firm_overlap * self.state.mean_overlap
             && best.support >= config.min_support
             && apart.translation.vector.norm() <= config.search_agrees_m
             && apart.rotation.angle().abs() <= config.search_agrees_deg.to_radians()
     }
 
-    /// Returns the motion to the estimated pose; none while the vehicle stands.
-    fn hold_standstill(
-        &mut self,
-        scan: &Scan<'_>,
-        outcome: Outcome,
-        pose: UncertainMotion,
-    ) -> Report {
+    /// Returns the motion to the estimated pose; none while the vehicle stands. Where the radar does
+    /// not see the way it cannot tell, as little as a prediction.
+    fn hold_standstill(&mut self, scan: &Scan<'_>, accepted: &Accepted) -> Report {
         let estimate = Estimate {
-            pose,
+            pose: accepted.pose,
             previous: self.state.pose,
-            outcome,
+            outcome: match accepted.slides {
+                true => Outcome::Predicted,
+                false => accepted.outcome,
+            },
             rolls: scan.step.distance.is_some_and(|it| it.is_certain()),
             interval_s: scan.step.interval_s,
         };

@@ -5,7 +5,7 @@
 mod tests;
 
 use gyre_geometry::Pose;
-use nalgebra::Vector3;
+use nalgebra::{UnitVector2, Vector3};
 
 use super::{
     map_level::MapView,
@@ -48,6 +48,30 @@ pub(super) fn align(
     initial: &Pose,
     max_iterations: usize,
 ) -> Alignment {
+    align_by(map, points, initial, max_iterations, gauss_newton_step)
+}
+
+/// As [`align`], with steps across a direction along the map's axes alone, and turns.
+pub(super) fn align_across(
+    map: &MapView<'_>,
+    points: &DeskewedPoints,
+    initial: &Pose,
+    max_iterations: usize,
+    locked: UnitVector2<f64>,
+) -> Alignment {
+    let locked = locked.push(0.0);
+    align_by(map, points, initial, max_iterations, |normal| {
+        gauss_newton_step(&normal.without(&locked))
+    })
+}
+
+fn align_by(
+    map: &MapView<'_>,
+    points: &DeskewedPoints,
+    initial: &Pose,
+    max_iterations: usize,
+    step: impl Fn(&NormalEquations) -> Option<Vector3<f64>>,
+) -> Alignment {
     let at = |pose: Pose| Alignment {
         normal: linearise(map, points, &pose),
         pose,
@@ -55,7 +79,7 @@ pub(super) fn align(
     let mut best = at(*initial);
     let mut share = FIRST_SHARE;
     for _ in 0..max_iterations {
-        let Some(whole) = gauss_newton_step(&best.normal) else {
+        let Some(whole) = step(&best.normal) else {
             break;
         };
         let step = whole * share;

@@ -7,7 +7,7 @@ use ndarray::{ArrayView2, ArrayViewMut2};
 
 use super::{
     RefinementConfig,
-    map_level::{Image, MapLevel, MapView},
+    map_level::{Image, ImageView, MapLevel, MapView},
     points::DeskewedPoints,
 };
 
@@ -133,6 +133,12 @@ impl LocalMap {
 
     pub fn fine(&self) -> MapView<'_> {
         self.fine.view()
+    }
+
+    /// The fine image of each keyframe.
+    pub fn fine_images(&self) -> impl Iterator<Item = ImageView<'_>> {
+        let view = |keyframe| ImageView::new(keyframe, self.fine.cell_m);
+        self.used.iter().map(move |keyframe| view(&keyframe.fine))
     }
 
     pub fn coarse(&self) -> MapView<'_> {

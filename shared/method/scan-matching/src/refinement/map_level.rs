@@ -5,7 +5,7 @@
 
 use gyre_geometry::Pose;
 use gyre_simd::simd;
-use nalgebra::Point2;
+use nalgebra::{Point2, Vector2};
 use ndarray::{ArrayView2, ArrayViewMut2};
 
 use super::points::DeskewedPoints;
@@ -48,6 +48,40 @@ impl Image {
 }
 
 const SQUARE: &str = "an image has n x n cells";
+
+/// An image as it lies in the map.
+pub(super) struct ImageView<'a> {
+    image: &'a Image,
+    /// Metres a cell.
+    cell_m: f64,
+}
+
+impl<'a> ImageView<'a> {
+    pub fn new(image: &'a Image, cell_m: f64) -> Self {
+        Self { image, cell_m }
+    }
+
+    /// The slope at a place in the map, per metre, of an image from 0 to 1, between whose cells it
+    /// is interpolated linearly: zero outside the image.
+    pub fn slope(&self, place: Vector2<f64>) -> Vector2<f64> {
+        let n = self.image.n;
+        let at = |axis: usize| place[axis] / self.cell_m - self.image.corner[axis] as f64;
+        let (u, v) = (at(0), at(1));
+        let last = (n - 1) as f64;
+        if !((0.0..last).contains(&u) && (0.0..last).contains(&v)) {
+            return Vector2::zeros();
+        }
+        let (across, along) = (u.fract(), v.fract());
+        let first = u as usize * n + v as usize;
+        let cells = &self.image.cells;
+        let [a, b, c, d] =
+            [first, first + 1, first + n, first + n + 1].map(|cell| f64::from(cells[cell]));
+        let per_m = 1.0 / (self.cell_m * f64::from(FULL));
+        let (upper, lower) = (a + along * (b - a), c + along * (d - c));
+        let (left, right) = (a + across * (c - a), b + across * (d - b));
+        Vector2::new(lower - upper, right - left) * per_m
+    }
+}
 
 /// The sum of the keyframes' images.
 #[derive(Debug)]

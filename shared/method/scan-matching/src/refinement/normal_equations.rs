@@ -27,6 +27,20 @@ pub(super) struct NormalEquations {
     pub information: Matrix3<f64>,
 }
 
+impl NormalEquations {
+    /// Returns the equations of steps that have no part in a direction of unit length.
+    pub fn without(&self, direction: &Vector3<f64>) -> Self {
+        let others = Matrix3::identity() - direction * direction.transpose();
+        let kept = others * self.information * others;
+        Self {
+            right_hand_side: others * self.right_hand_side,
+            // Any information along it will do: the right-hand side has nothing there.
+            information: kept + direction * direction.transpose() * self.information.trace(),
+            ..*self
+        }
+    }
+}
+
 /// The cost and the normal equations at a pose.
 pub(super) fn linearise(
     map: &MapView<'_>,

@@ -2,10 +2,11 @@
 //! guesses, then on the fine one.
 
 use gyre_geometry::{Pose, SparsePoint};
+use nalgebra::UnitVector2;
 
 use super::{
     InitialGuess, RefinementConfig, TrackerState,
-    alignment::{Alignment, align},
+    alignment::{Alignment, align, align_across},
     initial_guess::{initial_guesses, yaw_offsets},
     local_map::LocalMap,
     points::DeskewedPoints,
@@ -51,8 +52,9 @@ pub(super) struct Candidate {
     /// Sum of the points' weights, and the same as a share of its running mean.
     pub weight: f64,
     pub support: f64,
-    /// A vehicle can have driven there, and the scan overlaps the map about as much as the scans
-    /// before.
+    /// The scan overlaps the map about as much as the scans before.
+    pub fits: bool,
+    /// So it does, and a vehicle can have driven there.
     pub is_plausible: bool,
 }
 
@@ -150,6 +152,22 @@ impl Registration<'_> {
         align(&self.map.fine(), self.points, pose, FINE_ITERATIONS)
     }
 
+    /// Aligns the scan from a pose whose place in a direction along the map's axes stays.
+    pub fn align_across(&mut self, initial: &Pose, locked: UnitVector2<f64>) -> Alignment {
+        self.deskew(initial);
+        self.points.thin(COARSE_STRIDE);
+        let (coarse, points) = (self.map.coarse(), &*self.points);
+        let mut pose = align_across(&coarse, points, initial, COARSE_ITERATIONS, locked).pose;
+        let mut fine = |pose: &Pose| {
+            self.deskew(pose);
+            align_across(&self.map.fine(), self.points, pose, FINE_ITERATIONS, locked)
+        };
+        for _ in 1..FINE_ROUNDS {
+            pose = fine(&pose).pose;
+        }
+        fine(&pose)
+    }
+
     /// Deskews the scan with the motion that leads to `pose`.
     fn deskew(&mut self, pose: &Pose) {
         let twist = self.state.twist_to(pose, &self.scan.step);
@@ -170,7 +188,8 @@ impl Registration<'_> {
         };
         let fits = overlap > 0.0 && overlap >= self.config.min_overlap * self.state.mean_overlap;
         Candidate {
-            is_plausible: fits && self.is_reachable(&alignment.pose, support.min(1.0)),
+            is_plausible: fits && self.is_reachable(&alignment.pose, support),
+            fits,
             guess,
             alignment,
             overlap,
@@ -179,8 +198,10 @@ impl Registration<'_> {
         }
     }
 
-    fn is_reachable(&self, pose: &Pose, jitter_share: f64) -> bool {
+    /// Returns whether a vehicle can have driven to a pose, where the weight of the points is this
+    /// share of its mean.
+    pub fn is_reachable(&self, pose: &Pose, support: f64) -> bool {
         self.state
-            .can_reach(pose, &self.scan.step, jitter_share, self.config)
+            .can_reach(pose, &self.scan.step, support.min(1.0), self.config)
     }
 }

@@ -30,6 +30,9 @@ pub struct TrackerState {
     pub doubtful: u32,
     /// Number of scans in a row that were predicted.
     pub unmatched: u32,
+    /// Number of scans in a row that were moved along walls without structure at constant velocity:
+    /// nothing says how far.
+    pub sliding: u32,
     /// The place where the vehicle stands, for the reported motions.
     pub standstill: Standstill,
     /// The bias of the gyro, and the like; `None` until it has measured a turn.
@@ -69,6 +72,7 @@ impl Default for TrackerState {
             mean_weight: 0.0,
             doubtful: 0,
             unmatched: 0,
+            sliding: 0,
             standstill: Standstill::default(),
             heading: None,
             wheels: None,

@@ -1,10 +1,10 @@
 //! Covariances of refined and predicted motions, and the shares of them that accumulate.
 
 use gyre_geometry::Pose;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Vector2, Vector3};
 
 use super::{
-    Outcome, RefinementConfig, TrackerState, alignment::Alignment, local_map::LocalMap,
+    Outcome, RefinementConfig, TrackerState, alignment::Alignment, heading::grown, local_map::LocalMap,
     points::DeskewedPoints, registration::Scan, standstill::Report, tracker::Step,
 };
 
@@ -54,6 +54,15 @@ impl Uncertainty {
         self.of_prediction
     }
 
+    /// Returns the variance of the prediction in a direction in which nothing else tells the place,
+    /// such that those of a row of such scans add up; `before` of them at constant velocity, whose
+    /// error is that of all.
+    pub fn of_sliding(&self, along: Vector2<f64>, before: u32) -> f64 {
+        let place = self.of_prediction.fixed_view::<2, 2>(0, 0);
+        let variance = (along.transpose() * place * along)[0];
+        variance * grown(1.0, f64::from(before))
+    }
+
     /// Returns the covariance of a reported motion. One that takes back the error of predictions
     /// has theirs too.
     pub fn of_report(&self, report: &Report) -> Matrix3<f64> {
@@ -75,6 +84,19 @@ impl Uncertainty {
             self.of_map
         }
     }
+}
+
+/// A covariance with another variance in a direction of unit length: what is known of the others
+/// under that, by how their errors depend on its, stays.
+pub(super) fn with_variance(
+    covariance: &Matrix3<f64>,
+    along: Vector3<f64>,
+    variance: f64,
+) -> Matrix3<f64> {
+    let of_along = covariance * along;
+    let before = along.dot(&of_along);
+    let by_along = of_along / before;
+    covariance + by_along * by_along.transpose() * (variance - before)
 }
 
 /// The covariance of the motion from `previous` to an alignment, from the information matrix;

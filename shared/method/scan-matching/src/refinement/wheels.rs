@@ -221,6 +221,14 @@ impl WheelState {
         self.dead_m += measured.distance_m;
     }
 
+    /// Takes a registered pose whose place along the path is that of the wheels, since the map does
+    /// not determine it: the map moves along.
+    pub(super) fn slide(&mut self, measured: &WheelDistance) {
+        self.offset_m = 0.0;
+        self.covariance = Matrix2::new(measured.variance_m2, 0.0, 0.0, self.covariance[(1, 1)]);
+        self.dead_m += measured.distance_m;
+    }
+
     /// Takes a pose that is predicted from the motions before, with this variance.
     pub(super) fn guess(&mut self, variance_m2: f64) {
         self.covariance[(0, 0)] += variance_m2;

@@ -1,0 +1,101 @@
+//! The direction in which nothing that stands still determines a pose: along the walls of a tunnel,
+//! which look the same everywhere.
+//!
+//! The information matrix of an alignment does not tell. Speckle gives each keyframe gradients of
+//! its own, some of which are left in the mean of all keyframes, and their squares count as
+//! information. But the gradients by speckle of one keyframe are independent of those of another,
+//! while what stands still gives all keyframes the same ones. So the products of gradients of
+//! different keyframes are the information by structure: that of speckle alone is zero in the mean.
+
+use gyre_geometry::Pose;
+use nalgebra::{Matrix2, Matrix3, SymmetricEigen, UnitVector2, Vector2, Vector3};
+
+use super::{
+    alignment::Alignment, local_map::LocalMap, points::DeskewedPoints, registration::COARSE_STRIDE,
+};
+
+/// The least number of keyframes by which structure is told from speckle.
+const MIN_KEYFRAMES: usize = 4;
+/// Share of the information along a direction that is by structure, below which the direction is
+/// undetermined: most of what seems to determine it is speckle.
+const MIN_SHARE: f64 = 0.5;
+/// The information along the weakest direction over that along the strongest, from which on it is
+/// not examined, which saves the time: it determines a pose even if half of it is speckle.
+const ENOUGH: f64 = 0.2;
+
+/// Returns the direction along the axes of the map in which structure does not determine the place
+/// of an aligned scan; `None` if it does in all of them.
+pub(super) fn undetermined_direction(
+    map: &LocalMap,
+    points: &DeskewedPoints,
+    alignment: &Alignment,
+) -> Option<UnitVector2<f64>> {
+    let place = of_place(&alignment.normal.information)?;
+    let along = SymmetricEigen::new(place).eigenvalues;
+    if map.len() < MIN_KEYFRAMES || along.min() >= ENOUGH * along.max() {
+        return None;
+    }
+    let informations = Informations::of(map, points, &alignment.pose);
+    let (whole, shared) = (of_place(&informations.whole)?, informations.by_structure()?);
+    let eigen = SymmetricEigen::new(shared);
+    let weakest = eigen.eigenvalues.imin();
+    let along = eigen.eigenvectors.column(weakest).into_owned();
+    let all = (along.transpose() * whole * along)[0];
+    (eigen.eigenvalues[weakest] < MIN_SHARE * all).then(|| UnitVector2::new_normalize(along))
+}
+
+/// The information about the place of a matrix over place and heading, with a heading that is known
+/// as well as the scan says it.
+fn of_place(information: &Matrix3<f64>) -> Option<Matrix2<f64>> {
+    without_heading(information, information[(2, 2)])
+}
+
+fn without_heading(information: &Matrix3<f64>, heading: f64) -> Option<Matrix2<f64>> {
+    let across = information.fixed_view::<2, 1>(0, 2);
+    let place = information.fixed_view::<2, 2>(0, 0) - across * across.transpose() / heading;
+    place.iter().all(|it| it.is_finite()).then_some(place)
+}
+
+/// The information over (x, y, yaw) by the mean of the keyframes, as that of
+/// [`super::normal_equations`], from every third point.
+struct Informations {
+    whole: Matrix3<f64>,
+    /// The part that is of squares of the gradients of single keyframes.
+    of_squares: Matrix3<f64>,
+    keyframes: f64,
+}
+
+impl Informations {
+    fn of(map: &LocalMap, points: &DeskewedPoints, pose: &Pose) -> Self {
+        let (mut whole, mut of_squares) = (Matrix3::zeros(), Matrix3::zeros());
+        let keyframes = map.len() as f64;
+        let places = points.x_m.iter().zip(&points.y_m).zip(&points.weight);
+        for ((x_m, y_m), weight) in places.step_by(COARSE_STRIDE) {
+            let arm = pose.rotation * Vector2::new(f64::from(*x_m), f64::from(*y_m));
+            let place = pose.translation.vector + arm;
+            let (mut sum, mut squares) = (Vector3::zeros(), Matrix3::zeros());
+            for image in map.fine_images() {
+                let slope = image.slope(place);
+                let gradient = Vector3::new(slope.x, slope.y, arm.x * slope.y - arm.y * slope.x);
+                sum += gradient;
+                squares += gradient * gradient.transpose();
+            }
+            let weight = f64::from(*weight) / (keyframes * keyframes);
+            whole += sum * sum.transpose() * weight;
+            of_squares += squares * weight;
+        }
+        Self {
+            whole,
+            of_squares,
+            keyframes,
+        }
+    }
+
+    /// The information about the place by products of gradients of different keyframes: as much as
+    /// if all products were of these.
+    fn by_structure(&self) -> Option<Matrix2<f64>> {
+        let shared = (self.whole - self.of_squares) * (self.keyframes / (self.keyframes - 1.0));
+        // The heading is known: the walls themselves tell it.
+        without_heading(&shared, self.whole[(2, 2)])
+    }
+}
