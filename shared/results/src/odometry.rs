@@ -80,6 +80,7 @@ fn initial_guess_name(refinement: &RefinementRecord) -> &'static str {
         initial_guess::PREDICTION => "prediction",
         initial_guess::SEARCH => "search",
         initial_guess::YAW_OFFSET => "yaw-offset",
+        initial_guess::ALONG_WALLS => "along-walls",
         _ => "unknown",
     }
 }

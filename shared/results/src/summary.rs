@@ -274,6 +274,13 @@ impl fmt::Display for Summary {
                  weak {}  predicted {}  stationary {}",
                 m.refined, m.second_hypothesis, m.weak, m.predicted, m.stationary
             )?;
+            if m.along_walls > 0 {
+                let along = m.along_walls;
+                writeln!(
+                    f,
+                    "along walls without structure {along}: the radar does not see how far"
+                )?;
+            }
         }
         if let Some(gyro) = &c.gyro {
             writeln!(

@@ -152,8 +152,7 @@ impl Tube {
     fn line(&self, town: &mut Body, body: u32, rng: &mut impl Rng) {
         for (side, aside_m) in [1.0, -1.0].into_iter().zip(self.aside_m) {
             for piece in self.nodes.windows(2) {
-                let [from, to] =
-                    [0, 1].map(|end| piece[end].0 + piece[end].1 * (side * aside_m));
+                let [from, to] = [0, 1].map(|end| piece[end].0 + piece[end].1 * (side * aside_m));
                 town.walls.push(Wall {
                     mirror: MIRROR,
                     ..Wall::rough(from, to, TRANSMISSION, body)
@@ -266,15 +265,26 @@ mod tests {
         let posts = town.scatterers.iter().filter(|it| it.body == NO_BODY);
         let places: Vec<_> = posts.map(|it| it.position).collect();
         assert_eq!(places, kept);
-        assert!(town.walls.iter().all(|wall| wall.body == 8), "one body, and the wall is gone");
+        assert!(
+            town.walls.iter().all(|wall| wall.body == 8),
+            "one body, and the wall is gone"
+        );
     }
 
     #[test]
     fn a_tunnel_beyond_the_end_of_the_drive_is_refused() {
-        let nodes = (0..40).map(|k| (f64::from(k), gyre_geometry::pose(5.0 * f64::from(k), 0.0, 0.0)));
+        let nodes = (0..40).map(|k| {
+            (
+                f64::from(k),
+                gyre_geometry::pose(5.0 * f64::from(k), 0.0, 0.0),
+            )
+        });
         let path = crate::path::SplinePath::new(&nodes.collect::<Vec<_>>(), 0.7);
         let error = build(&[TUNNEL], &mut Body::default(), &path, DrivingSide::Left, 1);
         let text = error.unwrap_err().to_string();
-        assert!(text.contains("`tunnels.from_m` is 50") && text.contains("195 m long"), "{text}");
+        assert!(
+            text.contains("`tunnels.from_m` is 50") && text.contains("195 m long"),
+            "{text}"
+        );
     }
 }

@@ -1,176 +1,175 @@
 //! A tunnel of 300 m, whose walls look the same everywhere: the radar does not see how far the
-//! vehicle drives.
+//! vehicle drives. The table of `docs/fusion.md`.
 
-use std::fmt::Write as _;
+use std::{fmt::Write as _, path::Path};
 
-use gyre_geometry::{ComposedMotion, Pose, xy_yaw};
-use gyre_odometry::{Odometry, OdometryConfig, Registered};
-use gyre_radar::{GyroLog, OwnedScan, ScanSamples, WheelLog, open_source};
+use gyre_geometry::{ComposedMotion, OdometryMotion, Pose, xy_yaw};
+use gyre_odometry::{Odometry, OdometryConfig};
+use gyre_radar::{Dataset, GyroLog, OwnedScan, ScanSamples, WheelLog, open_source};
 use gyre_samples::{GyroKind, WheelsKind};
-use gyre_scan_matching::Outcome;
-use gyre_simulator::{DrivingSide, SimulatedDrive, SimulationConfig, TunnelConfig};
+use gyre_scan_matching::InitialGuess;
+use gyre_simulator::{
+    GyroProfile, SimulatedDrive, SimulationConfig, TunnelConfig, drive::DriveConfig,
+};
+use nalgebra::Vector3;
 
 /// Way to the tunnel, its length, and the way behind it, m.
 const BEFORE_M: f64 = 150.0;
 const TUNNEL_M: f64 = 300.0;
-const BEHIND_M: f64 = 100.0;
+const BEHIND_M: f64 = 60.0;
+/// Way behind the tunnel at which its end is out of mind, m.
+const OUT_M: f64 = 20.0;
 
-/// A road with wide bends, on which the vehicle drives now faster, now slower.
+/// A road with wide bends, on which the vehicle drives now faster, now slower, as a trajectory.
 fn road() -> String {
-    let (mut text, mut driven_m, mut place) = (String::new(), 0.0_f64, [0.0_f64; 2]);
     const STEP_S: f64 = 0.1;
+    let (mut text, mut driven_m, mut place) = (String::new(), 0.0_f64, [0.0_f64; 2]);
     for step in 0.. {
         let time_s = f64::from(step) * STEP_S;
         let yaw_rad = 0.15 * (driven_m / 110.0).sin();
+        let (sin, cos) = (yaw_rad / 2.0).sin_cos();
+        let [x_m, y_m] = place;
         let _ = writeln!(
             text,
-            "{time_s:.1} {:.4} {:.4} 0 0 0 {:.9} {:.9}",
-            place[0],
-            place[1],
-            (yaw_rad / 2.0).sin(),
-            (yaw_rad / 2.0).cos()
+            "{time_s:.1} {x_m:.4} {y_m:.4} 0 0 0 {sin:.9} {cos:.9}"
         );
         if driven_m > BEFORE_M + TUNNEL_M + BEHIND_M {
-            return text;
+            break;
         }
         let step_m = STEP_S * (9.0 + 2.5 * (time_s / 4.0).sin());
         driven_m += step_m;
-        place = [place[0] + step_m * yaw_rad.cos(), place[1] + step_m * yaw_rad.sin()];
+        place = [x_m + step_m * yaw_rad.cos(), y_m + step_m * yaw_rad.sin()];
     }
     text
 }
 
-fn simulation(seed: u64, folder: &std::path::Path) -> SimulationConfig {
+fn drive(seed: u64, folder: &Path) -> (SimulatedDrive, SimulationConfig) {
     let file = folder.join("road.tum");
     std::fs::write(&file, road()).unwrap();
     let mut config: SimulationConfig = toml::from_str("realism = \"road\"").unwrap();
-    config.seed = seed;
-    config.drive = gyre_simulator::drive::DriveConfig::along_file(file);
-    config.drive.keep = DrivingSide::Left;
-    config.gyro.profile = gyre_simulator::GyroProfile::Asm330lhh;
+    (config.seed, config.drive) = (seed, DriveConfig::along_file(file));
+    config.gyro.profile = GyroProfile::Asm330lhh;
     config.wheels.rate_hz = 50.0;
+    // The range is exact: what is measured is the way through the tunnel.
     config.effects.miscalibration = Some(false);
     config.tunnels = vec![TunnelConfig {
         from_m: BEFORE_M,
         length_m: TUNNEL_M,
     }];
-    config
+    (SimulatedDrive::new(&config).unwrap(), config)
+}
+
+/// The configuration with a gyro and with wheels, if they are used, and their samples.
+fn with(
+    [gyro, wheels]: [bool; 2],
+    drive: &SimulatedDrive,
+    dataset: &dyn Dataset,
+) -> (OdometryConfig, ScanSamples) {
+    let mut config = OdometryConfig::default();
+    config.refinement.scale_sigma = 0.0;
+    let (mut samples, path) = (ScanSamples::None, Path::new("simulation"));
+    if gyro {
+        config.gyro.kind = GyroKind::Auto;
+        let log = GyroLog::of(drive.gyro_samples().unwrap(), path).unwrap();
+        samples = ScanSamples::of_gyro(&log, &config.gyro, dataset).unwrap();
+    }
+    if wheels {
+        config.wheels.kind = WheelsKind::Auto;
+        let log = WheelLog::of(drive.wheel_samples().unwrap(), path).unwrap();
+        samples = samples.and(ScanSamples::of_wheels(&log, &config.wheels, dataset).unwrap());
+    }
+    (config, samples)
+}
+
+/// The way through the tunnel.
+struct Through {
+    /// Error at its end, m, and the standard deviation along it that the covariance says.
+    end_m: f64,
+    sigma_m: f64,
+    /// Mean NEES of the poses inside, over three.
+    nees: f64,
+    along_walls: usize,
+}
+
+/// The motions from the scan before the tunnel to one behind it, with the true poses.
+fn through(motions: &[(OdometryMotion, Pose, Pose, InitialGuess)]) -> Through {
+    let start = motions[0].1;
+    let mut composed: Option<ComposedMotion> = None;
+    let (mut nees, mut end_m) = (0.0, 0.0);
+    for (motion, _, pose, _) in motions {
+        let next = match &composed {
+            None => ComposedMotion::of(motion),
+            Some(composed) => composed.then(motion),
+        };
+        let (found, truth) = (next.motion(), start.inv_mul(pose));
+        let off = Vector3::from(xy_yaw(&found.motion)) - Vector3::from(xy_yaw(&truth));
+        let inverse = found.covariance.try_inverse().unwrap();
+        nees += (off.transpose() * inverse * off)[0] / (3.0 * motions.len() as f64);
+        end_m = off.xy().norm();
+        composed = Some(next);
+    }
+    let composed = composed.unwrap().motion();
+    let slid = |it: &&(OdometryMotion, Pose, Pose, InitialGuess)| it.3 == InitialGuess::AlongWalls;
+    Through {
+        end_m,
+        sigma_m: composed.covariance[(0, 0)].sqrt(),
+        nees,
+        along_walls: motions.iter().filter(slid).count(),
+    }
 }
 
 #[test]
-#[ignore = "experiment"]
-fn experiment() {
-    let seed: u64 = std::env::var("SEED").map_or(1, |seed| seed.parse().unwrap());
+#[ignore = "nightly: renders four drives and registers each three times, two minutes"]
+fn the_way_through_a_tunnel_is_that_of_the_wheels() {
     let folder = tempfile::tempdir().unwrap();
-    let simulation = simulation(seed, folder.path());
-    let drive = SimulatedDrive::new(&simulation).unwrap();
-    let mut scans = open_source(Box::new(drive.renderer()), &simulation.dataset_options()).unwrap();
-    let mut all = Vec::new();
-    for index in 0..scans.len() {
-        let mut scan = OwnedScan::with_limits(scans.limits());
-        scan.geometry = scans.read(index, scan.slot()).unwrap();
-        all.push(scan);
-    }
-    for variant in ["radar", "gyro", "both"] {
-        let mut config = OdometryConfig::default();
-        config.refinement.scale_sigma = 0.0;
-        if variant != "radar" {
-            config.gyro.kind = GyroKind::Auto;
+    println!("| seed | with | end error | of the tunnel | sigma along | NEES | along walls |");
+    for seed in 1..=4 {
+        let (drive, simulation) = drive(seed, folder.path());
+        let mut dataset =
+            open_source(Box::new(drive.renderer()), &simulation.dataset_options()).unwrap();
+        let mut scans = Vec::new();
+        for index in 0..dataset.len() {
+            let mut scan = OwnedScan::with_limits(dataset.limits());
+            scan.geometry = dataset.read(index, scan.slot()).unwrap();
+            scans.push(scan);
         }
-        if variant == "both" {
-            config.wheels.kind = WheelsKind::Auto;
-        }
-        let path = std::path::Path::new("simulation");
-        let gyro = GyroLog::of(drive.gyro_samples().unwrap(), path).unwrap();
-        let wheels = WheelLog::of(drive.wheel_samples().unwrap(), path).unwrap();
-        let turns = ScanSamples::of_gyro(&gyro, &config.gyro, scans.as_ref()).unwrap();
-        let speeds = ScanSamples::of_wheels(&wheels, &config.wheels, scans.as_ref()).unwrap();
-        let samples = match variant {
-            "radar" => ScanSamples::None,
-            "gyro" => turns,
-            _ => turns.and(speeds),
-        };
-        let mut odometry = Odometry::new(&config).unwrap();
-        let mut registered: Vec<Registered> = Vec::new();
-        for scan in &all {
-            let view = scan.view();
-            let of = samples.of(scans.as_ref(), view.span_ns()).into_owned();
-            registered.push(odometry.register(&view, &of).unwrap());
-        }
-        let sim = drive.simulator();
-        let mut driven_m = 0.0;
-        let mut reference: Option<(Pose, ComposedMotion)> = None;
-        let mut nees = Vec::new();
-        for k in 1..all.len() {
-            let (before, here) = (sim.pose(k - 1), sim.pose(k));
-            let truth = before.inv_mul(&here);
-            let step_m = truth.translation.vector.norm();
-            driven_m += step_m;
-            let it = &registered[k];
-            let off = truth.inv_mul(&it.motion.motion);
-            let inside = driven_m > BEFORE_M && driven_m < BEFORE_M + TUNNEL_M;
-            if inside && reference.is_none() {
-                reference = Some((before, ComposedMotion::new()));
-            }
-            let mut line = String::new();
-            if let Some((from, composed)) = reference.as_mut() {
-                *composed = match nees.is_empty() {
-                    true => ComposedMotion::of(&it.motion),
-                    false => composed.then(&it.motion),
+        for witnesses in [[false, false], [true, false], [true, true]] {
+            let (config, samples) = with(witnesses, &drive, dataset.as_ref());
+            let mut odometry = Odometry::new(&config).unwrap();
+            let (mut driven_m, mut inside) = (0.0, Vec::new());
+            for (index, scan) in scans.iter().enumerate() {
+                let of = samples.of(dataset.as_ref(), scan.view().span_ns());
+                let registered = odometry.register(&scan.view(), &of).unwrap();
+                let Some(refined) = registered.refined else {
+                    continue;
                 };
-                let expected = from.inv_mul(&here);
-                let apart = expected.inv_mul(&composed.motion().motion);
-                let value = {
-                    let [x, y, yaw] = xy_yaw(&composed.motion().motion);
-                    let [tx, ty, tyaw] = xy_yaw(&expected);
-                    let e = nalgebra_vector([x - tx, y - ty, yaw - tyaw]);
-                    let covariance = composed.motion().covariance;
-                    quadratic(&e, &covariance)
-                };
-                nees.push(value);
-                line = format!(
-                    "end {:.2} {:.2} yaw {:.2} sigma {:.2} nees {:.2}",
-                    apart.translation.x,
-                    apart.translation.y,
-                    apart.rotation.angle().to_degrees(),
-                    composed.motion().covariance[(0, 0)].sqrt(),
-                    value
-                );
-                if !inside {
-                    println!(
-                        "{variant} END after {driven_m:.0} m: {:.2} m, NEES mean {:.2}",
-                        apart.translation.vector.norm(),
-                        nees.iter().sum::<f64>() / nees.len() as f64
-                    );
-                    if driven_m > BEFORE_M + TUNNEL_M + 20.0 {
-                        reference = None;
-                        nees.clear();
-                    }
+                let [before, pose] = [index - 1, index].map(|k| drive.simulator().pose(k));
+                driven_m += before.inv_mul(&pose).translation.vector.norm();
+                if (BEFORE_M..BEFORE_M + TUNNEL_M + OUT_M).contains(&driven_m) {
+                    inside.push((registered.motion, before, pose, refined.guess));
                 }
             }
+            let through = through(&inside);
+            let Through {
+                end_m,
+                sigma_m,
+                nees,
+                along_walls,
+            } = through;
+            let share = 100.0 * end_m / TUNNEL_M;
             println!(
-                "{variant} {k} at {driven_m:.0} {} off {:.2} {:.2} {:.2} deg cov {:.3} {} {line}",
-                if inside { "TUNNEL" } else { "" },
-                off.translation.x,
-                off.translation.y,
-                off.rotation.angle().to_degrees(),
-                it.motion.covariance[(0, 0)].sqrt(),
-                match it.outcome {
-                    outcome => format!("{outcome:?}"),
-                },
+                "| {seed} | {witnesses:?} | {end_m:.2} m | {share:.2} % | {sigma_m:.2} m | {nees:.2} | {along_walls} of {} |",
+                inside.len()
             );
+            assert!(nees < 2.5 && along_walls > inside.len() / 2);
+            if witnesses == [true, true] {
+                assert!(end_m <= 0.01 * TUNNEL_M, "{end_m} m");
+            } else {
+                assert!(
+                    end_m > 10.0 && sigma_m > 0.3 * end_m,
+                    "{end_m} m, {sigma_m} m"
+                );
+            }
         }
     }
-    let _ = Outcome::Refined;
-}
-
-fn nalgebra_vector(values: [f64; 3]) -> [f64; 3] {
-    values
-}
-
-fn quadratic(e: &[f64; 3], covariance: &nalgebra::Matrix3<f64>) -> f64 {
-    let e = nalgebra::Vector3::from(*e);
-    covariance
-        .try_inverse()
-        .map_or(f64::NAN, |inverse| (e.transpose() * inverse * e)[0] / 3.0)
 }

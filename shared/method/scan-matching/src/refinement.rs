@@ -57,6 +57,7 @@ use local_map::LocalMap;
 use points::DeskewedPoints;
 use registration::{Candidate, Registration, Scan};
 use standstill::{Estimate, Report};
+use structure::WeakestDirection;
 use tracker::Step;
 use uncertainty::Uncertainty;
 use wheels::{PredictedDistance, Registered};
@@ -90,9 +91,6 @@ pub struct Refined {
     pub guess: InitialGuess,
     /// The vehicle stands: the motion is zero.
     pub stationary: bool,
-    /// The radar does not see how far the vehicle has driven along walls without structure: the
-    /// wheels say it, or the motions before.
-    pub slides: bool,
     /// The bias of the gyro; `None` where it has not measured the turn.
     pub gyro: Option<GyroBias>,
     /// The scale of the wheels; `None` where they have not measured the distance.
@@ -220,11 +218,11 @@ impl Refiner {
             support: best.support,
             guess: match outcome {
                 Outcome::Predicted => InitialGuess::Prediction,
+                Outcome::Refined | Outcome::Weak if accepted.slides => InitialGuess::AlongWalls,
                 Outcome::Refined | Outcome::Weak => best.guess,
             },
             outcome,
             stationary: report.stationary,
-            slides: accepted.slides,
             gyro: scan.step.turn.and(self.state.heading).map(|it| it.bias()),
             wheels: wheels.map(|it| it.known()),
         }
@@ -365,9 +363,8 @@ impl Refiner {
         best: &Candidate,
         uncertainty: &Uncertainty,
     ) -> Option<(UncertainMotion, Option<UnitVector2<f64>>)> {
-        let along = structure::undetermined_direction(&self.map, &self.points, &best.alignment);
-        let Some(along) = along.filter(|_| best.fits) else {
-            let registered = self.registered(&best.alignment)?;
+        let registered = self.registered(&best.alignment)?;
+        let Some(along) = self.undetermined(scan, &registered).filter(|_| best.fits) else {
             return best.is_plausible.then_some((registered, None));
         };
         let [predicted, _] = self.state.predict(&scan.step);
@@ -381,6 +378,34 @@ impl Refiner {
         }
         let registered = self.registered(&alignment)?;
         Some((self.slid(scan, registered, along, uncertainty), Some(along)))
+    }
+
+    /// Returns the direction along the axes of the map in which the place of a registered pose is
+    /// undetermined, if there is one. In one that is doubtful the wheels decide.
+    fn undetermined(
+        &self,
+        scan: &Scan<'_>,
+        registered: &UncertainMotion,
+    ) -> Option<UnitVector2<f64>> {
+        let weakest = WeakestDirection::of(&self.map, &self.points, &registered.motion)?;
+        let contradicts = || match (&self.distance, &self.state.wheels) {
+            (Some(measured), Some(wheels)) if scan.step.distance.is_some() => {
+                !wheels.agrees(measured, &self.driven(registered))
+            }
+            _ => false,
+        };
+        let is_undetermined = weakest.is_undetermined() || (weakest.is_doubtful() && contradicts());
+        is_undetermined.then_some(weakest.along)
+    }
+
+    /// Returns the part along the path of the motion to a registered pose.
+    fn driven(&self, registered: &UncertainMotion) -> Registered {
+        let motion = UncertainMotion {
+            motion: self.state.pose.inv_mul(&registered.motion),
+            ..*registered
+        };
+        let drift_share = uncertainty::drift_share(self.map.len(), &self.config);
+        Registered::of(&motion, drift_share, &self.wheels)
     }
 
     /// Returns the pose of an alignment with the covariance of the motion to it; `None` if the
@@ -467,15 +492,10 @@ impl Refiner {
         registered: &UncertainMotion,
         is_certain: bool,
     ) -> bool {
+        let registered = self.driven(registered);
         let Some(wheels) = &mut self.state.wheels else {
             return true;
         };
-        let motion = UncertainMotion {
-            motion: self.state.pose.inv_mul(&registered.motion),
-            ..*registered
-        };
-        let drift_share = uncertainty::drift_share(self.map.len(), &self.config);
-        let registered = Registered::of(&motion, drift_share, &self.wheels);
         match &self.distance {
             Some(measured) if wheels.agrees(measured, &registered) => {
                 wheels.correct(measured, &registered);

@@ -13,3 +13,4 @@ mod refinement;
 mod refinement_faults;
 mod refinement_wheels;
 mod slow_sweeps;
+mod tunnel;

@@ -27,6 +27,9 @@ pub mod initial_guess {
     pub const SEARCH: u32 = 2;
     /// The prediction with a yaw offset, tried when no other guess matched.
     pub const YAW_OFFSET: u32 = 3;
+    /// The prediction, which says how far the vehicle has driven along walls without structure: the
+    /// radar does not see that.
+    pub const ALONG_WALLS: u32 = 4;
 }
 
 /// Values of [`RefinementRecord::wheels`].
@@ -83,10 +86,10 @@ impl RefinementRecord {
         )?;
         let guess = self.initial_guess;
         require(
-            guess <= initial_guess::YAW_OFFSET,
+            guess <= initial_guess::ALONG_WALLS,
             "initial_guess",
             guess,
-            "0 to 3",
+            "0 to 4",
         )?;
         require(
             self.stationary <= 1,
@@ -119,6 +122,7 @@ impl From<&gyre_scan_matching::Refined> for RefinementRecord {
                 InitialGuess::Prediction => initial_guess::PREDICTION,
                 InitialGuess::Search => initial_guess::SEARCH,
                 InitialGuess::YawOffset => initial_guess::YAW_OFFSET,
+                InitialGuess::AlongWalls => initial_guess::ALONG_WALLS,
             },
             overlap: refined.overlap,
             support: refined.support,

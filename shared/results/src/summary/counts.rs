@@ -136,6 +136,9 @@ pub struct MotionCounts {
     pub second_hypothesis: u64,
     /// Those of a standing vehicle.
     pub stationary: u64,
+    /// Those along walls without structure, where the radar does not see how far the vehicle has
+    /// driven: the wheels say it, or the motions before.
+    pub along_walls: u64,
 }
 
 impl MotionCounts {
@@ -144,8 +147,9 @@ impl MotionCounts {
         match refinement.outcome {
             outcome::REFINED => {
                 self.refined += 1;
+                let predictions = [initial_guess::PREDICTION, initial_guess::ALONG_WALLS];
                 self.second_hypothesis +=
-                    u64::from(refinement.initial_guess != initial_guess::PREDICTION);
+                    u64::from(!predictions.contains(&refinement.initial_guess));
             }
             outcome::WEAK => self.weak += 1,
             outcome::PREDICTED => self.predicted += 1,
@@ -153,6 +157,7 @@ impl MotionCounts {
         }
         self.doubtful = self.weak + self.predicted;
         self.stationary += u64::from(refinement.is_stationary());
+        self.along_walls += u64::from(refinement.initial_guess == initial_guess::ALONG_WALLS);
     }
 }
 
@@ -376,17 +381,19 @@ mod tests {
             (outcome::REFINED, initial_guess::PREDICTION),
             (outcome::REFINED, initial_guess::SEARCH),
             (outcome::REFINED, initial_guess::YAW_OFFSET),
+            (outcome::REFINED, initial_guess::ALONG_WALLS),
             (outcome::WEAK, initial_guess::SEARCH),
             (outcome::PREDICTED, initial_guess::NONE),
         ];
         let counts = counted(&poses.map(pose)).counts(None, 0, true);
         let expected = MotionCounts {
-            refined: 3,
+            refined: 4,
             weak: 1,
             predicted: 1,
             doubtful: 2,
             second_hypothesis: 2,
             stationary: 1,
+            along_walls: 1,
         };
         assert_eq!(counts.motions, Some(expected));
     }

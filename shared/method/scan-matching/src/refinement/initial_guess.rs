@@ -14,6 +14,9 @@ pub enum InitialGuess {
     Search,
     /// The prediction with a yaw offset, tried if nothing else gave a plausible match.
     YawOffset,
+    /// The prediction, whose place along walls without structure stays: the radar does not see how
+    /// far the vehicle has driven. The wheels say it, or the motions before.
+    AlongWalls,
 }
 
 /// The prediction, the search's motion, and the prediction from the scan before in case the last

@@ -10,38 +10,61 @@
 use gyre_geometry::Pose;
 use nalgebra::{Matrix2, Matrix3, SymmetricEigen, UnitVector2, Vector2, Vector3};
 
-use super::{
-    alignment::Alignment, local_map::LocalMap, points::DeskewedPoints, registration::COARSE_STRIDE,
-};
+use super::{local_map::LocalMap, points::DeskewedPoints};
 
 /// The least number of keyframes by which structure is told from speckle.
 const MIN_KEYFRAMES: usize = 4;
 /// Share of the information along a direction that is by structure, below which the direction is
 /// undetermined: most of what seems to determine it is speckle.
 const MIN_SHARE: f64 = 0.5;
-/// The information along the weakest direction over that along the strongest, from which on it is
-/// not examined, which saves the time: it determines a pose even if half of it is speckle.
-const ENOUGH: f64 = 0.2;
+/// The information by structure along the weakest direction over that along the strongest, below
+/// which the direction is undetermined: the match that is taken is often another one, metres away.
+const MIN_RATIO: f64 = 0.2;
+/// The same, below which another sensor that contradicts is right.
+const SAFE_RATIO: f64 = 0.4;
+/// So many points of a scan are enough to tell.
+const POINTS: usize = 400;
 
-/// Returns the direction along the axes of the map in which structure does not determine the place
-/// of an aligned scan; `None` if it does in all of them.
-pub(super) fn undetermined_direction(
-    map: &LocalMap,
-    points: &DeskewedPoints,
-    alignment: &Alignment,
-) -> Option<UnitVector2<f64>> {
-    let place = of_place(&alignment.normal.information)?;
-    let along = SymmetricEigen::new(place).eigenvalues;
-    if map.len() < MIN_KEYFRAMES || along.min() >= ENOUGH * along.max() {
-        return None;
+/// The direction in which structure determines the place of a scan least.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct WeakestDirection {
+    /// Along the axes of the map.
+    pub along: UnitVector2<f64>,
+    /// The share of the information along it that is by structure.
+    share: f64,
+    /// The information by structure along it, over that along the strongest direction.
+    ratio: f64,
+}
+
+impl WeakestDirection {
+    /// Finds it for a scan that is aligned with the map; `None` with too few keyframes to tell.
+    pub fn of(map: &LocalMap, points: &DeskewedPoints, pose: &Pose) -> Option<Self> {
+        if map.len() < MIN_KEYFRAMES {
+            return None;
+        }
+        let informations = Informations::of(map, points, pose);
+        let (whole, structure) = (of_place(&informations.whole)?, informations.by_structure()?);
+        let eigen = SymmetricEigen::new(structure);
+        let (weakest, strongest) = (eigen.eigenvalues.imin(), eigen.eigenvalues.max());
+        let along = eigen.eigenvectors.column(weakest).into_owned();
+        let whole = (along.transpose() * whole * along)[0];
+        Some(Self {
+            along: UnitVector2::new_normalize(along),
+            share: eigen.eigenvalues[weakest] / whole,
+            ratio: eigen.eigenvalues[weakest] / strongest,
+        })
     }
-    let informations = Informations::of(map, points, &alignment.pose);
-    let (whole, shared) = (of_place(&informations.whole)?, informations.by_structure()?);
-    let eigen = SymmetricEigen::new(shared);
-    let weakest = eigen.eigenvalues.imin();
-    let along = eigen.eigenvectors.column(weakest).into_owned();
-    let all = (along.transpose() * whole * along)[0];
-    (eigen.eigenvalues[weakest] < MIN_SHARE * all).then(|| UnitVector2::new_normalize(along))
+
+    /// Returns whether nothing that stands still determines the place along it. What is no number,
+    /// of a scan without structure, is not.
+    pub fn is_undetermined(&self) -> bool {
+        self.share < MIN_SHARE || self.ratio < MIN_RATIO
+    }
+
+    /// Returns whether the match can be another one along it.
+    pub fn is_doubtful(&self) -> bool {
+        self.is_undetermined() || self.ratio < SAFE_RATIO
+    }
 }
 
 /// The information about the place of a matrix over place and heading, with a heading that is known
@@ -57,7 +80,7 @@ fn without_heading(information: &Matrix3<f64>, heading: f64) -> Option<Matrix2<f
 }
 
 /// The information over (x, y, yaw) by the mean of the keyframes, as that of
-/// [`super::normal_equations`], from every third point.
+/// [`super::normal_equations`], from some of the points.
 struct Informations {
     whole: Matrix3<f64>,
     /// The part that is of squares of the gradients of single keyframes.
@@ -70,7 +93,8 @@ impl Informations {
         let (mut whole, mut of_squares) = (Matrix3::zeros(), Matrix3::zeros());
         let keyframes = map.len() as f64;
         let places = points.x_m.iter().zip(&points.y_m).zip(&points.weight);
-        for ((x_m, y_m), weight) in places.step_by(COARSE_STRIDE) {
+        let step = points.x_m.len().div_ceil(POINTS).max(1);
+        for ((x_m, y_m), weight) in places.step_by(step) {
             let arm = pose.rotation * Vector2::new(f64::from(*x_m), f64::from(*y_m));
             let place = pose.translation.vector + arm;
             let (mut sum, mut squares) = (Vector3::zeros(), Matrix3::zeros());

@@ -4,8 +4,9 @@ use gyre_geometry::Pose;
 use nalgebra::{Matrix3, Vector2, Vector3};
 
 use super::{
-    Outcome, RefinementConfig, TrackerState, alignment::Alignment, heading::grown, local_map::LocalMap,
-    points::DeskewedPoints, registration::Scan, standstill::Report, tracker::Step,
+    Outcome, RefinementConfig, TrackerState, alignment::Alignment, heading::grown,
+    local_map::LocalMap, points::DeskewedPoints, registration::Scan, standstill::Report,
+    tracker::Step,
 };
 
 /// Factor on the covariance of a weak match.
@@ -86,17 +87,16 @@ impl Uncertainty {
     }
 }
 
-/// A covariance with another variance in a direction of unit length: what is known of the others
-/// under that, by how their errors depend on its, stays.
+/// A covariance with another variance in a direction of unit length, whose error is independent of
+/// the others: those are as if the place in that direction were known.
 pub(super) fn with_variance(
     covariance: &Matrix3<f64>,
     along: Vector3<f64>,
     variance: f64,
 ) -> Matrix3<f64> {
     let of_along = covariance * along;
-    let before = along.dot(&of_along);
-    let by_along = of_along / before;
-    covariance + by_along * by_along.transpose() * (variance - before)
+    let known = covariance - of_along * of_along.transpose() / along.dot(&of_along);
+    known + along * along.transpose() * variance
 }
 
 /// The covariance of the motion from `previous` to an alignment, from the information matrix;

@@ -20,7 +20,7 @@ const WHEEL_WORDS: usize = 1 + 6 + 4 + 9;
 const ANCHOR_WORDS: usize = 9;
 /// Where the means and counts of a tracker state begin, its standstill, its heading and its wheels.
 const REST: usize = 4 + 2 * ANCHOR_WORDS;
-const STANDSTILL: usize = REST + 4;
+const STANDSTILL: usize = REST + 5;
 const HEADING: usize = STANDSTILL + STANDSTILL_WORDS;
 const WHEELS: usize = HEADING + HEADING_WORDS;
 /// Words of a keyframe's slot before its cells: checksum, id, pose, corners of both levels.
@@ -105,6 +105,7 @@ fn tracker_words(state: &TrackerState) -> [u64; TRACKER_WORDS] {
         state.mean_weight.to_bits(),
         state.doubtful.into(),
         state.unmatched.into(),
+        state.sliding.into(),
     ];
     words[REST..STANDSTILL].copy_from_slice(&rest);
     words[STANDSTILL..HEADING].copy_from_slice(&standstill_words(&state.standstill));
@@ -217,6 +218,7 @@ fn tracker_from(words: &[u64; TRACKER_WORDS]) -> TrackerState {
         mean_weight: f64::from_bits(rest[1]),
         doubtful: rest[2] as u32,
         unmatched: rest[3] as u32,
+        sliding: rest[4] as u32,
         standstill: standstill_from(&words[STANDSTILL..]),
         heading: heading_from(&words[HEADING..]),
         wheels: wheels_from(&words[WHEELS..]),

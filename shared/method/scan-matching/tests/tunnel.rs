@@ -1,0 +1,134 @@
+//! A tunnel, whose walls look the same everywhere: no scan tells how far the vehicle has driven.
+
+use crate::common::{Numbers, scenes::*};
+use gyre_geometry::{ComposedMotion, Pose, SparsePoint, pose};
+use gyre_samples::{WheelDistance, WheelsConfig};
+use gyre_scan_matching::{InitialGuess, Outcome, Refined, Refiner};
+
+const NOISY: Sensor = Sensor {
+    noise_m: 0.05,
+    offset_m: 0.0,
+    doppler_s: 0.0,
+    hides_doppler: false,
+    seed: 1,
+};
+const SCANS: usize = 100;
+/// The last houses are out of sight.
+const INSIDE: usize = 40;
+/// Measured distance over the true one.
+const SCALE: f64 = 0.99;
+
+/// A vehicle that leaves a town for a tunnel and slows down there, and its scans.
+fn into_a_tunnel() -> (Drive, Vec<Vec<SparsePoint>>) {
+    let drive = Drive {
+        acceleration_mps2: -0.2,
+        ..Drive::steady(10.0, 0.0, SCANS)
+    };
+    let mut scene = town([[-110.0, -10.0], [-60.0, 60.0]], 1);
+    scene.extend(posts([[-110.0, 0.0], [-60.0, 60.0]], 20.0, 4));
+    // At every place of a wall another point in each scan: speckle.
+    let walls = [3.0, -6.5].map(|y| wall([0.0, y], [400.0, y], 2500));
+    scene.extend(walls);
+    (drive, scans(&scene, &drive, &NOISY))
+}
+
+fn refine_with(
+    refiner: &mut Refiner,
+    (drive, scans): (&Drive, &[Vec<SparsePoint>]),
+    wheels: impl Fn(usize) -> Option<f64>,
+) -> Vec<Refined> {
+    let mut numbers = Numbers(7);
+    let mut refine = |k: usize| {
+        let [from_m, to_m] = [k - 1, k].map(|k| drive.length_m(k as f64 * SWEEP_S));
+        let distance = |factor: f64| WheelDistance {
+            distance_m: factor * (to_m - from_m),
+            variance_m2: 1e-4,
+            side_variance_m2: 1e-4,
+            interval_s: SWEEP_S,
+        };
+        refiner.expect_distance(wheels(k).map(distance));
+        // Inside the search finds any way.
+        let searched = match k < INSIDE {
+            true => searched(drive, k - 1),
+            false => pose(2.0 + numbers.within(6.0), 0.0, 0.0),
+        };
+        refiner.refine(k as u64, &scans[k], &scans[k - 1], &searched, SWEEP_S)
+    };
+    (1..scans.len()).map(&mut refine).collect()
+}
+
+/// The displacement inside by the motions against the true one, and its standard deviation ahead.
+fn inside(drive: &Drive, refined: &[Refined]) -> (Pose, f64) {
+    let mut composed = ComposedMotion::of(&refined[INSIDE].motion);
+    for refined in &refined[INSIDE + 1..] {
+        composed = composed.then(&refined.motion);
+    }
+    let truth = drive.pose(INSIDE).inv_mul(&drive.pose(SCANS - 1));
+    let motion = composed.motion();
+    (
+        truth.inv_mul(&motion.motion),
+        motion.covariance[(0, 0)].sqrt(),
+    )
+}
+
+fn slid(refined: &Refined) -> bool {
+    refined.guess == InitialGuess::AlongWalls
+}
+
+#[test]
+fn the_wheels_say_how_far_and_the_radar_where_the_walls_are() {
+    let (drive, scans) = into_a_tunnel();
+    let mut refiner = refiner().with_wheels(&WheelsConfig::default());
+    let refined = refine_with(&mut refiner, (&drive, &scans), |_| Some(SCALE));
+    assert!(!refined[..6].iter().any(slid), "houses tell the way");
+    for (k, refined) in refined.iter().enumerate().skip(INSIDE) {
+        assert!(
+            slid(refined) && refined.outcome == Outcome::Refined,
+            "{k}: {refined:?}"
+        );
+        assert!(refined.motion.covariance.cholesky().is_some());
+    }
+    let (off, sigma_m) = inside(&drive, &refined);
+    println!("{off}, sigma {sigma_m:.2} m");
+    // One percent of 140 m, of which the scale was learnt before.
+    assert!(
+        off.translation.x.abs() < 1.4 && off.translation.y.abs() < 0.5,
+        "{off}"
+    );
+    assert!(off.rotation.angle().abs() < 5e-3, "{off}");
+    assert!(
+        off.translation.x.abs() < 3.0 * sigma_m && sigma_m < 2.5,
+        "{off}, {sigma_m} m"
+    );
+}
+
+#[test]
+fn radar_alone_says_that_it_does_not_know_how_far() {
+    let (drive, scans) = into_a_tunnel();
+    let refined = refine_with(&mut refiner(), (&drive, &scans), |_| None);
+    assert!(refined[INSIDE..].iter().all(slid));
+    let (off, sigma_m) = inside(&drive, &refined);
+    println!("{off}, sigma {sigma_m:.2} m");
+    // It goes on as fast as before, while the vehicle slows down.
+    assert!(off.translation.x > 10.0, "{off}");
+    assert!(off.translation.x < 3.0 * sigma_m, "{off}, {sigma_m} m");
+    assert!(
+        off.translation.y.abs() < 0.5 && off.rotation.angle().abs() < 5e-3,
+        "{off}"
+    );
+}
+
+#[test]
+fn wheels_that_fall_silent_inside_leave_the_speed_that_they_measured() {
+    let (drive, scans) = into_a_tunnel();
+    let mut refiner = refiner().with_wheels(&WheelsConfig::default());
+    let measured = |k: usize| (k < SCANS - 12).then_some(SCALE);
+    let refined = refine_with(&mut refiner, (&drive, &scans), measured);
+    let (off, sigma_m) = inside(&drive, &refined);
+    println!("{off}, sigma {sigma_m:.2} m");
+    assert!(
+        off.translation.x.abs() < 3.0 && sigma_m > 2.0,
+        "{off}, {sigma_m} m"
+    );
+    assert_eq!(refiner.state().sliding, 12);
+}
