@@ -364,7 +364,8 @@ impl Refiner {
         uncertainty: &Uncertainty,
     ) -> Option<(UncertainMotion, Option<UnitVector2<f64>>)> {
         let registered = self.registered(&best.alignment)?;
-        let Some(along) = self.undetermined(scan, &registered).filter(|_| best.fits) else {
+        let along = self.undetermined(scan, &best.alignment, &registered);
+        let Some(along) = along.filter(|_| best.fits) else {
             return best.is_plausible.then_some((registered, None));
         };
         let [predicted, _] = self.state.predict(&scan.step);
@@ -385,9 +386,10 @@ impl Refiner {
     fn undetermined(
         &self,
         scan: &Scan<'_>,
+        alignment: &Alignment,
         registered: &UncertainMotion,
     ) -> Option<UnitVector2<f64>> {
-        let weakest = WeakestDirection::of(&self.map, &self.points, &registered.motion)?;
+        let weakest = WeakestDirection::of(&self.map, &self.points, alignment)?;
         let contradicts = || match (&self.distance, &self.state.wheels) {
             (Some(measured), Some(wheels)) if scan.step.distance.is_some() => {
                 !wheels.agrees(measured, &self.driven(registered))

@@ -10,7 +10,7 @@
 use gyre_geometry::Pose;
 use nalgebra::{Matrix2, Matrix3, SymmetricEigen, UnitVector2, Vector2, Vector3};
 
-use super::{local_map::LocalMap, points::DeskewedPoints};
+use super::{alignment::Alignment, local_map::LocalMap, points::DeskewedPoints};
 
 /// The least number of keyframes by which structure is told from speckle.
 const MIN_KEYFRAMES: usize = 4;
@@ -37,12 +37,14 @@ pub(super) struct WeakestDirection {
 }
 
 impl WeakestDirection {
-    /// Finds it for a scan that is aligned with the map; `None` with too few keyframes to tell.
-    pub fn of(map: &LocalMap, points: &DeskewedPoints, pose: &Pose) -> Option<Self> {
-        if map.len() < MIN_KEYFRAMES {
+    /// Finds it for a scan that is aligned with the map; `None` with too few keyframes to tell, and
+    /// where so much information is in all directions that it is not examined, which saves the time.
+    pub fn of(map: &LocalMap, points: &DeskewedPoints, alignment: &Alignment) -> Option<Self> {
+        let all = SymmetricEigen::new(of_place(&alignment.normal.information)?).eigenvalues;
+        if map.len() < MIN_KEYFRAMES || all.min() >= SAFE_RATIO * all.max() {
             return None;
         }
-        let informations = Informations::of(map, points, pose);
+        let informations = Informations::of(map, points, &alignment.pose);
         let (whole, structure) = (of_place(&informations.whole)?, informations.by_structure()?);
         let eigen = SymmetricEigen::new(structure);
         let (weakest, strongest) = (eigen.eigenvalues.imin(), eigen.eigenvalues.max());
