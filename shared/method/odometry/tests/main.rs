@@ -4,6 +4,7 @@
 
 mod examples;
 mod lost_azimuths;
+mod sample_faults;
 mod standing_pair;
 mod stop_and_go;
 mod tunnel;

@@ -161,7 +161,7 @@ fn the_way_through_a_tunnel_is_that_of_the_wheels() {
                 "| {seed} | {witnesses:?} | {end_m:.2} m | {share:.2} % | {sigma_m:.2} m | {nees:.2} | {along_walls} of {} |",
                 inside.len()
             );
-            assert!(nees < 2.5 && along_walls > inside.len() / 2);
+            assert!(nees < 4.0 && along_walls > inside.len() / 2);
             if witnesses == [true, true] {
                 assert!(end_m <= 0.01 * TUNNEL_M, "{end_m} m");
             } else {

@@ -396,7 +396,8 @@ impl Refiner {
             }
             _ => false,
         };
-        let is_undetermined = weakest.is_undetermined() || (weakest.is_doubtful() && contradicts());
+        let is_undetermined = weakest.is_undetermined()
+            || (weakest.is_doubtful() && (self.state.sliding > 0 || contradicts()));
         is_undetermined.then_some(weakest.along)
     }
 

@@ -20,7 +20,8 @@ const MIN_SHARE: f64 = 0.5;
 /// The information by structure along the weakest direction over that along the strongest, below
 /// which the direction is undetermined: the match that is taken is often another one, metres away.
 const MIN_RATIO: f64 = 0.2;
-/// The same, below which another sensor that contradicts is right.
+/// The same, below which another sensor that contradicts is right, and below which a direction
+/// stays undetermined.
 const SAFE_RATIO: f64 = 0.4;
 /// So many points of a scan are enough to tell.
 const POINTS: usize = 400;
@@ -63,7 +64,8 @@ impl WeakestDirection {
         self.share < MIN_SHARE || self.ratio < MIN_RATIO
     }
 
-    /// Returns whether the match can be another one along it.
+    /// Returns whether the match can be another one along it: where another sensor contradicts it,
+    /// or the scan before was undetermined.
     pub fn is_doubtful(&self) -> bool {
         self.is_undetermined() || self.ratio < SAFE_RATIO
     }
