@@ -28,7 +28,7 @@ const PIECE_M: f64 = 2.0;
 /// less than that of a wall of rubble stone. Both are assumed.
 const SCATTERERS_M: usize = 20;
 const LINING_M2: f64 = 0.15;
-/// How far they are from even distances, as a share of those; and from the wall, metres.
+/// Deviation from even distances, as a share of those; and distance from the wall, metres.
 const UNEVEN: f64 = 0.5;
 const ROUGH_M: f64 = 0.02;
 /// Two-way share of the power that passes a wall, and the share that is mirrored: concrete.

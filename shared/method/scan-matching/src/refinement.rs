@@ -423,8 +423,8 @@ impl Refiner {
         })
     }
 
-    /// Returns a registered pose with the covariance that the prediction has in a direction in which
-    /// nothing else tells the place: by the wheels, or at constant velocity.
+    /// Returns a registered pose with the covariance that the prediction has in a direction in
+    /// which nothing else tells the place: by the wheels, or at constant velocity.
     fn slid(
         &self,
         scan: &Scan<'_>,
@@ -549,8 +549,8 @@ impl Refiner {
             && apart.rotation.angle().abs() <= config.search_agrees_deg.to_radians()
     }
 
-    /// Returns the motion to the estimated pose; none while the vehicle stands. Where the radar does
-    /// not see the way it cannot tell, as little as a prediction.
+    /// Returns the motion to the estimated pose; none while the vehicle stands. Where the radar
+    /// does not see the way it cannot tell, as little as a prediction.
     fn hold_standstill(&mut self, scan: &Scan<'_>, accepted: &Accepted) -> Report {
         let estimate = Estimate {
             pose: accepted.pose,

@@ -38,8 +38,9 @@ pub(super) struct WeakestDirection {
 }
 
 impl WeakestDirection {
-    /// Finds it for a scan that is aligned with the map; `None` with too few keyframes to tell, and
-    /// where so much information is in all directions that it is not examined, which saves the time.
+    /// Finds it for a scan that is aligned with the map; `None` with too few keyframes to tell,
+    /// and where there is so much information in all directions that it is not examined, which
+    /// saves the time.
     pub fn of(map: &LocalMap, points: &DeskewedPoints, alignment: &Alignment) -> Option<Self> {
         let all = SymmetricEigen::new(of_place(&alignment.normal.information)?).eigenvalues;
         if map.len() < MIN_KEYFRAMES || all.min() >= SAFE_RATIO * all.max() {
