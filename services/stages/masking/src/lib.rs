@@ -135,7 +135,7 @@ impl Stage for Masking {
             .map_err(|error| input.scan.malformed(error.to_string()))?;
         *header = self.header(twist, points);
         let azimuths = input.scan.header().azimuths as usize;
-        header.azimuth_variance_rad2 = self.azimuths.last().variance_rad2(azimuths);
+        header.azimuth_variance_rad2 = self.azimuths.last().variance_of_mean_rad2(azimuths);
         header.set_turn(input.turn);
         header.set_distance(input.distance);
         Ok(())

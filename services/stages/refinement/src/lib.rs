@@ -65,9 +65,10 @@ impl Stage for RefinementStage {
         self.restore_state_before(&item)?;
         output.header().motion = match input.pair.previous {
             Some(previous) if !item.is(flag::BREAK) => {
-                let masked = input.pair.current.header();
-                self.refiner
-                    .expect_azimuth_errors(masked.azimuth_variance_rad2);
+                let (masked, before) = (input.pair.current.header(), previous.header());
+                self.refiner.expect_azimuth_errors(
+                    before.azimuth_variance_rad2 + masked.azimuth_variance_rad2,
+                );
                 self.refiner.expect_turn(masked.turn());
                 self.refiner.expect_distance(masked.distance());
                 let refined = self.refiner.refine(

@@ -111,7 +111,7 @@ impl Odometry {
         self.lost = self.finder.find(scan, twist);
         let placed = self.rows.place(scan, &self.lost);
         self.pair.mask(self.masker.as_mut(), &placed, twist)?;
-        let variance_rad2 = self.lost.variance_rad2(scan.geometry.azimuths);
+        let variance_rad2 = self.lost.variance_of_mean_rad2(scan.geometry.azimuths);
         self.pair.expect_azimuth_errors(variance_rad2);
         Ok(())
     }

@@ -82,10 +82,10 @@ impl Pair {
         later.saturating_sub(earlier)
     }
 
-    /// Returns the mean variance of the azimuths of the later scan's rows, rad²: not zero where
-    /// azimuths were lost at places that are not known.
+    /// Returns the variance of the turn from the earlier scan to the later one by that of the mean
+    /// azimuths of both, rad²: not zero where azimuths were lost at places that are not known.
     pub fn azimuth_variance_rad2(&self) -> f32 {
-        self.later.azimuth_variance_rad2
+        self.earlier.azimuth_variance_rad2 + self.later.azimuth_variance_rad2
     }
 
     /// Returns the turn from the earlier scan to the later one, as the gyro has measured it.
@@ -143,7 +143,7 @@ impl Pair {
         Ok(())
     }
 
-    /// Sets the mean variance of the azimuths of the later scan's rows, rad².
+    /// Sets the variance of the mean azimuth of the later scan's rows, rad².
     pub(crate) fn expect_azimuth_errors(&mut self, variance_rad2: f32) {
         self.later.azimuth_variance_rad2 = variance_rad2;
     }

@@ -76,18 +76,18 @@ impl LostAzimuths {
         &self.between[..self.count]
     }
 
-    /// Returns the mean variance of the rows' azimuths by what is not known of the places, rad²,
-    /// in a turn of `azimuths`.
-    pub fn variance_rad2(&self, azimuths: usize) -> f32 {
-        let measured = azimuths.saturating_sub(self.count).max(1);
-        // Over the rows of an interval the probability to be behind the place rises from 0 to 1,
-        // and p (1 - p) is 1/6 in the mean.
-        let rows = self
-            .rows()
-            .iter()
-            .map(|[first, last]| f32::from(last - first) / 6.0);
+    /// Returns the variance of the mean of the rows' azimuths by what is not known of the places,
+    /// rad², in a turn of `azimuths`.
+    pub fn variance_of_mean_rad2(&self, azimuths: usize) -> f32 {
+        let measured = azimuths.saturating_sub(self.count).max(1) as f32;
+        // The mean falls back by a step for each row behind the place: its variance is that of one
+        // of n places, (n² - 1) / 12.
+        let of_places = self.rows().iter().map(|[first, last]| {
+            let places = f32::from(last - first) + 1.0;
+            (places * places - 1.0) / 12.0
+        });
         let step_rad = TAU / azimuths.max(1) as f32;
-        rows.sum::<f32>() / measured as f32 * step_rad * step_rad
+        of_places.sum::<f32>() * (step_rad / measured).powi(2)
     }
 
     /// Returns the azimuth at which a row is expected to have been measured, in steps of the turn.

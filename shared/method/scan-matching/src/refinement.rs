@@ -167,9 +167,9 @@ impl Refiner {
         self.turn = turn;
     }
 
-    /// Sets the mean variance of the azimuths of the next scan's points, rad²; 0 at first. Errors
-    /// of neighbouring azimuths are alike, as where some were lost, so that they do not average
-    /// out.
+    /// Sets the variance of the turn between the next two scans by the mean azimuths of both, rad²;
+    /// 0 at first. Where azimuths were lost, all points of a sector err alike, and the mean azimuth
+    /// by its share of the turn; the motion takes back the error of the earlier scan.
     pub fn expect_azimuth_errors(&mut self, variance_rad2: f32) {
         self.azimuth_variance_rad2 = f64::from(variance_rad2);
     }

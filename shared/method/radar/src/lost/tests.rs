@@ -183,3 +183,25 @@ fn without_a_scan_before_they_may_be_anywhere_and_measured_azimuths_are_never_mo
     }
     assert_eq!(finder.find(&now.view(), None), LostAzimuths::default());
 }
+
+#[test]
+fn the_variance_of_the_mean_azimuth_is_that_over_all_places() {
+    for rows in [[7_u16, 7], [120, 150], [0, 398]] {
+        let lost = LostAzimuths::between([rows]);
+        let measured = AZIMUTHS - 1;
+        // Behind the place the rows lie one step further on.
+        let means: Vec<f64> = (rows[0]..=rows[1])
+            .map(|place| (measured - usize::from(place)) as f64 / measured as f64)
+            .map(|steps| steps * TAU / AZIMUTHS as f64)
+            .collect();
+        let mean = means.iter().sum::<f64>() / means.len() as f64;
+        let variance =
+            means.iter().map(|it| (it - mean).powi(2)).sum::<f64>() / means.len() as f64;
+        let stated = f64::from(lost.variance_of_mean_rad2(AZIMUTHS));
+        assert!((stated - variance).abs() <= 1e-5 * variance, "{rows:?}");
+        let twice = LostAzimuths::between([rows, rows]);
+        // Two places vary independently.
+        let both = f64::from(twice.variance_of_mean_rad2(AZIMUTHS));
+        assert!((both - 2.0 * variance).abs() <= 0.02 * variance, "{rows:?}");
+    }
+}

@@ -125,24 +125,15 @@ pub(super) fn of_alignment(
     is_one.then_some(covariance)
 }
 
-/// The largest share in the variance of azimuths that their mean has, where one was lost anywhere
-/// in the turn.
-const MEAN_SHARE: f64 = 0.5;
-/// The largest share that their first harmonic has along each of the two axes.
-const HARMONIC_SHARE: f64 = 0.3;
-
-/// A bound of the covariance of an alignment by errors of the azimuths that vary slowly along the
-/// turn: their mean turns the scan, and their first harmonic moves it by as much as points at the
-/// typical range are moved sideways.
+/// The covariance of an alignment by errors of the azimuths of some rows beside each other, whose
+/// mean over the turn has this variance. The mean turns the scan; and since all of the error is in
+/// one direction, the scan also moves across that by the mean times the typical range. The
+/// direction is any, so each axis has half of it.
 pub(super) fn by_azimuths(alignment: &Alignment, variance_rad2: f64) -> Matrix3<f64> {
     let information = &alignment.normal.information;
     let square_range_m2 = 2.0 * information[(2, 2)] / (information[(0, 0)] + information[(1, 1)]);
-    let sideways = HARMONIC_SHARE * square_range_m2 * variance_rad2;
-    Matrix3::from_diagonal(&Vector3::new(
-        sideways,
-        sideways,
-        MEAN_SHARE * variance_rad2,
-    ))
+    let sideways = 0.5 * square_range_m2 * variance_rad2;
+    Matrix3::from_diagonal(&Vector3::new(sideways, sideways, variance_rad2))
 }
 
 /// The share of a match's covariance by which a map of `keyframes` drifts.
@@ -181,7 +172,10 @@ fn of_prediction(state: &TrackerState, step: &Step, config: &RefinementConfig) -
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::TAU;
+
     use super::*;
+    use crate::refinement::normal_equations::NormalEquations;
 
     #[test]
     fn a_map_of_one_keyframe_drifts_by_the_whole_noise_and_one_of_many_by_little_of_it() {
@@ -193,6 +187,51 @@ mod tests {
         assert_eq!(share(1), 1.0);
         assert_eq!(share(3), 0.25);
         assert!((share(10) - 4.0 / 121.0).abs() < 1e-12);
+    }
+
+    /// Points all around with gradients of any direction; those of a sector are turned by an
+    /// angle, and the pose is fitted. Over sectors in all directions this is the covariance that is
+    /// stated for the variance of the mean angle.
+    #[test]
+    fn azimuths_that_err_in_a_sector_move_the_scan_as_stated() {
+        const POINTS: usize = 20_000;
+        const SECTORS: usize = 50;
+        const WIDTH: usize = POINTS / SECTORS;
+        const TURN_RAD: f64 = 0.01;
+        let golden = |k: usize, step: f64| (k as f64 * step).fract();
+        let gradients: Vec<Vector3<f64>> = (0..POINTS)
+            .map(|k| {
+                let (sin, cos) = (k as f64 / POINTS as f64 * TAU).sin_cos();
+                let range_m = 5.0 + 60.0 * golden(k, 0.754_877_666);
+                let (ny, nx) = (golden(k, 0.569_840_291) * TAU).sin_cos();
+                Vector3::new(nx, ny, range_m * (cos * ny - sin * nx))
+            })
+            .collect();
+        let information: Matrix3<f64> = gradients.iter().map(|j| j * j.transpose()).sum();
+        let alignment = Alignment {
+            pose: Pose::identity(),
+            normal: NormalEquations {
+                cost: 0.0,
+                overlap: 0.0,
+                right_hand_side: Vector3::zeros(),
+                information,
+            },
+        };
+        let inverse = information.try_inverse().unwrap();
+        let of_sectors: Matrix3<f64> = (0..SECTORS)
+            .map(|sector| {
+                let first = sector * POINTS / SECTORS;
+                let sector = &gradients[first..first + WIDTH];
+                let moved: Vector3<f64> = sector.iter().map(|j| j * j.z * TURN_RAD).sum();
+                inverse * moved * (inverse * moved).transpose() / SECTORS as f64
+            })
+            .sum();
+        let mean_rad = TURN_RAD * WIDTH as f64 / POINTS as f64;
+        let stated = by_azimuths(&alignment, mean_rad.powi(2));
+        for axis in 0..3 {
+            let ratio = of_sectors[(axis, axis)] / stated[(axis, axis)];
+            assert!((0.8..1.25).contains(&ratio), "axis {axis}: {ratio}");
+        }
     }
 
     /// Poses that are each the mean of the last ten, with noise of their own: what is left of the
