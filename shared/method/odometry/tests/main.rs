@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod covariances;
 mod examples;
 mod lost_azimuths;
 mod sample_faults;

@@ -89,8 +89,8 @@ pub struct MaskedHeader {
     pub compensated: u32,
     /// Number of points after the rasters: see [`MaskedHeader::points`].
     pub points: u32,
-    /// Variance of the mean of the rows' azimuths, rad²: not zero where azimuths were lost at places
-    /// that are not known.
+    /// Variance of the mean of the rows' azimuths, rad²: not zero where azimuths were lost at
+    /// places that are not known.
     pub azimuth_variance_rad2: f32,
     /// The turn since the previous scan by the gyro: see [`MaskedHeader::turn`].
     pub gyro: GyroTurn,

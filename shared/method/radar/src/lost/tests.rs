@@ -195,8 +195,7 @@ fn the_variance_of_the_mean_azimuth_is_that_over_all_places() {
             .map(|steps| steps * TAU / AZIMUTHS as f64)
             .collect();
         let mean = means.iter().sum::<f64>() / means.len() as f64;
-        let variance =
-            means.iter().map(|it| (it - mean).powi(2)).sum::<f64>() / means.len() as f64;
+        let variance = means.iter().map(|it| (it - mean).powi(2)).sum::<f64>() / means.len() as f64;
         let stated = f64::from(lost.variance_of_mean_rad2(AZIMUTHS));
         assert!((stated - variance).abs() <= 1e-5 * variance, "{rows:?}");
         let twice = LostAzimuths::between([rows, rows]);
