@@ -266,7 +266,7 @@ mod tests {
         let places: Vec<_> = posts.map(|it| it.position).collect();
         assert_eq!(places, kept);
         assert!(
-            town.walls.iter().all(|wall| wall.body == 8),
+            town.walls.iter().all(|wall| wall.body == 1),
             "one body, and the wall is gone"
         );
     }
