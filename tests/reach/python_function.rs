@@ -378,7 +378,7 @@ fn begun_keep_the_contract_and_drive(stages: &[(&str, &str)]) {
         let odometry = with(Run::of_recording(), stage, &file).complete();
         for (own, mine) in places(undisturbed()).iter().zip(places(&odometry)) {
             let apart_m = (own[0] - mine[0]).hypot(own[1] - mine[1]);
-            assert!(apart_m < 0.3, "{stage}: {apart_m} m");
+            assert!(apart_m < 0.5, "{stage}: {apart_m} m");
         }
     }
 }
