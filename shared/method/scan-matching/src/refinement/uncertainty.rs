@@ -172,6 +172,8 @@ fn of_prediction(state: &TrackerState, step: &Step, config: &RefinementConfig) -
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
+
     use std::f64::consts::TAU;
 
     use super::*;
