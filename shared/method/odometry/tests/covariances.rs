@@ -1,5 +1,7 @@
 //! Covariances of motions on simulated roads, whose truth is exact, with and without lost azimuths.
 
+use std::{fs, path::Path};
+
 use gyre_geometry::{ComposedMotion, Pose, UncertainMotion, xy_yaw};
 use gyre_odometry::{Odometry, OdometryConfig};
 use gyre_radar::{OwnedScan, open_source};
@@ -63,12 +65,14 @@ fn error(estimate: &Pose, truth: &Pose) -> Vector3<f64> {
 
 /// The motions of all drives whose `[earlier, later]` scan has lost azimuths.
 fn motions() -> Vec<([bool; 2], UncertainMotion, Pose)> {
+    let text = fs::read_to_string(Path::new(PROJECT).join("configs/radiate.toml")).unwrap();
+    let config: OdometryConfig = toml::from_str(&text).unwrap();
     let mut motions = Vec::new();
     for seed in SEEDS {
         let drive = drive(seed);
         let mut dataset =
             open_source(Box::new(drive.renderer()), &drive.dataset_options()).unwrap();
-        let mut odometry = Odometry::new(&OdometryConfig::default()).unwrap();
+        let mut odometry = Odometry::new(&config).unwrap();
         let mut scan = OwnedScan::with_limits(dataset.limits());
         for index in 0..SCANS {
             scan.geometry = dataset.read(index, scan.slot()).unwrap();
