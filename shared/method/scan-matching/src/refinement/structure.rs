@@ -12,7 +12,7 @@ use nalgebra::{Matrix2, Matrix3, SymmetricEigen, UnitVector2, Vector2, Vector3};
 
 use super::{alignment::Alignment, local_map::LocalMap, points::DeskewedPoints};
 
-/// The least number of keyframes by which structure is told from speckle.
+/// The least number of keyframes that distinguish structure from speckle.
 const MIN_KEYFRAMES: usize = 4;
 /// Share of the information along a direction that is by structure, below which the direction is
 /// undetermined: most of what seems to determine it is speckle.
@@ -59,8 +59,8 @@ impl WeakestDirection {
         })
     }
 
-    /// Returns whether nothing that stands still determines the place along it. What is no number,
-    /// of a scan without structure, is not.
+    /// Returns whether nothing that stands still determines the place along it. What is not a
+    /// number, of a scan without structure, is not.
     pub fn is_undetermined(&self) -> bool {
         self.share < MIN_SHARE || self.ratio < MIN_RATIO
     }
