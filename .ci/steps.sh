@@ -6,8 +6,6 @@ export GYRE_DATA="${GYRE_DATA:-$PWD/../shared/data}"
 target="$(realpath -m "${CARGO_TARGET_DIR:-target}")"
 mkdir -p "$target"
 export GYRE_PYTHON="$target/python/bin/python" ORT_DYLIB_PATH="$target/onnxruntime" PATH="$PATH:$target/deny/bin:$target/mdbook/bin"
-# To write down what a second build could use again takes time, and so do the lines of backtraces.
-export CARGO_INCREMENTAL=0 CARGO_PROFILE_DEV_DEBUG=false
 
 step() {
     echo

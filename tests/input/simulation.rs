@@ -14,7 +14,8 @@ use crate::common::{Ended, Run, gyre, odometry};
 use rustix::process::Signal;
 
 const SCANS: usize = 12;
-const CONFIGURATION: &str = "[raster]\nn = 127\ncell_m = 0.8\n[simulation]\nscans = 12\nseed = 3\n";
+const CONFIGURATION: &str = "[raster]\nn = 127\ncell_m = 0.8\n[simulation]\nscans = 12\nseed = 3
+    sensor.profile = 'cts350x-radiate'\noutput.format = 'oxford'\n";
 
 fn streamed() -> Run {
     Run::configured(CONFIGURATION)
@@ -24,6 +25,8 @@ fn simulate(out: &Path, options: &[&str]) -> Command {
     let mut command = gyre();
     command
         .args(["simulate", "--scans", "12", "--seed", "3"])
+        .args(["--set", "simulation.sensor.profile=cts350x-radiate"])
+        .args(["--set", "simulation.output.format=oxford"])
         .args(options)
         .arg("--out")
         .arg(out);

@@ -24,11 +24,11 @@ fn demo() -> Run {
 }
 
 #[test]
-fn five_processes_give_the_same_bytes_again_though_one_is_killed() {
-    let first = demo().rate("max");
-    let undisturbed = first.complete();
-    let summary = first.summary();
-    let rows = odometry::rows(&undisturbed);
+fn five_processes_give_a_trajectory_of_their_own() {
+    let run = demo().rate("max");
+    let odometry = run.complete();
+    let summary = run.summary();
+    let rows = odometry::rows(&odometry);
     assert_eq!(rows.len(), SCANS - 1);
     odometry::assert_unbroken(&rows);
     let names = |object: &Value| {
@@ -53,7 +53,12 @@ fn five_processes_give_the_same_bytes_again_though_one_is_killed() {
         path > 100.0 && error < 0.02 * path,
         "{error} m over {path} m"
     );
+}
 
+#[test]
+#[ignore = "nightly: the demo twice, once as slowly as a radar turns"]
+fn five_processes_give_the_same_bytes_again_though_one_is_killed() {
+    let undisturbed = demo().rate("max").complete();
     let again = demo().rate("8");
     let mut running = again.start();
     for poses in [SCANS / 4, SCANS / 2] {

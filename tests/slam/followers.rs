@@ -155,6 +155,7 @@ fn a_run_that_is_interrupted_while_it_waits_for_loops_goes_on_where_it_was() {
 }
 
 #[test]
+#[ignore = "nightly: a drive with loops in three parts"]
 fn a_run_that_is_interrupted_in_its_middle_goes_on_with_its_loops() {
     let run = run();
     for poses in [SCANS / 3, SCANS * 2 / 3] {
@@ -168,26 +169,35 @@ fn a_run_that_is_interrupted_in_its_middle_goes_on_with_its_loops() {
 
 #[test]
 fn odometry_goes_on_without_a_follower_that_always_dies_and_the_same_command_makes_up_for_it() {
-    for follower in [LOOP_CLOSURE, TRAJECTORY] {
-        let run = run();
-        let broken = run.folder().join("broken");
-        fs::write(&broken, "").unwrap();
-        let script = "[ ! -e {broken} ] || { echo 'no more loops' >&2; exit 7; }; exec {gyre} stage {follower}"
+    assert_made_up_for(LOOP_CLOSURE);
+}
+
+#[test]
+#[ignore = "nightly: the same of the other follower"]
+fn odometry_goes_on_without_a_trajectory_that_always_dies() {
+    assert_made_up_for(TRAJECTORY);
+}
+
+fn assert_made_up_for(follower: &str) {
+    let run = run();
+    let broken = run.folder().join("broken");
+    fs::write(&broken, "").unwrap();
+    let script =
+        "[ ! -e {broken} ] || { echo 'no more loops' >&2; exit 7; }; exec {gyre} stage {follower}"
             .replace("{broken}", broken.to_str().unwrap())
             .replace("{follower}", follower);
-        let run = run.stage_script(follower, &script).set(&format!(
-            "stages.{follower}.restart={{limit = 2, backoff_ms = 10}}"
-        ));
-        let ended = run.finish();
-        let died = format!("{follower} died 3 times");
-        ended.failed_with(&[&died, "exit code 7", "no more loops", "the same command"]);
-        let goes_on = format!("odometry goes on without {follower}");
-        assert!(ended.stderr.contains(&goes_on), "{}", ended.stderr);
-        assert!(run.odometry() == undisturbed().odometry);
-        fs::remove_file(broken).unwrap();
-        run.complete();
-        assert_undisturbed(&run, follower);
-    }
+    let run = run.stage_script(follower, &script).set(&format!(
+        "stages.{follower}.restart={{limit = 2, backoff_ms = 10}}"
+    ));
+    let ended = run.finish();
+    let died = format!("{follower} died 3 times");
+    ended.failed_with(&[&died, "exit code 7", "no more loops", "the same command"]);
+    let goes_on = format!("odometry goes on without {follower}");
+    assert!(ended.stderr.contains(&goes_on), "{}", ended.stderr);
+    assert!(run.odometry() == undisturbed().odometry);
+    fs::remove_file(broken).unwrap();
+    run.complete();
+    assert_undisturbed(&run, follower);
 }
 
 #[test]

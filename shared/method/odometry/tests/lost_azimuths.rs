@@ -54,7 +54,7 @@ fn rows_before_which(drive: &SimulatedDrive, index: usize) -> Vec<usize> {
 #[test]
 fn all_are_counted_and_lie_where_they_are_said_to_be() {
     let (mut places, mut within, mut rows) = (0, 0, 0);
-    for seed in 1..4 {
+    for seed in 1..3 {
         let drive = drive(seed, true);
         let mut finder = LostAzimuthFinder::default();
         for (index, scan) in scans(&drive, LostAzimuthOption::Find).iter().enumerate() {
@@ -79,7 +79,7 @@ fn all_are_counted_and_lie_where_they_are_said_to_be() {
         "{within} of {places} within, of {} rows in the mean",
         rows / places
     );
-    assert!(places > 60);
+    assert!(places > 40);
     assert!(within * 4 >= places * 3, "{within} of {places}");
     assert!(rows < places * 150, "{rows} rows for {places} places");
 }

@@ -171,6 +171,10 @@ impl Sensor {
                 let weight = 0.3 + 0.7 * numbers.next();
                 // The sum of twelve uniform numbers is close to normal.
                 let normal = (0..12).map(|_| numbers.next()).sum::<f64>() - 6.0;
+                // The beam need not be followed to what is far beyond the range.
+                if (pose.translation.vector - place).norm() > 2.0 * VISIBLE_M.end() {
+                    continue;
+                }
                 let sensor = |t: f64| pose * arc(speed * t, drive.yaw_rate_radps * t);
                 let seen = |t: f64| {
                     sensor(t).inverse() * Point2::from(place + reflector.velocity * (middle_s + t))
@@ -218,8 +222,14 @@ fn swept(seen: impl Fn(f64) -> Point2<f64>) -> Option<f64> {
         let share = (-at.y).atan2(at.x).rem_euclid(std::f64::consts::TAU) / std::f64::consts::TAU;
         SWEEP_S * (share - 0.5)
     };
-    let time_s = (0..20).fold(0.0, |t, _| meets(t));
-    ((meets(time_s) - time_s).abs() < 1e-9).then_some(time_s)
+    let mut time_s = 0.0;
+    for _ in 0..20 {
+        let before_s = std::mem::replace(&mut time_s, meets(time_s));
+        if (time_s - before_s).abs() < 1e-12 {
+            return Some(time_s);
+        }
+    }
+    None
 }
 
 /// A drive and its refined motions.
