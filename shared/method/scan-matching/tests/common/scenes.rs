@@ -224,10 +224,11 @@ fn swept(seen: impl Fn(f64) -> Point2<f64>) -> Option<f64> {
     };
     let mut time_s = 0.0;
     for _ in 0..20 {
-        let before_s = std::mem::replace(&mut time_s, meets(time_s));
-        if (time_s - before_s).abs() < 1e-12 {
-            return Some(time_s);
+        let next_s = meets(time_s);
+        if (next_s - time_s).abs() < 1e-12 {
+            return Some(next_s);
         }
+        time_s = next_s;
     }
     None
 }
