@@ -69,7 +69,9 @@ fn configuration(name: &str) -> Run {
 
 #[test]
 fn on_the_demo() {
-    let run = Run::of_demo().set("simulation.scans=24");
+    let run = Run::of_demo()
+        .set("simulation.scans=24")
+        .set("simulation.sensor.profile=cts350x-radiate");
     assert_eq!(assert_same_bits(&run), 24);
 }
 

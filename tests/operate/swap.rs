@@ -119,7 +119,7 @@ fn a_cold_swap_to_a_program_that_cannot_be_started_changes_nothing() {
 
 #[test]
 fn a_program_that_was_edited_is_taken_by_a_swap_alone_and_gives_way_when_it_fails() {
-    let run = Run::of_recording().rate("0.5");
+    let run = Run::of_recording().rate("0.3");
     let mut running = run.start();
     running.await_poses(4);
     let own = script(&run, "own.sh", &format!("exec {PROGRAM} stage masking"));

@@ -25,8 +25,12 @@ fn tested(stage: &str, more: &[&str]) -> (Value, Ended) {
     command
         .args(["--set", "masking.kind='threshold'"])
         .args(more);
-    // The own source is tested with a simulation.
-    if stage != "radar-replay" {
+    // The own source is tested with a simulation, of a small radar.
+    if stage == "radar-replay" {
+        command
+            .args(["--set", "simulation.sensor.profile='cts350x-radiate'"])
+            .args(["--set", "simulation.output.format='oxford'"]);
+    } else {
         command.arg("--data").arg(recording::small());
     }
     if !more.contains(&"--stop-timeout-s") {

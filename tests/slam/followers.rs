@@ -29,11 +29,12 @@ fn run() -> Run {
 
 /// The results of a run that must be the same.
 #[derive(PartialEq)]
-struct Left {
+pub struct Left {
     odometry: String,
     keyframes: Vec<u8>,
     loops: Vec<u8>,
-    corrected: [String; 2],
+    /// `trajectory_slam.tum` and `loops.csv`.
+    pub corrected: [String; 2],
     map: Vec<u8>,
 }
 
@@ -49,7 +50,7 @@ impl Left {
     }
 }
 
-fn undisturbed() -> &'static Left {
+pub fn undisturbed() -> &'static Left {
     static LEFT: OnceLock<Left> = OnceLock::new();
     LEFT.get_or_init(|| {
         let run = run();

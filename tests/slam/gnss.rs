@@ -10,6 +10,7 @@ use gyre_samples::{Geographic, LocalPlane};
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use rustix::process::Signal;
 
+use super::followers::undisturbed;
 use crate::common::{
     Ended, Run, gyre,
     recording::{SCANS_AROUND as SCANS, around_a_block},
@@ -162,18 +163,17 @@ fn a_trajectory_that_is_killed_leaves_the_same() {
 
 #[test]
 fn a_clock_that_is_wrong_is_refused_and_told() {
-    let (run, without) = (run(6.0), without());
+    let run = run(6.0);
     let ended = run.finish();
     ended.succeeded();
-    without.complete();
     assert!(
         ended.stderr.contains("the fixes of GNSS are not used")
             && ended.stderr.contains("gnss.late_s"),
         "{}",
         ended.stderr
     );
-    let corrected = |run: &Run| run.result("trajectory_slam.tum");
-    assert_eq!(corrected(&run), corrected(&without));
+    let [corrected, _] = &undisturbed().corrected;
+    assert_eq!(&run.result("trajectory_slam.tum"), corrected);
     let gnss = &run.summary()["gnss"];
     assert_eq!(gnss["used"], 0, "{gnss}");
     assert!(gnss.get("origin").is_none(), "{gnss}");
