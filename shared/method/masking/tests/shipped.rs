@@ -46,7 +46,8 @@ fn every_card_fits_its_model() {
         let raster = trained_raster(&Card::read(&config).unwrap());
         let bytes = Model::read(&config, &raster).unwrap().bytes.len();
         assert!(bytes < 9_000_000, "{}: {bytes} bytes", path.display());
-        for backend in backends() {
+        // Where there are two libraries, the next test computes masks by both.
+        for backend in backends().into_iter().filter(|_| !runtime_is_installed()) {
             let mut network = Network::load(&learned_by(backend, &path), &raster).unwrap();
             let bright = Array3::from_elem((network.scans(), raster.n, raster.n), 255.0);
             assert_eq!(network.run(bright.view()).unwrap().dim(), bright.dim());
@@ -66,7 +67,9 @@ fn the_backends_agree_on_scans_of_a_simulated_drive() {
         let rasters = rasters_of(&scans[..card.model.inputs], &raster);
         let masks = |backend| {
             let mut network = Network::load(&learned_by(backend, &path), &raster).unwrap();
-            network.run(rasters.view()).unwrap().to_owned()
+            let masks = network.run(rasters.view()).unwrap().to_owned();
+            assert_eq!(masks.dim(), (network.scans(), raster.n, raster.n));
+            masks
         };
         let apart = (masks(Backend::Rten) - masks(Backend::OnnxRuntime)).mapv(f32::abs);
         let (most, mean) = (

@@ -49,6 +49,8 @@ fn garbage() -> impl Strategy<Value = Vec<u8>> {
 }
 
 proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
     #[test]
     fn any_pieces_give_the_same_messages(
         messages in prop::collection::vec(any_message(), 0..20),
