@@ -115,7 +115,7 @@ fn drive(config: &Configuration) -> Report {
 
 #[test]
 fn a_vehicle_that_stands_creeps_and_drives_off_is_followed() {
-    let mut config = configuration(Profile::Cts350xRadiate);
+    let mut config = configuration(Profile::Cts350xOxford);
     config.simulation.drive.from_s = 70.0;
     config.simulation.drive.for_s = Some(38.0);
     drive(&config).holds();
