@@ -27,6 +27,14 @@ const BEAM_SECTORS: usize = 2;
 const HIDING_WEIGHT: f64 = 0.3;
 /// Weight of a return by which the beam goes on.
 const BEYOND_WEIGHT: f64 = 0.15;
+/// Planes of the grid: any return, and the strong ones, which stand above the reverberation of a
+/// strong echo in all ranges of its azimuth.
+const ANY: usize = 0;
+const STRONG: usize = 1;
+/// Weight of a strong return: 4.5 dB above the threshold of the masks.
+const STRONG_WEIGHT: f64 = 0.15;
+/// Weight from which on a return outshines weak ones that were there before: 15 dB above those.
+const OUTSHINING_WEIGHT: f64 = 0.65;
 /// Standard deviations of the bearing within which a place may be that of a return.
 const ACROSS_SIGMAS: f64 = 1.5;
 /// The last scans in which a vehicle may have been at the place that it has now: one of 5 m that is
@@ -47,8 +55,6 @@ pub(crate) struct Evidence {
     views: VecDeque<View>,
     memory_scans: u32,
     max_range_m: f64,
-    /// Standard deviation of a return's bearing, rad.
-    bearing_sigma_rad: f64,
     scan: u32,
 }
 
@@ -64,8 +70,8 @@ struct View {
 struct Cell {
     /// The place that it stands for, by its cells from the origin.
     place: [i32; 2],
-    /// Bit k is set if there was a return k scans before `scan`.
-    hits: u64,
+    /// Bit k is set if there was a return k scans before `scan`: any, and one that is strong.
+    hits: [u64; 2],
     scan: u32,
 }
 
@@ -130,27 +136,30 @@ fn sector(ray: &Vector2<f64>) -> usize {
 }
 
 impl Evidence {
-    pub fn new(memory_scans: u32, max_range_m: f64, bearing_sigma_rad: f64) -> Self {
+    pub fn new(memory_scans: u32, max_range_m: f64) -> Self {
         Self {
             cells: vec![Cell::default(); (SIDE * SIDE) as usize],
             views: VecDeque::with_capacity(memory_scans as usize + 1),
             memory_scans,
             max_range_m,
-            bearing_sigma_rad,
             scan: 0,
         }
     }
 
-    /// Returns what the scans before saw where a return is, within its uncertainty.
-    pub fn history(&self, found: &Return) -> History {
-        // The bearing across, and one cell for the rest.
-        let across_m = ACROSS_SIGMAS * self.bearing_sigma_rad * found.range_m;
+    /// Returns what the scans before saw where a return is, within the standard deviation of its
+    /// bearing, rad, and one cell for the rest.
+    pub fn history(&self, found: &Return, bearing_sigma_rad: f64) -> History {
+        let plane = match found.weight >= OUTSHINING_WEIGHT {
+            true => STRONG,
+            false => ANY,
+        };
+        let across_m = ACROSS_SIGMAS * bearing_sigma_rad * found.range_m;
         let steps = (across_m / CELL_M).ceil() as i32;
         let side = Vector2::new(-found.direction.y, found.direction.x);
         let mut hits = 0;
         for step in -steps..=steps {
             let centre = found.at + side * (f64::from(step) * across_m / f64::from(steps.max(1)));
-            hits |= self.hits_around(&centre);
+            hits |= self.hits_around(&centre, plane);
         }
         // What came a moment ago may be the same object.
         let own = OWN_SCANS.min(self.views.len() as u32 / 2);
@@ -172,26 +181,26 @@ impl Evidence {
     }
 
     /// The scans with a return in a cell or one beside it.
-    fn hits_around(&self, place: &Point2<f64>) -> u64 {
+    fn hits_around(&self, place: &Point2<f64>, plane: usize) -> u64 {
         let [x, y] = cell_at(place);
         let around = (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| [x + dx, y + dy]));
-        around.fold(0, |bits, place| bits | self.hits(place))
+        around.fold(0, |bits, place| bits | self.hits(place, plane))
     }
 
     /// Returns whether the newest scan that was added has a return at a place; `None` if it is
     /// not in view.
     pub fn is_occupied(&self, place: &Point2<f64>) -> Option<bool> {
-        let taken = self.hits_around(place) & 1 != 0;
+        let taken = self.hits_around(place, ANY) & 1 != 0;
         let is_seen = taken || self.views.front()?.sees(place);
         is_seen.then_some(taken)
     }
 
     /// Bit k: a return k scans before the newest one that was added.
-    fn hits(&self, place: [i32; 2]) -> u64 {
+    fn hits(&self, place: [i32; 2], plane: usize) -> u64 {
         let cell = &self.cells[index(place)];
         let ago = self.scan.wrapping_sub(cell.scan);
         match cell.place == place && ago < self.memory_scans {
-            true => cell.hits << ago & mask(self.memory_scans),
+            true => cell.hits[plane] << ago & mask(self.memory_scans),
             false => 0,
         }
     }
@@ -205,7 +214,10 @@ impl Evidence {
         for (number, found) in returns.iter().enumerate() {
             if stands(number) {
                 let place = cell_at(&found.at);
-                let (hits, scan) = (self.hits(place) | 1, self.scan);
+                let is_strong = found.weight >= STRONG_WEIGHT;
+                let scan = self.scan;
+                let hits = [(ANY, true), (STRONG, is_strong)]
+                    .map(|(plane, is_new)| self.hits(place, plane) | u64::from(is_new));
                 self.cells[index(place)] = Cell { place, hits, scan };
             }
         }
@@ -219,7 +231,7 @@ impl Evidence {
         let steps = ((range_m - CLEAR_M - NEAREST_M) / CELL_M).max(0.0) as usize;
         let stands = |step: usize| {
             let at = sensor + ray * ((NEAREST_M + step as f64 * CELL_M) / range_m);
-            let hits = self.hits(cell_at(&at));
+            let hits = self.hits(cell_at(&at), STRONG);
             let views = self.views(&at) | hits;
             let share = f64::from(hits.count_ones()) / f64::from(views.count_ones().max(1));
             share >= STANDING_SHARE
@@ -271,38 +283,38 @@ mod tests {
 
     #[test]
     fn a_place_has_the_views_and_hits_of_the_remembered_scans() {
-        let mut evidence = Evidence::new(8, 70.0, 0.01);
+        let mut evidence = Evidence::new(8, 70.0);
         let (wall, car) = (at(20.0, 3.0), at(-15.0, 8.0));
         // The last three scans do not count.
         for scan in 0..12 {
             let seen = [wall, car];
             add(&mut evidence, &seen[..if scan == 6 { 2 } else { 1 }]);
         }
-        assert_eq!(evidence.history(&wall), History { views: 5, hits: 5 });
-        assert_eq!(evidence.history(&car), History { views: 5, hits: 1 });
+        assert_eq!(evidence.history(&wall, 0.01), History { views: 5, hits: 5 });
+        assert_eq!(evidence.history(&car, 0.01), History { views: 5, hits: 1 });
         assert_eq!(
-            evidence.history(&at(20.0, -9.0)),
+            evidence.history(&at(20.0, -9.0), 0.01),
             History { views: 5, hits: 0 }
         );
         assert_eq!(
-            evidence.history(&at(80.0, 0.0)),
+            evidence.history(&at(80.0, 0.0), 0.01),
             History { views: 0, hits: 0 }
         );
         // Across the beam a return may lie beside the place.
         let beside = wall.at + Vector2::new(-3.0, 20.0).normalize() * 0.6;
-        assert_eq!(evidence.history(&at(beside.x, beside.y)).hits, 5);
+        assert_eq!(evidence.history(&at(beside.x, beside.y), 0.01).hits, 5);
         evidence.clear();
-        assert_eq!(evidence.history(&wall), History { views: 0, hits: 0 });
+        assert_eq!(evidence.history(&wall, 0.01), History { views: 0, hits: 0 });
     }
 
     #[test]
     fn what_an_obstacle_hides_is_not_free_and_what_is_seen_beyond_it_is() {
         let behind = |beyond: &[Return]| {
-            let mut evidence = Evidence::new(8, 70.0, 0.01);
+            let mut evidence = Evidence::new(8, 70.0);
             for _ in 0..8 {
                 add(&mut evidence, &[&[at(20.0, 3.0)], beyond].concat());
             }
-            evidence.history(&at(30.0, 4.5)).views
+            evidence.history(&at(30.0, 4.5), 0.01).views
         };
         assert_eq!(behind(&[]), 0);
         assert_eq!(behind(&[at(50.0, 7.5)]), 5);
@@ -318,19 +330,19 @@ mod tests {
 
     #[test]
     fn a_cell_that_stands_for_another_place_after_a_way_of_256_m_has_no_hits() {
-        let mut evidence = Evidence::new(8, 70.0, 0.01);
+        let mut evidence = Evidence::new(8, 70.0);
         add(&mut evidence, &[at(20.0, 3.0)]);
         let far = Return {
             range_m: 20.0,
             ..at(276.0, 3.0)
         };
         assert_eq!(index(cell_at(&far.at)), index(cell_at(&at(20.0, 3.0).at)));
-        assert_eq!(evidence.history(&far).hits, 0);
+        assert_eq!(evidence.history(&far, 0.01).hits, 0);
     }
 
     #[test]
     fn a_wall_stands_between_the_sensor_and_what_is_behind_it() {
-        let mut evidence = Evidence::new(8, 70.0, 0.01);
+        let mut evidence = Evidence::new(8, 70.0);
         for _ in 0..8 {
             add(&mut evidence, &[at(20.25, 0.25)]);
         }

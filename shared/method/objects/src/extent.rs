@@ -1,37 +1,40 @@
 //! Length and width of an object, and its centre by what is seen of it.
 //!
 //! A radar sees the ends of a vehicle, in one scan the near one, in another both, and at times only
-//! the far one: the centre is half of the length behind the one, or before the other, and what is
-//! seen is what fits the prediction. Length and width begin as those of a car, and grow with what
-//! is seen.
+//! a part of its side, which slides along it as the vehicle passes. So the centre is not that of
+//! the returns: it is half of the size behind the near end, or before the far one, or anywhere
+//! between, each as likely as the aspect and the prediction say (probabilistic data association:
+//! Bar-Shalom and Tse, "Tracking in a cluttered environment with probabilistic data association",
+//! 1975). Length and width begin as those of a car and follow what is seen, while the end that is
+//! seen stays where it is.
 
-use nalgebra::{Point2, Vector2};
+use nalgebra::{Matrix2, Point2, Vector2};
 
+use crate::ObjectsConfig;
 use crate::returns::Return;
 
-/// Length and width of a car, m.
-const CAR_M: [f64; 2] = [4.4, 1.9];
-/// Length and width of the largest vehicle, an articulated lorry or bus, m.
-const LARGEST_M: [f64; 2] = [18.0, 2.6];
-/// Share of the returns at either end that is left out.
-const TRIM: f64 = 0.05;
 /// Shares by which length and width approach what is seen in a scan, if that is more and if it is
 /// less.
 const GAIN: [f64; 2] = [0.3, 0.1];
 /// Share of the size that is missing from which on only one end is seen, and says nothing about it.
 const ONE_END: f64 = 0.35;
-/// Length and width of the smallest vehicle, m.
-const SMALLEST_M: [f64; 2] = [4.0, 1.7];
-/// Distance from the prediction by which the near end is preferred to the far one and the whole, m.
-const DOUBT_M: f64 = 1.0;
-/// Cosine between the line of sight and an axis above which one end of the object is nearer.
+/// Shares of the scans in which neither end of an axis is seen, but something between: seen
+/// end-on, and from the side, where a panel may outshine the corners.
+const BETWEEN: [f64; 2] = [0.1, 0.4];
+/// Share of the other scans in which the far end is seen and the near one is not, seen end-on.
+const FAR: f64 = 0.1;
+/// Cosine between the line of sight and an axis from which on the object is seen end-on.
 const END_ON: f64 = 0.35;
+/// Share of what has been shown of the length that is kept from scan to scan.
+const KEPT: f64 = 0.7;
 
 /// The length and the width.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Extent {
     /// Along the heading and across it, m.
     pub size_m: [f64; 2],
+    /// Running mean of the length between the returns of a scan, m.
+    shown_m: f64,
 }
 
 /// An object as a scan shows it.
@@ -39,83 +42,267 @@ pub(crate) struct Extent {
 pub(crate) struct Outline {
     /// From one end to the other, along the heading and across it, relative to the centre as
     /// predicted, m.
-    spans_m: [[f64; 2]; 2],
+    pub spans_m: [[f64; 2]; 2],
+}
+
+/// The sight of an object.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sight {
+    /// Heading of the object, a unit vector.
+    pub heading: Vector2<f64>,
+    /// Line of sight to it, a unit vector.
+    pub direction: Vector2<f64>,
+    /// Covariance of the predicted centre, m².
+    pub predicted: Matrix2<f64>,
+    /// Covariance of the place of an end, m².
+    pub noise: Matrix2<f64>,
+}
+
+/// A place of the centre along an axis, relative to the prediction.
+struct Choice {
+    at_m: f64,
+    /// The variance of it beyond that of an end, m².
+    variance_m2: f64,
+    /// The probability of it before it is compared with the prediction.
+    prior: f64,
 }
 
 impl Extent {
-    /// That of a car.
-    pub fn car() -> Self {
-        Self { size_m: CAR_M }
+    /// The size of a new object.
+    pub fn new(config: &ObjectsConfig) -> Self {
+        Self {
+            size_m: config.usual_size_m,
+            shown_m: config.smallest_size_m[0],
+        }
     }
 
-    /// Returns the outline of some returns, seen from a heading, relative to a centre.
-    pub fn outline(
-        returns: &[Return],
-        members: &[u32],
+    /// Returns the outline of the returns of a body, seen from a heading, relative to a centre.
+    pub fn outline<'a>(
+        body: impl Iterator<Item = &'a Return>,
         (centre, velocity): (&Point2<f64>, &Vector2<f64>),
         heading: &Vector2<f64>,
     ) -> Outline {
         let side = Vector2::new(-heading.y, heading.x);
-        let mut along = Vec::with_capacity(members.len());
-        let mut across = Vec::with_capacity(members.len());
-        for member in members {
-            let at = returns[*member as usize].at_scan(velocity) - centre;
-            along.push(at.dot(heading));
-            across.push(at.dot(&side));
+        let mut spans_m = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
+        for found in body {
+            let at = found.at_scan(velocity) - centre;
+            for (span, at_m) in spans_m.iter_mut().zip([at.dot(heading), at.dot(&side)]) {
+                *span = [span[0].min(at_m), span[1].max(at_m)];
+            }
         }
-        Outline {
-            spans_m: [trimmed_span(along), trimmed_span(across)],
-        }
+        Outline { spans_m }
     }
 
-    /// Returns how far the centre of the object is from the one that the outline is relative to, m.
-    /// `direction` is the line of sight, a unit vector.
-    pub fn centre(
-        &self,
+    /// Returns the most likely offset of the centre from the one that the outline is relative to,
+    /// m, and its covariance as a measurement, m².
+    pub fn centre(&self, outline: &Outline, sight: &Sight) -> (Vector2<f64>, Matrix2<f64>) {
+        let (mut offset, mut noise) = (Vector2::zeros(), sight.noise);
+        for (axis, towards) in sight.axes().iter().enumerate() {
+            let along = |matrix: &Matrix2<f64>| (towards.transpose() * matrix * towards)[0];
+            let choices = self.choices(axis, outline, sight);
+            let known_m2 = along(&sight.predicted) + along(&sight.noise);
+            let (at_m, variance_m2) = resolve(&choices, known_m2);
+            offset += towards * at_m;
+            noise += towards * towards.transpose() * variance_m2;
+        }
+        (offset, noise)
+    }
+
+    /// The centre along an axis if its near end is seen, its far end, or neither.
+    fn choices(&self, axis: usize, outline: &Outline, sight: &Sight) -> [Choice; 3] {
+        let [low, high] = outline.spans_m[axis];
+        let (middle, hidden_m) = (0.5 * (low + high), self.size_m[axis] - (high - low));
+        let end_on = sight.end_on(axis);
+        let away_m = 0.5 * hidden_m * end_on.signum();
+        let between = BETWEEN[1] + (BETWEEN[0] - BETWEEN[1]) * end_on.abs();
+        let far = (1.0 - between) * (0.5 + (FAR - 0.5) * end_on.abs());
+        let choice = |at_m, variance_m2, prior| Choice {
+            at_m,
+            variance_m2,
+            prior,
+        };
+        [
+            choice(middle + away_m, 0.0, 1.0 - between - far),
+            choice(middle - away_m, 0.0, far),
+            choice(middle, hidden_m * hidden_m / 12.0, between),
+        ]
+    }
+
+    /// Takes the size that a scan shows. Returns by how much the centre has moved by that, m: the
+    /// end that is seen has not.
+    pub fn update(
+        &mut self,
         outline: &Outline,
-        heading: &Vector2<f64>,
-        direction: &Vector2<f64>,
+        sight: &Sight,
+        config: &ObjectsConfig,
     ) -> Vector2<f64> {
-        let side = Vector2::new(-heading.y, heading.x);
-        let mut centre = Vector2::zeros();
-        for (axis, towards) in [*heading, side].iter().enumerate() {
+        let (smallest_m, largest_m) = (config.smallest_size_m, config.largest_size_m);
+        let mut moved = Vector2::zeros();
+        for (axis, towards) in sight.axes().iter().enumerate() {
             let [low, high] = outline.spans_m[axis];
-            let hidden_m = (self.size_m[axis] - (high - low)).max(0.0);
-            let middle = 0.5 * (low + high);
-            // What is seen is the near end, or the far one, or the whole: that which is nearest to
-            // the prediction, and rather the near end.
-            let end_on = (towards.dot(direction) / END_ON).clamp(-1.0, 1.0);
-            let near = middle + 0.5 * end_on * hidden_m;
-            let far = middle - 0.5 * end_on * hidden_m;
-            let choices = [(near, 0.0), (middle, DOUBT_M), (far, DOUBT_M)];
-            let cost = |(at, doubt): &(f64, f64)| at.abs() + doubt;
-            let best = choices.iter().min_by(|a, b| cost(a).total_cmp(&cost(b)));
-            centre += towards * best.map_or(middle, |best| best.0);
-        }
-        centre
-    }
-
-    /// Takes what a scan shows.
-    pub fn update(&mut self, outline: &Outline) {
-        for axis in 0..2 {
-            let [low, high] = outline.spans_m[axis];
-            let excess_m = (high - low) - self.size_m[axis];
-            let gain = match excess_m / self.size_m[axis] {
+            let before_m = self.size_m[axis];
+            let excess_m = (high - low) - before_m;
+            let gain = match excess_m / before_m {
                 excess if excess > 0.0 => GAIN[0],
                 excess if excess > -ONE_END => GAIN[1],
                 _ => 0.0,
             };
-            let size_m = self.size_m[axis] + gain * excess_m;
-            self.size_m[axis] = size_m.clamp(SMALLEST_M[axis], LARGEST_M[axis]);
+            let size_m = before_m + gain * excess_m;
+            self.size_m[axis] = size_m.clamp(smallest_m[axis], largest_m[axis]);
+            moved += towards * (0.5 * (self.size_m[axis] - before_m) * sight.end_on(axis));
         }
+        let [low, high] = outline.spans_m[0];
+        self.shown_m = KEPT * self.shown_m + (1.0 - KEPT) * (high - low);
+        moved
+    }
+
+    /// Returns whether what has been seen of it so far is shorter than any vehicle.
+    pub fn is_an_end(&self, config: &ObjectsConfig) -> bool {
+        self.shown_m < (1.0 - ONE_END) * config.smallest_size_m[0]
+    }
+
+    /// Takes a length that two ends show together. Returns whether a vehicle can be that long.
+    pub fn lengthen(&mut self, length_m: f64, config: &ObjectsConfig) -> bool {
+        let fits = (self.size_m[0]..=config.largest_size_m[0]).contains(&length_m);
+        if fits {
+            self.size_m[0] = length_m;
+            self.shown_m = length_m;
+        }
+        fits
     }
 }
 
-/// The span of some values without those at its ends.
-fn trimmed_span(mut values: Vec<f64>) -> [f64; 2] {
-    values.sort_by(f64::total_cmp);
-    let last = values.len().saturating_sub(1);
-    let trimmed = (TRIM * last as f64).round() as usize;
-    let at = |index: usize| values.get(index).copied().unwrap_or_default();
-    [at(trimmed), at(last - trimmed)]
+impl Sight {
+    /// Along the heading and across it, unit vectors.
+    fn axes(&self) -> [Vector2<f64>; 2] {
+        [self.heading, Vector2::new(-self.heading.y, self.heading.x)]
+    }
+
+    /// Returns how much an axis is seen end-on: 0 from the side, 1 if it points away from the
+    /// sensor, -1 towards it.
+    fn end_on(&self, axis: usize) -> f64 {
+        (self.axes()[axis].dot(&self.direction) / END_ON).clamp(-1.0, 1.0)
+    }
+}
+
+/// Returns mean and variance of the choices, each weighed by how well it fits a prediction of zero
+/// with a variance `known_m2`.
+fn resolve(choices: &[Choice], known_m2: f64) -> (f64, f64) {
+    let weight = |choice: &Choice| {
+        let variance_m2 = known_m2 + choice.variance_m2;
+        choice.prior * (-0.5 * choice.at_m.powi(2) / variance_m2).exp() / variance_m2.sqrt()
+    };
+    // No choice fits what is far from the prediction: then it is as if nothing was predicted.
+    let fits: Vec<f64> = choices.iter().map(weight).collect();
+    let sum: f64 = fits.iter().sum();
+    let share = |index: usize| match sum > f64::MIN_POSITIVE {
+        true => fits[index] / sum,
+        false => choices[index].prior,
+    };
+    let mean = |of: &dyn Fn(&Choice) -> f64| -> f64 {
+        let weighed = choices.iter().enumerate();
+        weighed
+            .map(|(index, choice)| share(index) * of(choice))
+            .sum()
+    };
+    let at_m = mean(&|choice| choice.at_m);
+    (
+        at_m,
+        mean(&|choice| choice.variance_m2 + (choice.at_m - at_m).powi(2)),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::TAU;
+
+    const HALF_M: [f64; 2] = [2.2, 0.95];
+
+    fn at(place: Vector2<f64>) -> Return {
+        Return {
+            at: place.into(),
+            direction: Vector2::x(),
+            range_m: 30.0,
+            time_s: 0.0,
+            doppler_s: 0.0,
+            weight: 1.0,
+            stands_out: true,
+            share: 0.0,
+        }
+    }
+
+    fn sight(direction: Vector2<f64>) -> Sight {
+        Sight {
+            heading: Vector2::x(),
+            direction,
+            predicted: Matrix2::identity(),
+            noise: Matrix2::identity() * 0.01,
+        }
+    }
+
+    /// The centre of what is seen of a car at the origin, if it is predicted elsewhere.
+    fn centre(
+        seen: &[Return],
+        sight: &Sight,
+        predicted: Vector2<f64>,
+    ) -> (Vector2<f64>, Matrix2<f64>) {
+        let known = (&predicted.into(), &Vector2::zeros());
+        let outline = Extent::outline(seen.iter(), known, &sight.heading);
+        let (offset, noise) = Extent::new(&ObjectsConfig::default()).centre(&outline, sight);
+        (predicted + offset, noise)
+    }
+
+    #[test]
+    fn a_box_seen_from_all_sides_has_the_same_centre() {
+        for step in 0..72 {
+            let angle = TAU * f64::from(step) / 72.0;
+            let direction = Vector2::new(angle.cos(), angle.sin());
+            let mut seen = Vec::new();
+            for (axis, other) in [(0, 1), (1, 0)] {
+                // The face of each axis that looks towards the sensor.
+                let sign = -direction[axis].signum();
+                if direction[axis].abs() > 0.05 {
+                    for share in [-1.0, -0.5, 0.0, 0.5, 1.0] {
+                        let mut place = Vector2::zeros();
+                        place[axis] = sign * HALF_M[axis];
+                        place[other] = share * HALF_M[other];
+                        seen.push(at(place));
+                    }
+                }
+            }
+            let (found, _) = centre(&seen, &sight(direction), Vector2::new(0.3, -0.2));
+            assert!(found.norm() < 0.25, "{found} from {angle}");
+        }
+    }
+
+    #[test]
+    fn a_highlight_that_slides_along_the_side_leaves_the_centre_and_says_little() {
+        for step in -10..=10 {
+            let along_m = 0.2 * f64::from(step);
+            let highlight = at(Vector2::new(along_m, -HALF_M[1]));
+            let (found, noise) = centre(&[highlight], &sight(Vector2::y()), Vector2::zeros());
+            assert!(found.norm() < 0.5, "{found} by {along_m}");
+            let gain = 1.0 / (1.0 + noise[(0, 0)]);
+            assert!((gain * found.x).abs() < 0.2, "{found} by {along_m}");
+        }
+    }
+
+    #[test]
+    fn while_the_size_grows_the_end_that_is_seen_stays() {
+        let config = ObjectsConfig::default();
+        let mut extent = Extent::new(&config);
+        let away = sight(Vector2::x());
+        let mut centre = Vector2::zeros();
+        for _ in 0..20 {
+            // A lorry of 9 m, whose rear end is at -2.2 m.
+            let outline = Outline {
+                spans_m: [[-2.2 - centre.x, 6.8 - centre.x], [-0.95, 0.95]],
+            };
+            centre += extent.update(&outline, &away, &config);
+            assert!((centre.x - 0.5 * extent.size_m[0] + 2.2).abs() < 1e-9);
+        }
+        assert!((extent.size_m[0] - 9.0).abs() < 0.05 && centre.y == 0.0);
+        assert!(!extent.is_an_end(&config));
+    }
 }

@@ -1,7 +1,7 @@
 //! The returns of a scan in the frame of the odometry.
 
-use gyre_geometry::{Pose, SparsePoint, Twist};
-use nalgebra::{Point2, Vector2};
+use gyre_geometry::{Pose, SparsePoint, Twist, wrap_angle};
+use nalgebra::{Matrix2, Point2, Vector2};
 
 /// Range to either side of a return over which the power around it is averaged, m: more than a bus
 /// is long.
@@ -21,6 +21,65 @@ pub struct PlacedScan {
     /// The velocity of the sensor during the sweep, by which the points are deskewed: that of the
     /// motion from the scan before, by [`Twist::from_chord`].
     pub twist: Twist,
+}
+
+/// The steps in which a scan measures, from its points.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Resolution {
+    /// Depth of a range cell, m.
+    pub range_m: f64,
+    /// Angle between two azimuths, rad.
+    pub azimuth_rad: f64,
+}
+
+/// That of most radars that turn four times a second, before a scan is seen.
+impl Default for Resolution {
+    fn default() -> Self {
+        Self {
+            range_m: RANGE_CELL_M,
+            azimuth_rad: 0.9f64.to_radians(),
+        }
+    }
+}
+
+impl Resolution {
+    /// Measures the smallest steps between the points of a scan, which are in the order of their
+    /// azimuths, and in each of their ranges; `None` where there are none to measure.
+    pub fn of(points: &[SparsePoint]) -> Option<Self> {
+        let azimuths: Vec<&[SparsePoint]> = points.chunk_by(|a, b| a.time_s == b.time_s).collect();
+        let range_m = |point: &SparsePoint| f64::from(point.x_m).hypot(point.y_m.into());
+        let along = azimuths.iter().flat_map(|azimuth| azimuth.windows(2));
+        let ranges_m = along.map(|pair| (range_m(&pair[1]) - range_m(&pair[0])).abs());
+        let angle_rad =
+            |points: &[SparsePoint]| f64::from(points[0].y_m).atan2(points[0].x_m.into());
+        let steps = azimuths.windows(2);
+        let steps_rad = steps.map(|pair| wrap_angle(angle_rad(pair[1]) - angle_rad(pair[0])).abs());
+        Some(Self {
+            range_m: least(ranges_m)?,
+            azimuth_rad: least(steps_rad)?,
+        })
+    }
+
+    /// Standard deviation of the bearing of a return, rad: which azimuth of the beam, two of them
+    /// wide, is the strongest is random.
+    pub fn bearing_sigma_rad(&self) -> f64 {
+        2.0 * self.azimuth_rad / 12f64.sqrt()
+    }
+
+    /// Returns the covariance of the place of a return, m², if the edge that reflects is that of
+    /// the body but for a standard deviation, m.
+    pub fn noise(&self, direction: &Vector2<f64>, range_m: f64, edge_m: f64) -> Matrix2<f64> {
+        let across = Vector2::new(-direction.y, direction.x);
+        let bearing_m2 = (self.bearing_sigma_rad() * range_m).powi(2);
+        direction * direction.transpose() * (self.range_m.powi(2) / 12.0)
+            + across * across.transpose() * bearing_m2
+            + Matrix2::identity() * edge_m.powi(2)
+    }
+}
+
+/// Returns the smallest of some steps that are more than rounding.
+fn least(steps: impl Iterator<Item = f64>) -> Option<f64> {
+    steps.filter(|step| *step > 1e-3).min_by(f64::total_cmp)
 }
 
 /// A return, as if the sensor had stood and the object that reflects it too.
@@ -113,6 +172,29 @@ fn mark_what_stands_out(azimuth: &mut [Return], contrast: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_resolution_is_the_smallest_step_between_points() {
+        let at = |azimuth: i32, cell: i32| {
+            let angle = 0.0157 * f64::from(azimuth);
+            let range_m = 10.0 + 0.175 * f64::from(cell);
+            SparsePoint {
+                x_m: (range_m * angle.cos()) as f32,
+                y_m: (-range_m * angle.sin()) as f32,
+                time_s: azimuth as f32 * 1e-3,
+                weight: 1.0,
+                doppler_s: 0.0,
+            }
+        };
+        let points = [at(0, 0), at(0, 4), at(0, 5), at(2, 1), at(3, 9), at(399, 9)];
+        let found = Resolution::of(&points).unwrap_or(Resolution {
+            range_m: 0.0,
+            azimuth_rad: 0.0,
+        });
+        assert!((found.range_m - 0.175).abs() < 1e-4, "{found:?}");
+        assert!((found.azimuth_rad - 0.0157).abs() < 1e-4, "{found:?}");
+        assert_eq!(Resolution::of(&points[..1]), None);
+    }
 
     #[test]
     fn an_echo_stands_out_of_an_empty_azimuth_and_reverberation_does_not() {

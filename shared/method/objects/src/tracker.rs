@@ -1,28 +1,24 @@
 //! The tracker: the whole method on one page.
 
 use gyre_geometry::SparsePoint;
-use nalgebra::{Matrix2, Point2, Vector2};
+use nalgebra::{Matrix2, Point2};
 
 use crate::assignment::assign;
-use crate::clusters::{Measurement, Members, clusters};
+use crate::clusters::{Cluster, Measurement, Members, clusters};
 use crate::evidence::Evidence;
-use crate::returns::{PlacedScan, Return, place};
+use crate::returns::{PlacedScan, Resolution, Return, place};
 use crate::track::Track;
 use crate::{Object, ObjectsConfig, ObjectsError};
 
-/// Chi-square of two degrees of freedom that one cluster in a thousand of its own track exceeds.
-const GATE: f64 = 13.8;
-/// Share of the last scans with something at a place from which on a return there stands, and
-/// belongs to no object. Where an object is expected, more is taken for new than elsewhere.
-const OWN_SHARE: f64 = 0.7;
-/// Time between two scans beyond which all tracks end, s.
-const MAX_GAP_S: f64 = 2.0;
+/// Weight below which a cluster counts for nothing.
+const NEGLIGIBLE_WEIGHT: f64 = 0.1;
 
 /// Tracks moving objects from scan to scan.
 #[derive(Clone, Debug)]
 pub struct ObjectTracker {
     config: ObjectsConfig,
     evidence: Evidence,
+    resolution: Resolution,
     returns: Vec<Return>,
     tracks: Vec<Track>,
     objects: Vec<Object>,
@@ -38,12 +34,9 @@ impl ObjectTracker {
     pub fn new(config: &ObjectsConfig) -> Result<Self, ObjectsError> {
         config.validate()?;
         Ok(Self {
-            evidence: Evidence::new(
-                config.memory_scans,
-                config.max_range_m,
-                config.bearing_sigma_deg.to_radians(),
-            ),
+            evidence: Evidence::new(config.memory_scans, config.max_range_m),
             config: config.clone(),
+            resolution: Resolution::default(),
             returns: Vec::new(),
             tracks: Vec::new(),
             objects: Vec::new(),
@@ -58,20 +51,19 @@ impl ObjectTracker {
     /// A scan that is not later than the one before, or by more than two seconds, ends all tracks.
     pub fn update(&mut self, scan: &PlacedScan, points: &[SparsePoint]) -> &[Object] {
         self.predict(scan.stamp_ns);
-        let limits = (self.config.max_range_m, self.config.contrast);
-        place(scan, points, limits, &mut self.returns);
+        self.place(scan, points);
         self.compare();
         let claims = self.claim();
         let fresh = self.fresh(&claims);
-        let found = clusters(&self.returns, &fresh);
+        let found = clusters(&self.returns, &fresh, &self.config);
         let own = self.own_clusters(&claims);
         let rest = self.assign(&own, &found);
-        self.begin(scan, &found, &rest);
+        self.begin(scan, &rest);
         self.remember(scan, &claims);
         self.judge();
+        let objects = self.tracks.iter().filter_map(|it| it.object(&self.config));
         self.objects.clear();
-        self.objects
-            .extend(self.tracks.iter().filter_map(Track::object));
+        self.objects.extend(objects);
         &self.objects
     }
 
@@ -87,7 +79,7 @@ impl ObjectTracker {
     fn predict(&mut self, stamp_ns: i64) {
         if let Some(before_ns) = self.stamp_ns {
             let dt_s = stamp_ns.saturating_sub(before_ns) as f64 * 1e-9;
-            match dt_s > 0.0 && dt_s <= MAX_GAP_S {
+            match dt_s > 0.0 && dt_s <= self.config.max_gap_s {
                 true => {
                     let config = &self.config;
                     self.tracks
@@ -100,10 +92,20 @@ impl ObjectTracker {
         self.stamp_ns = Some(stamp_ns);
     }
 
+    /// Places the points of the scan, and measures in which steps they are.
+    fn place(&mut self, scan: &PlacedScan, points: &[SparsePoint]) {
+        let limits = (self.config.max_range_m, self.config.contrast);
+        place(scan, points, limits, &mut self.returns);
+        if let Some(resolution) = Resolution::of(points) {
+            self.resolution = resolution;
+        }
+    }
+
     /// Compares the returns with what the last scans saw where they are.
     fn compare(&mut self) {
+        let bearing_sigma_rad = self.resolution.bearing_sigma_rad();
         for found in &mut self.returns {
-            found.share = self.evidence.history(found).share();
+            found.share = self.evidence.history(found, bearing_sigma_rad).share();
         }
     }
 
@@ -117,12 +119,12 @@ impl ObjectTracker {
             .filter(|(_, track)| track.is_moving())
             .collect();
         let claim = |found: &Return| {
-            if !found.stands_out || found.share >= OWN_SHARE {
+            if !found.stands_out || found.share >= self.config.own_share {
                 return None;
             }
             let distances = moving
                 .iter()
-                .map(|(index, track)| (*index, track.distance(found)));
+                .map(|(index, track)| (*index, track.distance(found, &self.config)));
             let nearest = distances.min_by(|a, b| a.1.total_cmp(&b.1));
             nearest
                 .filter(|(_, distance)| *distance <= 1.0)
@@ -142,71 +144,64 @@ impl ObjectTracker {
         (0..self.returns.len() as u32).filter(is_fresh).collect()
     }
 
-    /// Returns the claimed returns of each track.
-    fn own_clusters(&self, claims: &[Option<usize>]) -> Vec<Members> {
+    /// Returns the claimed returns of each track, if it has any.
+    fn own_clusters(&self, claims: &[Option<usize>]) -> Vec<Option<Cluster>> {
         let mut own = vec![Members::new(); self.tracks.len()];
         for (index, claim) in claims.iter().enumerate() {
             if let Some(track) = claim {
                 own[*track].push(index as u32);
             }
         }
-        own
+        own.into_iter()
+            .map(|members| Cluster::of(&self.returns, members, &self.config))
+            .collect()
     }
 
     /// Updates the tracks by their own returns, and those without by the nearest clusters. Returns
     /// the clusters that are left.
-    fn assign(&mut self, own: &[Members], found: &[Members]) -> Vec<usize> {
+    fn assign<'a>(&mut self, own: &[Option<Cluster>], found: &'a [Cluster]) -> Vec<&'a Cluster> {
         let mut costs = Vec::new();
         let mut seekers = Vec::new();
-        let measured: Vec<Measurement> = found
-            .iter()
-            .map(|members| Measurement::of(&self.returns, members))
-            .collect();
-        for (index, members) in own.iter().enumerate() {
-            if members.is_empty() {
-                seekers.push(index);
-                costs.push(self.costs(&self.tracks[index], found, &measured));
-            } else {
-                let measured = Measurement::of(&self.returns, members);
-                let noise = self.noise(&measured, true);
-                self.tracks[index].update(&self.returns, members, &measured, &noise);
+        for (index, own) in own.iter().enumerate() {
+            match own {
+                Some(cluster) => self.update_track(index, cluster),
+                None => {
+                    seekers.push(index);
+                    costs.push(self.costs(&self.tracks[index], found));
+                }
             }
         }
         let assigned = assign(&costs);
         let mut is_left = vec![true; found.len()];
         for (track, cluster) in seekers.into_iter().zip(assigned) {
-            let Some(cluster) = cluster else { continue };
-            is_left[cluster] = false;
-            let noise = self.noise(&measured[cluster], self.tracks[track].is_confirmed());
-            self.tracks[track].update(&self.returns, &found[cluster], &measured[cluster], &noise);
+            if let Some(cluster) = cluster {
+                is_left[cluster] = false;
+                self.update_track(track, &found[cluster]);
+            }
         }
-        (0..found.len())
-            .filter(|cluster| is_left[*cluster])
+        let left = found.iter().zip(is_left);
+        left.filter_map(|(cluster, is_left)| is_left.then_some(cluster))
             .collect()
     }
 
+    fn update_track(&mut self, index: usize, cluster: &Cluster) {
+        let noise = self.noise(&cluster.measured, self.tracks[index].is_box());
+        self.tracks[index].update(&self.returns, cluster, &noise, &self.config);
+    }
+
     /// The cost of each cluster for a track; `None` outside of its gate.
-    fn costs(
-        &self,
-        track: &Track,
-        found: &[Members],
-        measured: &[Measurement],
-    ) -> Vec<Option<f64>> {
-        let cost = |(members, measured): (&Members, &Measurement)| {
+    fn costs(&self, track: &Track, found: &[Cluster]) -> Vec<Option<f64>> {
+        let cost = |cluster: &Cluster| {
+            let measured = &cluster.measured;
             if measured.weight < NEGLIGIBLE_WEIGHT {
                 return None;
             }
-            let at = match track.has_heading() {
-                true => track.measured_centre(&self.returns, members, measured),
-                false => measured.at,
-            };
-            let innovation =
-                track
-                    .filter
-                    .innovation(measured, &at, &self.noise(measured, track.is_confirmed()));
-            (innovation.chi_square() <= GATE).then(|| innovation.cost())
+            let noise = self.noise(measured, track.is_box());
+            let (at, noise) = track.measured(&self.returns, cluster, &noise);
+            let innovation = track.filter.innovation(measured, &at, &noise);
+            (innovation.chi_square() <= self.config.gate).then(|| innovation.cost())
         };
-        found.iter().zip(measured).map(cost).collect()
+        found.iter().map(cost).collect()
     }
 
     /// Returns whether a cluster can begin a track.
@@ -216,34 +211,28 @@ impl ObjectTracker {
             && measured.range_m >= self.config.min_range_m
     }
 
-    /// The covariance of a cluster's position, m².
-    fn noise(&self, measured: &Measurement, known: bool) -> Matrix2<f64> {
-        let along = measured.direction;
-        let across = Vector2::new(-along.y, along.x);
-        let bearing_m = self.config.bearing_sigma_deg.to_radians() * measured.range_m;
-        let range =
-            self.config.range_sigma_m.powi(2) + if known { 0.0 } else { UNKNOWN_CENTRE_M.powi(2) };
-        // Across as along there are scatterers that come and go.
-        along * along.transpose() * range
-            + across * across.transpose() * (range + bearing_m.powi(2))
+    /// The covariance of the place of an end, of a box or of what has no heading yet, m².
+    fn noise(&self, measured: &Measurement, is_box: bool) -> Matrix2<f64> {
+        let edge_m = match is_box {
+            true => self.config.edge_sigma_m,
+            false => self.config.unknown_edge_sigma_m,
+        };
+        let (direction, range_m) = (&measured.direction, measured.range_m);
+        self.resolution.noise(direction, range_m, edge_m)
     }
 
     /// Begins tracks at the clusters that belong to none, but for mirror images: those behind what
     /// stands.
-    fn begin(&mut self, scan: &PlacedScan, found: &[Members], rest: &[usize]) {
+    fn begin(&mut self, scan: &PlacedScan, rest: &[&Cluster]) {
         let sensor = Point2::from(scan.pose.translation.vector);
-        for members in rest.iter().map(|cluster| &found[*cluster]) {
-            let measured = Measurement::of(&self.returns, members);
-            if !self.is_strong(&measured) {
-                continue;
+        for cluster in rest {
+            let measured = &cluster.measured;
+            if self.is_strong(measured) && !self.evidence.is_behind_standing(&sensor, &measured.at)
+            {
+                let noise = self.noise(measured, false);
+                let track = Track::new(&self.returns, cluster, &noise, &self.config);
+                self.tracks.push(track);
             }
-            if self.evidence.is_behind_standing(&sensor, &measured.at) {
-                continue;
-            }
-            let noise = self.noise(&measured, false);
-            let mut track = Track::new(&measured, &noise, &self.config);
-            track.leave(&self.returns, members);
-            self.tracks.push(track);
         }
     }
 
@@ -252,8 +241,8 @@ impl ObjectTracker {
         let config = &self.config;
         self.tracks.retain(|track| !track.is_over(config));
         for track in &mut self.tracks {
-            track.look_back(&self.evidence);
-            if track.judge(&self.config) {
+            track.look_back(&self.evidence, config);
+            if track.judge(config) {
                 track.confirm(self.next_id);
                 self.next_id += 1;
             }
@@ -261,13 +250,17 @@ impl ObjectTracker {
         self.join();
     }
 
-    /// Ends each track whose centre lies in the outline of an older object.
+    /// Ends each track that an older object is, or whose other end it is.
     fn join(&mut self) {
+        let config = &self.config;
         let mut index = 0;
         while index < self.tracks.len() {
-            let (older, rest) = self.tracks.split_at(index);
-            let is_within = |older: &Track| older.is_confirmed() && older.is_same(&rest[0]);
-            match older.iter().any(is_within) {
+            let (older, rest) = self.tracks.split_at_mut(index);
+            let is_within = |older: &mut Track| {
+                older.is_confirmed()
+                    && (older.is_same(&rest[0], config) || older.unite(&rest[0], config))
+            };
+            match older.iter_mut().any(is_within) {
                 true => _ = self.tracks.remove(index),
                 false => index += 1,
             }
@@ -281,8 +274,3 @@ impl ObjectTracker {
         self.evidence.add(sensor, &self.returns, stands);
     }
 }
-
-/// Weight below which a cluster counts for nothing.
-const NEGLIGIBLE_WEIGHT: f64 = 0.1;
-/// Standard deviation of the centre of an object whose outline is not known yet, m: half of a car.
-const UNKNOWN_CENTRE_M: f64 = 1.0;

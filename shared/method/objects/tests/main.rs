@@ -7,7 +7,7 @@ use std::f64::consts::{PI, TAU};
 
 use gyre_geometry::{Pose, SparsePoint, Twist, pose};
 use gyre_objects::{Object, ObjectTracker, ObjectsConfig, PlacedScan};
-use nalgebra::{Point2, Vector2};
+use nalgebra::{Point2, Rotation2, Vector2};
 
 const PERIOD_S: f64 = 0.25;
 const DOPPLER_S: f64 = 0.046;
@@ -30,11 +30,50 @@ const OUTLINE: [(f64, f64); 14] = [
     (-0.5, 0.0),
 ];
 
+/// Returns of a bus of which only the ends are seen, between which nothing is.
+const BUS: [(f64, f64); 6] = [
+    (5.8, -1.2),
+    (5.8, 0.0),
+    (5.8, 1.2),
+    (-5.8, -1.2),
+    (-5.8, 0.0),
+    (-5.8, 1.2),
+];
+
 /// A car by its returns.
 #[derive(Clone, Copy)]
 struct Car {
+    /// Centre and velocity at time zero.
     at: Point2<f64>,
     velocity: Vector2<f64>,
+    turn_radps: f64,
+    outline: &'static [(f64, f64)],
+}
+
+impl Car {
+    fn new(at: Point2<f64>, velocity: Vector2<f64>) -> Self {
+        Self {
+            at,
+            velocity,
+            turn_radps: 0.0,
+            outline: &OUTLINE,
+        }
+    }
+
+    /// Returns its centre and velocity at a time.
+    fn after(&self, time_s: f64) -> (Point2<f64>, Vector2<f64>) {
+        let turned = self.turn_radps * time_s;
+        let velocity = Rotation2::new(turned) * self.velocity;
+        // The chord of an arc.
+        let chord = match turned.abs() < 1e-9 {
+            true => time_s,
+            false => (0.5 * turned).sin() / (0.5 * self.turn_radps),
+        };
+        (
+            self.at + Rotation2::new(0.5 * turned) * self.velocity * chord,
+            velocity,
+        )
+    }
 }
 
 /// A vehicle that drives ahead at 8 m/s between two walls, and what is around it.
@@ -81,11 +120,11 @@ impl Scene {
             }
         }
         for car in cars {
-            let heading = car.velocity.try_normalize(1e-9).unwrap_or_else(Vector2::x);
+            let (centre, velocity) = car.after(self.time_s());
+            let heading = velocity.try_normalize(1e-9).unwrap_or_else(Vector2::x);
             let side = Vector2::new(-heading.y, heading.x);
-            let centre = car.at + car.velocity * self.time_s();
-            for (a, b) in OUTLINE {
-                points.push((centre + heading * a + side * b, car.velocity));
+            for (a, b) in car.outline {
+                points.push((centre + heading * *a + side * *b, velocity));
             }
         }
         let placed = PlacedScan {
@@ -144,10 +183,7 @@ fn settled() -> Scene {
 #[test]
 fn what_stands_is_no_object_from_a_vehicle_that_moves() {
     let mut scene = settled();
-    let parked = Car {
-        at: Point2::new(60.0, 5.0),
-        velocity: Vector2::zeros(),
-    };
+    let parked = Car::new(Point2::new(60.0, 5.0), Vector2::zeros());
     for _ in 0..40 {
         assert!(scene.step(&[parked]).iter().all(|object| !object.moving));
     }
@@ -158,10 +194,7 @@ fn an_oncoming_car_is_tracked_from_its_third_scan_without_bias_of_time_and_doppl
     let mut scene = settled();
     // Straight ahead, where the sweep begins and ends: its two sides are seen a quarter of a second
     // apart.
-    let car = Car {
-        at: Point2::new(140.0, 0.5),
-        velocity: Vector2::new(-12.0, 0.0),
-    };
+    let car = Car::new(Point2::new(140.0, 0.5), Vector2::new(-12.0, 0.0));
     let mut seen = 0;
     let mut last = None;
     for _ in 0..14 {
@@ -189,15 +222,78 @@ fn an_oncoming_car_is_tracked_from_its_third_scan_without_bias_of_time_and_doppl
 }
 
 #[test]
+fn a_car_that_turns_off_keeps_its_identity_and_its_velocity_follows() {
+    let mut scene = settled();
+    scene.is_open = true;
+    let car = Car::new(Point2::new(20.0, -4.0), Vector2::new(7.0, 0.0));
+    let first = scene.steps(8, &[car]);
+    assert_eq!(first.len(), 1, "{first:?}");
+    let (at, velocity) = car.after(scene.time_s());
+    let turning = Car {
+        turn_radps: 0.6,
+        ..Car::new(at, velocity)
+    };
+    let start_s = scene.time_s();
+    for _ in 0..10 {
+        let after_s = scene.time_s() - start_s;
+        let (centre, velocity) = turning.after(after_s);
+        // At its place by the time since the turn began.
+        let now = Car {
+            at: centre - velocity * scene.time_s(),
+            turn_radps: 0.0,
+            ..Car::new(centre, velocity)
+        };
+        let objects = scene.step(&[now]);
+        assert_eq!(objects.len(), 1, "{objects:?} after {after_s} s");
+        let object = objects[0];
+        assert_eq!(object.id, first[0].id);
+        assert!(
+            (object.velocity - velocity).norm() < 2.5,
+            "{object:?}, {velocity}"
+        );
+        assert!(
+            (object.position - centre).norm() < 1.2,
+            "{object:?} at {centre}"
+        );
+    }
+}
+
+#[test]
+fn the_two_ends_of_a_bus_are_one_object() {
+    let mut scene = settled();
+    let bus = Car {
+        outline: &BUS,
+        ..Car::new(Point2::new(140.0, 4.0), Vector2::new(-9.0, 0.0))
+    };
+    let mut alone = 0;
+    for _ in 0..19 {
+        let (centre, _) = bus.after(scene.time_s());
+        let objects = scene.step(&[bus]);
+        let is_one = objects.len() == 1 && (objects[0].position - centre).norm() < 1.5;
+        alone = if is_one { alone + 1 } else { 0 };
+    }
+    assert!(alone > 3, "{alone}");
+}
+
+#[test]
+fn two_cars_in_a_queue_stay_two() {
+    let mut scene = settled();
+    let behind = |gap_m: f64| Car::new(Point2::new(110.0 + gap_m, 4.0), Vector2::new(-9.0, 0.0));
+    let objects = scene.steps(12, &[behind(0.0), behind(7.0)]);
+    assert_eq!(objects.len(), 2, "{objects:?}");
+    let apart = objects[0].position - objects[1].position;
+    assert!((apart.norm() - 7.0).abs() < 1.0, "{objects:?}");
+}
+
+#[test]
 fn a_hidden_car_keeps_its_identity_and_ends_when_it_stays_hidden() {
     let mut scene = settled();
-    let car = Car {
-        at: Point2::new(15.0, 4.0),
-        velocity: Vector2::new(10.0, 0.0),
-    };
+    let car = Car::new(Point2::new(15.0, 4.0), Vector2::new(10.0, 0.0));
     let before = scene.steps(8, &[car]);
     assert_eq!(before.len(), 1);
-    (0..3).for_each(|_| assert_eq!(scene.step(&[])[0].id, before[0].id));
+    // It is reported until it has probably gone.
+    assert_eq!(scene.step(&[])[0].id, before[0].id);
+    assert_eq!(scene.steps(2, &[]), []);
     assert_eq!(scene.step(&[car])[0].id, before[0].id);
     let after = scene.steps(6, &[]);
     assert_eq!(after, []);
@@ -210,10 +306,7 @@ fn an_image_behind_a_wall_is_not_born_and_the_same_in_the_open_is() {
             is_open,
             ..Scene::new()
         };
-        let image = Car {
-            at: Point2::new(-10.0, 24.0),
-            velocity: Vector2::new(9.0, 0.0),
-        };
+        let image = Car::new(Point2::new(-10.0, 24.0), Vector2::new(9.0, 0.0));
         (0..20).for_each(|scan| {
             scene.step(if scan < 10 {
                 &[]
@@ -229,17 +322,12 @@ fn an_image_behind_a_wall_is_not_born_and_the_same_in_the_open_is() {
 #[test]
 fn a_gap_in_time_ends_all_tracks_and_identities_are_not_given_again() {
     let mut scene = settled();
-    let car = Car {
-        at: Point2::new(15.0, 4.0),
-        velocity: Vector2::new(10.0, 0.0),
-    };
+    let car = Car::new(Point2::new(15.0, 4.0), Vector2::new(10.0, 0.0));
     let first = scene.steps(8, &[car])[0].id;
     scene.scan += 40;
     assert_eq!(scene.step(&[car]), []);
-    let car = Car {
-        at: car.at - Vector2::new(1.0, 0.0) * 2.0 * scene.time_s(),
-        velocity: Vector2::new(12.0, 0.0),
-    };
+    let at = car.at - Vector2::new(1.0, 0.0) * 2.0 * scene.time_s();
+    let car = Car::new(at, Vector2::new(12.0, 0.0));
     scene.steps(5, &[]);
     let again = scene.steps(8, &[car]);
     assert_eq!(again.len(), 1);
