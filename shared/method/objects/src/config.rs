@@ -82,8 +82,8 @@ pub struct ObjectsConfig {
     pub lateral_acceleration_mps2: f64,
     /// Largest turn rate, rad/s: a car turns off at 7 m/s on a radius of 10 m. Default 0.7.
     pub turn_rate_radps: f64,
-    /// Mean time for which a turn rate lasts, s: drivers steer into a corner and out of it within two
-    /// to three. Default 1.
+    /// Mean time for which a turn rate lasts, s: a driver steers into a corner, and out of it, in
+    /// about that. Default 0.5.
     pub turn_lasts_s: f64,
     /// Standard deviation of a new object's velocity, each component, m/s: two of it are 60 km/h.
     /// Default 8.
@@ -149,7 +149,7 @@ impl Default for ObjectsConfig {
             acceleration_mps2: 1.5,
             lateral_acceleration_mps2: 1.0,
             turn_rate_radps: 0.7,
-            turn_lasts_s: 1.0,
+            turn_lasts_s: 0.5,
             speed_sigma_mps: 8.0,
             standing_mps: 0.8,
             heading_mps: 1.0,

@@ -7,8 +7,9 @@
 //!   of the odometry,
 //! - `evidence`: where the last scans saw something and where they saw nothing,
 //! - `clusters`: returns where nothing was before, merged to clusters,
-//! - `filter`: the Kalman filter of a track, constant velocity with the time of each return,
-//! - `extent`: length and width, and the centre of what is seen from one side,
+//! - `filter`: the filter of a track, Kalman filters of several turn rates with the time of each
+//!   return,
+//! - `extent`: length and width, and the centre by the ends that are seen,
 //! - `score`: how likely a track is an object, and not clutter,
 //! - `track`: birth, confirmation, coasting and death,
 //! - `assignment`: which cluster belongs to which track.

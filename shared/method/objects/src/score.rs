@@ -2,9 +2,10 @@
 //! (Sittler; Blackman and Popoli, "Design and Analysis of Modern Tracking Systems", 1999,
 //! Sec. 6.2).
 //!
-//! The terms are those of a logistic regression over the clusters of the simulated drives that
-//! [docs/objects.md](../../../../docs/objects.md) calls tuned. Clutter comes back from scan to scan
-//! at the same places, so that a scan counts half of what it would by itself.
+//! The terms are those of a logistic regression over the clusters of the first six simulated drives
+//! on which [docs/objects.md](../../../../docs/objects.md) says that it was built. Clutter comes
+//! back from scan to scan at the same places, so that a scan counts half of what it would by
+//! itself.
 
 use nalgebra::{Point2, Vector2};
 
