@@ -192,15 +192,25 @@ impl ObjectsConfig {
     /// # Errors
     /// Returns the first setting that is out of bounds.
     pub fn validate(&self) -> Result<(), ObjectsError> {
-        let setting = |key, value: f64, (low, high): (f64, f64), bounds| match value >= low
-            && value <= high
-        {
-            true => Ok(()),
-            false => Err(ObjectsError { key, value, bounds }),
-        };
-        let [usual_m, smallest_m, largest_m] =
-            [self.usual_size_m, self.smallest_size_m, self.largest_size_m];
-        for (key, value, bounds, words) in [
+        let positive = self
+            .positive()
+            .map(|(key, value)| (key, value, POSITIVE, "0.001 to 100"));
+        let all = self
+            .shares_and_counts()
+            .into_iter()
+            .chain(self.sizes_and_scores())
+            .chain(positive);
+        for (key, value, (low, high), bounds) in all {
+            if !(low..=high).contains(&value) {
+                return Err(ObjectsError { key, value, bounds });
+            }
+        }
+        Ok(())
+    }
+
+    fn shares_and_counts(&self) -> [Setting; 13] {
+        let hits = f64::from(self.birth_hits);
+        [
             ("max_range_m", self.max_range_m, (5.0, 120.0), "5 to 120"),
             (
                 "memory_scans",
@@ -214,15 +224,46 @@ impl ObjectsConfig {
             ("own_share", self.own_share, SHARE, "0.01 to 1"),
             ("skirt_weight", self.skirt_weight, (0.0, 1.0), "0 to 1"),
             ("seen_share", self.seen_share, (0.01, 0.99), "0.01 to 0.99"),
-            ("gate", self.gate, (0.1, 1000.0), "0.1 to 1000"),
-            ("min_weight", self.min_weight, (0.0, 1000.0), "0 to 1000"),
+            ("min_weight", self.min_weight, LARGE, "0 to 1000"),
             (
                 "min_returns",
                 self.min_returns as f64,
                 (1.0, 1000.0),
                 "1 to 1000",
             ),
-            ("max_score", self.max_score, (0.0, 1000.0), "0 to 1000"),
+            ("birth_hits", hits, (2.0, 32.0), "2 to 32"),
+            (
+                "birth_scans",
+                self.birth_scans.into(),
+                (hits, 32.0),
+                "birth_hits to 32",
+            ),
+            ("coast_s", self.coast_s, (0.0, 30.0), "0 to 30"),
+        ]
+    }
+
+    fn sizes_and_scores(&self) -> [Setting; 9] {
+        let [usual, smallest, largest] =
+            [self.usual_size_m, self.smallest_size_m, self.largest_size_m];
+        let between = "from smallest_size_m to largest_size_m";
+        let size = (0.1, 50.0);
+        [
+            (
+                "smallest_size_m",
+                smallest[0].min(smallest[1]),
+                size,
+                "0.1 to 50",
+            ),
+            ("usual_size_m", usual[0], (smallest[0], largest[0]), between),
+            ("usual_size_m", usual[1], (smallest[1], largest[1]), between),
+            (
+                "largest_size_m",
+                largest[0].max(largest[1]),
+                size,
+                "0.1 to 50",
+            ),
+            ("gate", self.gate, (0.1, 1000.0), "0.1 to 1000"),
+            ("max_score", self.max_score, LARGE, "0 to 1000"),
             (
                 "confirm_score",
                 self.confirm_score,
@@ -230,43 +271,12 @@ impl ObjectsConfig {
                 "0 to max_score",
             ),
             ("end_score", self.end_score, (-1000.0, 0.0), "-1000 to 0"),
-            ("missed_loss", self.missed_loss, (0.0, 1000.0), "0 to 1000"),
-            ("birth_hits", self.birth_hits.into(), (2.0, 32.0), "2 to 32"),
-            (
-                "birth_scans",
-                self.birth_scans.into(),
-                (self.birth_hits.into(), 32.0),
-                "birth_hits to 32",
-            ),
-            ("coast_s", self.coast_s, (0.0, 30.0), "0 to 30"),
-            (
-                "smallest_size_m",
-                smallest_m[0].min(smallest_m[1]),
-                (0.1, 50.0),
-                "0.1 to 50",
-            ),
-            (
-                "usual_size_m",
-                usual_m[0],
-                (smallest_m[0], largest_m[0]),
-                "from smallest_size_m to largest_size_m",
-            ),
-            (
-                "usual_size_m",
-                usual_m[1],
-                (smallest_m[1], largest_m[1]),
-                "from smallest_size_m to largest_size_m",
-            ),
-            (
-                "largest_size_m",
-                largest_m[0].max(largest_m[1]),
-                (0.1, 50.0),
-                "0.1 to 50",
-            ),
-        ] {
-            setting(key, value, bounds, words)?;
-        }
-        for (key, value) in [
+            ("missed_loss", self.missed_loss, LARGE, "0 to 1000"),
+        ]
+    }
+
+    fn positive(&self) -> [(&'static str, f64); 15] {
+        [
             ("max_gap_s", self.max_gap_s),
             ("cluster_along_m", self.cluster_along_m),
             ("cluster_across_m", self.cluster_across_m),
@@ -282,13 +292,17 @@ impl ObjectsConfig {
             ("heading_mps", self.heading_mps),
             ("alike_mps", self.alike_mps),
             ("moving_sigmas", self.moving_sigmas),
-        ] {
-            setting(key, value, (1e-3, 100.0), "0.001 to 100")?;
-        }
-        Ok(())
+        ]
     }
 }
 
+/// A key, its value, its least and its largest value, and these in words.
+type Setting = (&'static str, f64, (f64, f64), &'static str);
+
+/// Bounds of what is above zero.
+const POSITIVE: (f64, f64) = (1e-3, 100.0);
+/// Bounds of what may be zero.
+const LARGE: (f64, f64) = (0.0, 1000.0);
 /// Bounds of a share of scans.
 const SHARE: (f64, f64) = (0.01, 1.0);
 

@@ -147,7 +147,8 @@ impl Evidence {
     }
 
     /// Returns what the scans before saw where a return is, within the standard deviation of its
-    /// bearing, rad, and one cell for the rest.
+    /// bearing, rad, and one cell for the rest. A return that outshines weak ones is compared with
+    /// strong ones only.
     pub fn history(&self, found: &Return, bearing_sigma_rad: f64) -> History {
         let plane = match found.weight >= OUTSHINING_WEIGHT {
             true => STRONG,
@@ -326,6 +327,23 @@ mod tests {
         assert_eq!(behind(&[weak]), 0);
         let unseen = History { views: 0, hits: 0 };
         assert_eq!(unseen.share(), 0.5);
+    }
+
+    #[test]
+    fn a_strong_return_outshines_the_reverberation_that_was_there_before() {
+        let mut evidence = Evidence::new(8, 70.0);
+        let strong = at(20.0, 3.0);
+        let weak = Return {
+            weight: 0.1,
+            ..strong
+        };
+        for _ in 0..8 {
+            add(&mut evidence, &[weak]);
+        }
+        let hits = |found: &Return| evidence.history(found, 0.01).hits;
+        assert_eq!((hits(&weak), hits(&strong)), (5, 0));
+        let behind = Point2::new(40.0, 6.0);
+        assert!(!evidence.is_behind_standing(&Point2::origin(), &behind));
     }
 
     #[test]
