@@ -58,7 +58,7 @@ export class HealthView {
     write("heading", `yaw ${signed(degrees(yaw), 1)}°, scan ${pose.scan}`);
     const isMatched = pose.outcome === "refined" || pose.outcome === "weak";
     write("match", isMatched ? `${(100 * pose.overlap).toFixed(0)} %` : UNKNOWN);
-    write("match-note", MATCHES[pose.outcome]);
+    this.writeMatchNote();
     if (!drift) return;
     write("drift", drift.position_m.toFixed(2));
     write("drift-note", `yaw ${degrees(drift.yaw_rad).toFixed(2)}°, last ${drift.over_m.toFixed(0)} m`);
@@ -78,9 +78,18 @@ export class HealthView {
     write("dropped", String(health.dropped));
     write("in-flight", `${health.in_flight} in flight`);
     write("missed", `Missed by this page's observer: ${missed.pose} poses, ${missed.scan} scans, ${missed.masked} masked scans`);
+    this.others = health.others;
+    this.writeMatchNote();
     this.notice = health.notice;
     this.setProcesses(health.processes);
     this.judge();
+  }
+
+  // What the newest pose rests on; with a gyro or wheels, how often they are used.
+  writeMatchNote() {
+    if (!this.pose) return;
+    const { outcome, basis } = this.pose;
+    write("match-note", this.others ? `${basis}: ${this.others}` : MATCHES[outcome]);
   }
 
   setProcesses(processes) {

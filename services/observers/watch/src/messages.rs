@@ -1,6 +1,6 @@
 //! The layers that a browser asks for, and the messages to it in JSON.
 
-use gyre_messages::{PoseHeader, outcome};
+use gyre_messages::{PoseHeader, WitnessCounts, outcome};
 use serde::Serialize;
 
 use crate::{delays::DelayReport, processes::Process, recent_drift::Drift, track::Vertex};
@@ -82,6 +82,8 @@ pub struct HealthReport {
     pub scans_per_s: f64,
     pub distance_m: f64,
     pub delays: DelayReport,
+    /// The part of gyro and wheels in the last motions, in words; none without them.
+    pub others: Option<String>,
     /// The reason why something is not shown.
     pub notice: Option<String>,
     pub processes: Vec<Process>,
@@ -100,6 +102,8 @@ pub struct RunCounts {
     pub in_flight: u64,
     /// The messages that this observer has missed.
     pub missed: Missed,
+    /// What the motions rest on, from the first of the run on.
+    pub witnesses: WitnessCounts,
 }
 
 /// The trajectory's new vertices and the newest pose.
@@ -128,6 +132,8 @@ pub struct CurrentPose {
     pub outcome: &'static str,
     /// Mean of the map under the scan's points, 0 to 1.
     pub overlap: f64,
+    /// What the motion rests on, in words: see [`gyre_messages::Basis`].
+    pub basis: &'static str,
 }
 
 impl CurrentPose {
@@ -157,6 +163,7 @@ impl CurrentPose {
                 _ => "searched",
             },
             overlap: pose.motion.refinement.overlap,
+            basis: pose.motion.refinement.basis().name(),
         }
     }
 }

@@ -9,6 +9,8 @@ use prometheus_client::{
     registry::{Registry, Unit},
 };
 
+use gyre_messages::Basis;
+
 use crate::{messages::RunCounts, processes::Process, run_view::RunView};
 
 /// The type of the newer format, which Prometheus accepts in its requests.
@@ -104,6 +106,7 @@ fn older(text: &str) -> String {
 impl Collector for Snapshot {
     fn encode(&self, mut encoder: DescriptorEncoder<'_>) -> fmt::Result {
         self.encode_counts(&mut encoder)?;
+        self.encode_witnesses(&mut encoder)?;
         self.encode_missed(&mut encoder)?;
         self.encode_received(&mut encoder)?;
         self.encode_processes(&mut encoder)
@@ -142,6 +145,44 @@ impl Snapshot {
         gauge(encoder, "up", "1 while a run works, else 0.", self.is_up)?;
         let help = "Scans that were published and have no pose yet.";
         gauge(encoder, "scans_in_flight", help, counts.in_flight)
+    }
+
+    /// Encodes what the motions rest on, and the part of gyro and wheels.
+    fn encode_witnesses(&self, encoder: &mut DescriptorEncoder<'_>) -> fmt::Result {
+        let counts = &self.counts.witnesses;
+        let by_basis = Basis::ALL.iter().zip(counts.by_basis);
+        let by_basis: Vec<_> = by_basis
+            .map(|(basis, count)| (basis.name(), count))
+            .collect();
+        let gyro = [("used", counts.gyro_used), ("refused", counts.gyro_refused)];
+        let wheels = [("used", counts.wheels_used), ("slip", counts.wheel_slips)];
+        let families = [
+            (
+                "motions",
+                "Motions by what they rest on.",
+                "basis",
+                by_basis,
+            ),
+            (
+                "gyro_turns",
+                "Turns that the gyro has measured: used, or refused since the radar contradicts.",
+                "state",
+                gyro.to_vec(),
+            ),
+            (
+                "wheel_distances",
+                "Distances that the wheels have measured: used, or slipping.",
+                "state",
+                wheels.to_vec(),
+            ),
+        ];
+        for (name, help, label, values) in families {
+            let mut family = encoder.encode_descriptor(name, help, None, MetricType::Counter)?;
+            for (value, count) in values {
+                ConstCounter::new(count).encode(family.encode_family(&[(label, value)])?)?;
+            }
+        }
+        Ok(())
     }
 
     fn encode_missed(&self, encoder: &mut DescriptorEncoder<'_>) -> fmt::Result {
@@ -237,7 +278,7 @@ impl Snapshot {
 
 #[cfg(test)]
 mod tests {
-    use gyre_messages::{Hop, Item, StageId};
+    use gyre_messages::{Hop, Item, PoseHeader, StageId, flag, gyro, outcome, wheels};
     use gyre_stage::source::Received;
 
     use super::*;
@@ -328,6 +369,30 @@ mod tests {
             "gyre_radar_foreign_messages_total 0",
             "gyre_radar_reconnections_total 7",
             "gyre_radar_receiving 1",
+        ] {
+            assert!(text.lines().any(|it| it == line), "{line}: {text}");
+        }
+    }
+
+    #[test]
+    fn motions_are_counted_by_what_they_rest_on() {
+        let view = view();
+        let mut pose = PoseHeader::default();
+        let record = &mut pose.motion.refinement;
+        (record.outcome, record.gyro, record.wheels) =
+            (outcome::PREDICTED, gyro::REFUSED, wheels::USED);
+        view.add_to_track(&pose);
+        // The first pose of a chain is that of no motion.
+        pose.item.flags = flag::BREAK;
+        view.add_to_track(&pose);
+        let (_, text) = scrape(&view, b"text/plain");
+        for line in [
+            "gyre_motions_total{basis=\"dead reckoning\"} 1",
+            "gyre_motions_total{basis=\"radar only\"} 0",
+            "gyre_gyro_turns_total{state=\"refused\"} 1",
+            "gyre_gyro_turns_total{state=\"used\"} 0",
+            "gyre_wheel_distances_total{state=\"used\"} 1",
+            "gyre_wheel_distances_total{state=\"slip\"} 0",
         ] {
             assert!(text.lines().any(|it| it == line), "{line}: {text}");
         }

@@ -9,7 +9,7 @@ use std::{
 };
 
 use axum::{body::Bytes, extract::ws::Utf8Bytes};
-use gyre_messages::PoseHeader;
+use gyre_messages::{PoseHeader, RefinementRecord, WitnessCounts, flag};
 use gyre_stage::{Manifest, clock, control::Status};
 use serde::Serialize;
 use tokio::sync::watch;
@@ -25,6 +25,8 @@ use crate::{
     track::{Cursor, Track, Vertex},
 };
 
+/// Motions whose part of gyro and wheels the page says: those of ten seconds at 4 Hz.
+const LAST_MOTIONS: usize = 40;
 /// Poses that are kept to find that of a scan whose points come later.
 const RECENT: usize = 256;
 
@@ -65,6 +67,7 @@ struct ViewState {
     delays: Delays,
     latest: Option<CurrentPose>,
     counts: RunCounts,
+    last_motions: VecDeque<RefinementRecord>,
     /// The numbers and poses of the last scans.
     recent: VecDeque<(u64, [f64; 3])>,
     /// Points that wait for the pose of their scan.
@@ -167,6 +170,9 @@ impl RunView {
         let mut state = self.state();
         state.track.add(pose);
         state.drift.add(pose);
+        if !pose.item.is(flag::BREAK) {
+            state.counts.witnesses.add(&pose.motion.refinement);
+        }
     }
 
     /// Shows a pose, unless it was shown before: an observer that attaches again receives the last
@@ -186,6 +192,12 @@ impl RunView {
         // The supervisor is asked once a second.
         let with_pose = state.counts.poses + state.counts.dropped;
         state.counts.published = state.counts.published.max(with_pose);
+        if !pose.item.is(flag::BREAK) {
+            state.last_motions.push_back(pose.motion.refinement);
+        }
+        if state.last_motions.len() > LAST_MOTIONS {
+            state.last_motions.pop_front();
+        }
         let (seq, place) = (pose.item.seq, [pose.x_m, pose.y_m, pose.yaw_rad]);
         state.recent.push_back((seq, place));
         if state.recent.len() > RECENT {
@@ -259,6 +271,7 @@ impl RunView {
             scans_per_s,
             distance_m: state.track.length_m(),
             delays: state.delays.report(now_ns),
+            others: WitnessCounts::of(&state.last_motions).in_words(),
             notice: state.notice.clone(),
             processes: state.processes.clone(),
         };

@@ -1,6 +1,6 @@
 //! Faults in the samples of a gyro and of wheels: each leaves the motions as they were, or is
-//! counted and named in what a run says of its samples and motions. The faults last for a sweep or
-//! more.
+//! counted and named in what a run says of its samples and motions. One kind of faults lasts for a
+//! sweep or more, the other for less: a third for one sample, a third for up to five.
 
 use std::collections::BTreeMap;
 
@@ -129,6 +129,8 @@ impl Drive {
             let refined = refiner.refine(k as u64, later, earlier, &scan.searched, interval_s);
             motions.push(xy_yaw(&refined.motion.motion).map(f64::to_bits));
             *counts.entry("turns").or_default() += u32::from(refined.gyro.is_some());
+            *counts.entry("refused").or_default() +=
+                u32::from(refined.gyro.is_some_and(|it| it.refused));
             *counts.entry("distances").or_default() += u32::from(refined.wheels.is_some());
             *counts.entry("slips").or_default() +=
                 u32::from(refined.wheels.is_some_and(|it| it.slip));
@@ -196,11 +198,33 @@ const KINDS: [&str; 7] = [
     "unit",
 ];
 
-/// Puts a fault of a kind into a log whose rows are of a gyro or of wheels.
-fn spoil(rows: &mut Vec<Row>, kind: &str, is_gyro: bool, numbers: &mut Numbers) {
-    // From the time of a sweep on: of shorter ones docs/fusion.md says what is not noticed.
-    let [least, more] = if is_gyro { [26, 94] } else { [13, 47] };
-    let count = least + numbers.below(more);
+/// Samples of a sweep.
+const SWEEP: [usize; 2] = [26, 13];
+
+/// How long faults last.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Length {
+    /// For a sweep or more.
+    Long,
+    /// For less than a sweep.
+    Short,
+}
+
+impl Length {
+    /// Draws a number of samples of a gyro (0) or of wheels (1).
+    fn draw(self, sensor: usize, seed: u64, numbers: &mut Numbers) -> usize {
+        let sweep = SWEEP[sensor];
+        match (self, seed / 14 % 3) {
+            (Self::Long, _) => sweep + numbers.below(94 / (1 + sensor)),
+            (Self::Short, 0) => 1,
+            (Self::Short, 1) => 1 + numbers.below(5),
+            (Self::Short, _) => 1 + numbers.below(sweep - 1),
+        }
+    }
+}
+
+/// Puts a fault of a kind into so many rows of a log, which is of a gyro or of wheels.
+fn spoil(rows: &mut Vec<Row>, kind: &str, is_gyro: bool, count: usize, numbers: &mut Numbers) {
     let from = numbers.below(rows.len() - count);
     let stretch = from..from + count;
     match kind {
@@ -235,7 +259,7 @@ fn spoil(rows: &mut Vec<Row>, kind: &str, is_gyro: bool, numbers: &mut Numbers) 
 }
 
 /// Draws so many faults, and checks that each that changes a motion is named.
-fn faults(count: u64, scans: usize) {
+fn faults(count: u64, scans: usize, length: Length) {
     let drive = Drive::new(scans);
     let rows = |samples: &[Sample]| samples.iter().map(Row::of).collect::<Vec<_>>();
     let logs = [rows(&drive.gyro), rows(&drive.wheels)];
@@ -248,12 +272,9 @@ fn faults(count: u64, scans: usize) {
         let kind = KINDS[(seed as usize) % KINDS.len()];
         let is_gyro = (seed as usize / KINDS.len()).is_multiple_of(2);
         let mut spoilt = logs.clone();
-        spoil(
-            &mut spoilt[usize::from(!is_gyro)],
-            kind,
-            is_gyro,
-            &mut numbers,
-        );
+        let sensor = usize::from(!is_gyro);
+        let samples = length.draw(sensor, seed, &mut numbers);
+        spoil(&mut spoilt[sensor], kind, is_gyro, samples, &mut numbers);
         let ran = drive.run(&spoilt[0], &spoilt[1]);
         let verdict = match (ran.motions == good.motions, ran.named == good.named) {
             (true, _) => 0,
@@ -263,20 +284,27 @@ fn faults(count: u64, scans: usize) {
         let sensor = if is_gyro { "gyro" } else { "wheels" };
         of_kind.entry(format!("{sensor}, {kind}")).or_default()[verdict] += 1;
         if verdict == 2 {
-            silent.push(format!("seed {seed}: {sensor}, {kind}"));
+            silent.push(format!("seed {seed}: {sensor}, {kind}, {samples} samples"));
         }
     }
-    println!("unchanged, named, silent: {of_kind:#?}");
+    println!("{length:?}, unchanged, named, silent: {of_kind:#?}");
     assert!(silent.is_empty(), "change motions silently: {silent:#?}");
 }
 
 #[test]
 fn no_fault_of_samples_changes_a_motion_silently() {
-    faults(28, 16);
+    faults(28, 16, Length::Long);
+    faults(42, 16, Length::Short);
 }
 
 #[test]
 #[ignore = "nightly: 300 faults, each with the refinement of 40 scans"]
 fn no_fault_of_many_changes_a_motion_silently() {
-    faults(308, 40);
+    faults(308, 40, Length::Long);
+}
+
+#[test]
+#[ignore = "nightly: 308 faults, each with the refinement of 40 scans"]
+fn no_short_fault_of_many_changes_a_motion_silently() {
+    faults(308, 40, Length::Short);
 }

@@ -4,11 +4,13 @@
 //! - `table`: tables as CSV; `columns`: which of their columns are what;
 //! - `twist`: the files of RADIATE, one for each sample;
 //! - [`SampleTrack`]: its samples in the vehicle's axes on the radar's clock;
-//! - `faults`: what is wrong with the samples, and which of them are left out.
+//! - `faults`: what is wrong with the samples, and which of them are left out; `jumps`: which of
+//!   them change faster than a vehicle can.
 
 pub(crate) mod columns;
 mod error;
 pub(crate) mod faults;
+mod jumps;
 pub(crate) mod table;
 mod track;
 mod twist;

@@ -124,7 +124,7 @@ impl ScanSamples {
     }
 
     fn of_track(
-        track: SampleTrack,
+        mut track: SampleTrack,
         (of, path): (SampleKind, &Path),
         faults: &LogFaults,
         dataset: &dyn Dataset,
@@ -142,7 +142,9 @@ impl ScanSamples {
             });
         }
         let named = |sentence| format!("{}: {sentence}", path.display());
-        let faults = faults.sentences().into_iter().map(named).collect();
+        let jumps = track.leave_out_jumps(of);
+        let faults = faults.sentences().into_iter().chain(jumps);
+        let faults = faults.map(named).collect();
         Ok(Self::Log { track, faults })
     }
 

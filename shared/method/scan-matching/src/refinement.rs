@@ -12,8 +12,11 @@
 //! - `alignment`, `normal_equations`: Gauss-Newton with a line search;
 //! - `tracker`: the last poses, what is predicted from them, and which poses a vehicle can have
 //!   reached;
+//! - `witnesses`: what gyro and wheels say of a motion, against what the radar says;
 //! - `heading`: with a gyro, the heading and the gyro's bias;
 //! - `wheels`: with wheels, their scale, and the motions of scans that match nothing;
+//! - `along_walls`: the way where nothing but other sensors tells how far it is; `structure`: where
+//!   that is so;
 //! - `uncertainty`: covariances, and the shares of them that accumulate;
 //! - `standstill`: the pose of a standing vehicle is held;
 //! - [`Submap`]: the points of a keyframe and of those around it;
@@ -21,6 +24,7 @@
 //!   time.
 
 mod alignment;
+mod along_walls;
 mod config;
 mod heading;
 mod initial_guess;
@@ -36,6 +40,7 @@ mod submap;
 mod tracker;
 mod uncertainty;
 mod wheels;
+mod witnesses;
 
 pub use config::{RefinementConfig, RefinementKind};
 use gyre_geometry::{OdometryMotion, Pose, SparsePoint, Twist, UncertainMotion};
@@ -52,15 +57,12 @@ pub use wheels::{WheelScale, WheelState};
 
 use crate::ConfigError;
 use alignment::Alignment;
-use heading::PredictedTurn;
 use local_map::LocalMap;
 use points::DeskewedPoints;
 use registration::{Candidate, Registration, Scan};
 use standstill::{Estimate, Report};
-use structure::WeakestDirection;
 use tracker::Step;
 use uncertainty::Uncertainty;
-use wheels::{PredictedDistance, Registered};
 
 /// After this many doubtful scans in a row a plausible match is accepted.
 const MAX_DOUBTFUL: u32 = 2;
@@ -116,6 +118,8 @@ pub struct Refiner {
     map: LocalMap,
     state: TrackerState,
     points: DeskewedPoints,
+    /// Those of a match that may be taken instead.
+    other_points: DeskewedPoints,
     azimuth_variance_rad2: f64,
     turn: Option<GyroTurn>,
     distance: Option<WheelDistance>,
@@ -135,6 +139,7 @@ impl Refiner {
             wheels: WheelsConfig::default(),
             state: TrackerState::default(),
             points: DeskewedPoints::with_capacity(capacity),
+            other_points: DeskewedPoints::with_capacity(capacity),
             azimuth_variance_rad2: 0.0,
             turn: None,
             distance: None,
@@ -188,7 +193,7 @@ impl Refiner {
     ) -> Refined {
         // Stamps that do not advance give no velocity: a second is assumed.
         let interval_s = if interval_s > 0.0 { interval_s } else { 1.0 };
-        let scan = Scan {
+        let mut scan = Scan {
             id: scan,
             points: later,
             searched: self.state.pose * searched,
@@ -199,11 +204,12 @@ impl Refiner {
             },
         };
         let predictions = self.ensure_map(&scan, earlier);
+        let best = self.best_match(&mut scan);
         let uncertainty =
             Uncertainty::before(&scan, &self.map, &self.state, predictions, &self.config);
-        let best = self.registration(&scan).best();
         let accepted = self.accept_or_predict(&scan, &best, &uncertainty);
         let outcome = accepted.outcome;
+        let gyro = self.turn.and(self.state.heading);
         let wheels = self.distance.and(self.state.wheels);
         let report = self.hold_standstill(&scan, &accepted);
         self.update(&scan, &best, outcome, &accepted.pose.motion);
@@ -223,7 +229,7 @@ impl Refiner {
             },
             outcome,
             stationary: report.stationary,
-            gyro: scan.step.turn.and(self.state.heading).map(|it| it.bias()),
+            gyro: gyro.map(|it| it.bias()),
             wheels: wheels.map(|it| it.known()),
         }
     }
@@ -286,31 +292,6 @@ impl Refiner {
         self.insert_keyframe(id, earlier, &pose, &twist);
     }
 
-    /// Predicts the turn since the scan before by the gyro, if that has measured it.
-    fn predict_turn(&mut self, interval_s: f64) -> Option<PredictedTurn> {
-        let Some(turn) = self.turn else {
-            let heading = self.state.heading.iter_mut();
-            heading.for_each(|heading| heading.wait(interval_s, &self.gyro));
-            return None;
-        };
-        let heading = self.state.heading.get_or_insert(Heading::new(&self.gyro));
-        Some(heading.predict(&turn, &self.gyro))
-    }
-
-    /// Predicts the distance since the scan before by the wheels, if those have measured it and do
-    /// not slip.
-    fn predict_distance(&mut self, interval_s: f64) -> Option<PredictedDistance> {
-        let measured = self.distance;
-        if measured.is_some() {
-            self.state
-                .wheels
-                .get_or_insert(WheelState::new(&self.wheels));
-        }
-        let wheels = self.state.wheels.as_mut()?;
-        wheels.wait(interval_s, &self.wheels);
-        wheels.predict(&measured?, &self.wheels)
-    }
-
     fn registration<'a>(&'a mut self, scan: &'a Scan<'a>) -> Registration<'a> {
         Registration {
             scan,
@@ -354,63 +335,6 @@ impl Refiner {
         }
     }
 
-    /// Returns the pose of the best match with the covariance of its motion; `None` where it is not
-    /// plausible. Beside it the direction in which nothing determines the place, if there is one:
-    /// there the predicted place is taken, which has to be plausible instead.
-    fn plausible_match(
-        &mut self,
-        scan: &Scan<'_>,
-        best: &Candidate,
-        uncertainty: &Uncertainty,
-    ) -> Option<(UncertainMotion, Option<UnitVector2<f64>>)> {
-        let registered = self.registered(&best.alignment)?;
-        let along = self.undetermined(scan, &best.alignment, &registered);
-        let Some(along) = along.filter(|_| best.fits) else {
-            return best.is_plausible.then_some((registered, None));
-        };
-        let [predicted, _] = self.state.predict(&scan.step);
-        let apart = predicted.translation.vector - best.alignment.pose.translation.vector;
-        let mut initial = best.alignment.pose;
-        initial.translation.vector += along.into_inner() * along.dot(&apart);
-        let mut registration = self.registration(scan);
-        let alignment = registration.align_across(&initial, along);
-        if !registration.is_reachable(&alignment.pose, best.support) {
-            return None;
-        }
-        let registered = self.registered(&alignment)?;
-        Some((self.slid(scan, registered, along, uncertainty), Some(along)))
-    }
-
-    /// Returns the direction along the axes of the map in which the place of a registered pose is
-    /// undetermined, if there is one. In one that is doubtful the wheels decide.
-    fn undetermined(
-        &self,
-        scan: &Scan<'_>,
-        alignment: &Alignment,
-        registered: &UncertainMotion,
-    ) -> Option<UnitVector2<f64>> {
-        let weakest = WeakestDirection::of(&self.map, &self.points, alignment)?;
-        let contradicts = || match (&self.distance, &self.state.wheels) {
-            (Some(measured), Some(wheels)) if scan.step.distance.is_some() => {
-                !wheels.agrees(measured, &self.driven(registered))
-            }
-            _ => false,
-        };
-        let is_undetermined = weakest.is_undetermined()
-            || (weakest.is_doubtful() && (self.state.sliding > 0 || contradicts()));
-        is_undetermined.then_some(weakest.along)
-    }
-
-    /// Returns the part along the path of the motion to a registered pose.
-    fn driven(&self, registered: &UncertainMotion) -> Registered {
-        let motion = UncertainMotion {
-            motion: self.state.pose.inv_mul(&registered.motion),
-            ..*registered
-        };
-        let drift_share = uncertainty::drift_share(self.map.len(), &self.config);
-        Registered::of(&motion, drift_share, &self.wheels)
-    }
-
     /// Returns the pose of an alignment with the covariance of the motion to it; `None` if the
     /// points do not determine it.
     fn registered(&self, alignment: &Alignment) -> Option<UncertainMotion> {
@@ -421,45 +345,6 @@ impl Refiner {
             covariance: covariance
                 + uncertainty::by_azimuths(alignment, self.azimuth_variance_rad2),
         })
-    }
-
-    /// Returns a registered pose with the covariance that the prediction has in a direction in
-    /// which nothing else tells the place: by the wheels, or at constant velocity.
-    fn slid(
-        &self,
-        scan: &Scan<'_>,
-        registered: UncertainMotion,
-        along: UnitVector2<f64>,
-        uncertainty: &Uncertainty,
-    ) -> UncertainMotion {
-        let sliding = match scan.step.distance {
-            Some(_) => 0,
-            None => self.state.sliding,
-        };
-        let along = self.state.pose.rotation.inverse() * along.into_inner();
-        let variance = uncertainty.of_sliding(along, sliding);
-        // The error of the prediction accumulates whole.
-        let drift_share = uncertainty::drift_share(self.map.len(), &self.config);
-        let covariance = registered.covariance;
-        UncertainMotion {
-            covariance: uncertainty::with_variance(
-                &covariance,
-                along.push(0.0),
-                variance / drift_share,
-            ),
-            ..registered
-        }
-    }
-
-    /// Takes a scan whose place along the walls is the predicted one.
-    fn slide(&mut self, scan: &Scan<'_>) {
-        match (self.distance, scan.step.distance, &mut self.state.wheels) {
-            (Some(measured), Some(_), Some(wheels)) => {
-                wheels.slide(&measured);
-                self.state.sliding = 0;
-            }
-            _ => self.state.sliding = self.state.sliding.saturating_add(1),
-        }
     }
 
     /// Returns the predicted pose and the covariance of its motion.
@@ -487,50 +372,26 @@ impl Refiner {
         }
     }
 
-    /// Compares a registered pose with the distance of the wheels, if there is one: they slip where
-    /// it disagrees. Returns false if they are believed instead, since the match is not certain.
-    fn weigh_distance(
-        &mut self,
-        scan: &Scan<'_>,
-        registered: &UncertainMotion,
-        is_certain: bool,
-    ) -> bool {
-        let registered = self.driven(registered);
-        let Some(wheels) = &mut self.state.wheels else {
-            return true;
-        };
-        match &self.distance {
-            Some(measured) if wheels.agrees(measured, &registered) => {
-                wheels.correct(measured, &registered);
-            }
-            Some(_) if scan.step.distance.is_some() && !is_certain => return false,
-            measured => {
-                let slips = measured.is_some() || wheels.slips;
-                wheels.adopt(&registered, slips);
-            }
-        }
-        true
-    }
-
-    /// Weighs the heading of a registered pose against that of the gyro, if there is one.
-    fn with_gyro_heading(
-        &mut self,
-        scan: &Scan<'_>,
-        registered: UncertainMotion,
-    ) -> UncertainMotion {
-        let Some(heading) = &mut self.state.heading else {
-            return registered;
-        };
-        let Some(turn) = scan.step.turn else {
-            return heading.adopt(&registered, &self.state.pose);
-        };
-        let drift_share = uncertainty::drift_share(self.map.len(), &self.config);
-        heading.weigh(&registered, &self.state.pose, &turn, drift_share)
-    }
-
     /// Returns whether the scan overlaps the map well, has enough points, and agrees with the
     /// search, but for a direction in which neither can tell.
     fn is_firm(
+        &self,
+        scan: &Scan<'_>,
+        best: &Candidate,
+        undetermined: Option<UnitVector2<f64>>,
+    ) -> bool {
+        self.fits_firmly(best) && self.agrees_with_search(scan, best, undetermined)
+    }
+
+    /// Returns whether the scan overlaps the map well and has enough points.
+    fn fits_firmly(&self, best: &Candidate) -> bool {
+        best.overlap >= self.config.firm_overlap * self.state.mean_overlap
+            && best.support >= self.config.min_support
+    }
+
+    /// Returns whether the motion is about that of the search, but for a direction in which neither
+    /// can tell.
+    fn agrees_with_search(
         &self,
         scan: &Scan<'_>,
         best: &Candidate,
@@ -543,9 +404,7 @@ impl Refiner {
             let shift = &mut apart.translation.vector;
             *shift -= along * along.dot(shift);
         }
-        best.overlap >= config.firm_overlap * self.state.mean_overlap
-            && best.support >= config.min_support
-            && apart.translation.vector.norm() <= config.search_agrees_m
+        apart.translation.vector.norm() <= config.search_agrees_m
             && apart.rotation.angle().abs() <= config.search_agrees_deg.to_radians()
     }
 

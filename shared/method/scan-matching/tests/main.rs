@@ -11,6 +11,7 @@ mod hostile_input;
 mod known_motions;
 mod refinement;
 mod refinement_faults;
+mod refinement_gyro;
 mod refinement_wheels;
 mod slow_sweeps;
 mod tunnel;

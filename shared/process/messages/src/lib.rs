@@ -23,6 +23,7 @@
 //! Reading order: `item`, `limits`, `message` (the contract of a message type), `check` (its
 //! enforcement), one file per message, `topics`.
 
+mod basis;
 mod block;
 mod check;
 mod closed_loop;
@@ -44,6 +45,7 @@ mod rotation;
 mod scan;
 mod topics;
 
+pub use basis::{Basis, WitnessCounts};
 pub use block::{ByteBlock, FloatBlock};
 pub use check::Violation;
 pub use closed_loop::{Loop, LoopHeader};
@@ -60,7 +62,7 @@ pub use numbering::{GivenAnew, NumberedBy};
 pub use objects::{Objects, ObjectsHeader};
 pub use pose::{Pose, PoseHeader};
 pub use refined::Refined;
-pub use refinement::{RefinementRecord, initial_guess, outcome, wheels};
+pub use refinement::{RefinementRecord, gyro, initial_guess, outcome, wheels};
 pub use rotation::{Rotation, RotationEstimate, RotationHeader};
 pub use scan::{Scan, ScanHeader};
 pub use topics::{Footprint, Topic, WireType, topic, topics};

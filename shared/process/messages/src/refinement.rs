@@ -32,6 +32,16 @@ pub mod initial_guess {
     pub const ALONG_WALLS: u32 = 4;
 }
 
+/// Values of [`RefinementRecord::gyro`].
+pub mod gyro {
+    /// It has not measured the turn.
+    pub const NONE: u64 = 0;
+    /// It agrees with the registered motion, or the motion is predicted with its turn.
+    pub const USED: u64 = 1;
+    /// It contradicts the registered motion, or has contradicted the last one: it is not used.
+    pub const REFUSED: u64 = 2;
+}
+
 /// Values of [`RefinementRecord::wheels`].
 pub mod wheels {
     /// They have not measured the distance.
@@ -57,7 +67,7 @@ pub struct RefinementRecord {
     pub support: f64,
     /// 1 while the vehicle stands, and its pose is held: the motion is zero. Otherwise 0.
     pub stationary: u64,
-    /// 1 if the gyro has measured the turn.
+    /// The part of the gyro: see [`gyro`].
     pub gyro: u64,
     /// Bias of the gyro after the scan, rad/s; zero without one.
     pub gyro_bias_radps: f64,
@@ -97,7 +107,7 @@ impl RefinementRecord {
             self.stationary,
             "0 or 1",
         )?;
-        require(self.gyro <= 1, "gyro", self.gyro, "0 or 1")?;
+        require(self.gyro <= gyro::REFUSED, "gyro", self.gyro, "0 to 2")?;
         require(self.wheels <= wheels::SLIP, "wheels", self.wheels, "0 to 2")?;
         finite([
             ("overlap", self.overlap),
@@ -127,7 +137,11 @@ impl From<&gyre_scan_matching::Refined> for RefinementRecord {
             overlap: refined.overlap,
             support: refined.support,
             stationary: refined.stationary.into(),
-            gyro: refined.gyro.is_some().into(),
+            gyro: match refined.gyro {
+                None => gyro::NONE,
+                Some(of) if of.refused => gyro::REFUSED,
+                Some(_) => gyro::USED,
+            },
             gyro_bias_radps: refined.gyro.map_or(0.0, |bias| bias.rate_radps),
             gyro_bias_sigma_radps: refined.gyro.map_or(0.0, |bias| bias.sigma_radps),
             wheels: match refined.wheels {

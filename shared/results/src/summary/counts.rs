@@ -1,6 +1,6 @@
 //! Counts of scans and motions.
 
-use gyre_messages::{Item, MotionEstimate, PoseHeader, flag, initial_guess, outcome, wheels};
+use gyre_messages::{Item, MotionEstimate, PoseHeader, flag, gyro, initial_guess, outcome, wheels};
 use serde::Serialize;
 
 /// Largest share of unreadable scans of a run that succeeds. With more, motions span more than one
@@ -73,6 +73,9 @@ impl LostCounts {
 pub struct GyroCounts {
     /// Motions whose turn it measured; the others are those of the radar alone.
     pub motions: u64,
+    /// Those in which it was not used: the turn was another one than that of the radar, or had last
+    /// been.
+    pub refused: u64,
     /// Bias after the last of them, rad/s.
     pub bias_radps: f64,
     /// Standard deviation of that bias, rad/s.
@@ -82,8 +85,9 @@ pub struct GyroCounts {
 impl GyroCounts {
     fn add(&mut self, motion: &MotionEstimate) {
         let refinement = &motion.refinement;
-        if refinement.gyro == 1 {
+        if refinement.gyro != gyro::NONE {
             self.motions += 1;
+            self.refused += u64::from(refinement.gyro == gyro::REFUSED);
             self.bias_radps = refinement.gyro_bias_radps;
             self.bias_sigma_radps = refinement.gyro_bias_sigma_radps;
         }

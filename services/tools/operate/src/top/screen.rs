@@ -48,7 +48,7 @@ fn columns(width: u16) -> Vec<usize> {
 pub fn draw(frame: &mut Frame<'_>, snapshot: &Snapshot) {
     let rows = snapshot.status.processes.len() as u16;
     let [head, latency, table, foot] = Layout::vertical([
-        Constraint::Length(4),
+        Constraint::Length(5),
         Constraint::Max(12),
         Constraint::Length(rows + 3),
         Constraint::Length(1),
@@ -116,7 +116,7 @@ pub fn text(snapshot: &Snapshot, width: u16) -> String {
     lines.join("\n")
 }
 
-fn head_lines(snapshot: &Snapshot) -> [String; 4] {
+fn head_lines(snapshot: &Snapshot) -> [String; 5] {
     let status = &snapshot.status;
     let in_flight = snapshot
         .in_flight
@@ -149,7 +149,20 @@ fn head_lines(snapshot: &Snapshot) -> [String; 4] {
             us(max_us),
             snapshot.latency.scans
         ),
+        witnesses(snapshot),
     ]
+}
+
+/// Returns what the newest motion rests on, and how often gyro and wheels were used.
+fn witnesses(snapshot: &Snapshot) -> String {
+    let basis = snapshot.basis.unwrap_or("no motion");
+    match snapshot.witnesses.in_words() {
+        Some(others) => {
+            let motions = snapshot.witnesses.motions();
+            format!("{basis}: {others} of {motions} motions in 10 s")
+        }
+        None => basis.to_owned(),
+    }
 }
 
 /// Returns what a recorder lacks, if it lacks anything.

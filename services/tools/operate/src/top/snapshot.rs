@@ -6,7 +6,7 @@ use std::{
 };
 
 use gyre_latency::{Latency, LatencyMeter};
-use gyre_messages::{PoseHeader, StageId};
+use gyre_messages::{PoseHeader, StageId, WitnessCounts, flag};
 use gyre_stage::{
     clock,
     control::{Control, Status},
@@ -32,6 +32,9 @@ pub struct Snapshot {
     pub in_flight: Option<u64>,
     /// Of the poses of the last 10 s that were seen.
     pub latency: Latency,
+    /// What those motions rest on, the newest one in words.
+    pub witnesses: WitnessCounts,
+    pub basis: Option<&'static str>,
     /// The usage of each process, in the order of the status.
     pub processes: Vec<Use>,
     /// The longest sensor-to-pose time between two snapshots, us, oldest first.
@@ -120,6 +123,12 @@ impl<'run> Snapshots<'run> {
         self.recent.retain(|pose| published_ns(pose) >= oldest_ns);
         let mut meter = LatencyMeter::default();
         self.recent.iter().for_each(|pose| meter.add(pose));
+        let motions = || {
+            let motions = self.recent.iter().filter(|pose| !pose.item.is(flag::BREAK));
+            motions.map(|pose| &pose.motion.refinement)
+        };
+        let witnesses = WitnessCounts::of(motions());
+        let basis = motions().next_back().map(|motion| motion.basis().name());
         let in_flight = status
             .published
             .map(|published| published.saturating_sub(status.poses + status.dropped));
@@ -146,6 +155,8 @@ impl<'run> Snapshots<'run> {
             rate,
             in_flight,
             latency: meter.latency(),
+            witnesses,
+            basis,
             processes: status.processes.iter().map(|it| used(it.pid)).collect(),
             history: self.history.iter().copied().collect(),
             status,

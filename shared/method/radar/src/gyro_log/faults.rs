@@ -41,6 +41,8 @@ pub struct LogFaults {
     pub by_clock_steps: usize,
     /// Times without samples, of more than three periods.
     pub gaps: Vec<LogGap>,
+    /// Samples that are missing one or two at a time: the value is interpolated.
+    pub bridged: usize,
     /// The header names no unit of the rates: rad/s is assumed.
     pub unit_is_assumed: bool,
 }
@@ -121,6 +123,13 @@ impl LogFaults {
                     gap.after_s
                 )
             }),
+            counted(
+                self.bridged,
+                format!(
+                    "{} samples are missing one or two at a time: interpolated where `max_gap_s` allows it.",
+                    self.bridged
+                ),
+            ),
             self.unit_is_assumed.then(|| {
                 "The header names no unit of the rates: rad/s is assumed; `gyre calibrate` tells deg/s by its scale.".to_owned()
             }),
@@ -201,20 +210,32 @@ pub(crate) fn examine(
     if samples.is_empty() {
         return Err(unusable("it has no samples".to_owned()));
     }
-    faults.gaps = gaps(&samples);
+    (faults.gaps, faults.bridged) = gaps(&samples);
     Ok((samples, faults))
 }
 
-/// Times without samples, of samples in the order of their stamps.
-fn gaps(samples: &[Sample]) -> Vec<LogGap> {
-    let seconds = |from: &Sample, to: &Sample| (to.stamp_ns - from.stamp_ns) as f64 * 1e-9;
-    let pairs = || samples.windows(2).map(|pair| (&pair[0], &pair[1]));
-    let period_s = median(pairs().map(|(a, b)| seconds(a, b))).unwrap_or_default();
-    pairs()
-        .filter(|(a, b)| seconds(a, b) > GAP_PERIODS * period_s)
-        .map(|(a, b)| LogGap {
-            after_s: seconds(&samples[0], a),
-            seconds: seconds(a, b),
-        })
-        .collect()
+/// Times without samples, of samples in the order of their stamps, and the number of samples that
+/// are missing one or two at a time.
+fn gaps(samples: &[Sample]) -> (Vec<LogGap>, usize) {
+    let seconds = |from: usize, to: usize| {
+        let [from, to] = [from, to].map(|k| samples.get(k).map(|it| it.stamp_ns));
+        from.zip(to).map(|(from, to)| (to - from) as f64 * 1e-9)
+    };
+    let steps = || (0..samples.len()).filter_map(|k| Some((k, seconds(k, k + 1)?)));
+    let period_s = median(steps().map(|(_, step_s)| step_s)).unwrap_or_default();
+    let (gaps, short): (Vec<_>, Vec<_>) = steps().partition(|it| it.1 > GAP_PERIODS * period_s);
+    let missing = |(k, step_s): (usize, f64)| {
+        let missing = (step_s / period_s - 1.0).round();
+        // A stamp that jitters is as much nearer to the sample on its other side.
+        let before = k.checked_sub(1).and_then(|before| seconds(before, k + 1));
+        let mut around = before.into_iter().chain(seconds(k, k + 2));
+        let is_missing = around.all(|around_s| around_s > (missing + 1.5) * period_s);
+        if is_missing { missing as usize } else { 0 }
+    };
+    let bridged = short.into_iter().map(missing).sum();
+    let gaps = gaps.into_iter().map(|(k, step_s)| LogGap {
+        after_s: seconds(0, k).unwrap_or_default(),
+        seconds: step_s,
+    });
+    (gaps.collect(), bridged)
 }

@@ -1,8 +1,8 @@
 //! Samples of a log on the radar's clock.
 
-use gyre_samples::{GyroConfig, Sample};
+use gyre_samples::{GyroConfig, Sample, SampleKind};
 
-use super::GyroLog;
+use super::{GyroLog, jumps};
 
 /// Samples in the vehicle's axes on the radar's clock, in the order in which they travel
 /// ([`Sample::order`]).
@@ -20,6 +20,12 @@ impl SampleTrack {
     /// Takes samples that are on the radar's clock, in their order.
     pub(crate) fn of(samples: impl Iterator<Item = Sample>) -> Self {
         Self(samples.collect())
+    }
+
+    /// Leaves out samples of a kind, which all of its samples are of, that jump away from those
+    /// around them faster than a vehicle can. Returns a sentence about jumps, if there are any.
+    pub(crate) fn leave_out_jumps(&mut self, kind: SampleKind) -> Option<String> {
+        jumps::leave_out(&mut self.0, kind).sentence()
     }
 
     /// Returns the samples of both tracks.

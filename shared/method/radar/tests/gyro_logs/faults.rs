@@ -97,7 +97,8 @@ proptest! {
             Fault::CutOff(_) => [0, 0, 0, 0, 1],
         };
         prop_assert_eq!(counted, one);
-        prop_assert_eq!(log.faults.sentences().is_empty(), counted == [0; 5]);
+        prop_assert_eq!(faults.bridged, usize::from(lost.is_some()));
+        prop_assert!(!faults.sentences().is_empty());
     }
 
     /// Whatever a file holds, reading it ends with samples in the order of their stamps, which are
@@ -131,6 +132,24 @@ fn gaps_are_told_with_the_longest() {
     assert!((log.faults.longest_gap_s() - 0.81).abs() < 1e-9);
     let sentence = "Samples are missing in 2 places, for up to 0.81 s (2.0 s after the first).";
     assert_eq!(log.faults.sentences(), [sentence]);
+}
+
+#[test]
+fn single_samples_that_are_missing_are_counted_and_stamps_that_jitter_are_not_taken_for_them() {
+    let bridged = |stamp_ms: &dyn Fn(i64) -> Option<i64>| {
+        let rows = (0..300).filter_map(|k| Some((START_NS + stamp_ms(k)? * MS, 0.0)));
+        let log = read("imu.csv", &text(&rows.collect::<Vec<_>>())).unwrap();
+        assert!(log.faults.gaps.is_empty(), "{:?}", log.faults);
+        log.faults.bridged
+    };
+    assert_eq!(bridged(&|k| Some(10 * k)), 0);
+    assert_eq!(bridged(&|k| (k % 50 != 7).then_some(10 * k)), 6);
+    assert_eq!(bridged(&|k| (k % 50 / 2 != 7).then_some(10 * k)), 12);
+    // Each tenth stamp is late, or early, by most of a period.
+    for off_ms in [-8, 8] {
+        let jittered = |k: i64| Some(10 * k + if k % 10 == 5 { off_ms } else { 0 });
+        assert_eq!(bridged(&jittered), 0, "{off_ms}");
+    }
 }
 
 #[test]

@@ -10,6 +10,8 @@ use gyre_geometry::{Pose, UncertainMotion, pose, wrap_angle, xy_yaw};
 use gyre_samples::{GyroConfig, GyroTurn};
 use nalgebra::{Matrix4, RowVector4, Vector4};
 
+use super::uncertainty::GATE;
+
 /// Standard deviation of the lean, rad, and the time over which it changes, s. On simulated roads
 /// 2.5e-4 rad leaves the bias unknown while the vehicle drives.
 const LEAN_SIGMA_RAD: f64 = 1e-4;
@@ -28,6 +30,8 @@ const HEADING: usize = 0;
 const BIAS: usize = 1;
 const LEAN: usize = 2;
 const SCALE: usize = 3;
+/// The part that each has in a registered heading against the predicted one.
+const SEEN: RowVector4<f64> = RowVector4::new(1.0, 0.0, 1.0, 0.0);
 
 /// The bias and the scale of the gyro, and the steady error of the radar.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,6 +44,8 @@ pub struct Heading {
     pub scale: f64,
     /// Covariance of the errors of the heading against the map, the bias, the lean and the scale.
     pub covariance: Matrix4<f64>,
+    /// The last registered heading was another one than that of the gyro.
+    pub refused: bool,
 }
 
 /// The bias of the gyro, as it is known after a scan.
@@ -49,6 +55,8 @@ pub struct GyroBias {
     pub rate_radps: f64,
     /// Standard deviation, rad/s.
     pub sigma_radps: f64,
+    /// The turn contradicts the registered motion, or has last done so: it is not used.
+    pub refused: bool,
 }
 
 /// The heading that the gyro predicts, against the scan before.
@@ -77,6 +85,13 @@ impl PredictedTurn {
             + self.bias_radps2 * grown(self.interval_s, time_s)
             + self.scale_variance * grown(self.yaw_rad, angle_rad)
     }
+
+    /// The registered heading against the predicted one, rad. `previous` is the pose of the scan
+    /// before.
+    fn apart_rad(&self, registered: &UncertainMotion, previous: &Pose) -> f64 {
+        let yaw_rad = registered.motion.rotation.angle();
+        wrap_angle(yaw_rad - previous.rotation.angle() - self.yaw_rad)
+    }
 }
 
 /// By how much the square of a sum grows with a step, at least by the square of that.
@@ -94,6 +109,7 @@ impl Heading {
             lean_rad: 0.0,
             scale: 1.0,
             covariance: Matrix4::from_diagonal(&variances),
+            refused: false,
         }
     }
 
@@ -102,6 +118,7 @@ impl Heading {
         GyroBias {
             rate_radps: self.bias_radps,
             sigma_radps: self.covariance[(BIAS, BIAS)].max(0.0).sqrt(),
+            refused: self.refused,
         }
     }
 
@@ -168,6 +185,18 @@ impl Heading {
         self.covariance[(HEADING, HEADING)] += variance_rad2;
     }
 
+    /// Returns whether a registered heading is as far from the predicted one as noise can bring it.
+    pub(super) fn agrees(
+        &self,
+        registered: &UncertainMotion,
+        previous: &Pose,
+        turn: &PredictedTurn,
+    ) -> bool {
+        let apart_rad = turn.apart_rad(registered, previous) - self.lean_rad;
+        let variance_rad2 = (SEEN * self.covariance * SEEN.transpose())[0];
+        apart_rad.powi(2) <= GATE * (variance_rad2 + registered.covariance[(2, 2)])
+    }
+
     /// Weighs the heading of a pose that was registered with the map against the predicted one. The
     /// place moves along as far as its error depends on that of the heading. `previous` is the pose
     /// of the scan before, `drift_share` the share of the covariance that accumulates.
@@ -180,8 +209,7 @@ impl Heading {
     ) -> UncertainMotion {
         let covariance = registered.covariance;
         let variance_rad2 = covariance[(2, 2)];
-        let yaw_rad = registered.motion.rotation.angle();
-        let apart = wrap_angle(yaw_rad - previous.rotation.angle() - turn.yaw_rad);
+        let apart = turn.apart_rad(registered, previous);
         let step_rad = self.correct(apart, variance_rad2) - apart;
         // The gyro's error accumulates whole.
         let kept = variance_rad2.min(turn.variance_rad2 / drift_share) - variance_rad2;
@@ -195,15 +223,14 @@ impl Heading {
     /// Takes a registered heading that differs by `apart_rad` from the predicted one. Returns the
     /// correction of the predicted one.
     fn correct(&mut self, apart_rad: f64, variance_rad2: f64) -> f64 {
-        let seen = RowVector4::new(1.0, 0.0, 1.0, 0.0);
-        let across = self.covariance * seen.transpose();
-        let gain = across / ((seen * across)[0] + variance_rad2);
+        let across = self.covariance * SEEN.transpose();
+        let gain = across / ((SEEN * across)[0] + variance_rad2);
         let step = gain * (apart_rad - self.lean_rad);
         self.bias_radps += step[BIAS];
         self.lean_rad += step[LEAN];
         self.scale += step[SCALE];
         // Joseph's form stays symmetric and positive.
-        let kept = Matrix4::identity() - gain * seen;
+        let kept = Matrix4::identity() - gain * SEEN;
         self.covariance =
             kept * self.covariance * kept.transpose() + gain * gain.transpose() * variance_rad2;
         step[HEADING]

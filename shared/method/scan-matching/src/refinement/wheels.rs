@@ -7,14 +7,10 @@
 //! used then. Where the radar sees nothing, or little that does not agree, the motion is that of an
 //! arc: as long as the wheels say, turned as the gyro says.
 
-use super::heading::grown;
+use super::{heading::grown, uncertainty::GATE};
 use gyre_geometry::{Pose, Twist, UncertainMotion, pose};
 use gyre_samples::{WheelDistance, WheelsConfig};
 use nalgebra::{Matrix2, Matrix3, RowVector3, Vector2, Vector3};
-
-/// Squared distance between wheels and radar, over its variance, beyond which the wheels slip: four
-/// standard deviations.
-const GATE: f64 = 16.0;
 
 /// The scale of the wheels, and what they were used for.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -12,8 +12,8 @@ const STATE_WORDS: usize = 1 + 3 + TRACKER_WORDS;
 const NAME_WORDS: usize = 2;
 const TRACKER_WORDS: usize = WHEELS + WHEEL_WORDS;
 const STANDSTILL_WORDS: usize = 4 + 4 + 4;
-/// A word that says whether there is one; bias, lean, scale, covariance.
-const HEADING_WORDS: usize = 1 + 3 + 16;
+/// A word that says whether there is one; bias, lean, scale, covariance; whether it was refused.
+const HEADING_WORDS: usize = 1 + 3 + 16 + 1;
 /// A word that says whether there are any; scale, offset, three dead reckonings; both covariances;
 /// whether they slip.
 const WHEEL_WORDS: usize = 1 + 6 + 4 + 9;
@@ -125,6 +125,7 @@ fn heading_words(heading: &Heading) -> [u64; HEADING_WORDS] {
     words[3] = heading.scale.to_bits();
     let covariance = words[4..].iter_mut().zip(&heading.covariance);
     covariance.for_each(|(word, value)| *word = value.to_bits());
+    words[20] = heading.refused.into();
     words
 }
 
@@ -135,6 +136,7 @@ fn heading_from(words: &[u64]) -> Option<Heading> {
         lean_rad: value(2),
         scale: value(3),
         covariance: Matrix4::from_fn(|row, column| value(4 + row + 4 * column)),
+        refused: words[20] == 1,
     })
 }
 

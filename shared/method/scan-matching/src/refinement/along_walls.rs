@@ -1,0 +1,104 @@
+//! Along walls without structure, as in a tunnel: the radar sees where they are, but not how far the
+//! vehicle drives.
+//!
+//! The place along them is the predicted one, by the wheels or at constant velocity, with the
+//! covariance of that; across them and of the heading the radar tells as elsewhere.
+
+use gyre_geometry::UncertainMotion;
+use nalgebra::UnitVector2;
+
+use super::{
+    Refiner,
+    alignment::Alignment,
+    registration::{Candidate, Scan},
+    structure::WeakestDirection,
+    uncertainty::{self, Uncertainty},
+};
+
+impl Refiner {
+    /// Returns the pose of the best match with the covariance of its motion; `None` where it is not
+    /// plausible. Beside it the direction in which nothing determines the place, if there is one:
+    /// there the predicted place is taken, which has to be plausible instead.
+    pub(super) fn plausible_match(
+        &mut self,
+        scan: &Scan<'_>,
+        best: &Candidate,
+        uncertainty: &Uncertainty,
+    ) -> Option<(UncertainMotion, Option<UnitVector2<f64>>)> {
+        let registered = self.registered(&best.alignment)?;
+        let along = self.undetermined(scan, &best.alignment, &registered);
+        let Some(along) = along.filter(|_| best.fits) else {
+            return best.is_plausible.then_some((registered, None));
+        };
+        let [predicted, _] = self.state.predict(&scan.step);
+        let apart = predicted.translation.vector - best.alignment.pose.translation.vector;
+        let mut initial = best.alignment.pose;
+        initial.translation.vector += along.into_inner() * along.dot(&apart);
+        let mut registration = self.registration(scan);
+        let alignment = registration.align_across(&initial, along);
+        if !registration.is_reachable(&alignment.pose, best.support) {
+            return None;
+        }
+        let registered = self.registered(&alignment)?;
+        Some((self.slid(scan, registered, along, uncertainty), Some(along)))
+    }
+
+    /// Returns the direction along the axes of the map in which the place of a registered pose is
+    /// undetermined, if there is one. In one that is doubtful the wheels decide.
+    pub(super) fn undetermined(
+        &self,
+        scan: &Scan<'_>,
+        alignment: &Alignment,
+        registered: &UncertainMotion,
+    ) -> Option<UnitVector2<f64>> {
+        let weakest = WeakestDirection::of(&self.map, &self.points, alignment)?;
+        let contradicts = || match (&self.distance, &self.state.wheels) {
+            (Some(measured), Some(wheels)) if scan.step.distance.is_some() => {
+                !wheels.agrees(measured, &self.driven(registered))
+            }
+            _ => false,
+        };
+        let is_undetermined = weakest.is_undetermined()
+            || (weakest.is_doubtful() && (self.state.sliding > 0 || contradicts()));
+        is_undetermined.then_some(weakest.along)
+    }
+
+    /// Returns a registered pose with the covariance that the prediction has in a direction in
+    /// which nothing else tells the place: by the wheels, or at constant velocity.
+    fn slid(
+        &self,
+        scan: &Scan<'_>,
+        registered: UncertainMotion,
+        along: UnitVector2<f64>,
+        uncertainty: &Uncertainty,
+    ) -> UncertainMotion {
+        let sliding = match scan.step.distance {
+            Some(_) => 0,
+            None => self.state.sliding,
+        };
+        let along = self.state.pose.rotation.inverse() * along.into_inner();
+        let variance = uncertainty.of_sliding(along, sliding);
+        // The error of the prediction accumulates whole.
+        let drift_share = uncertainty::drift_share(self.map.len(), &self.config);
+        let covariance = registered.covariance;
+        UncertainMotion {
+            covariance: uncertainty::with_variance(
+                &covariance,
+                along.push(0.0),
+                variance / drift_share,
+            ),
+            ..registered
+        }
+    }
+
+    /// Takes a scan whose place along the walls is the predicted one.
+    pub(super) fn slide(&mut self, scan: &Scan<'_>) {
+        match (self.distance, scan.step.distance, &mut self.state.wheels) {
+            (Some(measured), Some(_), Some(wheels)) => {
+                wheels.slide(&measured);
+                self.state.sliding = 0;
+            }
+            _ => self.state.sliding = self.state.sliding.saturating_add(1),
+        }
+    }
+}

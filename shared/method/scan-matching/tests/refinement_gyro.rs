@@ -1,0 +1,116 @@
+//! A gyro that contradicts the radar is not used, as long as it does.
+
+use std::ops::Range;
+
+use crate::common::scenes::*;
+use gyre_geometry::{Pose, SparsePoint, pose};
+use gyre_samples::{GyroConfig, GyroTurn};
+use gyre_scan_matching::{Outcome, Refined};
+
+const NOISY: Sensor = Sensor {
+    noise_m: 0.1,
+    offset_m: 0.0,
+    doppler_s: 0.0,
+    hides_doppler: false,
+    seed: 1,
+};
+const SCANS: usize = 60;
+/// Scans at which the gyro is wrong.
+const WRONG: Range<usize> = 30..33;
+
+/// A bend, and its scans.
+fn bend() -> (Drive, Vec<Vec<SparsePoint>>) {
+    let drive = Drive::steady(6.0, 3.0, SCANS);
+    let town = town([[-110.0, 220.0], [-110.0, 160.0]], 1);
+    (drive, scans(&town, &drive, &NOISY))
+}
+
+/// Refines the motions to these scans with a gyro whose rate is off by so much. The search looks for
+/// rotations near that of the gyro, and finds one at the edge of what it looks for.
+fn refine_with(
+    (drive, scans): (&Drive, &[Vec<SparsePoint>]),
+    off_radps: impl Fn(usize) -> f64,
+) -> Vec<Refined> {
+    const REACH_RAD: f64 = 0.07;
+    let mut refiner = refiner().with_gyro(&GyroConfig::default());
+    let refine = |k: usize| {
+        let off_radps = off_radps(k);
+        let rate_radps = drive.yaw_rate_radps + off_radps;
+        refiner.expect_turn(Some(GyroTurn {
+            yaw_rad: rate_radps * SWEEP_S,
+            variance_rad2: 1e-9,
+            interval_s: SWEEP_S,
+            sweep_rate_radps: rate_radps,
+        }));
+        let misled_rad = off_radps * SWEEP_S;
+        let misled_rad = misled_rad - misled_rad.clamp(-REACH_RAD, REACH_RAD);
+        let searched = drive.pose(k - 1).inv_mul(&drive.pose(k)) * pose(0.0, 0.0, misled_rad);
+        refiner.refine(k as u64, &scans[k], &scans[k - 1], &searched, SWEEP_S)
+    };
+    (1..scans.len()).map(refine).collect()
+}
+
+/// The error of the displacement over all scans: m, m, rad.
+fn off(drive: &Drive, refined: &[Refined]) -> Pose {
+    let driven = refined
+        .iter()
+        .fold(Pose::identity(), |at, it| at * it.motion.motion);
+    drive.pose(SCANS - 1).inv_mul(&driven)
+}
+
+/// The scans at which the gyro was refused.
+fn refused(refined: &[Refined]) -> Vec<usize> {
+    let is_refused = |it: &&(usize, &Refined)| it.1.gyro.is_some_and(|gyro| gyro.refused);
+    let scans = (1..).zip(refined);
+    scans
+        .collect::<Vec<_>>()
+        .iter()
+        .filter(is_refused)
+        .map(|it| it.0)
+        .collect()
+}
+
+#[test]
+fn a_gyro_is_refused_exactly_where_it_is_wrong_and_the_path_is_that_of_the_radar() {
+    let (drive, scans) = bend();
+    let good = refine_with((&drive, &scans), |_| 0.0);
+    assert_eq!(refused(&good), [0; 0]);
+    let undisturbed = off(&drive, &good);
+    for off_radps in [-3.0, -0.5, -0.15, 0.15, 0.5, 1.0, 3.0] {
+        let wrong = |k: usize| if WRONG.contains(&k) { off_radps } else { 0.0 };
+        let refined = refine_with((&drive, &scans), wrong);
+        assert_eq!(
+            refused(&refined),
+            WRONG.collect::<Vec<_>>(),
+            "{off_radps} rad/s"
+        );
+        let apart = undisturbed.inv_mul(&off(&drive, &refined));
+        assert!(
+            apart.translation.vector.norm() < 0.15,
+            "{off_radps} rad/s: {apart}"
+        );
+        assert!(
+            apart.rotation.angle().abs() < 4e-3,
+            "{off_radps} rad/s: {apart}"
+        );
+    }
+}
+
+#[test]
+fn a_gyro_that_was_refused_last_does_not_turn_a_blind_vehicle() {
+    let (drive, mut scans) = bend();
+    let blind = WRONG.end..WRONG.end + 4;
+    scans[blind.clone()].fill(Vec::new());
+    let refined = refine_with(
+        (&drive, &scans),
+        |k| if k < WRONG.start { 0.0 } else { 0.5 },
+    );
+    for k in blind {
+        let predicted = &refined[k - 1];
+        assert_eq!(predicted.outcome, Outcome::Predicted);
+        let off_rad = predicted.motion.motion.rotation.angle() - drive.yaw_rate_radps * SWEEP_S;
+        assert!(off_rad.abs() < 0.02, "scan {k}: {off_rad} rad");
+    }
+    let all: Vec<usize> = (WRONG.start..SCANS).collect();
+    assert_eq!(refused(&refined), all);
+}

@@ -1,0 +1,175 @@
+//! What motions rest on: the radar, other sensors, or a guess; and how often the others were used.
+
+use crate::refinement::{RefinementRecord, gyro, initial_guess, outcome, wheels};
+
+/// What a motion rests on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Basis {
+    /// Two scans: there is no refinement, or the chain starts here.
+    ScanToScan,
+    /// The map, without gyro and wheels: there are none, or they are not used.
+    RadarOnly,
+    /// The map, and a gyro or wheels that do not contradict it.
+    RadarAndOthers,
+    /// Walls without structure, and the wheels for the way along them.
+    AlongWalls,
+    /// The same without wheels: the way is that of the motions before.
+    WayGuessed,
+    /// The wheels, since nothing matches: with the turn of a gyro, if there is one.
+    DeadReckoning,
+    /// The motions before, since nothing matches and there are no wheels: with the turn of a gyro,
+    /// if there is one.
+    Guessed,
+}
+
+impl Basis {
+    /// All of them.
+    pub const ALL: [Self; 7] = [
+        Self::ScanToScan,
+        Self::RadarOnly,
+        Self::RadarAndOthers,
+        Self::AlongWalls,
+        Self::WayGuessed,
+        Self::DeadReckoning,
+        Self::Guessed,
+    ];
+
+    /// Returns its name in words.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::ScanToScan => "scan to scan",
+            Self::RadarOnly => "radar only",
+            Self::RadarAndOthers => "radar and others",
+            Self::AlongWalls => "along walls",
+            Self::WayGuessed => "way guessed",
+            Self::DeadReckoning => "dead reckoning",
+            Self::Guessed => "guessed",
+        }
+    }
+}
+
+impl RefinementRecord {
+    /// Returns what the motion rests on.
+    pub fn basis(&self) -> Basis {
+        let by_wheels = self.wheels == wheels::USED;
+        match self.outcome {
+            outcome::SEARCHED => Basis::ScanToScan,
+            outcome::PREDICTED if by_wheels => Basis::DeadReckoning,
+            outcome::PREDICTED => Basis::Guessed,
+            _ if self.initial_guess == initial_guess::ALONG_WALLS => match by_wheels {
+                true => Basis::AlongWalls,
+                false => Basis::WayGuessed,
+            },
+            _ if by_wheels || self.gyro == gyro::USED => Basis::RadarAndOthers,
+            _ => Basis::RadarOnly,
+        }
+    }
+}
+
+/// Counts of motions by what they rest on, and by the part of gyro and wheels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct WitnessCounts {
+    /// Motions by what they rest on, in the order of [`Basis::ALL`].
+    pub by_basis: [u64; Basis::ALL.len()],
+    /// Those whose turn the gyro has measured, and which were made with it.
+    pub gyro_used: u64,
+    /// Those whose turn it has measured, and which contradict it.
+    pub gyro_refused: u64,
+    /// Those whose distance the wheels have measured without slipping.
+    pub wheels_used: u64,
+    /// Those whose distance they have measured slipping.
+    pub wheel_slips: u64,
+}
+
+impl WitnessCounts {
+    /// Counts a motion.
+    pub fn add(&mut self, motion: &RefinementRecord) {
+        self.by_basis[motion.basis() as usize] += 1;
+        self.gyro_used += u64::from(motion.gyro == gyro::USED);
+        self.gyro_refused += u64::from(motion.gyro == gyro::REFUSED);
+        self.wheels_used += u64::from(motion.wheels == wheels::USED);
+        self.wheel_slips += u64::from(motion.wheels == wheels::SLIP);
+    }
+
+    /// Counts all of these.
+    pub fn of<'a>(motions: impl IntoIterator<Item = &'a RefinementRecord>) -> Self {
+        let mut counts = Self::default();
+        motions.into_iter().for_each(|motion| counts.add(motion));
+        counts
+    }
+
+    /// Returns the number of motions.
+    pub fn motions(&self) -> u64 {
+        self.by_basis.iter().sum()
+    }
+
+    /// Returns the part of gyro and wheels in words, as `gyro 98 %, 1 refused, wheels 100 %`; `None`
+    /// where neither has measured anything.
+    pub fn in_words(&self) -> Option<String> {
+        let of = |name, used: u64, (not, count): (&str, u64)| {
+            let share = 100.0 * used as f64 / self.motions().max(1) as f64;
+            let not = match count {
+                0 => String::new(),
+                _ => format!(", {count} {not}"),
+            };
+            (used + count > 0).then(|| format!("{name} {share:.0} %{not}"))
+        };
+        let words = [
+            of("gyro", self.gyro_used, ("refused", self.gyro_refused)),
+            of("wheels", self.wheels_used, ("slips", self.wheel_slips)),
+        ];
+        let words: Vec<String> = words.into_iter().flatten().collect();
+        (!words.is_empty()).then(|| words.join(", "))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn motion([outcome, initial_guess]: [u32; 2], gyro: u64, wheels: u64) -> RefinementRecord {
+        RefinementRecord {
+            outcome,
+            initial_guess,
+            gyro,
+            wheels,
+            ..RefinementRecord::default()
+        }
+    }
+
+    #[test]
+    fn each_state_has_its_name_and_the_sensors_that_were_used_are_counted() {
+        let refined = [outcome::REFINED, initial_guess::PREDICTION];
+        let walls = [outcome::REFINED, initial_guess::ALONG_WALLS];
+        let predicted = [outcome::PREDICTED, initial_guess::PREDICTION];
+        let cases = [
+            (motion([0, 0], 0, 0), "scan to scan"),
+            (motion(refined, gyro::NONE, wheels::NONE), "radar only"),
+            (motion(refined, gyro::REFUSED, wheels::SLIP), "radar only"),
+            (
+                motion(refined, gyro::USED, wheels::SLIP),
+                "radar and others",
+            ),
+            (
+                motion(refined, gyro::REFUSED, wheels::USED),
+                "radar and others",
+            ),
+            (motion(walls, gyro::USED, wheels::USED), "along walls"),
+            (motion(walls, gyro::USED, wheels::NONE), "way guessed"),
+            (
+                motion(predicted, gyro::NONE, wheels::USED),
+                "dead reckoning",
+            ),
+            (motion(predicted, gyro::USED, wheels::SLIP), "guessed"),
+        ];
+        for (motion, name) in cases {
+            assert_eq!(motion.basis().name(), name, "{motion:?}");
+        }
+        let counts = WitnessCounts::of(cases.iter().map(|(motion, _)| motion));
+        assert_eq!(counts.by_basis, [1, 2, 2, 1, 1, 1, 1]);
+        assert_eq!(counts.motions(), 9);
+        let words = "gyro 44 %, 2 refused, wheels 33 %, 3 slips";
+        assert_eq!(counts.in_words().as_deref(), Some(words));
+        assert_eq!(WitnessCounts::of([&cases[1].0]).in_words(), None);
+    }
+}
