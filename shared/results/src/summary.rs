@@ -285,9 +285,10 @@ impl fmt::Display for Summary {
         if let Some(gyro) = &c.gyro {
             writeln!(
                 f,
-                "turns by the gyro {} of {}  refused {}  bias {:.2e} +- {:.0e} rad/s",
+                "turns by the gyro {} of {}  doubted {}  refused {}  bias {:.2e} +- {:.0e} rad/s",
                 gyro.motions,
                 c.processed.saturating_sub(1 + c.breaks),
+                gyro.doubted,
                 gyro.refused,
                 gyro.bias_radps,
                 gyro.bias_sigma_radps

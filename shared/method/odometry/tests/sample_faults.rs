@@ -8,7 +8,7 @@ use gyre_geometry::{Pose, SparsePoint, xy_yaw};
 use gyre_odometry::{Odometry, OdometryConfig};
 use gyre_radar::{Dataset, GyroLog, OwnedScan, ScanSamples, WheelLog, open_source};
 use gyre_samples::{Gyro, GyroKind, Sample, SampleKind, Wheels, WheelsKind};
-use gyre_scan_matching::{Outcome, Refiner};
+use gyre_scan_matching::{Outcome, Refiner, Verdict};
 use gyre_simulator::{GyroProfile, SimulatedDrive, SimulationConfig};
 
 /// A drive that was masked and searched once: what refinement gets, scan by scan.
@@ -129,8 +129,9 @@ impl Drive {
             let refined = refiner.refine(k as u64, later, earlier, &scan.searched, interval_s);
             motions.push(xy_yaw(&refined.motion.motion).map(f64::to_bits));
             *counts.entry("turns").or_default() += u32::from(refined.gyro.is_some());
-            *counts.entry("refused").or_default() +=
-                u32::from(refined.gyro.is_some_and(|it| it.refused));
+            let verdict = refined.gyro.map(|it| it.verdict);
+            *counts.entry("doubted").or_default() += u32::from(verdict == Some(Verdict::Doubted));
+            *counts.entry("refused").or_default() += u32::from(verdict == Some(Verdict::Refused));
             *counts.entry("distances").or_default() += u32::from(refined.wheels.is_some());
             *counts.entry("slips").or_default() +=
                 u32::from(refined.wheels.is_some_and(|it| it.slip));

@@ -83,8 +83,8 @@ pub use masked_correlation::MaskedCorrelation;
 pub use peak::{LinePeak, line_peak};
 pub use refinement::{
     Anchor, GyroBias, Heading, InitialGuess, Keyframe, KeyframeAligner, Outcome, Refined,
-    RefinementConfig, RefinementKind, Refiner, Standstill, Submap, TrackerState, WheelScale,
-    WheelState,
+    RefinementConfig, RefinementKind, Refiner, Standstill, Submap, TrackerState, Verdict,
+    WheelScale, WheelState,
 };
 pub use rotation::{RotationMatch, RotationRunnerUp, RotationSearch};
 pub use sequential::SequentialRotation;

@@ -45,7 +45,7 @@ mod witnesses;
 pub use config::{RefinementConfig, RefinementKind};
 use gyre_geometry::{OdometryMotion, Pose, SparsePoint, Twist, UncertainMotion};
 use gyre_samples::{GyroConfig, GyroTurn, WheelDistance, WheelsConfig};
-pub use heading::{GyroBias, Heading};
+pub use heading::{GyroBias, Heading, Verdict};
 pub use initial_guess::InitialGuess;
 pub use keyframe_aligner::KeyframeAligner;
 pub use local_map::Keyframe;
@@ -324,7 +324,7 @@ impl Refiner {
             ..registered
         };
         match along {
-            Some(_) => self.slide(scan),
+            Some(_) => self.slide(scan, &registered),
             None if self.weigh_distance(scan, &registered, is_certain) => self.state.sliding = 0,
             None => return self.predicted(scan, uncertainty),
         }

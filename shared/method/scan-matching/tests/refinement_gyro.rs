@@ -5,7 +5,7 @@ use std::ops::Range;
 use crate::common::scenes::*;
 use gyre_geometry::{Pose, SparsePoint, pose};
 use gyre_samples::{GyroConfig, GyroTurn};
-use gyre_scan_matching::{Outcome, Refined};
+use gyre_scan_matching::{Outcome, Refined, Verdict};
 
 const NOISY: Sensor = Sensor {
     noise_m: 0.1,
@@ -58,29 +58,23 @@ fn off(drive: &Drive, refined: &[Refined]) -> Pose {
     drive.pose(SCANS - 1).inv_mul(&driven)
 }
 
-/// The scans at which the gyro was refused.
-fn refused(refined: &[Refined]) -> Vec<usize> {
-    let is_refused = |it: &&(usize, &Refined)| it.1.gyro.is_some_and(|gyro| gyro.refused);
-    let scans = (1..).zip(refined);
-    scans
-        .collect::<Vec<_>>()
-        .iter()
-        .filter(is_refused)
-        .map(|it| it.0)
-        .collect()
+/// The scans of this verdict.
+fn judged(refined: &[Refined], verdict: Verdict) -> Vec<usize> {
+    let of = |(k, it): (usize, &Refined)| (it.gyro?.verdict == verdict).then_some(k);
+    (1..).zip(refined).filter_map(of).collect()
 }
 
 #[test]
 fn a_gyro_is_refused_exactly_where_it_is_wrong_and_the_path_is_that_of_the_radar() {
     let (drive, scans) = bend();
     let good = refine_with((&drive, &scans), |_| 0.0);
-    assert_eq!(refused(&good), [0; 0]);
+    assert_eq!(judged(&good, Verdict::Agrees).len(), SCANS - 1);
     let undisturbed = off(&drive, &good);
-    for off_radps in [-3.0, -0.5, -0.15, 0.15, 0.5, 1.0, 3.0] {
+    for off_radps in [-3.0, -0.5, 0.5, 1.0, 3.0] {
         let wrong = |k: usize| if WRONG.contains(&k) { off_radps } else { 0.0 };
         let refined = refine_with((&drive, &scans), wrong);
         assert_eq!(
-            refused(&refined),
+            judged(&refined, Verdict::Refused),
             WRONG.collect::<Vec<_>>(),
             "{off_radps} rad/s"
         );
@@ -112,5 +106,15 @@ fn a_gyro_that_was_refused_last_does_not_turn_a_blind_vehicle() {
         assert!(off_rad.abs() < 0.02, "scan {k}: {off_rad} rad");
     }
     let all: Vec<usize> = (WRONG.start..SCANS).collect();
-    assert_eq!(refused(&refined), all);
+    assert_eq!(judged(&refined, Verdict::Refused), all);
+}
+
+/// A match can err by two degrees as well as the gyro: which of them does is not known.
+#[test]
+fn a_gyro_that_differs_by_what_a_match_can_err_is_doubted_and_weighed() {
+    let (drive, scans) = bend();
+    let wrong = |k: usize| if k == WRONG.start { 0.15 } else { 0.0 };
+    let refined = refine_with((&drive, &scans), wrong);
+    assert!(judged(&refined, Verdict::Doubted).contains(&WRONG.start));
+    assert_eq!(judged(&refined, Verdict::Refused), [0; 0]);
 }

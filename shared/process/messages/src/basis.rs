@@ -49,6 +49,10 @@ impl Basis {
 }
 
 impl RefinementRecord {
+    fn uses_gyro(&self) -> bool {
+        [gyro::USED, gyro::DOUBTED].contains(&self.gyro)
+    }
+
     /// Returns what the motion rests on.
     pub fn basis(&self) -> Basis {
         let by_wheels = self.wheels == wheels::USED;
@@ -60,7 +64,7 @@ impl RefinementRecord {
                 true => Basis::AlongWalls,
                 false => Basis::WayGuessed,
             },
-            _ if by_wheels || self.gyro == gyro::USED => Basis::RadarAndOthers,
+            _ if by_wheels || self.uses_gyro() => Basis::RadarAndOthers,
             _ => Basis::RadarOnly,
         }
     }
@@ -85,7 +89,7 @@ impl WitnessCounts {
     /// Counts a motion.
     pub fn add(&mut self, motion: &RefinementRecord) {
         self.by_basis[motion.basis() as usize] += 1;
-        self.gyro_used += u64::from(motion.gyro == gyro::USED);
+        self.gyro_used += u64::from(motion.uses_gyro());
         self.gyro_refused += u64::from(motion.gyro == gyro::REFUSED);
         self.wheels_used += u64::from(motion.wheels == wheels::USED);
         self.wheel_slips += u64::from(motion.wheels == wheels::SLIP);

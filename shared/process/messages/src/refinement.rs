@@ -1,7 +1,7 @@
 //! The record of a refinement in the messages that carry a motion.
 
 use bytemuck::{Pod, Zeroable};
-use gyre_scan_matching::{InitialGuess, Outcome};
+use gyre_scan_matching::{InitialGuess, Outcome, Verdict};
 
 use crate::check::{Violation, finite, require};
 
@@ -40,6 +40,9 @@ pub mod gyro {
     pub const USED: u64 = 1;
     /// It contradicts the registered motion, or has contradicted the last one: it is not used.
     pub const REFUSED: u64 = 2;
+    /// It differs by more than noise from the registered motion, but not by more than a match can
+    /// err: both are weighed all the same.
+    pub const DOUBTED: u64 = 3;
 }
 
 /// Values of [`RefinementRecord::wheels`].
@@ -107,7 +110,7 @@ impl RefinementRecord {
             self.stationary,
             "0 or 1",
         )?;
-        require(self.gyro <= gyro::REFUSED, "gyro", self.gyro, "0 to 2")?;
+        require(self.gyro <= gyro::DOUBTED, "gyro", self.gyro, "0 to 3")?;
         require(self.wheels <= wheels::SLIP, "wheels", self.wheels, "0 to 2")?;
         finite([
             ("overlap", self.overlap),
@@ -137,10 +140,11 @@ impl From<&gyre_scan_matching::Refined> for RefinementRecord {
             overlap: refined.overlap,
             support: refined.support,
             stationary: refined.stationary.into(),
-            gyro: match refined.gyro {
+            gyro: match refined.gyro.map(|of| of.verdict) {
                 None => gyro::NONE,
-                Some(of) if of.refused => gyro::REFUSED,
-                Some(_) => gyro::USED,
+                Some(Verdict::Agrees) => gyro::USED,
+                Some(Verdict::Doubted) => gyro::DOUBTED,
+                Some(Verdict::Refused) => gyro::REFUSED,
             },
             gyro_bias_radps: refined.gyro.map_or(0.0, |bias| bias.rate_radps),
             gyro_bias_sigma_radps: refined.gyro.map_or(0.0, |bias| bias.sigma_radps),

@@ -73,6 +73,9 @@ impl LostCounts {
 pub struct GyroCounts {
     /// Motions whose turn it measured; the others are those of the radar alone.
     pub motions: u64,
+    /// Those whose turn differed by more than noise from that of the radar, and was weighed all the
+    /// same, since single matches can err by so much.
+    pub doubted: u64,
     /// Those in which it was not used: the turn was another one than that of the radar, or had last
     /// been.
     pub refused: u64,
@@ -87,6 +90,7 @@ impl GyroCounts {
         let refinement = &motion.refinement;
         if refinement.gyro != gyro::NONE {
             self.motions += 1;
+            self.doubted += u64::from(refinement.gyro == gyro::DOUBTED);
             self.refused += u64::from(refinement.gyro == gyro::REFUSED);
             self.bias_radps = refinement.gyro_bias_radps;
             self.bias_sigma_radps = refinement.gyro_bias_sigma_radps;

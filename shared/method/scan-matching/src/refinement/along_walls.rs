@@ -92,13 +92,19 @@ impl Refiner {
     }
 
     /// Takes a scan whose place along the walls is the predicted one.
-    pub(super) fn slide(&mut self, scan: &Scan<'_>) {
+    pub(super) fn slide(&mut self, scan: &Scan<'_>, registered: &UncertainMotion) {
+        let driven = self.driven(registered);
         match (self.distance, scan.step.distance, &mut self.state.wheels) {
             (Some(measured), Some(_), Some(wheels)) => {
                 wheels.slide(&measured);
                 self.state.sliding = 0;
             }
-            _ => self.state.sliding = self.state.sliding.saturating_add(1),
+            (measured, _, wheels) => {
+                self.state.sliding = self.state.sliding.saturating_add(1);
+                if let (Some(measured), Some(wheels)) = (measured, wheels) {
+                    wheels.slide_without(&measured, &driven);
+                }
+            }
         }
     }
 }

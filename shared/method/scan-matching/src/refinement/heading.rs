@@ -44,8 +44,20 @@ pub struct Heading {
     pub scale: f64,
     /// Covariance of the errors of the heading against the map, the bias, the lean and the scale.
     pub covariance: Matrix4<f64>,
-    /// The last registered heading was another one than that of the gyro.
-    pub refused: bool,
+    /// What the last registered heading said of that of the gyro.
+    pub verdict: Verdict,
+}
+
+/// What a registered heading says of that of the gyro.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Verdict {
+    /// Noise can bring both so far apart.
+    #[default]
+    Agrees,
+    /// Noise cannot, but a match can err by so much: they are weighed all the same.
+    Doubted,
+    /// The gyro is wrong: it is not used.
+    Refused,
 }
 
 /// The bias of the gyro, as it is known after a scan.
@@ -55,8 +67,8 @@ pub struct GyroBias {
     pub rate_radps: f64,
     /// Standard deviation, rad/s.
     pub sigma_radps: f64,
-    /// The turn contradicts the registered motion, or has last done so: it is not used.
-    pub refused: bool,
+    /// What the registered heading says of the turn, or has last said.
+    pub verdict: Verdict,
 }
 
 /// The heading that the gyro predicts, against the scan before.
@@ -109,7 +121,7 @@ impl Heading {
             lean_rad: 0.0,
             scale: 1.0,
             covariance: Matrix4::from_diagonal(&variances),
-            refused: false,
+            verdict: Verdict::Agrees,
         }
     }
 
@@ -118,7 +130,7 @@ impl Heading {
         GyroBias {
             rate_radps: self.bias_radps,
             sigma_radps: self.covariance[(BIAS, BIAS)].max(0.0).sqrt(),
-            refused: self.refused,
+            verdict: self.verdict,
         }
     }
 
@@ -185,16 +197,24 @@ impl Heading {
         self.covariance[(HEADING, HEADING)] += variance_rad2;
     }
 
-    /// Returns whether a registered heading is as far from the predicted one as noise can bring it.
-    pub(super) fn agrees(
+    /// Returns what a registered heading says of the predicted one, where single matches err by up
+    /// to `jitter_rad`.
+    pub(super) fn judge(
         &self,
         registered: &UncertainMotion,
         previous: &Pose,
         turn: &PredictedTurn,
-    ) -> bool {
+        jitter_rad: f64,
+    ) -> Verdict {
         let apart_rad = turn.apart_rad(registered, previous) - self.lean_rad;
         let variance_rad2 = (SEEN * self.covariance * SEEN.transpose())[0];
-        apart_rad.powi(2) <= GATE * (variance_rad2 + registered.covariance[(2, 2)])
+        if apart_rad.powi(2) <= GATE * (variance_rad2 + registered.covariance[(2, 2)]) {
+            Verdict::Agrees
+        } else if apart_rad.abs() <= jitter_rad {
+            Verdict::Doubted
+        } else {
+            Verdict::Refused
+        }
     }
 
     /// Weighs the heading of a pose that was registered with the map against the predicted one. The

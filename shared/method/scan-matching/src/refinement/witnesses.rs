@@ -4,7 +4,7 @@ use gyre_geometry::UncertainMotion;
 
 use super::{
     Heading, Refiner, WheelState,
-    heading::PredictedTurn,
+    heading::{PredictedTurn, Verdict},
     registration::{Candidate, Scan},
     tracker::Step,
     uncertainty,
@@ -50,20 +50,30 @@ impl Refiner {
             },
             ..*scan
         };
-        if self.state.heading.is_some_and(|heading| heading.refused) {
+        let last = self.state.heading.map(|heading| heading.verdict);
+        if last == Some(Verdict::Refused) {
             let best = self.registration(&alone).best();
-            if !best.is_plausible || self.contradicts(&best, &turn) {
+            if !best.is_plausible || self.judge(&best, &turn) != Verdict::Agrees {
                 *scan = alone;
                 return best;
             }
         }
         let best = self.registration(scan).best();
-        let refusal = match best.is_plausible && !self.contradicts(&best, &turn) {
+        // A match that is not plausible says nothing.
+        let verdict = match best.is_plausible {
+            true => self.judge(&best, &turn),
+            false => Verdict::Agrees,
+        };
+        let refusal = match best.is_plausible && verdict != Verdict::Refused {
             true => None,
             false => self.match_against_gyro(&alone, &turn),
         };
         if let Some(heading) = &mut self.state.heading {
-            heading.refused = refusal.is_some();
+            heading.verdict = match (refusal.is_some(), verdict) {
+                (true, _) => Verdict::Refused,
+                (false, Verdict::Agrees) => Verdict::Agrees,
+                (false, _) => Verdict::Doubted,
+            };
         }
         if refusal.is_some() {
             *scan = alone;
@@ -76,8 +86,9 @@ impl Refiner {
     fn match_against_gyro(&mut self, alone: &Scan<'_>, turn: &PredictedTurn) -> Option<Candidate> {
         std::mem::swap(&mut self.points, &mut self.other_points);
         let best = self.registration(alone).best();
-        let is_certain =
-            best.is_plausible && self.contradicts(&best, turn) && self.is_certain(alone, &best);
+        let is_certain = best.is_plausible
+            && self.judge(&best, turn) == Verdict::Refused
+            && self.is_certain(alone, &best);
         if !is_certain {
             std::mem::swap(&mut self.points, &mut self.other_points);
         }
@@ -95,15 +106,14 @@ impl Refiner {
             && (self.state.unmatched == 0 || self.agrees_with_search(scan, best, along))
     }
 
-    /// Returns whether a match has another heading than noise can bring between it and the gyro's.
-    fn contradicts(&self, best: &Candidate, turn: &PredictedTurn) -> bool {
+    /// Returns what the heading of a match says of that of the gyro.
+    fn judge(&self, best: &Candidate, turn: &PredictedTurn) -> Verdict {
         let registered = self.registered(&best.alignment);
-        let heading = &self.state.heading;
-        registered
-            .zip(heading.as_ref())
-            .is_some_and(|(registered, heading)| {
-                !heading.agrees(&registered, &self.state.pose, turn)
-            })
+        let both = registered.zip(self.state.heading);
+        let jitter_rad = self.config.jitter_deg.to_radians();
+        both.map_or(Verdict::Agrees, |(registered, heading)| {
+            heading.judge(&registered, &self.state.pose, turn, jitter_rad)
+        })
     }
 
     /// Returns the part along the path of the motion to a registered pose.

@@ -2,7 +2,9 @@
 //! checksum of the rest.
 
 use gyre_geometry::Twist;
-use gyre_scan_matching::{Anchor, Heading, Keyframe, Standstill, TrackerState, WheelState};
+use gyre_scan_matching::{
+    Anchor, Heading, Keyframe, Standstill, TrackerState, Verdict, WheelState,
+};
 use gyre_storage::Checksum;
 use nalgebra::{Complex, Isometry2, Matrix2, Matrix3, Matrix4, Translation2, UnitComplex};
 
@@ -12,7 +14,7 @@ const STATE_WORDS: usize = 1 + 3 + TRACKER_WORDS;
 const NAME_WORDS: usize = 2;
 const TRACKER_WORDS: usize = WHEELS + WHEEL_WORDS;
 const STANDSTILL_WORDS: usize = 4 + 4 + 4;
-/// A word that says whether there is one; bias, lean, scale, covariance; whether it was refused.
+/// A word that says whether there is one; bias, lean, scale, covariance; the last verdict.
 const HEADING_WORDS: usize = 1 + 3 + 16 + 1;
 /// A word that says whether there are any; scale, offset, three dead reckonings; both covariances;
 /// whether they slip.
@@ -125,7 +127,7 @@ fn heading_words(heading: &Heading) -> [u64; HEADING_WORDS] {
     words[3] = heading.scale.to_bits();
     let covariance = words[4..].iter_mut().zip(&heading.covariance);
     covariance.for_each(|(word, value)| *word = value.to_bits());
-    words[20] = heading.refused.into();
+    words[20] = heading.verdict as u64;
     words
 }
 
@@ -136,7 +138,11 @@ fn heading_from(words: &[u64]) -> Option<Heading> {
         lean_rad: value(2),
         scale: value(3),
         covariance: Matrix4::from_fn(|row, column| value(4 + row + 4 * column)),
-        refused: words[20] == 1,
+        verdict: match words[20] {
+            2 => Verdict::Refused,
+            1 => Verdict::Doubted,
+            _ => Verdict::Agrees,
+        },
     })
 }
 
