@@ -53,7 +53,9 @@ impl Refiner {
         let last = self.state.heading.map(|heading| heading.verdict);
         if last == Some(Verdict::Refused) {
             let best = self.registration(&alone).best();
-            if !best.is_plausible || self.judge(&best, &turn) != Verdict::Agrees {
+            // After predictions the heading is so uncertain that any turn agrees.
+            let is_known = self.state.unmatched == 0 && best.is_plausible;
+            if !is_known || self.judge(&best, &turn) != Verdict::Agrees {
                 *scan = alone;
                 return best;
             }
