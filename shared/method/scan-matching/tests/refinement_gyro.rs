@@ -25,8 +25,8 @@ fn bend() -> (Drive, Vec<Vec<SparsePoint>>) {
     (drive, scans(&town, &drive, &NOISY))
 }
 
-/// Refines the motions to these scans with a gyro whose rate is off by so much. The search looks for
-/// rotations near that of the gyro, and finds one at the edge of what it looks for.
+/// Refines the motions to these scans with a gyro whose rate is off by so much. The search looks
+/// for rotations near that of the gyro, and finds one at the edge of what it looks for.
 fn refine_with(
     (drive, scans): (&Drive, &[Vec<SparsePoint>]),
     off_radps: impl Fn(usize) -> f64,

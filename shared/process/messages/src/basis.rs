@@ -1,8 +1,8 @@
-//! What motions rest on: the radar, other sensors, or a guess; and how often the others were used.
+//! The basis of motions: the radar, other sensors, or a guess; and how often the others were used.
 
 use crate::refinement::{RefinementRecord, gyro, initial_guess, outcome, wheels};
 
-/// What a motion rests on.
+/// The basis of a motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Basis {
     /// Two scans: there is no refinement, or the chain starts here.
@@ -107,8 +107,8 @@ impl WitnessCounts {
         self.by_basis.iter().sum()
     }
 
-    /// Returns the part of gyro and wheels in words, as `gyro 98 %, 1 refused, wheels 100 %`; `None`
-    /// where neither has measured anything.
+    /// Returns the part of gyro and wheels in words, as `gyro 98 %, 1 refused, wheels 100 %`;
+    /// `None` where neither has measured anything.
     pub fn in_words(&self) -> Option<String> {
         let of = |name, used: u64, (not, count): (&str, u64)| {
             let share = 100.0 * used as f64 / self.motions().max(1) as f64;

@@ -44,11 +44,11 @@ pub struct Heading {
     pub scale: f64,
     /// Covariance of the errors of the heading against the map, the bias, the lean and the scale.
     pub covariance: Matrix4<f64>,
-    /// What the last registered heading said of that of the gyro.
+    /// The verdict of the last registered heading on that of the gyro.
     pub verdict: Verdict,
 }
 
-/// What a registered heading says of that of the gyro.
+/// The verdict of a registered heading on that of the gyro.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Verdict {
     /// Noise can bring both so far apart.
@@ -67,7 +67,7 @@ pub struct GyroBias {
     pub rate_radps: f64,
     /// Standard deviation, rad/s.
     pub sigma_radps: f64,
-    /// What the registered heading says of the turn, or has last said.
+    /// The verdict of the registered heading on the turn, or the last one.
     pub verdict: Verdict,
 }
 

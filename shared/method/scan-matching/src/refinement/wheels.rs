@@ -225,8 +225,8 @@ impl WheelState {
         self.dead_m += measured.distance_m;
     }
 
-    /// Takes a pose whose place along the path is that of the motions before, since the map does not
-    /// determine it: wheels that had slipped are believed again if they do not contradict that.
+    /// Takes a pose whose place along the path is that of the motions before, since the map does
+    /// not determine it: wheels that had slipped are believed again if they do not contradict that.
     pub(super) fn slide_without(&mut self, measured: &WheelDistance, driven: &Registered) {
         let apart_m = driven.distance_m - self.scale * measured.distance_m;
         let [_, variance_m2] = driven.noise_and_drift_m2();

@@ -1,4 +1,4 @@
-//! What gyro and wheels say of a motion, against what the radar says.
+//! Gyro and wheels as witnesses of a motion: against what the radar says of it.
 
 use gyre_geometry::UncertainMotion;
 
