@@ -102,7 +102,7 @@ pub struct RunCounts {
     pub in_flight: u64,
     /// The messages that this observer has missed.
     pub missed: Missed,
-    /// What the motions rest on, from the first of the run on.
+    /// The basis of the motions, from the first of the run on.
     pub witnesses: WitnessCounts,
 }
 
@@ -132,7 +132,7 @@ pub struct CurrentPose {
     pub outcome: &'static str,
     /// Mean of the map under the scan's points, 0 to 1.
     pub overlap: f64,
-    /// What the motion rests on, in words: see [`gyre_messages::Basis`].
+    /// The basis of the motion in words: see [`gyre_messages::Basis`].
     pub basis: &'static str,
 }
 

@@ -202,7 +202,7 @@ const KINDS: [&str; 7] = [
 /// Samples of a sweep.
 const SWEEP: [usize; 2] = [26, 13];
 
-/// How long faults last.
+/// The duration of faults.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Length {
     /// For a sweep or more.

@@ -32,7 +32,7 @@ pub struct Snapshot {
     pub in_flight: Option<u64>,
     /// Of the poses of the last 10 s that were seen.
     pub latency: Latency,
-    /// What those motions rest on, the newest one in words.
+    /// The basis of those motions, and that of the newest one in words.
     pub witnesses: WitnessCounts,
     pub basis: Option<&'static str>,
     /// The usage of each process, in the order of the status.

@@ -4,8 +4,8 @@ use gyre_samples::{Sample, SampleKind};
 
 use crate::median;
 
-/// The largest yaw acceleration of a vehicle, rad/s²: tyres that hold as much as they carry turn one
-/// with the wheelbase L, whose mass is spread over it, by 2 g / L. No vehicle with a radar is
+/// The largest yaw acceleration of a vehicle, rad/s²: tyres that hold as much as they carry turn
+/// one with the wheelbase L, whose mass is spread over it, by 2 g / L. No vehicle with a radar is
 /// shorter than half a metre.
 const YAW_RADPS2: f64 = 40.0;
 /// The largest change of its speed, m/s²: twice as much as such tyres brake.
@@ -85,7 +85,7 @@ pub(crate) fn leave_out(samples: &mut Vec<Sample>, kind: SampleKind) -> Jumps {
     jumps
 }
 
-/// How fast a value can change.
+/// The fastest change of a value.
 struct Limits {
     per_s: f64,
     /// Whatever the time between two samples, which are closer together where stamps jitter.

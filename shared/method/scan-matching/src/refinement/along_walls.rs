@@ -1,5 +1,5 @@
-//! Along walls without structure, as in a tunnel: the radar sees where they are, but not how far the
-//! vehicle drives.
+//! Along walls without structure, as in a tunnel: the radar sees where they are, but not how far
+//! the vehicle drives.
 //!
 //! The place along them is the predicted one, by the wheels or at constant velocity, with the
 //! covariance of that; across them and of the heading the radar tells as elsewhere.
