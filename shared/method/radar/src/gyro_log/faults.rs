@@ -15,8 +15,8 @@ use gyre_samples::{Sample, SampleKind};
 const ABSURD_RADPS: f64 = 10.0;
 /// Share of absurd rates above which the unit must be another one.
 const ABSURD_SHARE: f64 = 0.01;
-/// Time between two samples from which on it is a gap, median periods: more than two are missing.
-const GAP_PERIODS: f64 = 3.5;
+/// Longest time between two samples that is no gap, median periods, whatever stamps round to.
+const GAP_PERIODS: f64 = 3.0 + 1e-6;
 
 /// Faults of a log. What is counted as left out is not in its samples.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -39,7 +39,7 @@ pub struct LogFaults {
     pub clock_steps_s: Vec<f64>,
     /// Samples whose stamps such steps make unusable: left out.
     pub by_clock_steps: usize,
-    /// Times without samples, of which more than two are missing.
+    /// Times without samples, of more than three periods.
     pub gaps: Vec<LogGap>,
     /// Samples that are missing one or two at a time: the value is interpolated.
     pub bridged: usize,
