@@ -7,13 +7,6 @@ use gyre_geometry::{Pose, SparsePoint, mirrored as mirror};
 use gyre_scan_matching::{Outcome, Refiner, TrackerState};
 use nalgebra::{Matrix3, Vector3};
 
-const NOISY: Sensor = Sensor {
-    noise_m: 0.1,
-    offset_m: 0.0,
-    doppler_s: 0.0,
-    hides_doppler: false,
-    seed: 1,
-};
 /// The area visible along [`straight`].
 const AROUND: [[f64; 2]; 2] = [[-120.0, 370.0], [-100.0, 100.0]];
 const SEEDS: [u64; 3] = [1, 11, 21];

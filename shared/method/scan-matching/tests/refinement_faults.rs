@@ -5,14 +5,6 @@ use crate::common::{Numbers, scenes::*};
 use gyre_geometry::{ComposedMotion, Pose, SparsePoint};
 use gyre_scan_matching::{Outcome, Refined, RefinementConfig, Refiner};
 
-const NOISY: Sensor = Sensor {
-    noise_m: 0.1,
-    offset_m: 0.0,
-    doppler_s: 0.0,
-    hides_doppler: false,
-    seed: 1,
-};
-
 /// A gentle bend and its 60 scans.
 fn bend() -> (Drive, Vec<Vec<SparsePoint>>) {
     let drive = Drive::steady(10.0, 4.0, 60);

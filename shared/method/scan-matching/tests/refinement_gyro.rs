@@ -7,13 +7,6 @@ use gyre_geometry::{Pose, SparsePoint, pose};
 use gyre_samples::{GyroConfig, GyroTurn};
 use gyre_scan_matching::{Outcome, Refined, Verdict};
 
-const NOISY: Sensor = Sensor {
-    noise_m: 0.1,
-    offset_m: 0.0,
-    doppler_s: 0.0,
-    hides_doppler: false,
-    seed: 1,
-};
 const SCANS: usize = 60;
 /// Scans at which the gyro is wrong.
 const WRONG: Range<usize> = 30..33;

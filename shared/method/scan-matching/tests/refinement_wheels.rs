@@ -7,13 +7,6 @@ use gyre_geometry::{Pose, SparsePoint, pose};
 use gyre_samples::{GyroConfig, GyroTurn, WheelDistance, WheelsConfig};
 use gyre_scan_matching::{Outcome, Refined, Refiner};
 
-const NOISY: Sensor = Sensor {
-    noise_m: 0.1,
-    offset_m: 0.0,
-    doppler_s: 0.0,
-    hides_doppler: false,
-    seed: 1,
-};
 const SCANS: usize = 100;
 /// Six seconds.
 const BLIND: Range<usize> = 60..84;

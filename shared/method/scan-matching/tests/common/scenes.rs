@@ -158,6 +158,15 @@ pub struct Sensor {
     pub seed: u64,
 }
 
+/// Ranges that are noisy, and right in the mean.
+pub const NOISY: Sensor = Sensor {
+    noise_m: 0.1,
+    offset_m: 0.0,
+    doppler_s: 0.0,
+    hides_doppler: false,
+    seed: 1,
+};
+
 impl Sensor {
     /// Scan `k` of a drive. The velocity stays the same during the sweep.
     pub fn scan(&self, scene: &[Reflector], drive: &Drive, k: usize) -> Vec<SparsePoint> {
