@@ -7,11 +7,12 @@
 
 use std::{env, error::Error, f32::consts::TAU, fs, io, path::Path};
 
-use gyre_odometry::{Odometry, OdometryConfig};
-use gyre_radar::{
-    Dataset, DatasetOptions, FileList, Format, ImageSize, OwnedScan, ReadError, ScanLimits,
-    ScanSlot, Sense, SweepGeometry, Trajectory, inspect_dataset, scan::flag, turn_ns, write_tum,
+use gyre_datasets::{
+    Dataset, DatasetOptions, FileList, Format, ImageSize, ReadError, inspect_dataset, turn_ns,
+    write_tum,
 };
+use gyre_odometry::{Odometry, OdometryConfig};
+use gyre_radar::{OwnedScan, ScanLimits, ScanSlot, Sense, SweepGeometry, Trajectory, scan::flag};
 
 const SIZE: ImageSize = ImageSize {
     width: 576,
@@ -72,7 +73,7 @@ impl Dataset for RawSweeps {
     }
 
     fn period_ns(&self) -> i64 {
-        turn_ns(self.stamp_ns.iter().copied()).unwrap_or(gyre_radar::DEFAULT_TURN_NS)
+        turn_ns(self.stamp_ns.iter().copied()).unwrap_or(gyre_datasets::DEFAULT_TURN_NS)
     }
 
     fn stamp_meaning(&self) -> &'static str {

@@ -2,7 +2,7 @@
 
 use std::{fs, path::Path};
 
-use gyre_radar::Format;
+use gyre_datasets::Format;
 
 /// Azimuths of an image.
 pub const AZIMUTHS: usize = 16;

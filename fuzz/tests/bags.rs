@@ -4,11 +4,12 @@ use std::{collections::BTreeMap, fs, path::Path};
 
 use bolero::{TypeGenerator, check};
 use gyre_colossus::Configuration;
+use gyre_datasets::DatasetOptions;
 use gyre_fuzz::{
     Failure, Target,
     edit::{ByteEdit, edit_bytes},
 };
-use gyre_radar::{DatasetOptions, OwnedScan, ScanLimits, Sense, SweepGeometry, scan::flag};
+use gyre_radar::{OwnedScan, ScanLimits, Sense, SweepGeometry, scan::flag};
 use gyre_ros2_messages::{Ros2Message, encode, radar::ScanMessages};
 use mcap::{WriteOptions, Writer, records::MessageHeader};
 

@@ -3,12 +3,13 @@
 use std::{fs, path::Path};
 
 use bolero::{TypeGenerator, check};
+use gyre_datasets::{DatasetOptions, Format, inspect, open};
 use gyre_fuzz::{
     Failure, Target,
     edit::{ByteEdit, Number, TextEdit, edit_bytes, edit_text},
     recording::{Recording, write},
 };
-use gyre_radar::{DatasetOptions, Format, OwnedScan, inspect, open};
+use gyre_radar::OwnedScan;
 
 /// An edit of a row's metadata, or of its pixels.
 #[derive(Clone, Debug, TypeGenerator)]

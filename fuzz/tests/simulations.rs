@@ -1,11 +1,11 @@
 //! The configuration of a simulation, which a recording keeps beside its images.
 
 use bolero::check;
+use gyre_datasets::ImageSource as _;
 use gyre_fuzz::{
     Failure, Target,
     edit::{TextEdit, edit_text},
 };
-use gyre_radar::ImageSource as _;
 use gyre_simulator::{SimulatedDrive, SimulationConfig};
 
 /// Images up to this size are drawn, bytes.

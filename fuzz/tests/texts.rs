@@ -4,13 +4,14 @@ use std::{fs, path::Path};
 
 use bolero::check;
 use gyre_configuration::Configuration;
+use gyre_datasets::{ground_truth::parse_trajectory, write_tum};
 use gyre_fuzz::{
     Failure, Target,
     edit::{TextEdit, edit_text},
 };
 use gyre_masking::{MaskKind, MaskingConfig, model::Model};
 use gyre_odometry::Odometry;
-use gyre_radar::{RasterConfig, ground_truth::parse_trajectory, write_tum};
+use gyre_radar::RasterConfig;
 use gyre_results::{judgement::judge, odometry};
 
 use crate::recordings::folder;

@@ -18,8 +18,9 @@ use std::{
 };
 
 use clap::{Args, ValueEnum, builder::PossibleValue};
+use gyre_datasets::{Dataset, DatasetOptions};
 use gyre_masks::picture::write_grey;
-use gyre_radar::{Dataset, DatasetOptions, OwnedScan};
+use gyre_radar::OwnedScan;
 use gyre_terminal::{Failure, print};
 use rand::{RngCore, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -87,7 +88,7 @@ impl CorruptArguments {
     fn write(&self) -> Result<Vec<usize>, Failure> {
         let (resolved, out) = (self.path.canonicalize(), &self.out);
         let source = resolved.unwrap_or_else(|_| self.path.clone());
-        let mut dataset = gyre_radar::open(&source, &DatasetOptions::default())?;
+        let mut dataset = gyre_datasets::open(&source, &DatasetOptions::default())?;
         let hits: Vec<usize> = self.hits(dataset.len()).collect();
         let name = |index: &usize| Some(dataset.file(*index).file_name()?.to_owned());
         let corrupted: BTreeSet<OsString> = hits.iter().filter_map(name).collect();

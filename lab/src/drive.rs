@@ -3,11 +3,12 @@
 use std::{convert::Infallible, path::Path};
 
 use gyre_configuration::Configuration;
+use gyre_datasets::{find_ground_truth, read_trajectory};
 use gyre_estimation::places::{KeyframeSelector, MAX_NEIGHBOURS, PlaceOptions, neighbours};
 use gyre_evaluation::TimedMotion;
 use gyre_geometry::{ComposedMotion, Pose, SparsePoint, Twist, UncertainMotion};
 use gyre_masking::{MaskKind, Masker};
-use gyre_radar::{OwnedScan, Trajectory, find_ground_truth, read_trajectory};
+use gyre_radar::{OwnedScan, Trajectory};
 use gyre_results::odometry;
 use gyre_scan_matching::{RefinementConfig, Submap};
 use gyre_slam::{Keyframe, KeyframeSource};
@@ -82,7 +83,7 @@ impl Drive {
         motions: &[TimedMotion],
         options: &PlaceOptions,
     ) -> Result<(), Failure> {
-        let mut dataset = gyre_radar::open(data, &configuration.dataset)?;
+        let mut dataset = gyre_datasets::open(data, &configuration.dataset)?;
         let (odometry, mut scan) = (
             &configuration.odometry,
             OwnedScan::with_limits(dataset.limits()),

@@ -6,11 +6,12 @@ use std::{
 };
 
 use gyre_configuration::{Configuration, Played};
-use gyre_geometry::Pose;
-use gyre_radar::{
-    Dataset, OwnedScan, Trajectory,
+use gyre_datasets::{
+    Dataset,
     ground_truth::{find_ground_truth, parse_trajectory, read_trajectory},
 };
+use gyre_geometry::Pose;
+use gyre_radar::{OwnedScan, Trajectory};
 use gyre_results::SIMULATED_TRUTH;
 use gyre_terminal::{Failure, print};
 

@@ -6,12 +6,12 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use gyre_geometry::Twist;
-use gyre_radar::{
-    Trajectory,
+use gyre_datasets::{
     ground_truth::{find_ground_truth, write_tum},
     read_trajectory,
 };
+use gyre_geometry::Twist;
+use gyre_radar::Trajectory;
 use nalgebra::{Isometry2, Vector2};
 use tempfile::TempDir;
 use toml::Table;

@@ -7,7 +7,7 @@ use gyre_configuration::{
     paths::{Named, find_own},
     strict,
 };
-use gyre_radar::Format;
+use gyre_datasets::Format;
 use pyo3::{
     prelude::*,
     types::{PyMapping, PyTuple},

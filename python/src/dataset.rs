@@ -9,7 +9,7 @@ use std::{
 };
 
 use gyre_configuration::radar_constants;
-use gyre_radar::{DatasetOptions, ScanSamples};
+use gyre_datasets::{DatasetOptions, ScanSamples};
 use numpy::PyArray1;
 use pyo3::{exceptions::PyIndexError, prelude::*, types::PyTuple};
 
@@ -62,7 +62,7 @@ pub fn open(
 /// Returns the file of the ground truth of a recording, if there is one at a usual path; else None.
 #[pyfunction]
 pub fn find_ground_truth(data: PathBuf) -> Option<PathBuf> {
-    gyre_radar::find_ground_truth(&data)
+    gyre_datasets::find_ground_truth(&data)
 }
 
 /// The scans of a recording, ordered by time.

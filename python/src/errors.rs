@@ -3,9 +3,9 @@
 use std::{ffi::CString, fmt::Display};
 
 use gyre_configuration::AutomaticError;
+use gyre_datasets::{LogError, OpenError};
 use gyre_masking::MaskError;
 use gyre_odometry::OdometryError;
-use gyre_radar::{LogError, OpenError};
 use pyo3::{prelude::*, sync::PyOnceLock, types::PyType};
 
 /// Returns a function that makes exceptions of one type.

@@ -23,7 +23,7 @@ pub fn inspect(
     );
     let report = py.detach(|| {
         let dataset = gyre_recording::open(&data, &options)?;
-        Ok(gyre_radar::inspect_dataset(
+        Ok(gyre_datasets::inspect_dataset(
             &data, dataset, &options, trajectory,
         ))
     });
@@ -32,7 +32,7 @@ pub fn inspect(
 
 /// The content of a recording. `str(report)` is a text, and `to_dict()` has every figure.
 #[pyclass(module = "gyre", frozen)]
-pub struct Report(gyre_radar::Report);
+pub struct Report(gyre_datasets::Report);
 
 #[pymethods]
 impl Report {

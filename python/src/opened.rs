@@ -1,6 +1,7 @@
 //! A recording, and what other sensors measured meanwhile.
 
-use gyre_radar::{Dataset, ReadError, ScanSamples, ScanSlot, SweepGeometry};
+use gyre_datasets::{Dataset, ReadError, ScanSamples};
+use gyre_radar::{ScanSlot, SweepGeometry};
 use gyre_samples::Sample;
 
 /// An open recording.

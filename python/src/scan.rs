@@ -1,6 +1,7 @@
 //! Scans, whose memory is that of numpy arrays.
 
-use gyre_radar::{PolarScan, ReadError, ScanSlot, Sense, SweepGeometry, scan::flag};
+use gyre_datasets::ReadError;
+use gyre_radar::{PolarScan, ScanSlot, Sense, SweepGeometry, scan::flag};
 use gyre_samples::{MAX_RATE_RADPS, MAX_SPEED_MPS, Sample, SampleKind};
 use ndarray::{Ix1, Ix2, IxDyn};
 use numpy::{

@@ -3,10 +3,8 @@
 
 use std::{f64::consts::TAU, fs, path::Path};
 
-use gyre_radar::{
-    Dataset, DatasetOptions, LostAzimuthOption, OwnedScan, lost::stale_rows, open, scan::flag,
-    stored_options,
-};
+use gyre_datasets::{Dataset, DatasetOptions, LostAzimuthOption, open, stored_options};
+use gyre_radar::{OwnedScan, lost::stale_rows, scan::flag};
 use serde_json::json;
 
 use crate::common::{Ended, Run, gyre, recording};

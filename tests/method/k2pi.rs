@@ -4,8 +4,8 @@
 
 use std::path::Path;
 
+use gyre_datasets::read_trajectory;
 use gyre_geometry::Pose;
-use gyre_radar::read_trajectory;
 use serde_json::Value;
 
 use crate::common::{Run, odometry};

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use gyre_datasets::read_trajectory;
 use gyre_localisation::Map;
-use gyre_radar::read_trajectory;
 
 use crate::common::{Ended, Run, gyre};
 

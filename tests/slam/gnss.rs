@@ -3,9 +3,10 @@
 
 use std::{fs, path::PathBuf, thread, time::Duration};
 
+use gyre_datasets::read_trajectory;
 use gyre_mapping::{Map, Origin};
 use gyre_messages::FollowerId;
-use gyre_radar::{Trajectory, read_trajectory};
+use gyre_radar::Trajectory;
 use gyre_samples::{Geographic, LocalPlane};
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use rustix::process::Signal;

@@ -8,8 +8,8 @@ use std::{
     sync::Arc,
 };
 
+use gyre_datasets::read_trajectory;
 use gyre_geometry::Pose;
-use gyre_radar::read_trajectory;
 use serde_json::Value;
 
 use crate::common::{Ended, Run, Shared, folder, gyre, recording};

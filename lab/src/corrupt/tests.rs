@@ -5,7 +5,8 @@ use std::fs;
 use std::num::NonZeroUsize;
 use std::path::Path;
 
-use gyre_radar::{DatasetOptions, OwnedScan};
+use gyre_datasets::DatasetOptions;
+use gyre_radar::OwnedScan;
 use gyre_simulator::{SimulationConfig, write_dataset};
 use tempfile::TempDir;
 
@@ -68,7 +69,7 @@ fn arguments(source: &Path, out: &Path, fault: Fault, every: usize) -> CorruptAr
 }
 
 fn scans(folder: &Path) -> Vec<OwnedScan> {
-    let mut dataset = gyre_radar::open(folder, &DatasetOptions::default()).unwrap();
+    let mut dataset = gyre_datasets::open(folder, &DatasetOptions::default()).unwrap();
     let indices = 0..dataset.len();
     let read = |index| {
         let mut scan = OwnedScan::with_limits(dataset.limits());

@@ -11,7 +11,8 @@ use std::{
 
 use gyre_calibration::{Configured, Drive, Found, Study, svg, toml};
 use gyre_configuration::{Configuration, Played, describe_masks_in_process};
-use gyre_radar::{DatasetOptions, OwnedScan, SweepGeometry};
+use gyre_datasets::DatasetOptions;
+use gyre_radar::{OwnedScan, SweepGeometry};
 use gyre_samples::GyroKind;
 use gyre_storage as storage;
 use gyre_terminal::{Failure, print};

@@ -3,8 +3,8 @@
 use std::process::ExitCode;
 
 use gyre_configuration::Configuration;
+use gyre_datasets::ground_truth::read_trajectory;
 use gyre_inputs::Inputs;
-use gyre_radar::ground_truth::read_trajectory;
 use gyre_terminal::{Failure, print};
 
 use crate::cli::InspectArguments;
@@ -33,7 +33,7 @@ pub fn inspect(arguments: &InspectArguments) -> Result<ExitCode, Failure> {
         return Err("name the recording to inspect: a folder, NAME.mcap or a bag of ROS 2".into());
     }
     let dataset = gyre_recording::open(&path, &options)?;
-    let report = gyre_radar::inspect_dataset(&path, dataset, &options, trajectory.as_ref());
+    let report = gyre_datasets::inspect_dataset(&path, dataset, &options, trajectory.as_ref());
     match arguments.json {
         true => print::line(serde_json::to_string_pretty(&report)?)?,
         false => print::values(report)?,

@@ -3,11 +3,11 @@
 use std::time::Duration;
 
 use gyre_configuration::{Configuration, Played, gnss_log, open};
+use gyre_datasets::{DEFAULT_TURN_NS, Fingerprint, turn_ns};
 use gyre_live_radar::Settings;
 use gyre_maps::localise::searched_map;
 use gyre_masking::Masker;
 use gyre_messages::{Footprint, Limits, StageId, Window};
-use gyre_radar::{DEFAULT_TURN_NS, Fingerprint, turn_ns};
 use gyre_radar_replay::{Listing, Player};
 use gyre_run::{MOST_OPEN_FILES, PlayedFrom, Side, SourceKind};
 use gyre_samples::{GyroKind, MAX_SAMPLES};

@@ -8,9 +8,9 @@ use std::{
 };
 
 use gyre_configuration::{process_names, simulated_samples};
+use gyre_datasets::DatasetOptions;
 use gyre_live_radar::Settings;
 use gyre_messages::{FollowerId, StageId};
-use gyre_radar::DatasetOptions;
 use gyre_radar_replay::Pace;
 use gyre_run::{LinkConfig, Side, SourceConfig, SourceKind, StageConfig};
 use gyre_search::{python, rotation, translation};

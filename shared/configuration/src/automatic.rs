@@ -5,7 +5,8 @@
 
 use std::path::Path;
 
-use gyre_radar::{Dataset, DatasetOptions, Format, OpenError, OwnedScan, ReadError};
+use gyre_datasets::{Dataset, DatasetOptions, Format, OpenError, ReadError};
+use gyre_radar::OwnedScan;
 use thiserror::Error;
 use toml::{Table, Value};
 

@@ -10,11 +10,11 @@ use std::{
     time::Duration,
 };
 
+use gyre_datasets::DatasetOptions;
 use gyre_masking::MaskKind;
 use gyre_messages::{FollowerId, StageId, Window};
 use gyre_objects::ObjectsConfig;
 use gyre_odometry::{OdometryConfig, SearchKind};
-use gyre_radar::DatasetOptions;
 use gyre_run::{
     Budget, LinkConfig, Mode, PlayedFrom, RecordConfig, RunConfig, Scenario, Side, SourceConfig,
     SourceKind, StageConfig,

@@ -1,8 +1,8 @@
 //! The settings that decide what is computed.
 
+use gyre_datasets::DatasetOptions;
 use gyre_objects::ObjectsConfig;
 use gyre_odometry::OdometryConfig;
-use gyre_radar::DatasetOptions;
 use gyre_samples::GnssConfig;
 use gyre_slam::SlamConfig;
 use serde::Serialize;

@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use gyre_radar::{
+use gyre_datasets::{
     Dataset, Fingerprint, GnssLog, GnssLogError, GyroLog, LogError, OpenError, ScanSamples,
     WheelLog,
 };

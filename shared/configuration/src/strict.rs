@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, fmt::Display, path::Path};
 
-use gyre_radar::in_plain_words;
+use gyre_datasets::in_plain_words;
 use serde::de::DeserializeOwned;
 use toml::{Table, Value};
 

@@ -15,11 +15,12 @@ use std::f64::consts::TAU;
 use std::path::Path;
 use std::{env, fs};
 
+use gyre_datasets::{Dataset, DatasetOptions, ScanSamples};
 use gyre_evaluation::{ObjectOptions, ObjectScan, TrackedObject, TrueObject, object_errors};
 use gyre_geometry::{Pose, SparsePoint, Twist, xy_yaw};
 use gyre_objects::{Object, ObjectTracker, ObjectsConfig, ObjectsKind, PlacedScan};
 use gyre_odometry::{Odometry, OdometryConfig};
-use gyre_radar::{Dataset, DatasetOptions, OwnedScan, ScanSamples};
+use gyre_radar::OwnedScan;
 use gyre_simulator::drive::DriveKind;
 use gyre_simulator::weather::WeatherConfig;
 use gyre_simulator::{Realism, SimulatedDrive, SimulationConfig};
@@ -170,7 +171,7 @@ fn simulated(name: &str) -> Outcome<Vec<DriveScan>> {
     }
     let simulated = SimulatedDrive::new(&simulation)?;
     let options = simulated.dataset_options();
-    let mut dataset = gyre_radar::open_source(Box::new(simulated.renderer()), &options)?;
+    let mut dataset = gyre_datasets::open_source(Box::new(simulated.renderer()), &options)?;
     let mut drive = registered(dataset.as_mut(), &OdometryConfig::default(), Path::new(""))?;
     for (index, scan) in drive.iter_mut().enumerate() {
         let sensor = simulated.simulator().pose(index).inverse();
@@ -218,7 +219,7 @@ fn annotated(folder: &Path, config: Option<&str>) -> Outcome<Vec<DriveScan>> {
         Some(path) => toml::from_str(&fs::read_to_string(path)?)?,
         None => Config::default(),
     };
-    let mut dataset = gyre_radar::open(folder, &config.dataset)?;
+    let mut dataset = gyre_datasets::open(folder, &config.dataset)?;
     let mut drive = registered(dataset.as_mut(), &config.odometry, folder)?;
     let text = fs::read_to_string(folder.join("objects.csv"))?;
     let rows: Vec<Annotation> = text

@@ -10,8 +10,9 @@ use std::{
 };
 
 use gyre_configuration::Configuration;
+use gyre_datasets::ground_truth::read_trajectory;
 use gyre_evaluation::{Evaluation, MatchedMotions, NeesOptions, Options, TimedMotion, TruthSigma};
-use gyre_radar::{Trajectory, ground_truth::read_trajectory};
+use gyre_radar::Trajectory;
 use gyre_terminal::{Failure, print};
 
 use crate::{

@@ -7,7 +7,7 @@ use std::{
 };
 
 use gyre_configuration::{Configuration, difference, fingerprint, with_stored_options};
-use gyre_radar::{DatasetOptions, Fingerprint};
+use gyre_datasets::{DatasetOptions, Fingerprint};
 use gyre_run::BEGUN_WITH;
 use gyre_storage as storage;
 use gyre_terminal::Failure;

@@ -8,7 +8,8 @@ use gyre_evaluation::{
     Options, TimedMotion, bands, nees,
     plot::{bands_svg, errors_svg, trajectory_svg},
 };
-use gyre_radar::{ClockOffset, MAX_OFFSET_S, Trajectory, clock_offset};
+use gyre_radar::Trajectory;
+use gyre_radar::{ClockOffset, MAX_OFFSET_S, clock_offset};
 use gyre_terminal::{Failure, print};
 use serde::Serialize;
 
@@ -198,8 +199,8 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use std::path::PathBuf;
 
+    use gyre_datasets::read_trajectory;
     use gyre_geometry::{Pose, pose};
-    use gyre_radar::read_trajectory;
 
     use super::*;
 

@@ -15,13 +15,11 @@ mod slam;
 use std::path::{Path, PathBuf};
 
 use gyre_configuration::Configuration;
+use gyre_datasets::ground_truth::{find_ground_truth, read_trajectory};
 use gyre_evaluation::{NeesOptions, Options, plot::bands_svg};
 use gyre_journal as journal;
 use gyre_messages::StageId;
-use gyre_radar::{
-    Trajectory,
-    ground_truth::{find_ground_truth, read_trajectory},
-};
+use gyre_radar::Trajectory;
 use gyre_terminal::{Failure, print};
 
 use crate::{

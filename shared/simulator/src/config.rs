@@ -1,6 +1,6 @@
 //! The configuration of a simulation.
 
-use gyre_radar::DatasetOptions;
+use gyre_datasets::DatasetOptions;
 use serde::{Deserialize, Serialize};
 
 use crate::drive::DriveConfig;

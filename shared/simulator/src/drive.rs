@@ -45,7 +45,7 @@ pub struct DriveConfig {
     pub lateral_acceleration_mps2: Option<f64>,
     /// `town`: length of the drive, metres.
     pub length_m: f64,
-    /// `file`: the trajectory, in any format that [`gyre_radar::read_trajectory`] knows.
+    /// `file`: the trajectory, in any format that [`gyre_datasets::read_trajectory`] knows.
     pub file: Option<PathBuf>,
     /// `file`: start, seconds after the first pose.
     pub from_s: f64,

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use gyre_radar::TrajectoryError;
+use gyre_datasets::TrajectoryError;
 use gyre_storage::StorageError;
 
 /// The reason why a dataset could not be set up or written.

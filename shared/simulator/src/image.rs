@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use gyre_radar::ImageSize;
+use gyre_datasets::ImageSize;
 use gyre_storage::Draft;
 
 use crate::error::SimulatorError;

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use gyre_radar::Format;
+use gyre_datasets::Format;
 use serde::{Deserialize, Serialize};
 
 /// The format of the dataset.

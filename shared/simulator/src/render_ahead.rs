@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 
-use gyre_radar::{Dataset, DatasetOptions, Format, ImageSize, ImageSource, OpenError};
+use gyre_datasets::{Dataset, DatasetOptions, Format, ImageSize, ImageSource, OpenError};
 
 use crate::simulated_drive::{Renderer, SimulatedDrive};
 
@@ -33,7 +33,7 @@ impl SimulatedDrive {
     /// # Errors
     /// Options that do not fit the drive's format.
     pub fn open(&self, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
-        gyre_radar::open_source(Box::new(RenderAhead::new(self)), options)
+        gyre_datasets::open_source(Box::new(RenderAhead::new(self)), options)
     }
 }
 

@@ -3,7 +3,8 @@
 
 use std::path::PathBuf;
 
-use gyre_radar::{DatasetOptions, Format, ImageSize, ImageSource, OwnedScan, ScanSlot};
+use gyre_datasets::{DatasetOptions, Format, ImageSize, ImageSource};
+use gyre_radar::{OwnedScan, ScanSlot};
 use gyre_samples::Sample;
 
 use crate::config::SimulationConfig;

@@ -21,7 +21,7 @@ pub(crate) fn ground_truth_tum(simulator: &Simulator, stamps_ns: Vec<i64>) -> Ve
         .collect();
     let mut text = Vec::new();
     // Writing to memory cannot fail, and there are stamps.
-    let _ = gyre_radar::write_tum(
+    let _ = gyre_datasets::write_tum(
         &Trajectory {
             stamp_ns: Some(stamps_ns),
             poses,

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
 
-use gyre_radar::ImageSource as _;
+use gyre_datasets::ImageSource as _;
 
 use crate::config::SimulationConfig;
 use crate::error::SimulatorError;

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
-use gyre_radar::read_trajectory;
+use gyre_datasets::read_trajectory;
 use gyre_simulator::Path;
 use gyre_simulator::path::recorded::{Excerpt, read};
 

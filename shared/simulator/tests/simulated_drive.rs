@@ -7,10 +7,9 @@ use std::num::NonZeroUsize;
 use std::path::Path;
 
 use crate::common::all_files;
+use gyre_datasets::{Dataset, DatasetOptions, Format, find_ground_truth, inspect, read_trajectory};
 use gyre_geometry::Pose;
-use gyre_radar::{
-    Dataset, DatasetOptions, Format, OwnedScan, find_ground_truth, inspect, read_trajectory,
-};
+use gyre_radar::OwnedScan;
 use gyre_simulator::output::OutputConfig;
 use gyre_simulator::{
     HostStamps, OutputFormat, SimulatedDrive, SimulationConfig, SimulatorError, Summary,
@@ -64,7 +63,7 @@ fn each_format_is_detected_and_read_back_as_it_was_rendered() {
     for format in FORMATS {
         let config = config(format, 3);
         let (folder, drive) = (written(&config), SimulatedDrive::new(&config).unwrap());
-        let mut dataset = gyre_radar::open(folder.path(), &options(&drive)).unwrap();
+        let mut dataset = gyre_datasets::open(folder.path(), &options(&drive)).unwrap();
         assert_eq!((dataset.format(), dataset.len()), (drive.format(), 3));
         for index in 0..3 {
             let (read, rendered) = (
@@ -177,7 +176,7 @@ fn a_stalling_host_shifts_the_logged_times_and_not_the_sensors_clock() {
     config.output.host_stamps = HostStamps::Stalling;
     let drive = SimulatedDrive::new(&config).unwrap();
     let source = Box::new(drive.renderer());
-    let dataset = gyre_radar::open_source(source, &drive.dataset_options()).unwrap();
+    let dataset = gyre_datasets::open_source(source, &drive.dataset_options()).unwrap();
     let late_ns = |index: usize| {
         dataset.logged_stamp_ns(index).unwrap() - dataset.nominal_stamp_ns(index).unwrap()
     };
@@ -341,8 +340,8 @@ fn streamed_scans_equal_those_from_a_disk() {
         let config = config(format, 3);
         let (folder, drive) = (written(&config), SimulatedDrive::new(&config).unwrap());
         let options = drive.dataset_options();
-        let mut disk = gyre_radar::open(folder.path(), &options).unwrap();
-        let mut memory = gyre_radar::open_source(Box::new(drive.renderer()), &options).unwrap();
+        let mut disk = gyre_datasets::open(folder.path(), &options).unwrap();
+        let mut memory = gyre_datasets::open_source(Box::new(drive.renderer()), &options).unwrap();
         assert_eq!((disk.len(), disk.limits()), (memory.len(), memory.limits()));
         assert_eq!(disk.notes(), memory.notes());
         for index in [2, 0, 1] {

@@ -2,8 +2,9 @@
 
 use std::f64::consts::TAU;
 
+use gyre_datasets::DatasetOptions;
 use gyre_geometry::{Pose, Twist};
-use gyre_radar::{DatasetOptions, OwnedScan};
+use gyre_radar::OwnedScan;
 use gyre_simulator::body::{NO_BODY, Scatterer, Wall};
 use gyre_simulator::profile::{Profile, Sampling};
 use gyre_simulator::{Body, Effects, Path, SensorConfig, SimulationConfig, Simulator};
@@ -236,7 +237,7 @@ fn powers_resemble_real_oxford_scans() {
         return;
     };
     let folder = std::path::Path::new(&data).join("oxford-2019-01-10-14-36-48");
-    let mut dataset = gyre_radar::open(&folder, &DatasetOptions::default()).unwrap();
+    let mut dataset = gyre_datasets::open(&folder, &DatasetOptions::default()).unwrap();
     let real: Vec<OwnedScan> = (0..3)
         .map(|index| {
             let mut scan = OwnedScan::with_limits(dataset.limits());

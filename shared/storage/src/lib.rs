@@ -10,7 +10,7 @@
 //! - [`Log`] is a file of records that grows at its end; [`LogReader`] reads it meanwhile.
 //! - [`lock`]: locks of files.
 //! - [`open()`], [`read_text`] and [`read_bytes`] read files that may come from elsewhere: no
-//!   pipes or devices, and up to a size.
+//!   pipes or devices, and up to a size. [`quoted`] quotes what is in them.
 //!
 //! A file and its name are two things: the name of a new or renamed file is safe once its folder is
 //! synchronised. Everything that must survive is written through this crate, so that a test can
@@ -24,6 +24,7 @@ mod group_sync;
 mod limited;
 pub mod lock;
 mod log;
+mod quoted;
 #[cfg(feature = "record")]
 pub mod record;
 
@@ -41,6 +42,7 @@ pub use folder::{create_folder, remove, rename, sync_folder};
 pub use group_sync::GroupSync;
 pub use limited::{SETTINGS, open, read_bytes, read_text};
 pub use log::{Log, LogError, LogMagic, LogReader};
+pub use quoted::quoted;
 
 /// A file or folder that cannot be read or written.
 #[derive(Debug, Error)]

@@ -3,11 +3,11 @@
 use std::{env, path::Path, thread, time::Duration};
 
 use bytemuck::Pod;
+use gyre_datasets::{Dataset, DatasetOptions};
 use gyre_messages::{
     Item, Masked, MaskedHeader, Motion, MotionEstimate, MotionHeader, PoseHeader, Refined,
     Rotation, Scan, ScanHeader, StageId, compose, flag,
 };
-use gyre_radar::{Dataset, DatasetOptions};
 use gyre_run::SourceConfig;
 use gyre_stage::{
     Launch, Sink, Source, Stage, StageCounters, StageError,
@@ -199,7 +199,7 @@ impl Stage for ForeignMasking {
 /// Plays the recording, with a fault in one header.
 fn replay(launch: &Launch, fault: Fault) -> Result<StageCounters, StageError> {
     let config: SourceConfig = launch.section("source")?;
-    let dataset = gyre_radar::open(&config.data, &DatasetOptions::default()).unwrap();
+    let dataset = gyre_datasets::open(&config.data, &DatasetOptions::default()).unwrap();
     let tolerance = gyre_radar_replay::tolerance(&config);
     source::run(launch, &mut ForeignSource { fault, dataset }, &tolerance)
 }

@@ -7,6 +7,7 @@ use gyre::{
     program,
 };
 use gyre_configuration::Configuration;
+use gyre_datasets::DatasetOptions;
 use gyre_geometry::SparsePoint;
 use gyre_journal::{
     self as journal, Journal,
@@ -14,7 +15,6 @@ use gyre_journal::{
     keyframes::Keyframes,
 };
 use gyre_messages::{Item, MotionEstimate, MotionHeader, PoseHeader, compose, flag};
-use gyre_radar::DatasetOptions;
 use gyre_results::{Identity, Out, Programs, Session};
 use gyre_run::Ending;
 use gyre_scan_matching::Refiner;

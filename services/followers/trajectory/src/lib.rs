@@ -10,9 +10,9 @@
 
 use std::path::PathBuf;
 
+use gyre_datasets::GnssLog;
 use gyre_geometry::{UncertainMotion, covariance, xy_yaw};
 use gyre_messages::{Correction, CorrectionHeader, Item};
-use gyre_radar::GnssLog;
 use gyre_run::SourceConfig;
 use gyre_samples::GnssConfig;
 use gyre_slam::{

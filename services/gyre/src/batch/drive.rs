@@ -12,8 +12,8 @@ use gyre_batch::DriveOutcome;
 use gyre_configuration::{
     AutomaticError, Configuration, ConfigurationError, SourceError, paths::shipped,
 };
+use gyre_datasets::OpenError;
 use gyre_masking::MaskerError;
-use gyre_radar::OpenError;
 use gyre_results::{Form, Holds, Identity, Out, OutError, Problem, SUMMARY};
 use gyre_simulator::SimulatorError;
 use gyre_stage::run::end_with;

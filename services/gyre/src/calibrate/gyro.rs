@@ -4,7 +4,7 @@ use std::path::{Path, absolute};
 
 use gyre_calibration::{Drive, GyroCalibration, GyroError, calibrate_gyro};
 use gyre_configuration::Configuration;
-use gyre_radar::GyroLog;
+use gyre_datasets::GyroLog;
 use gyre_samples::{GyroConfig, GyroKind};
 use gyre_terminal::{Failure, print};
 
@@ -54,7 +54,7 @@ impl Gyro {
         let log = self.log.path.display();
         print::line(format_args!("{:<21} {log}", "gyro, log"))?;
         let max_gap_s = self.configured.max_gap_s;
-        let found = calibrate_gyro(drive, &track, &self.log, max_gap_s);
+        let found = calibrate_gyro(drive, &track, &self.log.samples, max_gap_s);
         match &found {
             Ok(found) => print::line(found.table(&self.configured))?,
             Err(error) => print::line(format_args!("{:<21} not told: {error}", ""))?,

@@ -2,8 +2,8 @@
 
 use std::process::ExitCode;
 
+use gyre_datasets::DatasetOptions;
 use gyre_live_radar::Sizes;
-use gyre_radar::DatasetOptions;
 use gyre_run::SourceConfig;
 use gyre_stage::{Launch, StageCounters, StageError};
 use gyre_terminal::Failure;

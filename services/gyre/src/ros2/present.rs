@@ -3,8 +3,8 @@
 use std::{path::Path, process::ExitCode};
 
 use gyre_configuration::Configuration;
+use gyre_datasets::DatasetOptions;
 use gyre_live_radar::Sizes;
-use gyre_radar::DatasetOptions;
 use gyre_results::{absolute, map_options};
 use gyre_ros2_bridge::{
     Bridge, MapSettings, Settings,

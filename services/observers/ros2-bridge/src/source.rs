@@ -10,8 +10,8 @@ mod wakeups;
 use std::time::Duration;
 
 use gyre_colossus::Constants;
+use gyre_datasets::DatasetOptions;
 use gyre_live_radar::{encoder_counts, silence};
-use gyre_radar::DatasetOptions;
 use gyre_ros2_messages::{Domain, DomainError};
 use gyre_run::SourceConfig;
 use gyre_samples::{GyroConfig, GyroKind};

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use gyre_colossus::{Address, BadAddress, Constants};
-use gyre_radar::DatasetOptions;
+use gyre_datasets::DatasetOptions;
 use gyre_run::SourceConfig;
 
 use crate::parser::RadarParser;

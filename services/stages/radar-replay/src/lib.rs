@@ -9,8 +9,8 @@ mod turns;
 
 use std::{error::Error, num::NonZeroUsize, ops::Range, path::Path, time::Duration};
 
+use gyre_datasets::{Dataset, DatasetOptions, ScanSamples};
 use gyre_messages::{ScanHeader, StageId};
-use gyre_radar::{Dataset, DatasetOptions, ScanSamples};
 use gyre_run::{PlayedFrom, SourceConfig};
 use gyre_samples::{GyroConfig, WheelsConfig};
 use gyre_stage::{

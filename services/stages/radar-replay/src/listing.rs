@@ -9,7 +9,7 @@ use std::{
     path::Path,
 };
 
-use gyre_radar::{Dataset, FileList, Format};
+use gyre_datasets::{Dataset, FileList, Format};
 
 /// The file in the run's root: the name of the format, then the paths, each with a NUL behind it.
 const FILE: &str = "recording.list";

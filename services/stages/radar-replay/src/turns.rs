@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use gyre_radar::Dataset;
+use gyre_datasets::Dataset;
 
 /// The turns of a part of a recording. Each goes on in time where the one before ended.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -2,8 +2,8 @@
 
 use std::{collections::BTreeMap, io, path::Path};
 
+use gyre_datasets::ground_truth::read_trajectory;
 use gyre_evaluation::path_m;
-use gyre_radar::ground_truth::read_trajectory;
 use serde_json::Value;
 
 use crate::BatchError;

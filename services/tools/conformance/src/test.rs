@@ -2,9 +2,9 @@
 
 use std::{io, ops::Range, path::Path, time::Duration};
 
+use gyre_datasets::Dataset;
 use gyre_harness::{Candidate, Rig};
 use gyre_messages::StageId;
-use gyre_radar::Dataset;
 use gyre_stage::{StageError, wake::Signals};
 
 use crate::ConformanceError;

@@ -9,11 +9,13 @@ use std::{
 };
 
 use gyre_configuration::Configuration;
-use gyre_radar::{
-    Dataset, DatasetOptions, Format, LostAzimuthOption, LostAzimuths, OwnedScan, ReadError,
-    find_ground_truth,
-    lost::{repair, stale_rows},
+use gyre_datasets::{
+    Dataset, DatasetOptions, Format, LostAzimuthOption, ReadError, find_ground_truth,
     stored_options,
+};
+use gyre_radar::{
+    LostAzimuths, OwnedScan,
+    lost::{repair, stale_rows},
 };
 use gyre_storage::{StorageError, create_folder, write as write_file};
 use gyre_terminal::{Failure, print};

@@ -2,9 +2,9 @@
 
 use gyre_bags::{BagWriter, Kept, Topic};
 use gyre_colossus::Configuration as Radar;
+use gyre_datasets::{ReadError, correct_eccentricity, middle_ns};
 use gyre_radar::{
-    OwnedScan, PlacedRows, PolarScan, ReadError, Sense, SweepGeometry, correct_eccentricity,
-    lost::stale_rows, middle_ns, scan::flag,
+    OwnedScan, PlacedRows, PolarScan, Sense, SweepGeometry, lost::stale_rows, scan::flag,
 };
 use gyre_ros2_messages::{
     navtech_msgs::{RadarBScanMsg, RadarConfigurationMsg, RadarFftDataMsg},

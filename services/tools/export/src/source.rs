@@ -8,14 +8,13 @@ use std::{
 
 use gyre_bags::{BagWriter, Kept};
 use gyre_configuration::Configuration;
+use gyre_datasets::{Dataset, DatasetOptions, ground_truth::read_trajectory};
 use gyre_geometry::Pose;
 use gyre_journal as journal;
 use gyre_mapping::grid;
 use gyre_maps::map;
 use gyre_messages::{Correction, CorrectionHeader, Message, Pose as PoseTopic, PoseHeader, flag};
-use gyre_radar::{
-    Dataset, DatasetOptions, LostAzimuths, Trajectory, ground_truth::read_trajectory,
-};
+use gyre_radar::{LostAzimuths, Trajectory};
 use gyre_recording::Recording;
 use gyre_ros2_messages::{
     Mounting,

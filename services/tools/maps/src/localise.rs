@@ -18,11 +18,12 @@ use std::{
 };
 
 use clap::Args;
+use gyre_datasets::write_tum;
 use gyre_geometry::Pose;
 use gyre_inputs::Inputs;
 use gyre_localisation::{Localisation, Localiser, Status};
 use gyre_mapping::{Map, Overlay, map_png};
-use gyre_radar::{Trajectory, write_tum};
+use gyre_radar::Trajectory;
 use gyre_results::Out;
 use gyre_storage::{self as storage, Draft};
 use gyre_terminal::{Failure, print};

@@ -12,11 +12,12 @@ use std::{
 };
 
 use gyre_configuration::Configuration;
+use gyre_datasets::ground_truth::read_trajectory;
 use gyre_geometry::Pose;
 use gyre_mapping::{
     Drawing, Evidence, MapOptions, Origin, write_geotiff, write_pgm, write_web_tiles,
 };
-use gyre_radar::{Trajectory, ground_truth::read_trajectory};
+use gyre_radar::Trajectory;
 use gyre_results::{Out, georeference, map_options};
 use gyre_slam::{Keyframe, RecordReader, records_path};
 use gyre_storage::StorageError;
@@ -214,9 +215,9 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use std::fs;
 
+    use gyre_datasets::ground_truth::write_tum_pose;
     use gyre_geometry::{SparsePoint, Twist, UncertainMotion, pose};
     use gyre_mapping::Map;
-    use gyre_radar::ground_truth::write_tum_pose;
     use gyre_slam::RecordLog;
 
     use super::*;

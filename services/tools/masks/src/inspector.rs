@@ -3,10 +3,11 @@
 use std::error::Error;
 
 use gyre_configuration::{Configuration, Played};
+use gyre_datasets::{Dataset, ScanSamples};
 use gyre_geometry::SparsePoint;
 use gyre_masking::{MaskKind, Masker, MaskingConfig, Sweep};
 use gyre_odometry::{Odometry, OdometryConfig};
-use gyre_radar::{Dataset, LostAzimuths, OwnedScan, PlacedRows, ScanSamples};
+use gyre_radar::{LostAzimuths, OwnedScan, PlacedRows};
 use gyre_scan_matching::{RefinementConfig, RefinementKind};
 use gyre_terminal::{Failure, print};
 use ndarray::{Array2, ArrayView2};

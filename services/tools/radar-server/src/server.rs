@@ -13,7 +13,8 @@ use std::{
 };
 
 use gyre_colossus::{Azimuth, Configuration, Powers, write_azimuth};
-use gyre_radar::{Dataset, OwnedScan, PolarScan, ReadError, scan::flag};
+use gyre_datasets::{Dataset, ReadError};
+use gyre_radar::{OwnedScan, PolarScan, scan::flag};
 use thiserror::Error;
 
 pub(crate) use clients::Clients;

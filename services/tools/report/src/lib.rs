@@ -16,7 +16,7 @@ use std::{
 };
 
 use clap::Args;
-use gyre_radar::read_trajectory;
+use gyre_datasets::read_trajectory;
 use gyre_results::evaluate::truth_of_run;
 use gyre_terminal::{Failure, print};
 

@@ -286,7 +286,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use std::{fs, path::Path};
 
-    use gyre_radar::read_trajectory;
+    use gyre_datasets::read_trajectory;
 
     use super::*;
 

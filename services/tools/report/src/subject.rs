@@ -5,9 +5,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use gyre_datasets::read_trajectory;
 use gyre_evaluation::{Evaluation, Options};
 use gyre_geometry::Pose;
-use gyre_radar::{Trajectory, read_trajectory};
+use gyre_radar::Trajectory;
 use gyre_results::{SUMMARY, judgement::judge};
 use gyre_terminal::{Failure, print};
 use serde_json::Value;

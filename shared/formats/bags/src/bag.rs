@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use gyre_radar::DatasetOptions;
+use gyre_datasets::DatasetOptions;
 
 use crate::{
     BagError,

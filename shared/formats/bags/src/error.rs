@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use gyre_radar::OpenError;
+use gyre_datasets::OpenError;
 use gyre_ros2_messages::BadMessage;
 use thiserror::Error;
 

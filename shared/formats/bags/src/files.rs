@@ -6,7 +6,7 @@ use std::{
     path::{Component, Path, PathBuf},
 };
 
-use gyre_radar::quoted;
+use gyre_storage::quoted;
 use mcap::{
     MAGIC,
     records::{Record, op},

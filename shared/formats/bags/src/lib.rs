@@ -1,4 +1,4 @@
-//! Bags of ROS 2: a radar's scans in them as a [`Dataset`](gyre_radar::Dataset), and bags that
+//! Bags of ROS 2: a radar's scans in them as a [`Dataset`](gyre_datasets::Dataset), and bags that
 //! `ros2 bag play` takes.
 //!
 //! A bag is a file of the MCAP profile `ros2`, or a folder of such files with a `metadata.yaml`.

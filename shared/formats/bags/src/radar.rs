@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use gyre_colossus::Configuration;
-use gyre_radar::{EncoderTurn, FIRST_TURNS, encoder_counts, turn_ns};
+use gyre_datasets::{EncoderTurn, FIRST_TURNS, encoder_counts, turn_ns};
 use gyre_ros2_messages::{
     messages::RadarFftDataMessage,
     navtech_msgs::{RadarBScanMsg, RadarFftDataMsg},

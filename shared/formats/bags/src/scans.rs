@@ -6,10 +6,11 @@ mod notes;
 use std::path::{Path, PathBuf};
 
 use gyre_colossus::{Constants, SweepAssembler};
-use gyre_radar::{
+use gyre_datasets::{
     AzimuthSource, DEFAULT_TURN_NS, Dataset, DatasetOptions, FileList, Format, ImageSize,
-    OpenError, ReadError, ScanLimits, ScanSlot, SweepGeometry, turn_ns,
+    OpenError, ReadError, turn_ns,
 };
+use gyre_radar::{ScanLimits, ScanSlot, SweepGeometry};
 use gyre_samples::Sample;
 
 use crate::{

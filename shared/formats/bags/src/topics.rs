@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeSet, path::Path};
 
-use gyre_radar::quoted;
+use gyre_storage::quoted;
 
 use crate::{BagError, reading::Channel};
 

@@ -1,7 +1,7 @@
 //! Azimuths to scans.
 //!
 //! Angles, times and scales are those of a recording of the same azimuths, to the bit: see
-//! [`gyre_radar::open`].
+//! [`gyre_datasets::open`].
 
 mod counters;
 mod powers;
@@ -10,9 +10,8 @@ mod seam;
 
 use std::cmp::Ordering;
 
-use gyre_radar::{
-    DatasetOptions, ScanLimits, ScanSlot, Sense, SweepGeometry, correct_eccentricity, middle_ns,
-};
+use gyre_datasets::{DatasetOptions, correct_eccentricity, middle_ns};
+use gyre_radar::{ScanLimits, ScanSlot, Sense, SweepGeometry};
 
 use crate::clock::ByteOrder;
 use crate::configuration::{BadConfiguration, Configuration};
@@ -22,7 +21,7 @@ pub use counters::Counters;
 use rows::{Empty, RowWriter};
 use seam::{Grid, Seam};
 
-/// The constants that the radar does not report; as [`gyre_radar::DatasetOptions`].
+/// The constants that the radar does not report; as [`gyre_datasets::DatasetOptions`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Constants {
     /// Depth of a range bin, m. Default: the radar's.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use gyre_messages::topic;
-use gyre_radar::quoted;
+use gyre_storage::quoted;
 use mcap::records::Metadata;
 
 /// The name of the record.

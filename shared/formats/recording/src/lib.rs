@@ -21,7 +21,7 @@
 //!
 //! Reading order: `head` and `table` (the metadata), `writer`, `split` and `ledger` (several
 //! files), `walk` (the records of a file), `recording`, `generations`, `scans` (a
-//! [`Dataset`](gyre_radar::Dataset)).
+//! [`Dataset`](gyre_datasets::Dataset)).
 
 mod chunk;
 mod disk;

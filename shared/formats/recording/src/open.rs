@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use gyre_bags::is_bag;
-use gyre_radar::{Dataset, DatasetOptions, FileList, Format, OpenError, foreign};
+use gyre_datasets::{Dataset, DatasetOptions, FileList, Format, OpenError, foreign};
 
 use crate::{
     Recording, RecordingError,
@@ -23,7 +23,7 @@ pub fn is_recording(path: &Path) -> bool {
     is_named || first_part_in(path).is_some()
 }
 
-/// As [`gyre_radar::open`].
+/// As [`gyre_datasets::open`].
 ///
 /// # Errors
 /// As there; a recording that cannot be read.
@@ -33,22 +33,22 @@ pub fn open(root: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, O
     }
     match is_recording(root) {
         true => open_parts(&parts(root), root, options),
-        false => gyre_radar::open(root, options),
+        false => gyre_datasets::open(root, options),
     }
 }
 
-/// As [`gyre_radar::open_resolved`].
+/// As [`gyre_datasets::open_resolved`].
 ///
 /// # Errors
 /// As there; a recording that cannot be read.
 pub fn open_resolved(root: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
     match is_recording(root) || is_bag(root) {
         true => open(root, options),
-        false => gyre_radar::open_resolved(root, options),
+        false => gyre_datasets::open_resolved(root, options),
     }
 }
 
-/// As [`gyre_radar::reopen`].
+/// As [`gyre_datasets::reopen`].
 ///
 /// # Errors
 /// As there; a recording that cannot be read.
@@ -61,7 +61,7 @@ pub fn reopen(
     match format {
         Format::Mcap => {}
         Format::Ros2Bag => return gyre_bags::reopen(root, options, &files),
-        _ => return gyre_radar::reopen(root, options, format, files),
+        _ => return gyre_datasets::reopen(root, options, format, files),
     }
     let paths: Vec<PathBuf> = (0..files.len())
         .filter_map(|index| files.get(index))
@@ -70,7 +70,7 @@ pub fn reopen(
     open_parts(&paths, root, options)
 }
 
-/// As [`gyre_radar::stored_options`]: of a recording those of its run.
+/// As [`gyre_datasets::stored_options`]: of a recording those of its run.
 ///
 /// # Errors
 /// As there; a recording that cannot be read.
@@ -83,7 +83,7 @@ pub fn stored_options(root: &Path) -> Result<DatasetOptions, OpenError> {
     }
     match is_recording(root) {
         true => recorded_options(&open_recording(root)?),
-        false => gyre_radar::stored_options(root),
+        false => gyre_datasets::stored_options(root),
     }
 }
 

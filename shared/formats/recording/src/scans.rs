@@ -3,11 +3,12 @@
 
 use std::{collections::BTreeMap, path::Path};
 
-use gyre_messages::{Message, Scan, ScanHeader};
-use gyre_radar::{
-    DEFAULT_TURN_NS, Dataset, DatasetOptions, FileList, Format, ImageSize, MAX_AZIMUTHS, OpenError,
-    ReadError, ScanLimits, ScanSlot, SweepGeometry, turn_ns,
+use gyre_datasets::{
+    DEFAULT_TURN_NS, Dataset, DatasetOptions, FileList, Format, ImageSize, OpenError, ReadError,
+    turn_ns,
 };
+use gyre_messages::{Message, Scan, ScanHeader};
+use gyre_radar::{MAX_AZIMUTHS, ScanLimits, ScanSlot, SweepGeometry};
 use gyre_samples::Sample;
 
 use crate::{Entry, Recording, RecordingError, Stored, image::read};

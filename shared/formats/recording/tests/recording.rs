@@ -9,8 +9,9 @@ use std::{
 };
 
 use bytemuck::{Zeroable, bytes_of};
+use gyre_datasets::{DatasetOptions, ReadError};
 use gyre_messages::{GivenAnew, Item, MotionHeader, PoseHeader, RotationHeader, ScanHeader};
-use gyre_radar::{DatasetOptions, OwnedScan, ReadError};
+use gyre_radar::OwnedScan;
 use gyre_recording::{
     Head, Incoming, Ledger, LogLine, Positions, Recording, RecordingError, RecordingWriter, Split,
     SplitWriter, open, open_recording,

@@ -3,7 +3,8 @@
 use std::f64::consts::TAU;
 
 use gyre_colossus::{Configuration, Constants, RadarClock, SweepAssembler};
-use gyre_radar::{OwnedScan, ScanLimits, Sense, SweepGeometry, middle_ns, scan::flag};
+use gyre_datasets::middle_ns;
+use gyre_radar::{OwnedScan, ScanLimits, Sense, SweepGeometry, scan::flag};
 use gyre_ros2_messages::{
     messages::{RadarConfigurationMessage, RadarFftDataMessage},
     navtech_msgs::{RadarBScanMsg, RadarConfigurationMsg},

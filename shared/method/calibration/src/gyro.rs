@@ -21,7 +21,7 @@ mod turns;
 pub use error::GyroError;
 pub use found::GyroCalibration;
 
-use gyre_radar::GyroLog;
+use gyre_samples::Sample;
 
 use crate::{Drive, Estimate, Track};
 use angles::Angles;
@@ -53,7 +53,7 @@ const MAX_SCALE_SIGMA: f64 = 0.05;
 pub fn calibrate_gyro(
     drive: &Drive,
     track: &Track,
-    log: &GyroLog,
+    samples: &[Sample],
     max_gap_s: f64,
 ) -> Result<GyroCalibration, GyroError> {
     let stamps: Vec<i64> = drive.sweeps.iter().map(|sweep| sweep.stamp_ns).collect();
@@ -63,7 +63,7 @@ pub fn calibrate_gyro(
         .map(|pose| pose.rotation.angle())
         .collect();
     let starts: Vec<bool> = drive.sweeps.iter().map(|it| it.interval_s <= 0.0).collect();
-    calibrate_turns(&stamps, &headings, &starts, log, max_gap_s)
+    calibrate_turns(&stamps, &headings, &starts, samples, max_gap_s)
 }
 
 /// As [`calibrate_gyro`], from the headings of the scans, counter-clockwise; `starts` says where
@@ -72,12 +72,12 @@ pub(crate) fn calibrate_turns(
     stamps: &[i64],
     headings: &[f64],
     starts: &[bool],
-    log: &GyroLog,
+    samples: &[Sample],
     max_gap_s: f64,
 ) -> Result<GyroCalibration, GyroError> {
     let first_ns = stamps.first().copied().unwrap_or_default();
     let turns = turns(stamps, headings, starts);
-    let angles = Angles::new(log, first_ns, max_gap_s);
+    let angles = Angles::new(samples, first_ns, max_gap_s);
     let peak = search::peak(&turns, &angles)?;
     let fit = fit::Fit::new(&turns, &angles, &peak).ok_or(GyroError::Unsettled)?;
     let [scale, bias_radps, late_s] = fit.parameters;

@@ -3,8 +3,9 @@
 #![allow(clippy::unwrap_used)]
 
 use gyre_calibration::{Calibration, Drive, Fact, calibrate};
+use gyre_datasets::DatasetOptions;
 use gyre_odometry::OdometryConfig;
-use gyre_radar::{DatasetOptions, OwnedScan};
+use gyre_radar::OwnedScan;
 use gyre_simulator::{Profile, SimulatedDrive, SimulationConfig};
 
 const ECCENTRICITY_RAD: f64 = 4e-3;
@@ -29,7 +30,7 @@ fn calibrated(profile: Profile) -> Calibration {
         doppler_s: off(right.doppler_s, WRONG_BY[2]),
         ..right
     };
-    let mut dataset = gyre_radar::open_source(Box::new(simulated.renderer()), &options).unwrap();
+    let mut dataset = gyre_datasets::open_source(Box::new(simulated.renderer()), &options).unwrap();
     let mut scan = OwnedScan::with_limits(dataset.limits());
     let mut drive = Drive::new(&OdometryConfig::default()).unwrap();
     for index in 0..dataset.len() {

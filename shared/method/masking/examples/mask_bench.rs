@@ -6,9 +6,10 @@
 
 use std::{error::Error, hint::black_box, path::Path, time::Instant};
 
+use gyre_datasets::DatasetOptions;
 use gyre_geometry::{SparsePoint, Twist};
 use gyre_masking::{Backend, MaskKind, Masker, MaskingConfig, Sweep, network::Network};
-use gyre_radar::{DatasetOptions, OwnedScan, PointsConfig, RasterConfig};
+use gyre_radar::{OwnedScan, PointsConfig, RasterConfig};
 use ndarray::{Array2, Axis};
 
 const SCANS: usize = 100;
@@ -40,7 +41,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         maskers.push(Masker::new(&raster, &points, &learned(backend))?);
     }
     let folder = Path::new(&data).join("radiate-2019-02-12");
-    let mut dataset = gyre_radar::open(&folder, &DatasetOptions::default())?;
+    let mut dataset = gyre_datasets::open(&folder, &DatasetOptions::default())?;
     let mut scan = OwnedScan::with_limits(dataset.limits());
     let mut out = Array2::zeros((raster.n, raster.n));
     let mut sparse = vec![SparsePoint::default(); points.capacity];

@@ -5,7 +5,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use gyre_radar::{RasterConfig, Sampling, quoted};
+use gyre_radar::{RasterConfig, Sampling};
+use gyre_storage::quoted;
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
 use thiserror::Error;

@@ -4,9 +4,10 @@
 
 use std::{env, error::Error, path::Path};
 
+use gyre_datasets::DatasetOptions;
 use gyre_geometry::xy_yaw;
 use gyre_odometry::{Odometry, OdometryConfig};
-use gyre_radar::{DatasetOptions, OwnedScan};
+use gyre_radar::OwnedScan;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = env::args().skip(1).collect();
@@ -19,7 +20,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         number(2).transpose()?.unwrap_or(1),
     ];
 
-    let mut dataset = gyre_radar::open(Path::new(folder), &DatasetOptions::default())?;
+    let mut dataset = gyre_datasets::open(Path::new(folder), &DatasetOptions::default())?;
     let mut scan = OwnedScan::with_limits(dataset.limits());
     let mut odometry = Odometry::new(&OdometryConfig::default())?;
     for index in scans {

@@ -7,8 +7,9 @@
 
 use std::{env, error::Error, fs, io, path::Path};
 
+use gyre_datasets::{DatasetOptions, ScanSamples, write_tum};
 use gyre_odometry::{Odometry, OdometryConfig};
-use gyre_radar::{DatasetOptions, OwnedScan, ScanSamples, Trajectory, write_tum};
+use gyre_radar::{OwnedScan, Trajectory};
 use serde::Deserialize;
 
 /// The sections of a run's configuration that matter here.
@@ -30,7 +31,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         None => Config::default(),
     };
 
-    let mut dataset = gyre_radar::open(Path::new(folder), &config.dataset)?;
+    let mut dataset = gyre_datasets::open(Path::new(folder), &config.dataset)?;
     let mut scan = OwnedScan::with_limits(dataset.limits());
     let mut odometry = Odometry::new(&config.odometry)?;
     let (gyro, wheels) = (&config.odometry.gyro, &config.odometry.wheels);

@@ -19,7 +19,7 @@
 //! // Any reader of `gyre_radar` gives scans; this drive is generated.
 //! let drive = SimulatedDrive::new(&SimulationConfig { scans: Some(2), ..SimulationConfig::default() })?;
 //! let options = drive.dataset_options();
-//! let mut dataset = gyre_radar::open_source(Box::new(drive.renderer()), &options)?;
+//! let mut dataset = gyre_datasets::open_source(Box::new(drive.renderer()), &options)?;
 //! let mut scan = OwnedScan::with_limits(dataset.limits());
 //!
 //! let mut odometry = Odometry::new(&OdometryConfig::default())?;

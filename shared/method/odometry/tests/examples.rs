@@ -13,8 +13,9 @@ mod own_sensor;
 
 use std::fs;
 
+use gyre_datasets::{DatasetOptions, inspect_dataset};
 use gyre_odometry::Outcome;
-use gyre_radar::{DatasetOptions, RasterConfig, inspect_dataset};
+use gyre_radar::RasterConfig;
 use gyre_simulator::{Profile, SimulatedDrive, SimulationConfig, Simulator};
 use own_dataset::RawSweeps;
 

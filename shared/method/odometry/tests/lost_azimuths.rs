@@ -1,11 +1,9 @@
 //! Azimuths that the host has lost, in simulated recordings of RADIATE.
 
+use gyre_datasets::{DatasetOptions, LostAzimuthOption, open_source};
 use gyre_geometry::{Pose, Twist};
 use gyre_odometry::{Odometry, OdometryConfig};
-use gyre_radar::{
-    DatasetOptions, LostAzimuthFinder, LostAzimuthOption, LostAzimuths, OwnedScan, PlacedRows,
-    lost::stale_rows, open_source,
-};
+use gyre_radar::{LostAzimuthFinder, LostAzimuths, OwnedScan, PlacedRows, lost::stale_rows};
 use gyre_simulator::{OutputFormat, Profile, SimulatedDrive, SimulationConfig};
 
 const SCANS: usize = 60;

@@ -4,9 +4,10 @@
 
 use std::collections::BTreeMap;
 
+use gyre_datasets::{Dataset, GyroLog, ScanSamples, WheelLog, open_source};
 use gyre_geometry::{Pose, SparsePoint, xy_yaw};
 use gyre_odometry::{Odometry, OdometryConfig};
-use gyre_radar::{Dataset, GyroLog, OwnedScan, ScanSamples, WheelLog, open_source};
+use gyre_radar::OwnedScan;
 use gyre_samples::{Gyro, GyroKind, Sample, SampleKind, Wheels, WheelsKind};
 use gyre_scan_matching::{Outcome, Refiner, Verdict};
 use gyre_simulator::{GyroProfile, SimulatedDrive, SimulationConfig};
@@ -104,7 +105,7 @@ impl Drive {
             .and_then(|log| ScanSamples::of_gyro(&log, &self.config.gyro, dataset));
         let speeds = WheelLog::read(&wheels)
             .and_then(|log| ScanSamples::of_wheels(&log, &self.config.wheels, dataset));
-        let text = |error: gyre_radar::LogError| error.to_string();
+        let text = |error: gyre_datasets::LogError| error.to_string();
         Ok(turns.map_err(text)?.and(speeds.map_err(text)?))
     }
 

@@ -2,9 +2,10 @@
 
 use std::{env, fs, path::Path};
 
+use gyre_datasets::DatasetOptions;
 use gyre_geometry::xy_yaw;
 use gyre_odometry::{Odometry, OdometryConfig};
-use gyre_radar::{DatasetOptions, OwnedScan};
+use gyre_radar::OwnedScan;
 use serde::Deserialize;
 
 #[derive(Deserialize)]
@@ -20,7 +21,7 @@ fn motion(recording: &Path, hold: bool) -> [f64; 3] {
     let text = fs::read_to_string(project.join("configs/mulran.toml")).unwrap();
     let mut config: Configuration = toml::from_str(&text).unwrap();
     config.odometry.refinement.hold_standstill = hold;
-    let mut dataset = gyre_radar::open(recording, &config.dataset).unwrap();
+    let mut dataset = gyre_datasets::open(recording, &config.dataset).unwrap();
     let mut scan = OwnedScan::with_limits(dataset.limits());
     let mut odometry = Odometry::new(&config.odometry).unwrap();
     let registered = [0, 1].map(|index| {

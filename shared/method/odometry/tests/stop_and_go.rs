@@ -3,8 +3,9 @@
 
 use std::{fs, path::Path};
 
+use gyre_datasets::open_source;
 use gyre_odometry::{Odometry, OdometryConfig};
-use gyre_radar::{OwnedScan, open_source};
+use gyre_radar::OwnedScan;
 use gyre_simulator::{Profile, SimulatedDrive, SimulationConfig};
 use serde::Deserialize;
 

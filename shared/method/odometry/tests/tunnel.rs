@@ -3,9 +3,10 @@
 
 use std::{fmt::Write as _, path::Path};
 
+use gyre_datasets::{Dataset, GyroLog, ScanSamples, WheelLog, open_source};
 use gyre_geometry::{ComposedMotion, OdometryMotion, Pose, xy_yaw};
 use gyre_odometry::{Odometry, OdometryConfig};
-use gyre_radar::{Dataset, GyroLog, OwnedScan, ScanSamples, WheelLog, open_source};
+use gyre_radar::OwnedScan;
 use gyre_samples::{GyroKind, WheelsKind};
 use gyre_scan_matching::InitialGuess;
 use gyre_simulator::{

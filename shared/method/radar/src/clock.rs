@@ -4,7 +4,6 @@ use std::fmt;
 
 use serde::Serialize;
 
-use crate::dataset::stamp::SECOND_NS;
 use crate::trajectory::Trajectory;
 
 /// Range of the offsets that are evaluated, s: UTC and GPS time are 18 s apart, UTC and TAI 37 s.
@@ -13,6 +12,7 @@ pub const MAX_OFFSET_S: i64 = 60;
 /// drive resembles another.
 const NEAR_NS: i64 = 10_000_000_000;
 const FAR_MARGIN: f64 = 0.02;
+const SECOND_NS: i64 = 1_000_000_000;
 /// Steps of the offsets, ns: first over the range, then around the best.
 const COARSE_NS: i64 = 250_000_000;
 const STEP_NS: i64 = 50_000_000;

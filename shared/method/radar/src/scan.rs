@@ -6,7 +6,7 @@
 mod check;
 
 pub use check::ScanError;
-pub(crate) use check::check_sweep;
+pub use check::check_sweep;
 use ndarray::{ArrayView2, ShapeBuilder};
 
 /// The largest number of azimuths in a sweep. Navtech radars measure 400, some 800.

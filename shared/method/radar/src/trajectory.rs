@@ -1,7 +1,6 @@
 //! Trajectories in the plane.
 
 use gyre_geometry::{Pose, interpolate};
-use nalgebra::{Complex, Translation2, Unit, UnitComplex};
 
 /// Poses of the sensor (REP-103) in the world frame of the source.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -88,19 +87,6 @@ impl Trajectory {
         }
         Some(to.abs_diff(stamps[after.checked_sub(1)?]))
     }
-}
-
-/// Returns the planar pose of x, y, and the cosine and sine of its heading.
-///
-/// Cosine and sine are taken without normalisation if their norm is near 1: published KITTI results
-/// come from matrices rounded to six decimals, and normalising them changes the fifth decimal of
-/// the result.
-pub(crate) fn planar([x, y, cos, sin]: [f64; 4]) -> Pose {
-    let rotation = match (cos.hypot(sin) - 1.0).abs() < 1e-4 {
-        true => Unit::new_unchecked(Complex::new(cos, sin)),
-        false => UnitComplex::new(sin.atan2(cos)),
-    };
-    Pose::from_parts(Translation2::new(x, y), rotation)
 }
 
 #[cfg(test)]

@@ -2,7 +2,8 @@
 
 use gyre_estimation::{EstimationError, PoseGraph, Position};
 use gyre_geometry::{Pose, interpolate};
-use gyre_radar::{ClockOffset, Trajectory, clock_offset, median};
+use gyre_radar::{ClockOffset, clock_offset};
+use gyre_radar::{Trajectory, median};
 use gyre_samples::{GnssConfig, GnssFix};
 use nalgebra::{Point2, Vector2};
 

@@ -2,7 +2,7 @@
 
 use std::{num::NonZeroUsize, ops::Range, path::PathBuf};
 
-use gyre_radar::Dataset;
+use gyre_datasets::Dataset;
 use serde::{Deserialize, Serialize};
 
 use crate::PlayedFrom;

@@ -13,8 +13,8 @@
 //! 6. [`follower`]: the loop of a process that reads durable logs and is not in the stream.
 //! 7. [`observer`]: subscribers that the run does not depend on; [`relay`]: stand-ins for stages on
 //!    another machine.
-//! 8. [`usage`]: what a process uses of the machine; [`hand_over`]: one topic alone, to measure the
-//!    transport.
+//! 8. [`processes`], [`usage`]: the processes of the machine, and what they use of it;
+//!    [`hand_over`]: one topic alone, to measure the transport.
 //! 9. [`schedule`], [`heartbeat`], [`remote_progress`], [`services`]: what the supervisor
 //!    (`gyre-supervise`) reads and creates.
 //!
@@ -43,6 +43,7 @@ mod log_id;
 mod manifest;
 pub mod observer;
 mod outlet;
+pub mod processes;
 pub mod reader;
 pub mod relay;
 pub mod remote_progress;

@@ -1,12 +1,10 @@
 //! The machine's resources that a process uses, as the kernel counts it.
 
-use std::time::Duration;
+use std::{fs, path::Path, time::Duration};
 
-use procfs::{
-    ProcResult,
-    process::{Process, Status},
-};
 use serde::{Deserialize, Serialize};
+
+use crate::processes::ProcessStat;
 
 /// The resources that a process has used since its start, and the memory that it has now.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -31,28 +29,22 @@ pub struct Usage {
 impl Usage {
     /// Returns the usage of a process; `None` if it has ended, or belongs to another user.
     pub fn of(pid: u32) -> Option<Self> {
-        Self::read(pid).ok()
-    }
-
-    fn read(pid: u32) -> ProcResult<Self> {
-        let process = Process::new(pid as i32)?;
-        let (stat, status) = (process.stat()?, process.status()?);
+        let folder = format!("/proc/{pid}");
+        let of_process = status(Path::new(&folder))?;
         let mut usage = Self {
-            cpu_s: (stat.utime + stat.stime) as f64 / procfs::ticks_per_second() as f64,
-            own_bytes: kilobytes(status.rssanon),
-            resident_bytes: kilobytes(status.vmrss),
-            threads: status.threads,
+            cpu_s: ProcessStat::of(pid)?.cpu_s,
+            own_bytes: 1024 * count(&of_process, "RssAnon:"),
+            resident_bytes: 1024 * count(&of_process, "VmRSS:"),
+            threads: count(&of_process, "Threads:"),
             ..Self::default()
         };
-        for task in process.tasks()? {
-            // A thread may end meanwhile.
-            let status: ProcResult<Status> = task.and_then(|task| task.status());
-            if let Ok(status) = status {
-                usage.wake_ups += status.voluntary_ctxt_switches.unwrap_or_default();
-                usage.preemptions += status.nonvoluntary_ctxt_switches.unwrap_or_default();
-            }
+        for thread in fs::read_dir(folder + "/task").ok()?.flatten() {
+            // It may end meanwhile.
+            let of_thread = status(&thread.path()).unwrap_or_default();
+            usage.wake_ups += count(&of_thread, "voluntary_ctxt_switches:");
+            usage.preemptions += count(&of_thread, "nonvoluntary_ctxt_switches:");
         }
-        Ok(usage)
+        Some(usage)
     }
 
     /// Returns the share of one processor that was used since `earlier`, `elapsed` ago.
@@ -61,9 +53,16 @@ impl Usage {
     }
 }
 
-/// Returns a number of kilobytes in bytes.
-fn kilobytes(number: Option<u64>) -> u64 {
-    number.unwrap_or_default() * 1024
+/// Reads what `/proc` says of a process or thread.
+fn status(folder: &Path) -> Option<String> {
+    fs::read_to_string(folder.join("status")).ok()
+}
+
+/// Returns the number behind a name at the beginning of a line; 0 if there is none.
+fn count(status: &str, name: &str) -> u64 {
+    let value = status.lines().find_map(|line| line.strip_prefix(name));
+    let number = value.and_then(|value| value.split_whitespace().next()?.parse().ok());
+    number.unwrap_or_default()
 }
 
 #[cfg(test)]
@@ -87,7 +86,10 @@ mod tests {
             .output()
             .unwrap();
         let said = String::from_utf8_lossy(&ended.stdout);
-        assert!(ended.status.success() && said.contains("1 passed"), "{said}");
+        assert!(
+            ended.status.success() && said.contains("1 passed"),
+            "{said}"
+        );
     }
 
     fn use_and_measure() {

@@ -18,8 +18,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_stage::{run, wake::Signals};
-use procfs::process::Process;
+use gyre_stage::{processes::ProcessStat, run, wake::Signals};
 use rustix::{
     io::ioctl_fionbio,
     process::{Pid, RawPid, Signal, getpid, kill_process_group},
@@ -157,16 +156,13 @@ pub fn guard(mut messages: impl Read, root: Option<&Path>) {
 /// Returns whether a group has a process that has not ended. One that nobody waits for stays as a
 /// zombie.
 fn lives(group: Pid) -> bool {
-    let processes = procfs::process::all_processes().into_iter().flatten();
-    let stats = processes.filter_map(|process| process.ok()?.stat().ok());
-    let mut of_group = stats.filter(|stat| stat.pgrp == group.as_raw_pid());
-    of_group.any(|stat| !matches!(stat.state, 'Z' | 'X'))
+    let group = group.as_raw_pid() as u32;
+    ProcessStat::all().any(|stat| stat.group == group && !stat.has_ended)
 }
 
 /// Returns when a process was started, in the system's ticks; `None` if there is none.
 fn started(process: RawPid) -> Option<u64> {
-    let stat = Process::new(process).and_then(|process| process.stat());
-    stat.ok().map(|stat| stat.starttime)
+    ProcessStat::of(process as u32).map(|stat| stat.started)
 }
 
 #[cfg(test)]

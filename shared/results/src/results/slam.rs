@@ -4,12 +4,13 @@
 use std::fmt::{self, Write};
 
 use gyre_configuration::{Configuration, gnss_log};
+use gyre_datasets::GnssLog;
 use gyre_estimation::{Constraint, EstimationError, G2o};
 use gyre_evaluation::{BandSample, Bands, LoopErrors, TruthSigma, loop_errors};
 use gyre_geometry::{Pose, xy_yaw};
 use gyre_journal as journal;
 use gyre_messages::flag;
-use gyre_radar::{GnssLog, Trajectory};
+use gyre_radar::Trajectory;
 use gyre_slam::{
     Correction, Fixes, Keyframe, LoopOutcome, LoopVerdict, Query, RecordReader,
     TrajectoryEstimator, TrajectoryOptions, records_path,

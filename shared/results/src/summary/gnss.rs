@@ -2,10 +2,10 @@
 
 use std::fmt;
 
+use gyre_datasets::{GnssFaults, GnssLog};
 use gyre_estimation::EstimationError;
 use gyre_geometry::{UncertainMotion, xy_yaw};
 use gyre_mapping::Origin;
-use gyre_radar::{GnssFaults, GnssLog};
 use gyre_slam::TrajectoryEstimator;
 use serde::Serialize;
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use gyre_radar::ImageSource;
+use gyre_datasets::ImageSource;
 use gyre_simulator::output::OutputConfig;
 use gyre_simulator::profile::Profile;
 use gyre_simulator::weather::WeatherConfig;

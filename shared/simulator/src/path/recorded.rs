@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
+use gyre_datasets::{TrajectoryError, parse_trajectory, read_trajectory};
 use gyre_geometry::Pose;
-use gyre_radar::{Trajectory, TrajectoryError, parse_trajectory, read_trajectory};
+use gyre_radar::Trajectory;
 use nalgebra::Point2;
 
 use super::spline_path::SplinePath;
@@ -35,7 +36,7 @@ impl Default for Excerpt {
     }
 }
 
-/// Reads a trajectory of any format that [`gyre_radar::read_trajectory`] knows and returns a path
+/// Reads a trajectory of any format that [`gyre_datasets::read_trajectory`] knows and returns a path
 /// along it, in the frame of the excerpt's first pose.
 ///
 /// The path passes within 5 cm of 95 % of a real drive's poses and within 10 cm of 99 %; the rest

@@ -39,7 +39,7 @@ fn write(file: &FilePath, poses: Vec<Pose>) {
         stamp_ns: Some(stamps.collect()),
         poses,
     };
-    gyre_radar::write_tum(&trajectory, &mut File::create(file).unwrap()).unwrap();
+    gyre_datasets::write_tum(&trajectory, &mut File::create(file).unwrap()).unwrap();
 }
 
 /// The drive along a file through the town of all files.
@@ -204,7 +204,10 @@ fn a_recording_ends_with_its_trajectory() {
     let folder = tempfile::tempdir().unwrap();
     let files = trajectories(folder.path());
     let whole = Simulator::new(&through(&files, 0)).unwrap();
-    let poses = gyre_radar::read_trajectory(&files[0]).unwrap().poses.len();
+    let poses = gyre_datasets::read_trajectory(&files[0])
+        .unwrap()
+        .poses
+        .len();
     assert!(
         whole.scans().abs_diff(poses) <= 1,
         "{} of {poses}",
@@ -230,7 +233,7 @@ fn a_drive_off_the_streets_of_the_town_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let files = trajectories(folder.path());
     let mut config = through(&files, 0);
-    let aside = gyre_radar::read_trajectory(&files[0]).unwrap().poses;
+    let aside = gyre_datasets::read_trajectory(&files[0]).unwrap().poses;
     let aside = aside
         .iter()
         .map(|pose| pose * gyre_geometry::pose(0.0, 40.0, 0.0));

@@ -17,7 +17,7 @@ pub struct TownConfig {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub seed: Option<u64>,
     /// The trajectories of all drives through the town, in any format that
-    /// [`gyre_radar::read_trajectory`] knows: streets are laid along all of them, whichever is
+    /// [`gyre_datasets::read_trajectory`] knows: streets are laid along all of them, whichever is
     /// driven. The world's frame is that of the first file's first pose. Default: streets along the
     /// drive alone.
     #[serde(skip_serializing_if = "Vec::is_empty")]

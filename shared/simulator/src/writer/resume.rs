@@ -5,7 +5,7 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::Path;
 
-use gyre_radar::ImageSource as _;
+use gyre_datasets::ImageSource as _;
 use gyre_storage::{SETTINGS, StorageError, read_bytes, read_text};
 
 use crate::config::SimulationConfig;
@@ -19,7 +19,7 @@ pub const MADE_BY: &str = "simulation.toml";
 /// The largest image that is compared, bytes: twice what a radar's image may have.
 const MAX_IMAGE_BYTES: u64 = 64 << 20;
 
-/// The file with the options to read it; see [`gyre_radar::open`].
+/// The file with the options to read it; see [`gyre_datasets::open`].
 pub(super) const DATASET_OPTIONS: &str = "dataset.toml";
 
 /// Content of [`MADE_BY`].

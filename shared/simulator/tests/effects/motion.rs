@@ -2,9 +2,10 @@
 
 use std::f64::consts::TAU;
 
+use gyre_datasets::DatasetOptions;
 use gyre_geometry::Pose;
 use gyre_geometry::Twist;
-use gyre_radar::{DatasetOptions, OwnedScan};
+use gyre_radar::OwnedScan;
 use gyre_simulator::profile::Profile;
 use gyre_simulator::{
     Body, Effects, Movers, Moving, SensorConfig, SimulationConfig, write_dataset,
@@ -190,7 +191,7 @@ fn a_readers_correction_cancels_the_eccentricity() {
             azimuth_eccentricity_rad,
             ..DatasetOptions::default()
         };
-        let mut dataset = gyre_radar::open(folder.path(), &options).unwrap();
+        let mut dataset = gyre_datasets::open(folder.path(), &options).unwrap();
         let mut scan = OwnedScan::with_limits(dataset.limits());
         scan.geometry = dataset.read(0, scan.slot()).unwrap();
         scan.view().azimuth_rad.to_vec()

@@ -3,10 +3,11 @@
 use std::ops::Range;
 
 use gyre_configuration::{Configuration, describe_masks_in_process};
+use gyre_datasets::{Dataset, ScanSamples};
 use gyre_geometry::Twist;
 use gyre_localisation::Observation;
 use gyre_odometry::{Odometry, Outcome};
-use gyre_radar::{Dataset, OwnedScan, ScanSamples};
+use gyre_radar::OwnedScan;
 use gyre_terminal::{Failure, print};
 
 /// The scans of a recording, one after the other.

@@ -5,11 +5,11 @@
 
 use std::{
     collections::BTreeMap,
+    fs,
     path::{Path, PathBuf},
 };
 
-use gyre_stage::control::Control;
-use procfs::process::{Process, all_processes};
+use gyre_stage::{control::Control, processes::ProcessStat};
 
 /// A living process of a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -27,14 +27,6 @@ pub struct Members {
     out: PathBuf,
     /// The names of the process groups that have been seen.
     names: BTreeMap<u32, String>,
-}
-
-/// The identity of a process in `/proc`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct ProcessIds {
-    pid: u32,
-    parent: u32,
-    group: u32,
 }
 
 impl Members {
@@ -59,12 +51,13 @@ impl Members {
         let rows = rows();
         self.learn(&rows);
         let mut children = rows.iter().filter(|row| row.parent == self.supervisor);
-        let is_it = |row: &&ProcessIds| self.names.get(&row.pid).is_some_and(|known| known == name);
+        let is_it =
+            |row: &&ProcessStat| self.names.get(&row.pid).is_some_and(|known| known == name);
         children.find(is_it).map(|row| row.group)
     }
 
     /// Asks the supervisor for the names of its processes if there is one that has none.
-    fn learn(&mut self, rows: &[ProcessIds]) {
+    fn learn(&mut self, rows: &[ProcessStat]) {
         let children = || rows.iter().filter(|row| row.parent == self.supervisor);
         if children().all(|row| self.names.contains_key(&row.pid)) {
             return;
@@ -81,7 +74,7 @@ impl Members {
 }
 
 /// Returns the supervisor, its children, and all that are in their groups.
-fn members(rows: &[ProcessIds], supervisor: u32, names: &BTreeMap<u32, String>) -> Vec<Member> {
+fn members(rows: &[ProcessStat], supervisor: u32, names: &BTreeMap<u32, String>) -> Vec<Member> {
     let children = rows.iter().filter(|row| row.parent == supervisor);
     let name = |pid: u32| names.get(&pid).map_or("other", String::as_str);
     let leaders: BTreeMap<u32, &str> = children.map(|row| (row.pid, name(row.pid))).collect();
@@ -99,22 +92,14 @@ fn members(rows: &[ProcessIds], supervisor: u32, names: &BTreeMap<u32, String>) 
 }
 
 /// The living processes of the machine.
-fn rows() -> Vec<ProcessIds> {
-    let processes = all_processes().into_iter().flatten().flatten();
-    let stats = processes.filter_map(|process| process.stat().ok());
-    let living = stats.filter(|stat| stat.state != 'Z');
-    let row = |stat: procfs::process::Stat| ProcessIds {
-        pid: stat.pid as u32,
-        parent: stat.ppid as u32,
-        group: stat.pgrp as u32,
-    };
-    living.map(row).collect()
+fn rows() -> Vec<ProcessStat> {
+    ProcessStat::all().filter(|it| !it.has_ended).collect()
 }
 
 /// `gyre guard`, which no stage is.
 fn is_guardian(pid: u32) -> bool {
-    let line = Process::new(pid as i32).and_then(|process| process.cmdline());
-    line.is_ok_and(|line| line.last().is_some_and(|last| last == "guard"))
+    let line = fs::read_to_string(format!("/proc/{pid}/cmdline"));
+    line.is_ok_and(|line| line.trim_end_matches('\0').ends_with("\0guard"))
 }
 
 #[cfg(test)]
@@ -123,8 +108,13 @@ mod tests {
 
     const SUPERVISOR: u32 = 10;
 
-    fn row(pid: u32, parent: u32, group: u32) -> ProcessIds {
-        ProcessIds { pid, parent, group }
+    fn row(pid: u32, parent: u32, group: u32) -> ProcessStat {
+        ProcessStat {
+            pid,
+            parent,
+            group,
+            ..ProcessStat::default()
+        }
     }
 
     #[test]

@@ -15,10 +15,8 @@ use std::{
 
 use gyre_bags::{BagWriter, Kept, is_bag, open};
 use gyre_colossus::Configuration;
-use gyre_radar::{
-    Dataset, DatasetOptions, Format, OpenError, OwnedScan, ReadError, ScanLimits, Sense,
-    SweepGeometry, middle_ns, scan::flag,
-};
+use gyre_datasets::{Dataset, DatasetOptions, Format, OpenError, ReadError, middle_ns};
+use gyre_radar::{OwnedScan, ScanLimits, Sense, SweepGeometry, scan::flag};
 use gyre_ros2_messages::{
     Ros2Message, encode,
     messages::RadarFftDataMessage,

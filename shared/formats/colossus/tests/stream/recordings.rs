@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use gyre_colossus::{Azimuth, ClockFormat, Configuration, Powers, RadarClock};
-use gyre_radar::{Dataset, DatasetOptions, OwnedScan, PolarScan};
+use gyre_datasets::{Dataset, DatasetOptions};
+use gyre_radar::{OwnedScan, PolarScan};
 
 use crate::support::Assembly;
 
@@ -64,7 +65,8 @@ fn real_scans_come_back_identical() {
         "samples/fomo-2025-10-14",
         "samples/boreas-rt-2024-12-03",
     ] {
-        let Ok(mut dataset) = gyre_radar::open(&data.join(name), &DatasetOptions::default()) else {
+        let Ok(mut dataset) = gyre_datasets::open(&data.join(name), &DatasetOptions::default())
+        else {
             println!("skipped: {name} is missing");
             continue;
         };

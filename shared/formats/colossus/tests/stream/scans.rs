@@ -4,7 +4,7 @@ use gyre_colossus::{
     ByteOrder, ClockFormat, Configuration, Event, Message, Parser, RadarClock, SplitUnit,
     write_azimuth, write_configuration, write_keep_alive,
 };
-use gyre_radar::middle_ns;
+use gyre_datasets::middle_ns;
 
 use crate::support::{Assembly, START_NS, SentAzimuth, configuration, feed, turns};
 

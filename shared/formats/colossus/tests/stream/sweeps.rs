@@ -260,7 +260,7 @@ fn a_scan_has_the_constants_given() {
             assert_eq!(geometry.doppler_s, 0.04);
             assert_eq!(geometry.sense, Sense::Clockwise);
             let mut expected = [angle(5586, 5600)];
-            gyre_radar::correct_eccentricity(&mut expected, -0.01);
+            gyre_datasets::correct_eccentricity(&mut expected, -0.01);
             assert_eq!(scan.azimuth_rad[399], expected[0]);
             return;
         }

@@ -1,6 +1,7 @@
 //! The angles that a gyro turns by about its axes.
 
-use gyre_radar::{GyroLog, median};
+use gyre_radar::median;
+use gyre_samples::Sample;
 use nalgebra::Vector3;
 
 /// The integrals of the three rates of a log, s since the first scan on the log's own clock.
@@ -23,8 +24,8 @@ pub(super) struct Turned {
 }
 
 impl Angles {
-    pub(super) fn new(log: &GyroLog, first_ns: i64, max_gap_s: f64) -> Self {
-        let samples = log.samples.iter();
+    pub(super) fn new(samples: &[Sample], first_ns: i64, max_gap_s: f64) -> Self {
+        let samples = samples.iter();
         let seconds = |ns: i64| (i128::from(ns) - i128::from(first_ns)) as f64 * 1e-9;
         let stamps_s: Vec<f64> = samples.clone().map(|it| seconds(it.stamp_ns)).collect();
         let rates: Vec<_> = samples

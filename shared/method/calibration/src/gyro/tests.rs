@@ -77,7 +77,7 @@ impl Simulated {
         waves.sum()
     }
 
-    fn log(&self) -> GyroLog {
+    fn samples(&self) -> Vec<Sample> {
         let rate_hz = 20.0;
         let samples = (-200..(self.duration_s * rate_hz) as i64 + 200).map(|k| {
             let time_s = k as f64 / rate_hz + 0.013;
@@ -102,7 +102,7 @@ impl Simulated {
                 values,
             }
         });
-        GyroLog::of(samples.collect(), Path::new("simulated")).unwrap()
+        samples.collect()
     }
 
     /// Stamps and headings of the scans.
@@ -116,14 +116,14 @@ impl Simulated {
         (stamps.collect(), (0..scans).map(at).collect())
     }
 
-    fn calibrated_by(&self, log: &GyroLog) -> Result<GyroCalibration, GyroError> {
+    fn calibrated_by(&self, samples: &[Sample]) -> Result<GyroCalibration, GyroError> {
         let (stamps, headings) = self.radar();
         let starts = vec![false; stamps.len()];
-        calibrate_turns(&stamps, &headings, &starts, log, 0.12)
+        calibrate_turns(&stamps, &headings, &starts, samples, 0.12)
     }
 
     fn calibrated(&self) -> Result<GyroCalibration, GyroError> {
-        self.calibrated_by(&self.log())
+        self.calibrated_by(&self.samples())
     }
 }
 
@@ -178,13 +178,13 @@ fn a_clock_that_drifts_is_told() {
 #[test]
 fn stalls_of_the_log_are_left_out_and_not_interpolated() {
     let drive = Simulated::default();
-    let mut log = drive.log();
+    let mut samples = drive.samples();
     let whole = drive.calibrated().unwrap();
     let at_s = |sample: &Sample| (sample.stamp_ns - START_NS) as f64 * 1e-9;
-    log.samples.retain(|sample| {
+    samples.retain(|sample| {
         !(30.0..34.0).contains(&at_s(sample)) && !(60.0..60.8).contains(&at_s(sample))
     });
-    let found = drive.calibrated_by(&log).unwrap();
+    let found = drive.calibrated_by(&samples).unwrap();
     assert!(
         found.turns < whole.turns - 20,
         "{} {}",
@@ -203,7 +203,7 @@ fn the_log_of_another_drive_is_refused() {
             ..Simulated::default()
         };
         let refused = Simulated::default()
-            .calibrated_by(&other.log())
+            .calibrated_by(&other.samples())
             .unwrap_err();
         assert!(
             matches!(refused, GyroError::Ambiguous { .. } | GyroError::Unsettled),

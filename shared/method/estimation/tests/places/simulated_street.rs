@@ -68,7 +68,7 @@ fn simulate() -> Vec<Keyframe> {
     };
     let drive = SimulatedDrive::new(&config).unwrap();
     let mut dataset =
-        gyre_radar::open_source(Box::new(drive.renderer()), &drive.dataset_options()).unwrap();
+        gyre_datasets::open_source(Box::new(drive.renderer()), &drive.dataset_options()).unwrap();
     let mut scan = OwnedScan::with_limits(dataset.limits());
     let mut extractor = PointExtractor::new(&PointsConfig::default()).unwrap();
     let mut points = vec![SparsePoint::default(); 8192];

@@ -145,8 +145,11 @@ impl PolarScan<'_> {
     }
 }
 
-/// Checks that the times of the rows do not decrease, and span at most `max_sweep_ns`.
-pub(crate) fn check_sweep(stamp_ns: &[i64], max_sweep_ns: i64) -> Result<(), ScanError> {
+/// Checks that the times of the rows, ns, do not decrease, and span at most `max_sweep_ns`.
+///
+/// # Errors
+/// If they do not, with the row.
+pub fn check_sweep(stamp_ns: &[i64], max_sweep_ns: i64) -> Result<(), ScanError> {
     let Some(first) = stamp_ns.first().copied() else {
         return Ok(());
     };

@@ -1,0 +1,226 @@
+//! Readers of radar recordings: one trait, one file per format.
+
+mod boreas;
+mod dataset_toml;
+mod detect;
+mod eccentricity;
+mod encoder;
+mod error;
+mod file_list;
+mod first_image;
+mod fomo;
+mod foreign;
+mod format;
+mod image_list;
+mod image_size;
+mod image_source;
+mod images;
+mod mulran;
+mod navtech_notes;
+mod navtech_png;
+mod navtech_profile;
+mod navtech_scans;
+mod options;
+mod oxford;
+mod png_image;
+mod radiate;
+mod row_order;
+mod sensor_clock;
+
+mod stale;
+pub(crate) mod stamp;
+mod transposed;
+
+use std::path::Path;
+
+pub use eccentricity::correct_eccentricity;
+pub use encoder::{EncoderTurn, FIRST_TURNS, encoder_counts};
+pub use error::{OpenError, ReadError};
+pub use file_list::FileList;
+pub use foreign::foreign;
+pub use format::Format;
+use gyre_radar::scan::{ScanLimits, ScanSlot, SweepGeometry};
+use gyre_samples::Sample;
+pub use image_size::ImageSize;
+pub use image_source::ImageSource;
+pub use options::{AzimuthSource, DatasetOptions, LostAzimuthOption};
+pub use radiate::frame_stamps;
+pub use stamp::{DEFAULT_TURN_NS, middle_ns, parse_seconds, to_ns as stamp_to_ns, turn_ns};
+
+/// The scans of one recording, ordered by time.
+///
+/// A scan that cannot be read gives an error; the others stay readable.
+pub trait Dataset: Send {
+    /// The file format.
+    fn format(&self) -> Format;
+
+    /// Number of scans.
+    fn len(&self) -> usize;
+
+    /// Index of the first scan that can be read; those before it are of another part of the drive.
+    fn first(&self) -> usize {
+        0
+    }
+
+    /// Returns whether there is no scan; `open` rejects such a folder.
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Memory that a scan needs, from the header of the first image. All images must have its size.
+    fn limits(&self) -> ScanLimits;
+
+    /// Size of the images as stored.
+    fn image_size(&self) -> ImageSize;
+
+    /// Returns whether the images are stored as range x azimuth, and transposed by
+    /// [`Dataset::read`].
+    fn is_transposed(&self) -> bool {
+        false
+    }
+
+    /// The files of the scans.
+    fn files(&self) -> &FileList;
+
+    /// The file of a scan; an empty path past the end.
+    fn file(&self, index: usize) -> &Path {
+        self.files().get(index).unwrap_or(Path::new(""))
+    }
+
+    /// Time of a scan (the middle of the sweep on the sensor's clock), ns since 1970, as far as it
+    /// is known without decoding.
+    fn nominal_stamp_ns(&self, index: usize) -> Option<i64>;
+
+    /// Median time between two scans, ns.
+    fn period_ns(&self) -> i64;
+
+    /// Time logged for a scan (in the file name or the list of stamps), ns since 1970.
+    fn logged_stamp_ns(&self, index: usize) -> Option<i64> {
+        self.nominal_stamp_ns(index)
+    }
+
+    /// The definition of the stamps, and how the middle of the sweep is obtained: one sentence.
+    fn stamp_meaning(&self) -> &'static str;
+
+    /// Encoder counts per turn, if azimuths come from an encoder.
+    fn encoder_counts(&self) -> Option<u16> {
+        None
+    }
+
+    /// Observations of the reader when it opened the dataset, and how it handles them: whole
+    /// sentences.
+    fn notes(&self) -> &[String] {
+        &[]
+    }
+
+    /// Decodes a scan into `slot`, whose slices are at least as long as [`Dataset::limits`].
+    ///
+    /// # Errors
+    /// An index past the end, an image that cannot be read or decoded, metadata that is not of one
+    /// sweep, a slot that is too small.
+    fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError>;
+
+    /// Reads the samples of a gyro that the recording itself has, on the topic of this name, else
+    /// on the only one: in the gyro's own axes and on its own clock, in the order of the recording.
+    /// `None` without one.
+    ///
+    /// # Errors
+    /// No such topic, several without a name, or samples that cannot be read.
+    fn gyro(&mut self, topic: Option<&str>) -> Result<Option<Vec<Sample>>, OpenError> {
+        let _ = topic;
+        Ok(None)
+    }
+
+    /// The samples of other sensors that were recorded with the scan that was read last, in the
+    /// order of their stamps: of a recording of a run with such sensors.
+    fn samples(&self) -> &[Sample] {
+        &[]
+    }
+}
+
+/// Opens the dataset at `root`: the folder that holds the radar's folder, or the folder of images
+/// itself.
+///
+/// The format is detected unless `options` names it. Options that are not set are read from a
+/// `dataset.toml` in the folder, if there is one.
+///
+/// # Errors
+/// A folder without images of a known format, options out of bounds, or files that cannot be read.
+pub fn open(root: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
+    open_resolved(root, &options.or(&stored_options(root)?))
+}
+
+/// Returns the options in the `dataset.toml` of a recording; none are set where there is no such
+/// file.
+///
+/// # Errors
+/// A file that cannot be read or has other keys.
+pub fn stored_options(root: &Path) -> Result<DatasetOptions, OpenError> {
+    dataset_toml::options(root)
+}
+
+/// Opens the dataset at `root` with these options alone, whatever `dataset.toml` says by now.
+///
+/// # Errors
+/// As [`open`].
+pub fn open_resolved(root: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
+    options.check()?;
+    open_found(detect::locate(root, options.format)?, options)
+}
+
+/// Opens a dataset again as [`open_resolved`] has opened it before, with the format and the files
+/// that it had then. The folder is not listed, so it does not matter how many files it holds, or
+/// whether some came or went.
+///
+/// # Errors
+/// No file, options out of bounds, or files that cannot be read.
+pub fn reopen(
+    root: &Path,
+    options: &DatasetOptions,
+    format: Format,
+    files: FileList,
+) -> Result<Box<dyn Dataset>, OpenError> {
+    options.check()?;
+    open_found(detect::Found::listed(root, format, files)?, options)
+}
+
+/// Opens a recording that is not on disk, in its own format unless `options` names another.
+///
+/// # Errors
+/// A source without images, or options out of bounds.
+pub fn open_source(
+    source: Box<dyn ImageSource>,
+    options: &DatasetOptions,
+) -> Result<Box<dyn Dataset>, OpenError> {
+    options.check()?;
+    open_found(detect::Found::source(source, options.format)?, options)
+}
+
+fn open_found(
+    found: detect::Found,
+    options: &DatasetOptions,
+) -> Result<Box<dyn Dataset>, OpenError> {
+    options.check_without_topics(found.format)?;
+    Ok(match found.format {
+        Format::Oxford => Box::new(oxford::open(found, options)?),
+        Format::Oord => Box::new(oxford::open_oord(found, options)?),
+        Format::Boreas => Box::new(boreas::open(found, options)?),
+        Format::BoreasRt => Box::new(boreas::open_road_trip(found, options)?),
+        Format::Mulran => Box::new(mulran::open(found, options)?),
+        Format::MulranOxfordForm => Box::new(mulran::open_oxford_form(found, options)?),
+        Format::Radiate => Box::new(radiate::open(found, options)?),
+        Format::Fomo => Box::new(fomo::open(found, options)?),
+        format @ (Format::Mcap | Format::Ros2Bag) => {
+            let path = found.folder.display();
+            return Err(OpenError::Recording(format!(
+                "{path} is a folder of images, and the format `{format}` is that of a recording as MCAP"
+            )));
+        }
+        Format::Other => {
+            let path = found.folder.display();
+            return Err(OpenError::Recording(format!(
+                "{path} is in a format that only the program which wrote it reads"
+            )));
+        }
+    })
+}

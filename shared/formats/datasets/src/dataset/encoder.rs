@@ -1,0 +1,192 @@
+//! The counts per turn of an encoder, from the counts of the azimuths of a turn.
+
+use std::ops::RangeInclusive;
+
+use gyre_radar::median;
+
+/// Maximum deviation of the step over the seam from a whole number of steps, steps.
+const STEP_TOLERANCE: f64 = 0.25;
+/// Azimuths that can be missing at the seam, as a share of those that are there.
+const MISSING_SHARE: f64 = 0.05;
+/// Minimum number of azimuths that show the size of an encoder.
+const MIN_AZIMUTHS: usize = 8;
+/// Times that the azimuths of a turn take, turns. A sector that is blanked over the encoder's zero
+/// makes a turn look like one of a smaller encoder, but shorter by as much.
+const TURN_SHARES: RangeInclusive<f64> = 0.95..=1.05;
+/// Number of turns that show the size of an encoder.
+pub const FIRST_TURNS: usize = 8;
+
+/// The encoder counts of the azimuths of a turn, which may begin anywhere, and the time that the
+/// turn took.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EncoderTurn {
+    counts: Vec<u16>,
+    /// ns; the time over the encoder's zero counts as any other, since azimuths can be missing
+    /// there.
+    turn_ns: Option<i64>,
+}
+
+impl EncoderTurn {
+    /// Returns the turn of azimuths with these counts and times, where they have one.
+    pub fn new(counts: Vec<u16>, time_ns: impl Fn(usize) -> Option<i64>) -> Self {
+        let turn_ns = turn_ns(&counts, time_ns);
+        Self { counts, turn_ns }
+    }
+
+    /// Returns the duration of the turn by the times of its azimuths, ns.
+    pub(crate) fn turn_ns(&self) -> Option<i64> {
+        self.turn_ns
+    }
+
+    /// Returns the steps of the encoder; `None` for counts that are of no turn.
+    pub(crate) fn step(&self) -> Option<EncoderStep> {
+        EncoderStep::of(&self.counts)
+    }
+
+    /// Returns whether it took the time of a turn, as far as both are known.
+    fn is_turn(&self, turn_ns: Option<i64>) -> bool {
+        let times = self.turn_ns.zip(turn_ns);
+        let share = times.map(|(ns, turn_ns)| ns as f64 / turn_ns as f64);
+        share.is_none_or(|share| TURN_SHARES.contains(&share))
+    }
+}
+
+fn turn_ns(counts: &[u16], time_ns: impl Fn(usize) -> Option<i64>) -> Option<i64> {
+    let rows = counts.len();
+    let duration = |from: usize, to: usize| time_ns(to)?.checked_sub(time_ns(from)?);
+    let zero = (1..rows).find(|row| counts[*row] < counts[row - 1]);
+    let (over_zero_ns, steps) = match zero {
+        Some(row) => (duration(row - 1, row)?, rows - 2),
+        None => (0, rows.checked_sub(1)?),
+    };
+    let steps_ns = duration(0, rows - 1)?.checked_sub(over_zero_ns)?;
+    Some(steps_ns.checked_mul(rows as i64)? / steps.max(1) as i64)
+}
+
+/// The step of an encoder from azimuth to azimuth in a turn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct EncoderStep {
+    azimuths: usize,
+    /// Counts from the first azimuth after zero to the last one before it.
+    span: u32,
+    /// Counts from one azimuth to the next.
+    pub(crate) step: u16,
+}
+
+impl EncoderStep {
+    /// Returns the step of a turn, which may begin anywhere; `None` for counts that are of no turn.
+    pub(crate) fn of(counts: &[u16]) -> Option<Self> {
+        let zero = counts
+            .windows(2)
+            .position(|w| w[1] < w[0])
+            .map_or(0, |row| row + 1);
+        let (before, after) = counts.split_at(zero);
+        let turn = || after.iter().chain(before);
+        let steps = turn().zip(turn().skip(1));
+        let steps: Option<Vec<u16>> = steps.map(|(a, b)| b.checked_sub(*a)).collect();
+        let steps = steps.filter(|steps| steps.len() + 1 >= MIN_AZIMUTHS)?;
+        let step = median(steps.iter().map(|step| f64::from(*step)))? as u16;
+        (step > 0 && !steps.contains(&0)).then(|| Self {
+            azimuths: counts.len(),
+            span: steps.iter().map(|step| u32::from(*step)).sum(),
+            step,
+        })
+    }
+
+    /// Returns the counts per turn with which the step over the seam is as the others.
+    pub(crate) fn size(self) -> Option<u16> {
+        u16::try_from(self.span + u32::from(self.step)).ok()
+    }
+
+    /// Returns the counts over the seam, for an encoder of `counts` per turn.
+    pub(crate) fn seam(self, counts: u16) -> Option<u32> {
+        u32::from(counts).checked_sub(self.span)
+    }
+
+    /// Returns whether with `counts` per turn the step over the seam is as the others, or some
+    /// azimuths are missing there.
+    pub(crate) fn fits(self, counts: u16) -> bool {
+        let Some(seam) = self.seam(counts) else {
+            return false;
+        };
+        let steps = f64::from(seam) / f64::from(self.step);
+        let missing = steps.round() - 1.0;
+        let can_be_missing = (MISSING_SHARE * self.azimuths as f64).max(1.0);
+        (steps - steps.round()).abs() <= STEP_TOLERANCE && (0.0..=can_be_missing).contains(&missing)
+    }
+}
+
+/// Returns the counts per turn of the encoder of some turns: `usual` where that fits one of them,
+/// otherwise the number that makes the step over the seam as the others, of those that took
+/// `turn_ns` if that is known. `None` if they do not show it.
+pub fn encoder_counts(turns: &[EncoderTurn], turn_ns: Option<i64>, usual: u16) -> Option<u16> {
+    let fits = |turn: &EncoderTurn| turn.step().is_some_and(|step| step.fits(usual));
+    if turns.iter().any(fits) {
+        return Some(usual);
+    }
+    let whole = turns.iter().filter(|turn| turn.is_turn(turn_ns));
+    // A turn that lacks azimuths at its seam shows too few.
+    whole.filter_map(|turn| turn.step()?.size()).max()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn turn(azimuths: u32, size: u32, first: u32) -> Vec<u16> {
+        let count = |k| ((first + k * size / azimuths) % size) as u16;
+        (0..azimuths).map(count).collect()
+    }
+
+    fn found(turns: &[&[u16]]) -> Option<u16> {
+        let turns = turns
+            .iter()
+            .map(|counts| EncoderTurn::new(counts.to_vec(), |_| None));
+        encoder_counts(&turns.collect::<Vec<_>>(), None, 5600)
+    }
+
+    #[test]
+    fn the_size_makes_the_step_over_the_seam_as_the_others() {
+        for size in [2_800, 5_595, 5_600, 16_000] {
+            for first in [0, 5, size / 3] {
+                let counts = turn(400, size, first);
+                let expected = u16::try_from(size).ok();
+                assert_eq!(found(&[&counts]), expected, "{size} from {first}");
+            }
+        }
+    }
+
+    #[test]
+    fn azimuths_that_are_missing_at_the_seam_make_no_smaller_encoder() {
+        let whole = turn(400, 5_600, 7);
+        for missing in 0..20 {
+            assert_eq!(found(&[&whole[..400 - missing]]), Some(5600));
+        }
+        let other = turn(400, 16_000, 20);
+        let turns = [&other[3..], &other[..], &other[..390]];
+        assert_eq!(found(&turns), Some(16_000));
+    }
+
+    #[test]
+    fn a_turn_that_took_another_time_shows_no_size() {
+        let counts = turn(400, 5_600, 7)[..360].to_vec();
+        let turn = EncoderTurn::new(counts, |row| Some(row as i64 * 625_000));
+        assert_eq!(turn.turn_ns(), Some(225_000_000));
+        let turns = [turn];
+        assert_eq!(encoder_counts(&turns, Some(250_000_000), 5600), None);
+        assert_eq!(encoder_counts(&turns, Some(225_000_000), 5600), Some(5_040));
+        assert_eq!(encoder_counts(&turns, None, 5600), Some(5_040));
+    }
+
+    #[test]
+    fn counts_that_are_no_turn_show_no_size() {
+        for counts in [
+            &[][..],
+            &[5, 19, 33],
+            &[7; 400],
+            &[9, 3, 9, 3, 9, 3, 9, 3, 9],
+        ] {
+            assert_eq!(found(&[counts]), None, "{counts:?}");
+        }
+    }
+}

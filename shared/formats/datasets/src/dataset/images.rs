@@ -1,0 +1,212 @@
+//! The images of a dataset: their files, order and size.
+
+use std::collections::BTreeSet;
+use std::fmt;
+use std::ops::RangeInclusive;
+use std::path::Path;
+
+use super::error::{OpenError, ReadError};
+use super::file_list::FileList;
+use super::image_list::{self, ImageList, file_number};
+use super::image_size::ImageSize;
+use super::image_source::ImageSource;
+use super::png_image::{self, ImageReader};
+use super::stamp;
+use gyre_radar::scan::MAX_AZIMUTHS;
+
+/// Number of images tried until one can be read.
+const FIRST_TRIES: usize = 8;
+/// Number of images, spread over all of them, whose sizes are looked at.
+const SIZES: usize = 32;
+
+/// Images in order, of one width.
+#[derive(Debug)]
+pub(crate) struct Images {
+    files: FileList,
+    /// The size of most images.
+    pub(crate) size: ImageSize,
+    /// Rows of the tallest image of that width that is expected.
+    pub(crate) max_rows: usize,
+    origin: Origin,
+}
+
+/// The origin of the pixels.
+enum Origin {
+    Files(ImageReader),
+    Source(Box<dyn ImageSource>),
+}
+
+impl fmt::Debug for Origin {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(if matches!(self, Self::Files(_)) {
+            "Files"
+        } else {
+            "Source"
+        })
+    }
+}
+
+impl Images {
+    /// Lists `folder`, and returns its images with sentences on what is left out.
+    pub(crate) fn open(folder: &Path) -> Result<(Self, Vec<String>), OpenError> {
+        let ImageList { files, note } = image_list::list(folder)?;
+        Ok((Self::listed(folder, files)?, note.into_iter().collect()))
+    }
+
+    /// Reads the sizes of some of `files`, those of `folder`.
+    pub(crate) fn listed(folder: &Path, files: FileList) -> Result<Self, OpenError> {
+        if files.is_empty() {
+            return Err(OpenError::NoImages {
+                path: folder.to_owned(),
+            });
+        }
+        let (size, max_rows) = sizes(&files)?;
+        Ok(Self {
+            files,
+            size,
+            max_rows,
+            origin: Origin::Files(ImageReader::default()),
+        })
+    }
+
+    /// Returns the images of a source.
+    pub(crate) fn of(source: Box<dyn ImageSource>) -> Result<Self, OpenError> {
+        let (files, size): (FileList, _) = (source.files().into_iter().collect(), source.size());
+        match files.is_empty() {
+            true => Err(OpenError::NoImages {
+                path: source.folder(),
+            }),
+            false => Ok(Self {
+                files,
+                size,
+                max_rows: size.height,
+                origin: Origin::Source(source),
+            }),
+        }
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.files.len()
+    }
+
+    pub(crate) fn files(&self) -> &FileList {
+        &self.files
+    }
+
+    /// The file of an image; an empty path past the end.
+    pub(crate) fn file(&self, index: usize) -> &Path {
+        self.files.get(index).unwrap_or(Path::new(""))
+    }
+
+    /// The number in the name of a file.
+    pub(crate) fn number(&self, index: usize) -> Option<i64> {
+        file_number(self.file(index))
+    }
+
+    /// The time in the name of a file, ns.
+    pub(crate) fn name_stamp_ns(&self, index: usize) -> Option<i64> {
+        self.number(index).and_then(stamp::to_ns)
+    }
+
+    /// Decodes an image of the usual size.
+    pub(crate) fn decode(&mut self, index: usize, pixels: &mut [u8]) -> Result<(), ReadError> {
+        let rows = self.size.height;
+        self.decode_rows(index, rows..=rows, pixels).map(|_| ())
+    }
+
+    /// Decodes an image of the usual width with as many rows as are accepted, and returns its size.
+    pub(crate) fn decode_rows(
+        &mut self,
+        index: usize,
+        rows: RangeInclusive<usize>,
+        pixels: &mut [u8],
+    ) -> Result<ImageSize, ReadError> {
+        let len = self.files.len();
+        let path = self
+            .files
+            .get(index)
+            .ok_or(ReadError::NoSuchScan { index, len })?;
+        let (actual, needed) = (pixels.len(), self.size.width * rows.end());
+        let pixels = pixels.get_mut(..needed).ok_or(ReadError::SlotTooSmall {
+            what: "bytes",
+            needed,
+            actual,
+        })?;
+        match &mut self.origin {
+            Origin::Files(reader) => reader.decode(path, self.size, rows, pixels),
+            Origin::Source(source) => {
+                source.draw(index, pixels);
+                Ok(self.size)
+            }
+        }
+    }
+
+    /// Returns the rows that a turn may have: azimuths may have been lost.
+    pub(crate) fn accepted_rows(&self) -> RangeInclusive<usize> {
+        2..=self.max_rows
+    }
+
+    /// Returns the first bytes of an image's first row, without reading all of it; `None` if it
+    /// cannot be read, or is not on disk.
+    pub(crate) fn first_bytes<const N: usize>(&self, index: usize) -> Option<[u8; N]> {
+        match self.origin {
+            Origin::Files(_) => png_image::first_bytes(self.file(index)),
+            Origin::Source(_) => None,
+        }
+    }
+
+    /// Keeps the images at these indices, in this order.
+    pub(crate) fn keep(&mut self, indices: &[usize]) {
+        let paths = indices.iter().map(|index| self.file(*index).to_owned());
+        self.files = paths.collect();
+    }
+
+    /// Returns the first image with rows of azimuths that can be decoded, its index and its size;
+    /// `None` if the first ones are damaged.
+    ///
+    /// # Errors
+    /// One of the first ones cannot be read, and none can be decoded.
+    pub(crate) fn first_readable(
+        &mut self,
+    ) -> Result<Option<(usize, ImageSize, Vec<u8>)>, ReadError> {
+        let (rows, mut failed) = (self.accepted_rows(), None);
+        let mut pixels = vec![0; self.size.width * rows.end()];
+        for index in 0..self.len().min(FIRST_TRIES) {
+            match self.decode_rows(index, rows.clone(), &mut pixels) {
+                Ok(size) => return Ok(Some((index, size, pixels))),
+                Err(error) => failed = failed.or(error.is_io().then_some(error)),
+            }
+        }
+        failed.map_or(Ok(None), Err)
+    }
+}
+
+/// Returns the size of most images among some, and the rows of the tallest of that width. Where
+/// they differ, images between may have a few more.
+fn sizes(files: &FileList) -> Result<(ImageSize, usize), ReadError> {
+    let (mut counts, mut failed) = (Vec::<(ImageSize, usize)>::new(), None);
+    let spread = (0..files.len()).step_by(files.len().div_ceil(SIZES));
+    // Each once: the first ones are no more of the images than others.
+    let indices: BTreeSet<usize> = (0..FIRST_TRIES).chain(spread).collect();
+    for path in indices.into_iter().filter_map(|index| files.get(index)) {
+        match png_image::read_size(path) {
+            Ok(size) => match counts.iter_mut().find(|(known, _)| *known == size) {
+                Some((_, count)) => *count += 1,
+                None => counts.push((size, 1)),
+            },
+            Err(error) => failed = failed.or(Some(error)),
+        }
+    }
+    // The last of equal ones is the first that was found.
+    let most = counts.iter().rev().max_by_key(|(_, count)| *count);
+    let Some((size, _)) = most.copied() else {
+        return Err(failed.unwrap_or(ReadError::NoSuchScan { index: 0, len: 0 }));
+    };
+    let most_rows = MAX_AZIMUTHS.max(size.height);
+    let is_turn = |other: &ImageSize| other.width == size.width && other.height <= most_rows;
+    let of_width = counts.iter().filter(|(other, _)| is_turn(other));
+    let rows: Vec<usize> = of_width.map(|(other, _)| other.height).collect();
+    let tallest = rows.iter().copied().max().unwrap_or(size.height);
+    let more = if rows.len() > 1 { tallest / 20 } else { 0 };
+    Ok((size, (tallest + more).min(most_rows)))
+}

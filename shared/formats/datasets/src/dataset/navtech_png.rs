@@ -1,0 +1,309 @@
+//! The metadata columns that Navtech drivers store before the powers of each row: stamp, encoder
+//! count, one byte of flags.
+
+use std::path::Path;
+
+use super::error::ReadError;
+use super::image_size::ImageSize;
+use super::options::AzimuthSource;
+use super::stamp;
+use gyre_radar::scan::{check_sweep, flag};
+
+/// Metadata bytes per row.
+pub(crate) const METADATA_BYTES: usize = 11;
+/// Minimum share of consecutive rows that differ in byte 10 if it is the direction of the chirp.
+const ALTERNATING_SHARE: f64 = 0.9;
+/// Maximum share of a turn that no row is in: more is a part of a turn, or the encoder has another
+/// size.
+const MAX_GAP_SHARE: f64 = 0.25;
+
+/// The metadata of a row.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RowMetadata {
+    /// Bytes 0 to 7, little-endian: time since 1970, us or ns.
+    pub(crate) stamp: i64,
+    /// Bytes 8 and 9, little-endian: the encoder count.
+    pub(crate) count: u16,
+    /// Byte 10: validity, direction of the chirp, or unused.
+    pub(crate) byte_ten: u8,
+}
+
+impl RowMetadata {
+    /// Reads the first [`METADATA_BYTES`] of a row.
+    pub(crate) fn parse(row: &[u8]) -> Self {
+        let mut stamp = [0; 8];
+        stamp.copy_from_slice(&row[..8]);
+        Self {
+            stamp: i64::from_le_bytes(stamp),
+            count: u16::from_le_bytes([row[8], row[9]]),
+            byte_ten: row[10],
+        }
+    }
+}
+
+/// Returns the metadata of each row of an image wider than [`METADATA_BYTES`].
+pub(crate) fn rows(
+    pixels: &[u8],
+    size: ImageSize,
+) -> impl Iterator<Item = RowMetadata> + Clone + '_ {
+    pixels
+        .chunks_exact(size.width)
+        .take(size.height)
+        .map(RowMetadata::parse)
+}
+
+/// Returns whether byte 10 alternates between 0 and 255 from row to row. Then it is the direction
+/// of the chirp, not validity.
+pub(crate) fn chirps_alternate(bytes_ten: impl Iterator<Item = u8>) -> bool {
+    let (mut pairs, mut changes, mut last) = (0_usize, 0_usize, None);
+    for byte in bytes_ten {
+        if !matches!(byte, 0 | 255) {
+            return false;
+        }
+        if let Some(last) = last.replace(byte) {
+            pairs += 1;
+            changes += usize::from(last != byte);
+        }
+    }
+    pairs > 0 && changes as f64 >= ALTERNATING_SHARE * pairs as f64
+}
+
+/// The meaning of byte 10 if it does not alternate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum ByteTen {
+    /// 255: measured; otherwise interpolated from the neighbours.
+    Validity,
+    /// Unused.
+    Unused,
+}
+
+/// Writes the flags of each row, see [`flag`].
+pub(crate) fn fill_flags(pixels: &[u8], size: ImageSize, meaning: ByteTen, flags: &mut [u8]) {
+    let chirps = chirps_alternate(rows(pixels, size).map(|row| row.byte_ten));
+    for (row, into) in rows(pixels, size).zip(flags) {
+        *into = match (chirps, meaning, row.byte_ten) {
+            (true, _, 255) => flag::MEASURED | flag::CHIRP_KNOWN | flag::CHIRP_UP,
+            (true, _, _) => flag::MEASURED | flag::CHIRP_KNOWN,
+            (false, ByteTen::Validity, byte) if byte != 255 => 0,
+            _ => flag::MEASURED,
+        };
+    }
+}
+
+/// Writes the angle of each row in `[0, 2 pi)`. Rejects rows that are not one sweep.
+pub(crate) fn fill_azimuths(
+    path: &Path,
+    pixels: &[u8],
+    size: ImageSize,
+    source: AzimuthSource,
+    counts: u16,
+    azimuth_rad: &mut [f32],
+) -> Result<(), ReadError> {
+    if source == AzimuthSource::Uniform {
+        fill_uniform(&mut azimuth_rad[..size.height], 0.0);
+        return Ok(());
+    }
+    check_order(path, rows(pixels, size).map(|row| row.count), counts)?;
+    check_turn(path, rows(pixels, size).map(|row| row.count), counts)?;
+    let step = std::f64::consts::TAU / f64::from(counts);
+    for (row, into) in rows(pixels, size).zip(azimuth_rad) {
+        *into = (f64::from(row.count % counts) * step) as f32;
+    }
+    Ok(())
+}
+
+/// Writes uniform angles: row `i` of `n` at `2 pi (first + i) / n`.
+pub(crate) fn fill_uniform(azimuth_rad: &mut [f32], first: f64) {
+    let step = std::f64::consts::TAU / azimuth_rad.len() as f64;
+    for (row, into) in azimuth_rad.iter_mut().enumerate() {
+        *into = ((first + row as f64) * step) as f32;
+    }
+}
+
+/// Checks that the counts increase, with at most one wrap-around at zero and at most one turn.
+fn check_order(
+    path: &Path,
+    row_counts: impl Iterator<Item = u16>,
+    counts: u16,
+) -> Result<(), ReadError> {
+    let (mut first, mut last, mut wrapped) = (0, None, false);
+    for (row, count) in row_counts.enumerate() {
+        if count > counts {
+            return Err(ReadError::EncoderCount {
+                path: path.to_owned(),
+                row,
+                count,
+                counts,
+            });
+        }
+        let count = count % counts;
+        match last.replace(count) {
+            None => first = count,
+            Some(previous) => {
+                let wraps = count < previous;
+                let lapped = (wrapped || wraps) && count >= first;
+                if count == previous || lapped || (wraps && wrapped) {
+                    return Err(ReadError::AzimuthOrder {
+                        path: path.to_owned(),
+                        row,
+                        count,
+                        previous,
+                    });
+                }
+                wrapped |= wraps;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Checks that counts in order leave out no more than [`MAX_GAP_SHARE`] of a turn in one place.
+fn check_turn(
+    path: &Path,
+    row_counts: impl Iterator<Item = u16> + Clone,
+    counts: u16,
+) -> Result<(), ReadError> {
+    let Some(first) = row_counts.clone().next() else {
+        return Ok(());
+    };
+    let next = row_counts.clone().skip(1).chain([first]);
+    let step = |(count, next): (u16, u16)| {
+        (i32::from(next) - i32::from(count)).rem_euclid(i32::from(counts))
+    };
+    let widest = row_counts.zip(next).map(step).max().unwrap_or(0);
+    let gap = f64::from(widest) / f64::from(counts);
+    match gap <= MAX_GAP_SHARE {
+        true => Ok(()),
+        false => Err(ReadError::NotATurn {
+            path: path.to_owned(),
+            gap_deg: 360.0 * gap,
+            counts,
+        }),
+    }
+}
+
+/// Writes the logged time of each row, ns. Rejects invalid times, and times that are not of one
+/// sweep of at most `max_sweep_ns`.
+pub(crate) fn fill_stamps(
+    path: &Path,
+    pixels: &[u8],
+    size: ImageSize,
+    max_sweep_ns: i64,
+    stamp_ns: &mut [i64],
+) -> Result<(), ReadError> {
+    for (row, (metadata, into)) in rows(pixels, size).zip(stamp_ns.iter_mut()).enumerate() {
+        let ns = stamp::to_ns(metadata.stamp);
+        *into = ns.ok_or_else(|| ReadError::StampYear {
+            path: path.to_owned(),
+            row,
+            value: metadata.stamp,
+        })?;
+    }
+    check_sweep(&stamp_ns[..size.height], max_sweep_ns).map_err(|fault| ReadError::Times {
+        path: path.to_owned(),
+        fault,
+    })
+}
+
+/// Replaces stamps that come in bursts (the rows of a packet share the time of receipt) by a linear
+/// fit over the azimuth, shifted so that the middle of the sweep keeps its time: the mean of the
+/// first and last row's stamps.
+pub(crate) fn smooth_stamps(azimuth_rad: &[f32], stamp_ns: &mut [i64]) {
+    let n = stamp_ns.len();
+    if n < 2 {
+        return;
+    }
+    let middle_ns = stamp::middle_ns(stamp_ns[0], stamp_ns[n - 1]);
+    let angle = |row: usize| sweep_angle(azimuth_rad[0], azimuth_rad[row]);
+    let mean_angle = (0..n).map(angle).sum::<f64>() / n as f64;
+    let (mut covariance, mut variance) = (0.0, 0.0);
+    for (row, stamp) in stamp_ns.iter().enumerate() {
+        let from_mean = angle(row) - mean_angle;
+        covariance += from_mean * (stamp - middle_ns) as f64;
+        variance += from_mean * from_mean;
+    }
+    let ns_per_rad = covariance / variance;
+    let middle_angle = angle(n - 1) / 2.0;
+    for (row, stamp) in stamp_ns.iter_mut().enumerate() {
+        *stamp = middle_ns + ((angle(row) - middle_angle) * ns_per_rad).round() as i64;
+    }
+}
+
+/// Angle of an azimuth relative to the first, rad.
+fn sweep_angle(first_rad: f32, azimuth_rad: f32) -> f64 {
+    (f64::from(azimuth_rad) - f64::from(first_rad)).rem_euclid(std::f64::consts::TAU)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use proptest::prelude::*;
+
+    fn ordered(counts: &[u16]) -> Result<(), ReadError> {
+        check_order(Path::new("scan.png"), counts.iter().copied(), 5600)
+    }
+
+    #[test]
+    fn a_sweep_may_wrap_once_and_not_overlap_itself() {
+        assert!(ordered(&[13, 27, 5599]).is_ok());
+        assert!(ordered(&[5000, 5599, 0, 4999]).is_ok());
+        assert!(ordered(&[5000, 5600, 14]).is_ok());
+        assert!(matches!(
+            ordered(&[5000, 0, 5000]),
+            Err(ReadError::AzimuthOrder { row: 2, .. })
+        ));
+        assert!(matches!(
+            ordered(&[5000, 10, 20, 15]),
+            Err(ReadError::AzimuthOrder { row: 3, .. })
+        ));
+        assert!(matches!(
+            ordered(&[10, 20, 15]),
+            Err(ReadError::AzimuthOrder { row: 2, .. })
+        ));
+        assert!(matches!(
+            ordered(&[10, 10]),
+            Err(ReadError::AzimuthOrder {
+                row: 1,
+                count: 10,
+                previous: 10,
+                ..
+            })
+        ));
+        assert!(matches!(
+            ordered(&[10, 5601]),
+            Err(ReadError::EncoderCount {
+                row: 1,
+                count: 5601,
+                ..
+            })
+        ));
+    }
+
+    #[test]
+    fn alternation_is_distinguished_from_validity() {
+        assert!(chirps_alternate([0, 255, 0, 255, 0].into_iter()));
+        assert!(!chirps_alternate([255; 6].into_iter()));
+        assert!(!chirps_alternate([0; 6].into_iter()));
+        assert!(!chirps_alternate(
+            [255, 255, 0, 255, 255, 255, 0].into_iter()
+        ));
+        assert!(!chirps_alternate([0, 1, 0, 1].into_iter()));
+        assert!(!chirps_alternate(std::iter::empty()));
+    }
+
+    proptest! {
+        #[test]
+        fn smoothing_a_uniform_sweep_changes_nothing(start in 0_u16..5600, step in 10_u16..15, period in 1_000_000_i64..3_000_000) {
+            let n = 300_usize;
+            let angle = |i: usize| (usize::from(start) + i * usize::from(step)) % 5600;
+            let azimuth: Vec<f32> = (0..n).map(|i| (angle(i) as f64 * std::f64::consts::TAU / 5600.0) as f32).collect();
+            let uniform: Vec<i64> = (0..n).map(|i| 1_547_131_046_000_000_000 + i as i64 * period).collect();
+            let mut stamps = uniform.clone();
+            smooth_stamps(&azimuth, &mut stamps);
+            for (smooth, uniform) in stamps.iter().zip(&uniform) {
+                prop_assert!((smooth - uniform).abs() < 1_000, "{}", smooth - uniform);
+            }
+        }
+    }
+}

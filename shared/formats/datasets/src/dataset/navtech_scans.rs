@@ -1,0 +1,326 @@
+//! Reader of images with Navtech metadata columns, parameterised by a profile per format: Oxford,
+//! OORD, Boreas, MulRan (Oxford format) and FoMo.
+
+use super::Dataset;
+use super::detect::Found;
+use super::eccentricity;
+use super::encoder::{EncoderTurn, FIRST_TURNS, encoder_counts};
+use super::error::{OpenError, ReadError};
+use super::file_list::FileList;
+use super::first_image::{FirstImage, NamedBy};
+use super::format::Format;
+use super::image_size::ImageSize;
+use super::images::Images;
+use super::navtech_notes::{note_encoder, observations};
+use super::navtech_png::{self, METADATA_BYTES};
+use super::navtech_profile::{Profile, ScanTime};
+use super::options::{AzimuthSource, DatasetOptions};
+use super::row_order::{self, RowOrder};
+use super::stamp;
+use gyre_radar::MAX_INTERVAL_NS;
+use gyre_radar::scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, Sense, SweepGeometry};
+use std::ops::RangeInclusive;
+
+/// The scans of a folder. Images decode in place: the rows of a scan keep their 11 bytes of
+/// metadata.
+#[derive(Debug)]
+pub(crate) struct NavtechScans {
+    images: Images,
+    profile: Profile,
+    period_ns: i64,
+    /// The longest plausible sweep.
+    max_sweep_ns: i64,
+    /// True if the names of the files are times of their sweeps.
+    named_by_time: bool,
+    /// Times of the first rows, ns, if the names of the files are not times of their sweeps.
+    starts_ns: Option<Vec<i64>>,
+    notes: Vec<String>,
+}
+
+/// Longest sweep where the period is unknown, ns. The slowest scanning radars turn once in 2 s.
+const MAX_SWEEP_NS: i64 = 5 * stamp::SECOND_NS;
+/// Longest sweep in periods: the stamps of rows come late where the host was busy.
+const MAX_SWEEP_PERIODS: i64 = 2;
+
+impl NavtechScans {
+    /// `profile` returns the defaults of the format, which may depend on the first image; `options`
+    /// take precedence.
+    pub(crate) fn open(
+        found: Found,
+        options: &DatasetOptions,
+        profile: impl FnOnce(Option<&FirstImage>) -> Profile,
+    ) -> Result<Self, OpenError> {
+        let Found {
+            format,
+            mut images,
+            mut notes,
+            ..
+        } = found;
+        check_shape(&images, format)?;
+        let mut first_image = FirstImage::read(&mut images)?;
+        let order = first_image
+            .as_ref()
+            .and_then(|image| row_order::order(&mut images, image));
+        let mut starts_ns = None;
+        if let Some(RowOrder {
+            starts_ns: starts,
+            notes: sentences,
+        }) = order
+        {
+            first_image = FirstImage::read(&mut images)?;
+            starts_ns = Some(starts);
+            notes.extend(sentences);
+        }
+        let mut scans = Self {
+            profile: profile(first_image.as_ref()).with(options),
+            period_ns: stamp::DEFAULT_TURN_NS,
+            max_sweep_ns: MAX_SWEEP_NS,
+            named_by_time: first_image
+                .as_ref()
+                .is_some_and(|image| image.named_by().is_some()),
+            starts_ns,
+            images,
+            notes,
+        };
+        let logged = (0..scans.images.len()).filter_map(|index| scans.logged_stamp_ns(index));
+        let turn_ns = stamp::turn_ns(logged);
+        if let Some(turn_ns) = turn_ns {
+            scans.period_ns = turn_ns;
+            scans.max_sweep_ns = MAX_SWEEP_PERIODS * turn_ns;
+        }
+        if let Some(image) = &first_image {
+            match options.encoder_counts {
+                _ if !scans.has_encoder() => {}
+                Some(_) => scans.notes.extend(note_encoder(image, &scans.profile)),
+                None => scans.find_encoder(image, turn_ns),
+            }
+            scans.notes.extend(observations(image, &scans.profile));
+        }
+        Ok(scans)
+    }
+
+    /// Takes the size of the encoder that the first images show, unless it is the usual one. Only
+    /// says what the first image shows if that took less or more than a turn.
+    fn find_encoder(&mut self, first_image: &FirstImage, turn_ns: Option<i64>) {
+        let usual = self.profile.encoder_counts;
+        match encoder_counts(&[first_image.turn()], turn_ns, usual) {
+            None => self.notes.extend(note_encoder(first_image, &self.profile)),
+            Some(found) if found == usual => {}
+            Some(_) => self.take_encoder(turn_ns, usual),
+        }
+    }
+
+    fn take_encoder(&mut self, turn_ns: Option<i64>, usual: u16) {
+        let found = encoder_counts(&self.first_turns(), turn_ns, usual);
+        if let Some(found) = found.filter(|found| *found != usual) {
+            self.profile.encoder_counts = found;
+            self.notes.push(format!(
+                "The encoder has {found} counts per turn, not {usual}: with these the step from the last row to the first is as the others."
+            ));
+        }
+    }
+
+    /// The turns of the first images.
+    fn first_turns(&mut self) -> Vec<EncoderTurn> {
+        let rows = self.images.accepted_rows();
+        let mut pixels = vec![0; self.images.size.width * rows.end()];
+        let turn = |index| {
+            let decoded = self.images.decode_rows(index, rows.clone(), &mut pixels);
+            let rows: Vec<_> = navtech_png::rows(&pixels, decoded.ok()?).collect();
+            let counts = rows.iter().map(|row| row.count).collect();
+            Some(EncoderTurn::new(counts, |row| {
+                stamp::to_ns(rows.get(row)?.stamp)
+            }))
+        };
+        (0..FIRST_TURNS).filter_map(turn).collect()
+    }
+
+    /// The numbers of rows that are read: azimuths may have been lost. Where azimuths are taken as
+    /// even, only a few may.
+    fn accepted_rows(&self) -> RangeInclusive<usize> {
+        let (rows, usual) = (self.images.accepted_rows(), self.images.size.height);
+        match self.has_encoder() {
+            true => rows,
+            false => usual - usual / 16..=*rows.end(),
+        }
+    }
+
+    fn has_encoder(&self) -> bool {
+        self.profile.azimuth_source == AzimuthSource::Encoder
+    }
+
+    fn check_slot(&self, slot: &ScanSlot<'_>) -> Result<(), ReadError> {
+        let rows = self.images.max_rows;
+        check_capacity("azimuths", rows, slot.azimuth_rad.len())?;
+        check_capacity("stamps", rows, slot.stamp_ns.len())?;
+        check_capacity("flags", rows, slot.flags.len())
+    }
+
+    fn scan_time_ns(&self, stamp_ns: &[i64]) -> i64 {
+        let n = stamp_ns.len();
+        match self.profile.scan_time {
+            ScanTime::Halfway => stamp::middle_ns(stamp_ns[0], stamp_ns[n - 1]),
+            ScanTime::MiddleRow => stamp_ns[(n / 2).saturating_sub(1)],
+        }
+    }
+
+    /// Rejects a scan that is far from the time in its file's name, if that is how the files are
+    /// named.
+    fn check_name(&self, index: usize, scan_ns: i64) -> Result<(), ReadError> {
+        let named_ns = self.nominal_stamp_ns(index).filter(|_| self.named_by_time);
+        let apart_ns = named_ns.map_or(0, |named_ns| scan_ns - named_ns);
+        match apart_ns.abs() <= MAX_INTERVAL_NS {
+            true => Ok(()),
+            false => Err(ReadError::NameTime {
+                path: self.images.file(index).to_owned(),
+                apart_s: apart_ns as f64 * 1e-9,
+            }),
+        }
+    }
+
+    /// Time between the logged times of this file and the next, ns, if that can be one turn;
+    /// otherwise the period.
+    fn interval_ns(&self, index: usize) -> i64 {
+        let name = |i: usize| self.logged_stamp_ns(i);
+        let next = index
+            .checked_add(1)
+            .and_then(name)
+            .zip(name(index))
+            .map(|(b, a)| b - a);
+        next.filter(|ns| (ns - self.period_ns).abs() < self.period_ns / 5)
+            .unwrap_or(self.period_ns)
+    }
+}
+
+pub(crate) fn check_capacity(
+    what: &'static str,
+    needed: usize,
+    actual: usize,
+) -> Result<(), ReadError> {
+    if actual < needed {
+        return Err(ReadError::SlotTooSmall {
+            what,
+            needed,
+            actual,
+        });
+    }
+    Ok(())
+}
+
+fn check_shape(images: &Images, format: Format) -> Result<(), OpenError> {
+    let ImageSize { width, height } = images.size;
+    let reason = if width <= METADATA_BYTES {
+        format!("it requires {METADATA_BYTES} columns of metadata before the powers")
+    } else if !(2..=MAX_AZIMUTHS).contains(&height) {
+        format!("it requires one row per azimuth, 2 to {MAX_AZIMUTHS}; the image may be transposed")
+    } else {
+        return Ok(());
+    };
+    Err(OpenError::WrongImage {
+        path: images.file(0).to_owned(),
+        actual: images.size,
+        format,
+        reason,
+    })
+}
+
+impl Dataset for NavtechScans {
+    fn format(&self) -> Format {
+        self.profile.format
+    }
+
+    fn len(&self) -> usize {
+        self.images.len()
+    }
+
+    fn limits(&self) -> ScanLimits {
+        ScanLimits {
+            bytes: self.images.size.width * self.images.max_rows,
+            azimuths: self.images.max_rows,
+        }
+    }
+
+    fn image_size(&self) -> ImageSize {
+        self.images.size
+    }
+
+    fn files(&self) -> &FileList {
+        self.images.files()
+    }
+
+    fn nominal_stamp_ns(&self, index: usize) -> Option<i64> {
+        let logged_ns = self.logged_stamp_ns(index)?;
+        let rows = self.images.size.height as i64;
+        let half_sweep = self.interval_ns(index) * (rows - 1) / (2 * rows);
+        Some(match (&self.starts_ns, self.profile.named_by) {
+            (Some(_), _) | (None, NamedBy::Start) => logged_ns + half_sweep,
+            (None, NamedBy::Middle) => logged_ns,
+            (None, NamedBy::End) => logged_ns - half_sweep,
+        })
+    }
+
+    fn period_ns(&self) -> i64 {
+        self.period_ns
+    }
+
+    fn logged_stamp_ns(&self, index: usize) -> Option<i64> {
+        match &self.starts_ns {
+            Some(starts_ns) => starts_ns.get(index).copied(),
+            None => self.images.name_stamp_ns(index),
+        }
+    }
+
+    fn stamp_meaning(&self) -> &'static str {
+        match self.starts_ns {
+            Some(_) => self.profile.scan_time.of_rows(),
+            None => self.profile.stamp_meaning,
+        }
+    }
+
+    fn encoder_counts(&self) -> Option<u16> {
+        self.has_encoder().then_some(self.profile.encoder_counts)
+    }
+
+    fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError> {
+        self.check_slot(&slot)?;
+        let size = self
+            .images
+            .decode_rows(index, self.accepted_rows(), slot.bytes)?;
+        let (path, profile) = (self.images.file(index), &self.profile);
+        let (azimuth_rad, stamp_ns) = (
+            &mut slot.azimuth_rad[..size.height],
+            &mut slot.stamp_ns[..size.height],
+        );
+        navtech_png::fill_azimuths(
+            path,
+            slot.bytes,
+            size,
+            profile.azimuth_source,
+            profile.encoder_counts,
+            azimuth_rad,
+        )?;
+        navtech_png::fill_stamps(path, slot.bytes, size, self.max_sweep_ns, stamp_ns)?;
+        navtech_png::fill_flags(slot.bytes, size, profile.byte_ten, slot.flags);
+        let scan_ns = self.scan_time_ns(stamp_ns);
+        self.check_name(index, scan_ns)?;
+        if profile.smooth_stamps {
+            navtech_png::smooth_stamps(azimuth_rad, stamp_ns);
+        }
+        eccentricity::correct_eccentricity(azimuth_rad, profile.azimuth_eccentricity_rad);
+        Ok(SweepGeometry {
+            azimuths: size.height,
+            bins: size.width - METADATA_BYTES,
+            stride: size.width,
+            first_byte: METADATA_BYTES,
+            range_resolution_m: profile.range_resolution_m,
+            range_offset_m: profile.range_offset_m,
+            doppler_s: profile.doppler_s,
+            sense: Sense::Clockwise,
+            stamp_ns: scan_ns,
+        })
+    }
+}

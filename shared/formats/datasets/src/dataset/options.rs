@@ -1,0 +1,193 @@
+//! Options for reading a dataset.
+
+use std::{fmt, ops::RangeInclusive};
+
+use arrayvec::ArrayString;
+use serde::{Deserialize, Serialize};
+
+use super::error::OpenError;
+use super::format::Format;
+
+/// The source of the azimuth angles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum AzimuthSource {
+    /// The encoder count of each row.
+    Encoder,
+    /// Uniform spacing: row `i` of `n` at `2 pi i / n`.
+    Uniform,
+}
+
+/// The way to treat azimuths that the host of a radar has lost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum LostAzimuthOption {
+    /// Count them in each scan, and find where they were lost.
+    Find,
+    /// Take each row for the azimuth that it would be if none was lost.
+    Ignore,
+}
+
+/// The longest name of a topic, bytes.
+const TOPIC_BYTES: usize = 256;
+
+/// The way to read a dataset: the section `[dataset]` of a configuration. All keys are optional;
+/// the defaults depend on the format.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct DatasetOptions {
+    /// The file format. Default: detected from the folder, else from the first image.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub format: Option<Format>,
+    /// Depth of a range bin, m. Default: Oxford, OORD and FoMo 0.0438, Boreas 0.0596 (0.04381 from
+    /// 2021-09-21), Boreas-RT 0.04381, MulRan 200/3360, RADIATE 100/576.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub range_resolution_m: Option<f32>,
+    /// Offset of the ranges, m. Default: Boreas and Boreas-RT -0.31, FoMo -0.32, all others 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub range_offset_m: Option<f32>,
+    /// Doppler coefficient, s: metres to add to a range for each m/s of closing speed, see
+    /// [`SweepGeometry::doppler_s`](gyre_radar::SweepGeometry::doppler_s). About 0.04 for older Navtech
+    /// radars (negative for falling chirps), 0.049 for those with alternating chirps. Default: 0,
+    /// unknown.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub doppler_s: Option<f32>,
+    /// Eccentricity of the encoder, rad: the true azimuth is the encoder's plus this times its
+    /// cosine. It is specific to one radar, and found by driving a road in both directions; 2.5e-3
+    /// corresponds to 0.1 mm. Default: 0, unknown.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub azimuth_eccentricity_rad: Option<f32>,
+    /// Source of the azimuth angles. Default: `encoder`; `uniform` for OORD, whose encoder columns
+    /// are unreliable, and for images without metadata (RADIATE, MulRan as recorded), which have no
+    /// encoder.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub azimuth_source: Option<AzimuthSource>,
+    /// Encoder counts per turn. Default: 5600, or what the radar of a bag says; where the first
+    /// scans show another number, that one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub encoder_counts: Option<u16>,
+    /// Azimuths that the host has lost, which images without metadata (RADIATE, MulRan as recorded)
+    /// do not say: the columns behind them have moved up, and the last columns are of the scan
+    /// before. Default: `find`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lost_azimuths: Option<LostAzimuthOption>,
+    /// The topic of the scans in a bag of ROS 2. Default: the one whose type is of Navtech's
+    /// driver.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<String>")]
+    pub topic: Option<ArrayString<TOPIC_BYTES>>,
+}
+
+impl DatasetOptions {
+    /// Rejects values out of bounds.
+    ///
+    /// # Errors
+    /// The first of them.
+    pub fn check(&self) -> Result<(), OpenError> {
+        let check = |key, value: Option<f32>, bounds: RangeInclusive<f32>, reason| match value {
+            Some(v) if !bounds.contains(&v) => Err(self.invalid(key, value, reason)),
+            _ => Ok(()),
+        };
+        check(
+            "range_resolution_m",
+            self.range_resolution_m,
+            1e-3..=10.0,
+            "it must be from 0.001 to 10 m",
+        )?;
+        check(
+            "range_offset_m",
+            self.range_offset_m,
+            -100.0..=100.0,
+            "it must be from -100 to 100 m",
+        )?;
+        check(
+            "doppler_s",
+            self.doppler_s,
+            -1.0..=1.0,
+            "it must be from -1 to 1 s",
+        )?;
+        check(
+            "azimuth_eccentricity_rad",
+            self.azimuth_eccentricity_rad,
+            -0.1..=0.1,
+            "it must be from -0.1 to 0.1 rad",
+        )?;
+        check(
+            "encoder_counts",
+            self.encoder_counts.map(f32::from),
+            16.0..=f32::INFINITY,
+            "an encoder has at least 16 counts per turn",
+        )
+    }
+
+    /// Returns these options, with those of `other` where these are not set.
+    #[must_use]
+    pub fn or(self, other: &Self) -> Self {
+        Self {
+            format: self.format.or(other.format),
+            range_resolution_m: self.range_resolution_m.or(other.range_resolution_m),
+            range_offset_m: self.range_offset_m.or(other.range_offset_m),
+            doppler_s: self.doppler_s.or(other.doppler_s),
+            azimuth_eccentricity_rad: self
+                .azimuth_eccentricity_rad
+                .or(other.azimuth_eccentricity_rad),
+            azimuth_source: self.azimuth_source.or(other.azimuth_source),
+            encoder_counts: self.encoder_counts.or(other.encoder_counts),
+            lost_azimuths: self.lost_azimuths.or(other.lost_azimuths),
+            topic: self.topic.or(other.topic),
+        }
+    }
+
+    /// Rejects the option of bags, for images.
+    pub(crate) fn check_without_topics(&self, format: Format) -> Result<(), OpenError> {
+        let options = Self {
+            format: Some(format),
+            ..*self
+        };
+        match self.topic {
+            Some(_) => Err(options.invalid(
+                "topic",
+                self.topic,
+                "images have no topics; leave the key out",
+            )),
+            None => Ok(()),
+        }
+    }
+
+    /// Rejects options that require an encoder, for images without encoder counts.
+    pub(crate) fn check_without_encoder(&self, format: Format) -> Result<(), OpenError> {
+        let options = Self {
+            format: Some(format),
+            ..*self
+        };
+        if self.encoder_counts.is_some() {
+            return Err(options.invalid(
+                "encoder_counts",
+                self.encoder_counts,
+                "its images have no encoder counts",
+            ));
+        }
+        if self.azimuth_source == Some(AzimuthSource::Encoder) {
+            return Err(options.invalid(
+                "azimuth_source",
+                Some("encoder"),
+                "its images have no encoder counts",
+            ));
+        }
+        Ok(())
+    }
+
+    fn invalid(
+        &self,
+        key: &'static str,
+        value: Option<impl fmt::Display>,
+        reason: &'static str,
+    ) -> OpenError {
+        OpenError::BadOption {
+            key,
+            value: value.map(|v| v.to_string()).unwrap_or_default(),
+            format: self.format.map_or("any".to_owned(), |f| f.to_string()),
+            reason,
+        }
+    }
+}

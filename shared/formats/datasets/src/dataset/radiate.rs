@@ -1,0 +1,320 @@
+//! RADIATE: `Navtech_Polar/<frame>.png`, 576 rows of range x 400 columns of azimuth, and
+//! `Navtech_Polar.txt` with times.
+//!
+//! The times are `seconds.nanoseconds`, without leading zeros in the nanoseconds, and they are the
+//! times of receipt at the host: after a stall they are late by up to 1.4 s while the antenna turns
+//! uniformly. The sensor clock is reconstructed.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::io::ErrorKind;
+use std::path::Path;
+
+use super::detect::Found;
+use super::error::OpenError;
+use super::images::Images;
+use super::options::DatasetOptions;
+use super::sensor_clock::SensorClock;
+use super::stale::StaleRows;
+use super::stamp::{self, SECOND_NS};
+use super::transposed::{TransposedScans, Turn};
+use gyre_radar::MAX_INTERVAL_NS;
+use gyre_storage::quoted;
+
+/// The largest list of stamps: months of scans.
+const MAX_LIST_BYTES: u64 = 1 << 30;
+/// Full range of the images, m.
+const RANGE_M: f32 = 100.0;
+/// Bounds of the period, ns: the radar turns four times per second.
+const PERIOD_NS: std::ops::RangeInclusive<f64> = 0.2e9..=0.3e9;
+
+const STAMPS: &str = "Logged stamps are times of receipt at the host; the sensor clock is the uniform series that touches them from \
+                      below, columns are spread uniformly over its period, and the time of a scan is their mean.";
+
+pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<TransposedScans, OpenError> {
+    let list = found.folder.with_extension("txt");
+    let text = match &found.stamps {
+        Some(text) => text.clone(),
+        None => read_list(&list)?,
+    };
+    let (stamps, unpadded) = parse_stamps(&list, &text)?;
+    let mut scans = TransposedScans::open(found, options, STAMPS, |bins| RANGE_M / bins as f32)?;
+    scans.stale = scans.stale.map(StaleRows::of_compressed);
+    add_turns(&mut scans, &stamps, &list)?;
+    if unpadded > 0 {
+        scans.notes.push(format!(
+            "{unpadded} of {} stamps in {} have nanoseconds without leading zeros (.5 means 5 ns), and are read as integers; \
+             read as decimals, time would run backwards.",
+            stamps.len(),
+            file_name(&list)
+        ));
+    }
+    if stamps.len() > scans.turns.len() {
+        scans.notes.push(format!(
+            "{} lists {} scans, but there are {} images.",
+            file_name(&list),
+            stamps.len(),
+            scans.turns.len()
+        ));
+    }
+    Ok(scans)
+}
+
+/// Reads a list of `Frame: <number> Time: <seconds>.<nanoseconds>`: the times by frame number, ns.
+///
+/// # Errors
+/// A list that cannot be read, or a line of another form.
+pub fn frame_stamps(list: &Path) -> Result<BTreeMap<i64, i64>, OpenError> {
+    Ok(parse_stamps(list, &read_list(list)?)?.0)
+}
+
+fn read_list(list: &Path) -> Result<String, OpenError> {
+    let path = list.to_owned();
+    gyre_storage::read_text(list, MAX_LIST_BYTES).map_err(|source| match source.kind() {
+        ErrorKind::NotFound => OpenError::NoTimes { path },
+        _ => OpenError::Io { path, source },
+    })
+}
+
+/// A frame number and a time of receipt, ns.
+type Receipt = (i64, i64);
+
+/// Frames between two breaks in time, whose times of receipt come from one uniform clock.
+#[derive(Debug, PartialEq)]
+struct Segment {
+    /// Number of the first frame.
+    first: i64,
+    receipts: Vec<Receipt>,
+}
+
+/// Divides the frames where the time between two of them is not that of their numbers, as after a
+/// pause or when the clock was set. A single time that is off is left out.
+fn segments(received: &[Receipt]) -> Vec<Segment> {
+    let mut segments: Vec<Segment> = Vec::new();
+    for (index, receipt) in received.iter().enumerate() {
+        let next = received.get(index + 1);
+        let open = segments.last_mut();
+        match open.and_then(|segment| Some((*segment.receipts.last()?, segment))) {
+            Some((last, segment)) if agree(last, *receipt) => segment.receipts.push(*receipt),
+            Some((last, _)) if next.is_some_and(|next| agree(last, *next)) => {}
+            _ => segments.push(Segment {
+                first: receipt.0,
+                receipts: vec![*receipt],
+            }),
+        }
+    }
+    segments
+}
+
+/// Returns whether the time between two receipts is about that between their frames.
+fn agree(earlier: Receipt, later: Receipt) -> bool {
+    let frames = later.0.saturating_sub(earlier.0) as f64;
+    let apart_ns = later.1.saturating_sub(earlier.1) as f64;
+    let bounds = (frames * PERIOD_NS.start() - MAX_INTERVAL_NS as f64)
+        ..=(frames * PERIOD_NS.end() + MAX_INTERVAL_NS as f64);
+    bounds.contains(&apart_ns)
+}
+
+/// Adds the sweeps on the reconstructed sensor clock, and notes on times that cannot be used.
+fn add_turns(
+    scans: &mut TransposedScans,
+    stamps: &BTreeMap<i64, i64>,
+    list: &Path,
+) -> Result<(), OpenError> {
+    let received = receipts(&scans.images, stamps, list)?;
+    let segments = segments(&received);
+    let mut used: BTreeSet<i64> = BTreeSet::new();
+    let (mut clocks, mut early) = (Vec::new(), Vec::new());
+    for Segment { first, receipts } in &segments {
+        let Some((clock, ignored)) = SensorClock::below_most(receipts, PERIOD_NS) else {
+            continue;
+        };
+        used.extend(
+            receipts
+                .iter()
+                .filter(|receipt| !ignored.contains(receipt))
+                .map(|r| r.0),
+        );
+        early.extend(
+            ignored
+                .into_iter()
+                .map(|receipt| (receipt.0, -clock.after_ns(receipt) * 1e-9)),
+        );
+        clocks.push((*first, clock));
+    }
+    let turn = |&(frame, logged_ns): &Receipt| {
+        let later = clocks.partition_point(|(first, _)| *first <= frame);
+        let (_, clock) = clocks.get(later.checked_sub(1)?)?;
+        let start_ns = clock.start_ns(frame);
+        Some(Turn {
+            start_ns,
+            period_ns: clock.period.round() as i64,
+            logged_ns: if used.contains(&frame) {
+                logged_ns
+            } else {
+                start_ns
+            },
+        })
+    };
+    scans.turns = received.iter().filter_map(turn).collect();
+    scans.period_ns = scans.turns.first().map_or(0, |turn| turn.period_ns);
+    let far: Vec<String> = received
+        .iter()
+        .filter(|(frame, _)| !used.contains(frame) && early.iter().all(|(other, _)| other != frame))
+        .map(|(frame, _)| frame.to_string())
+        .collect();
+    scans
+        .notes
+        .extend(note_times(&far, &early, segments.len(), list));
+    Ok(())
+}
+
+/// Returns sentences on the frames whose times are far off, on those whose times are early by some
+/// seconds, and on breaks.
+fn note_times(far: &[String], early: &[(i64, f64)], segments: usize, list: &Path) -> Vec<String> {
+    let (list, limit_s) = (file_name(list), MAX_INTERVAL_NS / SECOND_NS);
+    let far = (!far.is_empty()).then(|| {
+        let frames = far.join(", ");
+        format!("{} times in {list} are more than {limit_s} s from those before and after (frames {frames}): the frame number is used instead.", far.len())
+    });
+    let early = (!early.is_empty()).then(|| {
+        let frames = early.iter().map(|(frame, s)| format!("{frame} by {s:.2} s"));
+        let frames = frames.collect::<Vec<_>>().join(", ");
+        format!("{} times in {list} are before their scans were measured, by all others (frames {frames}): the frame number is used instead.", early.len())
+    });
+    let breaks = (segments > 1).then(|| {
+        let breaks = segments - 1;
+        format!("The times in {list} break {breaks} times by more than {limit_s} s: the sensor clock starts anew there.")
+    });
+    [far, early, breaks].into_iter().flatten().collect()
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name()
+        .map(|n| n.to_string_lossy().into_owned())
+        .unwrap_or_default()
+}
+
+/// Returns the receipts of all images.
+fn receipts(
+    images: &Images,
+    stamps: &BTreeMap<i64, i64>,
+    list: &Path,
+) -> Result<Vec<Receipt>, OpenError> {
+    let receipt = |index| {
+        let frame = images.number(index)?;
+        Some((frame, *stamps.get(&frame)?))
+    };
+    let found: Vec<Option<Receipt>> = (0..images.len()).map(receipt).collect();
+    let missing = || (0..found.len()).filter(|index| found[*index].is_none());
+    match missing().next() {
+        Some(first) => Err(OpenError::MissingTimes {
+            path: list.to_owned(),
+            missing: missing().count(),
+            images: images.len(),
+            first: file_name(images.file(first)),
+        }),
+        None => Ok(found.into_iter().flatten().collect()),
+    }
+}
+
+/// Returns times by frame number, and how many of them lack leading zeros.
+fn parse_stamps(path: &Path, text: &str) -> Result<(BTreeMap<i64, i64>, usize), OpenError> {
+    let (mut stamps, mut unpadded) = (BTreeMap::new(), 0);
+    for (line, content) in text
+        .lines()
+        .enumerate()
+        .filter(|(_, l)| !l.trim().is_empty())
+    {
+        let (frame, ns, digits) = parse_line(content).ok_or_else(|| OpenError::Text {
+            path: path.to_owned(),
+            line: line + 1,
+            reason: format!(
+                "{} is not `Frame: <number> Time: <seconds>.<nanoseconds>` of the years 2015 to 2040",
+                quoted(content)
+            ),
+        })?;
+        unpadded += usize::from(digits < 9);
+        stamps.insert(frame, ns);
+    }
+    Ok((stamps, unpadded))
+}
+
+/// `Frame: 000248 Time: 1549986609.260809657`: number, ns, digits after the dot.
+fn parse_line(line: &str) -> Option<(i64, i64, usize)> {
+    let mut words = line.split_whitespace();
+    let (frame, number, time, value) = (words.next()?, words.next()?, words.next()?, words.next()?);
+    let (seconds, nanoseconds) = value.split_once('.')?;
+    let ns: i64 = nanoseconds
+        .parse()
+        .ok()
+        .filter(|ns| (0..SECOND_NS).contains(ns))?;
+    let stamp = seconds
+        .parse::<i64>()
+        .ok()?
+        .checked_mul(SECOND_NS)?
+        .checked_add(ns)?;
+    let labelled = frame == "Frame:" && time == "Time:" && stamp::plausible(stamp);
+    labelled.then_some((number.parse().ok()?, stamp, nanoseconds.len()))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn nanoseconds_without_leading_zeros_are_integers() {
+        assert_eq!(
+            parse_line("Frame: 000243 Time: 1549986608.1533537"),
+            Some((243, 1_549_986_608_001_533_537, 7))
+        );
+        assert_eq!(
+            parse_line("Frame: 1 Time: 1549986608.0"),
+            Some((1, 1_549_986_608_000_000_000, 1))
+        );
+        for bad in [
+            "Frame: 1 Time: 1549986608",
+            "Frame: 1 Time: 1549986608.1234567890",
+            "Frame: x Time: 1549986608.1",
+            "Frame: 1 Time: 12.5",
+            "",
+        ] {
+            assert_eq!(parse_line(bad), None, "{bad}");
+        }
+    }
+
+    fn received(frames: std::ops::Range<i64>, offset_ns: i64) -> Vec<Receipt> {
+        let at = |frame| {
+            (
+                frame,
+                1_549_986_607_000_000_000 + frame * 250_000_000 + offset_ns,
+            )
+        };
+        frames.map(at).collect()
+    }
+
+    #[test]
+    fn a_single_time_that_is_a_year_off_is_left_out() {
+        for off_ns in [-31_536_000, -60, 60, 31_536_000].map(|s| s * SECOND_NS) {
+            let mut frames = received(0..20, 0);
+            frames[7].1 += off_ns;
+            let [segment] = &segments(&frames)[..] else {
+                panic!("{off_ns}");
+            };
+            assert_eq!(segment.receipts.len(), 19);
+        }
+        let mut stalled = received(0..20, 0);
+        stalled[7].1 += 1_400_000_000;
+        assert_eq!(segments(&stalled)[0].receipts.len(), 20);
+    }
+
+    #[test]
+    fn a_pause_starts_a_new_clock() {
+        for pause_ns in [-3_600, 3_600].map(|s| s * SECOND_NS) {
+            let frames = [received(0..10, 0), received(10..20, pause_ns)].concat();
+            let found = segments(&frames);
+            let sizes: Vec<_> = found.iter().map(|s| (s.first, s.receipts.len())).collect();
+            assert_eq!(sizes, [(0, 10), (10, 10)]);
+        }
+    }
+}

@@ -1,0 +1,311 @@
+//! Reader of transposed images without metadata: rows are range (nearest first), columns azimuth
+//! from straight ahead.
+
+use super::Dataset;
+use super::detect::Found;
+use super::eccentricity;
+use super::error::{OpenError, ReadError};
+use super::file_list::FileList;
+use super::format::Format;
+use super::image_size::ImageSize;
+use super::images::Images;
+use super::navtech_png::fill_uniform;
+use super::navtech_scans::check_capacity;
+use super::options::{DatasetOptions, LostAzimuthOption};
+use super::stale::StaleRows;
+use gyre_radar::scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, Sense, SweepGeometry, flag};
+
+/// Side of the blocks of the transposition, pixels: a cache line.
+const BLOCK: usize = 64;
+
+/// The sweep of a scan.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Turn {
+    pub(crate) start_ns: i64,
+    pub(crate) period_ns: i64,
+    /// The stamp as logged; if that is wrong, of a host that is never late.
+    pub(crate) logged_ns: i64,
+}
+
+/// The azimuth of the first column.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) enum FirstAzimuth {
+    /// Straight ahead.
+    #[default]
+    Ahead,
+    /// Half a step to the right.
+    HalfAStep,
+}
+
+/// The scans of a folder, with scratch memory for the transposition. Images that are wider than
+/// high are not transposed.
+#[derive(Debug)]
+pub(crate) struct TransposedScans {
+    pub(crate) images: Images,
+    /// One per image.
+    pub(crate) turns: Vec<Turn>,
+    /// Time of a turn, of those without gaps between, ns. The caller sets it with the turns.
+    pub(crate) period_ns: i64,
+    /// The caller sets it if it is not the default.
+    pub(crate) first_azimuth: FirstAzimuth,
+    pub(crate) notes: Vec<String>,
+    format: Format,
+    stamp_meaning: &'static str,
+    range_resolution_m: f32,
+    range_offset_m: f32,
+    doppler_s: f32,
+    azimuth_eccentricity_rad: f32,
+    scratch: Vec<u8>,
+    /// Without angles nothing else tells that the host has lost azimuths; `None`: they are ignored.
+    pub(crate) stale: Option<StaleRows>,
+}
+
+impl TransposedScans {
+    /// `metres_per_bin` returns the range resolution of the format from the number of range bins.
+    /// The caller adds the turns.
+    pub(crate) fn open(
+        found: Found,
+        options: &DatasetOptions,
+        stamp_meaning: &'static str,
+        metres_per_bin: impl FnOnce(usize) -> f32,
+    ) -> Result<Self, OpenError> {
+        let Found {
+            format,
+            images,
+            notes,
+            ..
+        } = found;
+        options.check_without_encoder(format)?;
+        let mut scans = Self {
+            images,
+            turns: Vec::new(),
+            period_ns: 0,
+            first_azimuth: FirstAzimuth::default(),
+            notes,
+            format,
+            stamp_meaning,
+            range_resolution_m: 0.0,
+            range_offset_m: options.range_offset_m.unwrap_or(0.0),
+            doppler_s: options.doppler_s.unwrap_or(0.0),
+            azimuth_eccentricity_rad: options.azimuth_eccentricity_rad.unwrap_or(0.0),
+            scratch: Vec::new(),
+            stale: (options.lost_azimuths != Some(LostAzimuthOption::Ignore))
+                .then(StaleRows::default),
+        };
+        scans.check_shape()?;
+        scans.range_resolution_m = options
+            .range_resolution_m
+            .unwrap_or_else(|| metres_per_bin(scans.bins()));
+        if scans.is_transposed() {
+            let size = scans.images.size;
+            scans.scratch = vec![0; size.bytes()];
+            scans.notes.push(format!(
+                "Images are transposed ({} rows of range x {} columns of azimuth): they are transposed back when read.",
+                size.height, size.width
+            ));
+        }
+        Ok(scans)
+    }
+
+    fn check_shape(&self) -> Result<(), OpenError> {
+        if (2..=MAX_AZIMUTHS).contains(&self.azimuths()) {
+            return Ok(());
+        }
+        let reason = format!("it requires 2 to {MAX_AZIMUTHS} azimuths along its shorter side");
+        Err(OpenError::WrongImage {
+            path: self.images.file(0).to_owned(),
+            actual: self.images.size,
+            format: self.format,
+            reason,
+        })
+    }
+
+    pub(crate) fn azimuths(&self) -> usize {
+        self.images.size.height.min(self.images.size.width)
+    }
+
+    fn bins(&self) -> usize {
+        self.images.size.height.max(self.images.size.width)
+    }
+
+    /// Decodes an image, azimuth x range bin.
+    fn decode(&mut self, index: usize, into: &mut [u8]) -> Result<(), ReadError> {
+        if !self.is_transposed() {
+            return self.images.decode(index, into);
+        }
+        self.images.decode(index, &mut self.scratch)?;
+        transpose(&self.scratch, self.azimuths(), into);
+        Ok(())
+    }
+
+    /// Keeps the last rows of an image, or that it cannot be read.
+    fn remember(&mut self, index: usize, image: Option<&[u8]>) {
+        let bins = self.bins();
+        if let Some(stale) = &mut self.stale {
+            stale.remember(index, image.unwrap_or_default(), bins);
+        }
+    }
+
+    fn stamp_ns(&self, turn: &Turn) -> i64 {
+        turn.start_ns + mean_after_start_ns(turn.period_ns, self.azimuths())
+    }
+}
+
+impl Dataset for TransposedScans {
+    fn format(&self) -> Format {
+        self.format
+    }
+
+    fn len(&self) -> usize {
+        self.images.len()
+    }
+
+    fn limits(&self) -> ScanLimits {
+        ScanLimits {
+            bytes: self.images.size.bytes(),
+            azimuths: self.azimuths(),
+        }
+    }
+
+    fn image_size(&self) -> ImageSize {
+        self.images.size
+    }
+
+    fn is_transposed(&self) -> bool {
+        self.images.size.height > self.images.size.width
+    }
+
+    fn files(&self) -> &FileList {
+        self.images.files()
+    }
+
+    fn nominal_stamp_ns(&self, index: usize) -> Option<i64> {
+        self.turns.get(index).map(|turn| self.stamp_ns(turn))
+    }
+
+    fn period_ns(&self) -> i64 {
+        self.period_ns
+    }
+
+    fn logged_stamp_ns(&self, index: usize) -> Option<i64> {
+        self.turns.get(index).map(|turn| turn.logged_ns)
+    }
+
+    fn stamp_meaning(&self) -> &'static str {
+        self.stamp_meaning
+    }
+
+    fn encoder_counts(&self) -> Option<u16> {
+        None
+    }
+
+    fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError> {
+        let turn = *self.turns.get(index).ok_or(ReadError::NoSuchScan {
+            index,
+            len: self.len(),
+        })?;
+        let (azimuths, bins) = (self.azimuths(), self.bins());
+        check_capacity("bytes", azimuths * bins, slot.bytes.len())?;
+        check_capacity("azimuths", azimuths, slot.azimuth_rad.len())?;
+        check_capacity("stamps", azimuths, slot.stamp_ns.len())?;
+        check_capacity("flags", azimuths, slot.flags.len())?;
+        // Before the image, since it is decoded into the same scratch memory.
+        if let Some(before) = index.checked_sub(1)
+            && self.stale.as_ref().is_some_and(|stale| !stale.has(before))
+        {
+            let bytes = &mut slot.bytes[..azimuths * bins];
+            match self.decode(before, bytes) {
+                Ok(()) => self.remember(before, Some(bytes)),
+                // The file may come back, as with this one.
+                Err(ReadError::Io { .. }) => {}
+                Err(_) => self.remember(before, None),
+            }
+        }
+        let bytes = &mut slot.bytes[..azimuths * bins];
+        self.decode(index, bytes)?;
+        let before = index.checked_sub(1);
+        let lost = match &self.stale {
+            Some(stale) if before.is_some_and(|before| stale.has(before)) => {
+                stale.count(bytes, bins)
+            }
+            // No image is before the first one.
+            _ => 0,
+        };
+        self.remember(index, Some(bytes));
+        let azimuth_rad = &mut slot.azimuth_rad[..azimuths];
+        let first = match self.first_azimuth {
+            FirstAzimuth::Ahead => 0.0,
+            FirstAzimuth::HalfAStep => 0.5,
+        };
+        fill_uniform(azimuth_rad, first);
+        eccentricity::correct_eccentricity(azimuth_rad, self.azimuth_eccentricity_rad);
+        let assumed = match self.stale {
+            Some(_) => flag::ASSUMED,
+            None => 0,
+        };
+        let (measured, stale) = slot.flags[..azimuths].split_at_mut(azimuths - lost);
+        measured.fill(flag::MEASURED | assumed);
+        stale.fill(flag::STALE | assumed);
+        for (column, stamp) in slot.stamp_ns[..azimuths].iter_mut().enumerate() {
+            *stamp = turn.start_ns + turn.period_ns * column as i64 / azimuths as i64;
+        }
+        Ok(SweepGeometry {
+            azimuths,
+            bins,
+            stride: bins,
+            first_byte: 0,
+            range_resolution_m: self.range_resolution_m,
+            range_offset_m: self.range_offset_m,
+            doppler_s: self.doppler_s,
+            sense: Sense::Clockwise,
+            stamp_ns: self.stamp_ns(&turn),
+        })
+    }
+}
+
+/// Mean time of `azimuths` columns spread uniformly over a period, relative to the first, ns.
+fn mean_after_start_ns(period_ns: i64, azimuths: usize) -> i64 {
+    let n = azimuths as i64;
+    period_ns * (n - 1) / (2 * n)
+}
+
+/// `to[column][row] = from[row][column]`, for `from` of `columns` columns and `to` of the same
+/// size.
+fn transpose(from: &[u8], columns: usize, to: &mut [u8]) {
+    let rows = from.len() / columns;
+    for top in (0..rows).step_by(BLOCK) {
+        let bottom = (top + BLOCK).min(rows);
+        for left in (0..columns).step_by(BLOCK) {
+            for column in left..(left + BLOCK).min(columns) {
+                let line = &mut to[column * rows + top..column * rows + bottom];
+                for (row, into) in (top..bottom).zip(line) {
+                    *into = from[row * columns + column];
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn transposition_swaps_indices(rows in 1_usize..150, columns in 1_usize..150) {
+            let from: Vec<u8> = (0..rows * columns).map(|i| (i * 7 % 251) as u8).collect();
+            let mut to = vec![0; from.len()];
+            transpose(&from, columns, &mut to);
+            for row in 0..rows {
+                for column in 0..columns {
+                    prop_assert_eq!(to[column * rows + row], from[row * columns + column]);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,287 @@
+//! Trajectory files: the ground truth of each dataset, and the common pose formats.
+
+mod boreas;
+mod kitti;
+mod mulran;
+mod oxford;
+mod plane;
+mod tum;
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+pub use kitti::write_kitti;
+pub use tum::{write_tum, write_tum_pose};
+
+use gyre_radar::trajectory::Trajectory;
+use gyre_storage::quoted;
+
+/// Files of ground truth relative to the root of a dataset, in order of precedence.
+const PLACES: [&str; 9] = [
+    "ground_truth.tum",
+    "gt/radar_odometry.csv",
+    "radar_odometry.csv",
+    "applanix/radar_poses.csv",
+    "global_pose.csv",
+    "ground_truth.txt",
+    "gt.txt",
+    "gt/gt.txt",
+    "gt.tum",
+];
+
+/// The largest file: a month of poses at 10 Hz has 2.3 GB.
+const MAX_BYTES: u64 = 4 << 30;
+
+/// A trajectory that cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum TrajectoryError {
+    /// A file that cannot be read.
+    #[error("cannot read the trajectory {path}: {source}")]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// The cause.
+        source: io::Error,
+    },
+    /// A file of unknown format.
+    #[error(
+        "{path} is not a trajectory of a known format (Oxford radar_odometry.csv, Boreas radar_poses.csv, MulRan global_pose.csv, TUM, KITTI): {reason}"
+    )]
+    Unknown {
+        /// The file.
+        path: PathBuf,
+        /// The finding.
+        reason: String,
+    },
+    /// A line that does not match the format.
+    #[error("{path}, line {line}: {reason}")]
+    Line {
+        /// The file.
+        path: PathBuf,
+        /// The line, from 1.
+        line: usize,
+        /// The problem.
+        reason: String,
+    },
+}
+
+/// An error in a line (from 1); the caller adds the path of the file.
+#[derive(Debug)]
+struct LineError {
+    line: usize,
+    reason: String,
+}
+
+/// The format of a trajectory file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TrajectoryFormat {
+    /// Oxford `radar_odometry.csv`: motions between scans, composed from the identity.
+    OxfordCsv,
+    /// Boreas `radar_poses.csv`.
+    BoreasCsv,
+    /// MulRan `global_pose.csv`: poses of the vehicle, transformed to the radar.
+    MulranCsv,
+    /// `seconds x y z qx qy qz qw`.
+    Tum,
+    /// Row-major 3 x 4 matrices without times; Boreas' odometry: with times, inverted.
+    Kitti,
+}
+
+/// Reads a trajectory of any known format, detected from its first line, and converts it to
+/// REP-103. TUM and KITTI files may be of a vehicle (z up or down) or of a camera (z forward): the
+/// plane in which they move is found.
+///
+/// # Errors
+/// A file that cannot be read, or is not of a known format.
+pub fn read_trajectory(path: &Path) -> Result<Trajectory, TrajectoryError> {
+    let text = gyre_storage::read_text(path, MAX_BYTES).map_err(|source| TrajectoryError::Io {
+        path: path.to_owned(),
+        source,
+    })?;
+    parse_trajectory(&text, path)
+}
+
+/// As [`read_trajectory`], from a text; `path` is the name in errors.
+///
+/// # Errors
+/// A text that is not of a known format.
+pub fn parse_trajectory(text: &str, path: &Path) -> Result<Trajectory, TrajectoryError> {
+    let format = detect(text).map_err(|reason| TrajectoryError::Unknown {
+        path: path.to_owned(),
+        reason,
+    })?;
+    parse(text, format).map_err(|LineError { line, reason }| TrajectoryError::Line {
+        path: path.to_owned(),
+        line,
+        reason,
+    })
+}
+
+/// Returns the ground truth file of a dataset, if there is one at a usual path. `root` may also be
+/// the folder of images.
+pub fn find_ground_truth(root: &Path) -> Option<PathBuf> {
+    let above = root
+        .file_name()
+        .and_then(|n| n.to_str())
+        .is_some_and(|n| ["radar", "Navtech_Polar", "navtech", "polar"].contains(&n));
+    let roots = [Some(root), root.parent().filter(|_| above)];
+    roots
+        .into_iter()
+        .flatten()
+        .flat_map(|root| PLACES.iter().map(|p| root.join(p)))
+        .find(|path| path.is_file())
+}
+
+fn parse(text: &str, format: TrajectoryFormat) -> Result<Trajectory, LineError> {
+    match format {
+        TrajectoryFormat::OxfordCsv => oxford::parse(text),
+        TrajectoryFormat::BoreasCsv => boreas::parse(text),
+        TrajectoryFormat::MulranCsv => mulran::parse(text),
+        TrajectoryFormat::Tum => tum::parse(text),
+        TrajectoryFormat::Kitti => kitti::parse(text),
+    }
+}
+
+fn detect(text: &str) -> Result<TrajectoryFormat, String> {
+    let (_, first) = lines(text).next().ok_or("it is empty")?;
+    let commas = first.split(',').count();
+    let words = first.split_whitespace().count();
+    check_separators(first, commas, words)?;
+    match (commas, words) {
+        _ if first.contains("destination_timestamp") => Ok(TrajectoryFormat::OxfordCsv),
+        _ if first.contains("GPSTime") => Ok(TrajectoryFormat::BoreasCsv),
+        (13, _) => Ok(TrajectoryFormat::MulranCsv),
+        (1, 8) => Ok(TrajectoryFormat::Tum),
+        (1, 12 | 13) => Ok(TrajectoryFormat::Kitti),
+        _ => Err(format!("its first line has {} columns", commas.max(words))),
+    }
+}
+
+/// Rejects what spreadsheets write in countries with decimal commas, and columns that are parted as
+/// those of other formats.
+fn check_separators(first: &str, commas: usize, words: usize) -> Result<(), String> {
+    // With a fraction: a comma at the end of a word parts columns, as in `1, 2`.
+    let is_decimal = |word: &str| match word.split_once(',') {
+        Some((whole, fraction)) => {
+            whole.parse::<i64>().is_ok()
+                && fraction.starts_with(|c: char| c.is_ascii_digit())
+                && word.replace(',', ".").parse::<f64>().is_ok()
+        }
+        None => false,
+    };
+    let columns = |count| match count {
+        8 => "8 columns (TUM)",
+        _ => "columns (KITTI)",
+    };
+    match first.split(';').count() {
+        1 if matches!(words, 8 | 12 | 13) && first.split_whitespace().any(is_decimal) => Err(format!(
+            "the numbers in its {} have decimal commas, and need decimal points: `sed 's/,/./g'` makes them",
+            columns(words)
+        )),
+        1 if matches!(commas, 8 | 12) && first.split(',').all(|word| word.trim().parse::<f64>().is_ok()) => {
+            Err(format!("its {} are parted by commas, and need spaces: `sed 's/,/ /g'` makes them", columns(commas)))
+        }
+        1 => Ok(()),
+        count @ (8 | 12) => Err(format!(
+            "its {} are parted by semicolons, and need spaces, and decimal points: `sed 's/,/./g; s/;/ /g'` makes them",
+            columns(count)
+        )),
+        _ => Err("its columns are parted by semicolons, and need commas, and decimal points: `sed 's/,/./g; s/;/,/g'` makes them".to_owned()),
+    }
+}
+
+/// Returns the non-empty lines, numbered from 1; `#` starts a comment.
+fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    text.lines()
+        .enumerate()
+        .map(|(i, l)| (i + 1, l.trim()))
+        .filter(|(_, l)| !l.is_empty() && !l.starts_with('#'))
+}
+
+/// The largest number: no product or sum of such overflows.
+const LARGEST: f64 = 1e15;
+
+/// Parses `N` numbers.
+fn numbers<'a, const N: usize>(
+    line: usize,
+    fields: impl Iterator<Item = &'a str>,
+) -> Result<[f64; N], LineError> {
+    let (mut values, mut count) = ([0.0; N], 0);
+    for field in fields {
+        let value = field.trim().parse::<f64>().ok();
+        let value = value.filter(|value| value.abs() <= LARGEST);
+        let value = value.ok_or_else(|| LineError {
+            line,
+            reason: format!(
+                "{} is not a number from -{LARGEST:e} to {LARGEST:e}",
+                quoted(field)
+            ),
+        })?;
+        if let Some(into) = values.get_mut(count) {
+            *into = value;
+        }
+        count += 1;
+    }
+    match count {
+        _ if count == N => Ok(values),
+        _ => Err(LineError {
+            line,
+            reason: format!("{count} columns instead of {N}"),
+        }),
+    }
+}
+
+/// Returns the columns of a csv with the given names.
+fn columns<const N: usize>(header: &str, names: [&str; N]) -> Result<[usize; N], LineError> {
+    let mut found = [0; N];
+    for (into, name) in found.iter_mut().zip(names) {
+        let position = header.split(',').position(|h| h.trim() == name);
+        *into = position.ok_or_else(|| LineError {
+            line: 1,
+            reason: format!("the header has no column {name}"),
+        })?;
+    }
+    Ok(found)
+}
+
+/// Returns a field of a csv row.
+fn field(line: usize, row: &str, column: usize) -> Result<&str, LineError> {
+    row.split(',')
+        .nth(column)
+        .map(str::trim)
+        .ok_or_else(|| LineError {
+            line,
+            reason: format!("column {} is missing", column + 1),
+        })
+}
+
+fn number(line: usize, row: &str, column: usize) -> Result<f64, LineError> {
+    numbers::<1>(line, std::iter::once(field(line, row, column)?)).map(|[v]| v)
+}
+
+/// Parses an integer stamp of any unit to ns since 1970.
+fn stamp_field(line: usize, row: &str, column: usize) -> Result<i64, LineError> {
+    let text = field(line, row, column)?;
+    let stamp = text.parse().ok().and_then(crate::dataset::stamp::to_ns);
+    stamp.ok_or_else(|| LineError {
+        line,
+        reason: format!(
+            "stamp {} is not an integer time of the years 2015 to 2040",
+            quoted(text)
+        ),
+    })
+}
+
+/// Rejects times that run backwards.
+fn check_increasing(line: usize, stamps: &[i64], next: i64) -> Result<(), LineError> {
+    match stamps.last() {
+        Some(last) if next < *last => {
+            let back_s = (last - next) as f64 * 1e-9;
+            Err(LineError {
+                line,
+                reason: format!("time runs backwards by {back_s:.6} s"),
+            })
+        }
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,60 @@
+//! Boreas `radar_poses.csv`: poses of the radar in east-north-up; the radar frame is x forward, y
+//! right, z down (roll near pi).
+
+use gyre_geometry::pose;
+
+use super::{LineError, check_increasing, columns, lines, number, stamp_field};
+use gyre_radar::trajectory::Trajectory;
+
+pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
+    let mut rows = lines(text);
+    let header = rows.next().map(|(_, header)| header).unwrap_or_default();
+    let names = ["GPSTime", "easting", "northing", "roll", "pitch", "heading"];
+    let [time, east, north, roll, pitch, heading] = columns(header, names)?;
+    let (mut stamps, mut poses) = (Vec::new(), Vec::new());
+    for (line, row) in rows {
+        let stamp = stamp_field(line, row, time)?;
+        check_increasing(line, &stamps, stamp)?;
+        let yaw = forward_heading(
+            number(line, row, roll)?,
+            number(line, row, pitch)?,
+            number(line, row, heading)?,
+        );
+        stamps.push(stamp);
+        poses.push(pose(
+            number(line, row, east)?,
+            number(line, row, north)?,
+            yaw,
+        ));
+    }
+    Ok(Trajectory {
+        stamp_ns: Some(stamps),
+        poses,
+    })
+}
+
+/// Returns the direction of the sensor's x axis in the east-north plane, counter-clockwise from
+/// east.
+///
+/// The rotation from sensor to ENU is `roll(r) pitch(p) yaw(h)` of transposed elementary matrices;
+/// its first column is the x axis. The x axis does not depend on whether y points right (z down) or
+/// left.
+fn forward_heading(roll: f64, pitch: f64, heading: f64) -> f64 {
+    let ((sr, cr), (sp, cp), (sh, ch)) = (roll.sin_cos(), pitch.sin_cos(), heading.sin_cos());
+    let (x, y) = (cp * ch, cr * -sh + sr * sp * ch);
+    y.atan2(x)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::PI;
+
+    #[test]
+    fn with_z_down_the_heading_is_the_yaw() {
+        for heading in [-3.0, -1.0, 0.0, 0.5, 2.9] {
+            assert!((forward_heading(PI, 0.0, heading) - heading).abs() < 1e-12);
+            assert!((forward_heading(-PI, 0.0, heading) - heading).abs() < 1e-12);
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! KITTI: twelve numbers per line, a row-major 3 x 4 pose, after an optional index. Also Boreas
+//! odometry files, whose 13 columns are a stamp and the inverse of the pose.
+//!
+//! Poses have roll and pitch: they are inverted in space, and projected to the plane at last.
+
+use std::io::{self, Write};
+
+use gyre_geometry::{Pose, mirrored};
+use nalgebra::{Complex, Matrix3, Translation2, Unit, UnitComplex, Vector3};
+
+use super::{
+    LineError, check_increasing, lines, numbers,
+    plane::{Matrix, Plane},
+};
+use crate::dataset::stamp;
+use gyre_radar::trajectory::Trajectory;
+
+/// A first pose that is nearer to the identity than this, m and in each element of the rotation, is
+/// the world.
+const NEAR_IDENTITY: f64 = 0.1;
+
+pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
+    let stamped = lines(text)
+        .next()
+        .and_then(|(_, row)| leading_stamp(row))
+        .is_some();
+    let mut stamps = stamped.then(Vec::new);
+    let mut matrices = Vec::new();
+    for (line, row) in lines(text) {
+        let leading = usize::from(row.split_whitespace().count() == 13);
+        let matrix = numbers::<12>(line, row.split_whitespace().skip(leading))?;
+        let Some(stamps) = &mut stamps else {
+            matrices.push(matrix);
+            continue;
+        };
+        let stamp = leading_stamp(row).ok_or_else(|| LineError {
+            line,
+            reason: "the first column is not a time, as in the first line".to_owned(),
+        })?;
+        check_increasing(line, stamps, stamp)?;
+        stamps.push(stamp);
+        matrices.push(inverse(&matrix));
+    }
+    let mut poses = projected(&matrices)?;
+    // Boreas' sensors have y to the right where the world is their first frame, not a map.
+    if stamped && matrices.first().is_some_and(is_near_identity) {
+        poses.iter_mut().for_each(|pose| *pose = mirrored(pose));
+    }
+    Ok(Trajectory {
+        stamp_ns: stamps,
+        poses,
+    })
+}
+
+fn projected(matrices: &[Matrix]) -> Result<Vec<Pose>, LineError> {
+    let plane = Plane::of(matrices).map_err(|reason| LineError { line: 1, reason })?;
+    let project = |matrix| planar(plane.project(matrix));
+    Ok(matrices.iter().map(project).collect())
+}
+
+/// Returns the inverse of a rigid motion.
+fn inverse(m: &Matrix) -> Matrix {
+    let back = Matrix3::new(m[0], m[4], m[8], m[1], m[5], m[9], m[2], m[6], m[10]);
+    let t = back * Vector3::new(-m[3], -m[7], -m[11]);
+    [
+        m[0], m[4], m[8], t.x, m[1], m[5], m[9], t.y, m[2], m[6], m[10], t.z,
+    ]
+}
+
+fn is_near_identity(m: &Matrix) -> bool {
+    let identity = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+    let mut pairs = m.iter().zip(identity);
+    pairs.all(|(a, b)| (a - b).abs() < NEAR_IDENTITY)
+}
+
+fn leading_stamp(row: &str) -> Option<i64> {
+    let mut words = row.split_whitespace();
+    let first = words.next()?;
+    (words.count() == 12)
+        .then(|| first.parse().ok().and_then(stamp::to_ns))
+        .flatten()
+}
+
+/// Writes KITTI poses in the plane (z = 0).
+///
+/// # Errors
+/// Errors of `out`.
+pub fn write_kitti(trajectory: &Trajectory, out: &mut impl Write) -> io::Result<()> {
+    for pose in &trajectory.poses {
+        let (sin, cos) = pose.rotation.angle().sin_cos();
+        let (x, y, minus) = (pose.translation.x, pose.translation.y, -sin);
+        writeln!(
+            out,
+            "{cos:.12} {minus:.12} 0 {x:.6} {sin:.12} {cos:.12} 0 {y:.6} 0 0 1 0"
+        )?;
+    }
+    Ok(())
+}
+
+/// Returns the planar pose of x, y, and the cosine and sine of its heading.
+///
+/// Cosine and sine are taken without normalisation if their norm is near 1: published KITTI results
+/// come from matrices rounded to six decimals, and normalising them changes the fifth decimal of
+/// the result.
+fn planar([x, y, cos, sin]: [f64; 4]) -> Pose {
+    let rotation = match (cos.hypot(sin) - 1.0).abs() < 1e-4 {
+        true => Unit::new_unchecked(Complex::new(cos, sin)),
+        false => UnitComplex::new(sin.atan2(cos)),
+    };
+    Pose::from_parts(Translation2::new(x, y), rotation)
+}

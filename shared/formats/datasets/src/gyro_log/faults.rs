@@ -1,0 +1,241 @@
+//! Faults of the samples of a log, and which samples are left out.
+
+mod breaks;
+mod order;
+
+use std::path::Path;
+
+use gyre_radar::median;
+use serde::Serialize;
+
+use super::{LogError, Raw};
+use gyre_samples::{Sample, SampleKind};
+
+/// Rates beyond this one are no vehicle's, rad/s.
+const ABSURD_RADPS: f64 = 10.0;
+/// Share of absurd rates above which the unit must be another one.
+const ABSURD_SHARE: f64 = 0.01;
+/// Longest time between two samples that is no gap, median periods, whatever stamps round to.
+const GAP_PERIODS: f64 = 3.0 + 1e-6;
+
+/// Faults of a log. What is counted as left out is not in its samples.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct LogFaults {
+    /// Rows that are none of the table, as one that was cut off: left out.
+    pub unreadable: usize,
+    /// Line (of a folder of files: number) of the first of them.
+    pub first_unreadable: usize,
+    /// Samples with a rate that is not finite: left out.
+    pub not_a_number: usize,
+    /// Samples with a rate beyond 10 rad/s: left out.
+    pub absurd: usize,
+    /// Samples with the stamp of another one: left out.
+    pub repeated: usize,
+    /// Samples with a stamp before that of an earlier one: sorted.
+    pub out_of_order: usize,
+    /// Samples of times for which the clock was set back, by up to a second: left out.
+    pub measured_twice: usize,
+    /// Places where the stamps step back by more than a second, or ahead by more than an hour, s.
+    pub clock_steps_s: Vec<f64>,
+    /// Samples whose stamps such steps make unusable: left out.
+    pub by_clock_steps: usize,
+    /// Times without samples, of more than three periods.
+    pub gaps: Vec<LogGap>,
+    /// Samples that are missing one or two at a time: the value is interpolated.
+    pub bridged: usize,
+    /// The header names no unit of the rates: rad/s is assumed.
+    pub unit_is_assumed: bool,
+}
+
+/// A time without samples.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct LogGap {
+    /// The last sample before it, s since the first of the log.
+    pub after_s: f64,
+    /// The duration, s.
+    pub seconds: f64,
+}
+
+impl LogFaults {
+    /// Returns the number of rows that are not among the samples.
+    pub fn left_out(&self) -> usize {
+        self.unreadable
+            + self.not_a_number
+            + self.absurd
+            + self.repeated
+            + self.measured_twice
+            + self.by_clock_steps
+    }
+
+    /// Returns the longest time without samples, s; 0 if there are no gaps.
+    pub fn longest_gap_s(&self) -> f64 {
+        self.gaps.iter().map(|gap| gap.seconds).fold(0.0, f64::max)
+    }
+
+    /// Returns a sentence for each kind of fault.
+    pub fn sentences(&self) -> Vec<String> {
+        let counted = |count: usize, sentence: String| (count > 0).then_some(sentence);
+        let steps = self
+            .clock_steps_s
+            .iter()
+            .map(|step| format!("{step:+.1} s"));
+        let steps = steps.take(5).collect::<Vec<_>>().join(", ");
+        let longest = self.gaps.iter().copied();
+        let longest = longest.max_by(|a, b| a.seconds.total_cmp(&b.seconds));
+        [
+            counted(
+                self.unreadable,
+                format!("{} rows are not of its table, the first in line {}: left out.", self.unreadable, self.first_unreadable),
+            ),
+            counted(
+                self.not_a_number,
+                format!("{} samples have rates that are not finite: left out.", self.not_a_number),
+            ),
+            counted(
+                self.absurd,
+                format!("{} samples have rates beyond {ABSURD_RADPS} rad/s, at which no vehicle turns: left out.", self.absurd),
+            ),
+            counted(
+                self.repeated,
+                format!("{} samples have the stamp of another one: left out.", self.repeated),
+            ),
+            counted(
+                self.out_of_order,
+                format!("{} samples come later than their stamps say: sorted.", self.out_of_order),
+            ),
+            counted(
+                self.measured_twice,
+                format!("{} samples are of times over which the clock was set back, and which have two measurements: left out.", self.measured_twice),
+            ),
+            counted(
+                self.clock_steps_s.len(),
+                format!(
+                    "The clock steps {} times ({steps}): {} samples that do not fit with the others are left out.",
+                    self.clock_steps_s.len(),
+                    self.by_clock_steps
+                ),
+            ),
+            longest.map(|gap| {
+                format!(
+                    "Samples are missing in {} places, for up to {:.2} s ({:.1} s after the first).",
+                    self.gaps.len(),
+                    gap.seconds,
+                    gap.after_s
+                )
+            }),
+            counted(
+                self.bridged,
+                format!(
+                    "{} samples are missing one or two at a time: interpolated where `max_gap_s` allows it.",
+                    self.bridged
+                ),
+            ),
+            self.unit_is_assumed.then(|| {
+                "The header names no unit of the rates: rad/s is assumed; `gyre calibrate` tells deg/s by its scale.".to_owned()
+            }),
+        ]
+        .into_iter()
+        .flatten()
+        .collect()
+    }
+}
+
+/// The values that a sensor can measure on a vehicle.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Plausible {
+    /// The sensor.
+    pub of: SampleKind,
+    /// The number of values of a sample that count.
+    pub values: usize,
+    /// The largest of them.
+    pub most: f64,
+    /// That in words, and the remedy where many are beyond.
+    pub beyond: &'static str,
+}
+
+/// The rates of a gyro.
+pub(super) const RATES: Plausible = Plausible {
+    of: SampleKind::Gyro,
+    values: 3,
+    most: ABSURD_RADPS,
+    beyond: "have rates beyond 10 rad/s, at which no vehicle turns: if they are in deg/s, name the columns so, as gyro_z_degps",
+};
+
+/// Leaves out and sorts what the faults name, and counts it.
+pub(crate) fn examine(
+    raw: Raw,
+    path: &Path,
+    plausible: &Plausible,
+) -> Result<(Vec<Sample>, LogFaults), LogError> {
+    let unusable = |reason: String| LogError::Unusable {
+        of: plausible.of,
+        path: path.to_owned(),
+        reason,
+    };
+    let rows = raw.samples.len() + raw.unreadable;
+    let mut faults = LogFaults {
+        unreadable: raw.unreadable,
+        first_unreadable: raw.first_unreadable,
+        unit_is_assumed: raw.unit_is_assumed,
+        ..LogFaults::default()
+    };
+    if 2 * raw.unreadable > rows {
+        return Err(unusable(format!(
+            "{} of its {rows} rows cannot be read, the first in line {}: are its stamps, decimal points and columns those that its header names?",
+            raw.unreadable, raw.first_unreadable
+        )));
+    }
+    let mut samples = raw.samples;
+    let mut leave_out = |is_bad: &dyn Fn(f64) -> bool| {
+        let before = samples.len();
+        let is_bad = |sample: &Sample| {
+            sample.values[..plausible.values]
+                .iter()
+                .any(|it| is_bad(*it))
+        };
+        samples.retain(|sample| !is_bad(sample));
+        (before, before - samples.len())
+    };
+    (_, faults.not_a_number) = leave_out(&|value| !value.is_finite());
+    let (finite, absurd) = leave_out(&|value| value.abs() > plausible.most);
+    faults.absurd = absurd;
+    if absurd as f64 > ABSURD_SHARE * finite as f64 {
+        let beyond = plausible.beyond;
+        return Err(unusable(format!(
+            "{absurd} of its {finite} samples {beyond}"
+        )));
+    }
+    let samples = breaks::repair(samples, &mut faults).map_err(unusable)?;
+    let samples = order::sort(&samples, &mut faults);
+    if samples.is_empty() {
+        return Err(unusable("it has no samples".to_owned()));
+    }
+    (faults.gaps, faults.bridged) = gaps(&samples);
+    Ok((samples, faults))
+}
+
+/// Times without samples, of samples in the order of their stamps, and the number of samples that
+/// are missing one or two at a time.
+fn gaps(samples: &[Sample]) -> (Vec<LogGap>, usize) {
+    let seconds = |from: usize, to: usize| {
+        let [from, to] = [from, to].map(|k| samples.get(k).map(|it| it.stamp_ns));
+        from.zip(to).map(|(from, to)| (to - from) as f64 * 1e-9)
+    };
+    let steps = || (0..samples.len()).filter_map(|k| Some((k, seconds(k, k + 1)?)));
+    let period_s = median(steps().map(|(_, step_s)| step_s)).unwrap_or_default();
+    let (gaps, short): (Vec<_>, Vec<_>) = steps().partition(|it| it.1 > GAP_PERIODS * period_s);
+    let missing = |(k, step_s): (usize, f64)| {
+        let missing = (step_s / period_s - 1.0).round();
+        // A stamp that jitters is as much nearer to the sample on its other side.
+        let before = k.checked_sub(1).and_then(|before| seconds(before, k + 1));
+        let mut around = before.into_iter().chain(seconds(k, k + 2));
+        let is_missing = around.all(|around_s| around_s > (missing + 1.5) * period_s);
+        if is_missing { missing as usize } else { 0 }
+    };
+    let bridged = short.into_iter().map(missing).sum();
+    let gaps = gaps.into_iter().map(|(k, step_s)| LogGap {
+        after_s: seconds(0, k).unwrap_or_default(),
+        seconds: step_s,
+    });
+    (gaps.collect(), bridged)
+}

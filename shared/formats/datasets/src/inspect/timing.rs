@@ -1,0 +1,227 @@
+//! Period, jitter, missing scans and stalls of the host.
+
+use serde::Serialize;
+
+use crate::dataset::Dataset;
+use gyre_radar::median;
+
+/// Interval on the used clock from which on scans are missing, periods.
+const GAP_PERIODS: f64 = 1.5;
+/// Logged interval from which on the host has stalled, periods.
+const STALL_PERIODS: f64 = 1.4;
+/// Maximum interval while the host catches up after a stall, periods.
+const CATCH_UP_PERIODS: f64 = 0.97;
+/// Number of scans after a long interval that distinguish a gap from a stall.
+const AFTERWARDS: usize = 5;
+
+/// Times of the scans. Indices are from 0.
+#[derive(Clone, Debug, Serialize)]
+pub struct TimingReport {
+    /// Time of the first scan, ns since 1970.
+    pub first_ns: i64,
+    /// Time of the last scan, ns since 1970.
+    pub last_ns: i64,
+    /// Median time between scans, s; 0 for a single scan.
+    pub period_s: f64,
+    /// RMS deviation of the logged intervals from the period, s, without gaps and stalls.
+    pub jitter_s: f64,
+    /// Maximum and minimum logged interval, s.
+    pub logged_interval_s: (f64, f64),
+    /// Number of missing scans.
+    pub missing_scans: usize,
+    /// Missing scans.
+    pub gaps: Vec<Gap>,
+    /// Stalls of the host: stamps were logged late, but no scan is missing.
+    pub stalls: Vec<Stall>,
+    /// Scans whose logged stamp is before that of the previous scan.
+    pub backwards: Vec<usize>,
+}
+
+/// Missing scans.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Gap {
+    /// The first scan after the gap.
+    pub scan: usize,
+    /// Number of missing scans.
+    pub missing: usize,
+    /// Time between the scans before and after the gap, s.
+    pub seconds: f64,
+}
+
+/// A stall of the host.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Stall {
+    /// The first late scan.
+    pub scan: usize,
+    /// Delay of its stamp, s.
+    pub late_s: f64,
+}
+
+/// Examines the times of all scans; `None` if a scan has no time.
+pub(super) fn examine(dataset: &dyn Dataset) -> Option<TimingReport> {
+    let all = 0..dataset.len();
+    let used: Vec<i64> = all
+        .clone()
+        .map(|i| dataset.nominal_stamp_ns(i))
+        .collect::<Option<_>>()?;
+    let logged: Vec<i64> = all
+        .map(|i| dataset.logged_stamp_ns(i))
+        .collect::<Option<_>>()?;
+    times(&used, &logged)
+}
+
+/// `used` are the times that the scans are read with, `logged` those recorded by the host.
+fn times(used: &[i64], logged: &[i64]) -> Option<TimingReport> {
+    let (used_s, logged_s) = (intervals_s(used), intervals_s(logged));
+    let period_s = median(used_s.iter().copied()).unwrap_or(0.0);
+    let late_s = lateness_s(used, logged);
+    let (mut gaps, mut stalls, mut backwards) = (Vec::new(), Vec::new(), Vec::new());
+    for (i, (on_clock, on_host)) in used_s
+        .iter()
+        .copied()
+        .zip(logged_s.iter().copied())
+        .enumerate()
+    {
+        let scan = i + 1;
+        if period_s > 0.0
+            && on_clock > GAP_PERIODS * period_s
+            && !catches_up(&logged_s[scan..], period_s)
+        {
+            let missing = ((on_clock / period_s).round() as u32 - 1) as usize;
+            gaps.push(Gap {
+                scan,
+                missing,
+                seconds: on_clock,
+            });
+        } else if period_s > 0.0 && on_host > STALL_PERIODS * period_s {
+            stalls.push(Stall {
+                scan,
+                late_s: late_s[scan].max(on_host - period_s),
+            });
+        } else if on_host < 0.0 {
+            backwards.push(scan);
+        }
+    }
+    Some(TimingReport {
+        first_ns: *used.first()?,
+        last_ns: *used.last()?,
+        period_s,
+        jitter_s: jitter_s(&logged_s, period_s),
+        logged_interval_s: extremes(&logged_s),
+        missing_scans: gaps.iter().map(|g| g.missing).sum(),
+        gaps,
+        stalls,
+        backwards,
+    })
+}
+
+fn intervals_s(stamps: &[i64]) -> Vec<f64> {
+    stamps
+        .windows(2)
+        .map(|w| (w[1] - w[0]) as f64 * 1e-9)
+        .collect()
+}
+
+/// Delay of each logged stamp relative to the most prompt one.
+fn lateness_s(used: &[i64], logged: &[i64]) -> Vec<f64> {
+    let late: Vec<i64> = logged.iter().zip(used).map(|(l, u)| l - u).collect();
+    let prompt = late.iter().copied().min().unwrap_or(0);
+    late.iter().map(|l| (l - prompt) as f64 * 1e-9).collect()
+}
+
+/// Returns whether the scans after a long interval arrive faster than the sensor period.
+fn catches_up(afterwards: &[f64], period_s: f64) -> bool {
+    let next = afterwards
+        .iter()
+        .copied()
+        .take(AFTERWARDS)
+        .take_while(|s| *s < STALL_PERIODS * period_s);
+    median(next).is_some_and(|s| s < CATCH_UP_PERIODS * period_s)
+}
+
+fn jitter_s(logged_s: &[f64], period_s: f64) -> f64 {
+    let regular = || {
+        logged_s
+            .iter()
+            .map(|s| s - period_s)
+            .filter(|d| d.abs() < (STALL_PERIODS - 1.0) * period_s)
+    };
+    let count = regular().count().max(1);
+    (regular().map(|d| d * d).sum::<f64>() / count as f64).sqrt()
+}
+
+fn extremes(values: &[f64]) -> (f64, f64) {
+    let max = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let min = values.iter().copied().fold(f64::INFINITY, f64::min);
+    if values.is_empty() {
+        (0.0, 0.0)
+    } else {
+        (max, min)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    const MS: i64 = 1_000_000;
+
+    fn uniform(n: i64) -> Vec<i64> {
+        (0..n)
+            .map(|k| 1_549_986_607_000 * MS + k * 250 * MS)
+            .collect()
+    }
+
+    #[test]
+    fn a_gap_is_counted_and_no_stall() {
+        let mut stamps = uniform(20);
+        stamps.drain(7..10);
+        let report = times(&stamps, &stamps).unwrap();
+        assert_eq!(
+            report.gaps,
+            [Gap {
+                scan: 7,
+                missing: 3,
+                seconds: 1.0
+            }]
+        );
+        assert_eq!((report.missing_scans, report.stalls.len()), (3, 0));
+        assert!((report.period_s - 0.25).abs() < 1e-9 && report.jitter_s < 1e-9);
+    }
+
+    #[test]
+    fn a_stall_with_catching_up_is_not_a_gap() {
+        let mut logged = uniform(30);
+        for (k, late) in [900, 700, 500, 300, 100].into_iter().enumerate() {
+            logged[10 + k] += late * MS;
+        }
+        for used in [uniform(30), logged.clone()] {
+            let report = times(&used, &logged).unwrap();
+            assert_eq!(report.missing_scans, 0, "{:?}", report.gaps);
+            assert_eq!(report.stalls.len(), 1);
+            assert_eq!(report.stalls[0].scan, 10);
+            assert!(
+                (report.stalls[0].late_s - 0.9).abs() < 1e-9,
+                "{}",
+                report.stalls[0].late_s
+            );
+        }
+    }
+
+    #[test]
+    fn one_scan_has_no_period() {
+        let report = times(&uniform(1), &uniform(1)).unwrap();
+        assert_eq!(
+            (report.period_s, report.jitter_s, report.missing_scans),
+            (0.0, 0.0, 0)
+        );
+    }
+
+    #[test]
+    fn time_that_runs_backwards_is_detected() {
+        let mut logged = uniform(9);
+        logged[4] -= 400 * MS;
+        assert_eq!(times(&uniform(9), &logged).unwrap().backwards, [4]);
+    }
+}

@@ -1,0 +1,161 @@
+//! The log of the wheels' speed as a file: a table as CSV.
+
+use std::path::{Path, PathBuf};
+
+use csv::StringRecord;
+use gyre_samples::{Sample, SampleKind, WheelsConfig};
+
+use crate::{
+    LogError, LogFaults, SampleTrack,
+    gyro_log::{
+        Raw,
+        columns::{StampUnit, plain, stamp_unit},
+        faults::{Plausible, examine},
+        roots,
+        table::{self, SampleColumns},
+    },
+};
+use gyre_storage::quoted;
+
+/// Logs relative to the root of a dataset, in order of precedence.
+const PLACES: [&str; 4] = ["wheels.csv", "wheel_speed.csv", "speed.csv", "odometer.csv"];
+
+/// The speeds of a vehicle on wheels.
+const SPEEDS: Plausible = Plausible {
+    of: SampleKind::Wheels,
+    values: 1,
+    most: 100.0,
+    beyond: "have speeds beyond 100 m/s: if they are in km/h, name the column so, as speed_km_h",
+};
+
+/// The log of the wheels, on its own clock.
+#[derive(Clone, Debug, Default)]
+pub struct WheelLog {
+    /// The samples in the order of their stamps, which all differ, in m/s.
+    pub samples: Vec<Sample>,
+    /// Faults of the log, with the number of samples that were left out for each.
+    pub faults: LogFaults,
+    /// The file.
+    pub path: PathBuf,
+}
+
+impl WheelLog {
+    /// Reads a log. Its first row names the columns, as in `stamp_ns,speed_m_s`.
+    ///
+    /// # Errors
+    /// A file that cannot be read or has no speed, and one whose stamps or speeds cannot be those
+    /// of wheels.
+    pub fn read(path: &Path) -> Result<Self, LogError> {
+        Self::examined(table::read::<SpeedColumns>(path)?, path)
+    }
+
+    /// Returns the log that lies beside the scans of a dataset folder, which may also be that of
+    /// the images.
+    ///
+    /// # Errors
+    /// There is none.
+    pub fn find(folder: &Path) -> Result<PathBuf, LogError> {
+        let paths = roots(folder).flat_map(|root| PLACES.iter().map(|place| root.join(place)));
+        let found = paths.into_iter().find(|path| path.is_file());
+        found.ok_or_else(|| LogError::None {
+            of: SampleKind::Wheels,
+            folder: folder.to_owned(),
+        })
+    }
+
+    /// Takes the samples of a simulation, which messages name by this path.
+    ///
+    /// # Errors
+    /// Stamps or speeds that cannot be those of wheels.
+    pub fn of(samples: Vec<Sample>, path: &Path) -> Result<Self, LogError> {
+        Self::examined(Raw::of(samples), path)
+    }
+
+    /// Takes its samples over to the radar's clock: [`WheelsConfig::on_radar`].
+    pub fn track(&self, config: &WheelsConfig) -> SampleTrack {
+        SampleTrack::of(self.samples.iter().map(|sample| config.on_radar(sample)))
+    }
+
+    fn examined(raw: Raw, path: &Path) -> Result<Self, LogError> {
+        let (samples, faults) = examine(raw, path, &SPEEDS)?;
+        Ok(Self {
+            samples,
+            faults,
+            path: path.to_owned(),
+        })
+    }
+}
+
+/// Names of the speed.
+const NAMES: [&str; 7] = [
+    "speed",
+    "wheel_speed",
+    "vehicle_speed",
+    "velocity",
+    "v",
+    "vx",
+    "linear_x",
+];
+/// Units at the end of its name.
+const UNITS: [(&str, f64); 8] = [
+    ("_mps", 1.0),
+    ("_m_s", 1.0),
+    ("_m_per_s", 1.0),
+    ("_kmh", 1.0 / 3.6),
+    ("_km_h", 1.0 / 3.6),
+    ("_kmph", 1.0 / 3.6),
+    ("_kph", 1.0 / 3.6),
+    ("_mph", 0.44704),
+];
+
+/// The remedy, for messages.
+const REMEDY: &str = "the first row must name the columns, as in `stamp_ns,speed_m_s` (also stamp_us, stamp_s; speed_km_h)";
+
+/// Where a table has what.
+struct SpeedColumns {
+    stamp: (usize, StampUnit),
+    speed: usize,
+    /// Factor that makes speeds m/s; `None`: it is named nowhere.
+    unit: Option<f64>,
+}
+
+impl SampleColumns for SpeedColumns {
+    const OF: SampleKind = SampleKind::Wheels;
+
+    fn of(first: &StringRecord) -> Result<Self, String> {
+        let names: Vec<String> = first.iter().map(plain).collect();
+        let columns = || names.iter().enumerate();
+        let stamp = columns().find_map(|(k, name)| Some((k, stamp_unit(name)?)));
+        let speed = columns().find_map(|(k, name)| Some((k, speed_unit(name)?)));
+        let listed = || quoted(&names.join(","));
+        let (speed, unit) =
+            speed.ok_or_else(|| format!("its columns {} have no speed: {REMEDY}", listed()))?;
+        Ok(Self {
+            stamp: stamp
+                .ok_or_else(|| format!("its columns {} have no stamps: {REMEDY}", listed()))?,
+            speed,
+            unit,
+        })
+    }
+
+    fn unit_is_assumed(&self) -> bool {
+        self.unit.is_none()
+    }
+
+    fn sample(&self, row: &StringRecord) -> Option<Sample> {
+        let (column, unit) = self.stamp;
+        let stamp_ns = unit.ns(row.get(column)?)?;
+        let speed: f64 = row.get(self.speed)?.parse().ok()?;
+        Some(Sample::speed(stamp_ns, speed * self.unit.unwrap_or(1.0)))
+    }
+}
+
+/// The unit of a column of this name; `None` if it is no speed, `Some(None)` if it has no unit.
+fn speed_unit(name: &str) -> Option<Option<f64>> {
+    let of_unit = |(unit, factor): &(&str, f64)| {
+        let named = name.strip_suffix(unit)?;
+        NAMES.contains(&named).then_some(Some(*factor))
+    };
+    let by_name = UNITS.iter().find_map(of_unit);
+    by_name.or_else(|| NAMES.contains(&name).then_some(None))
+}

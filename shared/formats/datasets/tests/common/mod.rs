@@ -1,0 +1,152 @@
+//! Small generated datasets, and paths of real ones.
+#![allow(dead_code, clippy::unwrap_used)]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use gyre_datasets::{Dataset, ReadError};
+use gyre_radar::OwnedScan;
+
+/// 2019-01-10 14:37:26 UTC, us.
+pub const START_US: i64 = 1_547_131_046_000_000;
+pub const PERIOD_US: i64 = 250_000;
+
+/// The folder of real data; `None`, with a message, if there is none.
+pub fn real(folder: &str) -> Option<PathBuf> {
+    match std::env::var_os("GYRE_DATA") {
+        Some(root) => Some(Path::new(&root).join(folder)),
+        None => {
+            println!("skipped: GYRE_DATA is not set");
+            None
+        }
+    }
+}
+
+pub fn write_png(path: &Path, width: usize, height: usize, pixels: &[u8]) {
+    fs::create_dir_all(path.parent().unwrap()).unwrap();
+    let file = std::io::BufWriter::new(fs::File::create(path).unwrap());
+    let mut encoder = png::Encoder::new(file, width as u32, height as u32);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder
+        .write_header()
+        .unwrap()
+        .write_image_data(pixels)
+        .unwrap();
+}
+
+/// A sweep with Navtech metadata columns.
+#[derive(Clone)]
+pub struct Sweep {
+    pub rows: usize,
+    pub bins: usize,
+    pub first_count: u16,
+    pub step: u16,
+    /// Encoder counts per turn.
+    pub counts: usize,
+    /// Stamp of the first row, and interval of the rows, in the unit of the file.
+    pub start: i64,
+    pub row_interval: i64,
+    pub byte_ten: fn(usize) -> u8,
+}
+
+impl Default for Sweep {
+    fn default() -> Self {
+        Self {
+            rows: 40,
+            bins: 60,
+            first_count: 13,
+            step: 140,
+            counts: 5600,
+            start: START_US,
+            row_interval: PERIOD_US / 40,
+            byte_ten: |_| 255,
+        }
+    }
+}
+
+impl Sweep {
+    pub fn width(&self) -> usize {
+        self.bins + 11
+    }
+
+    /// The power of every generated scan at a row and bin.
+    pub fn power(row: usize, bin: usize) -> u8 {
+        (row * 31 + bin * 7) as u8
+    }
+
+    pub fn pixels(&self) -> Vec<u8> {
+        let mut pixels = Vec::with_capacity(self.rows * self.width());
+        for row in 0..self.rows {
+            pixels.extend((self.start + row as i64 * self.row_interval).to_le_bytes());
+            pixels.extend(
+                (((usize::from(self.first_count) + row * usize::from(self.step)) % self.counts)
+                    as u16)
+                    .to_le_bytes(),
+            );
+            pixels.push((self.byte_ten)(row));
+            pixels.extend((0..self.bins).map(|bin| Self::power(row, bin)));
+        }
+        pixels
+    }
+
+    pub fn write(&self, path: &Path) {
+        write_png(path, self.width(), self.rows, &self.pixels());
+    }
+}
+
+/// Writes `n` Oxford scans to `root/radar`, and returns their files in order.
+pub fn write_oxford(root: &Path, n: i64) -> Vec<PathBuf> {
+    let starts: Vec<i64> = (0..n).map(|k| START_US + k * PERIOD_US).collect();
+    let list: String = starts.iter().map(|s| format!("{s} 1\n")).collect();
+    fs::create_dir_all(root.join("radar")).unwrap();
+    fs::write(root.join("radar.timestamps"), list).unwrap();
+    starts
+        .iter()
+        .map(|start| {
+            let path = root.join(format!("radar/{start}.png"));
+            Sweep {
+                start: *start,
+                ..Sweep::default()
+            }
+            .write(&path);
+            path
+        })
+        .collect()
+}
+
+/// Writes `n` RADIATE scans of 60 bins x 40 azimuths, received at uniform times.
+pub fn write_radiate(root: &Path, n: i64) -> Vec<PathBuf> {
+    let (azimuths, bins) = (40, 60);
+    let pixels: Vec<u8> = (0..bins * azimuths)
+        .map(|i| Sweep::power(i % azimuths, i / azimuths))
+        .collect();
+    let line = |k: i64| {
+        let ns = k * 250_000_000 + 3_000_000;
+        format!(
+            "Frame: {:06} Time: {}.{}\n",
+            k + 7,
+            1_549_986_607 + ns / 1_000_000_000,
+            ns % 1_000_000_000
+        )
+    };
+    fs::create_dir_all(root.join("Navtech_Polar")).unwrap();
+    fs::write(
+        root.join("Navtech_Polar.txt"),
+        (0..n).map(line).collect::<String>(),
+    )
+    .unwrap();
+    (0..n)
+        .map(|k| {
+            let path = root.join(format!("Navtech_Polar/{:06}.png", k + 7));
+            write_png(&path, azimuths, bins, &pixels);
+            path
+        })
+        .collect()
+}
+
+pub fn read(dataset: &mut dyn Dataset, index: usize) -> Result<OwnedScan, ReadError> {
+    let mut scan = OwnedScan::with_limits(dataset.limits());
+    scan.geometry = dataset.read(index, scan.slot())?;
+    Ok(scan)
+}

@@ -1,0 +1,163 @@
+//! Formats.
+
+use gyre_datasets::GnssLog;
+use gyre_samples::{GnssConfig, GnssKind};
+use tempfile::TempDir;
+
+use super::{START_NS, read, written};
+
+/// Two fixes a second apart, the second 11.13 m north of the first, with these deviations.
+fn assert_two(log: &GnssLog, sigma_m: Option<f64>, what: &str) {
+    let [first, second] = &log.fixes[..] else {
+        panic!("{what}: {log:?}");
+    };
+    assert_eq!(
+        [first.stamp_ns, second.stamp_ns],
+        [START_NS, START_NS + 1_000_000_000],
+        "{what}"
+    );
+    assert_eq!(first.east_north_m, [0.0, 0.0], "{what}");
+    let [east, north] = second.east_north_m;
+    assert!(
+        east.abs() < 1e-6 && (north - 11.134).abs() < 0.001,
+        "{what}: {east} {north}"
+    );
+    for fix in [first, second] {
+        match (fix.sigma_m, sigma_m) {
+            (Some(found), Some(expected)) => assert!((found - expected).abs() < 1e-9, "{what}"),
+            (found, expected) => assert_eq!(found, expected, "{what}"),
+        }
+    }
+    let origin = log.plane.unwrap().origin();
+    assert_eq!([origin.latitude_deg, origin.longitude_deg], [55.9, -3.2]);
+    assert_eq!(log.faults.left_out(), 0);
+}
+
+#[test]
+fn tables_are_read_by_their_headers_or_by_their_number_of_columns() {
+    let us = START_NS / 1000;
+    let ns = START_NS;
+    let (next_us, next_ns) = (us + 1_000_000, ns + 1_000_000_000);
+    let cases = [
+        (
+            "gnss.csv",
+            format!(
+                "stamp_ns,latitude_deg,longitude_deg\n{ns},55.9,-3.2\n{next_ns},55.9001,-3.2\n"
+            ),
+            None,
+        ),
+        (
+            "gnss.csv",
+            format!("lon;lat;timestamp;sigma_m\n-3.2;55.9;{us};0.3\n-3.2;55.9001;{next_us};0.3\n"),
+            Some(0.3),
+        ),
+        (
+            "gps/gps.csv",
+            format!(
+                "timestamp,num_satellites,latitude,longitude,altitude,latitude_sigma,longitude_sigma,altitude_sigma,northing,easting,down,utm_zone\n\
+                 {us},8,55.9,-3.2,110.0,3.0,4.0,9.0,5.0,6.0,-110.0,30U\n{next_us},8,55.9001,-3.2,110.0,3.0,4.0,9.0,5.0,6.0,-110.0,30U\n"
+            ),
+            Some(12.5f64.sqrt()),
+        ),
+        (
+            "sensor_data/gps.csv",
+            format!(
+                "{ns},55.9,-3.2,60.0,4.0,0,0,0,16.0,0,0,0,9.0\n{next_ns},55.9001,-3.2,60.0,4.0,0,0,0,16.0,0,0,0,9.0\n"
+            ),
+            Some(10f64.sqrt()),
+        ),
+        (
+            "sensor_data/gps.csv",
+            format!(
+                "{ns},55.9,-3.2,60.0,0,0,0,0,0,0,0,0,0\n{next_ns},55.9001,-3.2,60.0,0,0,0,0,0,0,0,0,0\n"
+            ),
+            None,
+        ),
+    ];
+    for (name, text, sigma_m) in cases {
+        assert_two(&read(name, &text).unwrap(), sigma_m, &text);
+    }
+}
+
+#[test]
+fn a_folder_of_radiate_is_read_with_its_list_of_times() {
+    let folder = TempDir::new().unwrap();
+    let list =
+        "Frame: 000001 Time: 1760456485.551626000\nFrame: 000002 Time: 1760456486.551626000\n";
+    written(&folder, "GPS_IMU_Twist.txt", list);
+    let rest = "0,0,0,1\n".to_owned() + &" 0,0,0\n".repeat(12);
+    for (number, latitude) in [(1, "55.9"), (2, "55.9001")] {
+        let text = format!("{latitude},-3.2,80.0\n 0.04,0,0\n 0,0.14,0\n 0,0,1\n{rest}");
+        written(&folder, &format!("GPS_IMU_Twist/{number:06}.txt"), &text);
+    }
+    let path = GnssLog::find(&folder.path().join("Navtech_Polar")).unwrap();
+    let log = GnssLog::read(&path).unwrap();
+    assert_two(&log, Some(0.3), "RADIATE");
+}
+
+#[test]
+fn coordinates_in_a_plane_have_no_place_on_the_earth() {
+    for (name, text) in [
+        (
+            "gnss.csv",
+            format!("stamp_ns,east_m,north_m\n{START_NS},3.0,4.0\n"),
+        ),
+        (
+            "gnss_as_logged.tum",
+            "1760456485.551626000 3.0 4.0 1.0 0 0 0 1\n".to_owned(),
+        ),
+    ] {
+        let log = read(name, &text).unwrap();
+        assert_eq!(log.fixes[0].stamp_ns, START_NS, "{name}");
+        assert_eq!(log.fixes[0].east_north_m, [3.0, 4.0], "{name}");
+        assert!(log.plane.is_none(), "{name}");
+    }
+}
+
+#[test]
+fn fixes_on_the_radars_clock_have_the_delay_taken_off_and_the_uncertainty_that_is_known() {
+    let text = format!(
+        "stamp_ns,east_m,north_m,sigma_m\n{START_NS},3.0,4.0,0.5\n{},3.0,4.0,nan\n",
+        START_NS + 1_000_000_000
+    );
+    let config = GnssConfig {
+        late_s: 1.58,
+        sigma_m: 7.0,
+        ..GnssConfig::default()
+    };
+    let fixes = read("gnss.csv", &text).unwrap().on_radar(&config);
+    assert_eq!(fixes[0].stamp_ns, START_NS - 1_580_000_000);
+    assert_eq!([fixes[0].sigma_m, fixes[1].sigma_m], [0.5, 7.0]);
+}
+
+#[test]
+fn what_is_no_log_is_refused_with_what_to_do() {
+    for (text, expected) in [
+        ("", "it is empty"),
+        ("1,2,3\n", "3 columns have no names"),
+        ("stamp_ns,x,y\n", "have no positions"),
+        ("latitude,longitude\n", "no column of stamps"),
+        (
+            "stamp_ns,latitude,longitude\n",
+            "none of its 0 rows is a usable fix",
+        ),
+        (
+            "stamp_ns,latitude,longitude\na,b,c\n1,2\n5,1,1\n",
+            "2 of its 3 rows cannot be read, the first in line 2",
+        ),
+    ] {
+        let refused = read("gnss.csv", text).unwrap_err().to_string();
+        assert!(refused.contains(expected), "{text}: {refused}");
+    }
+    let folder = TempDir::new().unwrap();
+    let config = GnssConfig {
+        kind: GnssKind::Auto,
+        ..GnssConfig::default()
+    };
+    let refused = GnssLog::open(&config, folder.path())
+        .unwrap_err()
+        .to_string();
+    assert!(refused.contains("gnss.kind = \"none\""), "{refused}");
+    let none = GnssConfig::default();
+    assert!(GnssLog::open(&none, folder.path()).unwrap().is_none());
+}

@@ -1,0 +1,28 @@
+//! Logs of every format, as written here after the public development kits, their faults, and the
+//! real ones.
+
+mod faults;
+mod formats;
+mod wheels;
+
+use std::{fs, path::PathBuf};
+
+use gyre_datasets::{GyroLog, LogError};
+use tempfile::TempDir;
+
+/// 2025-10-14, ns.
+const START_NS: i64 = 1_760_456_485_551_626_000;
+
+/// Reads a text as a file of this name.
+fn read(name: &str, text: &str) -> Result<GyroLog, LogError> {
+    let folder = TempDir::new().unwrap();
+    let path = written(&folder, name, text);
+    GyroLog::read(&path)
+}
+
+fn written(folder: &TempDir, name: &str, text: &str) -> PathBuf {
+    let path = folder.path().join(name);
+    fs::create_dir_all(path.parent().unwrap()).unwrap();
+    fs::write(&path, text).unwrap();
+    path
+}

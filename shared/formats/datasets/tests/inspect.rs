@@ -1,0 +1,253 @@
+//! Findings of `inspect` on real and generated datasets.
+
+use crate::common::{Sweep, real, write_oxford, write_radiate};
+use gyre_datasets::inspect::Chirps;
+use gyre_datasets::{DatasetOptions, Report, inspect, read_trajectory};
+use gyre_radar::Trajectory;
+
+fn report(folder: &str, trajectory: Option<&Trajectory>) -> Option<Report> {
+    let report = inspect(&real(folder)?, &DatasetOptions::default(), trajectory).unwrap();
+    println!("{report}");
+    Some(report)
+}
+
+fn mentions(report: &Report, words: &[&str]) -> bool {
+    report
+        .findings
+        .iter()
+        .any(|sentence| words.iter().all(|word| sentence.contains(word)))
+}
+
+#[track_caller]
+fn assert_mentions(report: &Report, words: &[&str]) {
+    assert!(
+        mentions(report, words),
+        "{words:?} is not in {:#?}",
+        report.findings
+    );
+}
+
+#[test]
+fn stalls_stamps_and_transposed_images_of_radiate_are_reported() {
+    let Some(report) = report("radiate-2019-02-12", None) else {
+        return;
+    };
+    let timing = report.timing.as_ref().unwrap();
+    assert_eq!((report.scans, report.scans_read), (466, 466));
+    assert_eq!(timing.stalls.len(), 7, "{:?}", timing.stalls);
+    let worst = timing.stalls.iter().map(|s| s.late_s).fold(0.0, f64::max);
+    assert!((1.3..1.5).contains(&worst), "{worst}");
+    assert_eq!(timing.missing_scans, 0);
+    assert!(
+        (timing.period_s - 0.25002).abs() < 1e-5,
+        "{}",
+        timing.period_s
+    );
+    assert_mentions(&report, &["stalled 7 times"]);
+    assert_mentions(&report, &["without leading zeros"]);
+    assert_mentions(&report, &["transposed", "576"]);
+    assert_mentions(&report, &["Range bins 0 to 10", "ringing"]);
+    assert!(report.transposed && (report.max_range_m - 99.9).abs() < 0.1);
+}
+
+#[test]
+fn a_late_ground_truth_is_detected_with_a_trajectory() {
+    let Some(root) = real("radiate-2019-02-12") else {
+        return;
+    };
+    let truth = read_trajectory(&root.join("ground_truth.tum")).unwrap();
+    // Like an odometry result: every fifth pose, 4 Hz.
+    let every = |n: usize| Trajectory {
+        stamp_ns: truth
+            .stamp_ns
+            .as_ref()
+            .map(|s| s.iter().step_by(n).copied().collect()),
+        poses: truth.poses.iter().step_by(n).copied().collect(),
+    };
+    let report = report("radiate-2019-02-12", Some(&every(5))).unwrap();
+    let clock = |name: &str| {
+        report
+            .ground_truths
+            .iter()
+            .find(|t| t.file.ends_with(name))
+            .unwrap()
+            .clock
+            .unwrap()
+    };
+    assert!(clock("ground_truth.tum").agrees());
+    let late = clock("gnss_as_logged.tum");
+    assert!((1.4..1.7).contains(&late.late_s), "{late:?}");
+    assert_mentions(&report, &["gnss_as_logged.tum", "late"]);
+    assert!(!mentions(&report, &["ground_truth.tum is"]));
+}
+
+#[test]
+fn tiny_foggy_has_no_ground_truth_and_no_stall() {
+    let Some(report) = report("radiate-tiny_foggy", None) else {
+        return;
+    };
+    assert_eq!(
+        (report.scans, report.timing.as_ref().unwrap().stalls.len()),
+        (18, 0)
+    );
+    assert_mentions(&report, &["transposed"]);
+    assert_mentions(&report, &["No ground truth"]);
+}
+
+#[test]
+fn resolution_and_bursts_of_oxford_are_reported() {
+    let Some(report) = report("oxford-2019-01-10-14-36-48", None) else {
+        return;
+    };
+    assert_mentions(&report, &["0.0438 m", "0.0432"]);
+    assert_mentions(&report, &["bursts"]);
+    assert_eq!(
+        (report.rows.rows, report.rows.not_measured, report.rows.lost),
+        (4400, 0, 0)
+    );
+    assert!((report.rows.first_azimuth_deg.0 - 0.836).abs() < 1e-3);
+    let truth = &report.ground_truths[0];
+    assert_eq!((truth.poses, truth.scans_covered), (11, Some(11)));
+    assert!(truth.nearest_pose_s.unwrap() < 2e-3, "{truth:?}");
+}
+
+#[test]
+fn boreas_rt_and_fomo_are_reported() {
+    let Some(rt) = report("samples/boreas-rt-2024-12-03", None) else {
+        return;
+    };
+    assert_eq!(
+        (rt.format.name(), rt.rows.chirps, rt.rows.not_measured),
+        ("boreas-rt", Chirps::Alternating, 0)
+    );
+    assert_mentions(&rt, &["Byte 10 alternates", "chirp"]);
+    assert_mentions(&rt, &["only one scan"]);
+    let fomo = report("samples/fomo-2025-10-14", None).unwrap();
+    assert_eq!(
+        (fomo.format.name(), fomo.rows.chirps, fomo.rows.not_measured),
+        ("fomo", Chirps::Unknown, 0)
+    );
+    assert_mentions(&fomo, &["only one scan"]);
+    assert_mentions(&fomo, &["Byte 10 is 0"]);
+    assert_mentions(&fomo, &["gt.txt", "positions only"]);
+    assert!(!mentions(&fomo, &["encoder"]), "{:?}", fomo.findings);
+}
+
+#[test]
+fn gaps_lost_rows_and_damaged_files_are_counted() {
+    let root = tempfile::tempdir().unwrap();
+    let files = write_oxford(root.path(), 12);
+    std::fs::remove_file(&files[4]).unwrap();
+    let whole = std::fs::read(&files[7]).unwrap();
+    std::fs::write(&files[7], &whole[..whole.len() / 2]).unwrap();
+    // Every tenth row interpolated, and one lost: since all images must have 40 rows, the last step
+    // is double.
+    let sweep = Sweep {
+        start: crate::common::START_US + 9 * crate::common::PERIOD_US,
+        byte_ten: |row| if row % 10 == 3 { 0 } else { 255 },
+        ..Sweep::default()
+    };
+    let mut pixels = sweep.pixels();
+    for row in 20..39 {
+        let count = 13 + (row as u16 + 1) * 140;
+        pixels[row * sweep.width() + 8..][..2].copy_from_slice(&count.to_le_bytes());
+    }
+    pixels[39 * sweep.width() + 8..][..2].copy_from_slice(&5_u16.to_le_bytes());
+    crate::common::write_png(&files[9], sweep.width(), sweep.rows, &pixels);
+    let report = inspect(root.path(), &DatasetOptions::default(), None).unwrap();
+    let timing = report.timing.as_ref().unwrap();
+    assert_eq!(
+        (report.scans, timing.missing_scans, timing.gaps[0].scan),
+        (11, 1, 4)
+    );
+    assert_eq!((report.unreadable.len(), report.unreadable[0].scan), (1, 6));
+    assert_eq!((report.rows.not_measured, report.rows.lost), (4, 1));
+    assert_mentions(&report, &["1 scan is missing, before scans 4"]);
+    assert_mentions(&report, &["truncated"]);
+    let json = serde_json::to_string(&report).unwrap();
+    assert!(json.contains("\"missing_scans\":1") && json.contains("\"format\":\"oxford\""));
+}
+
+#[test]
+fn a_dataset_without_faults_has_few_findings() {
+    let root = tempfile::tempdir().unwrap();
+    write_radiate(root.path(), 9);
+    // What macOS stores beside a file is no ground truth.
+    std::fs::write(root.path().join("._ground_truth.tum"), "Mac OS X").unwrap();
+    let report = inspect(root.path(), &DatasetOptions::default(), None).unwrap();
+    let timing = report.timing.as_ref().unwrap();
+    assert!(report.ground_truths.is_empty());
+    assert_eq!(
+        (
+            timing.stalls.len(),
+            timing.gaps.len(),
+            timing.backwards.len()
+        ),
+        (0, 0, 0)
+    );
+    assert!(
+        !mentions(&report, &["stalled"])
+            && !mentions(&report, &["lost"])
+            && report.unreadable.is_empty()
+    );
+}
+
+#[test]
+fn the_log_of_a_gyro_is_told_with_its_span_and_faults() {
+    let folder = tempfile::tempdir().unwrap();
+    write_oxford(folder.path(), 8);
+    let plain = inspect(folder.path(), &DatasetOptions::default(), None).unwrap();
+    assert!(plain.gyro.is_none() && !plain.to_string().contains("gyro"));
+    let first_ns = plain.timing.as_ref().unwrap().first_ns;
+    // 100 Hz for 10 s from half a second before the first scan; x points up; it turns for 4 s.
+    let rows = (0..1000).filter(|k| !(700..720).contains(k)).map(|k| {
+        let stamp_ns = first_ns - 500_000_000 + 10_000_000 * k;
+        let rate = if k < 400 {
+            0.2 * (0.01 * k as f64).sin()
+        } else {
+            0.01
+        };
+        format!("{stamp_ns},{rate},0,0,9.8,0.1,0.1\n")
+    });
+    let text = format!(
+        "stamp_ns,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x,accel_y,accel_z\n{}",
+        rows.collect::<String>()
+    );
+    std::fs::write(folder.path().join("imu.csv"), text).unwrap();
+    let report = inspect(folder.path(), &DatasetOptions::default(), None).unwrap();
+    println!("{report}");
+    let gyro = report.gyro.as_ref().unwrap();
+    assert_eq!(gyro.samples, 980);
+    assert!((gyro.rate_hz - 100.0).abs() < 1e-6 && (gyro.missing - 0.02).abs() < 1e-6);
+    let [before, after] = gyro.after_scans_s.unwrap();
+    let scans_s = (report.timing.as_ref().unwrap().last_ns - first_ns) as f64 * 1e-9;
+    assert!((before + 0.5).abs() < 1e-6 && (after - (9.49 - scans_s)).abs() < 1e-6);
+    let quiet = gyro.quiet.unwrap();
+    assert!(quiet.after_s >= 4.0 && (quiet.mean_degps[0] - 0.01f64.to_degrees()).abs() < 1e-9);
+    assert_eq!(gyro.up_by_gravity.unwrap().name(), "x");
+    assert_mentions(&report, &["Samples are missing in 1 places"]);
+    assert_mentions(&report, &["by gravity its axis x points up"]);
+    assert_mentions(&report, &["gyre calibrate", "imu.csv"]);
+    assert!(
+        report
+            .to_string()
+            .contains("imu.csv: 980 samples of 100.0 Hz, 2.0 % missing")
+    );
+    std::fs::write(folder.path().join("imu.csv"), "a,b\n").unwrap();
+    let report = inspect(folder.path(), &DatasetOptions::default(), None).unwrap();
+    assert_mentions(&report, &["cannot be used", "no angular rates"]);
+}
+
+#[test]
+fn stalls_of_the_gyro_of_radiate_are_reported() {
+    let Some(report) = report("radiate-2019-02-12", None) else {
+        return;
+    };
+    let gyro = report.gyro.as_ref().unwrap();
+    assert!(
+        (gyro.rate_hz - 20.0).abs() < 0.1 && (0.05..0.06).contains(&gyro.missing),
+        "{gyro:?}"
+    );
+    assert!(gyro.up_by_gravity.is_none(), "gravity is taken out");
+    assert_mentions(&report, &["missing in 13 places, for up to 0.80 s"]);
+}

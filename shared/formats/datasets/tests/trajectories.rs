@@ -1,0 +1,342 @@
+//! Ground truth and pose files, real and generated.
+
+use std::fs;
+
+use crate::common::real;
+use gyre_datasets::{TrajectoryError, find_ground_truth, read_trajectory, write_kitti, write_tum};
+use gyre_radar::Trajectory;
+use nalgebra::{Isometry2, Vector2};
+use proptest::prelude::*;
+
+fn from_text(name: &str, text: &str) -> Result<Trajectory, TrajectoryError> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    fs::write(&path, text).unwrap();
+    read_trajectory(&path)
+}
+
+const HEADER: &str = "source_timestamp,destination_timestamp,x,y,z,roll,pitch,yaw,source_radar_timestamp,destination_radar_timestamp\n";
+
+fn row(from: i64, to: i64, x: f64, y: f64, yaw: f64) -> String {
+    let us = |t: i64| 1_547_131_046_000_000 + t;
+    format!(
+        "{},{},{x},{y},0,0,0,{yaw},{},{}\n",
+        us(to),
+        us(from),
+        us(to),
+        us(from)
+    )
+}
+
+#[test]
+fn oxford_motions_are_converted_to_rep_103_and_composed_from_identity() {
+    // 2 m ahead with a right turn of 90 degrees, then 1 m ahead and 0.5 m to the right. Rows may be
+    // in any order.
+    let quarter = std::f64::consts::FRAC_PI_2;
+    let text = [
+        HEADER,
+        &row(250, 500, 1.0, 0.5, 0.0),
+        &row(0, 250, 2.0, 0.0, quarter),
+    ]
+    .concat();
+    let trajectory = from_text("radar_odometry.csv", &text).unwrap();
+    assert_eq!(
+        trajectory.stamp_ns.as_deref().unwrap()[2] - trajectory.stamp_ns.as_deref().unwrap()[0],
+        500_000
+    );
+    assert_eq!(trajectory.poses[0], Isometry2::identity());
+    assert!((trajectory.poses[1].rotation.angle() + quarter).abs() < 1e-12);
+    let last = trajectory.poses[2].translation;
+    assert!(
+        (last.x - 1.5).abs() < 1e-12 && (last.y + 1.0).abs() < 1e-12,
+        "{last}"
+    );
+}
+
+#[test]
+fn a_gap_in_oxford_motions_is_an_error_with_its_line() {
+    let text = [
+        HEADER,
+        &row(0, 250, 2.0, 0.0, 0.0),
+        &row(500, 750, 1.0, 0.5, 0.0),
+    ]
+    .concat();
+    let error = from_text("radar_odometry.csv", &text)
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("line 3") && error.contains("gap"), "{error}");
+}
+
+#[test]
+fn the_oxford_drive_is_nine_kilometres() {
+    let Some(root) = real("trajectories") else {
+        return;
+    };
+    let trajectory =
+        read_trajectory(&root.join("oxford-2019-01-10-11-46-21.radar_odometry.csv")).unwrap();
+    assert_eq!(trajectory.len(), 8866);
+    assert!(
+        (8_900.0..9_200.0).contains(&trajectory.path_length_m()),
+        "{}",
+        trajectory.path_length_m()
+    );
+    let golden = read_trajectory(&real("golden/csv-chain").unwrap().join("estimate.txt")).unwrap();
+    // The estimate was made without mirroring y; the lengths of the paths agree nevertheless.
+    let ratio = golden.path_length_m() / trajectory.path_length_m();
+    assert!((0.98..1.03).contains(&ratio), "{ratio}");
+}
+
+#[test]
+fn boreas_headings_follow_the_course_over_ground() {
+    let Some(root) = real("trajectories") else {
+        return;
+    };
+    let trajectory =
+        read_trajectory(&root.join("boreas-2021-09-02-11-42-radar_poses.csv")).unwrap();
+    assert_eq!(trajectory.len(), 4134);
+    let mut slips: Vec<f64> = trajectory
+        .poses
+        .windows(2)
+        .map(|w| w[0].inverse() * w[1])
+        .map(|m| m.translation.vector)
+        .filter(|t| t.norm() > 1.5)
+        .map(|t| t.y.atan2(t.x))
+        .collect();
+    slips.sort_by(f64::total_cmp);
+    assert!(slips.len() > 500);
+    let median = slips[slips.len() / 2].to_degrees();
+    assert!(median.abs() < 0.2, "the vehicle slips by {median} deg");
+}
+
+#[test]
+fn real_kitti_and_tum_files_are_read() {
+    let Some(root) = real("golden/kitti-metric") else {
+        return;
+    };
+    for name in ["estimate.txt", "ground_truth.txt"] {
+        let trajectory = read_trajectory(&root.join(name)).unwrap();
+        assert_eq!(
+            (
+                trajectory.len(),
+                trajectory.stamp_ns.is_none(),
+                trajectory.has_heading()
+            ),
+            (4470, true, true)
+        );
+    }
+    let radiate =
+        read_trajectory(&real("radiate-2019-02-12").unwrap().join("ground_truth.tum")).unwrap();
+    assert_eq!(
+        (radiate.len(), radiate.span_ns().unwrap().0),
+        (2362, 1_549_986_606_800_100_000)
+    );
+    assert!((radiate.poses[0].rotation.angle() - 2.0 * (-0.076_197_180_f64).asin()).abs() < 1e-6);
+    let fomo = read_trajectory(&real("samples/fomo-2025-10-14").unwrap().join("gt.txt")).unwrap();
+    assert!(!fomo.has_heading() && fomo.len() == 1692);
+}
+
+#[test]
+fn tum_yaw_is_independent_of_roll_and_pitch() {
+    let rotation = nalgebra::UnitQuaternion::from_euler_angles(0.3, -0.2, 1.1);
+    let q = rotation.coords;
+    let text = format!("# comment\n1.5 1 2 3 {} {} {} {}\n", q.x, q.y, q.z, q.w);
+    let pose = from_text("a.tum", &text).unwrap().poses[0];
+    assert!((pose.rotation.angle() - 1.1).abs() < 1e-12);
+    assert_eq!((pose.translation.x, pose.translation.y), (1.0, 2.0));
+}
+
+#[test]
+fn boreas_odometry_files_are_inverted_and_mirrored() {
+    // The first frame in the sensor frame after 2 m ahead and a right turn of 0.1 rad (y right, yaw
+    // clockwise).
+    let later = Isometry2::new(Vector2::new(2.0, 0.3), 0.1);
+    let m = later.inverse().to_homogeneous();
+    let line = |t: i64, m: &nalgebra::Matrix3<f64>| {
+        format!(
+            "{t} {} {} 0 {} {} {} 0 {} 0 0 1 0\n",
+            m[(0, 0)],
+            m[(0, 1)],
+            m[(0, 2)],
+            m[(1, 0)],
+            m[(1, 1)],
+            m[(1, 2)]
+        )
+    };
+    let text = [
+        line(1_630_597_331_060_160, &nalgebra::Matrix3::identity()),
+        line(1_630_597_331_310_779, &m),
+    ]
+    .concat();
+    let trajectory = from_text("boreas.txt", &text).unwrap();
+    let pose = trajectory.poses[1];
+    assert!((pose.translation.x - 2.0).abs() < 1e-12 && (pose.translation.y + 0.3).abs() < 1e-12);
+    assert!((pose.rotation.angle() + 0.1).abs() < 1e-12);
+    assert_eq!(trajectory.stamp_ns.unwrap()[1], 1_630_597_331_310_779_000);
+}
+
+#[test]
+fn invalid_files_are_rejected_with_their_line() {
+    let cases = [
+        ("", "empty"),
+        ("1 2 3\n", "3 columns"),
+        ("1 0 0 0 0 0 0 1\n2 0 0 0 0 0 x 1\n", "line 2"),
+        ("1 0 0 0 0 0 0 1\n2 0 0 0 0 0 1\n", "line 2"),
+        ("2 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n", "backwards"),
+        ("1 0 0 0 0 0 0 0\n", "quaternion"),
+        ("1 inf 0 0 0 0 0 1\n", "line 1"),
+        // Finite, but their squares or sums are not.
+        ("1 0 0 0 1e200 0 0 1e200\n", "line 1"),
+        (
+            "1 0 0 1e308 0 1 0 1e308 0 0 1 0\n1 0 0 0 -1e308 1 0 0 0 0 1 0\n",
+            "line 1",
+        ),
+        (HEADER, "no motion"),
+        ("GPSTime,easting\n1,2\n", "northing"),
+    ];
+    for (text, words) in cases {
+        let error = from_text("a.txt", text).unwrap_err().to_string();
+        assert!(error.contains(words), "{text:?}: {error}");
+    }
+    assert!(matches!(
+        read_trajectory("/nonexistent/a.tum".as_ref()),
+        Err(TrajectoryError::Io { .. })
+    ));
+}
+
+#[test]
+fn what_spreadsheets_write_is_refused_with_what_to_do() {
+    let columns = |separator: &str, number: &str, count: usize| vec![number; count].join(separator);
+    let cases = [
+        (
+            columns(" ", "1,5", 8),
+            "8 columns (TUM) have decimal commas",
+        ),
+        (
+            columns("\t", "1,5", 12),
+            "columns (KITTI) have decimal commas",
+        ),
+        (
+            columns(";", "1,5", 8),
+            "8 columns (TUM) are parted by semicolons, and need spaces",
+        ),
+        (
+            columns(";", "1.5", 12),
+            "columns (KITTI) are parted by semicolons, and need spaces",
+        ),
+        (
+            columns(", ", "1.5", 8),
+            "8 columns (TUM) are parted by commas, and need spaces",
+        ),
+        (
+            columns(", ", "1", 8),
+            "8 columns (TUM) are parted by commas, and need spaces",
+        ),
+        (
+            "GPSTime;easting;northing\n".to_owned(),
+            "parted by semicolons, and need commas",
+        ),
+    ];
+    for (text, words) in cases {
+        let error = from_text("a.txt", &text).unwrap_err().to_string();
+        assert!(error.contains(words), "{text:?}: {error}");
+    }
+}
+
+#[test]
+fn columns_may_have_a_space_behind_their_comma() {
+    let row = "1561000444390857630,0,-1,0,353062.125,1,0,0,4026023,0,0,1,20\n";
+    assert_eq!(
+        from_text("global_pose.csv", &row.replace(',', ", ")).unwrap(),
+        from_text("global_pose.csv", row).unwrap()
+    );
+}
+
+#[test]
+fn a_byte_order_mark_is_no_part_of_a_trajectory() {
+    let tum = "1.5 1 2 0 0 0 0 1\n";
+    let boreas = "GPSTime,easting,northing,roll,pitch,heading\n1630597331060160,3,4,0,0,0.5\n";
+    let oxford = [HEADER, &row(0, 250, 2.0, 0.0, 0.1)].concat();
+    for text in [tum, boreas, &oxford] {
+        let marked = from_text("a.txt", &format!("\u{feff}{text}")).unwrap();
+        assert_eq!(marked, from_text("a.txt", text).unwrap());
+    }
+}
+
+#[test]
+fn a_word_of_a_damaged_file_is_quoted_in_part() {
+    let long = "9".repeat(5000);
+    for text in [
+        format!("1 0 0 {long}x 0 1 0 0 0 0 1 0\n"),
+        format!("{long}x 0 0 0 0 0 0 1\n"),
+        format!("GPSTime,easting,northing,roll,pitch,heading\n{long},0,0,0,0,0\n"),
+    ] {
+        let error = from_text("truth.txt", &text).unwrap_err().to_string();
+        assert!(error.len() < 300 && error.contains("999\"..."), "{error}");
+    }
+}
+
+#[test]
+fn ground_truth_is_found_at_the_path_of_each_dataset() {
+    for place in [
+        "ground_truth.tum",
+        "gt/radar_odometry.csv",
+        "applanix/radar_poses.csv",
+        "global_pose.csv",
+        "gt.txt",
+    ] {
+        let root = tempfile::tempdir().unwrap();
+        assert_eq!(find_ground_truth(root.path()), None);
+        let path = root.path().join(place);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::create_dir_all(root.path().join("radar")).unwrap();
+        fs::write(&path, "").unwrap();
+        assert_eq!(find_ground_truth(root.path()), Some(path.clone()));
+        assert_eq!(find_ground_truth(&root.path().join("radar")), Some(path));
+    }
+}
+
+fn trajectory() -> impl Strategy<Value = Trajectory> {
+    let pose = (0_i64..1_000_000_000, -1e4..1e4, -1e4..1e4, -3.1..3.1);
+    prop::collection::vec(pose, 1..20).prop_map(|steps| {
+        let mut stamp = 1_549_986_607_000_000_000;
+        let mut trajectory = Trajectory {
+            stamp_ns: Some(Vec::new()),
+            poses: Vec::new(),
+        };
+        for (step, x, y, yaw) in steps {
+            stamp += step;
+            trajectory.stamp_ns.get_or_insert_default().push(stamp);
+            trajectory
+                .poses
+                .push(Isometry2::new(Vector2::new(x, y), yaw));
+        }
+        trajectory
+    })
+}
+
+fn assert_close(a: &Trajectory, b: &Trajectory) {
+    assert_eq!(a.len(), b.len());
+    for (a, b) in a.poses.iter().zip(&b.poses) {
+        let apart = a.inverse() * b;
+        assert!(
+            (a.translation.vector - b.translation.vector).norm() < 1e-5
+                && apart.rotation.angle().abs() < 1e-9
+        );
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(32))]
+    #[test]
+    fn written_trajectories_are_read_back(written in trajectory()) {
+        let (mut tum, mut kitti) = (Vec::new(), Vec::new());
+        write_tum(&written, &mut tum).unwrap();
+        write_kitti(&written, &mut kitti).unwrap();
+        let from_tum = from_text("a.tum", std::str::from_utf8(&tum).unwrap()).unwrap();
+        assert_close(&written, &from_tum);
+        prop_assert_eq!(&written.stamp_ns, &from_tum.stamp_ns);
+        let from_kitti = from_text("a.txt", std::str::from_utf8(&kitti).unwrap()).unwrap();
+        assert_close(&written, &from_kitti);
+        prop_assert!(from_kitti.stamp_ns.is_none() && write_tum(&from_kitti, &mut Vec::new()).is_err());
+    }
+}

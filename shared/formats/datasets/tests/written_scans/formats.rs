@@ -1,0 +1,259 @@
+//! Formats: detection, names and stamps, options.
+
+use std::f32::consts::TAU;
+use std::fs;
+use std::path::Path;
+
+use gyre_datasets::{AzimuthSource, DatasetOptions, Format, OpenError, open};
+
+use super::{first_scan, first_scan_with, folder, opened, options, rejected};
+use crate::common::{PERIOD_US, START_US, Sweep, read, write_png, write_radiate};
+
+/// Writes three scans to `folder`, named by the stamp of row `named`; a microsecond has `unit`
+/// units of the stamps.
+fn write_named(folder: &Path, bins: usize, start_us: i64, named: i64, unit: i64) {
+    for k in 0..3 {
+        let start = (start_us + k * PERIOD_US) * unit;
+        let sweep = Sweep {
+            bins,
+            start,
+            row_interval: PERIOD_US / 40 * unit,
+            ..Sweep::default()
+        };
+        sweep.write(&folder.join(format!("{}.png", start + named * sweep.row_interval)));
+    }
+}
+
+#[test]
+fn boreas_resolution_depends_on_the_date_and_its_time_is_the_middle_row() {
+    for (start_us, resolution) in [
+        (1_630_000_000_000_000, 0.0596),
+        (1_632_182_400_000_000, 0.04381),
+    ] {
+        let root = folder();
+        fs::create_dir(root.path().join("applanix")).unwrap();
+        write_named(&root.path().join("radar"), 3360, start_us, 19, 1);
+        let mut dataset = opened(root.path());
+        assert_eq!(dataset.format(), Format::Boreas);
+        let scan = read(dataset.as_mut(), 1).unwrap();
+        assert_eq!(
+            (
+                scan.geometry.range_resolution_m,
+                scan.geometry.range_offset_m
+            ),
+            (resolution, -0.31)
+        );
+        assert_eq!(
+            (scan.geometry.stamp_ns, dataset.nominal_stamp_ns(1)),
+            (scan.stamp_ns[19], Some(scan.stamp_ns[19]))
+        );
+    }
+}
+
+#[test]
+fn formats_are_detected_from_layouts_and_first_images() {
+    let cases: [(&str, usize, i64, i64, Format); 6] = [
+        ("navtech", 60, 0, 1, Format::Fomo),
+        ("Navtech_CTS350-X_Radar", 60, 0, 1, Format::Oord),
+        ("polar_oxford_form", 60, 39, 1000, Format::MulranOxfordForm),
+        ("radar", 3768, 0, 1, Format::Oxford),
+        ("", 3360, 39, 1000, Format::MulranOxfordForm),
+        ("", 3360, 19, 1, Format::Boreas),
+    ];
+    for (name, bins, named, unit, format) in cases {
+        let root = folder();
+        write_named(&root.path().join(name), bins, START_US, named, unit);
+        let mut dataset = opened(root.path());
+        assert_eq!(dataset.format(), format, "{name:?}: {:?}", dataset.notes());
+        let scan = read(dataset.as_mut(), 1).unwrap();
+        let error = (dataset.nominal_stamp_ns(1).unwrap() - scan.geometry.stamp_ns).abs();
+        assert!(
+            error < 5_000_000,
+            "{name:?}: nominal time is off by {error} ns"
+        );
+    }
+}
+
+#[test]
+fn an_ambiguous_format_is_reported_with_its_alternative() {
+    let root = folder();
+    write_named(root.path(), 60, START_US, 0, 1);
+    let dataset = opened(root.path());
+    let note = dataset.notes().join(" ");
+    assert!(
+        note.contains("read as oxford") && note.contains("`format = \"fomo\"`"),
+        "{note}"
+    );
+}
+
+#[test]
+fn oord_has_uniform_azimuths() {
+    let root = folder();
+    let sweep = Sweep {
+        step: 0,
+        ..Sweep::default()
+    };
+    sweep.write(
+        &root
+            .path()
+            .join(format!("Navtech_CTS350-X_Radar/{START_US}.png")),
+    );
+    let scan = first_scan(root.path()).unwrap();
+    assert!((scan.azimuth_rad[10] - 0.25 * TAU).abs() < 1e-6);
+    assert_eq!(scan.geometry.range_resolution_m, 0.0438);
+}
+
+#[test]
+fn mulran_is_transposed_and_named_by_the_end_of_the_sweep() {
+    let root = folder();
+    let end = |k: i64| (START_US + k * PERIOD_US) * 1000;
+    for k in 0..3 {
+        write_png(
+            &root
+                .path()
+                .join(format!("sensor_data/radar/polar/{}.png", end(k))),
+            40,
+            60,
+            &[9; 2400],
+        );
+    }
+    let mut dataset = opened(root.path());
+    assert_eq!(
+        (dataset.format(), dataset.is_transposed()),
+        (Format::Mulran, true)
+    );
+    let scan = read(dataset.as_mut(), 2).unwrap();
+    // The name is the time of the last of 40 columns, the first of which is at half a step.
+    assert_eq!((scan.stamp_ns[39], scan.geometry.bins), (end(2), 60));
+    assert!((scan.azimuth_rad[0] - TAU / 80.0).abs() < 1e-6);
+    assert!(
+        scan.geometry.stamp_ns < end(2)
+            && dataset.nominal_stamp_ns(2) == Some(scan.geometry.stamp_ns)
+    );
+    assert!((scan.geometry.range_resolution_m - 0.0595238).abs() < 1e-6);
+}
+
+#[test]
+fn a_row_that_is_a_year_off_makes_its_scan_alone_unreadable_in_every_format_with_row_times() {
+    const YEAR_US: i64 = 31_536_000_000_000;
+    let formats = [
+        (Format::Oxford, 0, 1),
+        (Format::Oord, 0, 1),
+        (Format::Boreas, 19, 1),
+        (Format::BoreasRt, 19, 1),
+        (Format::Fomo, 0, 1),
+        (Format::MulranOxfordForm, 39, 1000),
+    ];
+    for (format, named, unit) in formats {
+        for off in [-YEAR_US * unit, YEAR_US * unit] {
+            let root = folder();
+            write_named(root.path(), 60, START_US, named, unit);
+            let sweep = Sweep {
+                start: (START_US + PERIOD_US) * unit,
+                row_interval: PERIOD_US / 40 * unit,
+                ..Sweep::default()
+            };
+            let mut pixels = sweep.pixels();
+            let row = &mut pixels[20 * sweep.width()..][..8];
+            let stamp = sweep.start + 20 * sweep.row_interval + off;
+            row.copy_from_slice(&stamp.to_le_bytes());
+            let name = sweep.start + named * sweep.row_interval;
+            write_png(
+                &root.path().join(format!("{name}.png")),
+                sweep.width(),
+                40,
+                &pixels,
+            );
+            let options = options(|o| o.format = Some(format));
+            let mut dataset = open(root.path(), &options).unwrap();
+            let error = read(dataset.as_mut(), 1).unwrap_err().to_string();
+            assert!(error.contains("row 20: stamp is 3153"), "{format}: {error}");
+            assert!(read(dataset.as_mut(), 0).is_ok() && read(dataset.as_mut(), 2).is_ok());
+        }
+    }
+}
+
+#[test]
+fn folders_without_a_dataset_are_rejected() {
+    let root = folder();
+    assert!(matches!(
+        rejected(&root.path().join("nothing")),
+        OpenError::Missing { .. }
+    ));
+    assert!(matches!(rejected(root.path()), OpenError::NoImages { .. }));
+    fs::write(root.path().join("notes.txt"), "hello").unwrap();
+    let error = rejected(root.path()).to_string();
+    assert!(
+        error.contains("Navtech_Polar") && error.contains("`format`"),
+        "{error}"
+    );
+    assert!(matches!(
+        rejected(&root.path().join("notes.txt")),
+        OpenError::NotAFolder { .. }
+    ));
+    fs::create_dir(root.path().join("radar")).unwrap();
+    assert!(
+        matches!(rejected(root.path()), OpenError::NoImages { path } if path.ends_with("radar"))
+    );
+    write_png(&root.path().join("radar/holiday.png"), 30, 20, &[0; 600]);
+    assert!(matches!(
+        rejected(root.path()),
+        OpenError::UnknownLayout { .. }
+    ));
+}
+
+#[test]
+fn options_out_of_bounds_are_rejected() {
+    let root = folder();
+    write_radiate(root.path(), 2);
+    let edits: [fn(&mut DatasetOptions); 7] = [
+        |o| o.range_resolution_m = Some(0.0),
+        |o| o.range_resolution_m = Some(f32::NAN),
+        |o| o.range_offset_m = Some(f32::INFINITY),
+        |o| o.doppler_s = Some(f32::NAN),
+        |o| o.encoder_counts = Some(0),
+        |o| o.encoder_counts = Some(5600),
+        |o| o.azimuth_source = Some(AzimuthSource::Encoder),
+    ];
+    for options in edits.map(options) {
+        let refused = open(root.path(), &options);
+        assert!(
+            matches!(refused, Err(OpenError::BadOption { .. })),
+            "{options:?}"
+        );
+    }
+    let scan = first_scan_with(root.path(), |o| {
+        o.range_resolution_m = Some(1.5);
+        o.range_offset_m = Some(-0.5);
+        o.doppler_s = Some(0.04);
+    });
+    assert_eq!(
+        (
+            scan.geometry.range_resolution_m,
+            scan.geometry.range_offset_m
+        ),
+        (1.5, -0.5)
+    );
+    assert_eq!(scan.geometry.doppler_s, 0.04);
+}
+
+#[test]
+fn options_are_kebab_case_and_unknown_keys_are_rejected() {
+    let options: DatasetOptions =
+        serde_json::from_str(r#"{"format": "boreas-rt", "azimuth_source": "uniform"}"#).unwrap();
+    assert_eq!(
+        (options.format, options.azimuth_source),
+        (Some(Format::BoreasRt), Some(AzimuthSource::Uniform))
+    );
+    assert_eq!(
+        serde_json::to_string(&DatasetOptions::default()).unwrap(),
+        "{}"
+    );
+    assert!(serde_json::from_str::<DatasetOptions>(r#"{"fromat": "oxford"}"#).is_err());
+    for format in Format::ALL {
+        assert_eq!(
+            serde_json::to_string(&format).unwrap(),
+            format!("\"{format}\"")
+        );
+    }
+}

@@ -1,0 +1,46 @@
+//! Readers on small generated datasets, valid and invalid: images and their series, the rows of a
+//! sweep, formats and options.
+
+mod encoders;
+mod formats;
+mod images;
+mod lost_azimuths;
+mod packed;
+mod radiate;
+mod rows;
+mod series;
+
+use std::path::Path;
+
+use crate::common::read;
+use gyre_datasets::{Dataset, DatasetOptions, OpenError, ReadError, open};
+use gyre_radar::OwnedScan;
+use tempfile::TempDir;
+
+fn folder() -> TempDir {
+    tempfile::tempdir().unwrap()
+}
+
+fn opened(root: &Path) -> Box<dyn Dataset> {
+    open(root, &DatasetOptions::default()).unwrap()
+}
+
+fn rejected(root: &Path) -> OpenError {
+    open(root, &DatasetOptions::default()).err().unwrap()
+}
+
+fn first_scan(root: &Path) -> Result<OwnedScan, ReadError> {
+    read(opened(root).as_mut(), 0)
+}
+
+/// The default options with a change.
+fn options(change: impl FnOnce(&mut DatasetOptions)) -> DatasetOptions {
+    let mut options = DatasetOptions::default();
+    change(&mut options);
+    options
+}
+
+/// The first scan, read with a change of the default options.
+fn first_scan_with(root: &Path, change: impl FnOnce(&mut DatasetOptions)) -> OwnedScan {
+    read(open(root, &options(change)).unwrap().as_mut(), 0).unwrap()
+}

@@ -1,0 +1,93 @@
+//! RADIATE's list of times.
+
+use std::fs;
+
+use gyre_datasets::{DatasetOptions, inspect};
+
+use super::{folder, opened, rejected};
+use crate::common::write_radiate;
+
+#[test]
+fn radiate_times_that_are_off_do_not_move_the_other_scans() {
+    let root = folder();
+    write_radiate(root.path(), 12);
+    let stamps = || -> Vec<_> {
+        let dataset = opened(root.path());
+        (0..12)
+            .map(|index| dataset.nominal_stamp_ns(index))
+            .collect()
+    };
+    let expected = stamps();
+    let list = root.path().join("Navtech_Polar.txt");
+    let text = fs::read_to_string(&list).unwrap();
+    let year_before = text.replace(
+        "Frame: 000011 Time: 1549986608",
+        "Frame: 000011 Time: 1518450608",
+    );
+    assert_ne!(year_before, text);
+    fs::write(&list, year_before).unwrap();
+    assert_eq!(stamps(), expected);
+    let notes = opened(root.path()).notes().join(" ");
+    assert!(
+        notes.contains("1 times in Navtech_Polar.txt are more than 10 s from those before and after (frames 11)"),
+        "{notes}"
+    );
+}
+
+#[test]
+fn a_list_without_all_times_is_named_with_the_first_image_that_it_lacks() {
+    let root = folder();
+    write_radiate(root.path(), 2);
+    let list = root.path().join("Navtech_Polar.txt");
+    fs::write(&list, "Frame: 000007 Time: 1549986607.5\n").unwrap();
+    let error = rejected(root.path()).to_string();
+    assert!(
+        error.contains("Navtech_Polar.txt has no times of 1 of 2 images, 000008.png first"),
+        "{error}"
+    );
+    fs::write(&list, "Frame: 000007 Time: 1549986607.5\nnonsense\n").unwrap();
+    let error = rejected(root.path()).to_string();
+    assert!(error.contains("line 2"), "{error}");
+    fs::remove_file(&list).unwrap();
+    let error = rejected(root.path()).to_string();
+    let start = format!("there is no {}: it lists the times", list.display());
+    assert!(error.starts_with(&start), "{error}");
+}
+
+#[test]
+fn one_time_that_is_early_moves_no_scan_and_is_named() {
+    let root = folder();
+    write_radiate(root.path(), 40);
+    let stamps = || -> Vec<_> {
+        let dataset = opened(root.path());
+        let stamps = (0..40).map(|index| dataset.nominal_stamp_ns(index).unwrap());
+        stamps.collect()
+    };
+    let expected = stamps();
+    let list = root.path().join("Navtech_Polar.txt");
+    let text = fs::read_to_string(&list).unwrap();
+    // Frame 20 was received 3.253 s after the first second, and is logged 0.7 s before that.
+    let early = text.replace("1549986610.253000000", "1549986609.553000000");
+    assert_ne!(early, text);
+    fs::write(&list, early).unwrap();
+    for (now, before) in stamps().iter().zip(&expected) {
+        assert!((now - before).abs() < 1_000, "{now} instead of {before}");
+    }
+    let report = inspect(root.path(), &DatasetOptions::default(), None).unwrap();
+    let findings = report.findings.join(" ");
+    assert!(findings.contains("(frames 20 by 0.70 s)"), "{findings}");
+    let timing = report.timing.unwrap();
+    assert!((timing.period_s - 0.25).abs() < 1e-6 && timing.stalls.is_empty());
+    assert!(timing.backwards.is_empty() && timing.gaps.is_empty());
+}
+
+#[test]
+fn a_byte_order_mark_before_the_list_is_none_of_it() {
+    let root = folder();
+    write_radiate(root.path(), 3);
+    let expected = opened(root.path()).nominal_stamp_ns(2);
+    let list = root.path().join("Navtech_Polar.txt");
+    let text = fs::read_to_string(&list).unwrap();
+    fs::write(&list, format!("\u{feff}{text}")).unwrap();
+    assert_eq!(opened(root.path()).nominal_stamp_ns(2), expected);
+}

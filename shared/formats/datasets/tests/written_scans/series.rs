@@ -1,0 +1,242 @@
+//! Folders in which not every image is a scan, or images are not named by times.
+
+use std::fs;
+use std::path::Path;
+
+use gyre_datasets::{Dataset, DatasetOptions, Format, inspect, open, reopen};
+
+use super::{folder, opened, options, rejected};
+use crate::common::{PERIOD_US, START_US, Sweep, read, write_oxford, write_radiate};
+
+/// Writes a scan of the turn `k`.
+fn write(path: &Path, k: i64) {
+    let start = START_US + k * PERIOD_US;
+    Sweep {
+        start,
+        ..Sweep::default()
+    }
+    .write(path);
+}
+
+fn names(dataset: &dyn Dataset) -> Vec<String> {
+    let name = |index| {
+        dataset
+            .file(index)
+            .file_name()
+            .unwrap()
+            .to_str()
+            .unwrap()
+            .to_owned()
+    };
+    (0..dataset.len()).map(name).collect()
+}
+
+#[test]
+fn images_that_are_not_named_by_times_are_in_the_order_of_their_rows_times() {
+    // In the order of text scan10 is before scan2, and view_b is before view_z.
+    for named in [
+        "scan1 scan2 scan9 scan10 scan11",
+        "view_z view_b 7 9 xx",
+        "5 4 3 2 1",
+    ] {
+        let root = folder();
+        let expected: Vec<_> = named.split(' ').map(|name| format!("{name}.png")).collect();
+        for (k, name) in expected.iter().enumerate() {
+            write(&root.path().join("radar").join(name), k as i64);
+        }
+        for format in [Format::Oxford, Format::Boreas, Format::Fomo] {
+            let options = options(|o| o.format = Some(format));
+            let images = root.path().join("radar");
+            let mut dataset = open(&images, &options).unwrap();
+            assert_eq!(names(dataset.as_ref()), expected, "{format}");
+            assert_eq!(dataset.period_ns(), PERIOD_US * 1000);
+            let again = reopen(&images, &options, format, dataset.files().clone()).unwrap();
+            for index in 0..5 {
+                let stamp_ns = read(dataset.as_mut(), index).unwrap().geometry.stamp_ns;
+                let start_ns = (START_US + index as i64 * PERIOD_US) * 1000;
+                assert!(
+                    (stamp_ns - start_ns - 122_000_000).abs() < 4_000_000,
+                    "{format} {index}"
+                );
+                let nominal_ns = dataset.nominal_stamp_ns(index).unwrap();
+                assert!(
+                    (nominal_ns - stamp_ns).abs() < 4_000_000,
+                    "{format} {index}"
+                );
+                assert_eq!(again.nominal_stamp_ns(index), Some(nominal_ns));
+                assert_eq!(again.file(index), dataset.file(index));
+            }
+        }
+    }
+}
+
+#[test]
+fn a_clock_that_is_set_back_breaks_the_time_of_numbered_images_once() {
+    let root = folder();
+    let images = root.path().join("radar");
+    for k in 0..40 {
+        let back_us = if k < 20 { 0 } else { 3_100_000 };
+        let start = START_US + k * PERIOD_US - back_us;
+        let sweep = Sweep {
+            start,
+            ..Sweep::default()
+        };
+        sweep.write(&images.join(format!("scan{}.png", k + 1)));
+    }
+    let expected: Vec<_> = (1..=40).map(|k| format!("scan{k}.png")).collect();
+    for format in [Format::Oxford, Format::Boreas, Format::Fomo] {
+        let options = options(|o| o.format = Some(format));
+        let mut dataset = open(&images, &options).unwrap();
+        assert_eq!(names(dataset.as_ref()), expected, "{format}");
+        assert_eq!(dataset.period_ns(), PERIOD_US * 1000);
+        let notes = dataset.notes().join(" ");
+        assert!(notes.contains("in the order of their names"), "{notes}");
+        let again = reopen(&images, &options, format, dataset.files().clone()).unwrap();
+        let times: Vec<_> = (0..40).map(|k| again.nominal_stamp_ns(k)).collect();
+        let back: Vec<_> = (1..40).filter(|k| times[*k] < times[k - 1]).collect();
+        assert_eq!((names(again.as_ref()), back), (expected.clone(), vec![20]));
+        assert!((0..40).all(|index| read(dataset.as_mut(), index).is_ok()));
+    }
+}
+
+#[test]
+fn inspect_has_times_and_gaps_of_images_that_are_not_named_by_times() {
+    let root = folder();
+    let images = root.path().join("radar");
+    for (number, k) in [(1, 0), (2, 1), (3, 2), (10, 5), (11, 6)] {
+        write(&images.join(format!("scan{number}.png")), k);
+    }
+    fs::copy(images.join("scan2.png"), images.join("scan2 (1).png")).unwrap();
+    fs::write(images.join("scan4.png"), "damaged").unwrap();
+    let report = inspect(root.path(), &DatasetOptions::default(), None).unwrap();
+    let (findings, timing) = (report.findings.join(" "), report.timing.unwrap());
+    assert_eq!(
+        (
+            report.scans,
+            report.unreadable.len(),
+            report.unreadable[0].scan
+        ),
+        (6, 1, 3)
+    );
+    assert!((timing.period_s - 0.25).abs() < 1e-9, "{}", timing.period_s);
+    // The damaged image takes the place of one of the two that are missing.
+    assert_eq!((timing.missing_scans, timing.gaps[0].scan), (1, 4));
+    assert!(
+        findings.contains("ordered by the times of their first rows"),
+        "{findings}"
+    );
+    assert!(
+        findings.contains(
+            "1 image is left out, with the times of other images in the rows: `scan2 (1).png`"
+        ),
+        "{findings}"
+    );
+    assert!(
+        !report.stamp_meaning.contains("named"),
+        "{}",
+        report.stamp_meaning
+    );
+}
+
+#[test]
+fn copies_and_hidden_files_are_no_scans_and_are_named() {
+    for write_files in [write_oxford, write_radiate] {
+        let root = folder();
+        let files = write_files(root.path(), 6);
+        for (index, file) in files.iter().enumerate() {
+            let stem = file.file_stem().unwrap().to_str().unwrap();
+            fs::write(file.with_file_name(format!("._{stem}.png")), "Mac OS X").unwrap();
+            if index % 2 == 0 {
+                fs::copy(file, file.with_file_name(format!("{stem} (1).png"))).unwrap();
+            }
+        }
+        fs::copy(&files[0], files[0].with_file_name("overview.png")).unwrap();
+        let dataset = opened(root.path());
+        let listed: Vec<_> = (0..dataset.len())
+            .map(|index| dataset.file(index))
+            .collect();
+        assert_eq!(listed, files);
+        let notes = dataset.notes().join(" ");
+        let first = files[0].file_stem().unwrap().to_str().unwrap();
+        let sentence = "10 images are left out, not of the series by name: `._";
+        assert!(notes.contains(sentence) && notes.contains(first), "{notes}");
+    }
+    let root = folder();
+    fs::write(root.path().join("._1547131046353776.png"), "Mac OS X").unwrap();
+    assert!(
+        rejected(root.path())
+            .to_string()
+            .contains("is not a known dataset")
+    );
+}
+
+#[test]
+fn scans_with_fewer_rows_are_read_with_the_azimuths_that_there_are() {
+    let rows_of = |k| if matches!(k, 0 | 3) { 38 } else { 40 };
+    for (name, format) in [
+        ("Navtech_CTS350-X_Radar", Format::Oord),
+        ("navtech", Format::Fomo),
+    ] {
+        let root = folder();
+        for k in 0..6 {
+            let start = START_US + k * PERIOD_US;
+            let sweep = Sweep {
+                rows: rows_of(k),
+                start,
+                ..Sweep::default()
+            };
+            sweep.write(&root.path().join(name).join(format!("{start}.png")));
+        }
+        let mut dataset = opened(root.path());
+        assert_eq!(
+            (dataset.format(), dataset.image_size().height),
+            (format, 40)
+        );
+        for k in 0..6 {
+            let scan = read(dataset.as_mut(), k).unwrap();
+            let rows = rows_of(k as i64);
+            assert_eq!(scan.geometry.azimuths, rows, "{format}, scan {k}");
+            let turn = std::f32::consts::TAU;
+            let expected = match format {
+                Format::Oord => turn / rows as f32,
+                _ => turn * (13.0 + 140.0) / 5600.0,
+            };
+            assert!(
+                (scan.azimuth_rad[1] - expected).abs() < 1e-6,
+                "{format}, scan {k}"
+            );
+            assert_eq!(scan.view().row(rows - 1)[5], Sweep::power(rows - 1, 5));
+        }
+        let report = inspect(root.path(), &DatasetOptions::default(), None).unwrap();
+        assert_eq!((report.azimuths, report.rows.in_scan), (40, (38, 40)));
+        assert!(
+            report
+                .findings
+                .join(" ")
+                .contains("Scans have 38 to 40 rows")
+        );
+    }
+}
+
+#[test]
+fn an_image_without_encoder_and_with_half_a_turn_is_refused() {
+    let root = folder();
+    for k in 0..4 {
+        let start = START_US + k * PERIOD_US;
+        let rows = if k == 0 { 20 } else { 40 };
+        let sweep = Sweep {
+            rows,
+            start,
+            ..Sweep::default()
+        };
+        let name = format!("Navtech_CTS350-X_Radar/{start}.png");
+        sweep.write(&root.path().join(name));
+    }
+    let mut dataset = opened(root.path());
+    let error = read(dataset.as_mut(), 0).unwrap_err().to_string();
+    assert!(
+        error.contains("most images of the dataset are 71 columns x 40 rows"),
+        "{error}"
+    );
+    assert!((1..4).all(|index| read(dataset.as_mut(), index).is_ok()));
+}
