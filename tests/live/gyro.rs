@@ -1,4 +1,4 @@
-//! A live radar with a live gyro, whose samples arrive in datagrams.
+//! A live radar with a live gyro and live wheels, whose samples arrive in datagrams.
 
 use std::{
     fs,
@@ -20,11 +20,13 @@ use crate::{
 
 pub const SCANS: usize = 12;
 
-/// A recording with the log of a gyro, all rows of which are measured: a radar sends no others.
+/// A recording with the logs of a gyro and of wheels, all rows of which are measured: a radar sends
+/// no others.
 pub fn with_log() -> TempDir {
     let simulation = format!("scans = {SCANS}\n{}", recording::SENSOR);
     let mut config: SimulationConfig = toml::from_str(&simulation).unwrap();
     config.gyro.profile = GyroProfile::Asm330lhh;
+    config.wheels.rate_hz = 20.0;
     let drive = recording::of("live-gyro", &config);
     let whole = recording::linked(&drive, |_| true);
     for image in recording::images(whole.path()) {
@@ -33,7 +35,7 @@ pub fn with_log() -> TempDir {
     whole
 }
 
-/// A gyro that sends what a log holds once somebody receives it, in datagrams of ten samples.
+/// A sensor that sends what a log holds once somebody receives it, in datagrams of ten samples.
 fn sending(log: PathBuf, address: String) -> JoinHandle<()> {
     thread::spawn(move || {
         let text = fs::read_to_string(log).unwrap();
@@ -58,30 +60,35 @@ fn address(test: u32) -> String {
     )
 }
 
-fn recorded_with_log(recording: &Path) -> String {
-    Run::small()
-        .data(recording)
-        .set("gyro.kind=auto")
-        .complete()
+fn recorded_with_logs(recording: &Path) -> String {
+    let run = Run::small().data(recording).set("gyro.kind=auto");
+    run.set("wheels.kind=auto").complete()
 }
 
 #[test]
-fn a_live_gyro_gives_the_motions_of_its_log_and_its_recording_replays_to_them() {
+fn a_live_gyro_and_wheels_give_the_motions_of_their_logs_and_the_recording_replays_to_them() {
     let whole = with_log();
-    let expected = recorded_with_log(whole.path());
+    let expected = recorded_with_logs(whole.path());
     let alone = Run::small().data(whole.path()).complete();
     assert_ne!(expected, alone);
-    let address = address(0);
+    let [of_gyro, of_wheels] = [0, 2].map(address);
     let radar = Radar::playing(whole.path(), &[]);
     let run = recorded(&radar.run(SCANS))
         .set("gyro.kind=udp")
-        .set(&format!("gyro.listen='{address}'"))
+        .set(&format!("gyro.listen='{of_gyro}'"))
+        .set("wheels.kind=udp")
+        .set(&format!("wheels.listen='{of_wheels}'"))
         .set("run.window=32");
-    let gyro = sending(whole.path().join("imu.csv"), address);
+    let sensors = [("imu.csv", of_gyro), ("wheels.csv", of_wheels)];
+    let sensors = sensors.map(|(log, address)| sending(whole.path().join(log), address));
     let live = run.complete();
-    gyro.join().unwrap();
+    for sensor in sensors {
+        sensor.join().unwrap();
+    }
     assert_eq!(run.summary()["dropped"], 0);
-    assert_eq!(run.summary()["gyro"]["motions"], SCANS - 1);
+    for sensor in ["gyro", "wheels"] {
+        assert_eq!(run.summary()[sensor]["motions"], SCANS - 1);
+    }
     assert!(live == expected, "{live}\n{expected}");
     assert_eq!(replay(&file(&run), &[]), expected);
 }
@@ -105,4 +112,7 @@ fn a_log_beside_a_live_radar_is_refused() {
     let run = radar.run(SCANS).set("gyro.kind=auto");
     run.finish()
         .refused_with(&["gyro.kind", "the radar is live", "`udp`"]);
+    let run = radar.run(SCANS).set("wheels.kind=auto");
+    run.finish()
+        .refused_with(&["wheels.kind", "the radar is live", "`udp`"]);
 }

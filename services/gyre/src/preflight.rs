@@ -45,7 +45,7 @@ pub enum PreflightError {
     )]
     LiveGyro,
     /// Wheels beside a live radar.
-    #[error("wheels.kind is of a recording, but the radar is live: set it to `none`")]
+    #[error("wheels.kind is of a recording, but the radar is live: set it to `udp`, or to `none`")]
     LiveWheels,
     /// The segments would not fit.
     #[error(
@@ -235,7 +235,8 @@ impl Scans {
         if !can_come {
             return Err(PreflightError::LiveGyro.into());
         }
-        if configuration.odometry.wheels.is_used() {
+        let wheels = &configuration.odometry.wheels;
+        if wheels.is_used() && !wheels.is_live() {
             return Err(PreflightError::LiveWheels.into());
         }
         configuration.dataset.check()?;

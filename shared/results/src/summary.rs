@@ -80,11 +80,22 @@ impl Problem {
                 "only {poses} of the {scans} scans of {data} can be read, and a motion is between two: {log} says what is wrong with them"
             )));
         }
-        counts.too_many_are_unreadable().then(|| {
-            Self(format!(
+        if counts.too_many_are_unreadable() {
+            return Some(Self(format!(
                 "{unreadable} of the {scans} scans of {data} cannot be read: the results are of the others, and {log} says what is wrong with each"
-            ))
-        })
+            )));
+        }
+        if let Some(gyro) = counts.gyro_contradicts() {
+            return Some(Self(format!(
+                "the gyro contradicts the radar: {} of its {} turns were refused. `gyro.up`, `gyro.late_s` or the unit of its log is wrong; `gyre calibrate` finds them from a recording, and gyro.kind=none leaves it out",
+                gyro.refused, gyro.motions
+            )));
+        }
+        let wheels = counts.wheels_contradict()?;
+        Some(Self(format!(
+            "the wheels contradict the radar: {} of their {} distances are not those that it sees. `wheels.late_s`, `wheels.scale` or the unit of their log is wrong; wheels.kind=none leaves them out",
+            wheels.slips, wheels.motions
+        )))
     }
 }
 

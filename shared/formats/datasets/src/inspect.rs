@@ -2,19 +2,25 @@
 
 mod display;
 mod findings;
+mod gnss;
 mod ground_truth;
 mod gyro;
 mod rows;
+mod times;
 mod timing;
+mod wheels;
 
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
+pub use gnss::GnssReport;
 pub use ground_truth::GroundTruthReport;
 pub use gyro::{GyroReport, QuietReport};
 pub use rows::{Chirps, RowsReport};
+pub use times::LogTimes;
 pub use timing::{Gap, Stall, TimingReport};
+pub use wheels::WheelReport;
 
 use crate::dataset::ImageSize;
 use crate::dataset::OpenError;
@@ -65,6 +71,10 @@ pub struct Report {
     pub ground_truths: Vec<GroundTruthReport>,
     /// The log of a gyro beside the scans.
     pub gyro: Option<GyroReport>,
+    /// The log of the wheels beside the scans.
+    pub wheels: Option<WheelReport>,
+    /// The log of a GNSS receiver beside the scans.
+    pub gnss: Option<GnssReport>,
     /// Observations of the reader and faults: whole sentences.
     pub findings: Vec<String>,
 }
@@ -108,6 +118,8 @@ pub fn inspect_dataset(
     let mut report = assemble(root, dataset.as_ref(), read, timing);
     report.ground_truths = ground_truth::examine(root, dataset.as_ref(), trajectory);
     report.gyro = gyro::examine(root, report.timing.as_ref());
+    report.wheels = wheels::examine(root, report.timing.as_ref());
+    report.gnss = gnss::examine(root, report.timing.as_ref());
     report.findings = findings::list(&report, dataset.notes(), options);
     report
 }
@@ -176,6 +188,8 @@ fn assemble(
         unreadable: read.unreadable,
         ground_truths: Vec::new(),
         gyro: None,
+        wheels: None,
+        gnss: None,
         findings: Vec::new(),
     }
 }

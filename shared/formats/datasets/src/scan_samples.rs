@@ -49,12 +49,13 @@ impl ScanSamples {
                 Some(samples) => GyroLog::of(samples, folder)?,
                 None => GyroLog::read(&GyroLog::find(folder)?)?,
             }),
-            GyroKind::Udp | GyroKind::Ros2 => return Err(LogError::Live),
+            GyroKind::Udp | GyroKind::Ros2 => return Err(LogError::Live(SampleKind::Gyro)),
             GyroKind::Log => Some(GyroLog::read(&gyro.file.clone().unwrap_or_default())?),
         };
         let speeds = match wheels.kind {
             WheelsKind::None => None,
             WheelsKind::Auto => Some(WheelLog::read(&WheelLog::find(folder)?)?),
+            WheelsKind::Udp => return Err(LogError::Live(SampleKind::Wheels)),
             WheelsKind::Log => Some(WheelLog::read(&wheels.file.clone().unwrap_or_default())?),
         };
         let of_gyro = turns.map(|log| Self::of_gyro(&log, gyro, dataset));

@@ -217,9 +217,9 @@ fn the_log_of_a_gyro_is_told_with_its_span_and_faults() {
     let report = inspect(folder.path(), &DatasetOptions::default(), None).unwrap();
     println!("{report}");
     let gyro = report.gyro.as_ref().unwrap();
-    assert_eq!(gyro.samples, 980);
-    assert!((gyro.rate_hz - 100.0).abs() < 1e-6 && (gyro.missing - 0.02).abs() < 1e-6);
-    let [before, after] = gyro.after_scans_s.unwrap();
+    assert_eq!(gyro.times.samples, 980);
+    assert!((gyro.times.rate_hz - 100.0).abs() < 1e-6 && (gyro.times.missing - 0.02).abs() < 1e-6);
+    let [before, after] = gyro.times.after_scans_s.unwrap();
     let scans_s = (report.timing.as_ref().unwrap().last_ns - first_ns) as f64 * 1e-9;
     assert!((before + 0.5).abs() < 1e-6 && (after - (9.49 - scans_s)).abs() < 1e-6);
     let quiet = gyro.quiet.unwrap();
@@ -239,13 +239,63 @@ fn the_log_of_a_gyro_is_told_with_its_span_and_faults() {
 }
 
 #[test]
+fn the_logs_of_wheels_and_gnss_are_told_with_what_they_say_and_their_faults() {
+    let folder = tempfile::tempdir().unwrap();
+    write_oxford(folder.path(), 8);
+    let examine = || inspect(folder.path(), &DatasetOptions::default(), None).unwrap();
+    let first_ns = examine().timing.as_ref().unwrap().first_ns;
+    let write = |name: &str, head: &str, row: &dyn Fn(i64) -> String| {
+        let rows: String = (0..100).map(row).collect();
+        std::fs::write(folder.path().join(name), format!("{head}\n{rows}")).unwrap();
+    };
+    // 10 Hz at 36 km/h from half a second before the first scan; a fix each, one of them at 0, 0.
+    let stamp_ns = |k: i64| first_ns - 500_000_000 + 100_000_000 * k;
+    write("wheels.csv", "stamp_ns,speed_km_h", &|k| {
+        format!("{},36\n", stamp_ns(k))
+    });
+    write(
+        "gnss.csv",
+        "stamp_ns,latitude_deg,longitude_deg,sigma_m",
+        &|k| {
+            let north = if k == 50 { 0.0 } else { 51.0 + 9e-6 * k as f64 };
+            let east = if k == 50 { 0.0 } else { -1.0 };
+            format!("{},{north},{east},0.5\n", stamp_ns(k))
+        },
+    );
+    let report = examine();
+    println!("{report}");
+    let (wheels, gnss) = (
+        report.wheels.as_ref().unwrap(),
+        report.gnss.as_ref().unwrap(),
+    );
+    assert!((wheels.path_m - 99.0).abs() < 1e-6 && (wheels.fastest_mps - 10.0).abs() < 1e-6);
+    assert!((wheels.times.rate_hz - 10.0).abs() < 1e-6);
+    assert!(
+        gnss.on_the_earth && (gnss.reach_m - 99.1).abs() < 0.3,
+        "{gnss:?}"
+    );
+    assert_eq!((gnss.times.samples, gnss.sigma_m), (99, Some(0.5)));
+    assert_mentions(&report, &["left out, or sorted: 1 at 0, 0"]);
+    assert_mentions(&report, &["wheels.csv", "wheels.kind"]);
+    assert_mentions(&report, &["gnss.csv", "gnss.kind"]);
+    write("wheels.csv", "stamp_ns,colour", &|k| format!("{k},1\n"));
+    write("gnss.csv", "stamp_ns,colour", &|k| format!("{k},1\n"));
+    let report = examine();
+    assert_mentions(
+        &report,
+        &["log of the wheels", "cannot be used", "no speed"],
+    );
+    assert_mentions(&report, &["GNSS receiver", "cannot be used"]);
+}
+
+#[test]
 fn stalls_of_the_gyro_of_radiate_are_reported() {
     let Some(report) = report("radiate-2019-02-12", None) else {
         return;
     };
     let gyro = report.gyro.as_ref().unwrap();
     assert!(
-        (gyro.rate_hz - 20.0).abs() < 0.1 && (0.05..0.06).contains(&gyro.missing),
+        (gyro.times.rate_hz - 20.0).abs() < 0.1 && (0.05..0.06).contains(&gyro.times.missing),
         "{gyro:?}"
     );
     assert!(gyro.up_by_gravity.is_none(), "gravity is taken out");

@@ -43,6 +43,11 @@ impl Bounds {
         self.within("late_s", value, [-1e6, 1e6], expected)
     }
 
+    pub fn max_wait_ms(&self, value: f64) -> Result<(), SampleConfigError> {
+        let expected = "milliseconds, 0 to 1000";
+        self.within("max_wait_ms", value, [0.0, 1000.0], expected)
+    }
+
     /// Checks a scale and its standard deviation.
     pub fn scale(&self, [scale, sigma]: [f64; 2]) -> Result<(), SampleConfigError> {
         self.within("scale", scale, [0.5, 2.0], "a factor, 0.5 to 2")?;

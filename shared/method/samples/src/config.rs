@@ -179,12 +179,7 @@ impl GyroConfig {
         let bounds = Bounds("gyro");
         let rate = "a rate in rad/s, at most 1";
         bounds.late_s(self.late_s)?;
-        bounds.within(
-            "max_wait_ms",
-            self.max_wait_ms,
-            [0.0, 1000.0],
-            "milliseconds, 0 to 1000",
-        )?;
+        bounds.max_wait_ms(self.max_wait_ms)?;
         bounds.scale([self.scale, self.scale_sigma])?;
         bounds.within("bias_radps", self.bias_radps, [-1.0, 1.0], rate)?;
         bounds.within("bias_sigma_radps", self.bias_sigma_radps, [0.0, 1.0], rate)?;

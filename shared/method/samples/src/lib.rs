@@ -10,7 +10,7 @@
 //! - `integral`: what a rate comes to between two scans;
 //! - [`Gyro`]: integrates the yaw rate between two scans, to a [`GyroTurn`];
 //! - [`Wheels`]: integrates the speed, to a [`WheelDistance`];
-//! - [`LiveSamples`]: what has arrived of a live gyro;
+//! - [`LiveSamples`]: what has arrived of a live gyro or of live wheels;
 //! - [`GnssConfig`]: the section `[gnss]`, and [`GnssFix`], which goes with no scan;
 //! - [`LocalPlane`]: places on the earth as coordinates in a plane.
 //!
@@ -34,7 +34,7 @@ pub use geodesy::{Geographic, LocalPlane};
 pub use gnss::{GnssConfig, GnssFix, GnssKind};
 pub use gyro::{Gyro, GyroTurn, with_yaw_rate};
 pub use integral::interval_of;
-pub use live::LiveSamples;
+pub use live::{LiveSamples, LiveSensor};
 pub use sample::{MAX_RATE_RADPS, MAX_SAMPLES, MAX_SPEED_MPS, Sample, SampleKind};
 pub use wheels::{WheelDistance, Wheels};
 pub use wheels_config::{WheelsConfig, WheelsKind};

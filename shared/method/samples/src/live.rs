@@ -1,15 +1,33 @@
-//! Samples of a live gyro, until the scan comes that they go with.
+//! Samples of a live gyro or of live wheels, until the scan comes that they go with.
 
-use crate::{GyroConfig, MAX_SAMPLES, Sample, interval_of};
+use crate::{GyroConfig, MAX_SAMPLES, Sample, WheelsConfig, interval_of};
 
 /// A sample that is so much later than the last scan is of a clock that has jumped, ns.
 const MAX_AHEAD_NS: i64 = 10_000_000_000;
 
+/// The sensor that the samples are of, by whose settings they are taken over to the radar's clock.
+#[derive(Clone, Debug)]
+pub enum LiveSensor {
+    /// A gyro.
+    Gyro(GyroConfig),
+    /// The wheels.
+    Wheels(WheelsConfig),
+}
+
+impl LiveSensor {
+    fn on_radar(&self, sample: &Sample) -> Sample {
+        match self {
+            Self::Gyro(config) => config.on_radar(sample),
+            Self::Wheels(config) => config.on_radar(sample),
+        }
+    }
+}
+
 /// Samples that have arrived, in the order of their stamps. Which of them go with a scan is decided
 /// by their stamps; when they arrived decides only whether they are late.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct LiveSamples {
-    config: GyroConfig,
+    sensor: LiveSensor,
     samples: Vec<Sample>,
     /// The end of the last scan, ns.
     handed_until_ns: Option<i64>,
@@ -18,18 +36,20 @@ pub struct LiveSamples {
 
 impl LiveSamples {
     /// Creates an empty queue.
-    pub fn new(config: &GyroConfig) -> Self {
+    pub fn new(sensor: LiveSensor) -> Self {
         Self {
-            config: config.clone(),
-            ..Self::default()
+            sensor,
+            samples: Vec::new(),
+            handed_until_ns: None,
+            left_out: 0,
         }
     }
 
     /// Takes a sample as its sensor sends it: in its own axes, on its own clock. One that cannot be
-    /// used is left out, and counted: no number, a rate beyond any gyro, a stamp that there was
-    /// already, one of a scan that is gone, or one far ahead of the radar's.
+    /// used is left out, and counted: no number, a rate or a speed beyond any, a stamp that there
+    /// was already, one of a scan that is gone, or one far ahead of the radar's.
     pub fn add(&mut self, sample: &Sample) {
-        let sample = self.config.on_radar(sample);
+        let sample = self.sensor.on_radar(sample);
         let place = self
             .samples
             .partition_point(|it| it.stamp_ns < sample.stamp_ns);
@@ -80,6 +100,10 @@ mod tests {
 
     const MS: i64 = 1_000_000;
 
+    fn of_gyro(config: GyroConfig) -> LiveSamples {
+        LiveSamples::new(LiveSensor::Gyro(config))
+    }
+
     fn stamps(samples: &[Sample]) -> Vec<i64> {
         samples.iter().map(|it| it.stamp_ns / MS).collect()
     }
@@ -88,7 +112,7 @@ mod tests {
         /// Whatever the order of arrival, each scan has the samples of its interval.
         #[test]
         fn stamps_alone_decide(order in Just((1..=50i64).collect::<Vec<_>>()).prop_shuffle()) {
-            let mut live = LiveSamples::new(&GyroConfig::default());
+            let mut live = of_gyro(GyroConfig::default());
             order.iter().for_each(|ms| live.add(&Sample::yaw_rate(10 * ms * MS, 0.1)));
             for sweep in [[5 * MS, 255 * MS], [255 * MS, 505 * MS]] {
                 let [after, until] = interval_of(sweep).map(|ns| ns / MS);
@@ -103,7 +127,7 @@ mod tests {
 
     #[test]
     fn what_cannot_be_used_is_left_out_and_counted() {
-        let mut live = LiveSamples::new(&GyroConfig::default());
+        let mut live = of_gyro(GyroConfig::default());
         live.of_scan([0, 100 * MS]);
         for (stamp_ns, rate) in [
             (100 * MS, 0.1),    // of the scan that is gone
@@ -124,7 +148,7 @@ mod tests {
 
     #[test]
     fn samples_are_put_on_the_radars_clock_and_axes() {
-        let mut live = LiveSamples::new(&GyroConfig {
+        let mut live = of_gyro(GyroConfig {
             late_s: 0.1,
             up: crate::UpAxis::MinusZ,
             ..GyroConfig::default()
@@ -132,5 +156,20 @@ mod tests {
         live.add(&Sample::yaw_rate(200 * MS, -0.5));
         let (samples, _) = live.of_scan([0, 100 * MS]);
         assert_eq!(samples, [Sample::yaw_rate(100 * MS, 0.5)]);
+    }
+
+    #[test]
+    fn speeds_are_put_on_the_radars_clock_and_scaled() {
+        let mut live = LiveSamples::new(LiveSensor::Wheels(WheelsConfig {
+            late_s: 0.1,
+            scale: 1.02,
+            ..WheelsConfig::default()
+        }));
+        for speed in [10.0, f64::INFINITY, 1e3] {
+            live.add(&Sample::speed(200 * MS, speed));
+        }
+        let (samples, left_out) = live.of_scan([0, 100 * MS]);
+        assert_eq!(samples, [Sample::speed(100 * MS, 10.2)]);
+        assert_eq!(left_out, 2);
     }
 }

@@ -20,6 +20,11 @@ pub struct WheelsConfig {
     /// The log, for `kind = "log"`: a table as CSV whose first row names its columns.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
+    /// The address and port at which datagrams of live wheels are received: lines of a stamp (ns
+    /// since 1970) and the speed (m/s), with a comma between.
+    pub listen: String,
+    /// Longest time for which a scan of a live radar waits for its samples, ms.
+    pub max_wait_ms: f64,
     /// Time by which the stamps of the speed are late against the radar's, s: it is taken off them.
     pub late_s: f64,
     /// Distance by which the radar is ahead of the axle that does not steer, m.
@@ -53,6 +58,8 @@ pub enum WheelsKind {
     Auto,
     /// The log that `file` names.
     Log,
+    /// Of a live radar: what arrives in datagrams at `listen`.
+    Udp,
 }
 
 impl Default for WheelsConfig {
@@ -60,6 +67,8 @@ impl Default for WheelsConfig {
         Self {
             kind: WheelsKind::None,
             file: None,
+            listen: "127.0.0.1:6322".to_owned(),
+            max_wait_ms: 20.0,
             late_s: 0.0,
             radar_ahead_m: 0.0,
             scale: 1.0,
@@ -79,6 +88,11 @@ impl WheelsConfig {
         self.kind != WheelsKind::None
     }
 
+    /// Returns whether the wheels are live: their samples arrive while the radar is received.
+    pub fn is_live(&self) -> bool {
+        self.kind == WheelsKind::Udp
+    }
+
     /// Takes a sample over to the radar's clock: the delay is taken off its stamp, and the scale is
     /// applied.
     pub fn on_radar(&self, sample: &Sample) -> Sample {
@@ -94,6 +108,7 @@ impl WheelsConfig {
     pub fn validate(&self) -> Result<(), SampleConfigError> {
         let bounds = Bounds("wheels");
         bounds.late_s(self.late_s)?;
+        bounds.max_wait_ms(self.max_wait_ms)?;
         let expected = "metres, -10 to 10";
         bounds.within("radar_ahead_m", self.radar_ahead_m, [-10.0, 10.0], expected)?;
         bounds.scale([self.scale, self.scale_sigma])?;

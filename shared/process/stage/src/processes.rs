@@ -7,11 +7,11 @@ use std::{fs, str::FromStr};
 pub struct ProcessStat {
     /// The process.
     pub pid: u32,
-    /// Its parent.
+    /// The parent.
     pub parent: u32,
-    /// Its process group.
+    /// The process group.
     pub group: u32,
-    /// Whether it has ended, and nobody has waited for it yet.
+    /// True if it has ended, and nobody has waited for it yet.
     pub has_ended: bool,
     /// Processor time of all threads, s.
     pub cpu_s: f64,

@@ -3,7 +3,7 @@
 
 mod attempts;
 mod credit;
-mod live_gyro;
+mod live_samples;
 mod pace;
 mod playback;
 mod player;

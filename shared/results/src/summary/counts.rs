@@ -7,6 +7,13 @@ use serde::Serialize;
 /// scan too often for the trajectory to be the recording's.
 const MAX_UNREADABLE_SHARE: f64 = 0.2;
 
+/// Largest share of turns of a gyro that is refused, and of distances of wheels that slip, in a run
+/// that succeeds: beyond, the log is another one than its settings say. Fewer than the number say
+/// nothing.
+const MAX_REFUSED_SHARE: f64 = 0.1;
+const MAX_SLIPPING_SHARE: f64 = 0.5;
+const MIN_CONTRADICTIONS: u64 = 10;
+
 /// Motions from which the radar's period is taken, so that longer runs take no more memory.
 const MOTIONS_OF_PERIOD: usize = 1 << 16;
 
@@ -170,11 +177,29 @@ impl MotionCounts {
 }
 
 impl Counts {
+    /// Returns the counts of a gyro that contradicts the radar so often that its settings must be
+    /// wrong.
+    pub fn gyro_contradicts(&self) -> Option<&GyroCounts> {
+        let gyro = self.gyro.as_ref();
+        gyro.filter(|it| too_many(it.refused, it.motions, MAX_REFUSED_SHARE))
+    }
+
+    /// Returns the counts of wheels that contradict the radar so often that their settings must be
+    /// wrong.
+    pub fn wheels_contradict(&self) -> Option<&WheelCounts> {
+        let wheels = self.wheels.as_ref();
+        wheels.filter(|it| too_many(it.slips, it.motions, MAX_SLIPPING_SHARE))
+    }
+
     /// Returns whether the result is hardly one of the recording.
     pub fn too_many_are_unreadable(&self) -> bool {
         let read = self.published + self.unreadable;
         self.unreadable as f64 > MAX_UNREADABLE_SHARE * read as f64
     }
+}
+
+fn too_many(contradictions: u64, motions: u64, max_share: f64) -> bool {
+    contradictions >= MIN_CONTRADICTIONS && contradictions as f64 > max_share * motions as f64
 }
 
 /// Counts the poses of a journal.

@@ -107,6 +107,14 @@ impl Summary {
                 motions.predicted,
                 "motions predicted, since nothing matched",
             ),
+            (
+                c.gyro.map_or(0, |gyro| gyro.refused),
+                "turns of the gyro refused",
+            ),
+            (
+                c.wheels.map_or(0, |wheels| wheels.slips),
+                "distances of slipping wheels",
+            ),
             (restarts, "restarts of processes"),
         ];
         let counts = counts.iter().filter(|(count, _)| *count > 0);
@@ -144,7 +152,10 @@ mod tests {
     use gyre_latency::{Latency, Percentiles};
 
     use super::*;
-    use crate::summary::{Counts, Course, Measured, MotionCounts, Session};
+    use crate::summary::{
+        Counts, Course, Measured, MotionCounts, Session,
+        counts::{GyroCounts, WheelCounts},
+    };
 
     fn summary(rate: &str, counts: Counts, p99_us: f64) -> Summary {
         let configuration = Configuration::of_overrides(&[format!("run.rate='{rate}'")]).unwrap();
@@ -215,6 +226,33 @@ look at     gyre report out/radiate --open; all figures:
             "{text}"
         );
         assert!(text.lines().all(|line| line.chars().count() <= WIDTH));
+    }
+
+    #[test]
+    fn a_gyro_or_wheels_that_contradict_the_radar_throughout_are_a_problem() {
+        let problem = |refused, slips| {
+            let gyro = GyroCounts {
+                motions: 400,
+                refused,
+                ..GyroCounts::default()
+            };
+            let wheels = WheelCounts {
+                motions: 400,
+                slips,
+                ..WheelCounts::default()
+            };
+            let counts = Counts {
+                processed: 466,
+                gyro: Some(gyro),
+                wheels: Some(wheels),
+                ..Counts::default()
+            };
+            let summary = summary("max", counts, 1e6);
+            summary.problem().map(ToString::to_string)
+        };
+        assert_eq!(problem(40, 200), None);
+        assert!(problem(41, 0).unwrap().contains("41 of its 400 turns"));
+        assert!(problem(0, 201).unwrap().contains("201 of their 400"));
     }
 
     #[test]

@@ -36,8 +36,8 @@ impl Default for Excerpt {
     }
 }
 
-/// Reads a trajectory of any format that [`gyre_datasets::read_trajectory`] knows and returns a path
-/// along it, in the frame of the excerpt's first pose.
+/// Reads a trajectory of any format that [`gyre_datasets::read_trajectory`] knows and returns a
+/// path along it, in the frame of the excerpt's first pose.
 ///
 /// The path passes within 5 cm of 95 % of a real drive's poses and within 10 cm of 99 %; the rest
 /// is noise of the poses.

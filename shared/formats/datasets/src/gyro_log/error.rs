@@ -32,11 +32,12 @@ pub enum LogError {
         /// The log.
         path: PathBuf,
     },
-    /// A live gyro beside scans of a recording.
+    /// A live sensor beside scans of a recording.
     #[error(
-        "gyro.kind is that of a live gyro, but the scans are of a recording: set gyro.kind to `auto`, `log` or `none`"
+        "{}.kind is that of a live sensor, but the scans are of a recording: set it to `auto`, `log` or `none`",
+        .0.section()
     )]
-    Live,
+    Live(SampleKind),
     /// A file that cannot be read.
     #[error("cannot read the log of the {} {path}: {source}", of.section())]
     Io {

@@ -3,7 +3,9 @@
 use std::fmt;
 use std::path::Path;
 
-use super::{Chirps, GroundTruthReport, GyroReport, Report, TimingReport};
+use super::{
+    Chirps, GnssReport, GroundTruthReport, GyroReport, LogTimes, Report, TimingReport, WheelReport,
+};
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -56,6 +58,12 @@ impl fmt::Display for Report {
         }
         if let Some(gyro) = &self.gyro {
             gyro_lines(f, gyro, &self.root)?;
+        }
+        if let Some(wheels) = &self.wheels {
+            wheel_lines(f, wheels, &self.root)?;
+        }
+        if let Some(gnss) = &self.gnss {
+            gnss_lines(f, gnss, &self.root)?;
         }
         writeln!(f, "findings")?;
         self.findings
@@ -176,24 +184,7 @@ fn gyro_lines(f: &mut fmt::Formatter<'_>, gyro: &GyroReport, root: &Path) -> fmt
     if gyro.error.is_some() {
         return line(f, "gyro", format_args!("{name}: cannot be used"));
     }
-    let (samples, rate_hz) = (gyro.samples, gyro.rate_hz);
-    let missing = gyro.missing * 100.0;
-    line(
-        f,
-        "gyro",
-        format_args!("{name}: {samples} samples of {rate_hz:.1} Hz, {missing:.1} % missing"),
-    )?;
-    if let (Some([first, last]), Some([before, after])) = (gyro.span_ns, gyro.after_scans_s) {
-        let seconds = (last - first) as f64 * 1e-9;
-        let jitter_ms = gyro.jitter_s * 1e3;
-        line(
-            f,
-            "gyro stamps",
-            format_args!(
-                "{seconds:.1} s, from {before:+.2} s of the first scan to {after:+.2} s of the last, jitter {jitter_ms:.1} ms RMS"
-            ),
-        )?;
-    }
+    log_lines(f, "gyro", format_args!("{name}: "), "samples", &gyro.times)?;
     if let Some(quiet) = &gyro.quiet {
         let [mean, sigma] = [quiet.mean_degps, quiet.sigma_degps]
             .map(|[x, y, z]| format!("{x:.3}, {y:.3}, {z:.3}"));
@@ -207,4 +198,55 @@ fn gyro_lines(f: &mut fmt::Formatter<'_>, gyro: &GyroReport, root: &Path) -> fmt
         )?;
     }
     Ok(())
+}
+
+fn wheel_lines(f: &mut fmt::Formatter<'_>, wheels: &WheelReport, root: &Path) -> fmt::Result {
+    let file = &wheels.file;
+    let name = file.strip_prefix(root).unwrap_or(file).display();
+    if wheels.error.is_some() {
+        return line(f, "wheels", format_args!("{name}: cannot be used"));
+    }
+    let (path_m, fastest_mps) = (wheels.path_m, wheels.fastest_mps);
+    let driven = format_args!("{name}: {path_m:.0} m at up to {fastest_mps:.1} m/s, ");
+    log_lines(f, "wheels", driven, "samples", &wheels.times)
+}
+
+fn gnss_lines(f: &mut fmt::Formatter<'_>, gnss: &GnssReport, root: &Path) -> fmt::Result {
+    let name = gnss.file.strip_prefix(root).unwrap_or(&gnss.file).display();
+    if gnss.error.is_some() {
+        return line(f, "gnss", format_args!("{name}: cannot be used"));
+    }
+    let sigma = gnss.sigma_m.map_or("no accuracy stated".to_owned(), |m| {
+        format!("standard deviation {m:.2} m as stated")
+    });
+    let reach_m = gnss.reach_m;
+    let places = format_args!("{name}: up to {reach_m:.0} m from the first, {sigma}, ");
+    log_lines(f, "gnss", places, "fixes", &gnss.times)
+}
+
+/// Writes what a log has, how often, and when.
+fn log_lines(
+    f: &mut fmt::Formatter<'_>,
+    name: &str,
+    what: fmt::Arguments<'_>,
+    samples: &str,
+    times: &LogTimes,
+) -> fmt::Result {
+    let (count, rate_hz, missing) = (times.samples, times.rate_hz, times.missing * 100.0);
+    line(
+        f,
+        name,
+        format_args!("{what}{count} {samples} of {rate_hz:.1} Hz, {missing:.1} % missing"),
+    )?;
+    let (Some([first, last]), Some([before, after])) = (times.span_ns, times.after_scans_s) else {
+        return Ok(());
+    };
+    let (seconds, jitter_ms) = ((last - first) as f64 * 1e-9, times.jitter_s * 1e3);
+    line(
+        f,
+        &format!("{name} stamps"),
+        format_args!(
+            "{seconds:.1} s, from {before:+.2} s of the first scan to {after:+.2} s of the last, jitter {jitter_ms:.1} ms RMS"
+        ),
+    )
 }

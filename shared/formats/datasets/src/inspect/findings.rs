@@ -1,6 +1,10 @@
 //! Faults of a dataset, in sentences.
 
-use super::{Chirps, GroundTruthReport, GyroReport, Report, TimingReport};
+use std::path::Path;
+
+use super::{
+    Chirps, GnssReport, GroundTruthReport, GyroReport, LogTimes, Report, TimingReport, WheelReport,
+};
 use crate::dataset::{DatasetOptions, Format};
 use gyre_radar::MAX_OFFSET_S;
 
@@ -31,15 +35,14 @@ pub(super) fn list(report: &Report, notes: &[String], options: &DatasetOptions) 
         ),
     }
     found.extend(report.gyro.iter().flat_map(gyro));
+    found.extend(report.wheels.iter().flat_map(wheels));
+    found.extend(report.gnss.iter().flat_map(gnss));
     found
 }
 
 fn gyro(report: &GyroReport) -> Vec<String> {
-    let name = report.file.file_name().unwrap_or_default().display();
     if let Some(error) = &report.error {
-        return vec![format!(
-            "The log of a gyro, {name}, cannot be used: {error}."
-        )];
+        return vec![unusable("a gyro", &report.file, error)];
     }
     let faults = report.faults.sentences().into_iter();
     let mut found: Vec<String> = faults.map(|it| format!("Gyro: {it}")).collect();
@@ -48,17 +51,65 @@ fn gyro(report: &GyroReport) -> Vec<String> {
             .up_by_gravity
             .map(|up| format!("Gyro: by gravity its axis {} points up.", up.name())),
     );
-    let covers = report
-        .after_scans_s
-        .map(|[first_s, last_s]| first_s <= 0.0 && last_s >= 0.0);
-    let clocks = match covers {
-        Some(false) => ", whose stamps do not cover those of the scans",
-        _ => "",
-    };
+    let name = report.file.file_name().unwrap_or_default().display();
+    let clocks = of_clocks(&report.times);
     found.push(format!(
         "The log of a gyro, {name}{clocks}, lies beside the scans: `gyre calibrate` finds its axis and how late its clock is, and gyro.kind = \"auto\" uses it."
     ));
     found
+}
+
+fn wheels(report: &WheelReport) -> Vec<String> {
+    if let Some(error) = &report.error {
+        return vec![unusable("the wheels", &report.file, error)];
+    }
+    let faults = report.faults.sentences().into_iter();
+    let mut found: Vec<String> = faults.map(|it| format!("Wheels: {it}")).collect();
+    let name = report.file.file_name().unwrap_or_default().display();
+    let clocks = of_clocks(&report.times);
+    found.push(format!(
+        "The log of the wheels, {name}{clocks}, lies beside the scans: wheels.kind = \"auto\" uses it."
+    ));
+    found
+}
+
+fn gnss(report: &GnssReport) -> Vec<String> {
+    if let Some(error) = &report.error {
+        return vec![unusable("a GNSS receiver", &report.file, error)];
+    }
+    let faults = report.faults.named().into_iter();
+    let faults: Vec<String> = faults
+        .map(|(count, what)| format!("{count} {what}"))
+        .collect();
+    let faults = (!faults.is_empty()).then(|| {
+        format!(
+            "GNSS: rows of its log that are left out, or sorted: {}.",
+            faults.join(", ")
+        )
+    });
+    let name = report.file.file_name().unwrap_or_default().display();
+    let clocks = of_clocks(&report.times);
+    let place = match report.on_the_earth {
+        true => "",
+        false => " Its plane is its own: the map has no place on the earth by it.",
+    };
+    let found = format!(
+        "The log of a GNSS receiver, {name}{clocks}, lies beside the scans: with slam.kind = \"graph\", gnss.kind = \"auto\" uses it.{place}"
+    );
+    faults.into_iter().chain([found]).collect()
+}
+
+fn unusable(of: &str, file: &Path, error: &str) -> String {
+    let name = file.file_name().unwrap_or_default().display();
+    format!("The log of {of}, {name}, cannot be used: {error}.")
+}
+
+/// Says it where the stamps of a log do not cover those of the scans.
+fn of_clocks(times: &LogTimes) -> &'static str {
+    match times.cover_scans() {
+        true => "",
+        false => ", whose stamps do not cover those of the scans",
+    }
 }
 
 fn resolution(report: &Report, options: &DatasetOptions) -> Option<String> {

@@ -5,9 +5,8 @@ use std::path::{Path, PathBuf};
 use gyre_samples::{Sample, UpAxis};
 use serde::Serialize;
 
-use super::TimingReport;
+use super::{LogTimes, TimingReport};
 use crate::gyro_log::{GyroLog, LogError, LogFaults};
-use gyre_radar::median;
 
 /// Time in which the gyro is looked at where it turns least, s.
 const QUIET_S: f64 = 5.0;
@@ -24,18 +23,9 @@ pub struct GyroReport {
     pub file: PathBuf,
     /// Why it cannot be used; the fields below are empty then.
     pub error: Option<String>,
-    /// Number of samples that can be used.
-    pub samples: usize,
-    /// Median rate, Hz.
-    pub rate_hz: f64,
-    /// RMS deviation of the time between samples from its median, s, without gaps.
-    pub jitter_s: f64,
-    /// First and last stamp, ns, on the log's own clock.
-    pub span_ns: Option<[i64; 2]>,
-    /// Samples that are missing between them, share of all.
-    pub missing: f64,
-    /// First and last stamp against those of the scans, s.
-    pub after_scans_s: Option<[f64; 2]>,
+    /// The stamps.
+    #[serde(flatten)]
+    pub times: LogTimes,
     /// The time in which the rates vary least: the bias and the noise, if the vehicle stood.
     pub quiet: Option<QuietReport>,
     /// The axis that points up, if the accelerations have gravity.
@@ -76,33 +66,15 @@ fn examine_file(file: &Path, timing: Option<&TimingReport>) -> GyroReport {
         Err(error) => return GyroReport::of(file, Some(error.to_string())),
     };
     let samples = &log.samples[..];
-    let steps_s: Vec<f64> = samples
-        .windows(2)
-        .map(|pair| apart_s(&pair[0], &pair[1]))
-        .collect();
-    let period_s = median(steps_s.iter().copied()).unwrap_or_default();
-    let regular = steps_s.iter().map(|step_s| step_s - period_s);
-    let regular: Vec<f64> = regular.filter(|apart_s| *apart_s < period_s).collect();
-    let squares: f64 = regular.iter().map(|apart_s| apart_s * apart_s).sum();
-    let span = samples.first().zip(samples.last());
-    let slots = span.map_or(0.0, |(first, last)| {
-        apart_s(first, last) / period_s.max(1e-9) + 1.0
-    });
+    let stamps: Vec<i64> = samples.iter().map(|sample| sample.stamp_ns).collect();
+    let times = LogTimes::of(&stamps, timing);
+    let period_s = if times.rate_hz > 0.0 {
+        1.0 / times.rate_hz
+    } else {
+        0.0
+    };
     GyroReport {
-        samples: samples.len(),
-        rate_hz: if period_s > 0.0 { 1.0 / period_s } else { 0.0 },
-        jitter_s: (squares / regular.len().max(1) as f64).sqrt(),
-        span_ns: span.map(|(first, last)| [first.stamp_ns, last.stamp_ns]),
-        missing: (1.0 - samples.len() as f64 / slots.max(1.0)).max(0.0),
-        after_scans_s: span.zip(timing).map(|((first, last), timing)| {
-            let after = |stamp_ns: i64, scan_ns: i64| {
-                (i128::from(stamp_ns) - i128::from(scan_ns)) as f64 * 1e-9
-            };
-            [
-                after(first.stamp_ns, timing.first_ns),
-                after(last.stamp_ns, timing.last_ns),
-            ]
-        }),
+        times,
         quiet: quiet(samples, period_s),
         up_by_gravity: up_by_gravity(samples),
         faults: log.faults.clone(),
@@ -115,12 +87,7 @@ impl GyroReport {
         Self {
             file: file.to_owned(),
             error,
-            samples: 0,
-            rate_hz: 0.0,
-            jitter_s: 0.0,
-            span_ns: None,
-            missing: 0.0,
-            after_scans_s: None,
+            times: LogTimes::default(),
             quiet: None,
             up_by_gravity: None,
             faults: LogFaults::default(),

@@ -8,7 +8,7 @@ use gyre_samples::Sample;
 
 use super::{
     Credit,
-    live_gyro::LiveGyro,
+    live_samples::LiveSensors,
     position::Position,
     received::{self, Received, ReceivedWriter},
 };
@@ -22,8 +22,8 @@ use crate::{
 /// Time for which the supervisor need not intervene: this loop says again and again that it is not
 /// late, since a radar that is switched off is no reason to restart it.
 pub(crate) const ALIVE_NS: i64 = 5_000_000_000;
-/// Time between two looks for samples of a gyro that comes with the sensor.
-const GYRO_POLL: Duration = Duration::from_millis(2);
+/// Time between two looks for samples that have arrived elsewhere than at the first socket.
+const SAMPLE_POLL: Duration = Duration::from_millis(2);
 /// Time between two such words, ns: it wakes many times for each scan, and a word is a write to a
 /// file.
 const SAID_EVERY_NS: i64 = 1_000_000_000;
@@ -94,7 +94,7 @@ pub fn run_sensor(
         schedule: ScheduleWriter::resume(&launch.manifest)?,
         scans: Writer::open(&launch.node, &launch.manifest)?,
         counters: StageCounters::default(),
-        gyro: LiveGyro::open(launch)?,
+        live: LiveSensors::open(launch)?,
         said_ns: 0,
     };
     if let Some(start) = stream.wait_for_start()? {
@@ -113,7 +113,7 @@ struct Stream<'a> {
     scans: Writer<Scan>,
     counters: StageCounters,
     received: ReceivedWriter,
-    gyro: Option<LiveGyro>,
+    live: Option<LiveSensors>,
     /// When the supervisor was last told that this process is alive, `CLOCK_MONOTONIC`, ns.
     said_ns: i64,
 }
@@ -214,23 +214,23 @@ impl Stream<'_> {
         sensor: &mut S,
         draft: &mut Draft<Scan>,
     ) -> Result<bool, StageError> {
-        let Some(mut gyro) = self.gyro.take() else {
+        let Some(mut live) = self.live.take() else {
             return Ok(true);
         };
-        let until_ns = clock::now_ns() + gyro.max_wait().as_nanos() as i64;
+        let until_ns = clock::now_ns() + live.max_wait().as_nanos() as i64;
         loop {
-            gyro.receive(sensor)?;
+            live.receive(sensor)?;
             let left = clock::until(until_ns);
-            if gyro.covers(draft.header()) || left.is_zero() {
+            if live.cover(draft.header()) || left.is_zero() {
                 break;
             }
-            if self.sleep(gyro.socket(), left.min(GYRO_POLL))? {
+            if self.sleep(live.socket(), left.min(SAMPLE_POLL))? {
                 return Ok(false);
             }
         }
         let (header, bytes) = draft.parts();
-        gyro.store(header, bytes);
-        self.gyro = Some(gyro);
+        live.store(header, bytes);
+        self.live = Some(live);
         Ok(true)
     }
 

@@ -1,0 +1,59 @@
+//! The log of a GNSS receiver beside the scans.
+
+use std::path::{Path, PathBuf};
+
+use gyre_radar::median;
+use serde::Serialize;
+
+use super::{LogTimes, TimingReport};
+use crate::{GnssFaults, GnssLog};
+
+/// Summary of the log of a GNSS receiver.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct GnssReport {
+    /// The log.
+    pub file: PathBuf,
+    /// Why it cannot be used; the fields below are empty then.
+    pub error: Option<String>,
+    /// The stamps.
+    #[serde(flatten)]
+    pub times: LogTimes,
+    /// True if the fixes are places on the earth, and not in a plane of their own.
+    pub on_the_earth: bool,
+    /// The longest distance of a fix from the first one, m.
+    pub reach_m: f64,
+    /// Median of the standard deviations that the log states, m; `None` where it has none.
+    pub sigma_m: Option<f64>,
+    /// Faults of the fixes.
+    pub faults: GnssFaults,
+}
+
+/// Examines the log beside the scans; `None` if there is none.
+pub(super) fn examine(root: &Path, timing: Option<&TimingReport>) -> Option<GnssReport> {
+    let file = GnssLog::find(root).ok()?;
+    let log = match GnssLog::read(&file) {
+        Ok(log) => log,
+        Err(error) => {
+            return Some(GnssReport {
+                file,
+                error: Some(error.to_string()),
+                ..GnssReport::default()
+            });
+        }
+    };
+    let stamps: Vec<i64> = log.fixes.iter().map(|fix| fix.stamp_ns).collect();
+    let [east_m, north_m] = log.fixes.first().map_or([0.0; 2], |fix| fix.east_north_m);
+    let from_first = log.fixes.iter().map(|fix| {
+        let [east, north] = fix.east_north_m;
+        (east - east_m).hypot(north - north_m)
+    });
+    Some(GnssReport {
+        file,
+        error: None,
+        times: LogTimes::of(&stamps, timing),
+        on_the_earth: log.plane.is_some(),
+        reach_m: from_first.fold(0.0, f64::max),
+        sigma_m: median(log.fixes.iter().filter_map(|fix| fix.sigma_m)),
+        faults: log.faults,
+    })
+}

@@ -1,0 +1,263 @@
+//! The samples of a live gyro and of live wheels: what arrives in datagrams, or comes with the
+//! radar, is handed over with the scan that it belongs to.
+
+use std::{
+    io::ErrorKind,
+    net::UdpSocket,
+    os::fd::{AsFd, BorrowedFd},
+    str::FromStr,
+    time::Duration,
+};
+
+use gyre_messages::ScanHeader;
+use gyre_samples::{GyroConfig, GyroKind, LiveSamples, LiveSensor, Sample, WheelsConfig};
+
+use super::Sensor;
+use crate::{Launch, StageError};
+
+/// The largest datagram, bytes: that of UDP.
+const MAX_DATAGRAM: usize = 65_536;
+
+/// The live sensors beside a radar.
+pub(super) struct LiveSensors {
+    gyro: Option<Live>,
+    wheels: Option<Live>,
+    datagram: Vec<u8>,
+    /// The samples of the last scan.
+    of_scan: Vec<Sample>,
+    max_wait: Duration,
+    /// Samples that were left out so far, and the number at which that is said next.
+    left_out: usize,
+    said_at: usize,
+}
+
+/// A live sensor.
+struct Live {
+    samples: LiveSamples,
+    socket: Option<UdpSocket>,
+    /// Parses a line of a datagram.
+    parse: fn(&str) -> Option<Sample>,
+    /// Lines of datagrams that are no samples.
+    unreadable: usize,
+}
+
+impl LiveSensors {
+    /// Opens those of the sections `[gyro]` and `[wheels]`; `None` without one.
+    ///
+    /// # Errors
+    /// An address at which nothing can be received.
+    pub fn open(launch: &Launch) -> Result<Option<Self>, StageError> {
+        let (gyro, wheels): (GyroConfig, WheelsConfig) =
+            (launch.section("gyro")?, launch.section("wheels")?);
+        let waits_ms = [
+            gyro.is_live().then_some(gyro.max_wait_ms),
+            wheels.is_live().then_some(wheels.max_wait_ms),
+        ];
+        let Some(max_wait_ms) = waits_ms.into_iter().flatten().reduce(f64::max) else {
+            return Ok(None);
+        };
+        Ok(Some(Self {
+            gyro: match gyro.is_live() {
+                true => Some(Live {
+                    socket: match gyro.kind {
+                        GyroKind::Udp => Some(listen("gyro", &gyro.listen)?),
+                        _ => None,
+                    },
+                    samples: LiveSamples::new(LiveSensor::Gyro(gyro)),
+                    parse: rates,
+                    unreadable: 0,
+                }),
+                false => None,
+            },
+            wheels: match wheels.is_live() {
+                true => Some(Live {
+                    socket: Some(listen("wheels", &wheels.listen)?),
+                    samples: LiveSamples::new(LiveSensor::Wheels(wheels)),
+                    parse: speed,
+                    unreadable: 0,
+                }),
+                false => None,
+            },
+            datagram: vec![0; MAX_DATAGRAM],
+            of_scan: Vec::new(),
+            max_wait: Duration::from_secs_f64(max_wait_ms * 1e-3),
+            left_out: 0,
+            said_at: 1,
+        }))
+    }
+
+    /// The longest time for which a scan waits for its samples.
+    pub fn max_wait(&self) -> Duration {
+        self.max_wait
+    }
+
+    /// The first socket to wait for, if there is one.
+    pub fn socket(&self) -> Option<BorrowedFd<'_>> {
+        let mut sockets = self.all().filter_map(|live| live.socket.as_ref());
+        sockets.next().map(AsFd::as_fd)
+    }
+
+    /// Takes what has arrived.
+    ///
+    /// # Errors
+    /// A socket fails.
+    pub fn receive(&mut self, radar: &mut impl Sensor) -> Result<(), StageError> {
+        while let Some(sample) = radar.gyro_sample() {
+            if let Some(gyro) = &mut self.gyro {
+                gyro.samples.add(&sample);
+            }
+        }
+        let mut sensors = [&mut self.gyro, &mut self.wheels].into_iter().flatten();
+        sensors.try_for_each(|live| live.receive(&mut self.datagram))
+    }
+
+    /// Returns whether a complete scan has all its samples.
+    pub fn cover(&self, header: &ScanHeader) -> bool {
+        let until_ns = header.span_ns()[1];
+        self.all().all(|live| live.samples.cover(until_ns))
+    }
+
+    /// Stores the samples of a complete scan behind its powers.
+    pub fn store(&mut self, header: &mut ScanHeader, bytes: &mut [u8]) {
+        self.of_scan.clear();
+        let mut left_out = 0;
+        for live in [&mut self.gyro, &mut self.wheels].into_iter().flatten() {
+            let (samples, of_sensor) = live.samples.of_scan(header.span_ns());
+            self.of_scan.extend_from_slice(samples);
+            left_out += of_sensor + std::mem::take(&mut live.unreadable);
+        }
+        self.of_scan.sort_unstable_by_key(Sample::order);
+        header.set_samples(bytes, &self.of_scan, left_out);
+        self.left_out += left_out;
+        if self.left_out >= self.said_at {
+            let so_far = self.left_out;
+            tracing::warn!(
+                so_far,
+                "samples of the gyro or of the wheels are late or unusable, and left out"
+            );
+            self.said_at = 2 * so_far;
+        }
+    }
+
+    fn all(&self) -> impl Iterator<Item = &Live> {
+        [&self.gyro, &self.wheels].into_iter().flatten()
+    }
+}
+
+impl Live {
+    fn receive(&mut self, datagram: &mut [u8]) -> Result<(), StageError> {
+        let Some(socket) = &self.socket else {
+            return Ok(());
+        };
+        loop {
+            match socket.recv(datagram) {
+                Ok(bytes) => {
+                    for sample in samples_in(&datagram[..bytes], self.parse) {
+                        match sample {
+                            Some(sample) => self.samples.add(&sample),
+                            None => self.unreadable += 1,
+                        }
+                    }
+                }
+                Err(error) if error.kind() == ErrorKind::WouldBlock => return Ok(()),
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Err(error) => return Err(StageError::transport("receive samples", error)),
+            }
+        }
+    }
+}
+
+/// Opens the socket of a section.
+fn listen(section: &str, address: &str) -> Result<UdpSocket, StageError> {
+    let bound = UdpSocket::bind(address);
+    let opened = bound.and_then(|socket| socket.set_nonblocking(true).map(|()| socket));
+    opened.map_err(|error| {
+        StageError::Input(format!(
+            "cannot receive the {section} at {address} ({section}.listen): {error}"
+        ))
+    })
+}
+
+/// Returns the samples of a datagram, line by line; `None` for one that is no sample.
+fn samples_in(
+    datagram: &[u8],
+    parse: fn(&str) -> Option<Sample>,
+) -> impl Iterator<Item = Option<Sample>> {
+    let text = str::from_utf8(datagram).unwrap_or("not text");
+    text.lines().map(parse)
+}
+
+/// Parses a sample of a gyro: a stamp, ns, and the rates about x, y and z, rad/s; then, if they are
+/// measured, the accelerations, m/s².
+fn rates(line: &str) -> Option<Sample> {
+    let (stamp_ns, rest) = line.trim().split_once(',')?;
+    let mut sample = Sample::yaw_rate(stamp_ns.trim().parse().ok()?, 0.0);
+    let values: Result<Vec<f64>, _> = rest.split(',').map(|it| f64::from_str(it.trim())).collect();
+    let values = values.ok()?;
+    let is_whole = matches!(values.len(), 3 | 6);
+    sample.values[..values.len().min(6)].copy_from_slice(values.get(..values.len().min(6))?);
+    is_whole.then_some(sample)
+}
+
+/// Parses a sample of the wheels: a stamp, ns, and the speed, m/s.
+fn speed(line: &str) -> Option<Sample> {
+    let (stamp_ns, speed_mps) = line.trim().split_once(',')?;
+    Some(Sample::speed(
+        stamp_ns.trim().parse().ok()?,
+        speed_mps.trim().parse().ok()?,
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_datagram_has_a_sample_in_each_line() {
+        let text = b"1700000000000000001, 0.1,-0.2,0.3\n1700000000000000002,0,0,1e-3,0.5,0,9.8\n";
+        let found: Vec<_> = samples_in(text, rates).collect();
+        let expected = |stamp_ns, values| {
+            Some(Sample {
+                stamp_ns,
+                values,
+                ..Sample::yaw_rate(0, 0.0)
+            })
+        };
+        let [first, second] = [1, 2].map(|ns| 1_700_000_000_000_000_000 + ns);
+        assert_eq!(
+            found,
+            [
+                expected(first, [0.1, -0.2, 0.3, 0.0, 0.0, 0.0]),
+                expected(second, [0.0, 0.0, 1e-3, 0.5, 0.0, 9.8]),
+            ]
+        );
+    }
+
+    #[test]
+    fn what_is_no_sample_is_told() {
+        for text in [
+            &b"hello"[..],
+            b"1700000000000000001",
+            b"1700000000.5,0,0,0",
+            b"1700000000000000001,0,0",
+            b"1700000000000000001,0,0,0,1",
+            b"1700000000000000001,0,0,0,1,2,3,4",
+            b"1700000000000000001,0,x,0",
+            b"\xff\xfe",
+        ] {
+            let found: Vec<_> = samples_in(text, rates).collect();
+            assert_eq!(found, [None], "{text:?}");
+        }
+        for text in [&b"hello"[..], b"17", b"17,x", b"1.5,3", b"17,3,4", b"\xff"] {
+            let found: Vec<_> = samples_in(text, speed).collect();
+            assert_eq!(found, [None], "{text:?}");
+        }
+    }
+
+    #[test]
+    fn a_line_of_the_wheels_has_a_stamp_and_a_speed() {
+        let found: Vec<_> = samples_in(b"1700000000000000001, 8.25\n17,-1\n", speed).collect();
+        let first = Sample::speed(1_700_000_000_000_000_001, 8.25);
+        assert_eq!(found, [Some(first), Some(Sample::speed(17, -1.0))]);
+    }
+}
