@@ -3,7 +3,7 @@
 
 use std::{
     io::{BufRead, BufReader},
-    path::Path,
+    path::{Path, PathBuf},
     process::{Child, Stdio},
 };
 
@@ -26,16 +26,16 @@ struct Driver {
 
 impl Driver {
     fn playing(recording: &Path, domain: &str, publishes: &str, options: &[&str]) -> Self {
-        Self::with_log(recording, domain, publishes, options, None)
+        Self::with_logs(recording, domain, publishes, options, &[])
     }
 
-    /// One beside which a gyro publishes what its log holds.
-    fn with_log(
+    /// One beside which a gyro and wheels publish what their logs hold.
+    fn with_logs(
         recording: &Path,
         domain: &str,
         publishes: &str,
         options: &[&str],
-        log: Option<&Path>,
+        logs: &[PathBuf],
     ) -> Self {
         let mut command = gyre();
         command.args(["radar-server", "--listen", "127.0.0.1:0", "--data"]);
@@ -52,7 +52,7 @@ impl Driver {
             .unwrap();
         let address = said.trim().rsplit(' ').next().unwrap();
         let mut arguments = vec![domain, address, publishes];
-        arguments.extend(log.and_then(Path::to_str));
+        arguments.extend(logs.iter().filter_map(|log| log.to_str()));
         let driver = Program::peer("driver.py", &arguments);
         Self {
             server,
@@ -141,25 +141,30 @@ fn assert_configuration_is_found(publishes: &str, topic: &str, domain: String) {
 }
 
 #[test]
-fn a_gyro_beside_the_driver_is_used() {
+fn a_gyro_and_wheels_beside_the_driver_are_used() {
     if !can_speak() {
         return;
     }
     let whole = with_log();
-    let log = whole.path().join("imu.csv");
+    let logs = ["imu.csv", "wheels.csv"].map(|log| whole.path().join(log));
     let domain = domain(9);
-    let _driver = Driver::with_log(whole.path(), &domain, "configured", &[], Some(&log));
+    let _driver = Driver::with_logs(whole.path(), &domain, "configured", &[], &logs);
     let run = receiving(with_constants(Run::small()), &domain, FFT_DATA, SCANS);
     let run = run.set("gyro.kind=ros2").set("gyro.max_wait_ms=200");
+    let run = run.set("wheels.kind=ros2");
     let live = run.complete();
-    let used = run.summary()["gyro"]["motions"].as_u64().unwrap_or(0) as usize;
+    let summary = run.summary();
+    let used = ["gyro", "wheels"].map(|of| summary[of]["motions"].as_u64().unwrap_or(0) as usize);
     assert!(
-        used > SCANS / 2,
-        "{used}: samples are sent once, and may be lost"
+        used.iter().all(|used| *used > SCANS / 2),
+        "{used:?}: samples are sent once, and may be lost"
     );
-    if used == SCANS - 1 {
+    if used == [SCANS - 1; 2] {
         let recorded = Run::small().data(whole.path()).set("gyro.kind=auto");
-        assert!(live == recorded.complete(), "{live}");
+        assert!(
+            live == recorded.set("wheels.kind=auto").complete(),
+            "{live}"
+        );
     }
 }
 

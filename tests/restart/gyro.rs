@@ -105,6 +105,34 @@ fn a_run_that_is_continued_has_the_same_result() {
 }
 
 #[test]
+#[ignore = "nightly: a hundred runs"]
+fn a_hundred_kills_of_any_process_change_no_byte() {
+    let undisturbed = undisturbed();
+    for kill in 0..100 {
+        let run = with_both().rate("6");
+        let mut running = run.start();
+        // Each process at one moment of the drive after the other.
+        let poses = 1 + kill * (recording::SCANS - 4) / 100;
+        running.await_poses(poses);
+        match STAGES.get(kill % (STAGES.len() + 1)) {
+            Some(stage) => {
+                running.kill(stage);
+                running.finish().succeeded();
+            }
+            None => {
+                running.kill_supervisor();
+                run.complete();
+            }
+        }
+        assert_eq!(
+            run.odometry(),
+            undisturbed,
+            "kill {kill}, after {poses} poses"
+        );
+    }
+}
+
+#[test]
 fn a_recording_holds_what_was_used_and_replays_to_the_same_bytes() {
     let run = recorded(&with_both()).set("run.window=32");
     run.complete();

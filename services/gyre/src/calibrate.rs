@@ -1,7 +1,8 @@
-//! `gyre calibrate`: finds the constants of a radar from drives alone, and the clock and the axes
-//! of a gyro beside it.
+//! `gyre calibrate`: finds the constants of a radar from drives alone, the clock and the axes of a
+//! gyro beside it, and the clock and the scale of the wheels.
 
 mod gyro;
+mod wheels;
 
 use std::{
     path::Path,
@@ -13,12 +14,13 @@ use gyre_calibration::{Configured, Drive, Found, Study, svg, toml};
 use gyre_configuration::{Configuration, Played, describe_masks_in_process};
 use gyre_datasets::DatasetOptions;
 use gyre_radar::{OwnedScan, SweepGeometry};
-use gyre_samples::GyroKind;
+use gyre_samples::{GyroKind, WheelsKind};
 use gyre_storage as storage;
 use gyre_terminal::{Failure, print};
 
 use crate::cli::CalibrateArguments;
-use gyro::{Gyro, Section};
+use gyro::Gyro;
+use wheels::Wheels;
 
 /// The section for the configuration.
 const SECTION: &str = "calibration.toml";
@@ -32,27 +34,29 @@ const EVERY: Duration = Duration::from_secs(5);
 /// # Errors
 /// A recording or a configuration that cannot be used, a drive that does not determine the
 /// constants, drives that are read with different ones, a file that cannot be written; a named log
-/// of a gyro that the drive does not tell.
+/// of a gyro or of wheels that the drive does not tell.
 pub fn calibrate(arguments: &CalibrateArguments) -> Result<ExitCode, Failure> {
     let started = Instant::now();
     let file = arguments.out.join(SECTION);
     storage::create_folder(&arguments.out)?;
     let drives = read_drives(arguments)?;
-    let logs = drives
-        .iter()
-        .filter_map(|it| Some((it.gyro.as_ref()?, &it.drive)));
-    let gyro = Section::of(logs.collect())?;
+    let logs = drives.iter();
+    let of_gyro = logs.filter_map(|it| Some((it.gyro.as_ref()?, &it.drive)));
+    let gyro = gyro::section(&of_gyro.collect::<Vec<_>>())?;
+    let logs = drives.iter();
+    let of_wheels = logs.filter_map(|it| Some((it.wheels.as_ref()?, &it.drive)));
+    let wheels = wheels::section(&of_wheels.collect::<Vec<_>>())?;
     let radar = found_by(drives, &arguments.out);
     let text = match &radar {
         Ok(found) => toml(found),
-        // A drive may tell the gyro alone, as one that stands and turns.
-        Err(error) if gyro.is_told => {
+        // A drive may tell the others alone, as one that stands and turns tells the gyro.
+        Err(error) if gyro.is_told || wheels.is_told => {
             print::note(format_args!("the radar is not calibrated: {error}"));
             format!("# Found by gyre calibrate. The radar is not calibrated: {error}\n")
         }
         Err(_) => return radar.map(|_| ExitCode::SUCCESS),
     };
-    storage::write(&file, text + &gyro.text)?;
+    storage::write(&file, text + &gyro.text + &wheels.text)?;
     print::line(format_args!(
         "{:.0} s; {} for `gyre run --calibration`{}",
         started.elapsed().as_secs_f64(),
@@ -66,7 +70,42 @@ pub fn calibrate(arguments: &CalibrateArguments) -> Result<ExitCode, Failure> {
     if let Ok(found) = radar {
         print::line(found.overlap())?;
     }
-    gyro.refused.map_or(Ok(ExitCode::SUCCESS), Err)
+    let refused = gyro.refused.or(wheels.refused);
+    refused.map_or(Ok(ExitCode::SUCCESS), Err)
+}
+
+/// The part of the file that is of a sensor beside the radar.
+#[derive(Default)]
+struct Section {
+    text: String,
+    is_told: bool,
+    /// Why the sensor of a log that was named is not calibrated.
+    refused: Option<Failure>,
+}
+
+impl Section {
+    fn told(text: String) -> Self {
+        Self {
+            text,
+            is_told: true,
+            refused: None,
+        }
+    }
+
+    /// That of a sensor, as `gyro is`, that no drive tells.
+    fn refused<E>(sensor: &str, error: Option<E>, is_named: bool) -> Self
+    where
+        E: std::fmt::Display + Into<Failure>,
+    {
+        let text = error
+            .as_ref()
+            .map(|error| format!("\n# The {sensor} not calibrated: {error}\n"));
+        Self {
+            text: text.unwrap_or_default(),
+            is_told: false,
+            refused: error.filter(|_| is_named).map(Into::into),
+        }
+    }
 }
 
 /// Reads the drive and the others of the same radar.
@@ -105,6 +144,7 @@ struct Recorded {
     drive: Drive,
     configured: Configured,
     gyro: Option<Gyro>,
+    wheels: Option<Wheels>,
 }
 
 impl Recorded {
@@ -114,8 +154,10 @@ impl Recorded {
         arguments: &CalibrateArguments,
     ) -> Result<Self, Failure> {
         let gyro = Gyro::read(&configuration, arguments.gyro.as_deref())?;
-        // By radar alone: what the gyro says is compared with that.
+        let wheels = Wheels::read(&configuration, arguments.wheels.as_deref())?;
+        // By radar alone: what the others say is compared with that.
         configuration.odometry.gyro.kind = GyroKind::None;
+        configuration.odometry.wheels.kind = WheelsKind::None;
         let configuration = &configuration;
         let (drive, geometry) = read(configuration, arguments)?;
         let eccentricity_rad = options(configuration)?.azimuth_eccentricity_rad;
@@ -129,6 +171,7 @@ impl Recorded {
                 distance_m: arguments.distance_m,
             },
             gyro,
+            wheels,
         })
     }
 

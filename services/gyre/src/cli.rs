@@ -288,6 +288,10 @@ pub struct CalibrateArguments {
     /// beside the scans.
     #[arg(long, value_name = "FILE", conflicts_with = "with")]
     pub gyro: Option<PathBuf>,
+    /// The log of the wheels, a table as CSV: its clock and its scale are found too. Default: what
+    /// lies beside the scans.
+    #[arg(long, value_name = "FILE", conflicts_with = "with")]
+    pub wheels: Option<PathBuf>,
     /// Length of the path by an odometer or GNSS, m: without it the range resolution cannot be
     /// told.
     #[arg(long, value_parser = length, conflicts_with = "with")]

@@ -10,7 +10,7 @@ use gyre_masking::Masker;
 use gyre_messages::{Footprint, Limits, StageId, Window};
 use gyre_radar_replay::{Listing, Player};
 use gyre_run::{MOST_OPEN_FILES, PlayedFrom, Side, SourceKind};
-use gyre_samples::{GyroKind, MAX_SAMPLES};
+use gyre_samples::{GyroKind, MAX_SAMPLES, WheelsKind};
 use gyre_stage::run::free_shared_memory;
 use gyre_terminal::{Failure, print};
 use rustix::process::{Resource, getrlimit};
@@ -45,7 +45,9 @@ pub enum PreflightError {
     )]
     LiveGyro,
     /// Wheels beside a live radar.
-    #[error("wheels.kind is of a recording, but the radar is live: set it to `udp`, or to `none`")]
+    #[error(
+        "wheels.kind is of a recording, but the radar is live: set it to `udp`, to `ros2` for a radar behind its driver in ROS 2, or to `none`"
+    )]
     LiveWheels,
     /// The segments would not fit.
     #[error(
@@ -235,8 +237,12 @@ impl Scans {
         if !can_come {
             return Err(PreflightError::LiveGyro.into());
         }
-        let wheels = &configuration.odometry.wheels;
-        if wheels.is_used() && !wheels.is_live() {
+        let can_come = match configuration.odometry.wheels.kind {
+            WheelsKind::None | WheelsKind::Udp => true,
+            WheelsKind::Ros2 => is_in_ros2,
+            WheelsKind::Auto | WheelsKind::Log => false,
+        };
+        if !can_come {
             return Err(PreflightError::LiveWheels.into());
         }
         configuration.dataset.check()?;

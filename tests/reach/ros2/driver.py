@@ -2,8 +2,8 @@
 
 Arguments: the domain, the address of the radar, and what is published: azimuths and the configuration (`configured`), azimuths alone (`silent`), both
 with numbers as bytes, as until 2024 (`older`), turns and the configuration (`turns`), or turns alone (`silent-turns`). The radar is asked for azimuths
-once somebody subscribes to them, who has a second for the configuration. A fourth argument is the log of a gyro, which is
-published beside the azimuths by its stamps.
+once somebody subscribes to them, who has a second for the configuration. Further arguments are the log of a gyro and that of
+wheels, which are published beside the azimuths by their stamps.
 """
 
 import os
@@ -19,7 +19,7 @@ SIGNATURE = bytes.fromhex("000103030707 0f0f1f1f3f3f7f7ffefe".replace(" ", ""))
 CONFIGURATION, REQUEST_CONFIGURATION, START, AZIMUTH = 10, 20, 21, 30
 
 domain, address, publishes = int(sys.argv[1]), *sys.argv[2:4]
-log = [line.split(",") for line in open(sys.argv[4]).read().splitlines()[1:]] if len(sys.argv) > 4 else []
+rows, speeds = ([line.split(",") for line in open(log).read().splitlines()[1:]] for log in (sys.argv[4:] + [os.devnull] * 2)[:2])
 is_silent, in_turns = publishes.startswith("silent"), publishes.endswith("turns")
 AZIMUTHS, CONFIGURATIONS = {
     "turns": (ros.RadarBScanMsg, ros.RadarConfigurationMsg),
@@ -31,7 +31,8 @@ participant, kept = ros.join(domain)
 name = "radar_data/b_scan_msg" if in_turns else "radar_data/fft_data"
 scans = DataWriter(participant, ros.topic(participant, name, AZIMUTHS, depth=400), qos=ros.qos(400))
 configurations = DataWriter(participant, ros.topic(participant, "radar_data/configuration_data", CONFIGURATIONS, depth=1), qos=ros.qos(1))
-gyro = DataWriter(participant, ros.topic(participant, "imu/data", ros.Imu, depth=100), qos=ros.best_effort(100)) if log else None
+gyro = DataWriter(participant, ros.topic(participant, "imu/data", ros.Imu, depth=100), qos=ros.best_effort(100)) if rows else None
+wheels = DataWriter(participant, ros.topic(participant, "odom", ros.Odometry, depth=100), qos=ros.qos(100)) if speeds else None
 host, port = address.split(":")
 radar = socket.create_connection((host, int(port)))
 stream = radar.makefile("rb")
@@ -94,8 +95,15 @@ class Turn:
 
 
 def measure(until_ns):
-    while log and int(log[0][0]) <= until_ns:
-        stamp, *values = log.pop(0)
+    while speeds and int(speeds[0][0]) <= until_ns:
+        stamp, speed = speeds.pop(0)
+        stamp, at_rest = int(stamp), ros.Vector3(0.0, 0.0, 0.0)
+        header = ros.Header(ros.Time(stamp // 10**9, stamp % 10**9), "odom")
+        pose = ros.PoseWithCovariance(ros.Pose(ros.Point(0.0, 0.0, 0.0), ros.Quaternion(0.0, 0.0, 0.0, 1.0)), [0.0] * 36)
+        twist = ros.TwistWithCovariance(ros.Twist(ros.Vector3(float(speed), 0.0, 0.0), at_rest), [0.0] * 36)
+        wheels.write(ros.Odometry(header, "base_link", pose, twist))
+    while rows and int(rows[0][0]) <= until_ns:
+        stamp, *values = rows.pop(0)
         stamp, values = int(stamp), [float(value) for value in values]
         header = ros.Header(ros.Time(stamp // 10**9, stamp % 10**9), "imu")
         turn, along = ros.Vector3(*values[:3]), ros.Vector3(*values[3:])

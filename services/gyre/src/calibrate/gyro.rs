@@ -8,6 +8,8 @@ use gyre_datasets::GyroLog;
 use gyre_samples::{GyroConfig, GyroKind};
 use gyre_terminal::{Failure, print};
 
+use super::Section;
+
 /// A log, and what is configured of its gyro.
 pub(super) struct Gyro {
     log: GyroLog,
@@ -63,52 +65,30 @@ impl Gyro {
     }
 }
 
-/// The part of the file that is of the gyro.
-#[derive(Default)]
-pub(super) struct Section {
-    pub(super) text: String,
-    pub(super) is_told: bool,
-    /// Why the gyro of a log that was named is not calibrated.
-    pub(super) refused: Option<Failure>,
-}
-
-impl Section {
-    /// Calibrates the gyro by the drives that have a log, and prints what they say.
-    ///
-    /// # Errors
-    /// Scans that cannot be registered; drives of which another axis points up.
-    pub(super) fn of(logs: Vec<(&Gyro, &Drive)>) -> Result<Self, Failure> {
-        let Some((first, _)) = logs.first().copied() else {
-            return Ok(Self::default());
-        };
-        let (mut told, mut refused) = (Vec::new(), None);
-        for (gyro, drive) in logs {
-            match gyro.calibrate(drive)? {
-                Ok(found) => told.push(found),
-                Err(error) => refused = Some(error),
-            }
+/// Calibrates the gyro by the drives that have a log, and prints what they say.
+///
+/// # Errors
+/// Scans that cannot be registered; drives of which another axis points up.
+pub(super) fn section(logs: &[(&Gyro, &Drive)]) -> Result<Section, Failure> {
+    let Some((first, _)) = logs.first() else {
+        return Ok(Section::default());
+    };
+    let (mut told, mut refused) = (Vec::new(), None);
+    for (gyro, drive) in logs {
+        match gyro.calibrate(drive)? {
+            Ok(found) => told.push(found),
+            Err(error) => refused = Some(error),
         }
-        let Some((one, others)) = told.split_first() else {
-            let text = refused
-                .as_ref()
-                .map(|error| format!("\n# The gyro is not calibrated: {error}\n"));
-            return Ok(Self {
-                text: text.unwrap_or_default(),
-                is_told: false,
-                refused: refused.filter(|_| first.is_named).map(Into::into),
-            });
-        };
-        let found = one.mean(others)?;
-        if !others.is_empty() {
-            let table = found.table(&first.configured);
-            print::line(format_args!("gyro, all drives together\n{table}"))?;
-        }
-        // A relative path is one of the file's folder.
-        let file = first.is_named.then(|| absolute(&first.log.path));
-        Ok(Self {
-            text: found.toml(file.transpose()?.as_deref()),
-            is_told: true,
-            refused: None,
-        })
     }
+    let Some((one, others)) = told.split_first() else {
+        return Ok(Section::refused("gyro is", refused, first.is_named));
+    };
+    let found = one.mean(others)?;
+    if !others.is_empty() {
+        let table = found.table(&first.configured);
+        print::line(format_args!("gyro, all drives together\n{table}"))?;
+    }
+    // A relative path is one of the file's folder.
+    let file = first.is_named.then(|| absolute(&first.log.path));
+    Ok(Section::told(found.toml(file.transpose()?.as_deref())))
 }

@@ -14,7 +14,7 @@ use gyre_datasets::DatasetOptions;
 use gyre_live_radar::{encoder_counts, silence};
 use gyre_ros2_messages::{Domain, DomainError};
 use gyre_run::SourceConfig;
-use gyre_samples::{GyroConfig, GyroKind};
+use gyre_samples::{GyroConfig, GyroKind, WheelsConfig, WheelsKind};
 use gyre_stage::{Launch, StageCounters, StageError, source};
 
 pub use ask::{AskError, ask};
@@ -22,6 +22,8 @@ pub use gyre_live_radar::Sizes;
 
 /// The topic of an inertial sensor by REP-145.
 const IMU: &str = "/imu/data";
+/// The topic of the odometry of wheels, as drivers of bases name it.
+const ODOMETRY: &str = "/odom";
 
 /// The topics of a driver, and the properties of its radar that it does not publish.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,6 +34,8 @@ pub struct Settings {
     pub topic: String,
     /// The topic of an inertial sensor, if there is one.
     pub gyro_topic: Option<String>,
+    /// The topic of the odometry of the wheels, if it is used.
+    pub wheels_topic: Option<String>,
     /// Encoder counts per turn of a radar whose driver does not publish its configuration.
     pub encoder_counts: u16,
     /// Time without a message after which that is reported.
@@ -54,6 +58,7 @@ impl Settings {
             domain: Domain::new(source.domain, interface)?,
             topic: source.topic.clone(),
             gyro_topic: None,
+            wheels_topic: None,
             encoder_counts: encoder_counts(options),
             silence: silence(source),
             scans: source.scans.map(|scans| scans as u64),
@@ -79,6 +84,9 @@ pub fn run(launch: &Launch, mut settings: Settings) -> Result<StageCounters, Sta
     let gyro: GyroConfig = launch.section("gyro")?;
     let topic = gyro.topic.unwrap_or_else(|| IMU.to_owned());
     settings.gyro_topic = (gyro.kind == GyroKind::Ros2).then_some(topic);
+    let wheels: WheelsConfig = launch.section("wheels")?;
+    let topic = wheels.topic.unwrap_or_else(|| ODOMETRY.to_owned());
+    settings.wheels_topic = (wheels.kind == WheelsKind::Ros2).then_some(topic);
     let scans = settings.scans;
     let radar = radar::Radar::open(settings).map_err(|error| StageError::Input(error.to_string()));
     source::run_sensor(launch, &mut radar?, scans)

@@ -4,18 +4,18 @@
 //! A bag is a file of the MCAP profile `ros2`, or a folder of such files with a `metadata.yaml`.
 //! Reading order: `files` (what is a bag), `order` (of its files), [`damaged`] (MCAP records from
 //! damaged files), `spans` (where messages are), `topics` (which of them are a radar's), `azimuths`
-//! (messages as azimuths), `bag` (its files as one), `scans` (azimuths as scans), `gyro` (what an
-//! inertial sensor measures), [`BagWriter`].
+//! (messages as azimuths), `bag` (its files as one), `scans` (azimuths as scans), `samples` (of
+//! gyro and wheels), [`BagWriter`].
 
 mod azimuths;
 mod bag;
 pub mod damaged;
 mod error;
 mod files;
-mod gyro;
 mod order;
 mod radar;
 mod reading;
+mod samples;
 mod scans;
 mod spans;
 mod topics;

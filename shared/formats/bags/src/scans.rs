@@ -11,15 +11,15 @@ use gyre_datasets::{
     OpenError, ReadError, turn_ns,
 };
 use gyre_radar::{ScanLimits, ScanSlot, SweepGeometry};
-use gyre_samples::Sample;
+use gyre_samples::{Sample, SampleKind};
 
 use crate::{
     BagError,
     azimuths::{Described, azimuths},
     bag::Bag,
     files::files,
-    gyro,
     reading::Message,
+    samples,
     topics::Topics,
 };
 use index::{Entry, Index};
@@ -256,8 +256,12 @@ impl Dataset for Scans {
         &self.notes
     }
 
-    fn gyro(&mut self, topic: Option<&str>) -> Result<Option<Vec<Sample>>, OpenError> {
-        Ok(gyro::read(&mut self.bag, &self.path, topic)?)
+    fn logged(
+        &mut self,
+        of: SampleKind,
+        topic: Option<&str>,
+    ) -> Result<Option<Vec<Sample>>, OpenError> {
+        Ok(samples::read(&mut self.bag, &self.path, of, topic)?)
     }
 
     fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError> {

@@ -40,7 +40,7 @@ pub use file_list::FileList;
 pub use foreign::foreign;
 pub use format::Format;
 use gyre_radar::scan::{ScanLimits, ScanSlot, SweepGeometry};
-use gyre_samples::Sample;
+use gyre_samples::{Sample, SampleKind};
 pub use image_size::ImageSize;
 pub use image_source::ImageSource;
 pub use options::{AzimuthSource, DatasetOptions, LostAzimuthOption};
@@ -120,14 +120,18 @@ pub trait Dataset: Send {
     /// sweep, a slot that is too small.
     fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError>;
 
-    /// Reads the samples of a gyro that the recording itself has, on the topic of this name, else
-    /// on the only one: in the gyro's own axes and on its own clock, in the order of the recording.
-    /// `None` without one.
+    /// Reads the samples of another sensor that the recording itself has, on the topic of this
+    /// name, else on the only one: in the sensor's own axes and on its own clock, in the order of
+    /// the recording. `None` without one.
     ///
     /// # Errors
     /// No such topic, several without a name, or samples that cannot be read.
-    fn gyro(&mut self, topic: Option<&str>) -> Result<Option<Vec<Sample>>, OpenError> {
-        let _ = topic;
+    fn logged(
+        &mut self,
+        of: SampleKind,
+        topic: Option<&str>,
+    ) -> Result<Option<Vec<Sample>>, OpenError> {
+        let _ = (of, topic);
         Ok(None)
     }
 

@@ -45,17 +45,26 @@ impl ScanSamples {
         }
         let turns = match gyro.kind {
             GyroKind::None => None,
-            GyroKind::Auto => Some(match dataset.gyro(gyro.topic.as_deref())? {
-                Some(samples) => GyroLog::of(samples, folder)?,
-                None => GyroLog::read(&GyroLog::find(folder)?)?,
-            }),
+            GyroKind::Auto => {
+                let own = dataset.logged(SampleKind::Gyro, gyro.topic.as_deref())?;
+                Some(match own {
+                    Some(samples) => GyroLog::of(samples, folder)?,
+                    None => GyroLog::read(&GyroLog::find(folder)?)?,
+                })
+            }
             GyroKind::Udp | GyroKind::Ros2 => return Err(LogError::Live(SampleKind::Gyro)),
             GyroKind::Log => Some(GyroLog::read(&gyro.file.clone().unwrap_or_default())?),
         };
         let speeds = match wheels.kind {
             WheelsKind::None => None,
-            WheelsKind::Auto => Some(WheelLog::read(&WheelLog::find(folder)?)?),
-            WheelsKind::Udp => return Err(LogError::Live(SampleKind::Wheels)),
+            WheelsKind::Auto => {
+                let own = dataset.logged(SampleKind::Wheels, wheels.topic.as_deref())?;
+                Some(match own {
+                    Some(samples) => WheelLog::of(samples, folder)?,
+                    None => WheelLog::read(&WheelLog::find(folder)?)?,
+                })
+            }
+            WheelsKind::Udp | WheelsKind::Ros2 => return Err(LogError::Live(SampleKind::Wheels)),
             WheelsKind::Log => Some(WheelLog::read(&wheels.file.clone().unwrap_or_default())?),
         };
         let of_gyro = turns.map(|log| Self::of_gyro(&log, gyro, dataset));

@@ -63,7 +63,7 @@ impl WheelLog {
         })
     }
 
-    /// Takes the samples of a simulation, which messages name by this path.
+    /// Takes the samples of a bag or of a simulation, which messages name by this path.
     ///
     /// # Errors
     /// Stamps or speeds that cannot be those of wheels.

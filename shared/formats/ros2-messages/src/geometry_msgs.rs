@@ -1,6 +1,7 @@
 //! `geometry_msgs`: poses, twists and transforms. Frames follow REP-103, lengths are in m, angles
 //! in rad.
 
+use gyre_samples::Sample;
 use serde::{Deserialize, Serialize};
 
 use crate::{definition::message, std_msgs::Header};
@@ -148,6 +149,29 @@ message!(
     "Vector3 linear\nVector3 angular\n",
     [Vector3]
 );
+
+/// A velocity at a time.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TwistStamped {
+    /// Time and frame.
+    pub header: Header,
+    /// The velocity.
+    pub twist: Twist,
+}
+message!(
+    TwistStamped,
+    "geometry_msgs",
+    "std_msgs/Header header\nTwist twist\n",
+    [Header, Twist]
+);
+
+impl TwistStamped {
+    /// Returns the speed ahead as a sample of the wheels, on the driver's clock: see
+    /// [`Header::stamp_or`].
+    pub fn sample(&self, received_ns: i64) -> Sample {
+        Sample::speed(self.header.stamp_or(received_ns), self.twist.linear.x)
+    }
+}
 
 /// A velocity with covariance.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

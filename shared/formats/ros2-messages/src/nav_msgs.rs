@@ -1,5 +1,6 @@
 //! `nav_msgs`: odometry and grids.
 
+use gyre_samples::Sample;
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -28,6 +29,15 @@ message!(
      geometry_msgs/TwistWithCovariance twist\n",
     [Header, PoseWithCovariance, TwistWithCovariance]
 );
+
+impl Odometry {
+    /// Returns the speed ahead as a sample of the wheels, on the driver's clock: see
+    /// [`Header::stamp_or`].
+    pub fn sample(&self, received_ns: i64) -> Sample {
+        let speed_mps = self.twist.twist.linear.x;
+        Sample::speed(self.header.stamp_or(received_ns), speed_mps)
+    }
+}
 
 /// Size and place of a grid.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

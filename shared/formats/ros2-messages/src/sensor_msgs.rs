@@ -69,15 +69,11 @@ const NOT_MEASURED: f64 = -1.0;
 
 impl Imu {
     /// Returns the rates and accelerations as a sample, in the sensor's own axes and on its own
-    /// clock; `None` if it measures no rates. The time of receipt, ns since 1970, stands for the
-    /// stamp of a driver that sets none.
+    /// clock ([`Header::stamp_or`]); `None` if it measures no rates.
     pub fn sample(&self, received_ns: i64) -> Option<Sample> {
         let (turn, along) = (self.angular_velocity, self.linear_acceleration);
         let sample = Sample {
-            stamp_ns: match self.header.stamp.ns() {
-                0 => received_ns,
-                stamp_ns => stamp_ns,
-            },
+            stamp_ns: self.header.stamp_or(received_ns),
             kind: SampleKind::Gyro as u32,
             reserved: 0,
             values: [turn.x, turn.y, turn.z, along.x, along.y, along.z],

@@ -27,4 +27,12 @@ impl Header {
             frame_id: frame_id.to_owned(),
         }
     }
+
+    /// Returns the time, ns since 1970; that of the receipt of a message whose driver sets none.
+    pub fn stamp_or(&self, received_ns: i64) -> i64 {
+        match self.stamp.ns() {
+            0 => received_ns,
+            stamp_ns => stamp_ns,
+        }
+    }
 }

@@ -9,18 +9,19 @@
 //! - `fit`: the least squares, with the jackknife over blocks of the drive;
 //! - [`GyroCalibration`]: what was found; [`GyroError`]: why nothing was.
 
-mod angles;
+pub(crate) mod angles;
 mod error;
-mod fit;
+pub(crate) mod fit;
 mod found;
-mod search;
+pub(crate) mod search;
 #[cfg(test)]
 mod tests;
-mod turns;
+pub(crate) mod turns;
 
 pub use error::GyroError;
 pub use found::GyroCalibration;
 
+use gyre_geometry::wrap_angle;
 use gyre_samples::Sample;
 
 use crate::{Drive, Estimate, Track};
@@ -76,10 +77,15 @@ pub(crate) fn calibrate_turns(
     max_gap_s: f64,
 ) -> Result<GyroCalibration, GyroError> {
     let first_ns = stamps.first().copied().unwrap_or_default();
-    let turns = turns(stamps, headings, starts);
+    let apart = headings
+        .windows(2)
+        .map(|pair| wrap_angle(pair[1] - pair[0]));
+    let steps: Vec<f64> = std::iter::once(0.0).chain(apart).collect();
+    let turns = turns(stamps, &steps, starts);
     let angles = Angles::new(samples, first_ns, max_gap_s);
-    let peak = search::peak(&turns, &angles)?;
-    let fit = fit::Fit::new(&turns, &angles, &peak).ok_or(GyroError::Unsettled)?;
+    let begins_s = angles.span_s().map(|[first_s, _]| first_s);
+    let peak = search::peak(&turns, &angles).map_err(|none| GyroError::of(none, begins_s))?;
+    let fit = fit::Fit::new(&turns, &angles, &peak, true).ok_or(GyroError::Unsettled)?;
     let [scale, bias_radps, late_s] = fit.parameters;
     let floored = |estimate: Estimate, floor: f64| Estimate {
         sigma: estimate.sigma.hypot(floor),

@@ -18,7 +18,8 @@
 //! - [`Mounting`], [`OwnReflections`]: what follows from the track and from the scans directly;
 //! - [`Found`]: the constants beside the configured ones, with what each rests on; [`toml()`]: as a
 //!   section of a configuration; [`svg`]: a place seen twice, before and after;
-//! - [`calibrate_gyro`]: the clock and the axes of a gyro, by the same track;
+//! - [`calibrate_gyro`], [`calibrate_wheels`]: the clock and the axes of a gyro, the clock and the
+//!   scale of the wheels, by the same track;
 //! - [`Study`]: a drive with all that, and what several drives of one radar say together.
 
 mod calibrate;
@@ -37,6 +38,7 @@ mod picture;
 mod revisits;
 mod section;
 mod study;
+mod wheels;
 
 pub use calibrate::{Calibration, FactEstimate, calibrate};
 pub use drive::{Drive, Sweep, Track};
@@ -50,6 +52,7 @@ pub use picture::svg;
 pub use revisits::Revisit;
 pub use section::toml;
 pub use study::Study;
+pub use wheels::{WheelCalibration, WheelError, calibrate_wheels};
 
 /// A number with its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -20,6 +20,10 @@ pub struct WheelsConfig {
     /// The log, for `kind = "log"`: a table as CSV whose first row names its columns.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
+    /// The topic of the speed in ROS 2, of the type `nav_msgs/msg/Odometry`, in a bag also
+    /// `geometry_msgs/msg/TwistStamped`. Default: `/odom` of a live radar, none of a bag.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub topic: Option<String>,
     /// The address and port at which datagrams of live wheels are received: lines of a stamp (ns
     /// since 1970) and the speed (m/s), with a comma between.
     pub listen: String,
@@ -60,6 +64,8 @@ pub enum WheelsKind {
     Log,
     /// Of a live radar: what arrives in datagrams at `listen`.
     Udp,
+    /// Of a live radar behind its driver in ROS 2: `topic`.
+    Ros2,
 }
 
 impl Default for WheelsConfig {
@@ -67,6 +73,7 @@ impl Default for WheelsConfig {
         Self {
             kind: WheelsKind::None,
             file: None,
+            topic: None,
             listen: "127.0.0.1:6322".to_owned(),
             max_wait_ms: 20.0,
             late_s: 0.0,
@@ -90,7 +97,7 @@ impl WheelsConfig {
 
     /// Returns whether the wheels are live: their samples arrive while the radar is received.
     pub fn is_live(&self) -> bool {
-        self.kind == WheelsKind::Udp
+        matches!(self.kind, WheelsKind::Udp | WheelsKind::Ros2)
     }
 
     /// Takes a sample over to the radar's clock: the delay is taken off its stamp, and the scale is

@@ -6,6 +6,7 @@ use gyre_colossus::{Azimuth, Configuration};
 use gyre_ros2_messages::{
     BadMessage, Definition, Ros2Message,
     messages::{RadarConfigurationMessage, RadarFftDataMessage},
+    nav_msgs::Odometry,
     navtech_msgs::{RadarBScanMsg, RadarConfigurationMsg, RadarFftDataMsg},
     sensor_msgs::Imu,
     std_msgs::Header,
@@ -138,6 +139,8 @@ pub struct Driver {
     azimuths: Option<Azimuths>,
     /// Samples of an inertial sensor. Azimuths wake often enough for them.
     gyro: Option<Subscription<Imu>>,
+    /// The odometry of the wheels.
+    wheels: Option<Subscription<Odometry>>,
 }
 
 /// The radar's description of itself.
@@ -164,6 +167,8 @@ impl Driver {
         wakeups.add(&mut older)?;
         let gyro = settings.gyro_topic.as_ref();
         let gyro = gyro.map(|topic| node.subscribe_to_sensor(topic, SAMPLES));
+        let wheels = settings.wheels_topic.as_ref();
+        let wheels = wheels.map(|topic| node.subscribe_to_sensor(topic, SAMPLES));
         Ok(Self {
             topic: settings.topic.clone(),
             dds_name: node.dds_name(&settings.topic)?,
@@ -174,6 +179,7 @@ impl Driver {
             older,
             azimuths: None,
             gyro: gyro.transpose()?,
+            wheels: wheels.transpose()?,
         })
     }
 
@@ -272,6 +278,18 @@ impl Driver {
                         return sample;
                     }
                 }
+                Err(_) => {}
+            }
+        }
+    }
+
+    /// Takes the next speed of the wheels. Messages that cannot be read are passed over.
+    pub fn wheel_sample(&self) -> Option<Sample> {
+        let wheels = self.wheels.as_ref()?;
+        loop {
+            match wheels.take() {
+                Ok(None) => return None,
+                Ok(Some((odometry, _))) => return Some(odometry.sample(clock::since_1970_ns())),
                 Err(_) => {}
             }
         }

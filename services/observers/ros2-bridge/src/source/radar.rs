@@ -9,7 +9,7 @@ use std::{
 use gyre_live_radar::{Intake, NoScans};
 use gyre_messages::{ScanHeader, StageId};
 use gyre_ros2_messages::navtech_msgs::RadarBScanMsg;
-use gyre_samples::Sample;
+use gyre_samples::{Sample, SampleKind};
 use gyre_stage::{
     StageError, clock,
     source::{Arrival, Received, Sensor},
@@ -269,8 +269,11 @@ impl Sensor for Radar {
         Ok(Arrival::Nothing(Duration::ZERO))
     }
 
-    fn gyro_sample(&mut self) -> Option<Sample> {
-        self.driver.gyro_sample()
+    fn sample(&mut self, of: SampleKind) -> Option<Sample> {
+        match of {
+            SampleKind::Gyro => self.driver.gyro_sample(),
+            SampleKind::Wheels => self.driver.wheel_sample(),
+        }
     }
 
     fn due_ns(&self) -> Option<i64> {

@@ -4,8 +4,8 @@
 mod damage;
 mod drivers;
 mod encoders;
-mod gyro;
 mod order;
+mod samples;
 
 use std::{
     collections::BTreeMap,

@@ -5,7 +5,7 @@ use gyre_samples::Sample;
 use nalgebra::Vector3;
 
 /// The integrals of the three rates of a log, s since the first scan on the log's own clock.
-pub(super) struct Angles {
+pub(crate) struct Angles {
     stamps_s: Vec<f64>,
     rates: Vec<Vector3<f64>>,
     /// Angles since the first sample, and gaps.
@@ -15,16 +15,16 @@ pub(super) struct Angles {
 
 /// The measurement of a gyro over a time.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Turned {
+pub(crate) struct Turned {
     /// Angles about x, y and z, rad.
-    pub(super) angle: Vector3<f64>,
+    pub(crate) angle: Vector3<f64>,
     /// The rates at the end less those at the start, rad/s: the change of the angles by a later
     /// time.
-    pub(super) by_late: Vector3<f64>,
+    pub(crate) by_late: Vector3<f64>,
 }
 
 impl Angles {
-    pub(super) fn new(samples: &[Sample], first_ns: i64, max_gap_s: f64) -> Self {
+    pub(crate) fn new(samples: &[Sample], first_ns: i64, max_gap_s: f64) -> Self {
         let samples = samples.iter();
         let seconds = |ns: i64| (i128::from(ns) - i128::from(first_ns)) as f64 * 1e-9;
         let stamps_s: Vec<f64> = samples.clone().map(|it| seconds(it.stamp_ns)).collect();
@@ -49,18 +49,18 @@ impl Angles {
     }
 
     /// Returns the median time between samples, s.
-    pub(super) fn period_s(&self) -> f64 {
+    pub(crate) fn period_s(&self) -> f64 {
         let steps = self.stamps_s.windows(2).map(|pair| pair[1] - pair[0]);
         median(steps).unwrap_or_default()
     }
 
     /// Returns the span of the log, s; `None` without samples.
-    pub(super) fn span_s(&self) -> Option<[f64; 2]> {
+    pub(crate) fn span_s(&self) -> Option<[f64; 2]> {
         Some([*self.stamps_s.first()?, *self.stamps_s.last()?])
     }
 
     /// Integrates over a time of the log's clock; `None` where samples are missing.
-    pub(super) fn between(&self, from_s: f64, to_s: f64) -> Option<Turned> {
+    pub(crate) fn between(&self, from_s: f64, to_s: f64) -> Option<Turned> {
         let [(first, from), (last, to)] = [self.at(from_s)?, self.at(to_s)?];
         let has_gap = self.gaps[last + 1] > self.gaps[first];
         (!has_gap).then(|| Turned {

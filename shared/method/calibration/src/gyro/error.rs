@@ -2,7 +2,10 @@
 
 use thiserror::Error;
 
-use super::{MAX_LATE_S, search::Peak};
+use super::{
+    MAX_LATE_S,
+    search::{MIN_TURNS, NoPeak, Peak},
+};
 use crate::Estimate;
 
 /// Why nothing was found.
@@ -66,6 +69,23 @@ pub enum GyroError {
         /// The axis of another one.
         other: &'static str,
     },
+}
+
+impl GyroError {
+    /// `begins_s`: from the first scan to the first sample, s.
+    pub(super) fn of(none: NoPeak, begins_s: Option<f64>) -> Self {
+        match none {
+            NoPeak::Apart { turns } => Self::Apart {
+                turns,
+                needed: MIN_TURNS,
+                begins_s,
+            },
+            NoPeak::Ambiguous { best, rival } => Self::Ambiguous {
+                best: best.into(),
+                rival: rival.into(),
+            },
+        }
+    }
 }
 
 /// An offset with an axis.

@@ -21,23 +21,34 @@ const NEAR_S: f64 = 1.0;
 /// Scale, bias (rad/s), offset (s), drift (s/s):
 /// `yaw = scale * angle(time + offset) - bias * time`.
 type Parameters = Vector4<f64>;
+/// Which of them are solved for.
+type Free = [bool; 4];
 
 /// The parameters by all turns together.
-pub(super) struct Fit {
+pub(crate) struct Fit {
     /// Scale, bias (rad/s) and offset (s) without a drift.
-    pub(super) parameters: [Estimate; 3],
+    pub(crate) parameters: [Estimate; 3],
     /// The offset of each half of the drive, s.
-    pub(super) halves_s: [Option<f64>; 2],
+    pub(crate) halves_s: [Option<f64>; 2],
     /// The drift of the clock.
-    pub(super) drift: Estimate,
+    pub(crate) drift: Estimate,
     /// Number of turns.
-    pub(super) turns: usize,
+    pub(crate) turns: usize,
 }
 
 impl Fit {
     /// Fits the turns around a peak; `None` if they do not determine the parameters, or another
     /// offset than that of the peak.
-    pub(super) fn new(turns: &[Turn], angles: &Angles, peak: &Peak) -> Option<Self> {
+    ///
+    /// Speeds have no bias: without one it stays zero.
+    pub(crate) fn new(
+        turns: &[Turn],
+        angles: &Angles,
+        peak: &Peak,
+        has_bias: bool,
+    ) -> Option<Self> {
+        let (without_drift, with_drift) =
+            ([true, has_bias, true, false], [true, has_bias, true, true]);
         let sign = peak.correlation.signum();
         let covered = |turn: &&Turn| {
             let late_s = peak.late_s;
@@ -55,13 +66,13 @@ impl Fit {
         };
         let count = turns.len();
         let block = |k: usize| k * BLOCKS / count;
-        let without = |left_out: usize, free: usize| {
+        let without = |left_out: usize, free: Free| {
             let kept = (0..count)
                 .filter(|k| block(*k) != left_out)
                 .map(|k| turns[k]);
             problem.solve(&kept.collect::<Vec<_>>(), free)
         };
-        let jackknife = |free: usize| -> Option<[Estimate; 4]> {
+        let jackknife = |free: Free| -> Option<[Estimate; 4]> {
             let all = problem.solve(&turns, free)?;
             let mut variance = Parameters::zeros();
             for left_out in 0..BLOCKS {
@@ -74,7 +85,7 @@ impl Fit {
                 sigma: (share * variance[k]).sqrt(),
             }))
         };
-        let [scale, bias, late, _] = jackknife(3)?;
+        let [scale, bias, late, _] = jackknife(without_drift)?;
         let unknown = Estimate {
             value: 0.0,
             sigma: f64::INFINITY,
@@ -82,8 +93,8 @@ impl Fit {
         let halves = [&turns[..count / 2], &turns[count / 2..]];
         Some(Self {
             parameters: [scale, bias, late],
-            halves_s: halves.map(|half| Some(problem.solve(half, 3)?[2])),
-            drift: jackknife(4).map_or(unknown, |all| all[3]),
+            halves_s: halves.map(|half| Some(problem.solve(half, without_drift)?[2])),
+            drift: jackknife(with_drift).map_or(unknown, |all| all[3]),
             turns: count,
         })
     }
@@ -100,8 +111,8 @@ struct Problem<'a> {
 }
 
 impl Problem<'_> {
-    /// Solves for the first `free` parameters.
-    fn solve(&self, turns: &[Turn], free: usize) -> Option<Parameters> {
+    /// Solves for the parameters that are free.
+    fn solve(&self, turns: &[Turn], free: Free) -> Option<Parameters> {
         let mut at = Parameters::new(1.0, 0.0, self.late_s, 0.0);
         for _ in 0..ROUNDS {
             let rows = self.rows(turns, &at);
@@ -112,7 +123,7 @@ impl Problem<'_> {
                 normal += weight * slopes * slopes.transpose();
                 right += weight * *residual * slopes;
             }
-            for fixed in free..4 {
+            for fixed in (0..4).filter(|k| !free[*k]) {
                 normal.row_mut(fixed).fill(0.0);
                 normal.column_mut(fixed).fill(0.0);
                 normal[(fixed, fixed)] = 1.0;
@@ -143,7 +154,7 @@ impl Problem<'_> {
             let by_late = scale * self.sign * turned.by_late[self.axis];
             let by_drift = by_late * (turn.from_s - self.middle_s);
             let slopes = Parameters::new(angle, -time_s, by_late, by_drift);
-            Some((turn.yaw_rad - (scale * angle - bias * time_s), slopes))
+            Some((turn.amount - (scale * angle - bias * time_s), slopes))
         };
         turns.iter().filter_map(row).collect()
     }

@@ -3,7 +3,7 @@
 use gyre_samples::UpAxis;
 
 use super::{
-    GyroError, MAX_LATE_S,
+    MAX_LATE_S,
     angles::Angles,
     turns::{BASELINE_S, Turn},
 };
@@ -17,7 +17,7 @@ const FINE: i32 = 20;
 const PEAK_S: f64 = 3.0;
 /// Turns that the log must have in common, and their share of the most that it has at any offset.
 /// Among many offsets one of a few turns agrees by chance.
-const MIN_TURNS: usize = 36;
+pub(crate) const MIN_TURNS: usize = 36;
 const MIN_SHARE: f64 = 0.6;
 /// Time after which a turn is independent of another, baselines.
 const INDEPENDENT: f64 = 2.0;
@@ -26,18 +26,18 @@ const MIN_EVIDENCE: f64 = 5.0;
 
 /// The axis and the offset that fit best.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Peak {
-    pub(super) late_s: f64,
-    pub(super) axis: usize,
+pub(crate) struct Peak {
+    pub(crate) late_s: f64,
+    pub(crate) axis: usize,
     /// Of the radar's turns and the angles about the axis.
-    pub(super) correlation: f64,
+    pub(crate) correlation: f64,
     /// The turns that it is of.
     turns: usize,
 }
 
 impl Peak {
     /// Returns the axis that points up.
-    pub(super) fn up(&self) -> UpAxis {
+    pub(crate) fn up(&self) -> UpAxis {
         match (self.axis, self.correlation < 0.0) {
             (0, false) => UpAxis::X,
             (0, true) => UpAxis::MinusX,
@@ -71,8 +71,17 @@ impl Peak {
     }
 }
 
+/// Why no offset is told.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum NoPeak {
+    /// The log covers so few turns at any offset.
+    Apart { turns: usize },
+    /// Two offsets or axes fit about as well.
+    Ambiguous { best: Peak, rival: Peak },
+}
+
 /// Finds the offset and the axis of the highest correlation.
-pub(super) fn peak(turns: &[Turn], angles: &Angles) -> Result<Peak, GyroError> {
+pub(crate) fn peak(turns: &[Turn], angles: &Angles) -> Result<Peak, NoPeak> {
     let steps = (MAX_LATE_S / STEP_S) as i32;
     let offsets = (-steps..=steps).map(|k| f64::from(k) * STEP_S);
     let mut peaks: Vec<Peak> = offsets
@@ -80,11 +89,7 @@ pub(super) fn peak(turns: &[Turn], angles: &Angles) -> Result<Peak, GyroError> {
         .collect();
     let most = peaks.iter().map(|peak| peak.turns).max().unwrap_or(0);
     if most < MIN_TURNS {
-        return Err(GyroError::Apart {
-            turns: most,
-            needed: MIN_TURNS,
-            begins_s: angles.span_s().map(|[first_s, _]| first_s),
-        });
+        return Err(NoPeak::Apart { turns: most });
     }
     let enough = MIN_TURNS.max((MIN_SHARE * most as f64) as usize);
     peaks.retain(|peak| peak.turns >= enough);
@@ -104,10 +109,7 @@ pub(super) fn peak(turns: &[Turn], angles: &Angles) -> Result<Peak, GyroError> {
     let best = refined.first().copied().unwrap_or_default();
     let rival = refined.get(1).copied().unwrap_or_default();
     match best.evidence(&rival, independent(turns)) < MIN_EVIDENCE {
-        true => Err(GyroError::Ambiguous {
-            best: best.into(),
-            rival: rival.into(),
-        }),
+        true => Err(NoPeak::Ambiguous { best, rival }),
         false => Ok(best),
     }
 }
@@ -116,8 +118,8 @@ pub(super) fn peak(turns: &[Turn], angles: &Angles) -> Result<Peak, GyroError> {
 /// tells nothing, and one bend looks like any other.
 fn independent(turns: &[Turn]) -> f64 {
     let count = turns.len() as f64;
-    let mean = turns.iter().map(|turn| turn.yaw_rad).sum::<f64>() / count;
-    let squares = || turns.iter().map(|turn| (turn.yaw_rad - mean).powi(2));
+    let mean = turns.iter().map(|turn| turn.amount).sum::<f64>() / count;
+    let squares = || turns.iter().map(|turn| (turn.amount - mean).powi(2));
     let fourth: f64 = squares().map(|square| square * square).sum();
     let times = turns.windows(2).map(|pair| pair[1].from_s - pair[0].from_s);
     let interval_s = gyre_radar::median(times).unwrap_or_default();
@@ -129,7 +131,7 @@ fn independent(turns: &[Turn]) -> f64 {
 fn correlations(turns: &[Turn], angles: &Angles, late_s: f64) -> [Peak; 3] {
     let common = turns.iter().filter_map(|turn| {
         let turned = angles.between(turn.from_s + late_s, turn.to_s + late_s)?;
-        Some((turn.yaw_rad, turned.angle))
+        Some((turn.amount, turned.angle))
     });
     let common: Vec<_> = common.collect();
     let count = common.len().max(1) as f64;

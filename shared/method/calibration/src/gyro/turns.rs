@@ -1,20 +1,21 @@
-//! The turns of the radar.
+//! The turns of the radar, or the distances that it has driven.
 
-/// Time over which a turn is taken, s: longer than a scan, to average the noise of headings.
-pub(super) const BASELINE_S: f64 = 1.0;
+/// Time over which a turn is taken, s: longer than a scan, to average the noise of motions.
+pub(crate) const BASELINE_S: f64 = 1.0;
 
-/// A turn of the radar.
+/// A turn of the radar, or a distance.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Turn {
+pub(crate) struct Turn {
     /// Start and end, s since the first scan.
-    pub(super) from_s: f64,
-    pub(super) to_s: f64,
-    /// The angle, counter-clockwise, rad.
-    pub(super) yaw_rad: f64,
+    pub(crate) from_s: f64,
+    pub(crate) to_s: f64,
+    /// The angle, counter-clockwise, rad; or the distance ahead, m.
+    pub(crate) amount: f64,
 }
 
-/// The turns from each scan to the first that is [`BASELINE_S`] later.
-pub(super) fn turns(stamps: &[i64], headings: &[f64], starts: &[bool]) -> Vec<Turn> {
+/// The turns from each scan to the first that is [`BASELINE_S`] later, from those since the scan
+/// before; `starts` says where the chain of motions begins anew.
+pub(crate) fn turns(stamps: &[i64], steps: &[f64], starts: &[bool]) -> Vec<Turn> {
     let since = |k: usize| (stamps[k] - stamps[0]) as f64 * 1e-9;
     let ends = (0..stamps.len()).map(|from| {
         let wanted_s = since(from) + BASELINE_S - 1e-3;
@@ -28,9 +29,7 @@ pub(super) fn turns(stamps: &[i64], headings: &[f64], starts: &[bool]) -> Vec<Tu
         .map(|(from, to)| Turn {
             from_s: since(from),
             to_s: since(to),
-            yaw_rad: (from + 1..=to)
-                .map(|k| gyre_geometry::wrap_angle(headings[k] - headings[k - 1]))
-                .sum(),
+            amount: steps[from + 1..=to].iter().sum(),
         })
         .collect()
 }

@@ -10,7 +10,9 @@ use std::{
 };
 
 use gyre_messages::ScanHeader;
-use gyre_samples::{GyroConfig, GyroKind, LiveSamples, LiveSensor, Sample, WheelsConfig};
+use gyre_samples::{
+    GyroConfig, GyroKind, LiveSamples, LiveSensor, Sample, SampleKind, WheelsConfig, WheelsKind,
+};
 
 use super::Sensor;
 use crate::{Launch, StageError};
@@ -49,6 +51,8 @@ impl LiveSensors {
     pub fn open(launch: &Launch) -> Result<Option<Self>, StageError> {
         let (gyro, wheels): (GyroConfig, WheelsConfig) =
             (launch.section("gyro")?, launch.section("wheels")?);
+        let at_gyro = (gyro.kind == GyroKind::Udp).then_some(gyro.listen.as_str());
+        let at_wheels = (wheels.kind == WheelsKind::Udp).then_some(wheels.listen.as_str());
         let waits_ms = [
             gyro.is_live().then_some(gyro.max_wait_ms),
             wheels.is_live().then_some(wheels.max_wait_ms),
@@ -56,28 +60,14 @@ impl LiveSensors {
         let Some(max_wait_ms) = waits_ms.into_iter().flatten().reduce(f64::max) else {
             return Ok(None);
         };
+        let of_gyro = || Live::open("gyro", at_gyro, LiveSensor::Gyro(gyro.clone()), rates);
+        let of_wheels = || {
+            let sensor = LiveSensor::Wheels(wheels.clone());
+            Live::open("wheels", at_wheels, sensor, speed)
+        };
         Ok(Some(Self {
-            gyro: match gyro.is_live() {
-                true => Some(Live {
-                    socket: match gyro.kind {
-                        GyroKind::Udp => Some(listen("gyro", &gyro.listen)?),
-                        _ => None,
-                    },
-                    samples: LiveSamples::new(LiveSensor::Gyro(gyro)),
-                    parse: rates,
-                    unreadable: 0,
-                }),
-                false => None,
-            },
-            wheels: match wheels.is_live() {
-                true => Some(Live {
-                    socket: Some(listen("wheels", &wheels.listen)?),
-                    samples: LiveSamples::new(LiveSensor::Wheels(wheels)),
-                    parse: speed,
-                    unreadable: 0,
-                }),
-                false => None,
-            },
+            gyro: gyro.is_live().then(of_gyro).transpose()?,
+            wheels: wheels.is_live().then(of_wheels).transpose()?,
             datagram: vec![0; MAX_DATAGRAM],
             of_scan: Vec::new(),
             max_wait: Duration::from_secs_f64(max_wait_ms * 1e-3),
@@ -102,13 +92,18 @@ impl LiveSensors {
     /// # Errors
     /// A socket fails.
     pub fn receive(&mut self, radar: &mut impl Sensor) -> Result<(), StageError> {
-        while let Some(sample) = radar.gyro_sample() {
-            if let Some(gyro) = &mut self.gyro {
-                gyro.samples.add(&sample);
+        let sensors = [
+            (SampleKind::Gyro, &mut self.gyro),
+            (SampleKind::Wheels, &mut self.wheels),
+        ];
+        for (kind, live) in sensors {
+            let Some(live) = live else { continue };
+            while let Some(sample) = radar.sample(kind) {
+                live.samples.add(&sample);
             }
+            live.receive(&mut self.datagram)?;
         }
-        let mut sensors = [&mut self.gyro, &mut self.wheels].into_iter().flatten();
-        sensors.try_for_each(|live| live.receive(&mut self.datagram))
+        Ok(())
     }
 
     /// Returns whether a complete scan has all its samples.
@@ -145,6 +140,21 @@ impl LiveSensors {
 }
 
 impl Live {
+    /// Opens the sensor of a section, whose datagrams are received at an address if there is one.
+    fn open(
+        section: &str,
+        listens: Option<&str>,
+        sensor: LiveSensor,
+        parse: fn(&str) -> Option<Sample>,
+    ) -> Result<Self, StageError> {
+        Ok(Self {
+            samples: LiveSamples::new(sensor),
+            socket: listens.map(|at| listen(section, at)).transpose()?,
+            parse,
+            unreadable: 0,
+        })
+    }
+
     fn receive(&mut self, datagram: &mut [u8]) -> Result<(), StageError> {
         let Some(socket) = &self.socket else {
             return Ok(());

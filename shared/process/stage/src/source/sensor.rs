@@ -4,7 +4,7 @@
 use std::{os::fd::BorrowedFd, time::Duration};
 
 use gyre_messages::{Hop, NumberedBy, Scan, ScanHeader, StageId};
-use gyre_samples::Sample;
+use gyre_samples::{Sample, SampleKind};
 
 use super::{
     Credit,
@@ -48,9 +48,10 @@ pub trait Sensor {
     /// latency counts from when it was read.
     fn due_ns(&self) -> Option<i64>;
 
-    /// Takes the next sample of a gyro that comes with the sensor, in its own axes and on its own
-    /// clock.
-    fn gyro_sample(&mut self) -> Option<Sample> {
+    /// Takes the next sample of a gyro or of wheels that comes with the sensor, in its own axes and
+    /// on its own clock.
+    fn sample(&mut self, of: SampleKind) -> Option<Sample> {
+        let _ = of;
         None
     }
 

@@ -1,6 +1,11 @@
-//! Samples of inertial sensors in bags.
+//! Samples of inertial sensors and of wheels in bags.
 
-use gyre_ros2_messages::{geometry_msgs::Vector3, sensor_msgs::Imu, std_msgs::Header};
+use gyre_ros2_messages::{
+    geometry_msgs::{TwistStamped, Vector3},
+    sensor_msgs::Imu,
+    std_msgs::Header,
+};
+use gyre_samples::{Sample, SampleKind};
 
 use super::*;
 
@@ -24,6 +29,13 @@ fn imu(number: i64) -> Imu {
     }
 }
 
+fn of_gyro(
+    dataset: &mut dyn Dataset,
+    topic: Option<&str>,
+) -> Result<Option<Vec<Sample>>, OpenError> {
+    dataset.logged(SampleKind::Gyro, topic)
+}
+
 /// Four turns of a radar, with the samples of a gyro on each of these topics.
 fn with_gyros(topics: &[&str]) -> Messages {
     let mut messages = b_scans(4);
@@ -40,7 +52,7 @@ fn the_samples_of_the_only_gyro_are_read() {
     let folder = Folder::new();
     let mut dataset = opened(&folder.bag(&with_gyros(&["/imu/data"])));
     assert_has_turns(dataset.as_mut(), 4);
-    let samples = dataset.gyro(None).unwrap().unwrap();
+    let samples = of_gyro(dataset.as_mut(), None).unwrap().unwrap();
     assert_eq!(samples.len() as i64, SAMPLES);
     assert_eq!(samples[7].stamp_ns, START_NS + 7 * 25_000_000);
     assert_eq!(samples[7].values, [0.01, 0.02, 0.1, 0.5, 0.0, 9.8]);
@@ -51,8 +63,10 @@ fn the_samples_of_the_only_gyro_are_read() {
 fn a_bag_without_a_gyro_has_no_samples() {
     let folder = Folder::new();
     let mut dataset = opened(&folder.bag(&b_scans(4)));
-    assert_eq!(dataset.gyro(None).unwrap(), None);
-    let refused = dataset.gyro(Some("/imu/data")).unwrap_err().to_string();
+    assert_eq!(of_gyro(dataset.as_mut(), None).unwrap(), None);
+    let refused = of_gyro(dataset.as_mut(), Some("/imu/data"))
+        .unwrap_err()
+        .to_string();
     assert!(
         refused.contains("on the topic /imu/data (gyro.topic)"),
         "{refused}"
@@ -63,10 +77,12 @@ fn a_bag_without_a_gyro_has_no_samples() {
 fn of_several_gyros_one_is_to_be_named() {
     let folder = Folder::new();
     let mut dataset = opened(&folder.bag(&with_gyros(&["/imu/data", "/imu/raw"])));
-    let refused = dataset.gyro(None).unwrap_err().to_string();
-    let words = "gyros on several topics, /imu/data, /imu/raw: choose one with gyro.topic";
+    let refused = of_gyro(dataset.as_mut(), None).unwrap_err().to_string();
+    let words = "gyro on several topics, /imu/data, /imu/raw: choose one with gyro.topic";
     assert!(refused.contains(words), "{refused}");
-    let samples = dataset.gyro(Some("/imu/raw")).unwrap().unwrap();
+    let samples = of_gyro(dataset.as_mut(), Some("/imu/raw"))
+        .unwrap()
+        .unwrap();
     assert_eq!(samples.len() as i64, SAMPLES);
 }
 
@@ -78,13 +94,41 @@ fn a_driver_without_stamps_has_the_times_of_receipt_and_one_without_rates_is_ref
     messages.add("/imu/data", START_NS + 77, &unstamped);
     let folder = Folder::new();
     let mut dataset = opened(&folder.bag(&messages));
-    let samples = dataset.gyro(None).unwrap().unwrap();
+    let samples = of_gyro(dataset.as_mut(), None).unwrap().unwrap();
     assert_eq!(samples[0].stamp_ns, START_NS + 77);
 
     let mut rateless = imu(1);
     rateless.angular_velocity_covariance[0] = -1.0;
     messages.add("/imu/data", START_NS + 99, &rateless);
     let mut dataset = opened(&folder.bag(&messages));
-    let refused = dataset.gyro(None).unwrap_err().to_string();
+    let refused = of_gyro(dataset.as_mut(), None).unwrap_err().to_string();
     assert!(refused.contains("no angular velocity"), "{refused}");
+}
+
+#[test]
+fn the_speed_of_the_wheels_is_that_of_odometry_or_of_a_twist() {
+    let folder = Folder::new();
+    let mut messages = b_scans(4);
+    let stamp_ns = |number: i64| START_NS + 50_000_000 * number;
+    let mut odometry = Odometry::default();
+    odometry.twist.twist.linear.x = 8.25;
+    let mut twist = TwistStamped::default();
+    twist.twist.linear.x = -0.5;
+    for number in 0..20 {
+        odometry.header = Header::new(stamp_ns(number), "odom");
+        twist.header = Header::new(stamp_ns(number), "base_link");
+        messages.add("/odom", stamp_ns(number) + 3, &odometry);
+        messages.add("/speed", stamp_ns(number) + 3, &twist);
+    }
+    let mut dataset = opened(&folder.bag(&messages));
+    let mut wheels = |topic| dataset.logged(SampleKind::Wheels, topic);
+    for (topic, speed_mps) in [("/odom", 8.25), ("/speed", -0.5)] {
+        let samples = wheels(Some(topic)).unwrap().unwrap();
+        let expected = (0..20).map(|number| Sample::speed(stamp_ns(number), speed_mps));
+        assert_eq!(samples, expected.collect::<Vec<_>>());
+    }
+    let refused = wheels(None).unwrap_err().to_string();
+    let words = "speeds on /odom, /speed: name the topic that is of wheels with wheels.topic";
+    assert!(refused.contains(words), "{refused}");
+    assert_has_turns(dataset.as_mut(), 4);
 }

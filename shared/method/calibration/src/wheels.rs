@@ -1,0 +1,305 @@
+//! The clock and the scale of the wheels, from the distances that the radar drives.
+//!
+//! As for a [gyro](crate::calibrate_gyro): the log fits where the radar's distances correlate with
+//! it best, over all offsets of its clock. What tells the offset is how the speed changes.
+
+use std::path::Path;
+
+use gyre_samples::{Sample, WheelsConfig};
+use thiserror::Error;
+
+use crate::{
+    Drive, Estimate, Track,
+    gyro::{
+        MAX_LATE_S,
+        angles::Angles,
+        fit::Fit,
+        search::{MIN_TURNS, NoPeak, Peak, peak},
+        turns::turns,
+    },
+};
+
+/// Least standard deviation of the offset, periods of the log: its speeds are interpolated.
+const PERIOD_SHARE: f64 = 0.1;
+/// Least standard deviation of the scale: the radar's own, and tyres that warm.
+const SCALE_SIGMA: f64 = 2e-3;
+/// An offset that is known less well is refused, s: while braking at 5 m/s² it is half a m/s.
+const MAX_LATE_SIGMA_S: f64 = 0.1;
+/// Scales that wheels can have: beyond, their unit is another one.
+const SCALES: std::ops::RangeInclusive<f64> = 0.8..=1.25;
+
+/// The clock and the scale of the wheels, by the distances of the radar.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WheelCalibration {
+    /// Time by which the stamps of the wheels are late, s.
+    pub late_s: Estimate,
+    /// True distance over the measured one.
+    pub scale: Estimate,
+    /// Correlation of the distances with those of the radar.
+    pub correlation: f64,
+    /// Number of distances that were compared, of a second each.
+    pub distances: usize,
+}
+
+/// Why a drive does not tell the clock of the wheels.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum WheelError {
+    /// The times of the log are not those of the scans.
+    #[error(
+        "with offsets of the clocks up to {MAX_LATE_S:.0} s the log covers {seconds} distances of a second, and {MIN_TURNS} are needed: the drive is too short, or the log is of another one"
+    )]
+    Apart {
+        /// Distances that the log has samples for, at most.
+        seconds: usize,
+    },
+    /// Two offsets fit about as well.
+    #[error(
+        "the wheels drive as the radar best with late_s = {:.2} (correlation {:.2}), but about as well with {:.2} ({:.2}): the speed changes too little, or the log is of another drive",
+        best[0], best[1], rival[0], rival[1]
+    )]
+    Ambiguous {
+        /// The best offset, s, and its correlation.
+        best: [f64; 2],
+        /// Another one.
+        rival: [f64; 2],
+    },
+    /// The least squares do not end near the peak.
+    #[error(
+        "the offset of the clocks is not determined: parts of the drive lead to different ones"
+    )]
+    Unsettled,
+    /// The speed changes too little.
+    #[error(
+        "the offset of the clocks is {:.2} \u{b1} {:.2} s, which is too uncertain to be used: the speed changes too little, or a clock drifts",
+        .0.value, .0.sigma
+    )]
+    Steady(Estimate),
+    /// The speeds have another unit.
+    #[error(
+        "the radar drives {0:.3} times as far as the wheels measure: their speeds have another unit (0.278 is km/h, 0.447 mph)"
+    )]
+    Scale(f64),
+}
+
+impl From<NoPeak> for WheelError {
+    fn from(none: NoPeak) -> Self {
+        match none {
+            NoPeak::Apart { turns } => Self::Apart { seconds: turns },
+            NoPeak::Ambiguous { best, rival } => {
+                let of = |it: Peak| [it.late_s, it.correlation];
+                Self::Ambiguous {
+                    best: of(best),
+                    rival: of(rival),
+                }
+            }
+        }
+    }
+}
+
+/// Finds the offset and the scale of the wheels by a track of the drive.
+///
+/// Over `max_gap_s` without samples their speed is not interpolated.
+///
+/// # Errors
+/// A log that does not tell them.
+pub fn calibrate_wheels(
+    drive: &Drive,
+    track: &Track,
+    samples: &[Sample],
+    max_gap_s: f64,
+) -> Result<WheelCalibration, WheelError> {
+    let stamps: Vec<i64> = drive.sweeps.iter().map(|sweep| sweep.stamp_ns).collect();
+    let driven = track.motions.iter().map(|it| it.motion.translation.x);
+    let starts: Vec<bool> = drive.sweeps.iter().map(|it| it.interval_s <= 0.0).collect();
+    calibrate_distances(
+        &stamps,
+        &driven.collect::<Vec<_>>(),
+        &starts,
+        samples,
+        max_gap_s,
+    )
+}
+
+/// As [`calibrate_wheels`], from the distances since the scans before, m.
+fn calibrate_distances(
+    stamps: &[i64],
+    driven_m: &[f64],
+    starts: &[bool],
+    samples: &[Sample],
+    max_gap_s: f64,
+) -> Result<WheelCalibration, WheelError> {
+    let first_ns = stamps.first().copied().unwrap_or_default();
+    let distances = turns(stamps, driven_m, starts);
+    let log = Angles::new(samples, first_ns, max_gap_s);
+    let peak = peak(&distances, &log)?;
+    let fit = Fit::new(&distances, &log, &peak, false).ok_or(WheelError::Unsettled)?;
+    let [scale, _, late_s] = fit.parameters;
+    let floored = |estimate: Estimate, floor: f64| Estimate {
+        sigma: estimate.sigma.hypot(floor),
+        ..estimate
+    };
+    let late_s = floored(late_s, PERIOD_SHARE * log.period_s());
+    if !SCALES.contains(&scale.value) {
+        return Err(WheelError::Scale(scale.value));
+    }
+    match late_s.sigma <= MAX_LATE_SIGMA_S {
+        true => Ok(WheelCalibration {
+            late_s,
+            scale: floored(scale, SCALE_SIGMA),
+            correlation: peak.correlation,
+            distances: fit.turns,
+        }),
+        false => Err(WheelError::Steady(late_s)),
+    }
+}
+
+impl WheelCalibration {
+    /// Returns the mean of what drives of one vehicle say, each weighted by its uncertainty.
+    #[must_use]
+    pub fn mean(&self, others: &[Self]) -> Self {
+        others.iter().fold(*self, |mean, other| Self {
+            late_s: mean.late_s.combined(&other.late_s),
+            scale: mean.scale.combined(&other.scale),
+            correlation: mean.correlation.min(other.correlation),
+            distances: mean.distances + other.distances,
+        })
+    }
+
+    /// Returns the section `[wheels]`, with the log if it does not lie beside the scans.
+    pub fn toml(&self, file: Option<&Path>) -> String {
+        let kind = match file.map(|file| toml::Value::from(file.display().to_string())) {
+            Some(file) => format!("kind = \"log\"\nfile = {file}\n"),
+            None => "kind = \"auto\"\n".to_owned(),
+        };
+        let (late, scale) = (self.late_s, self.scale);
+        format!(
+            "\n[wheels]\n{kind}late_s = {:.4}\ntime_sigma_s = {:.4}\nscale = {:.4}\nscale_sigma = {:.4} # correlation {:.3} of {} distances with those of the radar\n",
+            late.value,
+            late.sigma.max(1e-4),
+            scale.value,
+            scale.sigma,
+            self.correlation,
+            self.distances
+        )
+    }
+
+    /// Returns the lines of a table, beside what is configured if wheels are used.
+    pub fn table(&self, configured: &WheelsConfig) -> String {
+        let line = |name: &str, found: &Estimate, unit: &str, value: f64| {
+            let verdict = match (value - found.value).abs() > WRONG_SIGMAS * found.sigma {
+                _ if !configured.is_used() => String::new(),
+                true => format!(", configured {value:.4}: CONTRADICTS the configured value"),
+                false => format!(", configured {value:.4}: agrees with the configured value"),
+            };
+            format!(
+                "{name:<21} {:.4} \u{b1} {:.4}{unit}{verdict}",
+                found.value, found.sigma
+            )
+        };
+        let (late, scale) = (&self.late_s, &self.scale);
+        [
+            line("wheels, late by", late, " s", configured.late_s),
+            line("wheels, scale", scale, "", configured.scale),
+            format!(
+                "{:<21} {} distances of a second, correlation {:.4}",
+                "", self.distances, self.correlation
+            ),
+        ]
+        .join("\n")
+    }
+}
+
+/// A configured value that is off by so many standard deviations is wrong.
+const WRONG_SIGMAS: f64 = 3.0;
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const START_NS: i64 = 1_549_986_607_000_000_000;
+    const SECONDS: i64 = 120;
+
+    /// A speed that changes as in a town, m/s, by a time, s.
+    fn speed(time_s: f64, seed: f64) -> f64 {
+        let waves = (1..7).map(|k| {
+            let pace = 0.07 * f64::from(k) + 0.013 * seed;
+            (pace * time_s + seed * f64::from(k * k)).sin() / f64::from(k)
+        });
+        8.0 + 3.0 * waves.sum::<f64>()
+    }
+
+    /// The distances of a radar at 4 Hz, whose noise is a centimetre, and its stamps.
+    fn radar(seed: f64) -> (Vec<i64>, Vec<f64>) {
+        let at = |k: i64| 0.25 * k as f64;
+        let stamps = (0..4 * SECONDS).map(|k| START_NS + 250_000_000 * k);
+        let driven = (0..4 * SECONDS).map(|k| {
+            let steps = (0..25).map(|part| 0.01 * speed(at(k - 1) + 0.01 * part as f64, seed));
+            steps.sum::<f64>() + 0.01 * (k as f64 * 1.7).sin()
+        });
+        (stamps.collect(), driven.collect())
+    }
+
+    fn wheels(seed: f64, late_s: f64, scale: f64) -> Vec<Sample> {
+        let samples = (-200 * 20..(SECONDS + 200) * 20).map(|k| {
+            let time_s = 0.05 * k as f64;
+            let stamp_ns = START_NS + ((time_s + late_s) * 1e9) as i64;
+            Sample::speed(stamp_ns, speed(time_s, seed) / scale)
+        });
+        samples.collect()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(12))]
+
+        /// Whatever the offset and the scale, they are found within their uncertainties.
+        #[test]
+        fn clock_and_scale_are_found(
+            late_s in -60.0..60.0f64, scale in 0.95..1.05f64, seed in 1.0..9.0f64,
+        ) {
+            let (stamps, driven) = radar(seed);
+            let starts = vec![false; stamps.len()];
+            let log = wheels(seed, late_s, scale);
+            let found = calibrate_distances(&stamps, &driven, &starts, &log, 0.25).unwrap();
+            let late = found.late_s;
+            prop_assert!((late.value - late_s).abs() < 4.0 * late.sigma, "{late:?} {late_s}");
+            prop_assert!((found.scale.value - scale).abs() < 4.0 * found.scale.sigma);
+            prop_assert!(late.sigma < 0.05 && found.scale.sigma < 0.01, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn another_drive_another_unit_and_a_steady_speed_are_refused() {
+        let (stamps, driven) = radar(1.0);
+        let starts = vec![false; stamps.len()];
+        let refused = |driven: &[f64], log: &[Sample]| {
+            calibrate_distances(&stamps, driven, &starts, log, 0.25).unwrap_err()
+        };
+        let km_h = refused(&driven, &wheels(1.0, 0.5, 1.0 / 3.6));
+        assert!(
+            matches!(km_h, WheelError::Scale(scale) if (scale - 0.278).abs() < 0.01),
+            "{km_h}"
+        );
+        let steady = vec![2.5; driven.len()];
+        let log: Vec<Sample> = wheels(1.0, 0.0, 1.0)
+            .iter()
+            .map(|sample| Sample::speed(sample.stamp_ns, 10.0))
+            .collect();
+        assert!(matches!(
+            refused(&steady, &log),
+            WheelError::Ambiguous { .. }
+        ));
+        let other = refused(&driven, &wheels(5.0, 0.0, 1.0));
+        assert!(
+            matches!(
+                other,
+                WheelError::Ambiguous { .. } | WheelError::Unsettled | WheelError::Steady(_)
+            ),
+            "{other}"
+        );
+        let later: Vec<Sample> = wheels(1.0, 3600.0, 1.0);
+        assert!(matches!(refused(&driven, &later), WheelError::Apart { .. }));
+    }
+}
