@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use gyre_datasets::DatasetOptions;
-use gyre_samples::GyroConfig;
+use gyre_samples::{GyroConfig, WheelsConfig};
 use gyre_storage as storage;
 use thiserror::Error;
 
@@ -17,8 +17,9 @@ pub struct CalibrationError {
     reason: String,
 }
 
-/// The sections of which a calibration may have any key: those of the radar and of the gyro.
-const WHOLE: [&str; 2] = ["dataset", "gyro"];
+/// The sections of which a calibration may have any key: those of the radar, the gyro and the
+/// wheels.
+const WHOLE: [&str; 3] = ["dataset", "gyro", "wheels"];
 /// The sections whose key `min_range_m` a calibration may have.
 const RANGES: [&str; 2] = ["points", "raster"];
 
@@ -45,13 +46,15 @@ pub fn overrides(file: &Path) -> Result<Vec<String>, CalibrationError> {
     };
     if !WHOLE.iter().any(|section| table.contains_key(*section)) || !table.iter().all(is_known) {
         return Err(unusable(
-            "a calibration has the sections [dataset] and [gyro], min_range_m in [points] and [raster], and no more: give the calibration.toml of `gyre calibrate`".to_owned(),
+            "a calibration has the sections [dataset], [gyro] and [wheels], min_range_m in [points] and [raster], and no more: give the calibration.toml of `gyre calibrate`".to_owned(),
         ));
     }
     let mut sections = table.clone();
     strict::section::<DatasetOptions>(&mut sections, "dataset")
         .map_err(|error| unusable(error.to_string()))?;
     strict::section::<GyroConfig>(&mut sections, "gyro")
+        .map_err(|error| unusable(error.to_string()))?;
+    strict::section::<WheelsConfig>(&mut sections, "wheels")
         .map_err(|error| unusable(error.to_string()))?;
     let sections = table
         .iter()
@@ -91,6 +94,10 @@ mod tests {
         storage::write(&file, text).unwrap();
         let gyro = ["gyro.kind=\"auto\"", "gyro.late_s=1.58", "gyro.up=\"-z\""];
         assert_eq!(overrides(&file).unwrap(), gyro);
+        let text = "[wheels]\nkind = \"auto\"\nlate_s = 0.35\n";
+        storage::write(&file, text).unwrap();
+        let wheels = ["wheels.kind=\"auto\"", "wheels.late_s=0.35"];
+        assert_eq!(overrides(&file).unwrap(), wheels);
         for text in [
             "[dataset]\n[points]\nbeam_deg = 3\n",
             "[points]\nmin_range_m = 7\n",

@@ -68,7 +68,7 @@ fn wheels(report: &WheelReport) -> Vec<String> {
     let name = report.file.file_name().unwrap_or_default().display();
     let clocks = of_clocks(&report.times);
     found.push(format!(
-        "The log of the wheels, {name}{clocks}, lies beside the scans: wheels.kind = \"auto\" uses it."
+        "The log of the wheels, {name}{clocks}, lies beside the scans: `gyre calibrate` finds how late its clock is, and wheels.kind = \"auto\" uses it."
     ));
     found
 }
