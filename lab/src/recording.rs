@@ -53,7 +53,7 @@ impl Recording {
         };
         Ok(Self {
             data: configuration.data(),
-            played: configuration.source.played(dataset.as_ref()),
+            played: configuration.source.played(dataset.scans()),
             dataset,
             truth,
         })

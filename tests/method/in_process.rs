@@ -20,7 +20,7 @@ fn register_all(run: &Run) -> Vec<Registered> {
     let (mut dataset, samples) = (played.dataset, played.samples);
     let mut scan = OwnedScan::with_limits(dataset.limits());
     let mut odometry = Odometry::new(&config).unwrap();
-    let scans = configuration.source.played(dataset.as_ref());
+    let scans = configuration.source.played(dataset.scans());
     scans
         .map(|index| {
             scan.geometry = dataset.read(index, scan.slot()).unwrap();

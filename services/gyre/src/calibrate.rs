@@ -230,7 +230,7 @@ fn read(
         .for_each(print::note);
     let mut scan = OwnedScan::with_limits(dataset.limits());
     let mut drive = Drive::new(&configuration.odometry)?;
-    let played = configuration.source.played(dataset.as_ref());
+    let played = configuration.source.played(dataset.scans());
     let (all, count) = (played.len(), played.len().min(arguments.scans));
     if count < all {
         let sentence =

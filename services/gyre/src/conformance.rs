@@ -59,7 +59,7 @@ fn examine(arguments: &ConformanceArguments) -> Result<Option<Report>, Failure> 
         .tempdir()?;
     let dataset = gyre_configuration::open(&configuration)?.dataset;
     let scans = InputScans {
-        played: configuration.source.played(dataset.as_ref()),
+        played: configuration.source.played(dataset.scans()),
         dataset,
     };
     let test = Test {

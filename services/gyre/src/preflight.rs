@@ -166,7 +166,7 @@ impl Scans {
         for fault in samples.faults() {
             print::note(fault);
         }
-        let count = configuration.source.stream_len(dataset.as_ref());
+        let count = configuration.source.stream_len(dataset.scans());
         if let Some(scans @ 0..2) = count {
             return Err(PreflightError::TooFew {
                 path: configuration.data(),

@@ -95,8 +95,8 @@ pub fn play(
 ) -> Result<StageCounters, StageError> {
     let config: SourceConfig = launch.section("source")?;
     let mut replay = Replay {
-        scans: config.stream(dataset.as_ref()),
-        turns: Turns::of(config.played(dataset.as_ref()), dataset.as_ref()),
+        scans: config.stream(dataset.scans()),
+        turns: Turns::of(config.played(dataset.scans()), dataset.as_ref()),
         burst: config.burst,
         dataset,
         samples,

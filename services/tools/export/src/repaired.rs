@@ -41,7 +41,7 @@ pub fn write(source: &Source, out: &Path) -> Result<(), Failure> {
         );
     };
     let dataset = recording(configuration)?;
-    let played = configuration.source.played(dataset.as_ref());
+    let played = configuration.source.played(dataset.scans());
     let images = dataset
         .file(played.start)
         .parent()

@@ -141,7 +141,7 @@ impl Source {
                 let eccentricity = configuration.dataset.azimuth_eccentricity_rad;
                 configuration.dataset.azimuth_eccentricity_rad = Some(0.0);
                 let dataset = gyre_configuration::open(&configuration)?.dataset;
-                let played = configuration.source.played(dataset.as_ref());
+                let played = configuration.source.played(dataset.scans());
                 Ok(Some(Scans::uncorrected(dataset, played, eccentricity)))
             }
             Kind::Recording => {

@@ -73,7 +73,7 @@ impl MaskInspector {
         Ok(Self {
             odometry: Odometry::new(&config)?,
             lag: config.masking.feedback_lag(),
-            next: configuration.source.played(dataset.as_ref()).start,
+            next: configuration.source.played(dataset.scans()).start,
             last: [scan.clone(), scan.clone()],
             spare: scan,
             samples,

@@ -53,7 +53,7 @@ pub fn masks(arguments: &MasksArguments) -> Result<ExitCode, Failure> {
     let played = gyre_configuration::open(&configuration)?;
     let chosen = choose(
         arguments,
-        configuration.source.played(played.dataset.as_ref()),
+        configuration.source.played(played.dataset.scans()),
         &configuration.data(),
     )?;
     let mut inspector = MaskInspector::new(&configuration, played)?;

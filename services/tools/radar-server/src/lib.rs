@@ -34,7 +34,7 @@ pub fn serve(arguments: &RadarServerArguments) -> Result<ExitCode, Failure> {
     // eccentricity.
     configuration.dataset.azimuth_eccentricity_rad = Some(0.0);
     let Played { mut dataset, .. } = gyre_configuration::open(&configuration)?;
-    let mut scans = configuration.source.played(dataset.as_ref());
+    let mut scans = configuration.source.played(dataset.scans());
     if let Some(count) = arguments.scans {
         scans.end = scans.end.min(scans.start.saturating_add(count));
     }

@@ -31,7 +31,10 @@ mod stale;
 pub(crate) mod stamp;
 mod transposed;
 
-use std::path::Path;
+use std::{ops::Range, path::Path};
+
+use gyre_radar::scan::{ScanLimits, ScanSlot, SweepGeometry};
+use gyre_samples::{Sample, SampleKind};
 
 pub use eccentricity::correct_eccentricity;
 pub use encoder::{EncoderTurn, FIRST_TURNS, encoder_counts};
@@ -39,8 +42,6 @@ pub use error::{OpenError, ReadError};
 pub use file_list::FileList;
 pub use foreign::foreign;
 pub use format::Format;
-use gyre_radar::scan::{ScanLimits, ScanSlot, SweepGeometry};
-use gyre_samples::{Sample, SampleKind};
 pub use image_size::ImageSize;
 pub use image_source::ImageSource;
 pub use options::{AzimuthSource, DatasetOptions, LostAzimuthOption};
@@ -60,6 +61,11 @@ pub trait Dataset: Send {
     /// Index of the first scan that can be read; those before it are of another part of the drive.
     fn first(&self) -> usize {
         0
+    }
+
+    /// Indices of the scans that can be read.
+    fn scans(&self) -> Range<usize> {
+        self.first()..self.len()
     }
 
     /// Returns whether there is no scan; `open` rejects such a folder.

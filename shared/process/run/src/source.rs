@@ -2,7 +2,6 @@
 
 use std::{num::NonZeroUsize, ops::Range, path::PathBuf};
 
-use gyre_datasets::Dataset;
 use serde::{Deserialize, Serialize};
 
 use crate::PlayedFrom;
@@ -121,23 +120,22 @@ impl Default for SourceConfig {
 }
 
 impl SourceConfig {
-    /// Returns the scans to play of a dataset, by their index in it.
-    pub fn played(&self, dataset: &dyn Dataset) -> Range<usize> {
-        let scans = dataset.len();
-        let first = self.first.max(dataset.first()).min(scans);
+    /// Returns the scans to play of a recording that has these, by their index in it.
+    pub fn played(&self, scans: Range<usize>) -> Range<usize> {
+        let first = self.first.max(scans.start).min(scans.end);
         let end = first.saturating_add(self.scans.unwrap_or(usize::MAX));
-        first..end.min(scans)
+        first..end.min(scans.end)
     }
 
-    /// Returns the scans of the stream that is played of a dataset, counted on through all turns.
-    /// It ends at `usize::MAX` if it is without end.
-    pub fn stream(&self, dataset: &dyn Dataset) -> Range<usize> {
-        self.turned(self.played(dataset))
+    /// Returns the scans of the stream that is played of a recording that has these, counted on
+    /// through all turns. It ends at `usize::MAX` if it is without end.
+    pub fn stream(&self, scans: Range<usize>) -> Range<usize> {
+        self.turned(self.played(scans))
     }
 
     /// Returns the number of scans of [`stream`](Self::stream); `None`: without end.
-    pub fn stream_len(&self, dataset: &dyn Dataset) -> Option<usize> {
-        let stream = self.stream(dataset);
+    pub fn stream_len(&self, scans: Range<usize>) -> Option<usize> {
+        let stream = self.stream(scans);
         (stream.end < usize::MAX).then_some(stream.len())
     }
 

@@ -45,7 +45,7 @@ impl Scans {
             .iter()
             .for_each(print::note);
         Ok(Self {
-            played: configuration.source.played(dataset.as_ref()),
+            played: configuration.source.played(dataset.scans()),
             odometry: Odometry::new(&configuration.odometry)?,
             scan: OwnedScan::with_limits(dataset.limits()),
             samples: played.samples,
