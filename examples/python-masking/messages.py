@@ -92,8 +92,13 @@ class WheelDistance(Message):
     _fields_ = [(name, c_double) for name in ("distance_m", "variance_m2", "side_variance_m2", "interval_s")]
 
 
+class DopplerVelocity(Message):
+    NAME = "gyre_doppler_velocity_v1"
+    _fields_ = [("velocity_mps", c_double * 2), ("covariance", c_double * 3), ("bearings", c_uint64)]
+
+
 class MaskedHeader(Message):
-    NAME = "gyre_masked_header_v7"
+    NAME = "gyre_masked_header_v8"
     _fields_ = [
         ("item", Item),
         ("n", c_uint32),
@@ -108,6 +113,8 @@ class MaskedHeader(Message):
         ("has_gyro", c_uint64),
         ("wheels", WheelDistance),
         ("has_wheels", c_uint64),
+        ("doppler", DopplerVelocity),
+        ("has_doppler", c_uint64),
     ]
 
 
@@ -120,7 +127,7 @@ class RotationEstimate(Message):
 
 
 class RefinementRecord(Message):
-    NAME = "gyre_refinement_v4"
+    NAME = "gyre_refinement_v5"
     _fields_ = [
         ("outcome", c_uint32),
         ("initial_guess", c_uint32),
@@ -133,11 +140,14 @@ class RefinementRecord(Message):
         ("wheels", c_uint64),
         ("wheel_scale", c_double),
         ("wheel_scale_sigma", c_double),
+        ("doppler", c_uint64),
+        ("doppler_scale", c_double),
+        ("doppler_scale_sigma", c_double),
     ]
 
 
 class MotionEstimate(Message):
-    NAME = "gyre_motion_estimate_v6"
+    NAME = "gyre_motion_estimate_v7"
     _fields_ = [
         ("x_m", c_double),
         ("y_m", c_double),
@@ -155,12 +165,12 @@ class MotionEstimate(Message):
 
 
 class MotionHeader(Message):
-    NAME = "gyre_motion_header_v9"
+    NAME = "gyre_motion_header_v10"
     _fields_ = [("item", Item), ("motion", MotionEstimate)]
 
 
 class PoseHeader(Message):
-    NAME = "gyre_pose_header_v9"
+    NAME = "gyre_pose_header_v10"
     _fields_ = [
         ("item", Item),
         ("motion", MotionEstimate),
@@ -196,12 +206,13 @@ SIZES = {
     ScanHeader: 13672,
     GyroTurn: 32,
     WheelDistance: 32,
-    MaskedHeader: 440,
+    DopplerVelocity: 48,
+    MaskedHeader: 496,
     RotationEstimate: 40,
-    RefinementRecord: 80,
-    MotionEstimate: 256,
-    MotionHeader: 576,
-    PoseHeader: 704,
+    RefinementRecord: 104,
+    MotionEstimate: 280,
+    MotionHeader: 600,
+    PoseHeader: 728,
     ByteBlock: 64,
     FloatBlock: 64,
 }

@@ -9,7 +9,7 @@ use std::{
 };
 
 use gyre_configuration::radar_constants;
-use gyre_datasets::{DatasetOptions, ScanSamples};
+use gyre_datasets::{DatasetOptions, ScanSamples, check_first_scan};
 use numpy::PyArray1;
 use pyo3::{exceptions::PyIndexError, prelude::*, types::PyTuple};
 
@@ -46,6 +46,9 @@ pub fn open(
         let (gyro, wheels) = (&method.odometry.gyro, &method.odometry.wheels);
         let samples = ScanSamples::open(gyro, wheels, &data, scans.as_mut());
         let samples = samples.map_err(errors::log)?;
+        if method.odometry.doppler.is_used() {
+            check_first_scan(scans.as_mut()).map_err(errors::doppler)?;
+        }
         Ok(Opened { scans, samples })
     })?;
     let scans = &opened.scans;

@@ -6,6 +6,7 @@ use gyre_configuration::AutomaticError;
 use gyre_datasets::{LogError, OpenError};
 use gyre_masking::MaskError;
 use gyre_odometry::OdometryError;
+use gyre_radar::NoDoppler;
 use pyo3::{prelude::*, sync::PyOnceLock, types::PyType};
 
 /// Returns a function that makes exceptions of one type.
@@ -61,6 +62,11 @@ pub fn log(error: LogError) -> PyErr {
         LogError::None { .. } | LogError::Live(_) => config(error),
         error => read(error),
     }
+}
+
+/// A radar that does not say its velocity by Doppler.
+pub fn doppler(error: NoDoppler) -> PyErr {
+    config(format!("doppler.kind is `auto`, but {error}"))
 }
 
 /// A recording whose settings cannot be found.

@@ -15,7 +15,7 @@ use gyre_messages::{
     ByteBlock, FloatBlock, Hop, Item, MaskedHeader, MotionEstimate, MotionHeader, PoseHeader,
     RefinementRecord, RotationEstimate, ScanHeader,
 };
-use gyre_samples::{GyroTurn, WheelDistance};
+use gyre_samples::{DopplerVelocity, GyroTurn, WheelDistance};
 use rustix::process::Signal;
 use serde_json::Value;
 
@@ -60,7 +60,7 @@ macro_rules! layout {
     };
 }
 
-fn layouts() -> [(&'static str, Layout); 11] {
+fn layouts() -> [(&'static str, Layout); 12] {
     [
         (
             "gyre_hop_v1",
@@ -77,9 +77,9 @@ fn layouts() -> [(&'static str, Layout); 11] {
                 doppler_s, samples, samples_left_out, azimuth_stamp_ns, azimuth_rad, azimuth_flags),
         ),
         (
-            "gyre_masked_header_v7",
+            "gyre_masked_header_v8",
             layout!(MaskedHeader: item, n, rasters, cell_m, mask, twist, compensated, points, azimuth_variance_rad2, gyro, has_gyro,
-                wheels, has_wheels),
+                wheels, has_wheels, doppler, has_doppler),
         ),
         (
             "gyre_gyro_turn_v1",
@@ -90,22 +90,29 @@ fn layouts() -> [(&'static str, Layout); 11] {
             layout!(WheelDistance: distance_m, variance_m2, side_variance_m2, interval_s),
         ),
         (
+            "gyre_doppler_velocity_v1",
+            layout!(DopplerVelocity: velocity_mps, covariance, bearings),
+        ),
+        (
             "gyre_rotation_estimate_v1",
             layout!(RotationEstimate: angle_rad, variance_rad2, score, runner_up_rad, runner_up_score),
         ),
         (
-            "gyre_refinement_v4",
+            "gyre_refinement_v5",
             layout!(RefinementRecord: outcome, initial_guess, overlap, support, stationary, gyro, gyro_bias_radps,
-                gyro_bias_sigma_radps, wheels, wheel_scale, wheel_scale_sigma),
+                gyro_bias_sigma_radps, wheels, wheel_scale, wheel_scale_sigma, doppler, doppler_scale, doppler_scale_sigma),
         ),
         (
-            "gyre_motion_estimate_v6",
+            "gyre_motion_estimate_v7",
             layout!(MotionEstimate: x_m, y_m, yaw_rad, covariance, drift_share, scale_sigma, interval_ns, score,
                 runner_up_score, rotation, searched, refinement),
         ),
-        ("gyre_motion_header_v9", layout!(MotionHeader: item, motion)),
         (
-            "gyre_pose_header_v9",
+            "gyre_motion_header_v10",
+            layout!(MotionHeader: item, motion),
+        ),
+        (
+            "gyre_pose_header_v10",
             layout!(PoseHeader: item, motion, x_m, y_m, yaw_rad, covariance, accumulated_covariance, trajectory_version),
         ),
     ]

@@ -49,6 +49,11 @@ pub enum PreflightError {
         "wheels.kind is of a recording, but the radar is live: set it to `udp`, to `ros2` for a radar behind its driver in ROS 2, or to `none`"
     )]
     LiveWheels,
+    /// Chirps of a live radar.
+    #[error(
+        "doppler.kind is `auto`, but a live radar does not say which of its chirps rise: set it to `none`"
+    )]
+    LiveDoppler,
     /// The segments would not fit.
     #[error(
         "shared memory at /dev/shm has {free_mb:.1} MB free, but the run needs {footprint}: enlarge it (containers: --shm-size), \
@@ -244,6 +249,9 @@ impl Scans {
         };
         if !can_come {
             return Err(PreflightError::LiveWheels.into());
+        }
+        if configuration.odometry.doppler.is_used() {
+            return Err(PreflightError::LiveDoppler.into());
         }
         configuration.dataset.check()?;
         let (source, options) = (&configuration.source, &configuration.dataset);

@@ -19,7 +19,7 @@ use crate::{
 pub struct MethodConfig {
     /// The format of the recording, and the constants of its radar.
     pub dataset: DatasetOptions,
-    /// The settings of the method: the sections from `raster` to `wheels`.
+    /// The settings of the method: the sections from `raster` to `doppler`.
     #[serde(flatten)]
     pub odometry: OdometryConfig,
     /// The correction of the trajectory at places that are seen again.
@@ -32,7 +32,7 @@ pub struct MethodConfig {
 
 impl MethodConfig {
     /// The names of the sections.
-    pub const SECTIONS: [&str; 14] = [
+    pub const SECTIONS: [&str; 15] = [
         "dataset",
         "raster",
         "points",
@@ -44,6 +44,7 @@ impl MethodConfig {
         "refinement",
         "gyro",
         "wheels",
+        "doppler",
         "slam",
         "gnss",
         "objects",
@@ -78,6 +79,7 @@ impl MethodConfig {
                 refinement: section(table, "refinement")?,
                 gyro: section(table, "gyro")?,
                 wheels: section(table, "wheels")?,
+                doppler: section(table, "doppler")?,
             },
             slam: section(table, "slam")?,
             gnss: section(table, "gnss")?,
@@ -100,6 +102,7 @@ impl MethodConfig {
         within("refinement", odometry.refinement.validate())?;
         within("gyro", odometry.gyro.validate())?;
         within("wheels", odometry.wheels.validate())?;
+        within("doppler", odometry.doppler.validate())?;
         within("slam.places", self.slam.validate())?;
         within("gnss", self.gnss.validate())?;
         within("objects", self.objects.validate())

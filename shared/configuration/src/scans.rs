@@ -5,10 +5,11 @@ use std::path::Path;
 
 use gyre_datasets::{
     Dataset, Fingerprint, GnssLog, GnssLogError, GyroLog, LogError, OpenError, ScanSamples,
-    WheelLog,
+    WheelLog, check_first_scan,
 };
+use gyre_radar::NoDoppler;
 use gyre_run::PlayedFrom;
-use gyre_samples::{GnssKind, GyroConfig, GyroKind, WheelsConfig, WheelsKind};
+use gyre_samples::{DopplerConfig, GnssKind, GyroConfig, GyroKind, WheelsConfig, WheelsKind};
 use gyre_simulator::{SimulatedDrive, SimulatorError};
 use thiserror::Error;
 
@@ -55,6 +56,9 @@ pub enum SourceError {
         "wheels.kind is `auto`, but the simulation has no wheels that measure: give them a rate in [simulation.wheels], or set wheels.kind = \"none\""
     )]
     NoWheels,
+    /// A radar that does not say the velocity.
+    #[error("doppler.kind is `auto`, but {0}; with doppler.kind = \"none\" it is not used")]
+    NoDoppler(NoDoppler),
 }
 
 /// An open recording or simulation.
@@ -82,6 +86,7 @@ pub fn open(configuration: &Configuration) -> Result<Played, SourceError> {
     if let Some(simulation) = configuration.streamed() {
         let drive = SimulatedDrive::new(simulation)?;
         let mut dataset = drive.open(options)?;
+        check_doppler(&method.doppler, dataset.as_mut())?;
         return Ok(Played {
             samples: simulated_samples(&drive, (&method.gyro, &method.wheels), dataset.as_mut())?,
             dataset,
@@ -92,11 +97,20 @@ pub fn open(configuration: &Configuration) -> Result<Played, SourceError> {
         return Err(SourceError::NoData);
     }
     let mut dataset = gyre_recording::open(data, options)?;
+    check_doppler(&method.doppler, dataset.as_mut())?;
     Ok(Played {
         samples: ScanSamples::open(&method.gyro, &method.wheels, data, dataset.as_mut())?,
         dataset,
         truth: None,
     })
+}
+
+/// Checks that the radar says its velocity by Doppler, if that is used.
+fn check_doppler(doppler: &DopplerConfig, dataset: &mut dyn Dataset) -> Result<(), SourceError> {
+    match doppler.is_used() {
+        true => check_first_scan(dataset).map_err(SourceError::NoDoppler),
+        false => Ok(()),
+    }
 }
 
 /// Returns the samples that go with the scans of a simulation: of its own gyro and wheels, unless

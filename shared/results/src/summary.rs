@@ -317,6 +317,18 @@ impl fmt::Display for Summary {
                 wheels.scale_sigma
             )?;
         }
+        if let Some(doppler) = &c.doppler {
+            writeln!(
+                f,
+                "velocities by Doppler {} of {}  refused {}  predicted {}  scale {:.4} +- {:.4}",
+                doppler.motions,
+                c.processed.saturating_sub(1 + c.breaks),
+                doppler.refused,
+                doppler.predicted,
+                doppler.scale,
+                doppler.scale_sigma
+            )?;
+        }
         if let Some(mask) = &self.mask {
             writeln!(f, "masks of {} by {}", mask.model, mask.backend.name())?;
         }

@@ -211,7 +211,9 @@ fn outcome_of_preflight(error: &PreflightError) -> DriveOutcome {
         PreflightError::SharedMemory { .. }
         | PreflightError::OpenFiles { .. }
         | PreflightError::NoSharedMemory(_) => DriveOutcome::Machine,
-        PreflightError::LiveGyro | PreflightError::LiveWheels => DriveOutcome::Configuration,
+        PreflightError::LiveGyro | PreflightError::LiveWheels | PreflightError::LiveDoppler => {
+            DriveOutcome::Configuration
+        }
     }
 }
 

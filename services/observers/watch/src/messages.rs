@@ -82,7 +82,7 @@ pub struct HealthReport {
     pub scans_per_s: f64,
     pub distance_m: f64,
     pub delays: DelayReport,
-    /// The part of gyro and wheels in the last motions, in words; none without them.
+    /// The part of gyro, wheels and Doppler in the last motions, in words; none without them.
     pub others: Option<String>,
     /// The reason why something is not shown.
     pub notice: Option<String>,

@@ -147,7 +147,7 @@ impl Snapshot {
         gauge(encoder, "scans_in_flight", help, counts.in_flight)
     }
 
-    /// Encodes what the motions rest on, and the part of gyro and wheels.
+    /// Encodes what the motions rest on, and the part of gyro, wheels and Doppler.
     fn encode_witnesses(&self, encoder: &mut DescriptorEncoder<'_>) -> fmt::Result {
         let counts = &self.counts.witnesses;
         let by_basis = Basis::ALL.iter().zip(counts.by_basis);
@@ -156,6 +156,10 @@ impl Snapshot {
             .collect();
         let gyro = [("used", counts.gyro_used), ("refused", counts.gyro_refused)];
         let wheels = [("used", counts.wheels_used), ("slip", counts.wheel_slips)];
+        let doppler = [
+            ("used", counts.doppler_used),
+            ("refused", counts.doppler_refused),
+        ];
         let families = [
             (
                 "motions",
@@ -174,6 +178,12 @@ impl Snapshot {
                 "Distances that the wheels have measured: used, or slipping.",
                 "state",
                 wheels.to_vec(),
+            ),
+            (
+                "doppler_velocities",
+                "Velocities by Doppler: used, or refused since the matches contradict.",
+                "state",
+                doppler.to_vec(),
             ),
         ];
         for (name, help, label, values) in families {
@@ -393,6 +403,7 @@ mod tests {
             "gyre_gyro_turns_total{state=\"used\"} 0",
             "gyre_wheel_distances_total{state=\"used\"} 1",
             "gyre_wheel_distances_total{state=\"slip\"} 0",
+            "gyre_doppler_velocities_total{state=\"used\"} 0",
         ] {
             assert!(text.lines().any(|it| it == line), "{line}: {text}");
         }

@@ -25,7 +25,7 @@ use crate::{
     track::{Cursor, Track, Vertex},
 };
 
-/// Motions whose part of gyro and wheels the page says: those of ten seconds at 4 Hz.
+/// Motions whose part of gyro, wheels and Doppler the page says: those of ten seconds at 4 Hz.
 const LAST_MOTIONS: usize = 40;
 /// Poses that are kept to find that of a scan whose points come later.
 const RECENT: usize = 256;

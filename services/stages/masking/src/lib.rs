@@ -3,7 +3,8 @@
 //!
 //! [`gyre_masking::Masker`] does the work, with a function of Python where one is given (`python`).
 //! `scans` and `motions` are its inputs; `lossless` and `live` are the two modes of taking scans
-//! from the queue; `azimuths` finds those that were lost.
+//! from the queue; `azimuths` finds those that were lost. The velocity by Doppler is measured here,
+//! where the rows of the scan are.
 
 mod azimuths;
 mod live;
@@ -15,7 +16,8 @@ mod scans;
 use gyre_geometry::Twist;
 use gyre_masking::{MaskError, MaskFunction, MaskKind, Masker, MaskingConfig, Sweep};
 use gyre_messages::{Item, Masked, MaskedHeader, Scan, StageId, flag, mask_kind};
-use gyre_radar::{PlacedRows, PointsConfig, RasterConfig};
+use gyre_radar::{DopplerEstimator, PlacedRows, PointsConfig, RasterConfig};
+use gyre_samples::DopplerConfig;
 use gyre_stage::{
     Launch, Stage, StageCounters, StageError, reader::Received, stage, writer::Draft,
 };
@@ -62,6 +64,7 @@ fn work(
 ) -> Result<StageCounters, StageError> {
     let raster: RasterConfig = launch.section("raster")?;
     let points: PointsConfig = launch.section("points")?;
+    let doppler: DopplerConfig = launch.section("doppler")?;
     let masker = match function {
         None => Masker::new(&raster, &points, &config),
         Some(function) => Masker::with_function(&raster, &points, &config, function),
@@ -71,6 +74,8 @@ fn work(
         config,
         masker: masker.map_err(|error| StageError::Configuration(error.to_string()))?,
         azimuths: Azimuths::default(),
+        doppler: doppler.is_used().then(DopplerEstimator::default),
+        min_range_m: points.min_range_m,
         rows: [PlacedRows::default(), PlacedRows::default()],
     };
     stage::run(launch, &mut masking)
@@ -81,6 +86,9 @@ struct Masking {
     config: MaskingConfig,
     masker: Masker,
     azimuths: Azimuths,
+    doppler: Option<DopplerEstimator>,
+    /// Nearer echoes are of the vehicle itself.
+    min_range_m: f32,
     /// Of the scan and of the previous one.
     rows: [PlacedRows; 2],
 }
@@ -133,11 +141,17 @@ impl Stage for Masking {
             .masker
             .points(&sweep.scan, twist, parts.points)
             .map_err(|error| input.scan.malformed(error.to_string()))?;
+        // Of the scan alone, so that a restart changes nothing.
+        let velocity = self.doppler.as_mut().map(|doppler| {
+            let velocity = doppler.estimate(&sweep.scan, self.min_range_m);
+            velocity.ok()
+        });
         *header = self.header(twist, points);
         let azimuths = input.scan.header().azimuths as usize;
         header.azimuth_variance_rad2 = self.azimuths.last().variance_of_mean_rad2(azimuths);
         header.set_turn(input.turn);
         header.set_distance(input.distance);
+        header.set_velocity(velocity.flatten());
         Ok(())
     }
 

@@ -4,7 +4,7 @@ use gyre_geometry::SparsePoint;
 use gyre_journal::checkpoint::{self, Checkpoint, CheckpointError};
 use gyre_messages::{Item, Masked, Motion, Refined, StageId, flag};
 use gyre_radar::PointsConfig;
-use gyre_samples::{GyroConfig, WheelsConfig};
+use gyre_samples::{DopplerConfig, GyroConfig, WheelsConfig};
 use gyre_scan_matching::{RefinementConfig, Refiner};
 use gyre_stage::{
     Launch, Stage, StageCounters, StageError,
@@ -23,10 +23,12 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let config: RefinementConfig = launch.section("refinement")?;
     let gyro: GyroConfig = launch.section("gyro")?;
     let wheels: WheelsConfig = launch.section("wheels")?;
+    let doppler: DopplerConfig = launch.section("doppler")?;
     let refiner = Refiner::new(&config, points.capacity)
         .map_err(|error| StageError::Configuration(error.to_string()))?
         .with_gyro(&gyro)
-        .with_wheels(&wheels);
+        .with_wheels(&wheels)
+        .with_doppler(&doppler);
     if !launch.take_place()? {
         return Ok(StageCounters::default());
     }
@@ -71,6 +73,8 @@ impl Stage for RefinementStage {
                 );
                 self.refiner.expect_turn(masked.turn());
                 self.refiner.expect_distance(masked.distance());
+                let velocities = [before.velocity(), masked.velocity()];
+                self.refiner.expect_velocities(velocities);
                 let refined = self.refiner.refine(
                     item.seq,
                     points(input.pair.current)?,
@@ -97,8 +101,8 @@ impl RefinementStage {
         if self.next != Some(item.seq) {
             let before = item.seq.saturating_sub(1);
             let restored = self.checkpoint.restore(before, &mut self.refiner);
-            // A chain goes on with what is known of gyro and wheels alone, which the first one has
-            // not.
+            // A chain goes on with what is known of gyro, wheels and Doppler alone, which the first
+            // one has not.
             restored.or_else(|error| match starts_chain {
                 true => Ok(()),
                 false => Err(unusable(error)),

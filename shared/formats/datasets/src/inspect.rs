@@ -8,6 +8,7 @@ mod gyro;
 mod rows;
 mod times;
 mod timing;
+mod velocity;
 mod wheels;
 
 use std::path::{Path, PathBuf};
@@ -20,6 +21,7 @@ pub use gyro::{GyroReport, QuietReport};
 pub use rows::{Chirps, RowsReport};
 pub use times::LogTimes;
 pub use timing::{Gap, Stall, TimingReport};
+pub use velocity::VelocityReport;
 pub use wheels::WheelReport;
 
 use crate::dataset::ImageSize;
@@ -65,6 +67,9 @@ pub struct Report {
     pub timing: Option<TimingReport>,
     /// Rows of the scans read.
     pub rows: RowsReport,
+    /// The velocity of the radar by the Doppler shift of the last scan read; `None` where chirps do
+    /// not alternate.
+    pub velocity: Option<VelocityReport>,
     /// Scans that could not be read.
     pub unreadable: Vec<Unreadable>,
     /// Ground truth files found.
@@ -185,6 +190,7 @@ fn assemble(
         stamp_meaning: dataset.stamp_meaning(),
         timing,
         rows: read.rows,
+        velocity: velocity::examine(&read.scan.view()),
         unreadable: read.unreadable,
         ground_truths: Vec::new(),
         gyro: None,

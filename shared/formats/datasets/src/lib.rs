@@ -10,6 +10,7 @@
 
 pub mod dataset;
 pub mod fingerprint;
+mod first_scan;
 mod gnss_log;
 mod gps_imu_twist;
 pub mod ground_truth;
@@ -27,6 +28,7 @@ pub use dataset::{
     parse_seconds, reopen, stamp_to_ns, stored_options, turn_ns,
 };
 pub use fingerprint::Fingerprint;
+pub use first_scan::check_first_scan;
 pub use gnss_log::{GnssFaults, GnssLog, GnssLogError, LoggedFix};
 pub use ground_truth::{
     TrajectoryError, find_ground_truth, parse_trajectory, read_trajectory, write_kitti, write_tum,

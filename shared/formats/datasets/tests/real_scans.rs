@@ -7,7 +7,7 @@ use crate::common::{read, real};
 use gyre_datasets::{Dataset, DatasetOptions, Format, open, read_trajectory};
 use gyre_radar::lost::stale_rows;
 use gyre_radar::scan::flag;
-use gyre_radar::{OwnedScan, Sense};
+use gyre_radar::{DopplerEstimator, OwnedScan, Sense};
 
 fn opened(folder: &str) -> Option<Box<dyn Dataset>> {
     Some(open(&real(folder)?, &DatasetOptions::default()).unwrap())
@@ -302,4 +302,24 @@ fn a_gap_moves_no_scan_of_a_short_recording() {
         let apart_ns = scans.nominal_stamp_ns(index).unwrap() - stamp_ns;
         assert!(apart_ns.abs() < 1_000_000, "scan {index}: {apart_ns} ns");
     }
+}
+
+/// The truth is not known. By what the correlations of both chirps show, at zero in all directions,
+/// the vehicle stands.
+#[test]
+fn a_scan_of_boreas_rt_says_that_its_vehicle_stands() {
+    let Some(folder) = real("samples/boreas-rt-2024-12-03") else {
+        return;
+    };
+    let options = DatasetOptions {
+        doppler_s: Some(0.049),
+        ..DatasetOptions::default()
+    };
+    let scan = read(open(&folder, &options).unwrap().as_mut(), 0).unwrap();
+    let found = DopplerEstimator::default().estimate(&scan.view(), 5.0);
+    let found = found.unwrap();
+    let [ahead, left] = found.velocity_mps;
+    assert!(ahead.hypot(left) < 0.5, "{found:?}");
+    let [xx, _, yy] = found.covariance;
+    assert!(xx.max(yy) < 0.04 && found.bearings > 100, "{found:?}");
 }

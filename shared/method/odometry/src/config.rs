@@ -2,7 +2,7 @@
 
 use gyre_masking::MaskingConfig;
 use gyre_radar::{PointsConfig, RasterConfig};
-use gyre_samples::{GyroConfig, WheelsConfig};
+use gyre_samples::{DopplerConfig, GyroConfig, WheelsConfig};
 use gyre_scan_matching::{ExhaustiveConfig, RefinementConfig, RotationConfig, TranslationConfig};
 use serde::{Deserialize, Serialize};
 
@@ -31,6 +31,8 @@ pub struct OdometryConfig {
     pub gyro: GyroConfig,
     /// The wheels, if their speed is known.
     pub wheels: WheelsConfig,
+    /// The velocity by the Doppler shift of single scans.
+    pub doppler: DopplerConfig,
 }
 
 impl OdometryConfig {

@@ -1,8 +1,10 @@
 //! Odometry: from scans to motions and poses.
 
 use gyre_geometry::{ComposedMotion, OdometryMotion, SparsePoint, Twist, UncertainMotion};
-use gyre_radar::{LostAzimuthFinder, LostAzimuths, PlacedRows, PolarScan};
-use gyre_samples::{Gyro, Sample, Wheels, with_yaw_rate};
+use gyre_radar::{
+    DopplerEstimator, LostAzimuthFinder, LostAzimuths, NoDoppler, PlacedRows, PolarScan,
+};
+use gyre_samples::{DopplerVelocity, Gyro, Sample, Wheels, with_yaw_rate};
 use gyre_scan_matching::{JointMatch, Refined};
 use ndarray::{ArrayView2, ArrayViewMut2};
 
@@ -19,6 +21,10 @@ pub struct Odometry {
     twists: LaggedTwists,
     gyro: Gyro,
     wheels: Wheels,
+    doppler: Option<DopplerEstimator>,
+    /// By the last scan.
+    velocity: Option<Result<DopplerVelocity, NoDoppler>>,
+    min_range_m: f32,
     finder: LostAzimuthFinder,
     lost: LostAzimuths,
     rows: PlacedRows,
@@ -50,6 +56,9 @@ impl Odometry {
             twists: LaggedTwists::new(config.masking.feedback_lag()),
             gyro: Gyro::new(&config.gyro),
             wheels: Wheels::new(&config.wheels),
+            doppler: config.doppler.is_used().then(DopplerEstimator::default),
+            velocity: None,
+            min_range_m: config.points.min_range_m,
             finder: LostAzimuthFinder::default(),
             lost: LostAzimuths::default(),
             rows: PlacedRows::default(),
@@ -111,6 +120,10 @@ impl Odometry {
         self.lost = self.finder.find(scan, twist);
         let placed = self.rows.place(scan, &self.lost);
         self.pair.mask(self.masker.as_mut(), &placed, twist)?;
+        let doppler = self.doppler.as_mut();
+        self.velocity = doppler.map(|it| it.estimate(&placed, self.min_range_m));
+        let velocity = self.velocity.as_ref().and_then(|it| it.as_ref().ok());
+        self.pair.set_velocity(velocity.copied());
         let variance_rad2 = self.lost.variance_of_mean_rad2(scan.geometry.azimuths);
         self.pair.expect_azimuth_errors(variance_rad2);
         Ok(())
@@ -197,6 +210,12 @@ impl Odometry {
     /// Returns the points of the last registered scan.
     pub fn points(&self) -> &[SparsePoint] {
         self.pair.earlier_points()
+    }
+
+    /// Returns the velocity of the radar by the Doppler shift of the last scan, or the reason why
+    /// there is none; `None` before the first one, and without `[doppler]`.
+    pub fn doppler(&self) -> Option<&Result<DopplerVelocity, NoDoppler>> {
+        self.velocity.as_ref()
     }
 
     /// Returns where azimuths of the last scan were lost: [`PlacedRows`] puts its rows where they

@@ -3,7 +3,7 @@
 use gyre_geometry::{SparsePoint, Twist};
 use gyre_masking::Sweep;
 use gyre_radar::{PolarScan, continues};
-use gyre_samples::{GyroTurn, WheelDistance};
+use gyre_samples::{DopplerVelocity, GyroTurn, WheelDistance};
 use ndarray::{Array2, ArrayView2, ArrayViewMut2};
 
 use crate::{Mask, OdometryError, Rasters};
@@ -25,6 +25,7 @@ struct Frame {
     stamp_ns: i64,
     twist: Option<Twist>,
     azimuth_variance_rad2: f32,
+    velocity: Option<DopplerVelocity>,
     raster: Array2<f32>,
     points: Vec<SparsePoint>,
     /// Number of points in use.
@@ -101,6 +102,17 @@ impl Pair {
     /// Returns the distance from the earlier scan to the later one, as the wheels have measured it.
     pub fn distance(&self) -> Option<WheelDistance> {
         self.distance
+    }
+
+    /// Returns the velocities by Doppler of the earlier scan and of the later one; `None` where a
+    /// scan does not say it.
+    pub fn velocities(&self) -> [Option<DopplerVelocity>; 2] {
+        [self.earlier.velocity, self.later.velocity]
+    }
+
+    /// Sets the velocity by Doppler of the later scan.
+    pub(crate) fn set_velocity(&mut self, velocity: Option<DopplerVelocity>) {
+        self.later.velocity = velocity;
     }
 
     /// Sets the distance from the earlier scan to the one that comes.
@@ -191,6 +203,7 @@ impl Frame {
             stamp_ns: 0,
             twist: None,
             azimuth_variance_rad2: 0.0,
+            velocity: None,
             raster: Array2::zeros((n, n)),
             points: vec![SparsePoint::default(); capacity],
             count: 0,

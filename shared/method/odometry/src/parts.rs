@@ -121,7 +121,8 @@ fn refiner(config: &OdometryConfig) -> Result<Option<Box<dyn Refine>>, SetupErro
         RefinementKind::LocalMap => {
             let refiner = Refiner::new(&config.refinement, capacity)?
                 .with_gyro(&config.gyro)
-                .with_wheels(&config.wheels);
+                .with_wheels(&config.wheels)
+                .with_doppler(&config.doppler);
             Ok(Some(Box::new(refiner)))
         }
     }
@@ -134,6 +135,7 @@ impl Refine for Refiner {
         self.expect_azimuth_errors(pair.azimuth_variance_rad2());
         self.expect_turn(pair.turn());
         self.expect_distance(pair.distance());
+        self.expect_velocities(pair.velocities());
         Refiner::refine(self, pair.seq(), later, earlier, searched, interval_s)
     }
 

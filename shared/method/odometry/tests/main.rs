@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod covariances;
+mod doppler;
 mod examples;
 mod lost_azimuths;
 mod sample_faults;

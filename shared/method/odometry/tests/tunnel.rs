@@ -1,5 +1,5 @@
 //! A tunnel of 300 m, whose walls look the same everywhere: the radar does not see how far the
-//! vehicle drives. The table of `docs/fusion.md`.
+//! vehicle drives. The tables of `docs/fusion.md`.
 
 use std::{fmt::Write as _, path::Path};
 
@@ -7,10 +7,11 @@ use gyre_datasets::{Dataset, GyroLog, ScanSamples, WheelLog, open_source};
 use gyre_geometry::{ComposedMotion, OdometryMotion, Pose, xy_yaw};
 use gyre_odometry::{Odometry, OdometryConfig};
 use gyre_radar::OwnedScan;
-use gyre_samples::{GyroKind, WheelsKind};
+use gyre_samples::{DopplerKind, GyroKind, WheelsKind};
 use gyre_scan_matching::InitialGuess;
 use gyre_simulator::{
-    GyroProfile, SimulatedDrive, SimulationConfig, TunnelConfig, drive::DriveConfig,
+    GyroProfile, OutputFormat, Profile, SimulatedDrive, SimulationConfig, TunnelConfig,
+    drive::DriveConfig,
 };
 use nalgebra::Vector3;
 
@@ -44,11 +45,16 @@ fn road() -> String {
     text
 }
 
-fn drive(seed: u64, folder: &Path) -> (SimulatedDrive, SimulationConfig) {
+fn drive(seed: u64, folder: &Path, radar: Profile) -> SimulatedDrive {
     let file = folder.join("road.tum");
     std::fs::write(&file, road()).unwrap();
     let mut config: SimulationConfig = toml::from_str("realism = \"road\"").unwrap();
     (config.seed, config.drive) = (seed, DriveConfig::along_file(file));
+    config.sensor.profile = radar;
+    config.output.format = Some(match radar {
+        Profile::Ras6 => OutputFormat::Boreas,
+        _ => OutputFormat::Oxford,
+    });
     config.gyro.profile = GyroProfile::Asm330lhh;
     config.wheels.rate_hz = 50.0;
     // The range is exact: what is measured is the way through the tunnel.
@@ -57,7 +63,7 @@ fn drive(seed: u64, folder: &Path) -> (SimulatedDrive, SimulationConfig) {
         from_m: BEFORE_M,
         length_m: TUNNEL_M,
     }];
-    (SimulatedDrive::new(&config).unwrap(), config)
+    SimulatedDrive::new(&config).unwrap()
 }
 
 /// Scales of covariances: the defaults, which hold for sharp corners, or those of simulated roads
@@ -106,6 +112,61 @@ struct Through {
     /// That of x, y and yaw alone.
     of_each: [f64; 3],
     along_walls: usize,
+    scans: usize,
+}
+
+impl Through {
+    fn print(&self, seed: u64, with: &str) {
+        let Self {
+            end_m,
+            sigma_m,
+            nees,
+            of_each: [x, y, yaw],
+            along_walls,
+            scans,
+        } = self;
+        let share = 100.0 * end_m / TUNNEL_M;
+        println!(
+            "| {seed} | {with} | {end_m:.2} m | {share:.2} % | {sigma_m:.2} m | {nees:.2} ({x:.2}, {y:.2}, {yaw:.2}) | {along_walls} of {scans} |"
+        );
+    }
+}
+
+/// The scans of a drive.
+fn rendered(drive: &SimulatedDrive) -> (Box<dyn Dataset>, Vec<OwnedScan>) {
+    let options = drive.dataset_options();
+    let mut dataset = open_source(Box::new(drive.renderer()), &options).unwrap();
+    let mut scans = Vec::new();
+    for index in 0..dataset.len() {
+        let mut scan = OwnedScan::with_limits(dataset.limits());
+        scan.geometry = dataset.read(index, scan.slot()).unwrap();
+        scans.push(scan);
+    }
+    (dataset, scans)
+}
+
+/// Registers the scans of a drive, and returns how it got through the tunnel.
+fn registered(
+    config: &OdometryConfig,
+    samples: &ScanSamples,
+    drive: &SimulatedDrive,
+    (dataset, scans): &(Box<dyn Dataset>, Vec<OwnedScan>),
+) -> Through {
+    let mut odometry = Odometry::new(config).unwrap();
+    let (mut driven_m, mut inside) = (0.0, Vec::new());
+    for (index, scan) in scans.iter().enumerate() {
+        let of = samples.of(dataset.as_ref(), scan.view().span_ns());
+        let registered = odometry.register(&scan.view(), &of).unwrap();
+        let Some(refined) = registered.refined else {
+            continue;
+        };
+        let [before, pose] = [index - 1, index].map(|k| drive.simulator().pose(k));
+        driven_m += before.inv_mul(&pose).translation.vector.norm();
+        if (BEFORE_M..BEFORE_M + TUNNEL_M + OUT_M).contains(&driven_m) {
+            inside.push((registered.motion, before, pose, refined.guess));
+        }
+    }
+    through(&inside)
 }
 
 /// The motions from the scan before the tunnel to one behind it, with the true poses.
@@ -136,6 +197,7 @@ fn through(motions: &[(OdometryMotion, Pose, Pose, InitialGuess)]) -> Through {
         nees,
         of_each,
         along_walls: motions.iter().filter(slid).count(),
+        scans: motions.len(),
     }
 }
 
@@ -147,47 +209,16 @@ fn the_way_through_a_tunnel_is_that_of_the_wheels() {
         "| seed | with | end error | of the tunnel | sigma along | NEES (x, y, yaw) | along walls |"
     );
     for seed in 1..=8 {
-        let (drive, simulation) = drive(seed, folder.path());
-        let mut dataset =
-            open_source(Box::new(drive.renderer()), &simulation.dataset_options()).unwrap();
-        let mut scans = Vec::new();
-        for index in 0..dataset.len() {
-            let mut scan = OwnedScan::with_limits(dataset.limits());
-            scan.geometry = dataset.read(index, scan.slot()).unwrap();
-            scans.push(scan);
-        }
+        let drive = drive(seed, folder.path(), Profile::default());
+        let recording = rendered(&drive);
         let runs = [[false, false], [true, false], [true, true]].map(|it| (it, Scales::Default));
         let runs = runs.into_iter().filter(|_| seed <= 4);
         for run in runs.chain([([true, true], Scales::Roads)]) {
-            let (config, samples) = with(run, &drive, dataset.as_ref());
-            let mut odometry = Odometry::new(&config).unwrap();
-            let (mut driven_m, mut inside) = (0.0, Vec::new());
-            for (index, scan) in scans.iter().enumerate() {
-                let of = samples.of(dataset.as_ref(), scan.view().span_ns());
-                let registered = odometry.register(&scan.view(), &of).unwrap();
-                let Some(refined) = registered.refined else {
-                    continue;
-                };
-                let [before, pose] = [index - 1, index].map(|k| drive.simulator().pose(k));
-                driven_m += before.inv_mul(&pose).translation.vector.norm();
-                if (BEFORE_M..BEFORE_M + TUNNEL_M + OUT_M).contains(&driven_m) {
-                    inside.push((registered.motion, before, pose, refined.guess));
-                }
-            }
-            let through = through(&inside);
-            let Through {
-                end_m,
-                sigma_m,
-                nees,
-                of_each: [x, y, yaw],
-                along_walls,
-            } = through;
-            let share = 100.0 * end_m / TUNNEL_M;
-            println!(
-                "| {seed} | {run:?} | {end_m:.2} m | {share:.2} % | {sigma_m:.2} m | {nees:.2} ({x:.2}, {y:.2}, {yaw:.2}) | {along_walls} of {} |",
-                inside.len()
-            );
-            assert!(nees < 4.0 && along_walls > inside.len() / 2);
+            let (config, samples) = with(run, &drive, recording.0.as_ref());
+            let through = registered(&config, &samples, &drive, &recording);
+            through.print(seed, &format!("{run:?}"));
+            let (end_m, sigma_m) = (through.end_m, through.sigma_m);
+            assert!(through.nees < 4.0 && through.along_walls > through.scans / 2);
             if run.0 == [true, true] {
                 assert!(end_m <= 0.01 * TUNNEL_M, "{end_m} m");
             } else {
@@ -195,6 +226,32 @@ fn the_way_through_a_tunnel_is_that_of_the_wheels() {
                     end_m > 10.0 && sigma_m > 0.3 * end_m,
                     "{end_m} m, {sigma_m} m"
                 );
+            }
+        }
+    }
+}
+
+#[test]
+#[ignore = "nightly: renders four drives, and registers each three times"]
+fn the_way_through_a_tunnel_is_that_of_doppler() {
+    let folder = tempfile::tempdir().unwrap();
+    println!(
+        "| seed | gyro, Doppler | end error | of the tunnel | sigma along | NEES (x, y, yaw) | along walls |"
+    );
+    for seed in 1..=4 {
+        let drive = drive(seed, folder.path(), Profile::Ras6);
+        let recording = rendered(&drive);
+        for (gyro, doppler) in [(true, false), (false, true), (true, true)] {
+            let run = ([gyro, false], Scales::Default);
+            let (mut config, samples) = with(run, &drive, recording.0.as_ref());
+            if doppler {
+                config.doppler.kind = DopplerKind::Auto;
+            }
+            let through = registered(&config, &samples, &drive, &recording);
+            through.print(seed, &format!("{gyro}, {doppler}"));
+            if gyro && doppler {
+                assert!(through.along_walls > through.scans / 2);
+                assert!(through.end_m <= 0.02 * TUNNEL_M && through.nees < 4.0);
             }
         }
     }

@@ -5,10 +5,12 @@
 //! - [`lost`]: where azimuths of a turn were lost that has no measured angles;
 //! - [`raster`]: from a scan to a Cartesian raster, with motion compensation;
 //! - [`points`]: from a scan to sparse points, its strongest returns;
+//! - [`doppler`]: from one scan to the velocity of the radar, if its chirps alternate;
 //! - [`trajectory`]: poses with times; [`clock_offset`]: how far the clocks of two are apart.
 
 mod chain;
 mod clock;
+pub mod doppler;
 pub mod lost;
 mod median;
 pub mod points;
@@ -18,6 +20,7 @@ pub mod trajectory;
 
 pub use chain::{MAX_INTERVAL_NS, continues};
 pub use clock::{ClockOffset, MAX_OFFSET_S, clock_offset};
+pub use doppler::{DopplerEstimator, NoDoppler, check_chirps};
 pub use lost::{LostAzimuthFinder, LostAzimuths, PlacedRows};
 pub use median::median;
 pub use points::{PointExtractor, PointsConfig, PointsError};

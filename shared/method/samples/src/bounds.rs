@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-/// A setting of `[gyro]`, `[wheels]` or `[gnss]` out of its bounds.
+/// A setting of `[gyro]`, `[wheels]`, `[doppler]` or `[gnss]` out of its bounds.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[error("{section}.{key} is {value}, but must be {expected}")]
 pub struct SampleConfigError {

@@ -11,6 +11,7 @@
 //! - [`Gyro`]: integrates the yaw rate between two scans, to a [`GyroTurn`];
 //! - [`Wheels`]: integrates the speed, to a [`WheelDistance`];
 //! - [`LiveSamples`]: what has arrived of a live gyro or of live wheels;
+//! - [`DopplerConfig`]: the section `[doppler]`, and [`DopplerVelocity`], which a scan says itself;
 //! - [`GnssConfig`]: the section `[gnss]`, and [`GnssFix`], which goes with no scan;
 //! - [`LocalPlane`]: places on the earth as coordinates in a plane.
 //!
@@ -19,6 +20,7 @@
 
 mod bounds;
 mod config;
+mod doppler;
 mod geodesy;
 mod gnss;
 mod gyro;
@@ -30,6 +32,7 @@ mod wheels_config;
 
 pub use bounds::SampleConfigError;
 pub use config::{GyroConfig, GyroKind, UpAxis};
+pub use doppler::{DopplerConfig, DopplerKind, DopplerVelocity, DopplerWay};
 pub use geodesy::{Geographic, LocalPlane};
 pub use gnss::{GnssConfig, GnssFix, GnssKind};
 pub use gyro::{Gyro, GyroTurn, with_yaw_rate};

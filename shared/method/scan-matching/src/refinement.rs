@@ -12,9 +12,9 @@
 //! - `alignment`, `normal_equations`: Gauss-Newton with a line search;
 //! - `tracker`: the last poses, what is predicted from them, and which poses a vehicle can have
 //!   reached;
-//! - `witnesses`: what gyro and wheels say of a motion, against what the radar says;
+//! - `witnesses`: what gyro, wheels and Doppler say of a motion, against what the radar says;
 //! - `heading`: with a gyro, the heading and the gyro's bias;
-//! - `wheels`: with wheels, their scale, and the motions of scans that match nothing;
+//! - `wheels`: with wheels or Doppler, their scale, and the motions of scans that match nothing;
 //! - `along_walls`: the way where nothing but other sensors tells how far it is; `structure`: where
 //!   that is so;
 //! - `uncertainty`: covariances, and the shares of them that accumulate;
@@ -44,7 +44,9 @@ mod witnesses;
 
 pub use config::{RefinementConfig, RefinementKind};
 use gyre_geometry::{OdometryMotion, Pose, SparsePoint, Twist, UncertainMotion};
-use gyre_samples::{GyroConfig, GyroTurn, WheelDistance, WheelsConfig};
+use gyre_samples::{
+    DopplerConfig, DopplerVelocity, DopplerWay, GyroConfig, GyroTurn, WheelDistance, WheelsConfig,
+};
 pub use heading::{GyroBias, Heading, Verdict};
 pub use initial_guess::InitialGuess;
 pub use keyframe_aligner::KeyframeAligner;
@@ -97,6 +99,8 @@ pub struct Refined {
     pub gyro: Option<GyroBias>,
     /// The scale of the wheels; `None` where they have not measured the distance.
     pub wheels: Option<WheelScale>,
+    /// The scale of the velocity by Doppler; `None` where one of both scans does not say it.
+    pub doppler: Option<WheelScale>,
 }
 
 /// An estimated pose, with the covariance of the motion to it.
@@ -115,6 +119,9 @@ pub struct Refiner {
     config: RefinementConfig,
     gyro: GyroConfig,
     wheels: WheelsConfig,
+    doppler: DopplerConfig,
+    /// [`DopplerConfig::as_wheels`].
+    doppler_as_wheels: WheelsConfig,
     map: LocalMap,
     state: TrackerState,
     points: DeskewedPoints,
@@ -123,6 +130,9 @@ pub struct Refiner {
     azimuth_variance_rad2: f64,
     turn: Option<GyroTurn>,
     distance: Option<WheelDistance>,
+    velocities: [Option<DopplerVelocity>; 2],
+    /// By these.
+    way: Option<DopplerWay>,
 }
 
 impl Refiner {
@@ -137,12 +147,16 @@ impl Refiner {
             config: config.clone(),
             gyro: GyroConfig::default(),
             wheels: WheelsConfig::default(),
+            doppler: DopplerConfig::default(),
+            doppler_as_wheels: DopplerConfig::default().as_wheels(),
             state: TrackerState::default(),
             points: DeskewedPoints::with_capacity(capacity),
             other_points: DeskewedPoints::with_capacity(capacity),
             azimuth_variance_rad2: 0.0,
             turn: None,
             distance: None,
+            velocities: [None; 2],
+            way: None,
         })
     }
 
@@ -158,6 +172,20 @@ impl Refiner {
     pub fn with_wheels(mut self, wheels: &WheelsConfig) -> Self {
         self.wheels = wheels.clone();
         self
+    }
+
+    /// Uses the velocities by Doppler, if this says so: [`Refiner::expect_velocities`].
+    #[must_use]
+    pub fn with_doppler(mut self, doppler: &DopplerConfig) -> Self {
+        self.doppler = doppler.clone();
+        self.doppler_as_wheels = doppler.as_wheels();
+        self
+    }
+
+    /// Sets the velocities by Doppler of the earlier scan and of the later one; `None` where a scan
+    /// does not say it.
+    pub fn expect_velocities(&mut self, velocities: [Option<DopplerVelocity>; 2]) {
+        self.velocities = velocities;
     }
 
     /// Sets the distance from the earlier scan to the later one that the wheels have measured;
@@ -193,6 +221,7 @@ impl Refiner {
     ) -> Refined {
         // Stamps that do not advance give no velocity: a second is assumed.
         let interval_s = if interval_s > 0.0 { interval_s } else { 1.0 };
+        self.way = self.way_by_doppler(interval_s);
         let mut scan = Scan {
             id: scan,
             points: later,
@@ -211,6 +240,7 @@ impl Refiner {
         let outcome = accepted.outcome;
         let gyro = self.turn.and(self.state.heading);
         let wheels = self.distance.and(self.state.wheels);
+        let doppler = self.way.and(self.state.doppler);
         let report = self.hold_standstill(&scan, &accepted);
         self.update(&scan, &best, outcome, &accepted.pose.motion);
         Refined {
@@ -231,17 +261,19 @@ impl Refiner {
             stationary: report.stationary,
             gyro: gyro.map(|it| it.bias()),
             wheels: wheels.map(|it| it.known()),
+            doppler: doppler.map(|it| it.known()),
         }
     }
 
-    /// Forgets the map and the tracker state but for the bias of the gyro and the scale of the
-    /// wheels: the next scan starts a new chain of motions.
+    /// Forgets the map and the tracker state but for the bias of the gyro and the scales of wheels
+    /// and Doppler: the next scan starts a new chain of motions.
     pub fn reset(&mut self) {
         self.map.clear();
         self.state.leave_map();
         self.state = TrackerState {
             heading: self.state.heading,
             wheels: self.state.wheels,
+            doppler: self.state.doppler,
             ..TrackerState::default()
         };
     }
@@ -354,17 +386,11 @@ impl Refiner {
         if let (None, Some(heading)) = (scan.step.turn, &mut self.state.heading) {
             heading.guess(covariance[(2, 2)]);
         }
-        if let Some(wheels) = &mut self.state.wheels {
-            match self.distance.filter(|_| scan.step.distance.is_some()) {
-                Some(measured) => wheels.carry(&measured),
-                None => wheels.guess(covariance[(0, 0)]),
-            }
-            let alone = UncertainMotion {
-                motion: self.state.pose.inv_mul(&motion),
-                covariance,
-            };
-            wheels.miss(&alone, scan.step.interval_s);
-        }
+        let alone = UncertainMotion {
+            motion: self.state.pose.inv_mul(&motion),
+            covariance,
+        };
+        self.carry(scan, &alone);
         Accepted {
             outcome: Outcome::Predicted,
             pose: UncertainMotion { motion, covariance },

@@ -10,6 +10,7 @@ mod exhaustive;
 mod hostile_input;
 mod known_motions;
 mod refinement;
+mod refinement_doppler;
 mod refinement_faults;
 mod refinement_gyro;
 mod refinement_wheels;

@@ -4,7 +4,7 @@ use gyre_messages::PoseHeader;
 use gyre_storage::{Checksum, Slots};
 
 /// The start of a journal, with the version of its records.
-pub(crate) const MAGIC: [u8; 16] = *b"gyre journal v10";
+pub(crate) const MAGIC: [u8; 16] = *b"gyre journal v11";
 const POSE: usize = size_of::<PoseHeader>();
 /// Bytes of a record: the pose, the number of records before it that were in danger, and a checksum
 /// of both.

@@ -1,24 +1,24 @@
 //! The basis of motions: the radar, other sensors, or a guess; and how often the others were used.
 
-use crate::refinement::{RefinementRecord, gyro, initial_guess, outcome, wheels};
+use crate::refinement::{RefinementRecord, doppler, gyro, initial_guess, outcome, wheels};
 
 /// The basis of a motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Basis {
     /// Two scans: there is no refinement, or the chain starts here.
     ScanToScan,
-    /// The map, without gyro and wheels: there are none, or they are not used.
+    /// The map alone: there is no gyro, no wheels and no Doppler, or they are not used.
     RadarOnly,
-    /// The map, and a gyro or wheels that do not contradict it.
+    /// The map, and a gyro, wheels or Doppler that do not contradict it.
     RadarAndOthers,
-    /// Walls without structure, and the wheels for the way along them.
+    /// Walls without structure, and wheels or Doppler for the way along them.
     AlongWalls,
-    /// The same without wheels: the way is that of the motions before.
+    /// The same without these: the way is that of the motions before.
     WayGuessed,
-    /// The wheels, since nothing matches: with the turn of a gyro, if there is one.
+    /// Wheels or Doppler, since nothing matches: with the turn of a gyro, if there is one.
     DeadReckoning,
-    /// The motions before, since nothing matches and there are no wheels: with the turn of a gyro,
-    /// if there is one.
+    /// The motions before, since nothing matches and there are no wheels and no Doppler: with the
+    /// turn of a gyro, if there is one.
     Guessed,
 }
 
@@ -55,22 +55,22 @@ impl RefinementRecord {
 
     /// Returns what the motion rests on.
     pub fn basis(&self) -> Basis {
-        let by_wheels = self.wheels == wheels::USED;
+        let by_distance = self.wheels == wheels::USED || self.doppler == doppler::USED;
         match self.outcome {
             outcome::SEARCHED => Basis::ScanToScan,
-            outcome::PREDICTED if by_wheels => Basis::DeadReckoning,
+            outcome::PREDICTED if by_distance => Basis::DeadReckoning,
             outcome::PREDICTED => Basis::Guessed,
-            _ if self.initial_guess == initial_guess::ALONG_WALLS => match by_wheels {
+            _ if self.initial_guess == initial_guess::ALONG_WALLS => match by_distance {
                 true => Basis::AlongWalls,
                 false => Basis::WayGuessed,
             },
-            _ if by_wheels || self.uses_gyro() => Basis::RadarAndOthers,
+            _ if by_distance || self.uses_gyro() => Basis::RadarAndOthers,
             _ => Basis::RadarOnly,
         }
     }
 }
 
-/// Counts of motions by what they rest on, and by the part of gyro and wheels.
+/// Counts of motions by what they rest on, and by the part of gyro, wheels and Doppler.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct WitnessCounts {
     /// Motions by what they rest on, in the order of [`Basis::ALL`].
@@ -83,6 +83,10 @@ pub struct WitnessCounts {
     pub wheels_used: u64,
     /// Those whose distance they have measured slipping.
     pub wheel_slips: u64,
+    /// Those whose velocity Doppler has said, and which do not contradict it.
+    pub doppler_used: u64,
+    /// Those whose velocity it has said, and which contradict it.
+    pub doppler_refused: u64,
 }
 
 impl WitnessCounts {
@@ -93,6 +97,8 @@ impl WitnessCounts {
         self.gyro_refused += u64::from(motion.gyro == gyro::REFUSED);
         self.wheels_used += u64::from(motion.wheels == wheels::USED);
         self.wheel_slips += u64::from(motion.wheels == wheels::SLIP);
+        self.doppler_used += u64::from(motion.doppler == doppler::USED);
+        self.doppler_refused += u64::from(motion.doppler == doppler::REFUSED);
     }
 
     /// Counts all of these.
@@ -107,8 +113,8 @@ impl WitnessCounts {
         self.by_basis.iter().sum()
     }
 
-    /// Returns the part of gyro and wheels in words, as `gyro 98 %, 1 refused, wheels 100 %`;
-    /// `None` where neither has measured anything.
+    /// Returns the part of gyro, wheels and Doppler in words, as `gyro 98 %, 1 refused, wheels 100
+    /// %`; `None` where none has measured anything.
     pub fn in_words(&self) -> Option<String> {
         let of = |name, used: u64, (not, count): (&str, u64)| {
             let share = 100.0 * used as f64 / self.motions().max(1) as f64;
@@ -121,6 +127,11 @@ impl WitnessCounts {
         let words = [
             of("gyro", self.gyro_used, ("refused", self.gyro_refused)),
             of("wheels", self.wheels_used, ("slips", self.wheel_slips)),
+            of(
+                "Doppler",
+                self.doppler_used,
+                ("refused", self.doppler_refused),
+            ),
         ];
         let words: Vec<String> = words.into_iter().flatten().collect();
         (!words.is_empty()).then(|| words.join(", "))
@@ -175,5 +186,22 @@ mod tests {
         let words = "gyro 44 %, 2 refused, wheels 33 %, 3 slips";
         assert_eq!(counts.in_words().as_deref(), Some(words));
         assert_eq!(WitnessCounts::of([&cases[1].0]).in_words(), None);
+        let by_doppler = |made: [u32; 2], doppler: u64| RefinementRecord {
+            doppler,
+            ..motion(made, gyro::NONE, wheels::NONE)
+        };
+        let cases = [
+            (by_doppler(refined, doppler::USED), "radar and others"),
+            (by_doppler(refined, doppler::REFUSED), "radar only"),
+            (by_doppler(walls, doppler::USED), "along walls"),
+            (by_doppler(walls, doppler::REFUSED), "way guessed"),
+            (by_doppler(predicted, doppler::USED), "dead reckoning"),
+        ];
+        for (motion, name) in cases {
+            assert_eq!(motion.basis().name(), name, "{motion:?}");
+        }
+        let counts = WitnessCounts::of(cases.iter().map(|(motion, _)| motion));
+        let words = "Doppler 60 %, 2 refused";
+        assert_eq!(counts.in_words().as_deref(), Some(words));
     }
 }

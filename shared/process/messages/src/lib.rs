@@ -62,7 +62,7 @@ pub use numbering::{GivenAnew, NumberedBy};
 pub use objects::{Objects, ObjectsHeader};
 pub use pose::{Pose, PoseHeader};
 pub use refined::Refined;
-pub use refinement::{RefinementRecord, gyro, initial_guess, outcome, wheels};
+pub use refinement::{RefinementRecord, doppler, gyro, initial_guess, outcome, wheels};
 pub use rotation::{Rotation, RotationEstimate, RotationHeader};
 pub use scan::{Scan, ScanHeader};
 pub use topics::{Footprint, Topic, WireType, topic, topics};

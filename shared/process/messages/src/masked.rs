@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use gyre_geometry::{SparsePoint, Twist};
-use gyre_samples::{GyroTurn, WheelDistance};
+use gyre_samples::{DopplerVelocity, GyroTurn, WheelDistance};
 use ndarray::{ArrayView2, ArrayViewMut2};
 
 use crate::{
@@ -56,7 +56,7 @@ impl Message for Masked {
             + (limits.points * size_of::<SparsePoint>()).div_ceil(ByteBlock::LEN)
     }
 }
-header!(MaskedHeader, "gyre_masked_header_v7");
+header!(MaskedHeader, "gyre_masked_header_v8");
 
 /// Values of [`MaskedHeader::mask`].
 pub mod mask_kind {
@@ -100,6 +100,10 @@ pub struct MaskedHeader {
     pub wheels: WheelDistance,
     /// 1 if they say so.
     pub has_wheels: u64,
+    /// The velocity by Doppler during this scan: see [`MaskedHeader::velocity`].
+    pub doppler: DopplerVelocity,
+    /// 1 if the scan says so.
+    pub has_doppler: u64,
 }
 
 /// The parts of a payload, to fill in: see [`MaskedHeader::split`].
@@ -165,8 +169,13 @@ impl MaskedHeader {
             self.has_wheels,
             "0 or 1",
         )?;
-        let (gyro, wheels) = (&self.gyro, &self.wheels);
+        let has_doppler = self.has_doppler;
+        require(has_doppler <= 1, "has_doppler", has_doppler, "0 or 1")?;
+        let (gyro, wheels, doppler) = (&self.gyro, &self.wheels, &self.doppler);
         finite([
+            ("doppler.velocity_mps[0]", doppler.velocity_mps[0]),
+            ("doppler.velocity_mps[1]", doppler.velocity_mps[1]),
+            ("doppler.covariance[1]", doppler.covariance[1]),
             ("gyro.yaw_rad", gyro.yaw_rad),
             ("gyro.sweep_rate_radps", gyro.sweep_rate_radps),
             ("wheels.distance_m", wheels.distance_m),
@@ -177,6 +186,8 @@ impl MaskedHeader {
             ("wheels.variance_m2", wheels.variance_m2),
             ("wheels.side_variance_m2", wheels.side_variance_m2),
             ("wheels.interval_s", wheels.interval_s),
+            ("doppler.covariance[0]", doppler.covariance[0]),
+            ("doppler.covariance[2]", doppler.covariance[2]),
         ] {
             require(
                 value >= 0.0 && value.is_finite(),
@@ -231,6 +242,17 @@ impl MaskedHeader {
     pub fn set_distance(&mut self, distance: Option<WheelDistance>) {
         self.wheels = distance.unwrap_or_default();
         self.has_wheels = distance.is_some().into();
+    }
+
+    /// Returns the velocity by Doppler during this scan; `None` where the scan does not say it.
+    pub fn velocity(&self) -> Option<DopplerVelocity> {
+        (self.has_doppler == 1).then_some(self.doppler)
+    }
+
+    /// Sets it.
+    pub fn set_velocity(&mut self, velocity: Option<DopplerVelocity>) {
+        self.doppler = velocity.unwrap_or_default();
+        self.has_doppler = velocity.is_some().into();
     }
 
     /// Splits a payload into its parts, with `rasters` (1 or 2) of n x n cells. `None` if it is too

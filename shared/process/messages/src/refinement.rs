@@ -55,6 +55,16 @@ pub mod wheels {
     pub const SLIP: u64 = 2;
 }
 
+/// Values of [`RefinementRecord::doppler`].
+pub mod doppler {
+    /// One of both scans does not say its velocity.
+    pub const NONE: u64 = 0;
+    /// It agrees with the registered motion, or the motion is predicted by it.
+    pub const USED: u64 = 1;
+    /// It contradicts the registered motion, or has contradicted the last one: it is not used.
+    pub const REFUSED: u64 = 2;
+}
+
 /// The result of a refinement; all zero without one.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -82,6 +92,12 @@ pub struct RefinementRecord {
     pub wheel_scale: f64,
     /// Standard deviation of that scale.
     pub wheel_scale_sigma: f64,
+    /// The part of the velocity by Doppler: see [`doppler`].
+    pub doppler: u64,
+    /// True velocity over that by Doppler, after the scan; zero without one.
+    pub doppler_scale: f64,
+    /// Standard deviation of that scale.
+    pub doppler_scale_sigma: f64,
 }
 
 impl RefinementRecord {
@@ -112,6 +128,8 @@ impl RefinementRecord {
         )?;
         require(self.gyro <= gyro::DOUBTED, "gyro", self.gyro, "0 to 3")?;
         require(self.wheels <= wheels::SLIP, "wheels", self.wheels, "0 to 2")?;
+        let part = self.doppler;
+        require(part <= doppler::REFUSED, "doppler", part, "0 to 2")?;
         finite([
             ("overlap", self.overlap),
             ("support", self.support),
@@ -119,6 +137,8 @@ impl RefinementRecord {
             ("gyro_bias_sigma_radps", self.gyro_bias_sigma_radps),
             ("wheel_scale", self.wheel_scale),
             ("wheel_scale_sigma", self.wheel_scale_sigma),
+            ("doppler_scale", self.doppler_scale),
+            ("doppler_scale_sigma", self.doppler_scale_sigma),
         ])
     }
 }
@@ -155,6 +175,13 @@ impl From<&gyre_scan_matching::Refined> for RefinementRecord {
             },
             wheel_scale: refined.wheels.map_or(0.0, |of| of.scale),
             wheel_scale_sigma: refined.wheels.map_or(0.0, |of| of.sigma),
+            doppler: match refined.doppler {
+                None => doppler::NONE,
+                Some(of) if of.slip => doppler::REFUSED,
+                Some(_) => doppler::USED,
+            },
+            doppler_scale: refined.doppler.map_or(0.0, |of| of.scale),
+            doppler_scale_sigma: refined.doppler.map_or(0.0, |of| of.sigma),
         }
     }
 }

@@ -1,6 +1,8 @@
 //! Counts of scans and motions.
 
-use gyre_messages::{Item, MotionEstimate, PoseHeader, flag, gyro, initial_guess, outcome, wheels};
+use gyre_messages::{
+    Item, MotionEstimate, PoseHeader, doppler, flag, gyro, initial_guess, outcome, wheels,
+};
 use serde::Serialize;
 
 /// Largest share of unreadable scans of a run that succeeds. With more, motions span more than one
@@ -44,6 +46,9 @@ pub struct Counts {
     /// `None`: no wheels have measured a distance.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wheels: Option<WheelCounts>,
+    /// `None`: no two scans in a row have said their velocity by Doppler.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub doppler: Option<DopplerCounts>,
 }
 
 /// The path that was driven.
@@ -136,6 +141,39 @@ impl WheelCounts {
     }
 }
 
+/// The contribution of the velocity by Doppler.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct DopplerCounts {
+    /// Motions between scans that both said it.
+    pub motions: u64,
+    /// Those in which it was not used: it was another one than that of the radar's matches, or had
+    /// last been.
+    pub refused: u64,
+    /// Those that were predicted by it, since nothing matched.
+    pub predicted: u64,
+    /// True velocity over the measured one, after the last of them.
+    pub scale: f64,
+    /// Standard deviation of that scale.
+    pub scale_sigma: f64,
+}
+
+impl DopplerCounts {
+    fn add(&mut self, motion: &MotionEstimate) {
+        let refinement = &motion.refinement;
+        if refinement.doppler == doppler::NONE {
+            return;
+        }
+        let is_used = refinement.doppler == doppler::USED;
+        self.motions += 1;
+        self.refused += u64::from(!is_used);
+        // Wheels go before.
+        let is_alone = is_used && refinement.wheels != wheels::USED;
+        self.predicted += u64::from(is_alone && refinement.outcome == outcome::PREDICTED);
+        self.scale = refinement.doppler_scale;
+        self.scale_sigma = refinement.doppler_scale_sigma;
+    }
+}
+
 /// Counts of motions by outcome.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct MotionCounts {
@@ -152,7 +190,7 @@ pub struct MotionCounts {
     /// Those of a standing vehicle.
     pub stationary: u64,
     /// Those along walls without structure, where the radar does not see how far the vehicle has
-    /// driven: the wheels say it, or the motions before.
+    /// driven: wheels or Doppler say it, or the motions before.
     pub along_walls: u64,
 }
 
@@ -214,6 +252,7 @@ pub struct Counter {
     motions: MotionCounts,
     gyro: GyroCounts,
     wheels: WheelCounts,
+    doppler: DopplerCounts,
 }
 
 impl Counter {
@@ -228,6 +267,7 @@ impl Counter {
         self.motions.add(&pose.motion);
         self.gyro.add(&pose.motion);
         self.wheels.add(&pose.motion);
+        self.doppler.add(&pose.motion);
     }
 
     /// Returns the path, which is so long.
@@ -261,6 +301,7 @@ impl Counter {
             motions: refines.then_some(self.motions),
             gyro: (self.gyro.motions > 0).then_some(self.gyro),
             wheels: (self.wheels.motions > 0).then_some(self.wheels),
+            doppler: (self.doppler.motions > 0).then_some(self.doppler),
         }
     }
 }

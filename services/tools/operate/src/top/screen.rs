@@ -153,7 +153,7 @@ fn head_lines(snapshot: &Snapshot) -> [String; 5] {
     ]
 }
 
-/// Returns what the newest motion rests on, and how often gyro and wheels were used.
+/// Returns what the newest motion rests on, and how often gyro, wheels and Doppler were used.
 fn witnesses(snapshot: &Snapshot) -> String {
     let basis = snapshot.basis.unwrap_or("no motion");
     match snapshot.witnesses.in_words() {

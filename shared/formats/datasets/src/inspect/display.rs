@@ -4,7 +4,8 @@ use std::fmt;
 use std::path::Path;
 
 use super::{
-    Chirps, GnssReport, GroundTruthReport, GyroReport, LogTimes, Report, TimingReport, WheelReport,
+    Chirps, GnssReport, GroundTruthReport, GyroReport, LogTimes, Report, TimingReport,
+    VelocityReport, WheelReport,
 };
 
 impl fmt::Display for Report {
@@ -46,6 +47,9 @@ impl fmt::Display for Report {
         )?;
         self.azimuth_line(f)?;
         self.row_line(f)?;
+        if let Some(velocity) = &self.velocity {
+            velocity_line(f, velocity)?;
+        }
         if let Some(timing) = &self.timing {
             timing_lines(f, timing)?;
         }
@@ -113,6 +117,22 @@ impl Report {
 
 fn line(f: &mut fmt::Formatter<'_>, name: &str, value: fmt::Arguments<'_>) -> fmt::Result {
     writeln!(f, "  {name:<13} {value}")
+}
+
+fn velocity_line(f: &mut fmt::Formatter<'_>, found: &VelocityReport) -> fmt::Result {
+    let (Some([ahead, left]), Some([of_ahead, of_left])) = (found.velocity_mps, found.sigma_mps)
+    else {
+        let reason = found.error.as_deref().unwrap_or_default();
+        return line(f, "velocity", format_args!("unknown: {reason}"));
+    };
+    let bearings = found.bearings;
+    line(
+        f,
+        "velocity",
+        format_args!(
+            "{ahead:.2} +- {of_ahead:.2} m/s ahead, {left:.2} +- {of_left:.2} m/s to the left, by the Doppler shift of {bearings} bearings of the last scan read"
+        ),
+    )
 }
 
 fn timing_lines(f: &mut fmt::Formatter<'_>, timing: &TimingReport) -> fmt::Result {

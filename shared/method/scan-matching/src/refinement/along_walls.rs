@@ -1,14 +1,14 @@
 //! Along walls without structure, as in a tunnel: the radar sees where they are, but not how far
 //! the vehicle drives.
 //!
-//! The place along them is the predicted one, by the wheels or at constant velocity, with the
-//! covariance of that; across them and of the heading the radar tells as elsewhere.
+//! The place along them is the predicted one, by wheels, by Doppler or at constant velocity, with
+//! the covariance of that; across them and of the heading the radar tells as elsewhere.
 
 use gyre_geometry::UncertainMotion;
 use nalgebra::UnitVector2;
 
 use super::{
-    Refiner,
+    Refiner, WheelState,
     alignment::Alignment,
     registration::{Candidate, Scan},
     structure::WeakestDirection,
@@ -44,7 +44,7 @@ impl Refiner {
     }
 
     /// Returns the direction along the axes of the map in which the place of a registered pose is
-    /// undetermined, if there is one. In one that is doubtful the wheels decide.
+    /// undetermined, if there is one. In one that is doubtful wheels or Doppler decide.
     pub(super) fn undetermined(
         &self,
         scan: &Scan<'_>,
@@ -52,19 +52,14 @@ impl Refiner {
         registered: &UncertainMotion,
     ) -> Option<UnitVector2<f64>> {
         let weakest = WeakestDirection::of(&self.map, &self.points, alignment)?;
-        let contradicts = || match (&self.distance, &self.state.wheels) {
-            (Some(measured), Some(wheels)) if scan.step.distance.is_some() => {
-                !wheels.agrees(measured, &self.driven(registered))
-            }
-            _ => false,
-        };
+        let contradicts = || self.contradicts_distance(scan, registered);
         let is_undetermined = weakest.is_undetermined()
             || (weakest.is_doubtful() && (self.state.sliding > 0 || contradicts()));
         is_undetermined.then_some(weakest.along)
     }
 
     /// Returns a registered pose with the covariance that the prediction has in a direction in
-    /// which nothing else tells the place: by the wheels, or at constant velocity.
+    /// which nothing else tells the place: by wheels, by Doppler, or at constant velocity.
     fn slid(
         &self,
         scan: &Scan<'_>,
@@ -93,18 +88,10 @@ impl Refiner {
 
     /// Takes a scan whose place along the walls is the predicted one.
     pub(super) fn slide(&mut self, scan: &Scan<'_>, registered: &UncertainMotion) {
-        let driven = self.driven(registered);
-        match (self.distance, scan.step.distance, &mut self.state.wheels) {
-            (Some(measured), Some(_), Some(wheels)) => {
-                wheels.slide(&measured);
-                self.state.sliding = 0;
-            }
-            (measured, _, wheels) => {
-                self.state.sliding = self.state.sliding.saturating_add(1);
-                if let (Some(measured), Some(wheels)) = (measured, wheels) {
-                    wheels.slide_without(&measured, &driven);
-                }
-            }
-        }
+        self.state.sliding = match scan.step.distance {
+            Some(_) => 0,
+            None => self.state.sliding.saturating_add(1),
+        };
+        self.each_distance(registered, WheelState::slide_along);
     }
 }

@@ -39,6 +39,9 @@ pub struct TrackerState {
     pub heading: Option<Heading>,
     /// The scale of the wheels, and the like; `None` until they have measured a distance.
     pub wheels: Option<WheelState>,
+    /// The scale of the velocity by Doppler, and the like; `None` until two scans in a row have
+    /// said it.
+    pub doppler: Option<WheelState>,
 }
 
 /// The time, the turn and the distance since the scan before.
@@ -48,7 +51,7 @@ pub(super) struct Step {
     pub interval_s: f64,
     /// The turn since then, by the gyro.
     pub turn: Option<PredictedTurn>,
-    /// The distance since then, by wheels that do not slip.
+    /// The distance since then, by wheels that do not slip, or by Doppler.
     pub distance: Option<PredictedDistance>,
 }
 
@@ -76,6 +79,7 @@ impl Default for TrackerState {
             standstill: Standstill::default(),
             heading: None,
             wheels: None,
+            doppler: None,
         }
     }
 }
@@ -130,7 +134,7 @@ impl Anchor {
 
 impl TrackerState {
     /// The poses after the interval at constant velocity, predicted from each anchor; the last pose
-    /// if there is none. With wheels the first is as far from the last pose as they say.
+    /// if there is none. With wheels or Doppler the first is as far from the last pose as they say.
     pub(super) fn predict(&self, step: &Step) -> [Pose; 2] {
         let heading = self.heading_at(step);
         let from = |anchor: &Anchor| anchor.predict(step.interval_s, heading);
@@ -193,7 +197,11 @@ impl TrackerState {
     /// to that, the scans of the map say nothing more of where the vehicle can be.
     pub(super) fn leave_map(&mut self) {
         self.heading.iter_mut().for_each(Heading::start_map);
-        self.wheels.iter_mut().for_each(WheelState::start_map);
+        let distances = [&mut self.wheels, &mut self.doppler];
+        distances
+            .into_iter()
+            .flatten()
+            .for_each(WheelState::start_map);
         if self.anchors[0].is_some_and(|anchor| anchor.age_s == 0.0) {
             self.anchors[1] = None;
         }

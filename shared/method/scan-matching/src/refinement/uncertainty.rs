@@ -9,8 +9,8 @@ use super::{
     tracker::Step,
 };
 
-/// Square of what gyro or wheels and the radar are apart, over its variance, beyond which one of
-/// them is wrong: four standard deviations.
+/// Square of what gyro, wheels or Doppler and the radar are apart, over its variance, beyond which
+/// one of them is wrong: four standard deviations.
 pub(super) const GATE: f64 = 16.0;
 /// Factor on the covariance of a weak match.
 pub(super) const WEAK_FACTOR: f64 = 4.0;
@@ -41,8 +41,8 @@ impl Uncertainty {
         config: &RefinementConfig,
     ) -> Self {
         let of_prediction = of_prediction(state, &scan.step, config);
-        let of_predictions = match &state.wheels {
-            Some(wheels) if predictions > 0 => wheels.unmatched,
+        let of_predictions = match state.wheels.or(state.doppler) {
+            Some(distance) if predictions > 0 => distance.unmatched,
             _ => of_prediction * f64::from(predictions),
         };
         Self {
@@ -152,7 +152,7 @@ pub(super) fn drift_share(keyframes: usize, config: &RefinementConfig) -> f64 {
 }
 
 /// The covariance of a motion predicted at constant velocity, whose acceleration is within the
-/// limits; of its turn, by the gyro if there is one; of its distance, by the wheels.
+/// limits; of its turn, by the gyro if there is one; of its distance, by wheels or Doppler.
 fn of_prediction(state: &TrackerState, step: &Step, config: &RefinementConfig) -> Matrix3<f64> {
     let interval_s = step.interval_s;
     let variance =

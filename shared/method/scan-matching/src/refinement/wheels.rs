@@ -1,5 +1,6 @@
-//! The distance by the wheels beside that of the radar: a Kalman filter over the place along the
-//! path against the map, and the scale of the wheels.
+//! The distance by the wheels beside that of the radar's matches: a Kalman filter over the place
+//! along the path against the map, and the scale of the wheels. The way by Doppler has one of its
+//! own, since it is a distance with a scale too: that of the Doppler coefficient.
 //!
 //! Where the radar sees, it says how far the vehicle has driven, and so what the scale is: the
 //! motions of a drive share it, and the noise of one registration is taken back by the next. A
@@ -29,6 +30,8 @@ pub struct WheelState {
     pub dead_s: f64,
     /// The turn since then, rad.
     pub dead_rad: f64,
+    /// The time since a match has last told the place along the path, s: also along walls.
+    pub untold_s: f64,
     /// Covariance of the predicted motions since then together, or since a new map was started:
     /// along the axes of the last scan.
     pub unmatched: Matrix3<f64>,
@@ -45,12 +48,23 @@ pub struct WheelScale {
     pub slip: bool,
 }
 
-/// The distance that the wheels predict, against the scan before.
+/// The witness of a distance.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum DistanceBy {
+    Wheels,
+    Doppler,
+}
+
+/// The distance that the wheels or Doppler predict, against the scan before.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PredictedDistance {
+    pub by: DistanceBy,
     /// Distance since the scan before, m; negative backwards.
     pub distance_m: f64,
-    /// Variance of that, m², such that those of the motions since the last registered one add up.
+    /// Way to the left of the heading half-way, m, by Doppler.
+    pub left_m: f64,
+    /// Variance of the distance, m², such that those of the motions since the last registered one
+    /// add up.
     pub variance_m2: f64,
     /// Variance across the path, m².
     pub side_variance_m2: f64,
@@ -113,6 +127,7 @@ impl WheelState {
             dead_m: 0.0,
             dead_s: 0.0,
             dead_rad: 0.0,
+            untold_s: 0.0,
             unmatched: Matrix3::zeros(),
         }
     }
@@ -129,6 +144,7 @@ impl WheelState {
     /// Lets time pass: the scale changes.
     pub(super) fn wait(&mut self, time_s: f64, config: &WheelsConfig) {
         self.covariance[(1, 1)] += config.scale_walk_per_sqrt_s.powi(2) * time_s;
+        self.untold_s += time_s;
     }
 
     /// Predicts the distance of the next scan; `None` while the wheels slip.
@@ -142,7 +158,9 @@ impl WheelState {
         // grows with the square of the whole distance.
         let since_m2 = grown(step_m, self.dead_m);
         (!self.slips).then_some(PredictedDistance {
+            by: DistanceBy::Wheels,
             distance_m: self.scale * step_m,
+            left_m: 0.0,
             variance_m2: measured.variance_m2 + self.covariance[(1, 1)] * since_m2,
             side_variance_m2: measured.side_variance_m2,
             radar_ahead_m: config.radar_ahead_m,
@@ -171,6 +189,25 @@ impl WheelState {
             before,
             seen,
             noise_m2,
+        }
+    }
+
+    /// Compares a registered pose with the measured distance, if there is one: it is another one
+    /// where both disagree, if the match is certain.
+    pub(super) fn weigh(
+        &mut self,
+        measured: Option<&WheelDistance>,
+        registered: &Registered,
+        is_certain: bool,
+    ) {
+        match measured {
+            Some(measured) if self.agrees(measured, registered) => {
+                self.correct(measured, registered);
+            }
+            measured => {
+                let slips = self.slips || (measured.is_some() && is_certain);
+                self.adopt(registered, slips);
+            }
         }
     }
 
@@ -206,6 +243,7 @@ impl WheelState {
 
     fn see(&mut self) {
         (self.dead_m, self.dead_s, self.dead_rad) = (0.0, 0.0, 0.0);
+        self.untold_s = 0.0;
         self.unmatched = Matrix3::zeros();
     }
 
@@ -215,6 +253,16 @@ impl WheelState {
         self.covariance = step * self.covariance * step.transpose();
         self.covariance[(0, 0)] += measured.variance_m2;
         self.dead_m += measured.distance_m;
+    }
+
+    /// Takes a registered pose whose place along the path is the predicted one, since the map does
+    /// not determine it.
+    pub(super) fn slide_along(&mut self, measured: Option<&WheelDistance>, driven: &Registered) {
+        match measured {
+            Some(measured) if !self.slips => self.slide(measured),
+            Some(measured) => self.slide_without(measured, driven),
+            None => {}
+        }
     }
 
     /// Takes a registered pose whose place along the path is that of the wheels, since the map does
@@ -265,7 +313,7 @@ impl PredictedDistance {
     pub(super) fn motion(&self, [yaw_rad, variance_rad2]: [f64; 2]) -> UncertainMotion {
         let arc = Twist {
             vx_mps: self.distance_m,
-            vy_mps: 0.0,
+            vy_mps: self.left_m,
             yaw_rate_radps: yaw_rad,
         };
         let ahead = pose(self.radar_ahead_m, 0.0, 0.0);

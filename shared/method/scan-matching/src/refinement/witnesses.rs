@@ -1,14 +1,16 @@
-//! Gyro and wheels as witnesses of a motion: against what the radar says of it.
+//! Gyro, wheels and Doppler as witnesses of a motion: against what the matches of the radar say of
+//! it.
 
 use gyre_geometry::UncertainMotion;
+use gyre_samples::{DopplerWay, WheelDistance, WheelsConfig};
 
 use super::{
     Heading, Refiner, WheelState,
-    heading::{PredictedTurn, Verdict},
+    heading::{PredictedTurn, Verdict, grown},
     registration::{Candidate, Scan},
     tracker::Step,
     uncertainty,
-    wheels::{PredictedDistance, Registered},
+    wheels::{DistanceBy, PredictedDistance, Registered},
 };
 
 impl Refiner {
@@ -24,8 +26,46 @@ impl Refiner {
     }
 
     /// Predicts the distance since the scan before by the wheels, if those have measured it and do
-    /// not slip.
+    /// not slip; else by Doppler, if that has and is not refused.
     pub(super) fn predict_distance(&mut self, interval_s: f64) -> Option<PredictedDistance> {
+        let by_wheels = self.predict_by_wheels(interval_s);
+        let by_doppler = self.predict_by_doppler(interval_s);
+        by_wheels.or(by_doppler)
+    }
+
+    /// Returns the way since the scan before by Doppler; `None` where one of both scans does not
+    /// say its velocity.
+    pub(super) fn way_by_doppler(&self, interval_s: f64) -> Option<DopplerWay> {
+        let [earlier, later] = &self.velocities;
+        let both = [earlier.as_ref()?, later.as_ref()?];
+        let is_used = self.doppler.is_used();
+        is_used.then(|| self.doppler.way(both, interval_s))
+    }
+
+    fn predict_by_doppler(&mut self, interval_s: f64) -> Option<PredictedDistance> {
+        let config = &self.doppler_as_wheels;
+        if self.way.is_some() {
+            self.state.doppler.get_or_insert(WheelState::new(config));
+        }
+        let state = self.state.doppler.as_mut()?;
+        state.wait(interval_s, config);
+        let way = self.way?;
+        let predicted = state.predict(&way.ahead, config)?;
+        // The error that lasts is that of all motions since a match has told the place: the
+        // variance of one motion alone is that of the way.
+        let before_s = (state.untold_s - interval_s).max(0.0);
+        let lasting = grown(interval_s, before_s) - interval_s.powi(2);
+        let lasting_m2 = self.doppler.noise_mps.powi(2) * lasting;
+        Some(PredictedDistance {
+            by: DistanceBy::Doppler,
+            left_m: state.scale * way.left_m,
+            variance_m2: predicted.variance_m2 + lasting_m2,
+            side_variance_m2: predicted.side_variance_m2 + lasting_m2,
+            ..predicted
+        })
+    }
+
+    fn predict_by_wheels(&mut self, interval_s: f64) -> Option<PredictedDistance> {
         let measured = self.distance;
         if measured.is_some() {
             self.state
@@ -118,38 +158,105 @@ impl Refiner {
         })
     }
 
-    /// Returns the part along the path of the motion to a registered pose.
-    pub(super) fn driven(&self, registered: &UncertainMotion) -> Registered {
+    /// Returns whether a registered pose contradicts the distance that was predicted by wheels or
+    /// Doppler.
+    pub(super) fn contradicts_distance(
+        &self,
+        scan: &Scan<'_>,
+        registered: &UncertainMotion,
+    ) -> bool {
+        let Some(by) = scan.step.distance.map(|it| it.by) else {
+            return false;
+        };
+        let (state, measured, config) = self.distance_by(by);
+        match (state, measured) {
+            (Some(state), Some(measured)) => {
+                !state.agrees(&measured, &self.driven(registered, config))
+            }
+            _ => false,
+        }
+    }
+
+    /// Returns what is known of a witness of the distance, what it has measured since the scan
+    /// before, and its settings.
+    fn distance_by(
+        &self,
+        by: DistanceBy,
+    ) -> (Option<&WheelState>, Option<WheelDistance>, &WheelsConfig) {
+        match by {
+            DistanceBy::Wheels => (self.state.wheels.as_ref(), self.distance, &self.wheels),
+            DistanceBy::Doppler => (
+                self.state.doppler.as_ref(),
+                self.way.map(|way| way.ahead),
+                &self.doppler_as_wheels,
+            ),
+        }
+    }
+
+    /// Hands each witness of the distance what it has measured, and what was driven to a registered
+    /// pose.
+    pub(super) fn each_distance(
+        &mut self,
+        registered: &UncertainMotion,
+        take: impl Fn(&mut WheelState, Option<&WheelDistance>, &Registered),
+    ) {
+        let driven =
+            [&self.wheels, &self.doppler_as_wheels].map(|config| self.driven(registered, config));
+        let measured = [self.distance, self.way.map(|way| way.ahead)];
+        let states = [&mut self.state.wheels, &mut self.state.doppler];
+        for ((state, measured), driven) in states.into_iter().zip(measured).zip(driven) {
+            if let Some(state) = state {
+                take(state, measured.as_ref(), &driven);
+            }
+        }
+    }
+
+    /// Takes the predicted motion of a scan that matches nothing.
+    pub(super) fn carry(&mut self, scan: &Scan<'_>, predicted: &UncertainMotion) {
+        let by = scan.step.distance.map(|it| it.by);
+        let way = self.way.map(|way| way.ahead);
+        let witnesses = [
+            (&mut self.state.wheels, self.distance, DistanceBy::Wheels),
+            (&mut self.state.doppler, way, DistanceBy::Doppler),
+        ];
+        for (state, measured, witness) in witnesses {
+            let Some(state) = state else {
+                continue;
+            };
+            match measured.filter(|_| by == Some(witness)) {
+                Some(measured) => state.carry(&measured),
+                None => state.guess(predicted.covariance[(0, 0)]),
+            }
+            state.miss(predicted, scan.step.interval_s);
+        }
+    }
+
+    /// Returns the part along the path of the motion to a registered pose, of the axle that these
+    /// settings say.
+    fn driven(&self, registered: &UncertainMotion, config: &WheelsConfig) -> Registered {
         let motion = UncertainMotion {
             motion: self.state.pose.inv_mul(&registered.motion),
             ..*registered
         };
         let drift_share = uncertainty::drift_share(self.map.len(), &self.config);
-        Registered::of(&motion, drift_share, &self.wheels)
+        Registered::of(&motion, drift_share, config)
     }
 
-    /// Compares a registered pose with the distance of the wheels, if there is one: they slip where
-    /// it disagrees. Returns false if they are believed instead, since the match is not certain.
+    /// Compares a registered pose with the distances of wheels and Doppler, if there are any: they
+    /// slip, or are refused, where it disagrees. Returns false if the predicted one is believed
+    /// instead, since the match is not certain.
     pub(super) fn weigh_distance(
         &mut self,
         scan: &Scan<'_>,
         registered: &UncertainMotion,
         is_certain: bool,
     ) -> bool {
-        let registered = self.driven(registered);
-        let Some(wheels) = &mut self.state.wheels else {
-            return true;
-        };
-        match &self.distance {
-            Some(measured) if wheels.agrees(measured, &registered) => {
-                wheels.correct(measured, &registered);
-            }
-            Some(_) if scan.step.distance.is_some() && !is_certain => return false,
-            measured => {
-                let slips = measured.is_some() || wheels.slips;
-                wheels.adopt(&registered, slips);
-            }
+        if !is_certain && self.contradicts_distance(scan, registered) {
+            return false;
         }
+        self.each_distance(registered, |state, measured, driven| {
+            state.weigh(measured, driven, is_certain);
+        });
         true
     }
 

@@ -12,19 +12,21 @@ use nalgebra::{Complex, Isometry2, Matrix2, Matrix3, Matrix4, Translation2, Unit
 /// of its motion, the number of keyframes; the tracker state.
 const STATE_WORDS: usize = 1 + 3 + TRACKER_WORDS;
 const NAME_WORDS: usize = 2;
-const TRACKER_WORDS: usize = WHEELS + WHEEL_WORDS;
+const TRACKER_WORDS: usize = DOPPLER + WHEEL_WORDS;
 const STANDSTILL_WORDS: usize = 4 + 4 + 4;
 /// A word that says whether there is one; bias, lean, scale, covariance; the last verdict.
 const HEADING_WORDS: usize = 1 + 3 + 16 + 1;
-/// A word that says whether there are any; scale, offset, three dead reckonings; both covariances;
-/// whether they slip.
-const WHEEL_WORDS: usize = 1 + 6 + 4 + 9;
+/// A word that says whether there are any; scale, offset, three dead reckonings and the time of the
+/// last; both covariances; whether they slip.
+const WHEEL_WORDS: usize = 1 + 6 + 4 + 9 + 1;
 const ANCHOR_WORDS: usize = 9;
-/// Where the means and counts of a tracker state begin, its standstill, its heading and its wheels.
+/// Where the means and counts of a tracker state begin, its standstill, its heading, its wheels and
+/// its velocity by Doppler.
 const REST: usize = 4 + 2 * ANCHOR_WORDS;
 const STANDSTILL: usize = REST + 5;
 const HEADING: usize = STANDSTILL + STANDSTILL_WORDS;
 const WHEELS: usize = HEADING + HEADING_WORDS;
+const DOPPLER: usize = WHEELS + WHEEL_WORDS;
 /// Words of a keyframe's slot before its cells: checksum, id, pose, corners of both levels.
 pub(super) const KEYFRAME_WORDS: usize = 2 + 4 + 4;
 /// The checksum of an empty slot. No content has it.
@@ -115,7 +117,10 @@ fn tracker_words(state: &TrackerState) -> [u64; TRACKER_WORDS] {
         words[HEADING..WHEELS].copy_from_slice(&heading_words(heading));
     }
     if let Some(wheels) = &state.wheels {
-        words[WHEELS..].copy_from_slice(&wheel_words(wheels));
+        words[WHEELS..DOPPLER].copy_from_slice(&wheel_words(wheels));
+    }
+    if let Some(doppler) = &state.doppler {
+        words[DOPPLER..].copy_from_slice(&wheel_words(doppler));
     }
     words
 }
@@ -154,6 +159,7 @@ fn wheel_words(wheels: &WheelState) -> [u64; WHEEL_WORDS] {
         wheels.dead_m,
         wheels.dead_s,
         wheels.dead_rad,
+        wheels.untold_s,
     ];
     let covariances = wheels.covariance.iter().chain(&wheels.unmatched);
     let values = state.iter().chain(covariances).map(|it| it.to_bits());
@@ -173,9 +179,10 @@ fn wheels_from(words: &[u64]) -> Option<WheelState> {
         dead_m: value(3),
         dead_s: value(4),
         dead_rad: value(5),
-        covariance: Matrix2::from_fn(|row, column| value(6 + row + 2 * column)),
-        unmatched: Matrix3::from_fn(|row, column| value(10 + row + 3 * column)),
-        slips: words[19] == 1,
+        untold_s: value(6),
+        covariance: Matrix2::from_fn(|row, column| value(7 + row + 2 * column)),
+        unmatched: Matrix3::from_fn(|row, column| value(11 + row + 3 * column)),
+        slips: words[20] == 1,
     })
 }
 
@@ -230,6 +237,7 @@ fn tracker_from(words: &[u64; TRACKER_WORDS]) -> TrackerState {
         standstill: standstill_from(&words[STANDSTILL..]),
         heading: heading_from(&words[HEADING..]),
         wheels: wheels_from(&words[WHEELS..]),
+        doppler: wheels_from(&words[DOPPLER..]),
     }
 }
 

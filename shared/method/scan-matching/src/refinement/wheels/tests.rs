@@ -199,7 +199,9 @@ fn a_new_map_starts_where_the_last_scan_is() {
 
 fn distance(distance_m: f64, radar_ahead_m: f64) -> PredictedDistance {
     PredictedDistance {
+        by: DistanceBy::Wheels,
         distance_m,
+        left_m: 0.0,
         variance_m2: 1e-4,
         side_variance_m2: 4e-4,
         radar_ahead_m,
