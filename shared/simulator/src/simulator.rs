@@ -18,7 +18,7 @@ use crate::relief::Relief;
 use crate::sensor::effects::is_on;
 use crate::sensor::{PitchRoll, Scene, Sensor, SweepTime};
 use crate::streets::Streets;
-use crate::town;
+use crate::town::{ParkedCar, Town};
 use crate::traffic::{Observer, RoadUser, Traffic};
 use crate::tunnel;
 use crate::weather::WeatherConfig;
@@ -49,6 +49,7 @@ pub struct Simulator {
     sampling: Sampling,
     path: Arc<dyn Path>,
     world: Arc<World>,
+    parked: Arc<[ParkedCar]>,
     traffic: Traffic,
 }
 
@@ -98,13 +99,20 @@ impl Simulator {
             false => Relief::LEVEL,
         };
         let (seed, keep) = (config.town_seed(), config.drive.keep);
-        let mut town = town::build(&config.town, &streets, seed);
-        tunnel::build(&config.tunnels, &mut town, path.as_ref(), keep, seed)?;
+        let mut town = Town::new(&config.town, &streets, seed);
+        tunnel::build(
+            &config.tunnels,
+            &mut town.content,
+            path.as_ref(),
+            keep,
+            seed,
+        )?;
         Ok(Self {
             config: config.clone(),
             scans,
             sampling,
-            world: Arc::new(World::new(town).on(relief)),
+            world: Arc::new(World::new(town.content).on(relief)),
+            parked: town.parked.into(),
             traffic: Traffic::new(
                 &config.traffic,
                 path.clone(),
@@ -179,6 +187,24 @@ impl Simulator {
             receiver: &self.config.sensor.receiver(),
         };
         self.traffic.road_users(time_s, REPORTED_M, &observer)
+    }
+
+    /// The parked cars of the town, those in tunnels too.
+    pub fn parked_cars(&self) -> &[ParkedCar] {
+        &self.parked
+    }
+
+    /// Returns the strongest echo of a parked car as scan `index` shows it, counts of half a
+    /// decibel, in clear weather and without scintillation and speckle. A car of another drive
+    /// through the same town is seen as if it stood here.
+    pub fn parked_counts(&self, car: &ParkedCar, index: usize) -> f64 {
+        let observer = Observer {
+            world: &self.world,
+            place: Point2::from(self.pose(index).translation.vector),
+            receiver: &self.config.sensor.receiver(),
+        };
+        let is_here = |it: &ParkedCar| it.number == car.number && it.pose == car.pose;
+        observer.parked_counts(car, self.parked.iter().any(is_here))
     }
 
     /// The samples of the gyro, by their stamps: rates and accelerations in its own axes. `None`

@@ -32,6 +32,7 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
 pub use config::{Character, TownConfig};
+pub use vehicle::ParkedCar;
 pub(crate) use vehicle::car;
 
 use crate::body::Body;
@@ -63,9 +64,28 @@ const DEPTHS: [f64; 3] = [1.0, 0.6, 0.35];
 /// Detail of the buildings of the second row relative to the first.
 const DETAIL_BEHIND: f64 = 0.5;
 
-/// Builds the town along these streets; the same for the same seed.
+/// A town.
+#[derive(Clone, Debug, Default)]
+pub struct Town {
+    /// All that stands.
+    pub content: Body,
+    /// The parked cars among it.
+    pub parked: Vec<ParkedCar>,
+}
+
+impl Town {
+    /// Builds the town along these streets; the same for the same seed.
+    pub fn new(config: &TownConfig, streets: &Streets, seed: u64) -> Self {
+        let Built {
+            content, parked, ..
+        } = Planner::plan(config, streets, seed).built;
+        Self { content, parked }
+    }
+}
+
+/// Builds all that stands in the town along these streets; the same for the same seed.
 pub fn build(config: &TownConfig, streets: &Streets, seed: u64) -> Body {
-    Planner::plan(config, streets, seed).built.content
+    Town::new(config, streets, seed).content
 }
 
 #[derive(Clone, Copy, PartialEq)]

@@ -9,7 +9,7 @@ use super::*;
 use crate::body::{Movers, Wall};
 use crate::drive::DriveConfig;
 use crate::path::TownDrive;
-use crate::town::TownConfig;
+use crate::town::{ParkedCar, TownConfig};
 
 /// Writes a drive of some 80 s and the way back in the other lane: `out.tum`, `back.tum`.
 fn trajectories(folder: &FilePath) -> Vec<PathBuf> {
@@ -180,6 +180,28 @@ fn parked_cars_and_building_sites_change_and_all_else_stays() {
         buildings(&changed(Some(3), 0.15)),
         "other sites on the next drive"
     );
+}
+
+#[test]
+fn a_parked_car_is_where_its_walls_are_and_a_building_hides_it() {
+    let simulator = with(|_| ());
+    let (cars, walls) = (simulator.parked_cars(), parked_cars(&simulator));
+    assert_eq!(walls.len(), 2 * cars.len());
+    for (car, diagonals) in cars.iter().zip(walls.chunks(2)) {
+        let centre = Point2::from(car.pose.translation.vector);
+        for (from, to) in diagonals {
+            assert!((nalgebra::center(from, to) - centre).norm() < 1e-9);
+        }
+    }
+    let place = simulator.pose(0).translation.vector;
+    let range_m = |car: &ParkedCar| (car.pose.translation.vector - place).norm();
+    let seen = |car| (range_m(car), simulator.parked_counts(car, 0));
+    let seen: Vec<(f64, f64)> = cars.iter().map(seen).collect();
+    // Not by the range alone: a farther one is seen.
+    let is_hidden = |(range_m, counts): &(f64, f64)| {
+        *counts < 60.0 && seen.iter().any(|far| far.0 > *range_m && far.1 > 80.0)
+    };
+    assert!(seen.iter().any(is_hidden), "{seen:?}");
 }
 
 #[test]

@@ -7,19 +7,22 @@ use rand_chacha::ChaCha8Rng;
 
 use super::changes::Changes;
 use super::random::{normal, spread};
+use super::vehicle::ParkedCar;
 use crate::body::{Aspect, Body, NO_BODY, Scatterer, Wall};
 
 /// Everything built so far, and the number of the last body.
 #[derive(Default)]
 pub(super) struct Built {
     pub content: Body,
+    pub parked: Vec<ParkedCar>,
     last_body: u32,
 }
 
 impl Built {
-    /// Returns the numbers of scatterers and walls.
-    pub(super) fn len(&self) -> [usize; 2] {
-        [self.content.scatterers.len(), self.content.walls.len()]
+    /// Returns the numbers of scatterers, walls and parked cars.
+    pub(super) fn len(&self) -> [usize; 3] {
+        let Body { scatterers, walls } = &self.content;
+        [scatterers.len(), walls.len(), self.parked.len()]
     }
 
     /// The number of a new body.
@@ -28,10 +31,12 @@ impl Built {
         self.last_body
     }
 
-    /// Removes all that was built since there were these numbers of scatterers and walls.
-    pub(super) fn cut_back(&mut self, len: [usize; 2]) {
+    /// Removes all that was built since there were these numbers of scatterers, walls and parked
+    /// cars.
+    pub(super) fn cut_back(&mut self, len: [usize; 3]) {
         self.content.scatterers.truncate(len[0]);
         self.content.walls.truncate(len[1]);
+        self.parked.truncate(len[2]);
     }
 }
 

@@ -60,12 +60,36 @@ pub(crate) fn car(body: u32, rng: &mut impl Rng) -> Body {
     car
 }
 
+/// A parked car.
+#[derive(Clone, Debug)]
+pub struct ParkedCar {
+    /// The pose of its centre in the world, x ahead or behind.
+    pub pose: Pose,
+    /// The number of its body in its own town.
+    pub(crate) number: u32,
+    /// All of it, in its own frame.
+    pub(crate) body: Body,
+}
+
+impl ParkedCar {
+    /// Returns its length and width, m.
+    pub fn size_m(&self) -> [f64; 2] {
+        [2.0 * CAR_HALF_M.0, 2.0 * CAR_HALF_M.1]
+    }
+}
+
 impl Site<'_> {
     /// Adds a parked car at `place`, facing `heading_rad` or the opposite direction.
     pub(super) fn parked_car(&mut self, place: Point2<f64>, heading_rad: f64) {
-        let body = self.body();
-        let car = car(body, &mut self.rng);
+        let number = self.body();
+        let body = car(number, &mut self.rng);
         let askew_rad = (0.03 * normal(&mut self.rng)).clamp(-0.06, 0.06);
-        self.place(&car, &Pose::new(place.coords, heading_rad + askew_rad));
+        let pose = Pose::new(place.coords, heading_rad + askew_rad);
+        self.place(&body, &pose);
+        self.built.parked.push(ParkedCar {
+            pose: self.pose * pose,
+            number,
+            body,
+        });
     }
 }

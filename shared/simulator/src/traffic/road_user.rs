@@ -6,9 +6,10 @@ use nalgebra::{Point2, Vector2};
 use super::actors::FIRST_BODY;
 use super::kind::Kind;
 use super::{Traffic, actor::Actor};
-use crate::body::{Moving, Wall};
+use crate::body::{Moving, NO_BODY, Scatterer, Wall};
 use crate::occlusion::crossing;
 use crate::profile::Receiver;
+use crate::town::ParkedCar;
 use crate::world::World;
 
 /// A road user at an instant.
@@ -60,11 +61,16 @@ impl Traffic {
                 velocity: moving.velocity,
                 size_m: [2.0 * length, 2.0 * width],
                 visible,
-                counts: 20.0 * power.max(1.0).log10(),
+                counts: counts(power),
             }
         };
         there.iter().map(user).collect()
     }
+}
+
+/// Power in the receiver's units as a scan shows it, counts.
+fn counts(power: f64) -> f64 {
+    20.0 * power.max(1.0).log10()
 }
 
 /// The number of a body.
@@ -88,22 +94,40 @@ impl Observer<'_> {
         let (mut visible, mut strongest) = (0.0f64, 0.0f64);
         for scatterer in &moving.body.scatterers {
             let there = scatterer.moved(&moving.pose);
-            let ray = self.place - there.position;
-            let range_m = ray.norm().max(1.0);
-            let walls = self
-                .world
-                .transmission(self.place, there.position, own, 1e-4);
+            let [walls, power] = self.echo(&there, own);
             let others = all.clone().filter(|other| number(other) != own);
             let passed = others.fold(walls, |passed, other| {
                 passed * self.passed(other, &there.position)
             });
-            let power = there.cross_section_m2
-                * there.aspect.gain(ray / range_m)
-                * self.receiver.sensitivity(range_m);
             visible = visible.max(passed);
             strongest = strongest.max(power * passed);
         }
         (visible, strongest)
+    }
+
+    /// Returns the strongest echo of a parked car as a scan shows it, counts. If it is here, its
+    /// own walls do not hide it.
+    pub fn parked_counts(&self, car: &ParkedCar, is_here: bool) -> f64 {
+        let own = if is_here { car.number } else { NO_BODY };
+        let echo = |scatterer: &Scatterer| {
+            let [passed, power] = self.echo(&scatterer.moved(&car.pose), own);
+            passed * power
+        };
+        counts(car.body.scatterers.iter().map(echo).fold(0.0, f64::max))
+    }
+
+    /// Returns the share of the power that standing walls but for those of a body let pass to a
+    /// scatterer, and the power of its echo without them, in the receiver's units.
+    fn echo(&self, there: &Scatterer, own: u32) -> [f64; 2] {
+        let ray = self.place - there.position;
+        let range_m = ray.norm().max(1.0);
+        let passed = self
+            .world
+            .transmission(self.place, there.position, own, 1e-4);
+        let power = there.cross_section_m2
+            * there.aspect.gain(ray / range_m)
+            * self.receiver.sensitivity(range_m);
+        [passed, power]
     }
 
     /// Returns the share of the power that the walls of a road user let pass to a place.
