@@ -3,7 +3,8 @@
 //! - [`Map`]: keyframes with their poses in the map's frame, recognisable at any heading;
 //! - [`Localiser`]: [`Localiser::find`], the first fix without prior from a single scan;
 //!   [`Localiser::locate`], scan after scan: the first fix, then tracking against the map, until it
-//!   is lost and finds itself again.
+//!   is lost and finds itself again;
+//! - [`DriveSearch`]: a whole drive, with all its poses in the map.
 //!
 //! # Method
 //! 1. The scan is described and compared with the submaps of all keyframes of the map
@@ -25,9 +26,11 @@
 mod localiser;
 mod map;
 mod options;
+mod placement;
 mod registration;
 mod sight;
 
 pub use localiser::{Fix, Localisation, Localiser, Observation, Status};
 pub use map::{Map, MapError};
 pub use options::LocaliserOptions;
+pub use placement::{DriveSearch, FoundKeyframe, PlacedDrive};
