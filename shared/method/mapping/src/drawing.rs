@@ -92,6 +92,7 @@ impl Drawing {
                 &[]
             },
             loops: &loops,
+            changes: &[],
         };
         map_png(&mut self.evidence, &overlay)
     }

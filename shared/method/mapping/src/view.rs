@@ -81,6 +81,17 @@ impl View {
         }
     }
 
+    /// Returns the places of all returns, m, with their weights from 0 to 1.
+    pub fn points(&self) -> impl Iterator<Item = (Vector2<f64>, f64)> {
+        let points = self.points.points();
+        let places = points.map(|[x_m, y_m, weight]| {
+            let place = Vector2::new(f64::from(x_m), f64::from(y_m));
+            (place, f64::from(weight))
+        });
+        // NaN is nowhere.
+        places.filter(|(place, weight)| *weight > 0.0 && place.norm().is_finite())
+    }
+
     /// Calls `take` with the parts of all returns.
     pub fn returns(&self, mut take: impl FnMut(Sample)) {
         let share = FULL_CELL_M / self.options.cell_m;

@@ -1,0 +1,131 @@
+//! The changes between two drives along a street whose content is known.
+
+use std::f64::consts::FRAC_PI_2;
+
+use gyre_geometry::pose;
+use gyre_mapping::{Change, ChangeKind, Changes, MapOptions, Survey, changes};
+use nalgebra::{Point2, Vector2};
+
+use crate::scenes::*;
+
+/// The outline of a car along the x axis, a point every 0.3 m.
+fn car(x_m: f64, y_m: f64) -> Vec<Point2<f64>> {
+    let along =
+        (0..15).flat_map(|k| [-0.9, 0.9].map(|y| Vector2::new(-2.1 + 0.3 * f64::from(k), y)));
+    let across =
+        (0..7).flat_map(|k| [-2.1, 2.1].map(|x| Vector2::new(x, -0.9 + 0.3 * f64::from(k))));
+    let centre = Point2::new(x_m, y_m);
+    along.chain(across).map(|by| centre + by).collect()
+}
+
+/// Random numbers from 0 to 1.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f64 {
+        // Knuth's linear congruential generator.
+        let Self(state) = self;
+        *state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (*state >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
+/// A drive along the x axis that sees a wall beyond `things`, and bushes in between of which each
+/// look shows others.
+fn survey(things: &[Vec<Point2<f64>>], seed: u64) -> Survey {
+    let mut survey = Survey::new(&MapOptions::default()).unwrap();
+    let mut random = Random(seed);
+    for seq in 0..40 {
+        let at = pose(-40.0 + 2.0 * seq as f64, 0.0, 0.0);
+        let mut places = [wall(), things.concat()].concat();
+        for bush in -14..14 {
+            let bush = Point2::new(2.0 * f64::from(bush), 15.0);
+            if random.next() < 0.4 {
+                let by = Vector2::new(random.next(), random.next());
+                places.push(bush + by);
+            }
+        }
+        let mut keyframe = keyframe(seq, &at, &places);
+        keyframe.path_m = 2.0 * seq as f64;
+        survey.add(&keyframe, &at);
+    }
+    survey
+}
+
+fn found(before: &[Vec<Point2<f64>>], after: &[Vec<Point2<f64>>]) -> Changes {
+    changes(&survey(before, 1), &survey(after, 2))
+}
+
+fn is_car(change: &Change, kind: ChangeKind, x_m: f64, y_m: f64) -> bool {
+    change.kind == kind
+        && (change.x_m - x_m).hypot(change.y_m - y_m) < 0.7
+        && (4.0..6.5).contains(&change.length_m)
+        && (1.5..3.5).contains(&change.width_m)
+        && change.yaw_rad.abs() < 0.2
+}
+
+#[test]
+fn a_car_that_has_come_and_one_that_has_gone_are_found() {
+    let (stays, goes, comes) = (car(-10.0, 8.0), car(0.0, 8.0), car(10.0, 8.0));
+    let Changes {
+        changes,
+        changed_share,
+        ..
+    } = found(&[stays.clone(), goes], &[stays, comes]);
+    assert_eq!(changes.len(), 2, "{changes:?}");
+    let has = |kind, x_m| changes.iter().any(|it| is_car(it, kind, x_m, 8.0));
+    assert!(
+        has(ChangeKind::Gone, 0.0) && has(ChangeKind::Appeared, 10.0),
+        "{changes:?}"
+    );
+    assert!(changes.iter().all(|it| it.confidence > 0.9), "{changes:?}");
+    assert!((0.005..0.3).contains(&changed_share), "{changed_share}");
+}
+
+#[test]
+fn a_street_that_stays_has_no_changes_and_neither_have_its_bushes() {
+    let stays = [car(0.0, 8.0)];
+    let found = found(&stays, &stays);
+    assert_eq!(found.changes, []);
+    assert!(found.compared_m2 > 500.0, "{}", found.compared_m2);
+    assert!(found.changed_share < 0.02, "{}", found.changed_share);
+}
+
+#[test]
+fn what_one_drive_did_not_look_at_has_not_changed() {
+    // On the other side nothing returns beyond the car, so that without it nothing is looked at.
+    assert_eq!(found(&[], &[car(0.0, -8.0)]).changes, []);
+    // Behind the wall.
+    assert_eq!(found(&[], &[car(0.0, 26.0)]).changes, []);
+}
+
+#[test]
+fn what_is_smaller_than_a_car_is_not_reported() {
+    let post = vec![Point2::new(0.0, 8.0)];
+    assert_eq!(found(&[], &[post]).changes, []);
+}
+
+#[test]
+fn the_corners_of_a_change_are_those_of_its_rectangle() {
+    let change = Change {
+        kind: ChangeKind::Gone,
+        x_m: 3.0,
+        y_m: -2.0,
+        yaw_rad: FRAC_PI_2,
+        length_m: 4.0,
+        width_m: 2.0,
+        area_m2: 8.0,
+        share: 0.5,
+        confidence: 1.0,
+    };
+    let corners = change.corners();
+    for (x, y) in [(2.0, 0.0), (4.0, 0.0), (2.0, -4.0), (4.0, -4.0)] {
+        let corner = Point2::new(x, y);
+        assert!(
+            corners.iter().any(|it| (it - corner).norm() < 1e-9),
+            "{corners:?}"
+        );
+    }
+}
