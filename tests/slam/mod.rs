@@ -6,3 +6,4 @@ mod gnss;
 mod keyframes;
 mod localise;
 mod loops;
+mod map_changes;

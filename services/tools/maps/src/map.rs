@@ -1,9 +1,11 @@
-//! `gyre map`: draws the map of a run.
+//! `gyre map`: draws the map of a run, or what has changed from one to another.
 
 mod arguments;
+mod changes;
 mod extend;
 mod keyframes;
 mod loops;
+mod placing;
 
 use std::{
     collections::BTreeMap,
@@ -32,11 +34,14 @@ const ODOMETRY: &str = "trajectory.tum";
 const LOOPS: &str = "loops.csv";
 
 /// Draws the keyframes of a run along its trajectory, and writes the map in the forms that were
-/// asked for.
+/// asked for; or compares it with a later run.
 ///
 /// # Errors
 /// A run without keyframes or without a trajectory, a folder that cannot be written.
 pub fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
+    if let Some(later) = &arguments.later {
+        return changes::compare(arguments, later);
+    }
     let mut drawing = match &arguments.extend {
         Some(map) => extend::extend(arguments, map)?,
         None => draw_run(arguments)?,
@@ -242,6 +247,7 @@ mod tests {
     fn arguments(folder: &Path) -> MapArguments {
         MapArguments {
             run: folder.join("run"),
+            later: None,
             out: folder.join("map"),
             format: vec![
                 MapFormat::Folder,
@@ -254,6 +260,7 @@ mod tests {
             extend: None,
             cell_m: 0.5,
             origin: None,
+            json: false,
         }
     }
 

@@ -26,6 +26,14 @@ pub fn open(path: &Path, configuration: &Configuration) -> Result<Localiser, Fai
         )
         .into());
     }
+    plan(map, configuration)
+}
+
+/// Plans localisation in a map.
+///
+/// # Errors
+/// A configuration that extracts no points.
+pub fn plan(map: Map, configuration: &Configuration) -> Result<Localiser, Failure> {
     let odometry = &configuration.odometry;
     if odometry.points.capacity == 0 {
         return Err(
