@@ -15,8 +15,9 @@ use serde_json::{Value, json};
 
 use crate::{
     common::{
-        Ended, Run, Running, gyre, processes, python, real_data, recording::SCANS, send,
-        undisturbed,
+        Ended, Run, Running, gyre, odometry, processes, python, real_data,
+        recording::{SCANS, around_a_block},
+        send, undisturbed,
     },
     operate::commands::{ask, await_status, process},
 };
@@ -478,13 +479,81 @@ with open(sys.argv[1], 'rb') as file:
 print(dict(counts))
 ";
 
-#[test]
-fn the_python_package_mcap_reads_a_recording() {
+/// Returns whether recordings can be read by others; prints why a test is skipped.
+fn can_read() -> bool {
     let import = Command::new(python())
         .args(["-c", "import mcap_protobuf"])
         .output();
-    if !import.is_ok_and(|output| output.status.success()) {
+    let can = import.is_ok_and(|output| output.status.success());
+    if !can {
         println!("skipped: {} has no package mcap-protobuf-support", python());
+    }
+    can
+}
+
+/// Prints the objects of a recording, as the Python package `mcap` decodes them by their schema: of
+/// each box the time, the identity, the place and the length, and the number of arrows.
+const READ_OBJECTS: &str = "
+import json, sys
+from mcap.reader import make_reader
+from mcap_protobuf.decoder import DecoderFactory
+boxes, arrows = [], 0
+with open(sys.argv[1], 'rb') as file:
+    for schema, channel, message, decoded in make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages(
+        topics=['/objects']
+    ):
+        assert schema.name == 'foxglove.SceneUpdate', schema.name
+        entity, = decoded.entities
+        assert (entity.frame_id, entity.id) == ('odometry', 'objects')
+        arrows += len(entity.arrows)
+        for cube, text in zip(entity.cubes, entity.texts, strict=True):
+            place = cube.pose.position
+            boxes.append([message.log_time, int(text.text), place.x, place.y, cube.size.x])
+print(json.dumps({'boxes': boxes, 'arrows': arrows}))
+";
+
+#[test]
+fn a_recording_has_the_objects_of_the_results_as_boxes_and_arrows() {
+    if !can_read() {
+        return;
+    }
+    let run = Run::small().data(around_a_block()).set(WINDOW);
+    let run = recorded(&run.set("objects.kind=tracks").rate("20"));
+    run.complete();
+    let mut command = Command::new(python());
+    command.args(["-c", READ_OBJECTS]).arg(file(&run));
+    let ended = Ended::of(command);
+    ended.succeeded();
+    let read: Value = serde_json::from_str(&ended.stdout).unwrap();
+    let names = ["stamp_ns", "object", "x_m", "y_m", "length_m", "moving"];
+    let rows = odometry::columns(&run.result("objects.csv"), &names);
+    let boxes = read["boxes"].as_array().unwrap();
+    assert!(rows.len() > 20, "{}", rows.len());
+    // In a scan the nearest one is first, in the table the oldest one.
+    for row in &rows {
+        let is_it = |found: &&Value| {
+            (0..2).all(|column| found[column].as_i64() == row[column].parse().ok())
+        };
+        let found = boxes
+            .iter()
+            .find(is_it)
+            .unwrap_or_else(|| panic!("no box for {row:?}"));
+        for (seen, text) in (2..5).map(|k| (&found[k], &row[k])) {
+            let expected: f64 = text.parse().unwrap();
+            assert!(
+                (seen.as_f64().unwrap() - expected).abs() < 1e-3,
+                "{found} {row:?}"
+            );
+        }
+    }
+    assert_eq!(boxes.len(), rows.len());
+    let moving = rows.iter().filter(|row| row[5] == "1").count();
+    assert_eq!(read["arrows"], moving);
+}
+
+#[test]
+fn the_python_package_mcap_reads_a_recording() {
+    if !can_read() {
         return;
     }
     let run = recorded(&played());

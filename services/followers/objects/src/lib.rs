@@ -7,15 +7,17 @@
 
 use std::path::PathBuf;
 
+use gyre_geometry::{wrap_angle, xy_yaw};
 use gyre_journal::objects::LoggedObjects;
 use gyre_journal::scans::LoggedScan;
-use gyre_messages::{Item, Objects, ObjectsHeader};
-use gyre_objects::{ObjectTracker, ObjectsConfig, PlacedScan};
+use gyre_messages::{Item, ListedObject, MAX_LISTED, Objects, ObjectsHeader};
+use gyre_objects::{Object, ObjectTracker, ObjectsConfig, PlacedScan};
 use gyre_slam::{RecordLog, RecordReader};
 use gyre_stage::{
     Follower, Launch, StageCounters, StageError,
     follower::{self, LogId, Progress, Step},
 };
+use nalgebra::Matrix2;
 
 /// Runs the follower to the end of the scans, or until SIGTERM.
 ///
@@ -89,17 +91,7 @@ impl Tracking {
         if known {
             return Ok(None);
         }
-        let header = ObjectsHeader {
-            item: Item {
-                seq: scan.seq,
-                scan: scan.scan,
-                previous_scan: scan.scan,
-                stamp_ns: scan.stamp_ns,
-                ..Item::default()
-            },
-            objects: objects.len() as u64,
-            moving: objects.iter().filter(|object| object.moving).count() as u64,
-        };
+        let header = header(&scan, objects);
         self.tracked.append(&LoggedObjects {
             seq: scan.seq,
             scan: scan.scan,
@@ -107,6 +99,52 @@ impl Tracking {
             objects: objects.to_vec(),
         })?;
         Ok(Some(header))
+    }
+}
+
+/// Returns the message about the objects of a scan.
+fn header(scan: &LoggedScan, objects: &[Object]) -> ObjectsHeader {
+    let [x_m, y_m, yaw_rad] = xy_yaw(&scan.pose);
+    let mut header = ObjectsHeader {
+        item: Item {
+            seq: scan.seq,
+            scan: scan.scan,
+            previous_scan: scan.scan,
+            stamp_ns: scan.stamp_ns,
+            ..Item::default()
+        },
+        x_m,
+        y_m,
+        yaw_rad,
+        objects: objects.len() as u64,
+        moving: objects.iter().filter(|object| object.moving).count() as u64,
+        listed: objects.len().min(MAX_LISTED) as u64,
+        ..ObjectsHeader::default()
+    };
+    let away_m = |object: &&Object| (object.position.coords - scan.pose.translation.vector).norm();
+    let mut nearest: Vec<&Object> = objects.iter().collect();
+    nearest.sort_by(|a, b| away_m(a).total_cmp(&away_m(b)));
+    for (listed, object) in header.list.iter_mut().zip(nearest) {
+        *listed = listed_object(object);
+    }
+    header
+}
+
+fn listed_object(object: &Object) -> ListedObject {
+    let packed = |matrix: &Matrix2<f64>| [matrix.m11, matrix.m12, matrix.m22];
+    ListedObject {
+        id: object.id,
+        x_m: object.position.x,
+        y_m: object.position.y,
+        yaw_rad: wrap_angle(object.yaw_rad),
+        vx_mps: object.velocity.x,
+        vy_mps: object.velocity.y,
+        length_m: object.length_m,
+        width_m: object.width_m,
+        position_covariance: packed(&object.position_covariance),
+        velocity_covariance: packed(&object.velocity_covariance),
+        moving: object.moving.into(),
+        age: object.age,
     }
 }
 

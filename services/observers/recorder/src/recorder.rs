@@ -31,7 +31,7 @@ use crate::{
 /// The name of the recorder in the log and among the processes of a run.
 const NAME: &str = "recorder";
 /// The topics that are recorded unless others are named.
-const DEFAULT: [&str; 7] = [
+const DEFAULT: [&str; 8] = [
     "scan",
     "motion",
     "refined",
@@ -39,6 +39,7 @@ const DEFAULT: [&str; 7] = [
     "loop",
     "correction",
     "fix",
+    "objects",
 ];
 /// Time between two sentences about missed messages in the log.
 const SENTENCE_PERIOD: Duration = Duration::from_secs(1);

@@ -25,11 +25,16 @@ const connection = new Connection({
       case "run":
         if (run && run !== message.id) track.clear();
         run = message.id;
+        byId("objects-choice").hidden = !message.objects;
+        if (!message.objects) scan.setObjects(null);
         health.setRun(message);
         break;
       case "poses":
         track.add(message);
         health.setPose(message.pose, message.drift);
+        break;
+      case "objects":
+        scan.setObjects(message);
         break;
       case "health":
         delays.set(message.delays);
@@ -48,18 +53,25 @@ const connection = new Connection({
     }
   },
   layers: () => {
-    const points = byId("with-points").checked || byId("with-map").checked;
-    return points ? `${chosen("layer")} points` : chosen("layer");
+    const wanted = [chosen("layer")];
+    if (byId("with-points").checked || byId("with-map").checked) wanted.push("points");
+    if (byId("with-objects").checked) wanted.push("objects");
+    return wanted.join(" ");
   },
 });
 
 function choose() {
-  scan.set({ layer: chosen("layer"), withPoints: byId("with-points").checked, rangeM: Number(byId("range").value) });
+  scan.set({
+    layer: chosen("layer"),
+    withPoints: byId("with-points").checked,
+    withObjects: byId("with-objects").checked,
+    rangeM: Number(byId("range").value),
+  });
   track.set({ withMap: byId("with-map").checked });
   connection.ask();
 }
 
-for (const control of document.querySelectorAll('input[name="layer"], #with-points, #with-map, #range')) {
+for (const control of document.querySelectorAll('input[name="layer"], #with-points, #with-objects, #with-map, #range')) {
   control.addEventListener("change", choose);
 }
 for (const control of document.querySelectorAll('input[name="view"]')) {

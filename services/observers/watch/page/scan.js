@@ -1,6 +1,7 @@
 // The newest scan, drawn as the antenna turns: powers or the masked raster, and the points.
 
 import { Drawing, colour, isDark, label, roundUp } from "./canvas.js";
+import { Objects } from "./objects.js";
 
 const SIDE = 600; // Pixels of the picture on each side.
 const FRAME_MS = 45;
@@ -23,6 +24,8 @@ export class ScanView {
     this.levels = { low: 0, high: 255 };
     this.layer = "scan";
     this.withPoints = true;
+    this.withObjects = true;
+    this.objects = new Objects();
     this.rangeM = 0;
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
       this.shades = null;
@@ -69,6 +72,12 @@ export class ScanView {
   setPoints(header, buffer) {
     this.points = { unitM: header.unit_m, places: new Int16Array(buffer) };
     if (this.layer === "raster") this.drawing.request();
+  }
+
+  /** Takes the objects of a scan; null: the run has none. */
+  setObjects(message) {
+    this.objects.set(message);
+    this.drawing.request();
   }
 
   /** Shows other layers, or another range (0: all). */
@@ -153,6 +162,7 @@ export class ScanView {
     }
     if (this.withPoints && this.points) this.drawPoints(context, scale);
     drawRings(context, scale, rangeM, width, height);
+    if (this.withObjects) this.objects.draw(context, scale);
     drawVehicle(context);
     context.restore();
   }

@@ -1,6 +1,6 @@
 //! The layers that a browser asks for, and the messages to it in JSON.
 
-use gyre_messages::{PoseHeader, WitnessCounts, outcome};
+use gyre_messages::{ListedObject, ObjectsHeader, PoseHeader, WitnessCounts, outcome};
 use serde::Serialize;
 
 use crate::{delays::DelayReport, processes::Process, recent_drift::Drift, track::Vertex};
@@ -14,6 +14,8 @@ pub enum Layer {
     Raster,
     /// Sparse points.
     Points,
+    /// Moving objects.
+    Objects,
 }
 
 /// The missed messages of the observed topics.
@@ -25,6 +27,8 @@ pub struct Missed {
     pub scan: u64,
     /// Masked scans that were missed.
     pub masked: u64,
+    /// Scans whose objects were missed.
+    pub objects: u64,
 }
 
 /// The state of the run.
@@ -67,6 +71,8 @@ pub struct RunInfo {
     pub rate: Option<f64>,
     /// The most scans in flight.
     pub window: usize,
+    /// True if it tracks objects.
+    pub objects: bool,
     /// The version of the program.
     pub version: &'static str,
 }
@@ -115,6 +121,50 @@ pub struct NewPoses<'a> {
     pub vertices: &'a [Vertex],
     pub pose: Option<CurrentPose>,
     pub drift: Option<Drift>,
+}
+
+/// The objects at the time of a scan, in the frame of the first one.
+#[derive(Debug, Serialize)]
+#[serde(tag = "kind", rename = "objects")]
+pub struct ObjectsReport {
+    pub seq: u64,
+    /// x, y (m), yaw (rad) of the scan.
+    pub pose: [f64; 3],
+    /// Objects, also those that are not listed.
+    pub count: u64,
+    pub objects: Vec<ObjectReport>,
+}
+
+/// An object.
+#[derive(Debug, Serialize)]
+pub struct ObjectReport {
+    pub id: u64,
+    /// x, y (m), yaw (rad) of its centre.
+    pub pose: [f64; 3],
+    /// Along x and y, m/s.
+    pub velocity: [f64; 2],
+    /// Length and width, m.
+    pub size: [f64; 2],
+    pub moving: bool,
+}
+
+impl ObjectsReport {
+    /// Reports the objects of a message.
+    pub fn of(header: &ObjectsHeader) -> Self {
+        let report = |object: &ListedObject| ObjectReport {
+            id: object.id,
+            pose: [object.x_m, object.y_m, object.yaw_rad],
+            velocity: [object.vx_mps, object.vy_mps],
+            size: [object.length_m, object.width_m],
+            moving: object.is_moving(),
+        };
+        Self {
+            seq: header.item.seq,
+            pose: [header.x_m, header.y_m, header.yaw_rad],
+            count: header.objects,
+            objects: header.list().iter().map(report).collect(),
+        }
+    }
 }
 
 /// The newest pose.

@@ -204,6 +204,7 @@ impl Snapshot {
             ("pose", missed.pose),
             ("scan", missed.scan),
             ("masked", missed.masked),
+            ("objects", missed.objects),
         ];
         for (topic, count) in topics {
             ConstCounter::new(count).encode(family.encode_family(&[("topic", topic)])?)?;

@@ -7,7 +7,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::{Masked, Message, Pose, Scan};
+use gyre_messages::{Masked, Message, Objects, Pose, Scan};
 use gyre_stage::{
     StageError,
     observer::{Next, ObservedRun},
@@ -60,6 +60,11 @@ pub fn start(followed: &Arc<Followed>) -> std::io::Result<Vec<JoinHandle<()>>> {
         })?,
         start("masked", |followed| {
             follow_pictures::<Masked>(followed, &[Layer::Raster, Layer::Points], masked);
+        })?,
+        start("objects", |followed| {
+            follow_pictures::<Objects>(followed, &[Layer::Objects], |view, message| {
+                view.set_objects(message.header());
+            });
         })?,
         start("report", report)?,
     ])
@@ -196,6 +201,7 @@ fn follow_topic<M: Message>(
         let missed_now = observer.missed();
         view.set_missed(|missed| match M::TOPIC {
             Scan::TOPIC => missed.scan = before.scan + missed_now,
+            Objects::TOPIC => missed.objects = before.objects + missed_now,
             _ => missed.masked = before.masked + missed_now,
         });
     }

@@ -8,7 +8,7 @@ use axum::{
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 
 /// The path, the type and the content of each file.
-pub const FILES: [(&str, &str, &str); 10] = [
+pub const FILES: [(&str, &str, &str); 11] = [
     (
         "/",
         "text/html; charset=utf-8",
@@ -32,6 +32,7 @@ pub const FILES: [(&str, &str, &str); 10] = [
     ),
     ("/canvas.js", SCRIPT, include_str!("../page/canvas.js")),
     ("/scan.js", SCRIPT, include_str!("../page/scan.js")),
+    ("/objects.js", SCRIPT, include_str!("../page/objects.js")),
     ("/track.js", SCRIPT, include_str!("../page/track.js")),
     ("/delays.js", SCRIPT, include_str!("../page/delays.js")),
     ("/health.js", SCRIPT, include_str!("../page/health.js")),

@@ -9,7 +9,7 @@ use std::{
 };
 
 use axum::{body::Bytes, extract::ws::Utf8Bytes};
-use gyre_messages::{PoseHeader, RefinementRecord, WitnessCounts, flag};
+use gyre_messages::{ObjectsHeader, PoseHeader, RefinementRecord, WitnessCounts, flag};
 use gyre_stage::{Manifest, clock, control::Status};
 use serde::Serialize;
 use tokio::sync::watch;
@@ -17,7 +17,10 @@ use tokio::sync::watch;
 use crate::{
     delays::Delays,
     histograms::Histograms,
-    messages::{CurrentPose, HealthReport, Layer, Missed, NewPoses, RunCounts, RunInfo, RunState},
+    messages::{
+        CurrentPose, HealthReport, Layer, Missed, NewPoses, ObjectsReport, RunCounts, RunInfo,
+        RunState,
+    },
     pictures::PackedPoints,
     processes::Process,
     recent_drift::RecentDrift,
@@ -36,7 +39,7 @@ pub struct RunView {
     /// The newest pictures and reports. A slow browser receives the newest, and not those between.
     pub updates: Updates,
     /// Browsers that want each layer.
-    wanted: [AtomicUsize; 3],
+    wanted: [AtomicUsize; 4],
     /// Delays of all poses.
     pub histograms: Histograms,
     /// The traces, where they are sent.
@@ -55,6 +58,8 @@ pub struct Updates {
     pub raster: watch::Sender<Bytes>,
     /// The newest points.
     pub points: watch::Sender<Bytes>,
+    /// The newest objects.
+    pub objects: watch::Sender<Utf8Bytes>,
     /// True when the program ends.
     pub stop: watch::Sender<bool>,
 }
@@ -89,6 +94,7 @@ impl RunView {
                 scan: watch::Sender::default(),
                 raster: watch::Sender::default(),
                 points: watch::Sender::default(),
+                objects: watch::Sender::default(),
                 stop: watch::Sender::new(false),
             },
             wanted: Default::default(),
@@ -119,7 +125,7 @@ impl RunView {
                 ..ViewState::default()
             };
         }
-        for layer in [Layer::Scan, Layer::Raster, Layer::Points] {
+        for layer in [Layer::Scan, Layer::Raster, Layer::Points, Layer::Objects] {
             self.clear_pictures(layer);
         }
         self.update_run(|run| {
@@ -129,6 +135,7 @@ impl RunView {
             run.live = manifest.live;
             run.rate = manifest.rate;
             run.window = manifest.window.scans;
+            run.objects = manifest.window.objects;
         });
     }
 
@@ -138,6 +145,10 @@ impl RunView {
             Layer::Scan => &self.updates.scan,
             Layer::Raster => &self.updates.raster,
             Layer::Points => &self.updates.points,
+            Layer::Objects => {
+                self.updates.objects.send_replace(Utf8Bytes::default());
+                return;
+            }
         };
         pictures.send_replace(Bytes::new());
     }
@@ -222,6 +233,11 @@ impl RunView {
         if let Ok(message) = points.at(place, seq) {
             self.updates.points.send_replace(message);
         }
+    }
+
+    /// Shows the objects of a scan.
+    pub fn set_objects(&self, header: &ObjectsHeader) {
+        send_json(&self.updates.objects, &ObjectsReport::of(header));
     }
 
     /// Sets the supervisor's status of the run, and the processes.
@@ -322,8 +338,11 @@ impl RunView {
         };
     }
 
-    /// Returns whether a browser wants a layer.
+    /// Returns whether a browser wants a layer that the run has.
     pub fn is_wanted(&self, layer: Layer) -> bool {
+        if layer == Layer::Objects && !self.state().run.objects {
+            return false;
+        }
         self.wanted[layer as usize].load(Ordering::Relaxed) > 0
     }
 
@@ -348,7 +367,7 @@ fn send_json(channel: &watch::Sender<Utf8Bytes>, message: &impl Serialize) {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use gyre_geometry::SparsePoint;
-    use gyre_messages::{Item, MaskedHeader, StageId};
+    use gyre_messages::{Item, ListedObject, MaskedHeader, StageId};
     use serde_json::Value;
 
     use super::*;
@@ -415,6 +434,41 @@ mod tests {
             (&false.into(), &1.into())
         );
         assert_eq!(next(), None);
+    }
+
+    #[test]
+    fn objects_are_wanted_of_a_run_that_has_them_and_have_places_velocities_and_sizes() {
+        let view = RunView::new("out");
+        view.want(Layer::Objects, true);
+        assert!(!view.is_wanted(Layer::Objects));
+        view.update_run(|run| run.objects = true);
+        assert!(view.is_wanted(Layer::Objects));
+        let mut header = ObjectsHeader {
+            x_m: 7.0,
+            objects: 1,
+            listed: 1,
+            ..ObjectsHeader::default()
+        };
+        header.list[0] = ListedObject {
+            id: 5,
+            x_m: 20.0,
+            vy_mps: -3.0,
+            length_m: 4.4,
+            moving: 1,
+            ..ListedObject::default()
+        };
+        view.set_objects(&header);
+        let sent: Value = serde_json::from_str(&view.updates.objects.borrow()).unwrap();
+        let expected = serde_json::json!({
+            "kind": "objects", "seq": 0, "pose": [7.0, 0.0, 0.0], "count": 1,
+            "objects": [{
+                "id": 5, "pose": [20.0, 0.0, 0.0], "velocity": [0.0, -3.0], "size": [4.4, 0.0],
+                "moving": true,
+            }],
+        });
+        assert_eq!(sent, expected);
+        view.clear_pictures(Layer::Objects);
+        assert!(view.updates.objects.borrow().is_empty());
     }
 
     #[test]

@@ -15,16 +15,17 @@ const POSES_INTERVAL: Duration = Duration::from_millis(200);
 /// The longest time that a browser may take for one message.
 const MAX_SEND: Duration = Duration::from_secs(10);
 /// The layers by the names that a browser gives them.
-const LAYERS: [(&str, Layer); 3] = [
+const LAYERS: [(&str, Layer); 4] = [
     ("scan", Layer::Scan),
     ("raster", Layer::Raster),
     ("points", Layer::Points),
+    ("objects", Layer::Objects),
 ];
 
 /// The layers that a browser wants. Dropped, it wants none.
 struct Wanted {
     view: Arc<RunView>,
-    layers: [bool; 3],
+    layers: [bool; 4],
 }
 
 impl Wanted {
@@ -60,16 +61,18 @@ pub async fn serve(mut socket: WebSocket, view: Arc<RunView>) {
         updates.raster.subscribe(),
         updates.points.subscribe(),
     );
+    let mut objects = updates.objects.subscribe();
     let mut stop = updates.stop.subscribe();
     // The newest of each is new to this browser.
     run.mark_changed();
     health.mark_changed();
+    objects.mark_changed();
     for pictures in [&mut scan, &mut raster, &mut points] {
         pictures.mark_changed();
     }
     let mut wanted = Wanted {
         view: Arc::clone(&view),
-        layers: [false; 3],
+        layers: [false; 4],
     };
     let (mut cursor, mut last) = (Cursor::default(), None);
     let mut tick = time::interval(POSES_INTERVAL);
@@ -89,6 +92,7 @@ pub async fn serve(mut socket: WebSocket, view: Arc<RunView>) {
             Ok(()) = run.changed() => text(&mut run),
             Ok(()) = health.changed() => text(&mut health),
             _ = tick.tick() => view.poses(&mut cursor, &mut last).map(Message::Text),
+            Ok(()) = objects.changed(), if wanted.has(Layer::Objects) => text(&mut objects),
             Ok(()) = points.changed(), if wanted.has(Layer::Points) => binary(&mut points),
             Ok(()) = raster.changed(), if wanted.has(Layer::Raster) => binary(&mut raster),
             Ok(()) = scan.changed(), if wanted.has(Layer::Scan) => binary(&mut scan),

@@ -241,7 +241,16 @@ fn fix(header: &FixHeader) -> String {
 }
 
 fn objects(header: &ObjectsHeader) -> String {
-    format!("{} objects, {} move", header.objects, header.moving)
+    let moving = header.list().iter().filter(|object| object.is_moving());
+    let moving = moving.map(|object| {
+        let (place, speed_mps) = (
+            place(object.x_m, object.y_m, object.yaw_rad),
+            object.speed_mps(),
+        );
+        format!("; {}: {place}, {speed_mps:.1} m/s", object.id)
+    });
+    let counts = format!("{} objects, {} move", header.objects, header.moving);
+    std::iter::once(counts).chain(moving).collect()
 }
 
 fn place(x_m: f64, y_m: f64, yaw_rad: f64) -> String {

@@ -11,6 +11,7 @@
 //! | `/correction` | `FrameTransform` | `map` to `odometry`: later than the poses, so on a channel of its own, which is in order |
 //! | `/loop` | `PoseInFrame` | the later keyframe in the frame of the earlier one |
 //! | `/fix` | `PoseInFrame` | a keyframe in the map of the earlier drive |
+//! | `/objects` | `SceneUpdate` | a box for each moving object, with its velocity as an arrow of a second's length and its identity |
 //! | `/log` | `Log` | a line of `log.jsonl` |
 
 use std::collections::VecDeque;
@@ -18,14 +19,16 @@ use std::collections::VecDeque;
 use foxglove::{
     Encode, Schema,
     messages::{
-        FrameTransform, Log, PackedElementField, PointCloud, Pose, PoseInFrame, PosesInFrame,
-        Quaternion, RawImage, Timestamp, Vector3, log::Level, packed_element_field::NumericType,
+        ArrowPrimitive, Color, CubePrimitive, FrameTransform, Log, PackedElementField, PointCloud,
+        Pose, PoseInFrame, PosesInFrame, Quaternion, RawImage, SceneEntity, SceneUpdate,
+        TextPrimitive, Timestamp, Vector3, log::Level, packed_element_field::NumericType,
     },
 };
 use gyre_geometry::SparsePoint;
 use gyre_messages::{
-    Correction, CorrectionHeader, Fix, FixHeader, Item, Loop, LoopHeader, Masked, MaskedHeader,
-    Message, Motion, MotionHeader, PoseHeader, Refined, Rotation, RotationHeader, Scan,
+    Correction, CorrectionHeader, Fix, FixHeader, Item, ListedObject, Loop, LoopHeader, Masked,
+    MaskedHeader, Message, Motion, MotionHeader, Objects, ObjectsHeader, PoseHeader, Refined,
+    Rotation, RotationHeader, Scan,
 };
 
 use crate::image::{Rows, read};
@@ -40,6 +43,10 @@ const ODOMETRY: &str = "odometry";
 const RADAR: &str = "radar";
 /// The frame of the scan before, for motions.
 const PREVIOUS: &str = "previous_scan";
+/// Height at which objects are drawn, m: a radar in the plane does not measure it.
+const OBJECT_HEIGHT_M: f64 = 1.6;
+/// Length of the head of an arrow, m.
+const ARROW_HEAD_M: f64 = 1.0;
 /// The channel of log lines.
 pub const LOG: &str = "/log";
 /// The channel of the trajectory.
@@ -82,7 +89,7 @@ pub struct Channel {
 }
 
 /// All channels, in the order of the stream.
-pub const CHANNELS: [Channel; 13] = [
+pub const CHANNELS: [Channel; 14] = [
     channel::<RawImage>(Some(Scan::TOPIC), "/scan"),
     channel::<RawImage>(Some(Masked::TOPIC), "/masked"),
     channel::<PointCloud>(Some(Masked::TOPIC), POINTS),
@@ -95,6 +102,7 @@ pub const CHANNELS: [Channel; 13] = [
     channel::<PoseInFrame>(Some(Loop::TOPIC), "/loop"),
     channel::<FrameTransform>(Some(Correction::TOPIC), "/correction"),
     channel::<PoseInFrame>(Some(Fix::TOPIC), "/fix"),
+    channel::<SceneUpdate>(Some(Objects::TOPIC), "/objects"),
     channel::<Log>(None, LOG),
 ];
 
@@ -204,6 +212,7 @@ pub fn views(topic: &str, header: &[u8]) -> Vec<View> {
         Loop::TOPIC => read(header).map(closed),
         Correction::TOPIC => read(header).map(correction),
         Fix::TOPIC => read(header).map(fix),
+        Objects::TOPIC => read(header).map(objects),
         _ => None,
     };
     views.unwrap_or_default()
@@ -276,6 +285,89 @@ fn fix(header: FixHeader) -> Vec<View> {
         .pose()
         .map(|_| in_frame("/fix", "earlier_map", &header.item, place));
     found.into_iter().collect()
+}
+
+/// Returns the objects as one entity, which replaces that of the scan before.
+fn objects(header: ObjectsHeader) -> Vec<View> {
+    let listed = header.list();
+    let entity = SceneEntity {
+        timestamp: Some(timestamp(header.item.stamp_ns)),
+        frame_id: ODOMETRY.to_owned(),
+        id: Objects::TOPIC.to_owned(),
+        cubes: listed.iter().map(cube).collect(),
+        arrows: listed
+            .iter()
+            .filter(|it| it.is_moving())
+            .map(arrow)
+            .collect(),
+        texts: listed.iter().map(name).collect(),
+        ..SceneEntity::default()
+    };
+    let message = SceneUpdate {
+        deletions: Vec::new(),
+        entities: vec![entity],
+    };
+    vec![View::of("/objects", &message)]
+}
+
+fn cube(object: &ListedObject) -> CubePrimitive {
+    CubePrimitive {
+        pose: Some(lifted(
+            [object.x_m, object.y_m, object.yaw_rad],
+            0.5 * OBJECT_HEIGHT_M,
+        )),
+        size: Some(Vector3 {
+            x: object.length_m,
+            y: object.width_m,
+            z: OBJECT_HEIGHT_M,
+        }),
+        color: Some(object_colour(object, 0.5)),
+    }
+}
+
+/// The way of an object in a second.
+fn arrow(object: &ListedObject) -> ArrowPrimitive {
+    let (way_m, heading_rad) = (object.speed_mps(), object.vy_mps.atan2(object.vx_mps));
+    ArrowPrimitive {
+        pose: Some(lifted(
+            [object.x_m, object.y_m, heading_rad],
+            OBJECT_HEIGHT_M,
+        )),
+        shaft_length: (way_m - ARROW_HEAD_M).max(0.0),
+        shaft_diameter: 0.3,
+        head_length: ARROW_HEAD_M.min(way_m),
+        head_diameter: 0.9,
+        color: Some(object_colour(object, 1.0)),
+    }
+}
+
+fn name(object: &ListedObject) -> TextPrimitive {
+    TextPrimitive {
+        pose: Some(lifted([object.x_m, object.y_m, 0.0], OBJECT_HEIGHT_M + 1.0)),
+        billboard: true,
+        font_size: 1.2,
+        scale_invariant: false,
+        color: Some(object_colour(object, 1.0)),
+        text: object.id.to_string(),
+    }
+}
+
+/// Orange if it moves, grey if it stands.
+fn object_colour(object: &ListedObject, a: f64) -> Color {
+    let [r, g, b] = match object.is_moving() {
+        true => [1.0, 0.55, 0.1],
+        false => [0.6, 0.65, 0.7],
+    };
+    Color { r, g, b, a }
+}
+
+/// A place at a height, m.
+fn lifted(place: [f64; 3], height_m: f64) -> Pose {
+    let pose = pose(place);
+    Pose {
+        position: pose.position.map(|at| Vector3 { z: height_m, ..at }),
+        ..pose
+    }
 }
 
 fn in_frame(channel: &'static str, frame: &str, item: &Item, place: [f64; 3]) -> View {

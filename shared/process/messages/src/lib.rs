@@ -59,7 +59,7 @@ pub use masked::{Masked, MaskedHeader, MaskedParts, Pair, mask_kind};
 pub use message::{Element, Header, Message, Sender};
 pub use motion::{Motion, MotionEstimate, MotionHeader, SearchedMotion};
 pub use numbering::{GivenAnew, NumberedBy};
-pub use objects::{Objects, ObjectsHeader};
+pub use objects::{ListedObject, MAX_LISTED, Objects, ObjectsHeader};
 pub use pose::{Pose, PoseHeader};
 pub use refined::Refined;
 pub use refinement::{RefinementRecord, doppler, gyro, initial_guess, outcome, wheels};

@@ -1,17 +1,24 @@
-//! `objects`: how many moving objects are around the vehicle.
+//! `objects`: what moves around the vehicle.
 
 use bytemuck::{Pod, Zeroable};
 
 use crate::{
     block::FloatBlock,
-    check::{Violation, require},
+    check::{Violation, finite, planar, require, within},
     follower::FollowerId,
     item::Item,
     limits::{History, Limits},
     message::{Message, Sender, header},
+    pose::MAX_DISTANCE_M,
 };
 
-/// The objects at the time of a scan. Where they are is in `journal/objects.log`.
+/// Objects that a message lists, at most: those nearest to the vehicle. The others are counted, and
+/// in `journal/objects.log`.
+pub const MAX_LISTED: usize = 64;
+/// Largest length and width of an object, m.
+const MAX_SIZE_M: f64 = 1e3;
+
+/// The objects at the time of a scan.
 #[derive(Debug)]
 pub enum Objects {}
 
@@ -28,20 +35,187 @@ impl Message for Objects {
         _: &[Self::Element],
         _: &Limits,
     ) -> Result<(), Violation> {
-        let fits = header.moving <= header.objects;
-        require(fits, "moving", header.moving, "at most objects")
+        header.check()
     }
 }
-header!(ObjectsHeader, "gyre_objects_header_v1");
+header!(ObjectsHeader, "gyre_objects_header_v2");
 
-/// The number of objects.
+/// The objects, in the frame of the odometry: that of the first scan.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct ObjectsHeader {
     /// That of the scan's pose.
     pub item: Item,
+    /// Pose of the sensor at the scan's time: forward, m.
+    pub x_m: f64,
+    /// To the left, m.
+    pub y_m: f64,
+    /// Counter-clockwise, rad, in (-pi, pi].
+    pub yaw_rad: f64,
     /// Objects that move, or did and stand now.
     pub objects: u64,
     /// Those that move.
     pub moving: u64,
+    /// Number of objects in `list`.
+    pub listed: u64,
+    /// The objects nearest to the vehicle, the nearest first; zero beyond `listed`.
+    pub list: [ListedObject; MAX_LISTED],
+}
+
+/// An object at the time of a scan.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct ListedObject {
+    /// The identity: counted from 1, and given to no other object of the run.
+    pub id: u64,
+    /// The centre: x, m.
+    pub x_m: f64,
+    /// The centre: y, m.
+    pub y_m: f64,
+    /// The heading, rad, in (-pi, pi].
+    pub yaw_rad: f64,
+    /// The velocity over ground along x, m/s.
+    pub vx_mps: f64,
+    /// The velocity over ground along y, m/s.
+    pub vy_mps: f64,
+    /// The length along the heading, m.
+    pub length_m: f64,
+    /// The width across it, m.
+    pub width_m: f64,
+    /// Covariance of the centre: xx, xy and yy, m².
+    pub position_covariance: [f64; 3],
+    /// Covariance of the velocity: xx, xy and yy, (m/s)².
+    pub velocity_covariance: [f64; 3],
+    /// 1 if it moves, 0 if its speed is not significantly above that of what stands.
+    pub moving: u32,
+    /// Scans since it was first seen, that one included.
+    pub age: u32,
+}
+
+/// No objects.
+impl Default for ObjectsHeader {
+    fn default() -> Self {
+        Self::zeroed()
+    }
+}
+
+impl ObjectsHeader {
+    /// Returns the listed objects.
+    pub fn list(&self) -> &[ListedObject] {
+        &self.list[..(self.listed as usize).min(MAX_LISTED)]
+    }
+
+    fn check(&self) -> Result<(), Violation> {
+        let pose = [
+            ("x_m", self.x_m),
+            ("y_m", self.y_m),
+            ("yaw_rad", self.yaw_rad),
+        ];
+        planar(pose, MAX_DISTANCE_M)?;
+        let fits = self.moving <= self.objects;
+        require(fits, "moving", self.moving, "at most objects")?;
+        let fits = self.listed == self.objects.min(MAX_LISTED as u64);
+        let expected = format_args!("objects, at most {MAX_LISTED}");
+        require(fits, "listed", self.listed, expected)?;
+        self.list().iter().try_for_each(ListedObject::check)
+    }
+}
+
+impl ListedObject {
+    /// Returns whether it moves.
+    pub fn is_moving(&self) -> bool {
+        self.moving != 0
+    }
+
+    /// Returns the speed over ground, m/s.
+    pub fn speed_mps(&self) -> f64 {
+        self.vx_mps.hypot(self.vy_mps)
+    }
+
+    fn check(&self) -> Result<(), Violation> {
+        let place = [
+            ("an object's x_m", self.x_m),
+            ("an object's y_m", self.y_m),
+            ("an object's yaw_rad", self.yaw_rad),
+        ];
+        planar(place, MAX_DISTANCE_M)?;
+        within("an object's length_m", self.length_m, 0.0..=MAX_SIZE_M)?;
+        within("an object's width_m", self.width_m, 0.0..=MAX_SIZE_M)?;
+        finite([
+            ("an object's vx_mps", self.vx_mps),
+            ("an object's vy_mps", self.vy_mps),
+        ])?;
+        let covariances = [self.position_covariance, self.velocity_covariance];
+        let is_finite = covariances.as_flattened().iter().all(|it| it.is_finite());
+        require(is_finite, "an object's covariance", "not finite", "finite")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LIMITS: Limits = Limits {
+        scan_bytes: 64,
+        raster_cells: 9,
+        cell_m: 2.0,
+        rasters: 1,
+        points: 2,
+        samples: 2,
+    };
+
+    /// A header with two objects, of which one moves.
+    fn header() -> ObjectsHeader {
+        let car = ListedObject {
+            id: 3,
+            x_m: 20.0,
+            yaw_rad: 3.0,
+            vx_mps: -9.0,
+            length_m: 4.4,
+            width_m: 1.9,
+            moving: 1,
+            ..ListedObject::default()
+        };
+        let mut header = ObjectsHeader {
+            objects: 2,
+            moving: 1,
+            listed: 2,
+            ..ObjectsHeader::default()
+        };
+        header.list[..2].copy_from_slice(&[car, ListedObject { moving: 0, ..car }]);
+        header
+    }
+
+    #[test]
+    fn a_list_that_is_not_that_of_its_objects_is_refused() {
+        assert_eq!(Objects::check(&header(), &[], &LIMITS), Ok(()));
+        assert_eq!(header().list().len(), 2);
+        type Change = fn(&mut ObjectsHeader);
+        let changes: [(&str, Change); 8] = [
+            ("x_m", |it| it.x_m = f64::NAN),
+            ("moving", |it| it.moving = 3),
+            ("listed", |it| it.listed = 1),
+            ("an object's y_m", |it| it.list[1].y_m = f64::INFINITY),
+            ("an object's yaw_rad", |it| it.list[1].yaw_rad = 4.0),
+            ("an object's vx_mps", |it| it.list[0].vx_mps = f64::NAN),
+            ("an object's width_m", |it| it.list[1].width_m = -1.0),
+            ("an object's covariance", |it| {
+                it.list[0].velocity_covariance[2] = f64::NAN;
+            }),
+        ];
+        for (field, change) in changes {
+            let mut header = header();
+            change(&mut header);
+            let refused = Objects::check(&header, &[], &LIMITS).map_err(|it| it.to_string());
+            let names_it = refused.as_ref().is_err_and(|it| it.starts_with(field));
+            assert!(names_it, "{field}: {refused:?}");
+        }
+        // What is not listed is not looked at.
+        let mut long = header();
+        long.list[2].y_m = f64::NAN;
+        assert_eq!(Objects::check(&long, &[], &LIMITS), Ok(()));
+        let mut many = header();
+        (many.objects, many.listed) = (100, 64);
+        assert_eq!(Objects::check(&many, &[], &LIMITS), Ok(()));
+    }
 }

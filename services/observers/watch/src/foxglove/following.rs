@@ -10,7 +10,7 @@ use std::{
 
 use bytemuck::bytes_of;
 use gyre_messages::{
-    Correction, Fix, Loop, Masked, Message, Motion, Pose, Refined, Rotation, Scan,
+    Correction, Fix, Loop, Masked, Message, Motion, Objects, Pose, Refined, Rotation, Scan,
 };
 use gyre_recorder::LogTail;
 use gyre_recording::view::{LOG, POINTS, TRAJECTORY, View, views};
@@ -65,6 +65,7 @@ pub fn start(followed: &Arc<Followed>, hub: &Arc<Hub>) -> io::Result<Vec<JoinHan
         follow::<Loop>(followed, hub, nothing)?,
         follow::<Correction>(followed, hub, nothing)?,
         follow::<Fix>(followed, hub, nothing)?,
+        follow::<Objects>(followed, hub, nothing)?,
     ])
 }
 

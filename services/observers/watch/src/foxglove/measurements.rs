@@ -67,7 +67,7 @@ pub fn latency_schema() -> Value {
 /// Returns the schema of the report that the page shows.
 pub fn health_schema() -> Value {
     let counts = ["published", "poses", "dropped", "in_flight"];
-    let missed = object(numbers(["pose", "scan", "masked"]));
+    let missed = object(numbers(["pose", "scan", "masked", "objects"]));
     let process = [
         ("name".to_owned(), json!({"type": "string"})),
         ("state".to_owned(), json!({"type": "string"})),
