@@ -1,11 +1,13 @@
-"""`gyre evaluate --objects` against motmetrics."""
+"""`gyre evaluate --objects` against motmetrics, and the table of objects as an array."""
 
 import json
 import math
 import random
 from pathlib import Path
 
+import gyre
 import motmetrics  # type: ignore[import-untyped]
+import numpy as np
 import pytest
 from conftest import gyre_program
 
@@ -104,3 +106,27 @@ def test_the_figures_are_those_of_motmetrics(seed: int, tmp_path: Path) -> None:
     assert ours["switches"] == theirs["num_switches"]
     for name in ("mota", "precision", "recall"):
         assert ours[name] == pytest.approx(theirs[name], abs=1e-9)
+
+
+def test_objects_are_read_as_an_array(tmp_path: Path) -> None:
+    scans = drawn(1)
+    run, _ = write(tmp_path, scans)
+    objects = gyre.read_objects(run)
+    assert len(objects) == sum(len(found) for _, found in scans)
+    assert objects.dtype["moving"] == np.bool_ and objects["moving"].all()
+    places = dict(zip(objects["object"][objects["scan"] == 3].tolist(), objects["x_m"][objects["scan"] == 3], strict=True))
+    assert places == {number: x for number, (x, _) in scans[3][1].items()}
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    (empty / "objects.csv").write_text(TRACKED + "\n")
+    assert len(gyre.read_objects(empty)) == 0
+
+
+def test_objects_that_are_not_there_or_damaged_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(gyre.ReadError, match="objects.kind=tracks"):
+        gyre.read_objects(tmp_path)
+    table = tmp_path / "objects.csv"
+    for text, reason in [("", "other columns"), (TRUE, "other columns"), (f"{TRACKED}\n1,2,x", "damaged")]:
+        table.write_text(text)
+        with pytest.raises(gyre.ReadError, match=reason):
+            gyre.read_objects(tmp_path)

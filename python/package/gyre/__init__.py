@@ -33,6 +33,7 @@ from ._gyre import (
     open,
 )
 from .errors import ConfigError, Error, ReadError, ScanError, SkippedScanWarning, TrajectoryError, WriteError
+from .objects import read_objects
 
 __all__ = [
     "Config",
@@ -60,4 +61,5 @@ __all__ = [
     "find_ground_truth",
     "inspect",
     "open",
+    "read_objects",
 ]
