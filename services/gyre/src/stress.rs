@@ -9,7 +9,11 @@ use gyre_results::{
     machine::{Machine, today},
 };
 use gyre_run::Scenario;
-use gyre_stress::{MessageKind, Options, Provenance, Report, TestedPipeline, report::Verdict};
+use gyre_scan_matching::RefinementKind;
+use gyre_stress::{
+    MessageKind, Options, Others, Provenance, Report, TestedPipeline, report::Verdict,
+    witness_fault,
+};
 use gyre_terminal::{Failure, own, print};
 
 use crate::{
@@ -37,7 +41,7 @@ const RENDERED: usize = 240;
 pub fn stress(arguments: &StressArguments) -> Result<ExitCode, Failure> {
     if arguments.list {
         for scenario in Scenario::ALL {
-            print::line(format_args!("{scenario:10}  {}", scenario.line()))?;
+            print::line(format_args!("{scenario:11}  {}", scenario.line()))?;
         }
         return Ok(ExitCode::SUCCESS);
     }
@@ -77,11 +81,20 @@ fn carry_out(arguments: &StressArguments) -> Result<Report, Failure> {
     let file = out.join("config.toml");
     fs::write(&file, configuration.to_toml()?)?;
     let stages = StageId::ALL.into_iter();
+    let turn = configuration.source.played(played.dataset.scans());
+    let odometry = &configuration.odometry;
     let tested = TestedPipeline {
         program: own(),
         configuration: file,
         out: out.path().to_owned(),
         period,
+        first_ns: played.dataset.nominal_stamp_ns(turn.start),
+        turn,
+        others: Others {
+            gyro: odometry.gyro.is_used(),
+            wheels: odometry.wheels.is_used(),
+            are_weighed: odometry.refinement.kind != RefinementKind::None,
+        },
         stages: stages.filter(|stage| configuration.has(*stage)).collect(),
         budget: configuration.budget.clone(),
         kinds: kinds(&checked),
@@ -89,7 +102,7 @@ fn carry_out(arguments: &StressArguments) -> Result<Report, Failure> {
     };
     let options = Options {
         scenarios: match arguments.scenarios.is_empty() {
-            true => Scenario::ALL.to_vec(),
+            true => possible(&tested),
             false => arguments.scenarios.clone(),
         },
         duration: Duration::from_secs_f64(match arguments.quick {
@@ -130,6 +143,19 @@ fn render(configuration: &mut Configuration, out: &Out) -> Result<(), Failure> {
     simulate::store(&simulation, &recording, true)?;
     configuration.source.data = recording;
     Ok(())
+}
+
+/// All scenarios but those of gyro and wheels that the run or its recording has no place for.
+fn possible(tested: &TestedPipeline) -> Vec<Scenario> {
+    let all = Scenario::ALL.into_iter();
+    all.filter(|scenario| match witness_fault::lacks(tested, *scenario) {
+        None => true,
+        Some(lacking) => {
+            print::note(format_args!("{scenario}: left out: {lacking}"));
+            false
+        }
+    })
+    .collect()
 }
 
 /// The messages whose hand-over is compared with copies: the largest ones, and one without a

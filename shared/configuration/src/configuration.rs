@@ -354,7 +354,7 @@ impl Configuration {
                 (
                     "source",
                     &[
-                        "kind", "address", "data", "from", "first", "scans", "repeat",
+                        "kind", "address", "data", "from", "first", "scans", "repeat", "faults",
                     ],
                 ),
                 ("link", &["side", "cut", "keyframes"]),

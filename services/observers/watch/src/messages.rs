@@ -1,6 +1,8 @@
 //! The layers that a browser asks for, and the messages to it in JSON.
 
-use gyre_messages::{ListedObject, ObjectsHeader, PoseHeader, WitnessCounts, outcome};
+use gyre_messages::{
+    ListedObject, ObjectsHeader, PoseHeader, SampleHealth, WitnessCounts, outcome,
+};
 use serde::Serialize;
 
 use crate::{delays::DelayReport, processes::Process, recent_drift::Drift, track::Vertex};
@@ -88,7 +90,8 @@ pub struct HealthReport {
     pub scans_per_s: f64,
     pub distance_m: f64,
     pub delays: DelayReport,
-    /// The part of gyro, wheels and Doppler in the last motions, in words; none without them.
+    /// The part of gyro, wheels and Doppler in the last motions, and the rates of their samples, in
+    /// words; none without them.
     pub others: Option<String>,
     /// The reason why something is not shown.
     pub notice: Option<String>,
@@ -110,6 +113,8 @@ pub struct RunCounts {
     pub missed: Missed,
     /// The basis of the motions, from the first of the run on.
     pub witnesses: WitnessCounts,
+    /// The samples of gyro and wheels, since this observer has come.
+    pub samples: SampleHealth,
 }
 
 /// The trajectory's new vertices and the newest pose.

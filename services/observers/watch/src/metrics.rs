@@ -107,6 +107,7 @@ impl Collector for Snapshot {
     fn encode(&self, mut encoder: DescriptorEncoder<'_>) -> fmt::Result {
         self.encode_counts(&mut encoder)?;
         self.encode_witnesses(&mut encoder)?;
+        self.encode_samples(&mut encoder)?;
         self.encode_missed(&mut encoder)?;
         self.encode_received(&mut encoder)?;
         self.encode_processes(&mut encoder)
@@ -191,6 +192,34 @@ impl Snapshot {
             for (value, count) in values {
                 ConstCounter::new(count).encode(family.encode_family(&[(label, value)])?)?;
             }
+        }
+        Ok(())
+    }
+
+    /// Encodes counts and rates of the samples of gyro and wheels, if there are any.
+    fn encode_samples(&self, encoder: &mut DescriptorEncoder<'_>) -> fmt::Result {
+        let samples = &self.counts.samples;
+        let sensors = [
+            ("gyro", samples.gyro, samples.gyro_hz),
+            ("wheels", samples.wheels, samples.wheels_hz),
+        ];
+        if sensors.iter().all(|(.., rate_hz)| rate_hz.is_none()) {
+            return Ok(());
+        }
+        let help = "Samples that were left out, since they came late or were unusable.";
+        counter(encoder, "samples_left_out", help, samples.left_out)?;
+        let help = "Samples that came with the scans.";
+        let mut family = encoder.encode_descriptor("samples", help, None, MetricType::Counter)?;
+        for (sensor, count, _) in sensors {
+            ConstCounter::new(count).encode(family.encode_family(&[("sensor", sensor)])?)?;
+        }
+        let help = "Samples a second by their stamps, over the last scans.";
+        let unit = Unit::Other("hertz".to_owned());
+        let mut family =
+            encoder.encode_descriptor("sample_rate", help, Some(&unit), MetricType::Gauge)?;
+        for (sensor, _, rate_hz) in sensors {
+            let rate_hz = rate_hz.unwrap_or(0.0);
+            ConstGauge::new(rate_hz).encode(family.encode_family(&[("sensor", sensor)])?)?;
         }
         Ok(())
     }
@@ -408,6 +437,40 @@ mod tests {
         ] {
             assert!(text.lines().any(|it| it == line), "{line}: {text}");
         }
+    }
+
+    #[test]
+    fn samples_are_counted_with_their_rates_and_missing_without_any() {
+        let mut snapshot = Snapshot {
+            is_up: true,
+            counts: view().counts(),
+            processes: Vec::new(),
+            traces: None,
+        };
+        let text = |snapshot: Snapshot| {
+            let mut registry = Registry::with_prefix("gyre");
+            registry.register_collector(Box::new(snapshot));
+            let mut text = String::new();
+            assert!(encode(&mut text, &registry).is_ok());
+            text
+        };
+        snapshot.counts.samples = gyre_messages::SampleHealth {
+            gyro: 2080,
+            left_out: 3,
+            gyro_hz: Some(208.0),
+            ..Default::default()
+        };
+        let text = text(snapshot);
+        for line in [
+            "gyre_samples_total{sensor=\"gyro\"} 2080",
+            "gyre_samples_left_out_total 3",
+            "gyre_sample_rate_hertz{sensor=\"gyro\"} 208.0",
+            "gyre_sample_rate_hertz{sensor=\"wheels\"} 0.0",
+        ] {
+            assert!(text.lines().any(|it| it == line), "{line}: {text}");
+        }
+        let (_, without) = scrape(&view(), b"text/plain");
+        assert!(!without.contains("gyre_sample"), "{without}");
     }
 
     #[test]

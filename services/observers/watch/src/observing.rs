@@ -122,6 +122,9 @@ fn follow_poses(
 ) -> Result<(), StageError> {
     let view = &followed.view;
     let mut poses = run.observe::<Pose>()?;
+    // Without a place for it the rates are missing, and nothing else.
+    let has_samples = run.manifest().limits.samples > 0;
+    let mut scans = has_samples.then(|| run.observe::<Scan>().ok()).flatten();
     view.set_notice(None);
     while !view.is_stopping() {
         let limit = match track.catch_up(|pose| view.add_to_track(pose)) {
@@ -144,6 +147,11 @@ fn follow_poses(
             }
         }
         view.set_missed(|missed| missed.pose = poses.missed());
+        if let Some(scans) = &mut scans {
+            while let Next::Message(scan, _) = scans.next(Duration::ZERO)? {
+                view.add_samples(scan.header(), scan.values());
+            }
+        }
     }
     Ok(())
 }

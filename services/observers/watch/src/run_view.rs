@@ -9,7 +9,9 @@ use std::{
 };
 
 use axum::{body::Bytes, extract::ws::Utf8Bytes};
-use gyre_messages::{ObjectsHeader, PoseHeader, RefinementRecord, WitnessCounts, flag};
+use gyre_messages::{
+    ObjectsHeader, PoseHeader, RefinementRecord, SampleRates, ScanHeader, WitnessCounts, flag,
+};
 use gyre_stage::{Manifest, clock, control::Status};
 use serde::Serialize;
 use tokio::sync::watch;
@@ -73,6 +75,7 @@ struct ViewState {
     latest: Option<CurrentPose>,
     counts: RunCounts,
     last_motions: VecDeque<RefinementRecord>,
+    rates: SampleRates,
     /// The numbers and poses of the last scans.
     recent: VecDeque<(u64, [f64; 3])>,
     /// Points that wait for the pose of their scan.
@@ -220,6 +223,13 @@ impl RunView {
         }
     }
 
+    /// Counts the samples that come with a scan.
+    pub fn add_samples(&self, scan: &ScanHeader, bytes: &[u8]) {
+        let mut state = self.state();
+        state.rates.add(scan, bytes);
+        state.counts.samples = state.rates.health();
+    }
+
     /// Adds the points of a scan. They are sent with its pose, now or when it comes.
     pub fn add_points(&self, points: PackedPoints, seq: u64) {
         let mut state = self.state();
@@ -287,7 +297,7 @@ impl RunView {
             scans_per_s,
             distance_m: state.track.length_m(),
             delays: state.delays.report(now_ns),
-            others: WitnessCounts::of(&state.last_motions).in_words(),
+            others: others(&state),
             notice: state.notice.clone(),
             processes: state.processes.clone(),
         };
@@ -355,6 +365,16 @@ impl RunView {
     pub fn is_stopping(&self) -> bool {
         *self.updates.stop.borrow()
     }
+}
+
+/// Returns the part of gyro, wheels and Doppler in the last motions, and their rates, in words.
+fn others(state: &ViewState) -> Option<String> {
+    let used = WitnessCounts::of(&state.last_motions).in_words();
+    let words: Vec<String> = used
+        .into_iter()
+        .chain(state.counts.samples.in_words())
+        .collect();
+    (!words.is_empty()).then(|| words.join("; "))
 }
 
 fn send_json(channel: &watch::Sender<Utf8Bytes>, message: &impl Serialize) {

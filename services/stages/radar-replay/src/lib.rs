@@ -3,6 +3,7 @@
 //!
 //! [`run`] opens a recording; [`play`] plays any dataset.
 
+mod faults;
 mod listing;
 mod player;
 mod turns;
@@ -18,6 +19,7 @@ use gyre_stage::{
     source::{self, Tolerance, Unreadable},
 };
 
+use faults::Faults;
 pub use listing::Listing;
 pub use player::{Player, play_recorded};
 use turns::Turns;
@@ -94,12 +96,16 @@ pub fn play(
     pace: Pace,
 ) -> Result<StageCounters, StageError> {
     let config: SourceConfig = launch.section("source")?;
+    let once = config.played(dataset.scans());
+    let first_ns = dataset.nominal_stamp_ns(once.start);
+    let faults = Faults::of(config.faults.clone(), first_ns)?;
     let mut replay = Replay {
         scans: config.stream(dataset.scans()),
-        turns: Turns::of(config.played(dataset.scans()), dataset.as_ref()),
+        turns: Turns::of(once, dataset.as_ref()),
         burst: config.burst,
         dataset,
-        samples,
+        samples: faults.put_into(samples)?,
+        faults,
         pace,
     };
     let counters = source::run(launch, &mut replay, &tolerance(&config))?;
@@ -117,6 +123,7 @@ struct Replay {
     /// The scans of the stream, counted on through all turns.
     scans: Range<usize>,
     turns: Turns,
+    faults: Faults,
     burst: NonZeroUsize,
     pace: Pace,
 }
@@ -158,6 +165,7 @@ impl Source for Replay {
             true => Unreadable::Io(error.to_string()),
             false => Unreadable::Damaged(error.to_string()),
         })?);
+        self.faults.blind(header, bytes);
         let samples = self.samples.of(self.dataset.as_ref(), header.span_ns());
         header.set_samples(bytes, &samples, 0);
         header.shift_times(shift_ns, bytes);

@@ -37,7 +37,10 @@ pub fn top(arguments: &TopArguments) -> Result<ExitCode, Failure> {
     let control = chosen(&arguments.run)?;
     let run = ObservedRun::writing_to(control.out())?;
     let poses = run.observe()?;
-    let mut snapshots = Snapshots::of(control, poses);
+    // Without a place for it the rates are missing, and nothing else.
+    let has_samples = run.manifest().limits.samples > 0;
+    let scans = has_samples.then(|| run.observe().ok()).flatten();
+    let mut snapshots = Snapshots::of(control, poses, scans);
     if arguments.once {
         // Shares and rates are over the time between two snapshots.
         let signals = Signals::install()?;
@@ -141,3 +144,4 @@ fn next_key() -> Result<Key, Failure> {
 
 /// The poses of a run, for [`Snapshots`].
 type Poses<'run> = Observer<'run, gyre_messages::Pose>;
+type Scans<'run> = Observer<'run, gyre_messages::Scan>;

@@ -3,7 +3,7 @@
 use std::{sync::Arc, thread, time::Duration};
 
 use gyre_messages::StageId;
-use gyre_run::{Limits, RADAR_HZ, Scenario};
+use gyre_run::{Limits, PlayedFault, RADAR_HZ, Scenario};
 use gyre_stage::run::{free_shared_memory, sweep};
 
 use crate::{
@@ -14,6 +14,7 @@ use crate::{
     pipeline::{Measured, Setup, measure},
     report::{Figures, ScenarioOutcome, Step, Verdict},
     search::{Found, Steps, largest, step_duration},
+    witness_fault::{self, WitnessFault},
     work::Work,
 };
 
@@ -106,6 +107,9 @@ impl Campaign<'_> {
 
     /// One run.
     fn single(&self) -> Result<ScenarioOutcome, StressError> {
+        if let Some(lacking) = witness_fault::lacks(self.tested, self.scenario) {
+            return Err(StressError::Usage(lacking));
+        }
         let setup = self.setup();
         if setup.faults.is_some() && setup.duration < fault::LEAST {
             return Err(StressError::TooShort {
@@ -120,6 +124,7 @@ impl Campaign<'_> {
             checks: checks(&self.limits, &figures),
             problem,
             figures: Some(figures),
+            duration_s: setup.duration.as_secs_f64(),
             ..self.empty()
         }
         .judged()
@@ -150,9 +155,29 @@ impl Campaign<'_> {
             Scenario::SlowStage => setup.set.extend(self.slow_stages()),
             Scenario::Stopped => setup.faults = Some((FaultKind::Stop, self.stages())),
             Scenario::Kills => setup.faults = Some((FaultKind::Kill, self.stages())),
-            _ => {}
+            _ => self.play_faults(&mut setup),
         }
         setup
+    }
+
+    /// Adds the faults that the source plays, and the time that they take.
+    fn play_faults(&self, setup: &mut Setup) {
+        setup.played = witness_fault::faults(self.scenario);
+        if setup.played.is_empty() {
+            return;
+        }
+        let needed_s = witness_fault::needed_s(&setup.played);
+        let needed_s = needed_s / self.tested.relative_rate(setup.rate_hz);
+        setup.duration = setup.duration.max(Duration::from_secs_f64(needed_s));
+        let fault = |fault: &PlayedFault| {
+            let PlayedFault { from_s, for_s, .. } = fault;
+            let kind = fault.kind.name();
+            format!("{{kind='{kind}',from_s={from_s:?},for_s={for_s:?}}}")
+        };
+        let faults: Vec<String> = setup.played.iter().map(fault).collect();
+        setup
+            .set
+            .push(format!("source.faults=[{}]", faults.join(",")));
     }
 
     fn stages(&self) -> Vec<StageId> {
@@ -291,13 +316,20 @@ fn problem(measured: &Measured) -> Option<String> {
     }
     let mut faults = measured.figures.faults.iter();
     let lost = faults.find(|fault| fault.recovery_ms.is_none());
-    lost.map(|fault| format!("no pose has followed the fault of {}", fault.stage))
+    let lost = lost.map(|fault| format!("no pose has followed the fault of {}", fault.stage));
+    // A fault that could not be told says nothing of the pipeline.
+    let mut told = measured.figures.witness_faults.iter();
+    lost.or_else(|| match measured.omitted {
+        None => told.find_map(WitnessFault::problem),
+        Some(_) => None,
+    })
 }
 
 /// Compares the figures of a run with limits.
 fn checks(limits: &Limits, figures: &Figures) -> Vec<Check> {
     let latency = &figures.latency.sensor_to_pose;
     let percentile = |percentile| latency.judged(percentile);
+    let degraded = figures.motions.degraded_percent();
     let at_most = [
         ("p50_ms", percentile(latency.p50_ms), limits.p50_ms),
         ("p90_ms", percentile(latency.p90_ms), limits.p90_ms),
@@ -320,14 +352,17 @@ fn checks(limits: &Limits, figures: &Figures) -> Vec<Check> {
             limits.cpu_percent,
         ),
         ("memory_mb", Some(figures.memory_mb()), limits.memory_mb),
+        (
+            "degraded_percent",
+            degraded,
+            limits.degraded_percent.filter(|_| degraded.is_some()),
+        ),
     ];
     // Without scans there is nothing to judge but what the processes cost.
     let has_scans = figures.latency.counts.due > 0;
-    let recovery = limits.recovery_ms.filter(|_| !figures.faults.is_empty());
-    let recovery = recovery.map(|limit| {
-        let longest = figures.faults.iter().filter_map(|fault| fault.recovery_ms);
-        Check::at_most("recovery_ms", longest.reduce(f64::max), limit)
-    });
+    let recovery = limits.recovery_ms.filter(|_| figures.had_faults());
+    let recovery =
+        recovery.map(|limit| Check::at_most("recovery_ms", figures.longest_recovery_ms(), limit));
     at_most
         .into_iter()
         .filter(|(key, ..)| has_scans || ["cpu_percent", "memory_mb"].contains(key))

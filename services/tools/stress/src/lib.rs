@@ -11,7 +11,8 @@
 //! 2. [`stress`] (in `campaign.rs`): one scenario after the other; [`pipeline`]: one run from its
 //!    start to its end.
 //! 3. [`record`]: poses in, distributions out; drops are samples too.
-//! 4. [`fault`]: stops and kills of stages; [`helper`], `work`, `load`: the child processes that
+//! 4. [`fault`]: stops and kills of stages; [`witness_fault`]: those of gyro, wheels and radar;
+//!    [`helper`], `work`, `load`: the child processes that
 //!    load the machine.
 //! 5. [`processes`]: the resources of each process.
 //! 6. [`copying`]: the transport beside copies through sockets.
@@ -33,6 +34,7 @@ pub mod record;
 pub mod report;
 mod search;
 mod tested;
+pub mod witness_fault;
 mod work;
 
 pub use campaign::{Options, stress};
@@ -40,5 +42,5 @@ pub use error::StressError;
 pub use gyre_run::Scenario;
 pub use help::help;
 pub use report::{Provenance, Report};
-pub use tested::{MessageKind, TestedPipeline};
+pub use tested::{MessageKind, Others, TestedPipeline};
 pub use work::Work;

@@ -10,8 +10,8 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_messages::{Footprint, Pose, PoseHeader, StageId};
-use gyre_run::Scenario;
+use gyre_messages::{Footprint, Pose, PoseHeader, StageId, WitnessCounts, flag};
+use gyre_run::{PlayedFault, Scenario};
 use gyre_stage::{
     clock,
     observer::{Next, Observer},
@@ -26,6 +26,7 @@ use crate::{
     record::Recorder,
     report::Figures,
     tested::TestedPipeline,
+    witness_fault::{PlayedClock, WitnessFaults},
     work::Work,
 };
 
@@ -60,6 +61,8 @@ pub struct Setup {
     pub observers: usize,
     /// The fault of these stages.
     pub faults: Option<(FaultKind, Vec<StageId>)>,
+    /// The faults that the source puts into what it plays.
+    pub played: Vec<PlayedFault>,
     /// For the choice of faults.
     pub seed: u64,
 }
@@ -78,6 +81,7 @@ impl Setup {
             memory_share: None,
             observers: 0,
             faults: None,
+            played: Vec::new(),
             seed: 0,
         }
     }
@@ -131,7 +135,7 @@ pub fn measure(
     let (mut loads, taken) = run.load(tested)?;
     drop(ticket);
     await_others(&held, &mut poses, &mut newest)?;
-    let mut session = Session::begin(setup, run.pid(), run.out(), &newest);
+    let mut session = Session::begin((tested, setup), run.pid(), run.out(), &newest);
     let has_ended = session.measure(&mut poses, || run.has_ended())?;
     let ended_load = loads.iter_mut().find_map(Helper::has_died);
     drop(loads);
@@ -139,6 +143,9 @@ pub fn measure(
     let latency = session.recorder.finish(session.period_ns, clock::now_ns());
     let omitted = session.faults.as_ref().and_then(Faults::omitted);
     let faults = session.faults.map(Faults::finish).unwrap_or_default();
+    let witness = session.witness.as_ref();
+    let omitted = omitted.or_else(|| witness.and_then(WitnessFaults::omitted));
+    let witness_faults = session.witness.map(WitnessFaults::finish);
     let manifest = observed.manifest();
     let shared_bytes = Footprint::new(&manifest.window, &manifest.limits).total() as u64;
     drop(poses);
@@ -157,6 +164,8 @@ pub fn measure(
         figures: Figures {
             latency,
             faults,
+            witness_faults: witness_faults.unwrap_or_default(),
+            motions: session.motions,
             restarts: summary.restarts,
             wakes_caught_late: late.filter(|(_, late)| *late > 0).collect(),
             processes,
@@ -206,26 +215,52 @@ struct Session {
     recorder: Recorder,
     processes: Sampler,
     faults: Option<Faults>,
+    witness: Option<WitnessFaults>,
+    /// What the motions rest on that are measured in the first turn of the recording: where it
+    /// starts anew, the vehicle jumps.
+    motions: WitnessCounts,
+    turn_end: u64,
+    newest: u64,
     period_ns: i64,
+    began_ns: i64,
     ends_ns: i64,
     sampled: Instant,
 }
 
 impl Session {
     /// Begins now; `newest` is the last pose of the warm-up.
-    fn begin(setup: &Setup, supervisor: u32, out: &Path, newest: &PoseHeader) -> Self {
+    fn begin(
+        (tested, setup): (&TestedPipeline, &Setup),
+        supervisor: u32,
+        out: &Path,
+        newest: &PoseHeader,
+    ) -> Self {
         let began_ns = clock::now_ns();
         let ends_ns = began_ns + setup.duration.as_nanos() as i64;
         let faults = setup
             .faults
             .clone()
             .map(|(kind, stages)| Faults::new(kind, stages, setup.seed, began_ns, setup.duration));
+        let clock = tested.first_ns.map(|first_ns| PlayedClock {
+            first_ns,
+            period_ns: tested.period.as_nanos() as i64,
+            rate: tested.relative_rate(setup.rate_hz),
+            end: tested.turn.end as u64,
+        });
+        let clock = clock.filter(|_| !setup.played.is_empty());
+        let witness = clock
+            .map(|clock| WitnessFaults::new(setup.played.clone(), tested.others, clock, began_ns));
         let mut recorder = Recorder::new(began_ns..ends_ns, setup.burst);
         recorder.add(newest);
         Self {
             recorder,
             processes: Sampler::new(supervisor, out),
             faults,
+            witness,
+            motions: WitnessCounts::default(),
+            turn_end: tested.turn.end as u64,
+            newest: newest.item.seq,
+            began_ns,
             period_ns: (1e9 / setup.rate_hz) as i64,
             ends_ns,
             sampled: Instant::now(),
@@ -254,6 +289,21 @@ impl Session {
         if let Some(faults) = &mut self.faults {
             faults.pose(pose);
         }
+        if let Some(faults) = &mut self.witness {
+            faults.pose(pose);
+        }
+        self.count(pose);
+    }
+
+    /// Counts what a motion rests on.
+    fn count(&mut self, pose: &PoseHeader) {
+        let item = &pose.item;
+        let is_new = item.seq > self.newest && !item.is(flag::BREAK);
+        self.newest = self.newest.max(item.seq);
+        let is_measured = (self.began_ns..self.ends_ns).contains(&item.due_ns);
+        if is_new && is_measured && item.scan < self.turn_end {
+            self.motions.add(&pose.motion.refinement);
+        }
     }
 
     fn poll(&mut self) {
@@ -274,6 +324,8 @@ impl Session {
         }
         let has_all = !self.recorder.owes(self.period_ns);
         let has_recovered = self.faults.as_ref().is_none_or(|faults| !faults.are_open());
+        let witness = self.witness.as_ref();
+        let has_recovered = has_recovered && witness.is_none_or(|faults| !faults.are_open());
         (has_all && has_recovered) || now_ns > self.ends_ns + GRACE.as_nanos() as i64
     }
 }

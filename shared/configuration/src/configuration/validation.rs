@@ -3,7 +3,9 @@
 use gyre_colossus::Address;
 use gyre_messages::StageId;
 use gyre_ros2_messages::Domain;
-use gyre_run::{Limits, Mode, PlayedFrom, Rate, Side, SourceConfig, SourceKind, StageConfig};
+use gyre_run::{
+    Limits, Mode, PlayedFault, PlayedFrom, Rate, Side, SourceConfig, SourceKind, StageConfig,
+};
 use gyre_samples::GnssKind;
 use gyre_simulator::OutputFormat;
 use gyre_slam::SlamKind;
@@ -67,6 +69,7 @@ impl Configuration {
             return Err(value("source", reason));
         }
         self.validate_played_from()?;
+        self.validate_faults()?;
         let has_scans = !self.is_radar() && !self.is_side(Side::Base);
         if self.run.mode == Mode::Live && self.run.rate == Rate::Max && has_scans {
             let reason = "mode `live` needs a radar's pace: set rate to `realtime` or a factor";
@@ -191,6 +194,21 @@ impl Configuration {
 
     fn validate_record(&self) -> Result<(), ConfigurationError> {
         seconds("record", "split_s", self.record.split_s)
+    }
+
+    /// Faults are put into the scans and logs of recordings and simulations.
+    fn validate_faults(&self) -> Result<(), ConfigurationError> {
+        let source = &self.source;
+        if let Some((key, time_s)) = source.faults.iter().find_map(PlayedFault::invalid) {
+            let reason = format!("faults has {key} = {time_s}, but must have 0 or more");
+            return Err(value("source", reason));
+        }
+        let plays_scans = !self.is_radar() && source.from == PlayedFrom::Scan;
+        if !source.faults.is_empty() && (!plays_scans || self.is_side(Side::Base)) {
+            let reason = "faults are put into the scans of a recording or a simulation, which this run does not play: remove them";
+            return Err(value("source", reason));
+        }
+        Ok(())
     }
 
     fn validate_budget(&self) -> Result<(), ConfigurationError> {

@@ -121,6 +121,18 @@ impl ScanSamples {
         }
     }
 
+    /// Returns the same with each sample of a log as `change` returns it, or without it.
+    #[must_use]
+    pub fn changed(self, change: impl FnMut(&Sample) -> Option<Sample>) -> Self {
+        match self {
+            Self::Log { track, faults } => Self::Log {
+                track: track.changed(change),
+                faults,
+            },
+            other => other,
+        }
+    }
+
     /// The samples that a recording has, of the kinds that are used.
     fn recorded(gyro: &GyroConfig, wheels: &WheelsConfig) -> Self {
         let used = [

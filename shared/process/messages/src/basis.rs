@@ -46,10 +46,20 @@ impl Basis {
             Self::Guessed => "guessed",
         }
     }
+
+    /// Returns whether the radar does not tell the whole motion: in part or as a whole it is that of
+    /// other sensors, or of the motions before.
+    pub fn is_degraded(self) -> bool {
+        match self {
+            Self::ScanToScan | Self::RadarOnly | Self::RadarAndOthers => false,
+            Self::AlongWalls | Self::WayGuessed | Self::DeadReckoning | Self::Guessed => true,
+        }
+    }
 }
 
 impl RefinementRecord {
-    fn uses_gyro(&self) -> bool {
+    /// Returns whether the motion is made with the turn of the gyro.
+    pub fn uses_gyro(&self) -> bool {
         [gyro::USED, gyro::DOUBTED].contains(&self.gyro)
     }
 
@@ -111,6 +121,15 @@ impl WitnessCounts {
     /// Returns the number of motions.
     pub fn motions(&self) -> u64 {
         self.by_basis.iter().sum()
+    }
+
+    /// Returns the share of the motions that the radar does not tell as a whole, %: see
+    /// [`Basis::is_degraded`]; `None` without motions.
+    pub fn degraded_percent(&self) -> Option<f64> {
+        let degraded = Basis::ALL.iter().filter(|basis| basis.is_degraded());
+        let degraded: u64 = degraded.map(|basis| self.by_basis[*basis as usize]).sum();
+        let motions = self.motions();
+        (motions > 0).then(|| 100.0 * degraded as f64 / motions as f64)
     }
 
     /// Returns the part of gyro, wheels and Doppler in words, as `gyro 98 %, 1 refused, wheels 100
@@ -183,6 +202,8 @@ mod tests {
         let counts = WitnessCounts::of(cases.iter().map(|(motion, _)| motion));
         assert_eq!(counts.by_basis, [1, 2, 2, 1, 1, 1, 1]);
         assert_eq!(counts.motions(), 9);
+        assert_eq!(counts.degraded_percent(), Some(400.0 / 9.0));
+        assert_eq!(WitnessCounts::default().degraded_percent(), None);
         let words = "gyro 44 %, 2 refused, wheels 33 %, 3 slips";
         assert_eq!(counts.in_words().as_deref(), Some(words));
         assert_eq!(WitnessCounts::of([&cases[1].0]).in_words(), None);

@@ -42,6 +42,7 @@ mod pose;
 mod refined;
 mod refinement;
 mod rotation;
+mod sample_rates;
 mod scan;
 mod topics;
 
@@ -64,5 +65,6 @@ pub use pose::{Pose, PoseHeader};
 pub use refined::Refined;
 pub use refinement::{RefinementRecord, doppler, gyro, initial_guess, outcome, wheels};
 pub use rotation::{Rotation, RotationEstimate, RotationHeader};
+pub use sample_rates::{SampleHealth, SampleRates};
 pub use scan::{Scan, ScanHeader};
 pub use topics::{Footprint, Topic, WireType, topic, topics};

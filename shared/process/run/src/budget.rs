@@ -56,8 +56,12 @@ limits! {
     /// The same, % of those that were due.
     drops_percent,
     /// Time from a fault (the kill, or the end of the stop) to the first pose that the stage has
-    /// worked on since, ms.
+    /// worked on since, ms. Of a fault of gyro, wheels or radar: from its end to the first pose of a
+    /// motion that is as before it.
     recovery_ms,
+    /// Motions that the radar does not tell as a whole (`along walls`, `way guessed`, `dead
+    /// reckoning`, `guessed`), % of those before the recording starts anew.
+    degraded_percent,
     /// Processor time of all processes of the run, % of one processor.
     cpu_percent,
     /// Own memory of all processes of the run and its shared memory, MB.
@@ -91,6 +95,10 @@ impl Budget {
                 drops_percent: None,
                 ..self.all.clone()
             }),
+            Judged::ButDegraded => own.or(&Limits {
+                degraded_percent: None,
+                ..self.all.clone()
+            }),
             Judged::ByRecovery => own.or(&Limits {
                 recovery_ms: self.all.recovery_ms,
                 ..Limits::default()
@@ -109,6 +117,7 @@ mod tests {
             p99_ms: Some(100.0),
             drops_percent: Some(0.0),
             recovery_ms: Some(500.0),
+            degraded_percent: Some(1.0),
             ..Limits::default()
         };
         let kills = Limits {
@@ -141,6 +150,9 @@ mod tests {
         let fast = budget().of(Scenario::Fast);
         assert_eq!((fast.p99_ms, fast.drops_percent), (Some(100.0), Some(5.0)));
         assert_eq!(budget().of(Scenario::Bursts).drops_percent, None);
+        let blind = budget().of(Scenario::RadarBlind);
+        assert_eq!((blind.p99_ms, blind.degraded_percent), (Some(100.0), None));
+        assert_eq!(fast.degraded_percent, Some(1.0));
         assert_eq!(budget().of(Scenario::Copying), Limits::default());
     }
 

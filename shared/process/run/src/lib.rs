@@ -10,6 +10,7 @@
 
 mod budget;
 mod link;
+mod played_fault;
 mod played_from;
 mod processes;
 mod rate;
@@ -22,6 +23,7 @@ mod unset;
 
 pub use budget::{Budget, Limits};
 pub use link::{LinkConfig, Side};
+pub use played_fault::{PlayedFault, PlayedFaultKind};
 pub use played_from::PlayedFrom;
 pub use processes::{Mode, RestartPolicy, RunConfig, StageConfig};
 pub use rate::Rate;

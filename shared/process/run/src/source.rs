@@ -4,7 +4,7 @@ use std::{num::NonZeroUsize, ops::Range, path::PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::PlayedFrom;
+use crate::{PlayedFault, PlayedFrom};
 
 /// Where scans come from.
 #[derive(
@@ -82,6 +82,10 @@ pub struct SourceConfig {
     /// than `max`.
     #[serde(skip_serializing_if = "is_one")]
     pub burst: NonZeroUsize,
+    /// Faults that are put into what is played of a recording: `gyre stress`. As in
+    /// `[{ kind = "gyro-out", from_s = 4.0, for_s = 3.0 }]`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub faults: Vec<PlayedFault>,
     /// Time for which a file that the disk or the network does not give is tried again, s. Then the
     /// run ends, and the same command continues it.
     pub retry_s: f64,
@@ -113,6 +117,7 @@ impl Default for SourceConfig {
             scans: None,
             repeat: false,
             burst: NonZeroUsize::MIN,
+            faults: Vec::new(),
             retry_s: 10.0,
             max_unreadable: 10,
         }

@@ -153,15 +153,17 @@ fn head_lines(snapshot: &Snapshot) -> [String; 5] {
     ]
 }
 
-/// Returns what the newest motion rests on, and how often gyro, wheels and Doppler were used.
+/// Returns what the newest motion rests on, how often gyro, wheels and Doppler were used, and the
+/// rates of their samples.
 fn witnesses(snapshot: &Snapshot) -> String {
     let basis = snapshot.basis.unwrap_or("no motion");
-    match snapshot.witnesses.in_words() {
-        Some(others) => {
-            let motions = snapshot.witnesses.motions();
-            format!("{basis}: {others} of {motions} motions in 10 s")
-        }
-        None => basis.to_owned(),
+    let motions = snapshot.witnesses.motions();
+    let used = snapshot.witnesses.in_words();
+    let used = used.map(|used| format!("{used} of {motions} motions in 10 s"));
+    let words: Vec<String> = used.into_iter().chain(snapshot.samples.clone()).collect();
+    match words.as_slice() {
+        [] => basis.to_owned(),
+        words => format!("{basis}: {}", words.join("; ")),
     }
 }
 

@@ -6,7 +6,7 @@ use std::{
 };
 
 use gyre_latency::{Latency, LatencyMeter};
-use gyre_messages::{PoseHeader, StageId, WitnessCounts, flag};
+use gyre_messages::{PoseHeader, SampleRates, StageId, WitnessCounts, flag};
 use gyre_stage::{
     clock,
     control::{Control, Status},
@@ -15,7 +15,7 @@ use gyre_stage::{
 };
 use gyre_terminal::Failure;
 
-use super::Poses;
+use super::{Poses, Scans};
 
 /// The time over which latencies are measured.
 const SPAN: Duration = Duration::from_secs(10);
@@ -34,6 +34,8 @@ pub struct Snapshot {
     pub latency: Latency,
     /// The basis of those motions, and that of the newest one in words.
     pub witnesses: WitnessCounts,
+    /// Rates of the samples of gyro and wheels, in words.
+    pub samples: Option<String>,
     pub basis: Option<&'static str>,
     /// The usage of each process, in the order of the status.
     pub processes: Vec<Use>,
@@ -56,6 +58,9 @@ pub struct Use {
 pub struct Snapshots<'run> {
     control: Control,
     poses: Poses<'run>,
+    /// The scans of a run with samples.
+    scans: Option<Scans<'run>>,
+    rates: SampleRates,
     recent: VecDeque<PoseHeader>,
     longest_us: u64,
     /// Since when scans wait for their poses and none comes.
@@ -74,10 +79,12 @@ struct Earlier {
 }
 
 impl<'run> Snapshots<'run> {
-    pub fn of(control: Control, poses: Poses<'run>) -> Self {
+    pub fn of(control: Control, poses: Poses<'run>, scans: Option<Scans<'run>>) -> Self {
         Self {
             control,
             poses,
+            scans,
+            rates: SampleRates::default(),
             recent: VecDeque::new(),
             longest_us: 0,
             owed_since: None,
@@ -98,7 +105,7 @@ impl<'run> Snapshots<'run> {
         self.last.take()
     }
 
-    /// Takes the poses that have come. Those that were missed do not matter: the rest is a sample.
+    /// Takes the poses and the scans that have come. Those that were missed do not matter: the rest is a sample.
     pub fn take_poses(&mut self) -> Result<(), Failure> {
         while let Next::Message(pose, _) = self.poses.next(Duration::ZERO)? {
             let pose = *pose.header();
@@ -107,6 +114,11 @@ impl<'run> Snapshots<'run> {
             self.longest_us = self.longest_us.max(latency_ns.max(0) as u64 / 1000);
             self.recent.push_back(pose);
             self.has_new = true;
+        }
+        if let Some(scans) = &mut self.scans {
+            while let Next::Message(scan, _) = scans.next(Duration::ZERO)? {
+                self.rates.add(scan.header(), scan.values());
+            }
         }
         Ok(())
     }
@@ -156,6 +168,7 @@ impl<'run> Snapshots<'run> {
             in_flight,
             latency: meter.latency(),
             witnesses,
+            samples: self.rates.health().in_words(),
             basis,
             processes: status.processes.iter().map(|it| used(it.pid)).collect(),
             history: self.history.iter().copied().collect(),

@@ -229,7 +229,7 @@ impl Drop for Running<'_> {
 /// Returns the arguments of `gyre` for the run.
 fn words(tested: &TestedPipeline, setup: &Setup, out: &Path) -> Vec<String> {
     // Relative to the sensor's own pace.
-    let rate = (setup.rate_hz * tested.period.as_secs_f64()).clamp(0.001, 1000.0);
+    let rate = tested.relative_rate(setup.rate_hz);
     let configuration = tested.configuration.display().to_string();
     let out = out.display().to_string();
     let rate = rate.to_string();

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use gyre_messages::WitnessCounts;
 use serde::Serialize;
 
 use crate::{
@@ -9,6 +10,7 @@ use crate::{
     memory::Taken,
     processes::Cost,
     record::{Counts, RunLatency},
+    witness_fault::WitnessFault,
 };
 
 /// The figures of a run.
@@ -19,6 +21,11 @@ pub struct Figures {
     pub latency: RunLatency,
     /// Faults and recoveries.
     pub faults: Vec<Fault>,
+    /// Faults of gyro, wheels and radar, and recoveries.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub witness_faults: Vec<WitnessFault>,
+    /// What the motions of the first turn of the recording rest on.
+    pub motions: WitnessCounts,
     /// Restarts by stage.
     pub restarts: BTreeMap<String, usize>,
     /// Lost wake-ups by stage, each found after up to 200 ms.
@@ -39,6 +46,19 @@ impl Figures {
         (due > 0).then(|| 100.0 * dropped as f64 / due as f64)
     }
 
+    /// Returns whether there was any fault.
+    pub fn had_faults(&self) -> bool {
+        !self.faults.is_empty() || !self.witness_faults.is_empty()
+    }
+
+    /// Returns the longest recovery from a fault, ms; `None` if there was none from one of them.
+    pub fn longest_recovery_ms(&self) -> Option<f64> {
+        let of_stages = self.faults.iter().map(|fault| fault.recovery_ms);
+        let of_others = self.witness_faults.iter().map(|fault| fault.recovery_ms);
+        let all: Option<Vec<f64>> = of_stages.chain(of_others).collect();
+        all?.into_iter().reduce(f64::max)
+    }
+
     /// Returns `p50 4.5, p99 7.0 of 480, max 7.2 ms; 0 of 480 scans dropped`.
     pub(super) fn sentence(&self) -> String {
         let latency = &self.latency.sensor_to_pose;
@@ -46,7 +66,7 @@ impl Figures {
         let Counts { due, dropped, .. } = self.latency.counts;
         let (p50, max) = (ms(latency.p50_ms), ms(latency.max_ms));
         let p99 = ms(latency.p99_ms) + &latency.mark(latency.p99_ms, 0.99);
-        let faults = match self.faults.len() {
+        let faults = match self.faults.len() + self.witness_faults.len() {
             0 => String::new(),
             1 => "; 1 fault".to_owned(),
             faults => format!("; {faults} faults"),

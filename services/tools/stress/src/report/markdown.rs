@@ -1,5 +1,6 @@
 //! `report.md`.
 
+use gyre_messages::{Basis, WitnessCounts};
 use gyre_run::Scenario;
 
 use super::{Figures, Provenance, Report, ScenarioOutcome, Verdict};
@@ -135,6 +136,7 @@ fn section(outcome: &ScenarioOutcome) -> String {
         text += &counts(figures);
         text += &hops(figures);
         text += &faults(figures);
+        text += &witness_faults(figures);
         text += &processes(figures);
     }
     text + &steps(outcome) + &copying(&outcome.copying)
@@ -204,6 +206,37 @@ fn faults(figures: &Figures) -> String {
                  is part of it.\n";
     }
     text
+}
+
+fn witness_faults(figures: &Figures) -> String {
+    let rows = figures.witness_faults.iter().map(|fault| {
+        let recovery = fault.recovery_ms;
+        let recovery = recovery.map_or("never".to_owned(), |ms| format!("{ms:.0}"));
+        let (at_s, name, by) = (fault.at_s, fault.name(), by_basis(&fault.counts));
+        let (noticed, motions) = (fault.noticed, fault.motions);
+        format!("{at_s:.2} | {name} | {noticed} of {motions} motions | {by} | {recovery}")
+    });
+    let columns = "at, s | fault | noticed in | which are | recovered after, ms";
+    let mut text = table("", columns, rows);
+    if !text.is_empty() {
+        let all = by_basis(&figures.motions);
+        let degraded = figures.motions.degraded_percent().unwrap_or(0.0);
+        text += &format!(
+            "\nRecovered: from the end of the fault by the sensor's clock to the first pose of a motion that is as before it; the wait for the next scan is \
+             part of it. All motions: {all}; {degraded:.1} % degraded.\n"
+        );
+    }
+    text
+}
+
+/// Returns `radar only 3, dead reckoning 8`.
+fn by_basis(counts: &WitnessCounts) -> String {
+    let counted = Basis::ALL.iter().zip(counts.by_basis);
+    let counted = counted.filter(|(_, count)| *count > 0);
+    let words: Vec<String> = counted
+        .map(|(basis, count)| format!("{} {count}", basis.name()))
+        .collect();
+    words.join(", ")
 }
 
 fn processes(figures: &Figures) -> String {

@@ -90,11 +90,9 @@ impl ScenarioOutcome {
     /// The same with its verdict.
     #[must_use]
     pub fn judged(mut self) -> Self {
-        let had_faults = self
-            .figures
-            .as_ref()
-            .is_some_and(|it| !it.faults.is_empty());
-        let has_recovered = self.scenario.judged() == Judged::ByRecovery && had_faults;
+        let had_faults = self.figures.as_ref().is_some_and(Figures::had_faults);
+        let by_recovery = [Judged::ByRecovery, Judged::ButDegraded];
+        let has_recovered = by_recovery.contains(&self.scenario.judged()) && had_faults;
         self.verdict = match (&self.problem, self.checks.as_slice()) {
             (Some(_), _) => Verdict::Failed,
             (None, checks) if checks.iter().any(|check| !check.passed) => Verdict::Failed,

@@ -96,7 +96,7 @@ pub fn percentiles(
 pub fn timeline(outcome: &ScenarioOutcome, figures: &Figures) -> Result<String, PlotError> {
     let samples = &figures.latency.timeline;
     let mut range_ms = range_of(samples.iter().map(|it| it.latency_ms)).ok_or(PlotError::Empty)?;
-    if !figures.faults.is_empty() {
+    if figures.had_faults() {
         range_ms.end *= HEADROOM;
     }
     let end_s = samples
@@ -138,7 +138,7 @@ fn caption(figures: &Figures) -> String {
             counts.dropped
         ));
     }
-    if !figures.faults.is_empty() {
+    if figures.had_faults() {
         parts.push("grey: faults".to_owned());
     }
     parts.join("; ")
@@ -316,26 +316,23 @@ fn draw_faults(
     range_ms: &Range<f64>,
 ) -> Result<(), PlotError> {
     let (bottom, top) = (range_ms.start.log10(), range_ms.end.log10());
-    for (index, fault) in figures.faults.iter().enumerate() {
-        let x = fault.at_s;
-        let drawn =
-            chart.draw_series([PathElement::new([(x, bottom), (x, top)], line(FAULT, 1.5))]);
-        drawn.map(drop).map_err(drawing)?;
+    let of_stages = figures.faults.iter().map(|fault| {
         let verb = match fault.kind {
             FaultKind::Stop => "stop",
             FaultKind::Kill => "kill",
         };
+        (fault.at_s, format!("{verb} {}", fault.stage))
+    });
+    let of_others = figures.witness_faults.iter();
+    let of_others = of_others.map(|fault| (fault.at_s, fault.name()));
+    for (index, (x, name)) in of_stages.chain(of_others).enumerate() {
+        let drawn =
+            chart.draw_series([PathElement::new([(x, bottom), (x, top)], line(FAULT, 1.5))]);
+        drawn.map(drop).map_err(drawing)?;
         let place = Pos::new(HPos::Left, VPos::Top);
         // Neighbours at different heights.
         let down = 4 + 18 * (index % 3) as i32;
-        label(
-            area,
-            chart,
-            (x, top),
-            (5, down),
-            &format!("{verb} {}", fault.stage),
-            place,
-        )?;
+        label(area, chart, (x, top), (5, down), &name, place)?;
     }
     Ok(())
 }

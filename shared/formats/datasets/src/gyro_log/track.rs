@@ -36,6 +36,16 @@ impl SampleTrack {
         self
     }
 
+    /// Returns the track with each sample as `change` returns it, or without it. Of samples that
+    /// have the same place in the order the first one stays.
+    #[must_use]
+    pub(crate) fn changed(self, change: impl FnMut(&Sample) -> Option<Sample>) -> Self {
+        let mut changed: Vec<Sample> = self.0.iter().filter_map(change).collect();
+        changed.sort_by_key(Sample::order);
+        changed.dedup_by_key(|sample| sample.order());
+        Self(changed)
+    }
+
     /// Returns the samples with stamps after one time and up to another, which is included.
     pub fn between(&self, after_ns: i64, until_ns: i64) -> &[Sample] {
         let up_to = |ns| self.0.partition_point(|sample| sample.stamp_ns <= ns);
@@ -157,6 +167,18 @@ mod tests {
             panic!("one sample");
         };
         assert_eq!(sample.values, [0.1, -0.2, 0.3 * 1.01, 1.0, -2.0, 9.8]);
+    }
+
+    #[test]
+    fn changed_samples_are_in_order_and_no_two_have_one_stamp() {
+        let late = |sample: &Sample| Sample {
+            stamp_ns: sample.stamp_ns + if sample.stamp_ns < 3 { 2 } else { 0 },
+            ..*sample
+        };
+        let kept = |sample: &Sample| (sample.stamp_ns != 5).then(|| late(sample));
+        let changed = of(vec![1, 2, 3, 4, 5, 6]).changed(kept);
+        let stamps: Vec<i64> = changed.0.iter().map(|it| it.stamp_ns).collect();
+        assert_eq!(stamps, [3, 4, 6]);
     }
 
     #[test]
