@@ -9,6 +9,7 @@ use std::{
     time::{Duration, Instant},
 };
 
+use gyre_simulator::{GyroProfile, Profile, SimulationConfig};
 use gyre_stage::control::Control;
 use rustix::process::Signal;
 use serde_json::Value;
@@ -29,13 +30,17 @@ struct Stress {
 
 impl Stress {
     fn new() -> Self {
+        Self::of(recording::small())
+    }
+
+    fn of(data: &Path) -> Self {
         let folder = tempfile::Builder::new()
             .prefix("gyre-test-")
             .tempdir()
             .unwrap();
         let configuration = format!(
             "[source]\ndata = '{}'\n[raster]\nn = 127\ncell_m = 0.8\n",
-            recording::small().display()
+            data.display()
         );
         fs::write(folder.path().join("small.toml"), configuration).unwrap();
         Self { folder }
@@ -316,6 +321,79 @@ fn a_run_without_a_place_for_an_observer_is_refused_at_once() {
     let said = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(said.contains("set run.observers to 1 or more"), "{said}");
     stress.assert_nothing_left("steady");
+}
+
+/// A drive of 15 s with the logs of a gyro and of wheels.
+fn with_gyro_and_wheels() -> PathBuf {
+    let mut config = SimulationConfig {
+        scans: Some(60),
+        ..SimulationConfig::default()
+    };
+    config.sensor.profile = Profile::Cts350xRadiate;
+    config.drive.speed_mps = 8.0;
+    config.gyro.profile = GyroProfile::Asm330lhh;
+    config.wheels.rate_hz = 50.0;
+    recording::of("stressed-gyro-and-wheels", &config)
+}
+
+const BOTH: [&str; 4] = ["--set", "gyro.kind=auto", "--set", "wheels.kind=auto"];
+
+#[test]
+#[ignore = "nightly: 25 s, two runs at the pace of a radar"]
+fn a_gyro_that_drops_out_is_noticed_and_a_recovery_that_takes_too_long_fails() {
+    let stress = Stress::of(&with_gyro_and_wheels());
+    let scenarios = [
+        "--scenario",
+        "gyro-out",
+        "--scenario",
+        "wheels-slip",
+        "--quick",
+    ];
+    let budget = [
+        "--set",
+        "budget.gyro-out.degraded_percent=0",
+        "--set",
+        "budget.gyro-out.recovery_ms=5000",
+        "--set",
+        "budget.wheels-slip.recovery_ms=1",
+    ];
+    let output = stress.run(&[&scenarios[..], &BOTH, &budget].concat());
+    assert_eq!(output.status.code(), Some(1));
+    let [out, slip] = [0, 1].map(|index| stress.outcome_of(index));
+    assert_eq!(out["verdict"], "passed", "{out}");
+    let fault = &out["figures"]["witness_faults"][0];
+    assert_eq!(fault["kind"], "gyro-out");
+    assert_eq!(fault["noticed"], fault["motions"], "{fault}");
+    assert!(ms(&fault["recovery_ms"]) > 1.0, "{fault}");
+    assert_eq!(out["checks"][0]["key"], "degraded_percent");
+    // The slip is noticed, and it is its end that takes too long.
+    assert_eq!(slip["verdict"], "failed", "{slip}");
+    assert_eq!(slip["problem"], Value::Null);
+    assert!(slip["figures"]["witness_faults"][0]["noticed"].as_u64() > Some(0));
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(said.contains("wheels-slip: FAILED; recovery_ms"), "{said}");
+    stress.assert_nothing_left("gyro-out");
+}
+
+#[test]
+fn faults_of_gyro_and_wheels_are_not_carried_out_without_them() {
+    let stress = Stress::new();
+    for (scenario, lacking) in [
+        ("gyro-out", "needs a gyro, and gyro.kind is none"),
+        ("wheels-slip", "needs wheels, and wheels.kind is none"),
+        ("radar-blind", "needs a gyro or wheels"),
+    ] {
+        let output = stress.run(&["--scenario", scenario]);
+        assert_eq!(output.status.code(), Some(2));
+        let said = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(said.contains(lacking), "{said}");
+        assert!(said.contains("simulation.gyro.profile"), "{said}");
+    }
+    let stress = Stress::of(&with_gyro_and_wheels());
+    let output = stress.run(&[&["--scenario", "radar-blind"][..], &BOTH].concat());
+    assert_eq!(output.status.code(), Some(2));
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(said.contains("the recording lasts 15 s"), "{said}");
 }
 
 /// The helper is asked for so little that other programs do not notice.

@@ -216,7 +216,7 @@ struct Session {
     processes: Sampler,
     faults: Option<Faults>,
     witness: Option<WitnessFaults>,
-    /// What the motions rest on that are measured in the first turn of the recording: where it
+    /// The basis of the motions that are measured in the first turn of the recording: where it
     /// starts anew, the vehicle jumps.
     motions: WitnessCounts,
     turn_end: u64,

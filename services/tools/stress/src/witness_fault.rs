@@ -83,13 +83,13 @@ pub struct WitnessFault {
     pub kind: PlayedFaultKind,
     /// The time at which it began, s since the measurement began.
     pub at_s: f64,
-    /// Its duration, s.
+    /// The duration, s.
     pub for_s: f64,
     /// Motions while it lasted.
     pub motions: u64,
     /// Those of them that say so.
     pub noticed: u64,
-    /// What these motions rest on.
+    /// The basis of these motions.
     pub counts: WitnessCounts,
     /// Time from its end to the first pose of a motion that is as before it, ms; `None`: there was
     /// none before the next fault.

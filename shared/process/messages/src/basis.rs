@@ -47,8 +47,8 @@ impl Basis {
         }
     }
 
-    /// Returns whether the radar does not tell the whole motion: in part or as a whole it is that of
-    /// other sensors, or of the motions before.
+    /// Returns whether the radar does not tell the whole motion: all or part of it is that of other
+    /// sensors, or of the motions before.
     pub fn is_degraded(self) -> bool {
         match self {
             Self::ScanToScan | Self::RadarOnly | Self::RadarAndOthers => false,

@@ -56,8 +56,8 @@ limits! {
     /// The same, % of those that were due.
     drops_percent,
     /// Time from a fault (the kill, or the end of the stop) to the first pose that the stage has
-    /// worked on since, ms. Of a fault of gyro, wheels or radar: from its end to the first pose of a
-    /// motion that is as before it.
+    /// worked on since, ms. Of a fault of gyro, wheels or radar: from its end to the first pose of
+    /// a motion that is as before it.
     recovery_ms,
     /// Motions that the radar does not tell as a whole (`along walls`, `way guessed`, `dead
     /// reckoning`, `guessed`), % of those before the recording starts anew.

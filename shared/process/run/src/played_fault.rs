@@ -44,9 +44,9 @@ pub struct PlayedFault {
     /// `clock-jump`: stamps of the samples of gyro and wheels that are 1 s ahead; `radar-blind`:
     /// scans that show nothing.
     pub kind: PlayedFaultKind,
-    /// Its begin, s after the stamp of the first scan that is played.
+    /// The begin, s after the stamp of the first scan that is played.
     pub from_s: f64,
-    /// Its duration, s; 0: no fault.
+    /// The duration, s; 0: no fault.
     pub for_s: f64,
 }
 

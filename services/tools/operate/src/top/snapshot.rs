@@ -105,7 +105,8 @@ impl<'run> Snapshots<'run> {
         self.last.take()
     }
 
-    /// Takes the poses and the scans that have come. Those that were missed do not matter: the rest is a sample.
+    /// Takes the poses and the scans that have come. Those that were missed do not matter: the rest
+    /// is a sample.
     pub fn take_poses(&mut self) -> Result<(), Failure> {
         while let Next::Message(pose, _) = self.poses.next(Duration::ZERO)? {
             let pose = *pose.header();

@@ -24,7 +24,7 @@ pub struct Figures {
     /// Faults of gyro, wheels and radar, and recoveries.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub witness_faults: Vec<WitnessFault>,
-    /// What the motions of the first turn of the recording rest on.
+    /// The basis of the motions of the first turn of the recording.
     pub motions: WitnessCounts,
     /// Restarts by stage.
     pub restarts: BTreeMap<String, usize>,
