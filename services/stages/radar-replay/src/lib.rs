@@ -99,6 +99,12 @@ pub fn play(
     let once = config.played(dataset.scans());
     let first_ns = dataset.nominal_stamp_ns(once.start);
     let faults = Faults::of(config.faults.clone(), first_ns)?;
+    if !config.faults.is_empty() {
+        tracing::warn!(
+            faults = config.faults.len(),
+            "faults are put into what is played: source.faults"
+        );
+    }
     let mut replay = Replay {
         scans: config.stream(dataset.scans()),
         turns: Turns::of(once, dataset.as_ref()),

@@ -56,10 +56,10 @@ impl SampleRates {
     /// Counts the samples of a kind that no scan before had.
     fn count(&mut self, kind: usize, samples: &[Sample]) -> u64 {
         let newest_ns = self.newest_ns[kind];
-        let of_kind = samples.iter().filter(|sample| sample.is(KINDS[kind]));
+        let mut of_kind = samples.iter().filter(|sample| sample.is(KINDS[kind]));
         let is_new = |sample: &&Sample| newest_ns.is_none_or(|ns| sample.stamp_ns > ns);
         let new = of_kind.clone().filter(is_new).count() as u64;
-        let last_ns = of_kind.last().map(|sample| sample.stamp_ns);
+        let last_ns = of_kind.next_back().map(|sample| sample.stamp_ns);
         self.newest_ns[kind] = newest_ns.max(last_ns);
         self.counts[kind] += new;
         new
