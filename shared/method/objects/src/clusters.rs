@@ -70,7 +70,7 @@ impl Cluster {
     }
 
     /// The returns that are not skirts of stronger ones.
-    pub fn body<'a>(&'a self, returns: &'a [Return]) -> impl Iterator<Item = &'a Return> {
+    pub fn body<'a>(&'a self, returns: &'a [Return]) -> impl Iterator<Item = &'a Return> + Clone {
         self.body.iter().map(|member| &returns[*member as usize])
     }
 }

@@ -25,7 +25,7 @@ pub struct ObjectsConfig {
     /// `none` or `tracks`. Default `none`.
     pub kind: ObjectsKind,
     /// Maximum range of what is tracked, m. Beyond it a beam of 1.8 degrees is wider than a car.
-    /// Default 70.
+    /// Default 76: an oncoming car that is one at 60 m was first seen a second before.
     pub max_range_m: f64,
     /// Minimum range of a new object, m: nearer, the vehicle sees itself. Default 8.
     pub min_range_m: f64,
@@ -129,7 +129,7 @@ impl Default for ObjectsConfig {
     fn default() -> Self {
         Self {
             kind: ObjectsKind::None,
-            max_range_m: 70.0,
+            max_range_m: 76.0,
             min_range_m: 8.0,
             contrast: 2.0,
             memory_scans: 20,

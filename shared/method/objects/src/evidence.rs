@@ -35,6 +35,9 @@ const STRONG: usize = 1;
 const STRONG_WEIGHT: f64 = 0.15;
 /// Weight from which on a return outshines weak ones that were there before: 15 dB above those.
 const OUTSHINING_WEIGHT: f64 = 0.65;
+/// Scans on end that see a place empty, after which what was there has gone: of what stands and is
+/// as strong as that, 15 dB above what a return needs, each scan sees four in five and more.
+const EMPTY_SCANS: u32 = 4;
 /// Standard deviations of the bearing within which a place may be that of a return.
 const ACROSS_SIGMAS: f64 = 1.5;
 /// The last scans in which a vehicle may have been at the place that it has now: one of 5 m that is
@@ -44,6 +47,9 @@ const OWN_SCANS: u32 = 3;
 const CLEAR_M: f64 = 3.0;
 /// Share of the views with a return in a cell of what stands: a firm wall returns in most scans.
 const STANDING_SHARE: f64 = 0.6;
+/// The views from which on that share says so: within two seconds a vehicle of 5 m has left its
+/// place, if it is faster than 2.5 m/s.
+const STANDING_VIEWS: u32 = 8;
 /// The range below which points are not extracted, m.
 const NEAREST_M: f64 = 5.0;
 
@@ -165,7 +171,11 @@ impl Evidence {
         // What came a moment ago may be the same object.
         let own = OWN_SCANS.min(self.views.len() as u32 / 2);
         let before = u64::MAX << own;
-        let (hits, views) = (hits & before, self.views(&found.at) & before);
+        let (mut hits, mut views) = (hits & before, self.views(&found.at) & before);
+        if found.weight >= OUTSHINING_WEIGHT {
+            let since = since_empty(hits, views);
+            (hits, views) = (hits & since, views & since);
+        }
         // A return shows that the place was in view.
         History {
             views: (views | hits).count_ones(),
@@ -235,7 +245,7 @@ impl Evidence {
             let hits = self.hits(cell_at(&at), STRONG);
             let views = self.views(&at) | hits;
             let share = f64::from(hits.count_ones()) / f64::from(views.count_ones().max(1));
-            share >= STANDING_SHARE
+            share >= STANDING_SHARE && views.count_ones() >= STANDING_VIEWS
         };
         (0..steps).any(stands)
     }
@@ -245,6 +255,17 @@ impl Evidence {
         self.cells.fill(Cell::default());
         self.views.clear();
         self.scan = 0;
+    }
+}
+
+/// Returns the scans since a place was last in view and empty for some scans on end, those included;
+/// all if it never was.
+fn since_empty(hits: u64, views: u64) -> u64 {
+    let empty = views & !hits;
+    let run = (1..EMPTY_SCANS).fold(empty, |run, ago| run & (empty >> ago));
+    match run {
+        0 => u64::MAX,
+        _ => mask((run.trailing_zeros() + EMPTY_SCANS).min(64)),
     }
 }
 
@@ -364,7 +385,16 @@ mod tests {
         for _ in 0..8 {
             add(&mut evidence, &[at(20.25, 0.25)]);
         }
-        let is_behind = |x| evidence.is_behind_standing(&Point2::origin(), &Point2::new(x, 0.2));
-        assert!(is_behind(40.0) && !is_behind(18.0) && !is_behind(22.0));
+        let is_behind = |evidence: &Evidence, x| {
+            evidence.is_behind_standing(&Point2::origin(), &Point2::new(x, 0.2))
+        };
+        assert!(is_behind(&evidence, 40.0));
+        assert!(!is_behind(&evidence, 18.0) && !is_behind(&evidence, 22.0));
+        // In its first seconds a wall may be a vehicle.
+        let mut first = Evidence::new(20, 70.0);
+        (1..STANDING_VIEWS).for_each(|_| add(&mut first, &[at(20.25, 0.25)]));
+        assert!(!is_behind(&first, 40.0));
+        add(&mut first, &[at(20.25, 0.25)]);
+        assert!(is_behind(&first, 40.0));
     }
 }

@@ -8,7 +8,9 @@
 //! 1975). Length and width begin as those of a car and follow what is seen, while the end that is
 //! seen stays where it is.
 
-use nalgebra::{Matrix2, Point2, Vector2};
+use std::f64::consts::TAU;
+
+use nalgebra::{Matrix2, Point2, Rotation2, Vector2};
 
 use crate::ObjectsConfig;
 use crate::returns::Return;
@@ -25,6 +27,14 @@ const BETWEEN: [f64; 2] = [0.1, 0.4];
 const FAR: f64 = 0.1;
 /// Cosine between the line of sight and an axis from which on the object is seen end-on.
 const END_ON: f64 = 0.35;
+/// Step and number of the turns to either side in which the heading of a box is searched: up to half
+/// a right angle, beyond which its side looks like its end.
+const TURN_STEP_RAD: f64 = TAU / 120.0;
+const TURN_STEPS: i32 = 15;
+/// Returns of an echo, which are not independent: it fills as many range cells.
+const CELLS_OF_ECHO: f64 = 4.0;
+/// Largest squared distance of a return from the outline, in variances: more is no part of it.
+const LARGEST_MISFIT: f64 = 9.0;
 /// Share of what has been shown of the length that is kept from scan to scan.
 const KEPT: f64 = 0.7;
 
@@ -43,6 +53,17 @@ pub(crate) struct Outline {
     /// From one end to the other, along the heading and across it, relative to the centre as
     /// predicted, m.
     pub spans_m: [[f64; 2]; 2],
+}
+
+/// The centre of an object as measured.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Centre {
+    /// Offset from the one that the outline is relative to, m.
+    pub offset: Vector2<f64>,
+    /// Covariance, m².
+    pub noise: Matrix2<f64>,
+    /// The logarithm of the likelihood of what is seen by what was predicted.
+    evidence: f64,
 }
 
 /// The sight of an object.
@@ -93,19 +114,87 @@ impl Extent {
         Outline { spans_m }
     }
 
-    /// Returns the most likely offset of the centre from the one that the outline is relative to,
-    /// m, and its covariance as a measurement, m².
-    pub fn centre(&self, outline: &Outline, sight: &Sight) -> (Vector2<f64>, Matrix2<f64>) {
-        let (mut offset, mut noise) = (Vector2::zeros(), sight.noise);
+    /// Returns the most likely centre.
+    pub fn centre(&self, outline: &Outline, sight: &Sight) -> Centre {
+        let mut found = Centre {
+            offset: Vector2::zeros(),
+            noise: sight.noise,
+            evidence: 0.0,
+        };
         for (axis, towards) in sight.axes().iter().enumerate() {
             let along = |matrix: &Matrix2<f64>| (towards.transpose() * matrix * towards)[0];
             let choices = self.choices(axis, outline, sight);
             let known_m2 = along(&sight.predicted) + along(&sight.noise);
-            let (at_m, variance_m2) = resolve(&choices, known_m2);
-            offset += towards * at_m;
-            noise += towards * towards.transpose() * variance_m2;
+            let (at_m, variance_m2, likelihood) = resolve(&choices, known_m2);
+            found.offset += towards * at_m;
+            found.noise += towards * towards.transpose() * variance_m2;
+            found.evidence += likelihood.max(f64::MIN_POSITIVE).ln();
         }
-        (offset, noise)
+        found
+    }
+
+    /// Returns by which angle the box is turned from the heading that is predicted, if that is
+    /// normally distributed with a standard deviation, rad.
+    pub fn turn<'a>(
+        &self,
+        body: impl Iterator<Item = &'a Return> + Clone,
+        known: (&Point2<f64>, &Vector2<f64>),
+        (sight, sigma_rad): (&Sight, f64),
+    ) -> Turn {
+        let fits: Vec<(f64, f64)> = (-TURN_STEPS..=TURN_STEPS)
+            .map(|step| {
+                let turn_rad = f64::from(step) * TURN_STEP_RAD;
+                let sight = sight.turned(turn_rad);
+                let fit = self.fit(body.clone(), known, &sight);
+                (turn_rad, fit - 0.5 * (turn_rad / sigma_rad).powi(2))
+            })
+            .collect();
+        let best = fits
+            .iter()
+            .map(|fit| fit.1)
+            .fold(f64::NEG_INFINITY, f64::max);
+        let weight = |fit: &(f64, f64)| (fit.1 - best).exp();
+        let sum: f64 = fits.iter().map(weight).sum();
+        let mean_rad = fits.iter().map(|fit| weight(fit) * fit.0).sum::<f64>() / sum;
+        let squares = fits
+            .iter()
+            .map(|fit| weight(fit) * (fit.0 - mean_rad).powi(2));
+        Turn {
+            mean_rad,
+            variance_rad2: squares.sum::<f64>() / sum + TURN_STEP_RAD.powi(2) / 12.0,
+        }
+    }
+
+    /// Returns the logarithm of the likelihood of the returns of a body if they are on the outline
+    /// of the box.
+    fn fit<'a>(
+        &self,
+        body: impl Iterator<Item = &'a Return> + Clone,
+        known: (&Point2<f64>, &Vector2<f64>),
+        sight: &Sight,
+    ) -> f64 {
+        let outline = Self::outline(body.clone(), known, &sight.heading);
+        let centre = self.centre(&outline, sight);
+        let place = known.0 + centre.offset;
+        let variance_m2 = 0.5 * sight.noise.trace();
+        let [along, across] = sight.axes();
+        let misfit = |found: &Return| {
+            let at = found.at_scan(known.1) - place;
+            let distance_m = self.from_edge(at.dot(&along).abs(), at.dot(&across).abs());
+            (distance_m.powi(2) / variance_m2).min(LARGEST_MISFIT)
+        };
+        let sum: f64 = body.map(misfit).sum();
+        centre.evidence - 0.5 * sum / CELLS_OF_ECHO
+    }
+
+    /// The distance of a place from the nearest edge, m.
+    fn from_edge(&self, along_m: f64, across_m: f64) -> f64 {
+        let [length_m, width_m] = self.size_m;
+        let [ahead_m, aside_m] = [along_m - 0.5 * length_m, across_m - 0.5 * width_m];
+        match ahead_m < 0.0 && aside_m < 0.0 {
+            true => ahead_m.max(aside_m).abs(),
+            false => ahead_m.max(0.0).hypot(aside_m.max(0.0)),
+        }
     }
 
     /// The centre along an axis if its near end is seen, its far end, or neither.
@@ -172,7 +261,24 @@ impl Extent {
     }
 }
 
+/// The angle of a box from the heading that was predicted.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Turn {
+    /// Mean, rad.
+    pub mean_rad: f64,
+    /// Variance, rad².
+    pub variance_rad2: f64,
+}
+
 impl Sight {
+    /// The sight of what is turned by an angle.
+    pub fn turned(&self, turn_rad: f64) -> Self {
+        Self {
+            heading: Rotation2::new(turn_rad) * self.heading,
+            ..*self
+        }
+    }
+
     /// Along the heading and across it, unit vectors.
     fn axes(&self) -> [Vector2<f64>; 2] {
         [self.heading, Vector2::new(-self.heading.y, self.heading.x)]
@@ -186,8 +292,8 @@ impl Sight {
 }
 
 /// Returns mean and variance of the choices, each weighed by how well it fits a prediction of zero
-/// with a variance `known_m2`.
-fn resolve(choices: &[Choice], known_m2: f64) -> (f64, f64) {
+/// with a variance `known_m2`, and the likelihood of them all.
+fn resolve(choices: &[Choice], known_m2: f64) -> (f64, f64, f64) {
     let weight = |choice: &Choice| {
         let variance_m2 = known_m2 + choice.variance_m2;
         choice.prior * (-0.5 * choice.at_m.powi(2) / variance_m2).exp() / variance_m2.sqrt()
@@ -209,13 +315,13 @@ fn resolve(choices: &[Choice], known_m2: f64) -> (f64, f64) {
     (
         at_m,
         mean(&|choice| choice.variance_m2 + (choice.at_m - at_m).powi(2)),
+        sum,
     )
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::f64::consts::TAU;
 
     const HALF_M: [f64; 2] = [2.2, 0.95];
 
@@ -249,8 +355,8 @@ mod tests {
     ) -> (Vector2<f64>, Matrix2<f64>) {
         let known = (&predicted.into(), &Vector2::zeros());
         let outline = Extent::outline(seen.iter(), known, &sight.heading);
-        let (offset, noise) = Extent::new(&ObjectsConfig::default()).centre(&outline, sight);
-        (predicted + offset, noise)
+        let centre = Extent::new(&ObjectsConfig::default()).centre(&outline, sight);
+        (predicted + centre.offset, centre.noise)
     }
 
     #[test]
@@ -285,6 +391,51 @@ mod tests {
             assert!(found.norm() < 0.5, "{found} by {along_m}");
             let gain = 1.0 / (1.0 + noise[(0, 0)]);
             assert!((gain * found.x).abs() < 0.2, "{found} by {along_m}");
+        }
+    }
+
+    /// The corners of a car at the origin, each an echo of four cells, and turned by an angle.
+    fn corners(turn_rad: f64) -> Vec<Return> {
+        let echo = |(along, across): (f64, f64)| {
+            let corner = Vector2::new(along * HALF_M[0], across * HALF_M[1]);
+            let place = Rotation2::new(turn_rad) * corner;
+            (0..4).map(move |_| at(place))
+        };
+        let all = [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)];
+        all.into_iter().flat_map(echo).collect()
+    }
+
+    /// The turn that some returns show of a car predicted at the origin and ahead.
+    fn turn(seen: &[Return], sigma_rad: f64) -> Turn {
+        let known = (&Point2::origin(), &Vector2::zeros());
+        let sight = Sight {
+            noise: Matrix2::identity() * 0.1,
+            ..sight(Vector2::new(0.9, 0.4).normalize())
+        };
+        Extent::new(&ObjectsConfig::default()).turn(seen.iter(), known, (&sight, sigma_rad))
+    }
+
+    #[test]
+    fn corners_show_by_which_angle_a_box_is_turned_whatever_the_angle_is() {
+        for step in -6..=6 {
+            let turned_rad = 0.1 * f64::from(step);
+            let found = turn(&corners(turned_rad), 0.5);
+            let sigma_rad = found.variance_rad2.sqrt();
+            assert!(sigma_rad < 0.2, "{found:?} at {turned_rad}");
+            let error_rad = found.mean_rad - turned_rad;
+            assert!(
+                error_rad.abs() < 2.0 * sigma_rad,
+                "{found:?} at {turned_rad}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_single_echo_shows_no_turn_and_leaves_the_prediction() {
+        for sigma_rad in [0.05, 0.2] {
+            let found = turn(&corners(0.0)[..4], sigma_rad);
+            assert!(found.mean_rad.abs() < 0.5 * sigma_rad, "{found:?}");
+            assert!(found.variance_rad2.sqrt() > 0.7 * sigma_rad, "{found:?}");
         }
     }
 

@@ -39,6 +39,29 @@ struct Estimate {
     covariance: Matrix4<f64>,
 }
 
+/// A measured position of an object.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sighting {
+    /// The position, m, as if the object stood and had the heading that is predicted.
+    pub at: Point2<f64>,
+    /// Covariance of it, m².
+    pub noise: Matrix2<f64>,
+    /// The change of `at` by the velocity, s: it is seen at its own time, lengthened or shortened by
+    /// the Doppler shift, and of a box whose heading is the direction of the velocity.
+    pub by_velocity: Matrix2<f64>,
+}
+
+impl Sighting {
+    /// The near end of a cluster, whatever its heading is.
+    pub fn of_near_end(measured: &Measurement, noise: &Matrix2<f64>) -> Self {
+        Self {
+            at: measured.at,
+            noise: *noise,
+            by_velocity: by_time_and_doppler(measured),
+        }
+    }
+}
+
 /// The difference of a measurement to what was predicted.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Innovation {
@@ -69,9 +92,13 @@ impl Innovation {
 impl Filter {
     /// Starts at a measurement, with a velocity of zero that is as good as unknown: where it was at
     /// the scan's time depends on it.
-    pub fn new(measured: &Measurement, noise: &Matrix2<f64>, speed_sigma_mps: f64) -> Self {
-        let at = &measured.at;
-        let (by_velocity, variance) = (by_velocity(measured), speed_sigma_mps.powi(2));
+    pub fn new(sighting: &Sighting, speed_sigma_mps: f64) -> Self {
+        let Sighting {
+            at,
+            noise,
+            by_velocity,
+        } = sighting;
+        let variance = speed_sigma_mps.powi(2);
         let mut covariance = Matrix4::from_diagonal_element(variance);
         let position = noise + by_velocity * by_velocity.transpose() * variance;
         covariance.fixed_view_mut::<2, 2>(0, 0).copy_from(&position);
@@ -148,27 +175,47 @@ impl Filter {
         self.combine();
     }
 
-    /// Compares with a measurement, whose place `at` was seen at its own time, and lengthened or
-    /// shortened by the Doppler shift of the object.
-    pub fn innovation(
-        &self,
-        measured: &Measurement,
-        at: &Point2<f64>,
-        noise: &Matrix2<f64>,
-    ) -> Innovation {
-        self.mean.innovation(measured, at, noise)
+    /// Compares with a measured position.
+    pub fn innovation(&self, sighting: &Sighting) -> Innovation {
+        self.mean.innovation(sighting)
     }
 
-    /// Updates the state by a measurement as [`Filter::innovation`] compares it.
-    pub fn update(&mut self, measured: &Measurement, at: &Point2<f64>, noise: &Matrix2<f64>) {
-        let innovations = self
-            .models
-            .map(|model| model.estimate.innovation(measured, at, noise));
-        let costs = innovations.map(|innovation| innovation.cost());
-        let least = costs.into_iter().fold(f64::INFINITY, f64::min);
-        for ((model, innovation), cost) in self.models.iter_mut().zip(&innovations).zip(costs) {
-            model.probability *= (-0.5 * (cost - least)).exp();
+    /// Updates the state by a measured position.
+    pub fn update(&mut self, sighting: &Sighting) {
+        let innovations = self.models.map(|model| model.estimate.innovation(sighting));
+        for (model, innovation) in self.models.iter_mut().zip(&innovations) {
             model.estimate.update(innovation);
+        }
+        self.weigh(&innovations.map(|innovation| innovation.cost()));
+    }
+
+    /// Updates the state by a heading, a unit vector, across which the velocity is zero but for a
+    /// standard deviation: a vehicle drives where it points to.
+    pub fn align(&mut self, heading: &Vector2<f64>, sigma_mps: f64) {
+        let side = Vector4::new(0.0, 0.0, -heading.y, heading.x);
+        let variance = |estimate: &Estimate| {
+            (side.transpose() * estimate.covariance * side)[0] + sigma_mps.powi(2)
+        };
+        let costs = self.models.map(|model| {
+            let variance = variance(&model.estimate);
+            side.dot(&model.estimate.state).powi(2) / variance + variance.ln()
+        });
+        for model in &mut self.models {
+            let estimate = &mut model.estimate;
+            let gain = estimate.covariance * side / variance(estimate);
+            estimate.state -= gain * side.dot(&estimate.state);
+            let rest = Matrix4::identity() - gain * side.transpose();
+            estimate.covariance = rest * estimate.covariance * rest.transpose()
+                + gain * gain.transpose() * sigma_mps.powi(2);
+        }
+        self.weigh(&costs);
+    }
+
+    /// Weighs the models by minus twice the logarithms of their likelihoods.
+    fn weigh(&mut self, costs: &[f64; TURNS.len()]) {
+        let least = costs.iter().copied().fold(f64::INFINITY, f64::min);
+        for (model, cost) in self.models.iter_mut().zip(costs) {
+            model.probability *= (-0.5 * (cost - least)).exp();
         }
         let sum: f64 = self.models.iter().map(|model| model.probability).sum();
         for (model, share) in self.models.iter_mut().zip(SHARES) {
@@ -218,24 +265,19 @@ impl Estimate {
         self.covariance = step * self.covariance * step.transpose() + noise;
     }
 
-    fn innovation(
-        &self,
-        measured: &Measurement,
-        at: &Point2<f64>,
-        noise: &Matrix2<f64>,
-    ) -> Innovation {
+    fn innovation(&self, sighting: &Sighting) -> Innovation {
         let mut jacobian = Matrix2x4::zeros();
         jacobian
             .fixed_view_mut::<2, 2>(0, 0)
             .copy_from(&Matrix2::identity());
         jacobian
             .fixed_view_mut::<2, 2>(0, 2)
-            .copy_from(&by_velocity(measured));
+            .copy_from(&sighting.by_velocity);
         Innovation {
-            difference: at.coords - jacobian * self.state,
-            covariance: jacobian * self.covariance * jacobian.transpose() + noise,
+            difference: sighting.at.coords - jacobian * self.state,
+            covariance: jacobian * self.covariance * jacobian.transpose() + sighting.noise,
             jacobian,
-            noise: *noise,
+            noise: sighting.noise,
         }
     }
 
@@ -290,9 +332,9 @@ fn acceleration_noise(dt_s: f64, heading: &Vector2<f64>, config: &ObjectsConfig)
     noise
 }
 
-/// The change of a measured place by the velocity: it is seen at its own time, and lengthened or
+/// The change of a measured position by the velocity: it is seen at its own time, and lengthened or
 /// shortened by the Doppler shift.
-fn by_velocity(measured: &Measurement) -> Matrix2<f64> {
+pub(crate) fn by_time_and_doppler(measured: &Measurement) -> Matrix2<f64> {
     let away = measured.direction;
     Matrix2::identity() * measured.time_s + away * away.transpose() * measured.doppler_s
 }
@@ -375,14 +417,15 @@ mod tests {
         let measured = |vehicle: &Vehicle, rng: &mut ChaCha8Rng| {
             measurement(vehicle.position + normal(rng) * SIGMA_M)
         };
-        let mut filter = Filter::new(&measured(vehicle, rng), &noise, config.speed_sigma_mps);
+        let sighting = |measured: Measurement| Sighting::of_near_end(&measured, &noise);
+        let first = sighting(measured(vehicle, rng));
+        let mut filter = Filter::new(&first, config.speed_sigma_mps);
         for _ in 1..scans {
             step(vehicle, rng);
             let velocity = filter.velocity();
             let heading = velocity.try_normalize(1e-9).unwrap_or_else(Vector2::x);
             filter.predict(DT_S, &heading, config);
-            let measured = measured(vehicle, rng);
-            filter.update(&measured, &measured.at, &noise);
+            filter.update(&sighting(measured(vehicle, rng)));
         }
         filter
     }
@@ -441,6 +484,35 @@ mod tests {
             );
             assert!(error_mps < 1.2, "{error_mps} at {wanted_radps}");
         }
+    }
+
+    #[test]
+    fn a_heading_turns_the_velocity_towards_it_and_makes_it_certain_across_it_alone() {
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        let mut vehicle = Vehicle {
+            position: Vector2::new(20.0, -7.0),
+            velocity: Vector2::new(6.0, 0.0),
+            model: 2,
+        };
+        let config = ObjectsConfig::default();
+        let mut filter = tracked(&mut vehicle, (6, &config), &mut rng, |vehicle, _| {
+            vehicle.turn(0.0);
+        });
+        let before = filter;
+        let heading = Vector2::new(0.3f64.cos(), 0.3f64.sin());
+        let side = Vector2::new(-heading.y, heading.x);
+        let variance = |filter: &Filter, of: &Vector2<f64>| {
+            (of.transpose() * filter.velocity_covariance() * of)[0]
+        };
+        filter.align(&heading, 0.1);
+        let across_mps = [&before, &filter].map(|filter| filter.velocity().dot(&side).abs());
+        assert!(across_mps[1] < 0.2 * across_mps[0], "{across_mps:?}");
+        assert!(variance(&filter, &side) <= 0.011);
+        assert!(variance(&filter, &heading) > 0.5 * variance(&before, &heading));
+        // A heading that may be anything changes nothing.
+        let mut same = before;
+        same.align(&heading, 1e6);
+        assert!((same.velocity() - before.velocity()).norm() < 1e-6);
     }
 
     #[test]

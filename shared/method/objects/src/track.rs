@@ -1,13 +1,14 @@
 //! A track: an object from its birth to its death.
 
 use std::collections::VecDeque;
+use std::f64::consts::FRAC_PI_4;
 
 use nalgebra::{Matrix2, Point2, Vector2};
 
 use crate::clusters::Cluster;
 use crate::evidence::Evidence;
 use crate::extent::{Extent, Sight};
-use crate::filter::Filter;
+use crate::filter::{Filter, Sighting, by_time_and_doppler};
 use crate::returns::Return;
 use crate::{Object, ObjectsConfig, score};
 
@@ -26,6 +27,16 @@ const NEW_SIGMAS: f64 = 3.0;
 const BESIDE_M: f64 = 1.0;
 /// Share of the size that is uncertain when an object becomes a box.
 const SIZE_SIGMA: f64 = 0.15;
+
+/// Bounds of the standard deviation of a predicted heading, rad: that of a vehicle which drives
+/// straight, and one beyond which its side may be its end.
+const LEAST_TURN_RAD: f64 = 0.02;
+const LARGEST_TURN_RAD: f64 = 0.5;
+/// Speed of a vehicle's centre across its heading, m/s: it has its place by the rear axle.
+const SLIP_MPS: f64 = 0.1;
+/// Factor of the standard deviation of a heading by the returns of one scan: the differences
+/// between edges and scatterers last for several.
+const LASTING: f64 = 2.0;
 
 /// An object that may be one.
 #[derive(Clone, Debug)]
@@ -64,7 +75,10 @@ impl Track {
         config: &ObjectsConfig,
     ) -> Self {
         let mut track = Self {
-            filter: Filter::new(&cluster.measured, noise, config.speed_sigma_mps),
+            filter: Filter::new(
+                &Sighting::of_near_end(&cluster.measured, noise),
+                config.speed_sigma_mps,
+            ),
             extent: Extent::new(config),
             heading: cluster.measured.direction,
             direction: cluster.measured.direction,
@@ -126,27 +140,77 @@ impl Track {
         beyond(&self.heading, length_m.max(CLAIMED_M)).hypot(beyond(&side, width_m))
     }
 
-    /// Returns where a cluster says that the filter's position is, as it would be seen at the
-    /// cluster's own time, and the covariance of that. `noise` is that of an end.
-    pub fn measured(
+    /// Returns where a cluster says that the filter's position is. `noise` is the covariance of the
+    /// place of an end.
+    pub fn sighting(
         &self,
         returns: &[Return],
         cluster: &Cluster,
         noise: &Matrix2<f64>,
-    ) -> (Point2<f64>, Matrix2<f64>) {
+    ) -> Sighting {
         let measured = &cluster.measured;
         if !self.is_box {
-            return (measured.at, *noise);
+            return Sighting::of_near_end(measured, noise);
         }
         let known = (&self.filter.position(), &self.filter.velocity());
-        let outline = Extent::outline(cluster.body(returns), known, &self.heading);
-        let (offset, noise) = self.extent.centre(&outline, &self.sight(cluster, noise));
-        let away_mps = measured.direction.dot(known.1);
-        let at = known.0
-            + offset
-            + known.1 * measured.time_s
-            + measured.direction * (measured.doppler_s * away_mps);
-        (at, noise)
+        let sight = self.sight(cluster, noise);
+        let outline = Extent::outline(cluster.body(returns), known, &sight.heading);
+        let found = self.extent.centre(&outline, &sight);
+        let by_velocity = by_time_and_doppler(measured);
+        Sighting {
+            at: known.0 + found.offset + by_velocity * known.1,
+            noise: found.noise,
+            by_velocity,
+        }
+    }
+
+    /// Turns the heading to that of the box by its returns. Returns the heading that these alone
+    /// say, and its standard deviation, rad; `None` where they say nothing, or it has no direction
+    /// of motion that tells one end from the other.
+    fn measure_heading(
+        &mut self,
+        returns: &[Return],
+        cluster: &Cluster,
+        noise: &Matrix2<f64>,
+        config: &ObjectsConfig,
+    ) -> Option<(Vector2<f64>, f64)> {
+        let velocity = self.filter.velocity();
+        if !self.is_box || velocity.norm() < config.heading_mps {
+            return None;
+        }
+        let sigma_rad = self.heading_sigma_rad();
+        let known = (&self.filter.position(), &velocity);
+        let sight = self.sight(cluster, noise);
+        let turn = self
+            .extent
+            .turn(cluster.body(returns), known, (&sight, sigma_rad));
+        self.heading = sight.turned(turn.mean_rad).heading;
+        // What the returns add to the prediction: the quotient of the two distributions.
+        let information = 1.0 / turn.variance_rad2 - 1.0 / sigma_rad.powi(2);
+        let alone_rad = turn.mean_rad / turn.variance_rad2 / information;
+        let is_measured = information > 0.0 && alone_rad.abs() < FRAC_PI_4;
+        is_measured.then(|| (sight.turned(alone_rad).heading, information.sqrt().recip()))
+    }
+
+    /// The standard deviation of the direction of the predicted velocity, rad.
+    fn heading_sigma_rad(&self) -> f64 {
+        let side = Vector2::new(-self.heading.y, self.heading.x);
+        let variance = (side.transpose() * self.filter.velocity_covariance() * side)[0];
+        let speed_mps = self.filter.velocity().norm();
+        (variance.max(0.0).sqrt() / speed_mps).clamp(LEAST_TURN_RAD, LARGEST_TURN_RAD)
+    }
+
+    /// Updates the filter by where a cluster says that it is and points to. Returns the squared
+    /// Mahalanobis distance of the place from the prediction.
+    fn update_filter(&mut self, sighting: &Sighting, heading: Option<(Vector2<f64>, f64)>) -> f64 {
+        let chi_square = self.filter.innovation(sighting).chi_square();
+        self.filter.update(sighting);
+        if let Some((heading, sigma_rad)) = heading {
+            let speed_mps = self.filter.velocity().norm();
+            let sigma_mps = SLIP_MPS + LASTING * sigma_rad * speed_mps;
+            self.filter.align(&heading, sigma_mps);
+        }
+        chi_square
     }
 
     fn sight(&self, cluster: &Cluster, noise: &Matrix2<f64>) -> Sight {
@@ -166,11 +230,10 @@ impl Track {
         noise: &Matrix2<f64>,
         config: &ObjectsConfig,
     ) {
+        let heading = self.measure_heading(returns, cluster, noise, config);
         self.resize(returns, cluster, noise, config);
-        let (at, noise) = self.measured(returns, cluster, noise);
-        let innovation = self.filter.innovation(&cluster.measured, &at, &noise);
-        let chi_square = innovation.chi_square();
-        self.filter.update(&cluster.measured, &at, &noise);
+        let sighting = self.sighting(returns, cluster, noise);
+        let chi_square = self.update_filter(&sighting, heading);
         let evidence = score::of_cluster(returns, &cluster.members, chi_square);
         self.add(evidence, config);
         self.direction = cluster.measured.direction;

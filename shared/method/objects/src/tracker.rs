@@ -197,8 +197,8 @@ impl ObjectTracker {
                 return None;
             }
             let noise = self.noise(measured, track.is_box());
-            let (at, noise) = track.measured(&self.returns, cluster, &noise);
-            let innovation = track.filter.innovation(measured, &at, &noise);
+            let sighting = track.sighting(&self.returns, cluster, &noise);
+            let innovation = track.filter.innovation(&sighting);
             (innovation.chi_square() <= self.config.gate).then(|| innovation.cost())
         };
         found.iter().map(cost).collect()
