@@ -368,6 +368,25 @@ mod tests {
     }
 
     #[test]
+    fn a_strong_return_is_new_where_the_place_has_just_been_empty_and_a_weak_one_is_not() {
+        let mut evidence = Evidence::new(20, 70.0);
+        let strong = at(20.0, 3.0);
+        let weak = Return {
+            weight: 0.5,
+            ..strong
+        };
+        // A vehicle stood there, and left.
+        (0..12).for_each(|_| add(&mut evidence, &[strong]));
+        (0..OWN_SCANS + EMPTY_SCANS - 1).for_each(|_| add(&mut evidence, &[]));
+        let history = |evidence: &Evidence, found| evidence.history(found, 0.01);
+        assert_eq!(history(&evidence, &strong).hits, 12);
+        add(&mut evidence, &[]);
+        let (views, hits) = (EMPTY_SCANS, 0);
+        assert_eq!(history(&evidence, &strong), History { views, hits });
+        assert_eq!(history(&evidence, &weak).hits, 12);
+    }
+
+    #[test]
     fn a_cell_that_stands_for_another_place_after_a_way_of_256_m_has_no_hits() {
         let mut evidence = Evidence::new(8, 70.0);
         add(&mut evidence, &[at(20.0, 3.0)]);

@@ -52,6 +52,9 @@ pub(crate) struct Track {
     /// From one end to the other of what was last seen, along the heading and relative to the
     /// position, m.
     span_m: [f64; 2],
+    /// True for what began behind something that stands: it becomes no object, and ends a scan later,
+    /// so that what has come out from behind an obstacle begins anew.
+    pub is_image: bool,
     /// Identity of an object that was moving once; before it has none.
     pub id: Option<u64>,
     /// Scans since its first cluster, that one included, and those with a cluster.
@@ -84,6 +87,7 @@ impl Track {
             direction: cluster.measured.direction,
             is_box: false,
             span_m: [0.0; 2],
+            is_image: false,
             id: None,
             age: 1,
             hits: 1,
@@ -339,7 +343,11 @@ impl Track {
         let is_given_up = self.score < config.end_score && self.age > 1;
         match self.is_confirmed() {
             true => self.unseen_s > config.coast_s || is_given_up,
-            false => is_given_up || missed > config.birth_scans - config.birth_hits,
+            false => {
+                is_given_up
+                    || self.is_image && self.age > 1
+                    || missed > config.birth_scans - config.birth_hits
+            }
         }
     }
 
@@ -351,6 +359,7 @@ impl Track {
         self.moving = excess > config.moving_sigmas * sigma_mps;
         self.moving
             && !self.is_confirmed()
+            && !self.is_image
             && self.hits >= config.birth_hits
             && self.score > config.confirm_score
     }

@@ -221,16 +221,17 @@ impl ObjectTracker {
         self.resolution.noise(direction, range_m, edge_m)
     }
 
-    /// Begins tracks at the clusters that belong to none, but for mirror images: those behind what
-    /// stands.
+    /// Begins tracks at the clusters that belong to none. Those behind what stands are taken for
+    /// mirror images: they become no objects, but what returns from them in the next scan is nobody
+    /// else's.
     fn begin(&mut self, scan: &PlacedScan, rest: &[&Cluster]) {
         let sensor = Point2::from(scan.pose.translation.vector);
         for cluster in rest {
             let measured = &cluster.measured;
-            if self.is_strong(measured) && !self.evidence.is_behind_standing(&sensor, &measured.at)
-            {
+            if self.is_strong(measured) {
                 let noise = self.noise(measured, false);
-                let track = Track::new(&self.returns, cluster, &noise, &self.config);
+                let mut track = Track::new(&self.returns, cluster, &noise, &self.config);
+                track.is_image = self.evidence.is_behind_standing(&sensor, &measured.at);
                 self.tracks.push(track);
             }
         }
