@@ -47,9 +47,9 @@ const OWN_SCANS: u32 = 3;
 const CLEAR_M: f64 = 3.0;
 /// Share of the views with a return in a cell of what stands: a firm wall returns in most scans.
 const STANDING_SHARE: f64 = 0.6;
-/// The views from which on that share says so: within two seconds a vehicle of 5 m has left its
-/// place, if it is faster than 2.5 m/s.
-const STANDING_VIEWS: u32 = 8;
+/// The views from which on that share says so: within a second a vehicle of 5 m has left its place,
+/// if it is faster than 5 m/s.
+const STANDING_VIEWS: u32 = 4;
 /// The range below which points are not extracted, m.
 const NEAREST_M: f64 = 5.0;
 
@@ -250,6 +250,13 @@ impl Evidence {
         (0..steps).any(stands)
     }
 
+    /// Returns whether something that stands is between a place and the sensor in the newest scan
+    /// that was added.
+    pub fn is_hidden(&self, place: &Point2<f64>) -> bool {
+        let view = self.views.front();
+        view.is_some_and(|view| self.is_behind_standing(&view.sensor, place))
+    }
+
     /// Forgets all scans.
     pub fn clear(&mut self) {
         self.cells.fill(Cell::default());
@@ -299,6 +306,14 @@ mod tests {
         }
     }
 
+    /// The same return, too weak to outshine others.
+    fn faint(found: Return) -> Return {
+        Return {
+            weight: 0.5,
+            ..found
+        }
+    }
+
     fn add(evidence: &mut Evidence, returns: &[Return]) {
         evidence.add(Point2::origin(), returns, |_| true);
     }
@@ -312,10 +327,16 @@ mod tests {
             let seen = [wall, car];
             add(&mut evidence, &seen[..if scan == 6 { 2 } else { 1 }]);
         }
-        assert_eq!(evidence.history(&wall, 0.01), History { views: 5, hits: 5 });
-        assert_eq!(evidence.history(&car, 0.01), History { views: 5, hits: 1 });
         assert_eq!(
-            evidence.history(&at(20.0, -9.0), 0.01),
+            evidence.history(&faint(wall), 0.01),
+            History { views: 5, hits: 5 }
+        );
+        assert_eq!(
+            evidence.history(&faint(car), 0.01),
+            History { views: 5, hits: 1 }
+        );
+        assert_eq!(
+            evidence.history(&faint(at(20.0, -9.0)), 0.01),
             History { views: 5, hits: 0 }
         );
         assert_eq!(
@@ -326,7 +347,10 @@ mod tests {
         let beside = wall.at + Vector2::new(-3.0, 20.0).normalize() * 0.6;
         assert_eq!(evidence.history(&at(beside.x, beside.y), 0.01).hits, 5);
         evidence.clear();
-        assert_eq!(evidence.history(&wall, 0.01), History { views: 0, hits: 0 });
+        assert_eq!(
+            evidence.history(&faint(wall), 0.01),
+            History { views: 0, hits: 0 }
+        );
     }
 
     #[test]
@@ -336,7 +360,7 @@ mod tests {
             for _ in 0..8 {
                 add(&mut evidence, &[&[at(20.0, 3.0)], beyond].concat());
             }
-            evidence.history(&at(30.0, 4.5), 0.01).views
+            evidence.history(&faint(at(30.0, 4.5)), 0.01).views
         };
         assert_eq!(behind(&[]), 0);
         assert_eq!(behind(&[at(50.0, 7.5)]), 5);

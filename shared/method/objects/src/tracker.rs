@@ -237,13 +237,15 @@ impl ObjectTracker {
         }
     }
 
-    /// Ends tracks, joins those that have become one, and decides which move.
+    /// Ends tracks, joins those that have become one, and decides which move. What is behind
+    /// something that stands becomes no object: in the first scans it was not known to stand.
     fn judge(&mut self) {
         let config = &self.config;
         self.tracks.retain(|track| !track.is_over(config));
         for track in &mut self.tracks {
             track.look_back(&self.evidence, config);
-            if track.judge(config) {
+            let begins = track.judge(config);
+            if begins && !self.evidence.is_hidden(&track.filter.position()) {
                 track.confirm(self.next_id);
                 self.next_id += 1;
             }
