@@ -265,8 +265,8 @@ impl Evidence {
     }
 }
 
-/// Returns the scans since a place was last in view and empty for some scans on end, those included;
-/// all if it never was.
+/// Returns the scans since a place was last in view and empty for some scans on end, those
+/// included; all if it never was.
 fn since_empty(hits: u64, views: u64) -> u64 {
     let empty = views & !hits;
     let run = (1..EMPTY_SCANS).fold(empty, |run, ago| run & (empty >> ago));

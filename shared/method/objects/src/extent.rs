@@ -27,8 +27,8 @@ const BETWEEN: [f64; 2] = [0.1, 0.4];
 const FAR: f64 = 0.1;
 /// Cosine between the line of sight and an axis from which on the object is seen end-on.
 const END_ON: f64 = 0.35;
-/// Step and number of the turns to either side in which the heading of a box is searched: up to half
-/// a right angle, beyond which its side looks like its end.
+/// Step and number of the turns to either side in which the heading of a box is searched: up to
+/// half a right angle, beyond which its side looks like its end.
 const TURN_STEP_RAD: f64 = TAU / 120.0;
 const TURN_STEPS: i32 = 15;
 /// Returns of an echo, which are not independent: it fills as many range cells.
@@ -180,7 +180,7 @@ impl Extent {
         let [along, across] = sight.axes();
         let misfit = |found: &Return| {
             let at = found.at_scan(known.1) - place;
-            let distance_m = self.from_edge(at.dot(&along).abs(), at.dot(&across).abs());
+            let distance_m = self.distance_from_edge(at.dot(&along).abs(), at.dot(&across).abs());
             (distance_m.powi(2) / variance_m2).min(LARGEST_MISFIT)
         };
         let sum: f64 = body.map(misfit).sum();
@@ -188,7 +188,7 @@ impl Extent {
     }
 
     /// The distance of a place from the nearest edge, m.
-    fn from_edge(&self, along_m: f64, across_m: f64) -> f64 {
+    fn distance_from_edge(&self, along_m: f64, across_m: f64) -> f64 {
         let [length_m, width_m] = self.size_m;
         let [ahead_m, aside_m] = [along_m - 0.5 * length_m, across_m - 0.5 * width_m];
         match ahead_m < 0.0 && aside_m < 0.0 {

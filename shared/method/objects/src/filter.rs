@@ -42,12 +42,12 @@ struct Estimate {
 /// A measured position of an object.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sighting {
-    /// The position, m, as if the object stood and had the heading that is predicted.
+    /// The position, m, as if the object stood.
     pub at: Point2<f64>,
     /// Covariance of it, m².
     pub noise: Matrix2<f64>,
-    /// The change of `at` by the velocity, s: it is seen at its own time, lengthened or shortened by
-    /// the Doppler shift, and of a box whose heading is the direction of the velocity.
+    /// The change of `at` by the velocity, s: it is seen at its own time, and lengthened or
+    /// shortened by the Doppler shift.
     pub by_velocity: Matrix2<f64>,
 }
 

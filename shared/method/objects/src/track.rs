@@ -52,8 +52,8 @@ pub(crate) struct Track {
     /// From one end to the other of what was last seen, along the heading and relative to the
     /// position, m.
     span_m: [f64; 2],
-    /// True for what began behind something that stands: it becomes no object, and ends a scan later,
-    /// so that what has come out from behind an obstacle begins anew.
+    /// True for what began behind something that stands: it becomes no object, and ends a scan
+    /// later, so that what has come out from behind an obstacle begins anew.
     pub is_image: bool,
     /// Identity of an object that was moving once; before it has none.
     pub id: Option<u64>,
