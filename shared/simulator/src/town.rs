@@ -32,7 +32,7 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
 pub use config::{Character, TownConfig};
-pub use vehicle::ParkedCar;
+pub use site::ParkedCar;
 pub(crate) use vehicle::car;
 
 use crate::body::Body;

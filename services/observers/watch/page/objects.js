@@ -1,4 +1,5 @@
-// Moving objects over a scan: a box with the way of a second as an arrow, and the places of the last scans.
+// Moving objects over a scan: a box with the way of a second as an arrow, and the places of the
+// last scans.
 
 import { colour, label } from "./canvas.js";
 

@@ -8,7 +8,7 @@ use crate::Dataset;
 /// [`check_chirps`]. A scan that cannot be read is reported where it is played.
 ///
 /// # Errors
-/// What is missing.
+/// The one of these that is missing.
 pub fn check_first_scan(dataset: &mut dyn Dataset) -> Result<(), NoDoppler> {
     let mut scan = OwnedScan::with_limits(dataset.limits());
     let Ok(geometry) = dataset.read(dataset.first(), scan.slot()) else {

@@ -84,7 +84,7 @@ pub enum NoDoppler {
 /// radar needs to say the velocity.
 ///
 /// # Errors
-/// What is missing.
+/// The one of these that is missing.
 pub fn check_chirps(scan: &PolarScan<'_>) -> Result<(), NoDoppler> {
     scan.check()?;
     let azimuths = scan.geometry.azimuths;

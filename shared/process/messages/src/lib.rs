@@ -15,7 +15,7 @@
 //! | `fix` | [`FixHeader`] | empty |
 //! | `objects` | [`ObjectsHeader`] | empty |
 //!
-//! The last three exist only in runs with SLAM: [`FollowerId`]. All headers start with an [`Item`],
+//! The last four exist only in runs with the follower that publishes them: [`FollowerId`]. All headers start with an [`Item`],
 //! which identifies the scan and carries the time stamps of each stage. Type names carry a version,
 //! so that two builds of different versions reject each other's messages instead of misreading
 //! them.

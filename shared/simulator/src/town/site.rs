@@ -7,8 +7,18 @@ use rand_chacha::ChaCha8Rng;
 
 use super::changes::Changes;
 use super::random::{normal, spread};
-use super::vehicle::ParkedCar;
 use crate::body::{Aspect, Body, NO_BODY, Scatterer, Wall};
+
+/// A parked car.
+#[derive(Clone, Debug)]
+pub struct ParkedCar {
+    /// The pose of its centre in the world, x ahead or behind.
+    pub pose: Pose,
+    /// The number of its body in its own town.
+    pub(crate) number: u32,
+    /// All of it, in its own frame.
+    pub(crate) body: Body,
+}
 
 /// Everything built so far, and the number of the last body.
 #[derive(Default)]

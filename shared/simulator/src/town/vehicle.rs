@@ -5,7 +5,7 @@ use nalgebra::{Point2, Rotation2, Vector2};
 use rand::Rng;
 
 use super::random::{normal, random_positions, spread};
-use super::site::Site;
+use super::site::{ParkedCar, Site};
 use crate::body::{Aspect, Body, Scatterer, Wall};
 
 /// Half of a car's length and width, metres.
@@ -58,17 +58,6 @@ pub(crate) fn car(body: u32, rng: &mut impl Rng) -> Body {
         diagonal(corners[1], corners[3]),
     ];
     car
-}
-
-/// A parked car.
-#[derive(Clone, Debug)]
-pub struct ParkedCar {
-    /// The pose of its centre in the world, x ahead or behind.
-    pub pose: Pose,
-    /// The number of its body in its own town.
-    pub(crate) number: u32,
-    /// All of it, in its own frame.
-    pub(crate) body: Body,
 }
 
 impl ParkedCar {

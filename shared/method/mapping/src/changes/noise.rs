@@ -2,7 +2,7 @@
 
 use super::survey::{Pair, Part, Survey};
 
-/// Steps of the root of a share: what is weak is told apart better than what is strong.
+/// Steps of the root of a share: weak ones are distinguished better than strong ones.
 const STEPS: usize = 8;
 /// Looks from nearby of each half of a drive at a place by which the noise is learnt.
 const MIN_LOOKED: f64 = 2.0;

@@ -4,10 +4,7 @@
 use gyre_samples::DopplerVelocity;
 use nalgebra::{Matrix2, Vector2};
 
-use super::{
-    NoDoppler,
-    shifts::{REACH, RowShifts},
-};
+use super::{NoDoppler, rows::REACH, shifts::RowShifts};
 
 /// Sideways velocities that are voted on, cells of shift: up to 5 m/s.
 const SIDEWAYS: [f64; 5] = [-4.0, -2.0, 0.0, 2.0, 4.0];

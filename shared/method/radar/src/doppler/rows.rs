@@ -1,9 +1,12 @@
 //! The powers of a scan above its noise, in cells deep enough that the fastest vehicle shifts
 //! echoes by [`REACH`] of them.
 
-use super::shifts::{REACH, WIDTH};
 use crate::scan::PolarScan;
 
+/// Cells by which echoes can be shifted, either way.
+pub(super) const REACH: usize = 31;
+/// Shifts of both ways and none, rounded up to whole vectors.
+pub(super) const WIDTH: usize = 64;
 /// The fastest vehicle, m/s.
 const MAX_SPEED_MPS: f32 = 40.0;
 /// Farther echoes are left out, m.

@@ -3,15 +3,14 @@
 use gyre_simd::simd;
 use nalgebra::Vector2;
 
-use super::{alternates_at, rows::Rows};
+use super::{
+    alternates_at,
+    rows::{REACH, Rows, WIDTH},
+};
 use crate::scan::{PolarScan, Sense};
 
-/// Cells by which echoes can be shifted, either way.
-pub(super) const REACH: usize = 31;
 /// Shifts that are looked at.
 pub(super) const LAGS: usize = 2 * REACH + 1;
-/// The same, rounded up to whole vectors.
-pub(super) const WIDTH: usize = 64;
 /// The mean of so many shifts on either side, about a metre, is taken off the correlation: of walls
 /// along the beam it is wide, at places of their own, and only what the chirps both see of the same
 /// scatterers is narrow.

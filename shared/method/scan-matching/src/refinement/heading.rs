@@ -10,8 +10,9 @@ use gyre_geometry::{Pose, UncertainMotion, pose, wrap_angle, xy_yaw};
 use gyre_samples::{GyroConfig, GyroTurn};
 use nalgebra::{Matrix4, RowVector4, Vector4};
 
-use super::uncertainty::GATE;
-
+/// Square of what gyro, wheels or Doppler and the radar are apart, over its variance, beyond which
+/// one of them is wrong: four standard deviations.
+pub(super) const GATE: f64 = 16.0;
 /// Standard deviation of the lean, rad, and the time over which it changes, s. On simulated roads
 /// 2.5e-4 rad leaves the bias unknown while the vehicle drives.
 const LEAN_SIGMA_RAD: f64 = 1e-4;

@@ -9,9 +9,6 @@ use super::{
     tracker::Step,
 };
 
-/// Square of what gyro, wheels or Doppler and the radar are apart, over its variance, beyond which
-/// one of them is wrong: four standard deviations.
-pub(super) const GATE: f64 = 16.0;
 /// Factor on the covariance of a weak match.
 pub(super) const WEAK_FACTOR: f64 = 4.0;
 /// Drift share of a prediction, whose error the next match takes back, and of that match. Not zero,

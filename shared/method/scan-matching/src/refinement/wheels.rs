@@ -8,7 +8,7 @@
 //! used then. Where the radar sees nothing, or little that does not agree, the motion is that of an
 //! arc: as long as the wheels say, turned as the gyro says.
 
-use super::{heading::grown, uncertainty::GATE};
+use super::heading::{GATE, grown};
 use gyre_geometry::{Pose, Twist, UncertainMotion, pose};
 use gyre_samples::{WheelDistance, WheelsConfig};
 use nalgebra::{Matrix2, Matrix3, RowVector3, Vector2, Vector3};
