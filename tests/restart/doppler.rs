@@ -5,8 +5,9 @@ use std::path::PathBuf;
 
 use gyre_simulator::{OutputFormat, Profile, SimulationConfig, TunnelConfig};
 
+use super::{assert_same_after_kills, assert_same_when_continued};
 use crate::{
-    common::{Run, STAGES, recording},
+    common::{Run, recording},
     observers::record::{file, recorded, replay},
 };
 
@@ -50,23 +51,12 @@ fn whatever_is_killed_the_result_is_the_undisturbed_one() {
     alone.complete();
     assert_ne!(alone.odometry(), undisturbed);
     assert!(alone.summary().get("doppler").is_none());
-    for stage in STAGES {
-        let run = with_doppler().rate("6");
-        let mut running = run.start();
-        running.await_poses(recording::SCANS / 3).kill(stage);
-        running.finish().succeeded();
-        assert_eq!(run.odometry(), undisturbed, "{stage}");
-    }
+    assert_same_after_kills(with_doppler, &undisturbed);
 }
 
 #[test]
 fn a_run_that_is_continued_has_the_same_result() {
-    let run = with_doppler().rate("6");
-    let mut running = run.start();
-    running.await_poses(recording::SCANS / 2);
-    running.kill_supervisor();
-    run.complete();
-    assert_eq!(run.odometry(), undisturbed());
+    assert_same_when_continued(with_doppler, &undisturbed());
 }
 
 #[test]

@@ -7,6 +7,7 @@ use gyre_simulator::{
     GyroProfile, OutputFormat, Profile, SimulationConfig, weather::WeatherConfig,
 };
 
+use super::{assert_same_after_kills, assert_same_when_continued};
 use crate::{
     common::{Run, STAGES, recording},
     observers::record::{file, recorded, replay},
@@ -85,23 +86,12 @@ fn whatever_is_killed_the_result_is_the_undisturbed_one() {
     by_gyro.complete();
     assert_ne!(by_gyro.odometry(), undisturbed);
     assert!(by_gyro.summary().get("wheels").is_none());
-    for stage in STAGES {
-        let run = with_both().rate("6");
-        let mut running = run.start();
-        running.await_poses(recording::SCANS / 3).kill(stage);
-        running.finish().succeeded();
-        assert_eq!(run.odometry(), undisturbed, "{stage}");
-    }
+    assert_same_after_kills(with_both, &undisturbed);
 }
 
 #[test]
 fn a_run_that_is_continued_has_the_same_result() {
-    let run = with_both().rate("6");
-    let mut running = run.start();
-    running.await_poses(recording::SCANS / 2);
-    running.kill_supervisor();
-    run.complete();
-    assert_eq!(run.odometry(), undisturbed());
+    assert_same_when_continued(with_both, &undisturbed());
 }
 
 #[test]
