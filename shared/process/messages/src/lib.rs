@@ -15,10 +15,10 @@
 //! | `fix` | [`FixHeader`] | empty |
 //! | `objects` | [`ObjectsHeader`] | empty |
 //!
-//! The last four exist only in runs with the follower that publishes them: [`FollowerId`]. All headers start with an [`Item`],
-//! which identifies the scan and carries the time stamps of each stage. Type names carry a version,
-//! so that two builds of different versions reject each other's messages instead of misreading
-//! them.
+//! The last four exist only in runs with the follower that publishes them: [`FollowerId`]. All
+//! headers start with an [`Item`], which identifies the scan and carries the time stamps of each
+//! stage. Type names carry a version, so that two builds of different versions reject each other's
+//! messages instead of misreading them.
 //!
 //! Reading order: `item`, `limits`, `message` (the contract of a message type), `check` (its
 //! enforcement), one file per message, `topics`.
