@@ -8,7 +8,7 @@ use gyre_geometry::UncertainMotion;
 use nalgebra::UnitVector2;
 
 use super::{
-    Refiner, WheelState,
+    Refiner,
     alignment::Alignment,
     registration::{Candidate, Scan},
     structure::WeakestDirection,
@@ -92,6 +92,8 @@ impl Refiner {
             Some(_) => 0,
             None => self.state.sliding.saturating_add(1),
         };
-        self.each_distance(registered, WheelState::slide_along);
+        self.each_distance(registered, |state, measured, driven, _| {
+            state.slide_along(measured, driven);
+        });
     }
 }

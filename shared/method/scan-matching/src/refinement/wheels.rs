@@ -4,14 +4,20 @@
 //!
 //! Where the radar sees, it says how far the vehicle has driven, and so what the scale is: the
 //! motions of a drive share it, and the noise of one registration is taken back by the next. A
-//! registered distance that is too far from that of the wheels says that they slip; they are not
-//! used then. Where the radar sees nothing, or little that does not agree, the motion is that of an
+//! registered distance that is too far from that of the wheels says that they slip, and so does a
+//! scale that no wheels have; they are not used then. Where the radar sees nothing, or little that does not agree, the motion is that of an
 //! arc: as long as the wheels say, turned as the gyro says.
 
 use super::heading::{GATE, grown};
 use gyre_geometry::{Pose, Twist, UncertainMotion, pose};
 use gyre_samples::{WheelDistance, WheelsConfig};
 use nalgebra::{Matrix2, Matrix3, RowVector3, Vector2, Vector3};
+
+/// A scale is as near to 1 as the settings say if it differs by less than four of these, whatever
+/// has been learnt: a difference of variances is rounded.
+const LEAST_LEARNT: f64 = 1e-3;
+/// The time of a drive, s, over which a scale may walk.
+const DRIVE_S: f64 = 3600.0;
 
 /// The scale of the wheels, and what they were used for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -193,22 +199,36 @@ impl WheelState {
     }
 
     /// Compares a registered pose with the measured distance, if there is one: it is another one
-    /// where both disagree, if the match is certain.
+    /// where both disagree, if the match is certain. If the motions together say another scale than
+    /// the settings allow, the wheels have slipped in all of them: it is learnt anew.
     pub(super) fn weigh(
         &mut self,
         measured: Option<&WheelDistance>,
         registered: &Registered,
         is_certain: bool,
+        config: &WheelsConfig,
     ) {
         match measured {
             Some(measured) if self.agrees(measured, registered) => {
                 self.correct(measured, registered);
+                if !self.is_scale_of(config) {
+                    *self = Self::new(config);
+                    self.adopt(registered, true);
+                }
             }
             measured => {
                 let slips = self.slips || (measured.is_some() && is_certain);
                 self.adopt(registered, slips);
             }
         }
+    }
+
+    /// Returns whether the learnt scale is as near to 1 as the settings say. What it can have moved
+    /// by is what is known of it now and was not before: the difference of both variances.
+    fn is_scale_of(&self, config: &WheelsConfig) -> bool {
+        let before = config.scale_sigma.powi(2) + config.scale_walk_per_sqrt_s.powi(2) * DRIVE_S;
+        let learnt = (before - self.covariance[(1, 1)]).max(LEAST_LEARNT.powi(2));
+        (self.scale - 1.0).powi(2) <= GATE * learnt
     }
 
     /// Takes a registered distance that agrees with the measured one.

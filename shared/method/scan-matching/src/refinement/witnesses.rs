@@ -198,15 +198,18 @@ impl Refiner {
     pub(super) fn each_distance(
         &mut self,
         registered: &UncertainMotion,
-        take: impl Fn(&mut WheelState, Option<&WheelDistance>, &Registered),
+        take: impl Fn(&mut WheelState, Option<&WheelDistance>, &Registered, &WheelsConfig),
     ) {
         let driven =
             [&self.wheels, &self.doppler_as_wheels].map(|config| self.driven(registered, config));
-        let measured = [self.distance, self.way.map(|way| way.ahead)];
-        let states = [&mut self.state.wheels, &mut self.state.doppler];
-        for ((state, measured), driven) in states.into_iter().zip(measured).zip(driven) {
+        let way = self.way.map(|way| way.ahead);
+        let witnesses = [
+            (&mut self.state.wheels, self.distance, &self.wheels),
+            (&mut self.state.doppler, way, &self.doppler_as_wheels),
+        ];
+        for ((state, measured, config), driven) in witnesses.into_iter().zip(driven) {
             if let Some(state) = state {
-                take(state, measured.as_ref(), &driven);
+                take(state, measured.as_ref(), &driven, config);
             }
         }
     }
@@ -254,8 +257,8 @@ impl Refiner {
         if !is_certain && self.contradicts_distance(scan, registered) {
             return false;
         }
-        self.each_distance(registered, |state, measured, driven| {
-            state.weigh(measured, driven, is_certain);
+        self.each_distance(registered, |state, measured, driven, config| {
+            state.weigh(measured, driven, is_certain, config);
         });
         true
     }
