@@ -105,15 +105,10 @@ impl Running {
         leftovers::bytes(self.run.out())
     }
 
-    /// `kill -9` of a stage, which must live.
-    pub fn kill(&self, stage: &str) -> &Self {
-        let stages = self.stages();
-        send(
-            *stages
-                .get(stage)
-                .unwrap_or_else(|| panic!("{stage} is not among {stages:?}")),
-            Signal::KILL,
-        );
+    /// `kill -9` of a stage. Waits until it lives: poses that are on their way are still journalled
+    /// while a stage is started again.
+    pub fn kill(&mut self, stage: &str) -> &mut Self {
+        send(self.await_stage(stage), Signal::KILL);
         self
     }
 
