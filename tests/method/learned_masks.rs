@@ -104,6 +104,7 @@ fn masking_killed_again_after_each_few_poses_goes_on_with_a_network_that_looks_a
 }
 
 #[test]
+#[ignore = "nightly: kills at many moments"]
 fn a_run_that_was_killed_as_a_whole_goes_on_with_a_network_that_looks_at_two_scans() {
     let undisturbed = masked_by(TWO_SCANS).complete();
     let run = masked_by(TWO_SCANS).rate("6");

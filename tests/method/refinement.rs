@@ -186,6 +186,7 @@ fn refinement_killed_at_any_moment_of_many_lives_goes_on() {
 }
 
 #[test]
+#[ignore = "nightly: kills at many moments"]
 fn refinement_killed_after_each_pose_goes_on() {
     let run = with_small_map();
     let alone = run.clone().into(&run.folder().join("alone")).complete();
@@ -203,6 +204,7 @@ fn refinement_killed_after_each_pose_goes_on() {
 }
 
 #[test]
+#[ignore = "nightly: kills at many moments"]
 fn a_supervisor_killed_again_and_again_does_not_confuse_the_map() {
     let run = with_small_map();
     let alone = run.clone().into(&run.folder().join("alone")).complete();

@@ -249,6 +249,7 @@ fn a_program_that_does_not_come_is_given_up_while_the_run_goes_on() {
 }
 
 #[test]
+#[ignore = "nightly: a drive in several runs"]
 fn shadows_that_fall_behind_again_and_again_are_compared_exactly() {
     // The mask takes two scans, and the motions of both.
     let run = long().rate(RATE).masked_by(&card(TWO_SCANS));

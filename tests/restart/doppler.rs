@@ -45,6 +45,7 @@ fn undisturbed() -> String {
 }
 
 #[test]
+#[ignore = "nightly: kills at many moments"]
 fn whatever_is_killed_the_result_is_the_undisturbed_one() {
     let undisturbed = undisturbed();
     let alone = radar_alone();

@@ -75,6 +75,7 @@ fn a_killed_pose_integration_goes_on() {
 
 /// Where azimuths were lost is found from scan to scan, so a restart is to know it of the last one.
 #[test]
+#[ignore = "nightly: kills at many moments"]
 fn a_stage_killed_amid_scans_with_lost_azimuths_goes_on() {
     let of_radiate = || {
         let run = Run::small().data(&recording::of_radiate(true));
@@ -143,6 +144,7 @@ fn a_restart_killed_in_the_first_milliseconds_of_its_life_goes_on() {
 }
 
 #[test]
+#[ignore = "nightly: kills at many moments"]
 fn a_stage_killed_when_all_poses_are_there_does_not_take_them_back() {
     for stage in STAGES {
         let run = Run::of_recording();

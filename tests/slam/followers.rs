@@ -125,6 +125,7 @@ fn kill_if_there(running: &Running, name: &str) {
 }
 
 #[test]
+#[ignore = "nightly: a drive with loops in several runs"]
 fn a_stopped_loop_closure_does_not_hold_odometry_back_and_is_waited_for_at_the_end() {
     let run = run();
     let mut running = run.start();
@@ -140,6 +141,7 @@ fn a_stopped_loop_closure_does_not_hold_odometry_back_and_is_waited_for_at_the_e
 }
 
 #[test]
+#[ignore = "nightly: a drive with loops in several runs"]
 fn a_run_that_is_interrupted_while_it_waits_for_loops_goes_on_where_it_was() {
     let slow = run().set("stages.loop-closure.delay_ms=200");
     let mut running = slow.start();
@@ -169,6 +171,7 @@ fn a_run_that_is_interrupted_in_its_middle_goes_on_with_its_loops() {
 }
 
 #[test]
+#[ignore = "nightly: a drive with loops in several runs"]
 fn odometry_goes_on_without_a_follower_that_always_dies_and_the_same_command_makes_up_for_it() {
     assert_made_up_for(LOOP_CLOSURE);
 }

@@ -163,6 +163,7 @@ fn a_trajectory_that_is_killed_leaves_the_same() {
 }
 
 #[test]
+#[ignore = "nightly: a drive with loops in several runs"]
 fn a_clock_that_is_wrong_is_refused_and_told() {
     let run = run(6.0);
     let ended = run.finish();

@@ -60,6 +60,7 @@ fn a_run_with_slam_has_the_same_odometry_and_logs_the_keyframes_of_its_poses() {
 }
 
 #[test]
+#[ignore = "nightly: a drive with loops in several runs"]
 fn keyframes_are_the_same_whatever_the_window_and_without_room_for_observers() {
     for sentence in ["run.window=1", "run.observers=0"] {
         let run = run().set(sentence);
@@ -131,6 +132,7 @@ fn assert_same_after_kills(seeds: Range<u64>) {
 }
 
 #[test]
+#[ignore = "nightly: kills at many moments"]
 fn keyframes_are_the_same_after_the_supervisor_is_killed_at_random_moments() {
     for seed in 0..3 {
         let mut random = StdRng::seed_from_u64(100 + seed);

@@ -104,6 +104,7 @@ fn gtsam_reads_all_of_a_graph() {
 }
 
 #[test]
+#[ignore = "nightly: a drive with loops in several runs"]
 fn an_interrupted_drive_has_the_same_corrected_trajectory() {
     let whole = corrected();
     let interrupted = run("graph").rate("20");

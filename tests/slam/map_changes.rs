@@ -35,6 +35,7 @@ fn count(report: &Value, kind: &str) -> u64 {
 }
 
 #[test]
+#[ignore = "nightly: two drives through a town"]
 fn parked_cars_that_have_come_and_gone_are_reported_and_a_drive_has_not_changed_since_itself() {
     let (first, second) = (drive(3, 1, None), drive(3, 9, Some(5)));
     let out = second.folder().join("changes");

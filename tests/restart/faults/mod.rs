@@ -2,8 +2,9 @@
 //! end. A run finishes with the results of the undisturbed one, or ends with a sentence and the
 //! same command resumes to them, or is refused with a sentence.
 //!
-//! One fault of each kind, on a short simulated drive, belongs to the tests of every change. All of
-//! them, on a real drive with refinement and learned masks:
+//! One fault of each kind, on a short simulated drive, belongs to the tests of every change, unless
+//! a test of its own has that fault already. All of them, on a real drive with refinement and
+//! learned masks:
 //!
 //! ```sh
 //! cargo test --release -p gyre --test pipeline on_a_real_drive -- --ignored --nocapture
@@ -57,10 +58,11 @@ struct Kind {
 
 /// Lists the kinds, with a test each.
 macro_rules! kinds {
-    ($($name:ident: $strike:path, $needs:expr;)*) => {
+    ($($(#[$when:meta])* $name:ident: $strike:path, $needs:expr;)*) => {
         const KINDS: &[Kind] = &[$(Kind { name: stringify!($name), needs: &$needs, strike: $strike }),*];
 
         $(#[test]
+        $(#[$when])*
         fn $name() {
             one_on_the_short_drive(stringify!($name));
         })*
@@ -68,16 +70,21 @@ macro_rules! kinds {
 }
 
 kinds! {
+    #[ignore = "nightly: a test of its own has this fault"]
     a_stage_is_killed: kills::stage, [];
+    #[ignore = "nightly: a test of its own has this fault"]
     stages_are_killed_together: kills::several, [];
+    #[ignore = "nightly: a test of its own has this fault"]
     a_stage_is_killed_as_it_starts: kills::at_the_start, [];
     a_stage_is_killed_as_it_writes: kills::at_a_write, [];
     processes_are_killed_in_storms: kills::storms, [];
+    #[ignore = "nightly: a test of its own has this fault"]
     the_supervisor_is_killed: kills::supervisor, [];
     the_supervisor_is_killed_as_it_writes_results: kills::at_the_results, [];
     the_run_is_interrupted: kills::interrupt, [];
     a_process_stops_for_a_while: stops::for_a_while, [];
     a_stage_stops_for_good: stops::for_good, [];
+    #[ignore = "nightly: a test of its own has this fault"]
     the_disk_is_full: results::disk_full, [Need::Mounts];
     input_and_output_fail: results::io_errors, [Need::Fiu];
     files_may_not_grow: results::file_size_limit, [Need::Prlimit];
@@ -87,11 +94,13 @@ kinds! {
     the_recording_has_gaps: input::gaps, [];
     the_recording_vanishes: input::vanishes, [];
     the_clock_is_set: environment::clock_step, [Need::Faketime];
+    #[ignore = "nightly: a test of its own has this fault"]
     shared_memory_fills_up: environment::shared_memory_full, [Need::Mounts];
     memory_runs_out: limits::memory, [Need::Prlimit];
     descriptors_run_out: limits::descriptors, [Need::Prlimit];
     no_process_can_be_started: limits::processes, [Need::Prlimit, Need::OtherUser];
     the_program_is_replaced: programs::replaced, [];
+    #[ignore = "nightly: a test of its own has this fault"]
     a_second_run_has_the_same_results: programs::second_run, [Need::Mounts];
 }
 
