@@ -5,8 +5,9 @@
 //! Where the radar sees, it says how far the vehicle has driven, and so what the scale is: the
 //! motions of a drive share it, and the noise of one registration is taken back by the next. A
 //! registered distance that is too far from that of the wheels says that they slip, and so does a
-//! scale that no wheels have; they are not used then. Where the radar sees nothing, or little that does not agree, the motion is that of an
-//! arc: as long as the wheels say, turned as the gyro says.
+//! scale that no wheels have; they are not used then. Where the radar sees nothing, or little that
+//! does not agree, the motion is that of an arc: as long as the wheels say, turned as the gyro
+//! says.
 
 use super::heading::{GATE, grown};
 use gyre_geometry::{Pose, Twist, UncertainMotion, pose};
