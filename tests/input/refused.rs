@@ -353,6 +353,19 @@ fn a_journal_of_another_program_is_reported() {
 }
 
 #[test]
+fn a_journal_of_another_version_is_refused_until_it_may_be_replaced() {
+    let run = Run::of_recording();
+    let undisturbed = run.complete();
+    let path = run.out().join("journal/poses.journal");
+    let mut bytes = fs::read(&path).unwrap();
+    bytes[..16].copy_from_slice(b"gyre journal v9 ");
+    fs::write(&path, bytes).unwrap();
+    run.finish()
+        .refused_with(&["poses.journal", "another version", "--fresh"]);
+    assert_eq!(run.option("--fresh").complete(), undisturbed);
+}
+
+#[test]
 fn too_little_shared_memory_is_reported_with_the_need_before_the_first_scan() {
     let run = Run::of_recording();
     let Some(command) = run.with_tmpfs(Path::new(SHARED_MEMORY), "size=1m") else {

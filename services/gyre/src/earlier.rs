@@ -72,7 +72,10 @@ impl Earlier {
     ) -> Result<Self, Failure> {
         let path = journal::path(out.path());
         // A file of another program is refused in any case.
-        let there = journal::records(&path)?.is_some();
+        let there = match journal::records(&path) {
+            Err(JournalError::OtherVersion { .. }) if fresh => true,
+            records => records?.is_some(),
+        };
         settle(out)?;
         if fresh {
             return Ok(Self::Nothing);

@@ -11,9 +11,17 @@ pub enum JournalError {
     /// The file cannot be read or written.
     #[error(transparent)]
     Storage(#[from] StorageError),
-    /// The file is not a journal, or of another version.
-    #[error("{path} is not a journal of this version: move it away, or choose another --out")]
+    /// The file is not a journal.
+    #[error("{path} is not a journal: move it away, or choose another --out")]
     Foreign {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file is a journal of another version of Gyre.
+    #[error(
+        "{path} is the journal of another version of Gyre: choose another --out, or begin anew with --fresh"
+    )]
+    OtherVersion {
         /// The file.
         path: PathBuf,
     },

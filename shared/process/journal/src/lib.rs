@@ -57,9 +57,7 @@ impl Journal {
             records = file.length()?.saturating_sub(begin) / RECORD as u64;
             let mut header = [0; MAGIC.len()];
             if records > 0 && !(file.read_at(&mut header, 0)? && header == MAGIC) {
-                return Err(JournalError::Foreign {
-                    path: path.to_owned(),
-                });
+                return Err(records::refused(&header, path));
             }
             if records == 0 {
                 // Opened to be read, it is refused if it belongs to another program.

@@ -11,7 +11,7 @@ use gyre_storage::StorageError;
 
 use crate::{
     JournalError,
-    record::{MAGIC, RECORD, RECORDS, Record},
+    record::{ANY_VERSION, MAGIC, RECORD, RECORDS, Record},
 };
 
 /// Bytes that are read at once.
@@ -106,9 +106,7 @@ impl Places {
                 next: 0,
                 has_header: header == MAGIC,
             })),
-            false => Err(JournalError::Foreign {
-                path: path.to_owned(),
-            }),
+            false => Err(refused(&header, path)),
         }
     }
 
@@ -124,5 +122,14 @@ impl Places {
             Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => None,
             Err(error) => Some(Err(StorageError::at("read", &self.path)(error).into())),
         }
+    }
+}
+
+/// Says why a file with such a header is none to go on with.
+pub(crate) fn refused(header: &[u8], path: &Path) -> JournalError {
+    let path = path.to_owned();
+    match header.starts_with(ANY_VERSION) {
+        true => JournalError::OtherVersion { path },
+        false => JournalError::Foreign { path },
     }
 }

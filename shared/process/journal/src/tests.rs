@@ -226,6 +226,18 @@ fn another_programs_file_is_rejected() {
 }
 
 #[test]
+fn a_journal_of_another_version_is_refused_by_that() {
+    let (_folder, path) = journal_of(2);
+    let mut bytes = fs::read(&path).unwrap();
+    bytes[..MAGIC.len()].copy_from_slice(b"gyre journal v9 ");
+    fs::write(&path, bytes).unwrap();
+    let refused = [check(&path).err(), Journal::open(&path).err()];
+    for error in refused {
+        assert!(matches!(error, Some(JournalError::OtherVersion { .. })));
+    }
+}
+
+#[test]
 fn two_processes_do_not_append_to_one_journal() {
     let (_folder, path) = journal_of(2);
     let _first = Journal::open(&path).unwrap();
