@@ -156,7 +156,7 @@ fn a_health_check_names_the_process_that_is_silent_and_fails_without_a_run() {
 
 #[test]
 fn a_run_in_the_background_goes_on_from_where_it_was_taken_down() {
-    let run = Run::of_recording().rate(MODERATE);
+    let run = Run::of_recording().rate(SLOW);
     let started = Ended::of(up(&run));
     assert!(
         started.succeeded().stdout.contains("6 processes"),

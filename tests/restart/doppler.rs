@@ -61,6 +61,7 @@ fn a_run_that_is_continued_has_the_same_result() {
 }
 
 #[test]
+#[ignore = "nightly: a drive in several runs"]
 fn a_recording_replays_to_the_same_bytes_with_and_without() {
     let run = recorded(&with_doppler()).set("run.window=32");
     run.complete();

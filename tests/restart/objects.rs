@@ -17,6 +17,7 @@ fn tracking() -> Run {
 }
 
 #[test]
+#[ignore = "nightly: kills at many moments"]
 fn a_killed_tracker_of_objects_finds_the_same_ones_and_odometry_does_not_depend_on_it() {
     let (plain, undisturbed) = (Run::small().data(around_a_block()), tracking());
     plain.complete();

@@ -218,6 +218,7 @@ fn a_run_that_goes_on_without_a_follower_can_be_interrupted() {
 }
 
 #[test]
+#[ignore = "nightly: a drive with loops in several runs"]
 fn a_follower_that_hangs_is_restarted_when_the_run_waits_for_it() {
     assert_restarted_when_it_hangs(TRAJECTORY);
 }

@@ -101,6 +101,7 @@ fn a_run_with_slam_is_not_resumed_without() {
 }
 
 #[test]
+#[ignore = "nightly: kills at many moments"]
 fn keyframes_are_the_same_after_kills_at_random_moments() {
     assert_same_after_kills(0..2);
 }
