@@ -5,20 +5,18 @@
 //! Where the radar sees, it says how far the vehicle has driven, and so what the scale is: the
 //! motions of a drive share it, and the noise of one registration is taken back by the next. A
 //! registered distance that is too far from that of the wheels says that they slip, and so does a
-//! scale that no wheels have; they are not used then. Where the radar sees nothing, or little that
-//! does not agree, the motion is that of an arc: as long as the wheels say, turned as the gyro
-//! says.
+//! scale that is too far from 1; they are not used then. Where the radar sees nothing, or little
+//! that does not agree, the motion is that of an arc: as long as the wheels say, turned as the
+//! gyro says.
 
 use super::heading::{GATE, grown};
 use gyre_geometry::{Pose, Twist, UncertainMotion, pose};
 use gyre_samples::{WheelDistance, WheelsConfig};
 use nalgebra::{Matrix2, Matrix3, RowVector3, Vector2, Vector3};
 
-/// A scale is as near to 1 as the settings say if it differs by less than four of these, whatever
-/// has been learnt: a difference of variances is rounded.
-const LEAST_LEARNT: f64 = 1e-3;
-/// The time of a drive, s, over which a scale may walk.
-const DRIVE_S: f64 = 3600.0;
+/// Standard deviation by which a scale may differ from 1 in any case: the settings may be of other
+/// tyres.
+const TYRES: f64 = 0.02;
 
 /// The scale of the wheels, and what they were used for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,7 +27,8 @@ pub struct WheelState {
     pub offset_m: f64,
     /// Covariance of the errors of that offset and of the scale.
     pub covariance: Matrix2<f64>,
-    /// The last registered distance was another one than that of the wheels.
+    /// The last registered distance was another one than that of the wheels, or the scale by which
+    /// they agree is none that they can have.
     pub slips: bool,
     /// The distance by the wheels since the last registered scan, m.
     pub dead_m: f64,
@@ -175,9 +174,15 @@ impl WheelState {
         })
     }
 
-    /// Returns whether a registered distance is as far from the measured one as noise can bring it.
+    /// Returns whether a registered distance is as near to the measured one as noise can bring it.
+    /// Wheels that have slipped are to agree by the scale that is known: one that is free to move
+    /// would follow them.
     pub(super) fn agrees(&self, measured: &WheelDistance, registered: &Registered) -> bool {
-        let innovation = self.innovation(measured, registered);
+        let mut state = *self;
+        if self.slips {
+            state.covariance = Matrix2::new(self.covariance[(0, 0)], 0.0, 0.0, 0.0);
+        }
+        let innovation = state.innovation(measured, registered);
         innovation.apart_m.powi(2) <= GATE * innovation.variance_m2
     }
 
@@ -200,8 +205,8 @@ impl WheelState {
     }
 
     /// Compares a registered pose with the measured distance, if there is one: it is another one
-    /// where both disagree, if the match is certain. If the motions together say another scale than
-    /// the settings allow, the wheels have slipped in all of them: it is learnt anew.
+    /// where both disagree, if the match is certain. If the motions together say a scale that the
+    /// wheels cannot have, they have slipped: it is learnt anew.
     pub(super) fn weigh(
         &mut self,
         measured: Option<&WheelDistance>,
@@ -212,7 +217,7 @@ impl WheelState {
         match measured {
             Some(measured) if self.agrees(measured, registered) => {
                 self.correct(measured, registered);
-                if !self.is_scale_of(config) {
+                if is_certain && !self.has_scale_of(config) {
                     *self = Self::new(config);
                     self.adopt(registered, true);
                 }
@@ -224,12 +229,9 @@ impl WheelState {
         }
     }
 
-    /// Returns whether the learnt scale is as near to 1 as the settings say. What it can have moved
-    /// by is what is known of it now and was not before: the difference of both variances.
-    fn is_scale_of(&self, config: &WheelsConfig) -> bool {
-        let before = config.scale_sigma.powi(2) + config.scale_walk_per_sqrt_s.powi(2) * DRIVE_S;
-        let learnt = (before - self.covariance[(1, 1)]).max(LEAST_LEARNT.powi(2));
-        (self.scale - 1.0).powi(2) <= GATE * learnt
+    /// Returns whether wheels with these settings can have the learnt scale.
+    fn has_scale_of(&self, config: &WheelsConfig) -> bool {
+        (self.scale - 1.0).powi(2) <= GATE * config.scale_sigma.max(TYRES).powi(2)
     }
 
     /// Takes a registered distance that agrees with the measured one.

@@ -201,6 +201,17 @@ fn wheels_that_slip_from_the_first_metre_are_noticed_and_their_scale_is_learnt_a
     }
 }
 
+/// A tachometer that shows 11 % too much, which the settings do not say, is not learnt in silence.
+#[test]
+fn wheels_of_another_scale_than_the_settings_allow_slip_again_and_again() {
+    for seed in 0..100 {
+        let mut drive = Drive::new(seed);
+        drive.true_scale = 0.9;
+        let refused = (0..100).filter(|_| !drive.step(2.5)).count();
+        assert!(refused > 30, "{seed}: {refused}");
+    }
+}
+
 #[test]
 fn a_new_map_starts_where_the_last_scan_is() {
     let mut drive = Drive::new(5);
