@@ -74,6 +74,9 @@ impl Earlier {
         // A file of another program is refused in any case.
         let there = match journal::records(&path) {
             Err(JournalError::OtherVersion { .. }) if fresh => true,
+            Err(error @ JournalError::OtherVersion { .. }) => {
+                return Err(format!("{error}, or begin anew with --fresh").into());
+            }
             records => records?.is_some(),
         };
         settle(out)?;

@@ -4,7 +4,7 @@
 
 use std::{ffi::OsStr, fs, path::Path};
 
-use gyre_journal as journal;
+use gyre_journal::{self as journal, JournalError};
 use gyre_messages::flag;
 use gyre_results::{Out, SIMULATED_TRUTH};
 use gyre_run::COMPLETE;
@@ -66,7 +66,11 @@ pub fn is_untouched(out: &Out) -> Result<bool, Failure> {
     if !is_whole(out) {
         return Ok(false);
     }
-    let records = journal::records(&journal::path(out.path()))?;
+    let records = match journal::records(&journal::path(out.path())) {
+        // Another version has begun there.
+        Err(JournalError::OtherVersion { .. }) => return Ok(false),
+        records => records?,
+    };
     let poses = records.into_iter().flatten().filter(|record| {
         let is_end = record.as_ref().is_ok_and(|pose| pose.item.is(flag::END));
         !is_end
@@ -189,6 +193,19 @@ mod tests {
         assert!(!is_untouched(&out).unwrap());
         settle(&out).unwrap();
         assert!(is_kept(&out) && !is_complete(out.path()));
+    }
+
+    #[test]
+    fn a_complete_run_is_not_given_back_where_another_version_has_begun() {
+        let (_folder, out) = being_replaced();
+        compute(&out, 0..1);
+        let path = journal::path(out.path());
+        let mut bytes = fs::read(&path).unwrap();
+        bytes[..16].copy_from_slice(b"gyre journal v9 ");
+        fs::write(&path, bytes).unwrap();
+        assert!(!is_untouched(&out).unwrap());
+        settle(&out).unwrap();
+        assert!(is_kept(&out));
     }
 
     #[test]

@@ -19,7 +19,7 @@ pub enum JournalError {
     },
     /// The file is a journal of another version of Gyre.
     #[error(
-        "{path} is the journal of another version of Gyre: choose another --out, or begin anew with --fresh"
+        "{path} is the journal of another version of Gyre: use that one, or choose another --out"
     )]
     OtherVersion {
         /// The file.

@@ -5,7 +5,7 @@ use gyre_storage::{Checksum, Slots};
 
 /// The start of a journal, with the version of its records.
 pub(crate) const MAGIC: [u8; 16] = *b"gyre journal v11";
-/// The beginning of that of any version.
+/// The prefix of the start of a journal of any version.
 pub(crate) const ANY_VERSION: &[u8] = b"gyre journal v";
 const POSE: usize = size_of::<PoseHeader>();
 /// Bytes of a record: the pose, the number of records before it that were in danger, and a checksum
