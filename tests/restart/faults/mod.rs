@@ -3,7 +3,7 @@
 //! same command resumes to them, or is refused with a sentence.
 //!
 //! One fault of each kind, on a short simulated drive, belongs to the tests of every change, unless
-//! a test of its own has that fault already. All of them, on a real drive with refinement and
+//! another test has that fault too. All of them, on a real drive with refinement and
 //! learned masks:
 //!
 //! ```sh
@@ -70,44 +70,42 @@ macro_rules! kinds {
 }
 
 kinds! {
-    #[ignore = "nightly: a test of its own has this fault"]
+    #[ignore = "nightly: restart::killed_stages has this fault too"]
     a_stage_is_killed: kills::stage, [];
-    #[ignore = "nightly: a test of its own has this fault"]
+    #[ignore = "nightly: restart::killed_stages has this fault too"]
     stages_are_killed_together: kills::several, [];
-    #[ignore = "nightly: a test of its own has this fault"]
+    #[ignore = "nightly: restart::killed_stages has this fault too"]
     a_stage_is_killed_as_it_starts: kills::at_the_start, [];
     a_stage_is_killed_as_it_writes: kills::at_a_write, [];
-    #[ignore = "nightly: a test of its own has this fault"]
     processes_are_killed_in_storms: kills::storms, [];
-    #[ignore = "nightly: a test of its own has this fault"]
+    #[ignore = "nightly: method::pipeline has this fault too"]
     the_supervisor_is_killed: kills::supervisor, [];
     the_supervisor_is_killed_as_it_writes_results: kills::at_the_results, [];
-    #[ignore = "nightly: a test of its own has this fault"]
+    #[ignore = "nightly: method::pipeline has this fault too"]
     the_run_is_interrupted: kills::interrupt, [];
-    #[ignore = "nightly: a test of its own has this fault"]
+    #[ignore = "nightly: operate::commands has this fault too"]
     a_process_stops_for_a_while: stops::for_a_while, [];
-    #[ignore = "nightly: a test of its own has this fault"]
+    #[ignore = "nightly: operate::commands has this fault too"]
     a_stage_stops_for_good: stops::for_good, [];
-    #[ignore = "nightly: a test of its own has this fault"]
     the_disk_is_full: results::disk_full, [Need::Mounts];
     input_and_output_fail: results::io_errors, [Need::Fiu];
     files_may_not_grow: results::file_size_limit, [Need::Prlimit];
     the_results_are_read_only: results::read_only, [Need::Mounts, Need::OtherUser];
     the_results_vanish: results::vanish, [];
-    #[ignore = "nightly: a test of its own has this fault"]
+    #[ignore = "nightly: restart::full_disk has this fault too"]
     nobody_can_be_told: results::full_terminal, [];
     the_recording_has_gaps: input::gaps, [];
     the_recording_vanishes: input::vanishes, [];
     the_clock_is_set: environment::clock_step, [Need::Faketime];
-    #[ignore = "nightly: a test of its own has this fault"]
+    #[ignore = "nightly: restart::shared_memory has this fault too"]
     shared_memory_fills_up: environment::shared_memory_full, [Need::Mounts];
     memory_runs_out: limits::memory, [Need::Prlimit];
     descriptors_run_out: limits::descriptors, [Need::Prlimit];
-    #[ignore = "nightly: a test of its own has this fault"]
+    #[ignore = "nightly: restart::supervisor has this fault too"]
     no_process_can_be_started: limits::processes, [Need::Prlimit, Need::OtherUser];
-    #[ignore = "nightly: a test of its own has this fault"]
+    #[ignore = "nightly: restart::identity has this fault too"]
     the_program_is_replaced: programs::replaced, [];
-    #[ignore = "nightly: a test of its own has this fault"]
+    #[ignore = "nightly: restart::results has this fault too"]
     a_second_run_has_the_same_results: programs::second_run, [Need::Mounts];
 }
 
