@@ -3,8 +3,7 @@
 //! same command resumes to them, or is refused with a sentence.
 //!
 //! One fault of each kind, on a short simulated drive, belongs to the tests of every change, unless
-//! another test has that fault too. All of them, on a real drive with refinement and
-//! learned masks:
+//! another test has that fault too. All of them, on a real drive with refinement and learned masks:
 //!
 //! ```sh
 //! cargo test --release -p gyre --test pipeline on_a_real_drive -- --ignored --nocapture
