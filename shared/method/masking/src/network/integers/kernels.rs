@@ -96,11 +96,12 @@ fn sums<I: Isa>(
     [row, column]: [usize; 2],
 ) -> [I::F32; OUTPUTS] {
     let (ops, stride) = (isa.f32(), from.stride());
+    let wide = ops.len() + 2;
     let mut sums = [ops.zero(); OUTPUTS];
     for (channel, weights) in weights.iter().enumerate() {
         let channel = from.channel(channel);
         for y in 0..3 {
-            let line = &channel[(row + y) * stride + column..][..LANES + 2];
+            let line = &channel[(row + y) * stride + column..][..wide];
             for x in 0..3 {
                 let values = ops.load(&line[x..]);
                 for (sum, weight) in sums.iter_mut().zip(&weights[3 * y + x]) {

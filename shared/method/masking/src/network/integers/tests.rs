@@ -4,7 +4,7 @@ use std::{fs, path::Path};
 
 use ndarray::Array3;
 use rten_onnx::onnx::ModelProto;
-use rten_simd::SimdOp;
+use rten_simd::{SimdOp, isa::GenericIsa};
 
 use super::{
     Integers,
@@ -67,27 +67,41 @@ fn a_convolution_is_the_direct_sum() {
             let block = &mut kernel.weights[output / OUTPUTS * inputs + input];
             block[tap][output % OUTPUTS] = *weight as f32;
         }
-        let mut to = Image::new([outputs, rows, columns]);
-        Convolution {
-            kernel: &kernel,
-            from: &from,
-            to: &mut to,
-        }
-        .dispatch();
-        for output in 0..outputs {
-            for (row, column) in
-                (0..rows as i64).flat_map(|y| (0..columns as i64).map(move |x| (y, x)))
-            {
-                let mut sum = offsets[output];
-                for input in 0..inputs {
-                    for tap in 0..9 {
-                        let value = at(&from, input, row + tap / 3 - 1, column + tap % 3 - 1);
-                        sum += value * weights[(output * inputs + input) * 9 + tap as usize];
-                    }
+        // A direct sum.
+        let expected = |output: usize, row: i64, column: i64| {
+            let mut sum = offsets[output];
+            for input in 0..inputs {
+                for tap in 0..9 {
+                    let value = at(&from, input, row + tap / 3 - 1, column + tap % 3 - 1);
+                    sum += value * weights[(output * inputs + input) * 9 + tap as usize];
                 }
-                let expected = (sum as f64 / 1024.0).round_ties_even() as i64 + 100;
-                let value = at(&to, output, row, column);
-                assert_eq!(value, expected.clamp(0, 255), "{output} {row} {column}");
+            }
+            let expected = (sum as f64 / 1024.0).round_ties_even() as i64 + 100;
+            expected.clamp(0, 255)
+        };
+        // The widest vector unit of this processor, and the narrowest that there is.
+        for is_widest in [true, false] {
+            let mut to = Image::new([outputs, rows, columns]);
+            let convolution = Convolution {
+                kernel: &kernel,
+                from: &from,
+                to: &mut to,
+            };
+            match is_widest {
+                true => convolution.dispatch(),
+                false => convolution.eval(GenericIsa::new()),
+            }
+            for output in 0..outputs {
+                for (row, column) in
+                    (0..rows as i64).flat_map(|y| (0..columns as i64).map(move |x| (y, x)))
+                {
+                    let value = at(&to, output, row, column);
+                    assert_eq!(
+                        value,
+                        expected(output, row, column),
+                        "{output} {row} {column}"
+                    );
+                }
             }
         }
     }
