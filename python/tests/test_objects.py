@@ -1,4 +1,4 @@
-"""`gyre evaluate --objects` against motmetrics, and the table of objects as an array."""
+"""`gyre evaluate --objects` against motmetrics and TrackEval, and the table of objects as an array."""
 
 import json
 import math
@@ -10,6 +10,7 @@ import motmetrics  # type: ignore[import-untyped]
 import numpy as np
 import pytest
 from conftest import gyre_program
+from trackeval.metrics import HOTA  # type: ignore[import-untyped]
 
 SCANS, GATE_M = 40, 4.0
 TRUE = "scan,stamp_ns,object,kind,x_m,y_m,yaw_rad,vx_m_s,vy_m_s,length_m,width_m,visible,counts"
@@ -93,6 +94,33 @@ def judged(scans: list[tuple[Places, Places]]) -> dict[str, float]:
     return dict(motmetrics.metrics.create().compute(accumulator, metrics=names).iloc[0])
 
 
+def hota(scans: list[tuple[Places, Places]]) -> dict[str, float]:
+    """The figures of TrackEval, each the mean over all similarities."""
+    numbers: tuple[dict[int, int], dict[int, int]] = ({}, {})
+    seen: dict[int, int] = {}
+    ids: tuple[list[np.ndarray], list[np.ndarray]] = ([], [])
+    similarities = []
+    for true, found in scans:
+        for number in true:
+            seen[number] = seen.get(number, 0) + 1
+        required = {number: place for number, place in true.items() if seen[number] >= 3}
+        for places, known, listed in zip((required, found), numbers, ids, strict=True):
+            listed.append(np.array([known.setdefault(number, len(known)) for number in places], int))
+        rows = [[max(0.0, 1 - math.dist(a, b) / GATE_M) for b in found.values()] for a in required.values()]
+        similarities.append(np.array(rows).reshape(len(required), len(found)))
+    data = {
+        "num_gt_ids": len(numbers[0]),
+        "num_tracker_ids": len(numbers[1]),
+        "num_gt_dets": sum(map(len, ids[0])),
+        "num_tracker_dets": sum(map(len, ids[1])),
+        "gt_ids": ids[0],
+        "tracker_ids": ids[1],
+        "similarity_scores": similarities,
+    }
+    figures = HOTA().eval_sequence(data)
+    return {name: float(figures[name].mean()) for name in ("HOTA", "DetA", "AssA")}
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_the_figures_are_those_of_motmetrics(seed: int, tmp_path: Path) -> None:
     scans = drawn(seed)
@@ -106,6 +134,19 @@ def test_the_figures_are_those_of_motmetrics(seed: int, tmp_path: Path) -> None:
     assert ours["switches"] == theirs["num_switches"]
     for name in ("mota", "precision", "recall"):
         assert ours[name] == pytest.approx(theirs[name], abs=1e-9)
+    theirs = hota(scans)
+    assert 0.1 < theirs["HOTA"] < 0.9
+    for name, their_name in [("hota", "HOTA"), ("hota_detection", "DetA"), ("hota_association", "AssA")]:
+        assert ours[name] == pytest.approx(theirs[their_name], abs=1e-9)
+    for bands in ("by_range", "by_speed"):
+        assert sum(band["required"] for band in ours[bands]) == ours["required"]
+
+
+def test_figures_by_range_count_a_false_object_in_its_own_band(tmp_path: Path) -> None:
+    scans: list[tuple[Places, Places]] = [({1: (10.0, 0.0), 2: (50.0, 0.0)}, {7: (10.5, 0.0), 8: (30.0, 0.0)})] * 6
+    bands = json.loads(gyre_program("evaluate", "--objects", *write(tmp_path, scans), "--json"))["by_range"]
+    assert [(band["required"], band["recall"], band["precision"]) for band in bands] == [(4, 1, 1), (0, 0, 0), (4, 0, 0)]
+    assert bands[0]["position_rmse_m"] == pytest.approx(0.5)
 
 
 def test_objects_are_read_as_an_array(tmp_path: Path) -> None:

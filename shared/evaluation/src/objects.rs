@@ -8,10 +8,18 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
-use gyre_geometry::wrap_angle;
 use gyre_objects::assign;
 use nalgebra::{Matrix2, Point2, Vector2};
 use serde::Serialize;
+
+mod bands;
+mod hota;
+
+pub use bands::ObjectBand;
+pub use hota::Hota;
+
+use bands::{Band, RANGES_M, SPEEDS_MPS, Sums};
+use hota::Compared;
 
 /// A true object at the time of a scan, in the frame of the sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -101,6 +109,9 @@ pub struct ObjectErrors {
     pub precision: f64,
     /// 1 less misses, false positives and switches over the required ones.
     pub mota: f64,
+    /// How well objects are found and keep their identity, in one figure, and its two parts.
+    #[serde(flatten)]
+    pub hota: Hota,
     /// Switches for each required object.
     pub switches_per_object: f64,
     /// Root mean square of the distance of the centres, m.
@@ -113,6 +124,10 @@ pub struct ObjectErrors {
     /// Mean of the squared error of the velocity by its covariance, over its two dimensions: 1 if
     /// the covariance is right.
     pub velocity_nees: f64,
+    /// The same by range, m.
+    pub by_range: Vec<ObjectBand>,
+    /// The same by speed, m/s.
+    pub by_speed: Vec<ObjectBand>,
 }
 
 impl fmt::Display for ObjectErrors {
@@ -136,12 +151,19 @@ impl fmt::Display for ObjectErrors {
             100.0 * self.precision
         )?;
         writeln!(f, "MOTA          {:.3}", self.mota)?;
+        writeln!(f, "HOTA          {}", self.hota)?;
         let (switches, each) = (self.switches, self.switches_per_object);
         writeln!(f, "ID switches   {switches}, {each:.3} an object")?;
         writeln!(f, "position      {:.2} m RMSE", self.position_rmse_m)?;
         writeln!(f, "velocity      {:.2} m/s RMSE", self.velocity_rmse_mps)?;
         writeln!(f, "heading       {:.1} deg RMSE", self.heading_rmse_deg)?;
-        write!(f, "velocity NEES {:.2}", self.velocity_nees)
+        write!(f, "velocity NEES {:.2}", self.velocity_nees)?;
+        for (bands, unit) in [(&self.by_range, "m"), (&self.by_speed, "m/s")] {
+            for band in bands {
+                write!(f, "\n{}", band.line(unit))?;
+            }
+        }
+        Ok(())
     }
 }
 
@@ -162,15 +184,11 @@ struct Count {
     /// The identity that each true object was last matched by.
     matches: BTreeMap<u64, u64>,
     objects: BTreeMap<u64, ()>,
-    required: usize,
-    matched: usize,
-    false_positives: usize,
     switches: usize,
-    position_m2: f64,
-    moving_pairs: usize,
-    velocity_m2_s2: f64,
-    heading_rad2: f64,
-    nees: f64,
+    all: Sums,
+    by_range: [Sums; RANGES_M.len()],
+    by_speed: [Sums; SPEEDS_MPS.len()],
+    compared: Vec<Compared>,
 }
 
 impl Count {
@@ -183,23 +201,32 @@ impl Count {
             .copied()
             .collect();
         let pairs = self.pairs(&required, &tracked, options.gate_m);
-        for (truth, found) in &pairs {
-            self.add_pair(&required[*truth], &tracked[*found]);
-        }
-        self.required += required.len();
-        self.matched += pairs.len();
-        self.objects
-            .extend(required.iter().map(|truth| (truth.id, ())));
-        let is_excused = |tracked: &TrackedObject| {
-            let range_m = tracked.position.coords.norm();
-            let near = |other: &TrueObject| distance_m(other, tracked) <= options.gate_m;
-            range_m > options.max_range_m || others.iter().any(near)
+        let found_as = |truth: usize| {
+            let pair = pairs.iter().find(|pair| pair.0 == truth)?;
+            Some(&tracked[pair.1])
         };
-        let unmatched =
-            (0..tracked.len()).filter(|found| pairs.iter().all(|pair| pair.1 != *found));
-        self.false_positives += unmatched
-            .filter(|found| !is_excused(&tracked[*found]))
-            .count();
+        for (index, truth) in required.iter().enumerate() {
+            self.add_required(truth, found_as(index));
+        }
+        let is_excused = |tracked: &TrackedObject| {
+            let near = |other: &TrueObject| distance_m(other, tracked) <= options.gate_m;
+            range_m(&tracked.position) > options.max_range_m || others.iter().any(near)
+        };
+        let is_matched = |found: usize| pairs.iter().any(|pair| pair.1 == found);
+        let (matched, rest): (Vec<usize>, Vec<usize>) =
+            (0..tracked.len()).partition(|found| is_matched(*found));
+        let is_false = |found: &usize| !is_excused(&tracked[*found]);
+        let wrong: Vec<usize> = rest.into_iter().filter(is_false).collect();
+        for found in &wrong {
+            self.add_false(&tracked[*found]);
+        }
+        let judged: Vec<&TrackedObject> = [matched, wrong]
+            .concat()
+            .iter()
+            .map(|f| &tracked[*f])
+            .collect();
+        self.compared
+            .push(Compared::new(&required, &judged, options.gate_m));
     }
 
     /// Splits the true objects into those that are required and the others.
@@ -209,7 +236,7 @@ impl Count {
         options: &ObjectOptions,
     ) -> (Vec<TrueObject>, Vec<TrueObject>) {
         let is_required = |truth: &TrueObject| {
-            let is_near = truth.position.coords.norm() <= options.max_range_m;
+            let is_near = range_m(&truth.position) <= options.max_range_m;
             let seen = self.seen.entry(truth.id).or_default();
             *seen += usize::from(is_near && truth.is_seen);
             let speed_mps = truth
@@ -261,46 +288,78 @@ impl Count {
         pairs
     }
 
-    fn add_pair(&mut self, truth: &TrueObject, tracked: &TrackedObject) {
-        let before = self.matches.insert(truth.id, tracked.id);
-        self.switches += usize::from(before.is_some_and(|id| id != tracked.id));
-        self.position_m2 += distance_m(truth, tracked).powi(2);
-        let Some(velocity) = truth.velocity else {
-            return;
-        };
-        let error = tracked.velocity - velocity;
-        let inverse = tracked
-            .velocity_covariance
-            .try_inverse()
-            .unwrap_or_default();
-        self.moving_pairs += 1;
-        self.velocity_m2_s2 += error.norm_squared();
-        self.heading_rad2 += wrap_angle(tracked.yaw_rad - truth.yaw_rad).powi(2);
-        self.nees += (error.transpose() * inverse * error)[0] / 2.0;
+    /// Adds a required object, and what matches it.
+    fn add_required(&mut self, truth: &TrueObject, found: Option<&TrackedObject>) {
+        self.objects.insert(truth.id, ());
+        if let Some(found) = found {
+            let before = self.matches.insert(truth.id, found.id);
+            self.switches += usize::from(before.is_some_and(|id| id != found.id));
+        }
+        let speed_mps = truth.velocity.map(|velocity| velocity.norm());
+        for sums in self.sums_of(range_m(&truth.position), speed_mps) {
+            sums.add(truth, found);
+        }
+    }
+
+    /// Adds a tracked object where nothing is.
+    fn add_false(&mut self, found: &TrackedObject) {
+        let (range_m, speed_mps) = (range_m(&found.position), found.velocity.norm());
+        for sums in self.sums_of(range_m, Some(speed_mps)) {
+            sums.false_positives += 1;
+        }
+    }
+
+    /// Returns the sums that an object at a range and of a speed counts in.
+    fn sums_of(&mut self, range_m: f64, speed_mps: Option<f64>) -> impl Iterator<Item = &mut Sums> {
+        let by_range = RANGES_M.iter().position(|band| band.contains(range_m));
+        let speed_of = |mps| SPEEDS_MPS.iter().position(|band| band.contains(mps));
+        let by_speed = speed_mps.and_then(speed_of);
+        std::iter::once(&mut self.all)
+            .chain(by_range.map(|band| &mut self.by_range[band]))
+            .chain(by_speed.map(|band| &mut self.by_speed[band]))
     }
 
     fn errors(&self, scans: usize) -> ObjectErrors {
-        let share = |part: f64, whole: usize| part / whole.max(1) as f64;
-        let missed = self.required - self.matched;
-        let wrong = missed + self.false_positives + self.switches;
-        let rmse = |sum: f64, count: usize| share(sum, count).sqrt();
+        let Sums {
+            required,
+            matched,
+            false_positives,
+            ..
+        } = self.all;
+        let wrong = required - matched + false_positives + self.switches;
+        let by = |bands: &[Band], sums: &[Sums]| -> Vec<ObjectBand> {
+            let both = bands.iter().zip(sums);
+            both.map(|(band, sums)| sums.in_band(band)).collect()
+        };
         ObjectErrors {
             scans,
             objects: self.objects.len(),
-            required: self.required,
-            matched: self.matched,
-            false_positives: self.false_positives,
+            required,
+            matched,
+            false_positives,
             switches: self.switches,
-            recall: share(self.matched as f64, self.required),
-            precision: share(self.matched as f64, self.matched + self.false_positives),
-            mota: 1.0 - share(wrong as f64, self.required),
+            recall: self.all.recall(),
+            precision: self.all.precision(),
+            mota: 1.0 - share(wrong as f64, required),
+            hota: Hota::of(&self.compared),
             switches_per_object: share(self.switches as f64, self.objects.len()),
-            position_rmse_m: rmse(self.position_m2, self.matched),
-            velocity_rmse_mps: rmse(self.velocity_m2_s2, self.moving_pairs),
-            heading_rmse_deg: rmse(self.heading_rad2, self.moving_pairs).to_degrees(),
-            velocity_nees: share(self.nees, self.moving_pairs),
+            position_rmse_m: self.all.position_rmse_m(),
+            velocity_rmse_mps: self.all.velocity_rmse_mps(),
+            heading_rmse_deg: self.all.heading_rmse_deg(),
+            velocity_nees: self.all.velocity_nees(),
+            by_range: by(&RANGES_M, &self.by_range),
+            by_speed: by(&SPEEDS_MPS, &self.by_speed),
         }
     }
+}
+
+/// Returns a part of a whole; 0 of nothing.
+fn share(part: f64, whole: usize) -> f64 {
+    part / whole.max(1) as f64
+}
+
+fn range_m(position: &Point2<f64>) -> f64 {
+    position.coords.norm()
 }
 
 fn distance_m(truth: &TrueObject, tracked: &TrackedObject) -> f64 {

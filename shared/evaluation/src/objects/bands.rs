@@ -1,0 +1,140 @@
+//! Sums over pairs of true and tracked objects, of all and of bands of range and speed.
+
+use gyre_geometry::wrap_angle;
+use serde::Serialize;
+
+use super::{TrackedObject, TrueObject, distance_m, share};
+
+/// A band of range, m, or speed, m/s: from the first up to the second.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Band(f64, f64);
+
+/// Bands of range, m: where a beam of 1.8 degrees is narrower than a car is wide, as wide, and as
+/// wide as a lane.
+pub(super) const RANGES_M: [Band; 3] =
+    [Band(0.0, 20.0), Band(20.0, 40.0), Band(40.0, f64::INFINITY)];
+/// Bands of speed, m/s: walking pace to a turn, a town, a road.
+pub(super) const SPEEDS_MPS: [Band; 3] =
+    [Band(0.0, 5.0), Band(5.0, 10.0), Band(10.0, f64::INFINITY)];
+
+impl Band {
+    /// Returns whether a value is in it.
+    pub fn contains(&self, value: f64) -> bool {
+        (self.0..self.1).contains(&value)
+    }
+}
+
+/// The figures of the objects in a band of range or speed. False positives count in the band of
+/// the tracked object, the others in that of the true one.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ObjectBand {
+    /// The lower bound, m or m/s.
+    pub from: f64,
+    /// The upper bound, m or m/s; `None`: there is none.
+    pub to: Option<f64>,
+    /// Required objects, once for each scan.
+    pub required: usize,
+    /// Share of them that were matched.
+    pub recall: f64,
+    /// Share of the tracked ones that were matched.
+    pub precision: f64,
+    /// Root mean square of the distance of the centres, m.
+    pub position_rmse_m: f64,
+    /// Root mean square of the difference of the velocities, m/s.
+    pub velocity_rmse_mps: f64,
+    /// Root mean square of the difference of the headings, degrees.
+    pub heading_rmse_deg: f64,
+}
+
+impl ObjectBand {
+    /// Returns the figures in a line.
+    pub(super) fn line(&self, unit: &str) -> String {
+        let band = match self.to {
+            Some(to) => format!("{} to {to} {unit}", self.from),
+            None => format!("from {} {unit}", self.from),
+        };
+        format!(
+            "{band:<13} recall {:.1} %, precision {:.1} %, {:.2} m, {:.2} m/s, {:.1} deg, of {}",
+            100.0 * self.recall,
+            100.0 * self.precision,
+            self.position_rmse_m,
+            self.velocity_rmse_mps,
+            self.heading_rmse_deg,
+            self.required
+        )
+    }
+}
+
+/// Sums over required objects.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Sums {
+    pub required: usize,
+    pub matched: usize,
+    pub false_positives: usize,
+    position_m2: f64,
+    /// Pairs whose true velocity is known.
+    moving_pairs: usize,
+    velocity_m2_s2: f64,
+    heading_rad2: f64,
+    nees: f64,
+}
+
+impl Sums {
+    /// Adds a required object, and what matches it.
+    pub fn add(&mut self, truth: &TrueObject, found: Option<&TrackedObject>) {
+        self.required += 1;
+        let Some(found) = found else {
+            return;
+        };
+        self.matched += 1;
+        self.position_m2 += distance_m(truth, found).powi(2);
+        let Some(velocity) = truth.velocity else {
+            return;
+        };
+        let error = found.velocity - velocity;
+        let inverse = found.velocity_covariance.try_inverse().unwrap_or_default();
+        self.moving_pairs += 1;
+        self.velocity_m2_s2 += error.norm_squared();
+        self.heading_rad2 += wrap_angle(found.yaw_rad - truth.yaw_rad).powi(2);
+        self.nees += (error.transpose() * inverse * error)[0] / 2.0;
+    }
+
+    pub fn recall(&self) -> f64 {
+        share(self.matched as f64, self.required)
+    }
+
+    pub fn precision(&self) -> f64 {
+        share(self.matched as f64, self.matched + self.false_positives)
+    }
+
+    pub fn position_rmse_m(&self) -> f64 {
+        share(self.position_m2, self.matched).sqrt()
+    }
+
+    pub fn velocity_rmse_mps(&self) -> f64 {
+        share(self.velocity_m2_s2, self.moving_pairs).sqrt()
+    }
+
+    pub fn heading_rmse_deg(&self) -> f64 {
+        let squares_rad2 = share(self.heading_rad2, self.moving_pairs);
+        squares_rad2.sqrt().to_degrees()
+    }
+
+    pub fn velocity_nees(&self) -> f64 {
+        share(self.nees, self.moving_pairs)
+    }
+
+    /// Returns the figures of a band whose sums they are.
+    pub fn in_band(&self, band: &Band) -> ObjectBand {
+        ObjectBand {
+            from: band.0,
+            to: Some(band.1).filter(|bound| bound.is_finite()),
+            required: self.required,
+            recall: self.recall(),
+            precision: self.precision(),
+            position_rmse_m: self.position_rmse_m(),
+            velocity_rmse_mps: self.velocity_rmse_mps(),
+            heading_rmse_deg: self.heading_rmse_deg(),
+        }
+    }
+}
