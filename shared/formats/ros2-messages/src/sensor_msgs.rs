@@ -1,4 +1,4 @@
-//! `sensor_msgs`: images, and what an inertial sensor measures.
+//! `sensor_msgs`: images, and what an inertial sensor and a GNSS receiver measure.
 
 use gyre_samples::{Sample, SampleKind};
 use serde::{Deserialize, Serialize};
@@ -79,5 +79,66 @@ impl Imu {
             values: [turn.x, turn.y, turn.z, along.x, along.y, along.z],
         };
         (self.angular_velocity_covariance[0] != NOT_MEASURED).then_some(sample)
+    }
+}
+
+/// The kind of a fix of a GNSS receiver, and the systems that it is of.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct NavSatStatus {
+    /// 0 for a fix, 1 and 2 for one that is augmented by satellites or on the ground; below 0
+    /// without a fix.
+    pub status: i8,
+    /// The systems, a bit each: GPS, GLONASS, BeiDou, Galileo.
+    pub service: u16,
+}
+message!(
+    NavSatStatus,
+    "sensor_msgs",
+    "int8 status\nuint16 service\n",
+    []
+);
+
+/// A fix of a GNSS receiver on the ellipsoid of WGS 84.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct NavSatFix {
+    /// Time, and the frame of the antenna.
+    pub header: Header,
+    /// The kind of the fix.
+    pub status: NavSatStatus,
+    /// Latitude, degrees.
+    pub latitude: f64,
+    /// Longitude, degrees.
+    pub longitude: f64,
+    /// Altitude above the ellipsoid, m; NaN where it is not known.
+    pub altitude: f64,
+    /// Covariance along east, north and up, by rows, m².
+    pub position_covariance: [f64; 9],
+    /// 0 if the covariance is not known; 1 to 3 for an approximation, its diagonal, all of it.
+    pub position_covariance_type: u8,
+}
+message!(
+    NavSatFix,
+    "sensor_msgs",
+    "std_msgs/Header header\nsensor_msgs/NavSatStatus status\nfloat64 latitude\nfloat64 longitude\n\
+     float64 altitude\nfloat64[9] position_covariance\nuint8 position_covariance_type\n",
+    [Header, NavSatStatus]
+);
+
+/// The least status of a fix.
+const FIX: i8 = 0;
+/// The type of a covariance that is not known.
+const COVARIANCE_UNKNOWN: u8 = 0;
+
+impl NavSatFix {
+    /// Returns whether the receiver had a fix.
+    pub fn has_fix(&self) -> bool {
+        self.status.status >= FIX
+    }
+
+    /// Returns the variances along east and north, m²; `None` where the receiver does not know
+    /// them.
+    pub fn variances_m2(&self) -> Option<[f64; 2]> {
+        let variances = [0, 4].map(|at| self.position_covariance[at]);
+        (self.position_covariance_type != COVARIANCE_UNKNOWN).then_some(variances)
     }
 }

@@ -7,7 +7,7 @@ use gyre_ros2_messages::{
     geometry_msgs::{Quaternion, TransformStamped},
     nav_msgs::{OccupancyGrid, Odometry},
     navtech_msgs::{RadarBScanMsg, RadarConfigurationMsg, RadarFftDataMsg},
-    sensor_msgs::Imu,
+    sensor_msgs::{Imu, NavSatFix},
     std_msgs::Header,
     tf2_msgs::TFMessage,
 };
@@ -179,12 +179,16 @@ const IMU: &str = "\
     0000144000000000000018400000000000001c400000000000002040\
 ";
 
+fn bytes_of(hexadecimal: &str) -> Vec<u8> {
+    (0..hexadecimal.len())
+        .step_by(2)
+        .map(|at| u8::from_str_radix(&hexadecimal[at..at + 2], 16).unwrap())
+        .collect()
+}
+
 #[test]
 fn an_imu_of_another_writer_is_read_and_written_alike() {
-    let bytes: Vec<u8> = (0..IMU.len())
-        .step_by(2)
-        .map(|at| u8::from_str_radix(&IMU[at..at + 2], 16).unwrap())
-        .collect();
+    let bytes = bytes_of(IMU);
     let imu: Imu = decode(&bytes).unwrap();
     assert_eq!(imu.header, Header::new(1_549_986_608_000_000_007, "imu"));
     assert_eq!(imu.orientation, Quaternion::default());
@@ -195,4 +199,37 @@ fn an_imu_of_another_writer_is_read_and_written_alike() {
     assert_eq!([along.x, along.y, along.z], [0.5, 0.0, 9.8]);
     assert_eq!(imu.linear_acceleration_covariance[8], 8.0);
     assert_eq!(encode(&imu).unwrap(), bytes);
+}
+
+/// A fix of a GNSS receiver, as rosbags 0.11.9 serialises it.
+const FIX: &str = "\
+    0001000030eb625c0700000005000000676e7373000209000000000000000000\
+    00e04940295c8fc2f528f4bf0000000000205040000000000000104000000000\
+    0000d03f000000000000e03f000000000000d03f000000000000224000000000\
+    0000e83f000000000000e03f000000000000e83f000000000000304003\
+";
+
+#[test]
+fn a_fix_of_another_writer_is_read_and_written_alike() {
+    let bytes = bytes_of(FIX);
+    let fix: NavSatFix = decode(&bytes).unwrap();
+    assert_eq!(fix.header, Header::new(1_549_986_608_000_000_007, "gnss"));
+    assert_eq!((fix.status.status, fix.status.service), (2, 9));
+    let place = [fix.latitude, fix.longitude, fix.altitude];
+    assert_eq!(place, [51.75, -1.26, 64.5]);
+    assert_eq!(fix.variances_m2(), Some([4.0, 9.0]));
+    assert_eq!(fix.position_covariance_type, 3);
+    assert_eq!(encode(&fix).unwrap(), bytes);
+}
+
+#[test]
+fn a_receiver_without_a_fix_or_an_accuracy_says_so() {
+    let mut fix: NavSatFix = decode(&bytes_of(FIX)).unwrap();
+    // Not yet set, none, and the kinds of fixes.
+    for (status, has_fix) in [(-2, false), (-1, false), (0, true), (1, true), (2, true)] {
+        fix.status.status = status;
+        assert_eq!(fix.has_fix(), has_fix, "{status}");
+    }
+    fix.position_covariance_type = 0;
+    assert_eq!(fix.variances_m2(), None);
 }
