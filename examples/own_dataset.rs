@@ -121,7 +121,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (dataset, options) = (RawSweeps::open(folder)?, DatasetOptions::default());
     eprintln!(
         "{}",
-        inspect_dataset(folder, Box::new(dataset), &options, None)
+        inspect_dataset(folder, Box::new(dataset), &options, None, None)
     );
     let trajectory = drive(&mut RawSweeps::open(folder)?)?;
     Ok(write_tum(&trajectory, &mut io::stdout().lock())?)

@@ -17,14 +17,17 @@ pub fn inspect(
     trajectory: Option<&Bound<'_, Trajectory>>,
     config: Option<&Bound<'_, Config>>,
 ) -> PyResult<Report> {
-    let (options, trajectory) = (
-        Config::method(config).dataset,
-        trajectory.map(|it| &it.get().0),
-    );
+    let method = Config::method(config);
+    let (options, topic) = (method.dataset, method.gnss.topic);
+    let trajectory = trajectory.map(|it| &it.get().0);
     let report = py.detach(|| {
         let dataset = gyre_recording::open(&data, &options)?;
         Ok(gyre_datasets::inspect_dataset(
-            &data, dataset, &options, trajectory,
+            &data,
+            dataset,
+            &options,
+            topic.as_deref(),
+            trajectory,
         ))
     });
     report.map(Report).map_err(errors::open)

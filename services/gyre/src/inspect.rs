@@ -25,15 +25,15 @@ pub fn inspect(arguments: &InspectArguments) -> Result<ExitCode, Failure> {
         Some(named) => gyre_inputs::configuration(named, set)?,
         None => Configuration::of_overrides(set)?,
     };
-    let (path, options) = (
-        given.data.unwrap_or(configuration.source.data),
-        configuration.dataset,
-    );
+    let path = given.data.unwrap_or(configuration.source.data);
+    let options = configuration.dataset;
     if path.as_os_str().is_empty() {
         return Err("name the recording to inspect: a folder, NAME.mcap or a bag of ROS 2".into());
     }
     let dataset = gyre_recording::open(&path, &options)?;
-    let report = gyre_datasets::inspect_dataset(&path, dataset, &options, trajectory.as_ref());
+    let topic = configuration.gnss.topic.as_deref();
+    let report =
+        gyre_datasets::inspect_dataset(&path, dataset, &options, topic, trajectory.as_ref());
     match arguments.json {
         true => print::line(serde_json::to_string_pretty(&report)?)?,
         false => print::values(report)?,

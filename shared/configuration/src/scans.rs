@@ -150,7 +150,7 @@ pub fn gnss_log(configuration: &Configuration) -> Result<Option<GnssLog>, Source
     let is_in_folder = configuration.streamed().is_none() && !data.as_os_str().is_empty();
     match config.kind == GnssKind::Auto && !is_in_folder {
         true => Err(SourceError::NoGnss),
-        false => Ok(GnssLog::open(config, data)?),
+        false => Ok(gyre_recording::gnss_log(config, data)?),
     }
 }
 

@@ -10,7 +10,6 @@
 
 use std::path::PathBuf;
 
-use gyre_datasets::GnssLog;
 use gyre_geometry::{UncertainMotion, covariance, xy_yaw};
 use gyre_messages::{Correction, CorrectionHeader, Item};
 use gyre_run::SourceConfig;
@@ -44,7 +43,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
 fn fixes(launch: &Launch) -> Result<Fixes, StageError> {
     let config: GnssConfig = launch.section("gnss")?;
     let source: SourceConfig = launch.section("source")?;
-    let log = GnssLog::open(&config, &source.data).map_err(input)?;
+    let log = gyre_recording::gnss_log(&config, &source.data).map_err(input)?;
     let fixes = log.map(|log| log.on_radar(&config)).unwrap_or_default();
     Ok(Fixes::new(fixes, &config))
 }

@@ -4,24 +4,27 @@
 //! A bag is a file of the MCAP profile `ros2`, or a folder of such files with a `metadata.yaml`.
 //! Reading order: `files` (what is a bag), `order` (of its files), [`damaged`] (MCAP records from
 //! damaged files), `spans` (where messages are), `topics` (which of them are a radar's), `azimuths`
-//! (messages as azimuths), `bag` (its files as one), `scans` (azimuths as scans), `samples` (of
-//! gyro and wheels), [`BagWriter`].
+//! (messages as azimuths), `bag` (its files as one), `scans` (azimuths as scans), `sensors` (others
+//! than the radar), `samples` (of gyro and wheels), [`fixes()`] (of GNSS), [`BagWriter`].
 
 mod azimuths;
 mod bag;
 pub mod damaged;
 mod error;
 mod files;
+mod fixes;
 mod order;
 mod radar;
 mod reading;
 mod samples;
 mod scans;
+mod sensors;
 mod spans;
 mod topics;
 mod writer;
 
 pub use error::BagError;
 pub use files::is_bag;
+pub use fixes::fixes;
 pub use scans::{open, reopen};
 pub use writer::{BagWriter, Kept, Topic};

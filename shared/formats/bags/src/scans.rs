@@ -11,13 +11,14 @@ use gyre_datasets::{
     OpenError, ReadError, turn_ns,
 };
 use gyre_radar::{ScanLimits, ScanSlot, SweepGeometry};
-use gyre_samples::{Sample, SampleKind};
+use gyre_samples::{BagFixes, Sample, SampleKind};
 
 use crate::{
     BagError,
     azimuths::{Described, azimuths},
     bag::Bag,
     files::files,
+    fixes,
     reading::Message,
     samples,
     topics::Topics,
@@ -262,6 +263,10 @@ impl Dataset for Scans {
         topic: Option<&str>,
     ) -> Result<Option<Vec<Sample>>, OpenError> {
         Ok(samples::read(&mut self.bag, &self.path, of, topic)?)
+    }
+
+    fn fixes(&mut self, topic: Option<&str>) -> Result<Option<BagFixes>, OpenError> {
+        Ok(fixes::read(&mut self.bag, &self.path, topic)?)
     }
 
     fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError> {

@@ -34,7 +34,7 @@ mod transposed;
 use std::{ops::Range, path::Path};
 
 use gyre_radar::scan::{ScanLimits, ScanSlot, SweepGeometry};
-use gyre_samples::{Sample, SampleKind};
+use gyre_samples::{BagFixes, Sample, SampleKind};
 
 pub use eccentricity::correct_eccentricity;
 pub use encoder::{EncoderTurn, FIRST_TURNS, encoder_counts};
@@ -138,6 +138,16 @@ pub trait Dataset: Send {
         topic: Option<&str>,
     ) -> Result<Option<Vec<Sample>>, OpenError> {
         let _ = (of, topic);
+        Ok(None)
+    }
+
+    /// Reads the fixes of a GNSS receiver that the recording itself has, on the topic of this name,
+    /// else on the only one. `None` without one.
+    ///
+    /// # Errors
+    /// No such topic, several without a name, or fixes that cannot be read.
+    fn fixes(&mut self, topic: Option<&str>) -> Result<Option<BagFixes>, OpenError> {
+        let _ = topic;
         Ok(None)
     }
 

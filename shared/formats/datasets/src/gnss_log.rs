@@ -1,4 +1,4 @@
-//! The log of a GNSS receiver as a file.
+//! The log of a GNSS receiver as a file, or in a bag.
 //!
 //! - [`GnssLog`]: where it lies beside the scans of a dataset, and how it is read;
 //! - `table`: tables as CSV; `radiate`: the files of RADIATE, one for each fix;
@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 pub use error::GnssLogError;
 pub use faults::GnssFaults;
 
-use gyre_samples::{Geographic, GnssConfig, GnssFix, GnssKind, LocalPlane};
+use gyre_samples::{BagFixes, GnssConfig, GnssFix, LocalPlane, RawFix};
 
 use crate::{gps_imu_twist::has_list, gyro_log::roots};
 
@@ -43,8 +43,10 @@ pub struct GnssLog {
     pub plane: Option<LocalPlane>,
     /// Faults of the log, with the number of fixes that were left out for each.
     pub faults: GnssFaults,
-    /// The file, or the folder of files.
+    /// The file, the folder of files, or the bag.
     pub path: PathBuf,
+    /// The topic in the bag; `None` of a file.
+    pub topic: Option<String>,
 }
 
 /// A fix as it was logged.
@@ -68,7 +70,23 @@ impl GnssLog {
             true => radiate::read(path)?,
             false => table::read(path)?,
         };
-        Self::of(raw, path)
+        Self::examined(raw, path)
+    }
+
+    /// Takes the fixes of this bag.
+    ///
+    /// # Errors
+    /// No usable fix.
+    pub fn of(fixes: BagFixes, bag: &Path) -> Result<Self, GnssLogError> {
+        let raw = Raw {
+            rows: fixes.fixes,
+            without_fix: fixes.without_fix,
+            ..Raw::default()
+        };
+        Ok(Self {
+            topic: Some(fixes.topic),
+            ..Self::examined(raw, bag)?
+        })
     }
 
     /// Returns the log that lies beside the scans of a dataset, which may also be named by the
@@ -90,19 +108,6 @@ impl GnssLog {
             })
     }
 
-    /// Opens what the section `[gnss]` names for the dataset in this folder; `None` without one.
-    ///
-    /// # Errors
-    /// No log beside the scans, or one that cannot be read.
-    pub fn open(config: &GnssConfig, folder: &Path) -> Result<Option<Self>, GnssLogError> {
-        let path = match config.kind {
-            GnssKind::None => return Ok(None),
-            GnssKind::Auto => Self::find(folder)?,
-            GnssKind::Log => config.file.clone().unwrap_or_default(),
-        };
-        Self::read(&path).map(Some)
-    }
-
     /// Returns the fixes on the radar's clock, with the configured uncertainty where the log has
     /// none.
     pub fn on_radar(&self, config: &GnssConfig) -> Vec<GnssFix> {
@@ -116,7 +121,7 @@ impl GnssLog {
         fixes.collect()
     }
 
-    fn of(raw: Raw, path: &Path) -> Result<Self, GnssLogError> {
+    fn examined(raw: Raw, path: &Path) -> Result<Self, GnssLogError> {
         let (fixes, plane, faults) =
             faults::examine(raw).map_err(|reason| GnssLogError::Unusable {
                 path: path.to_owned(),
@@ -127,6 +132,7 @@ impl GnssLog {
             plane,
             faults,
             path: path.to_owned(),
+            topic: None,
         })
     }
 }
@@ -140,27 +146,8 @@ struct Raw {
     /// Rows that are none of the table, and the line of the first.
     unreadable: usize,
     first_unreadable: usize,
-}
-
-/// A row of a log.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct RawFix {
-    stamp_ns: i64,
-    /// Latitude and longitude, degrees; or m east and north.
-    at: [f64; 2],
-    /// Altitude above the ellipsoid, m; 0 where the log has none.
-    altitude_m: f64,
-    /// Standard deviation of a coordinate, m; not above zero where the log has none.
-    sigma_m: f64,
-}
-
-impl RawFix {
-    fn geographic(&self) -> Geographic {
-        Geographic {
-            latitude_deg: self.at[0],
-            longitude_deg: self.at[1],
-        }
-    }
+    /// Messages in which the receiver had no fix.
+    without_fix: usize,
 }
 
 impl Raw {

@@ -78,7 +78,7 @@ pub struct Report {
     pub gyro: Option<GyroReport>,
     /// The log of the wheels beside the scans.
     pub wheels: Option<WheelReport>,
-    /// The log of a GNSS receiver beside the scans.
+    /// The fixes of a GNSS receiver in the bag, else its log beside the scans.
     pub gnss: Option<GnssReport>,
     /// Observations of the reader and faults: whole sentences.
     pub findings: Vec<String>,
@@ -108,14 +108,16 @@ pub fn inspect(
     trajectory: Option<&Trajectory>,
 ) -> Result<Report, OpenError> {
     let dataset = open(root, options)?;
-    Ok(inspect_dataset(root, dataset, options, trajectory))
+    Ok(inspect_dataset(root, dataset, options, None, trajectory))
 }
 
-/// Examines an open dataset, which was opened at `root` with `options`.
+/// Examines an open dataset, which was opened at `root` with `options`. The fixes of GNSS in a bag
+/// are those on this topic, else on the only one.
 pub fn inspect_dataset(
     root: &Path,
     mut dataset: Box<dyn Dataset>,
     options: &DatasetOptions,
+    gnss_topic: Option<&str>,
     trajectory: Option<&Trajectory>,
 ) -> Report {
     let timing = timing::examine(dataset.as_ref());
@@ -124,7 +126,7 @@ pub fn inspect_dataset(
     report.ground_truths = ground_truth::examine(root, dataset.as_ref(), trajectory);
     report.gyro = gyro::examine(root, report.timing.as_ref());
     report.wheels = wheels::examine(root, report.timing.as_ref());
-    report.gnss = gnss::examine(root, report.timing.as_ref());
+    report.gnss = gnss::examine(root, dataset.as_mut(), gnss_topic, report.timing.as_ref());
     report.findings = findings::list(&report, dataset.notes(), options);
     report
 }

@@ -21,13 +21,15 @@
 //!
 //! Reading order: `head` and `table` (the metadata), `writer`, `split` and `ledger` (several
 //! files), `walk` (the records of a file), `recording`, `generations`, `scans` (a
-//! [`Dataset`](gyre_datasets::Dataset)).
+//! [`Dataset`](gyre_datasets::Dataset)), [`open()`] and [`gnss_log`] (what a source plays, of
+//! whatever form).
 
 mod chunk;
 mod disk;
 mod early_lines;
 mod error;
 mod generations;
+mod gnss;
 mod head;
 pub mod image;
 mod ledger;
@@ -44,6 +46,7 @@ mod walk;
 mod writer;
 
 pub use error::RecordingError;
+pub use gnss::gnss_log;
 pub use head::Head;
 pub use ledger::{Begun, Ledger};
 pub use open::{is_recording, open, open_recording, open_resolved, reopen, stored_options};

@@ -53,7 +53,7 @@ fn an_own_dataset_is_registered_and_inspected() {
     fs::write(damaged.unwrap().path(), "too short").unwrap();
     let dataset = Box::new(RawSweeps::open(folder.path()).unwrap());
     let options = DatasetOptions::default();
-    let report = inspect_dataset(folder.path(), dataset, &options, None).to_string();
+    let report = inspect_dataset(folder.path(), dataset, &options, None, None).to_string();
     assert!(
         report.contains("other") && report.contains("has 9 bytes"),
         "{report}"

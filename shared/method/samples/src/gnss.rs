@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use crate::{SampleConfigError, bounds::Bounds};
+use crate::{Geographic, SampleConfigError, bounds::Bounds};
 
 /// Configuration of GNSS: section `[gnss]`.
 ///
@@ -18,6 +18,10 @@ pub struct GnssConfig {
     /// The log, for `kind = "log"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
+    /// The topic of the fixes in a bag of ROS 2, of the type `sensor_msgs/msg/NavSatFix`, for `kind
+    /// = "auto"`. Default: the only one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub topic: Option<String>,
     /// Time by which the stamps of the fixes are late against the radar's, s: it is taken off them.
     pub late_s: f64,
     /// The antenna in the frame of the radar: x forward, y left, m.
@@ -37,7 +41,8 @@ pub enum GnssKind {
     /// None.
     #[default]
     None,
-    /// The log that lies beside the scans; without one it is an error.
+    /// The fixes in a bag of ROS 2, else the log that lies beside the scans; without either it is
+    /// an error.
     Auto,
     /// The log that `file` names.
     Log,
@@ -50,6 +55,7 @@ impl Default for GnssConfig {
         Self {
             kind: GnssKind::None,
             file: None,
+            topic: None,
             late_s: 0.0,
             lever_m: [0.0, 0.0],
             sigma_m: 2.0,
@@ -92,4 +98,43 @@ pub struct GnssFix {
     pub north_m: f64,
     /// Standard deviation along each of both axes, m.
     pub sigma_m: f64,
+}
+
+/// A fix as it was logged, whatever it says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RawFix {
+    /// Time on the receiver's clock, ns since 1970.
+    pub stamp_ns: i64,
+    /// Latitude and longitude, degrees; or m east and north.
+    pub at: [f64; 2],
+    /// Altitude above the ellipsoid, m; 0 where the log has none.
+    pub altitude_m: f64,
+    /// Standard deviation along each of both axes, m; not above zero where the log has none.
+    pub sigma_m: f64,
+}
+
+impl RawFix {
+    /// Returns the place, of a fix in degrees.
+    pub fn geographic(&self) -> Geographic {
+        Geographic {
+            latitude_deg: self.at[0],
+            longitude_deg: self.at[1],
+        }
+    }
+
+    /// Returns the standard deviation along each of both axes with these variances along them, m².
+    pub fn sigma_of([east_m2, north_m2]: [f64; 2]) -> f64 {
+        (0.5 * (east_m2 + north_m2)).sqrt()
+    }
+}
+
+/// The fixes in a bag of ROS 2, in degrees.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BagFixes {
+    /// The topic of their messages.
+    pub topic: String,
+    /// The fixes in the order of the bag.
+    pub fixes: Vec<RawFix>,
+    /// Messages in which the receiver had no fix.
+    pub without_fix: usize,
 }

@@ -34,7 +34,7 @@ pub use bounds::SampleConfigError;
 pub use config::{GyroConfig, GyroKind, UpAxis};
 pub use doppler::{DopplerConfig, DopplerKind, DopplerVelocity, DopplerWay};
 pub use geodesy::{Geographic, LocalPlane};
-pub use gnss::{GnssConfig, GnssFix, GnssKind};
+pub use gnss::{BagFixes, GnssConfig, GnssFix, GnssKind, RawFix};
 pub use gyro::{Gyro, GyroTurn, with_yaw_rate};
 pub use integral::interval_of;
 pub use live::{LiveSamples, LiveSensor};

@@ -38,7 +38,7 @@ pub enum SampleKind {
 
 impl SampleKind {
     /// Returns the name of its section in configurations.
-    pub fn section(self) -> &'static str {
+    pub const fn section(self) -> &'static str {
         match self {
             Self::Gyro => "gyro",
             Self::Wheels => "wheels",

@@ -15,8 +15,11 @@ const LEAST_WEIGHT: f64 = 0.25;
 /// The fixes of GNSS in the summary, and the place of the run on the earth.
 #[derive(Debug, Serialize)]
 pub struct GnssSummary {
-    /// The log.
+    /// The log, or the bag.
     log: String,
+    /// The topic in the bag.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    topic: Option<String>,
     /// Fixes of the log without those of its faults.
     fixes: usize,
     /// The faults of the log.
@@ -106,6 +109,7 @@ impl GnssSummary {
         let counts = fixes.counts();
         Ok(Self {
             log: log.path.display().to_string(),
+            topic: log.topic.clone(),
             fixes: log.fixes.len(),
             faults: log.faults.clone(),
             outside: counts.outside,
@@ -139,7 +143,7 @@ impl fmt::Display for GnssSummary {
             write!(f, "; they lie {rms_m:.2} m rms from the trajectory")?;
         }
         for (count, what) in self.faults.named() {
-            write!(f, "\n              {count} rows of the log {what}")?;
+            write!(f, "\n              {count} entries of the log {what}")?;
         }
         if let (Some(origin), Some(east_north)) = (&self.origin, &self.east_north) {
             let across_m = east_north.east_sigma_m.max(east_north.north_sigma_m);

@@ -4,6 +4,7 @@
 mod damage;
 mod drivers;
 mod encoders;
+mod fixes;
 mod order;
 mod samples;
 

@@ -40,7 +40,25 @@ pub enum GnssLogError {
         /// The finding, and the remedy.
         reason: String,
     },
-    /// The list of the times of RADIATE's files.
+    /// No fixes in a bag, and no log beside it.
+    #[error(
+        "the bag {bag} has no messages of sensor_msgs/msg/NavSatFix, and no log of a GNSS receiver lies beside it: name one with gnss.kind = \"log\" and gnss.file, or set gnss.kind = \"none\""
+    )]
+    NoneInBag {
+        /// The bag.
+        bag: PathBuf,
+    },
+    /// A topic of scans that are in no bag.
+    #[error(
+        "gnss.topic is {topic}, but {data} is no bag of ROS 2: remove it, and the log beside the scans is used"
+    )]
+    NoBag {
+        /// The topic.
+        topic: String,
+        /// The scans.
+        data: PathBuf,
+    },
+    /// A bag, or the list of the times of RADIATE's files.
     #[error(transparent)]
-    List(#[from] OpenError),
+    Open(#[from] OpenError),
 }

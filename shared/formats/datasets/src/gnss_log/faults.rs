@@ -1,9 +1,9 @@
 //! Faults of the fixes of a log, and which fixes are left out.
 
-use gyre_samples::LocalPlane;
+use gyre_samples::{LocalPlane, RawFix};
 use serde::Serialize;
 
-use super::{LoggedFix, Raw, RawFix};
+use super::{LoggedFix, Raw};
 use crate::stretches::{between, longest_chain};
 
 /// No vehicle that carries a spinning radar is faster, m/s.
@@ -23,6 +23,8 @@ pub struct GnssFaults {
     /// Line (of a folder of files: number) of the first of them.
     #[serde(skip_serializing_if = "is_zero")]
     pub first_unreadable: usize,
+    /// Messages of a bag in which the receiver had no fix.
+    pub without_fix: usize,
     /// Fixes with a coordinate that is not finite.
     pub not_a_number: usize,
     /// Fixes that are on no place of the earth.
@@ -45,6 +47,7 @@ impl GnssFaults {
     /// Returns the number of rows that are not among the fixes.
     pub fn left_out(&self) -> usize {
         self.unreadable
+            + self.without_fix
             + self.not_a_number
             + self.off_the_earth
             + self.zero
@@ -52,10 +55,24 @@ impl GnssFaults {
             + self.jumps
     }
 
+    /// Returns the reason why none of so many entries is a usable fix.
+    fn without_usable(&self, all: usize) -> String {
+        let named = self.named().into_iter();
+        let named: Vec<String> = named
+            .map(|(count, what)| format!("{count} {what}"))
+            .collect();
+        let named = match named.is_empty() {
+            true => String::new(),
+            false => format!(" ({})", named.join(", ")),
+        };
+        format!("none of its {all} entries is a usable fix{named}")
+    }
+
     /// Returns the counts that are not zero, with what was counted.
     pub fn named(&self) -> Vec<(usize, &'static str)> {
         let all = [
             (self.unreadable, "unreadable"),
+            (self.without_fix, "without a fix"),
             (self.not_a_number, "not a number"),
             (self.off_the_earth, "off the earth"),
             (self.zero, "at 0, 0"),
@@ -75,10 +92,11 @@ type Examined = (Vec<LoggedFix>, Option<LocalPlane>, GnssFaults);
 /// # Errors
 /// A log without a usable fix, or most of whose rows cannot be read.
 pub(super) fn examine(raw: Raw) -> Result<Examined, String> {
-    let all = raw.rows.len() + raw.unreadable;
+    let all = raw.rows.len() + raw.unreadable + raw.without_fix;
     let mut faults = GnssFaults {
         unreadable: raw.unreadable,
         first_unreadable: raw.first_unreadable,
+        without_fix: raw.without_fix,
         ..GnssFaults::default()
     };
     if 2 * raw.unreadable > all {
@@ -104,7 +122,7 @@ pub(super) fn examine(raw: Raw) -> Result<Examined, String> {
     let rows: Vec<RawFix> = kept.into_iter().map(|k| rows[k]).collect();
     let plane = rows.first().filter(|_| !raw.is_plane).map(plane_at);
     match rows.is_empty() {
-        true => Err(format!("none of its {all} rows is a usable fix")),
+        true => Err(faults.without_usable(all)),
         false => Ok((in_plane(&rows, plane.as_ref()), plane, faults)),
     }
 }

@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
-use super::{GnssLogError, Raw, RawFix};
+use gyre_samples::RawFix;
+
+use super::{GnssLogError, Raw};
 use crate::gps_imu_twist::{TwistFile, files, has_list, without_list};
 
 /// Lines of the place and of the first two rows of its covariance, from 0.
@@ -31,6 +33,6 @@ fn read_fix(file: &TwistFile) -> Option<RawFix> {
         stamp_ns: file.stamp_ns,
         at: [latitude, longitude],
         altitude_m,
-        sigma_m: (0.5 * (east + north)).sqrt(),
+        sigma_m: RawFix::sigma_of([east, north]),
     })
 }

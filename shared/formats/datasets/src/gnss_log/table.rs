@@ -5,7 +5,9 @@ use std::path::Path;
 use csv::StringRecord;
 use gyre_storage as storage;
 
-use super::{GnssLogError, Raw, RawFix};
+use gyre_samples::RawFix;
+
+use super::{GnssLogError, Raw};
 use crate::gyro_log::{
     columns::{StampUnit, plain, stamp_unit},
     table::reader,

@@ -232,7 +232,11 @@ fn wheel_lines(f: &mut fmt::Formatter<'_>, wheels: &WheelReport, root: &Path) ->
 }
 
 fn gnss_lines(f: &mut fmt::Formatter<'_>, gnss: &GnssReport, root: &Path) -> fmt::Result {
-    let name = gnss.file.strip_prefix(root).unwrap_or(&gnss.file).display();
+    let name = match &gnss.topic {
+        Some(topic) => Path::new(topic),
+        None => gnss.file.strip_prefix(root).unwrap_or(&gnss.file),
+    };
+    let name = name.display();
     if gnss.error.is_some() {
         return line(f, "gnss", format_args!("{name}: cannot be used"));
     }

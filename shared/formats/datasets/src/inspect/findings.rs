@@ -83,7 +83,7 @@ fn gnss(report: &GnssReport) -> Vec<String> {
         .collect();
     let faults = (!faults.is_empty()).then(|| {
         format!(
-            "GNSS: rows of its log that are left out, or sorted: {}.",
+            "GNSS: entries of its log that are left out, or sorted: {}.",
             faults.join(", ")
         )
     });
@@ -93,8 +93,12 @@ fn gnss(report: &GnssReport) -> Vec<String> {
         true => "",
         false => " Its plane is its own: the map has no place on the earth by it.",
     };
+    let lies = match &report.topic {
+        Some(topic) => format!("{topic}{clocks}, is in the bag"),
+        None => format!("{name}{clocks}, lies beside the scans"),
+    };
     let found = format!(
-        "The log of a GNSS receiver, {name}{clocks}, lies beside the scans: with slam.kind = \"graph\", gnss.kind = \"auto\" uses it.{place}"
+        "The log of a GNSS receiver, {lies}: with slam.kind = \"graph\", gnss.kind = \"auto\" uses it.{place}"
     );
     faults.into_iter().chain([found]).collect()
 }

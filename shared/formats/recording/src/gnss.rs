@@ -1,0 +1,80 @@
+//! The log of the GNSS receiver that a configuration names.
+
+use std::path::Path;
+
+use gyre_bags::is_bag;
+use gyre_datasets::{GnssLog, GnssLogError};
+use gyre_samples::{GnssConfig, GnssKind};
+
+/// Reads what the section `[gnss]` names for the scans at `data`; `None` without GNSS.
+///
+/// # Errors
+/// No log, a topic that is not in the bag or of scans in no bag, or fixes that cannot be used.
+pub fn gnss_log(config: &GnssConfig, data: &Path) -> Result<Option<GnssLog>, GnssLogError> {
+    match config.kind {
+        GnssKind::None => Ok(None),
+        GnssKind::Auto => of_scans(config.topic.as_deref(), data).map(Some),
+        GnssKind::Log => GnssLog::read(&config.file.clone().unwrap_or_default()).map(Some),
+    }
+}
+
+/// Reads the fixes in the bag, else the log beside the scans.
+fn of_scans(topic: Option<&str>, data: &Path) -> Result<GnssLog, GnssLogError> {
+    let none_in_bag = |_| GnssLogError::NoneInBag {
+        bag: data.to_owned(),
+    };
+    match (is_bag(data), topic) {
+        (true, _) => match gyre_bags::fixes(data, topic)? {
+            Some(fixes) => GnssLog::of(fixes, data),
+            None => GnssLog::read(&GnssLog::find(data).map_err(none_in_bag)?),
+        },
+        (false, None) => GnssLog::read(&GnssLog::find(data)?),
+        (false, Some(topic)) => Err(GnssLogError::NoBag {
+            topic: topic.to_owned(),
+            data: data.to_owned(),
+        }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::fs;
+
+    use super::*;
+
+    fn auto(topic: Option<&str>) -> GnssConfig {
+        GnssConfig {
+            kind: GnssKind::Auto,
+            topic: topic.map(str::to_owned),
+            ..GnssConfig::default()
+        }
+    }
+
+    #[test]
+    fn the_log_is_the_one_that_is_named_or_lies_beside_the_scans() {
+        let folder = tempfile::tempdir().unwrap();
+        let beside = folder.path().join("gnss.csv");
+        let named = folder.path().join("other.csv");
+        for file in [&beside, &named] {
+            fs::write(file, "stamp_s,east_m,north_m\n7,1,2\n").unwrap();
+        }
+        let log = |config: &GnssConfig| gnss_log(config, folder.path()).unwrap();
+        assert_eq!(log(&auto(None)).unwrap().path, beside);
+        let config = GnssConfig {
+            kind: GnssKind::Log,
+            file: Some(named.clone()),
+            ..GnssConfig::default()
+        };
+        assert_eq!(log(&config).unwrap().path, named);
+        assert!(log(&GnssConfig::default()).is_none());
+    }
+
+    #[test]
+    fn a_topic_of_scans_that_are_in_no_bag_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let refused = gnss_log(&auto(Some("/fix")), folder.path()).unwrap_err();
+        let refused = refused.to_string();
+        assert!(refused.contains("gnss.topic is /fix, but"), "{refused}");
+    }
+}
