@@ -1,15 +1,24 @@
 //! GNSS: fixes move no byte of odometry, whatever is killed the corrected trajectory is the same,
 //! and the map lies where they say.
 
-use std::{fs, path::PathBuf, thread, time::Duration};
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+    thread,
+    time::Duration,
+};
 
 use gyre_datasets::read_trajectory;
 use gyre_mapping::{Map, Origin};
 use gyre_messages::FollowerId;
 use gyre_radar::Trajectory;
+use gyre_ros2_messages::{Ros2Message, encode, sensor_msgs::NavSatFix, std_msgs::Header};
 use gyre_samples::{Geographic, LocalPlane};
+use mcap::{MessageStream, WriteOptions, records::MessageHeader};
 use rand::{Rng, SeedableRng, rngs::StdRng};
 use rustix::process::Signal;
+use serde_json::Value;
 
 use super::followers::undisturbed;
 use crate::common::{
@@ -34,31 +43,74 @@ fn truth() -> Trajectory {
     read_trajectory(&around_a_block().join("ground_truth.tum")).unwrap()
 }
 
-/// The log of a receiver at 5 Hz whose clock is late by this, with rows without a fix and a
-/// reflection.
-fn log(late_s: f64) -> String {
+/// The stamps and places of a receiver at 5 Hz whose clock is late by this, with one without a fix
+/// and a reflection.
+fn fixes(late_s: f64) -> Vec<(i64, Geographic)> {
     let (truth, mut random) = (truth(), StdRng::seed_from_u64(7));
     let plane = LocalPlane::new(PLACE, 0.0);
     let (first_ns, last_ns) = truth.span_ns().unwrap();
-    let mut text = "stamp_ns,latitude_deg,longitude_deg,sigma_m\n".to_owned();
     let (sin, cos) = TURNED_RAD.sin_cos();
-    for (k, stamp_ns) in (first_ns..last_ns).step_by(200_000_000).enumerate() {
+    let stamps = (first_ns..last_ns).step_by(200_000_000).enumerate();
+    let fix = |(k, stamp_ns): (usize, i64)| {
         let pose = truth.at(stamp_ns).unwrap();
         let antenna = pose * nalgebra::Point2::from(LEVER_M);
         let mut noise = || SIGMA_M * 3f64.sqrt() * random.random_range(-1.0..1.0);
         let reflected = if (60..75).contains(&k) { 20.0 } else { 0.0 };
-        let place = plane.place([
+        let mut place = plane.place([
             cos * antenna.x - sin * antenna.y + noise() + reflected,
             sin * antenna.x + cos * antenna.y + noise(),
         ]);
-        let (mut latitude, mut longitude) = (place.latitude_deg, place.longitude_deg);
         if k == 3 {
-            (latitude, longitude) = (0.0, 0.0);
+            place = Geographic {
+                latitude_deg: 0.0,
+                longitude_deg: 0.0,
+            };
         }
-        let stamp_ns = stamp_ns + (late_s * 1e9) as i64;
-        text += &format!("{stamp_ns},{latitude:.9},{longitude:.9},{SIGMA_M}\n");
+        (stamp_ns + (late_s * 1e9) as i64, place)
+    };
+    stamps.map(fix).collect()
+}
+
+/// The log of that receiver as a table.
+fn log(late_s: f64) -> String {
+    let mut text = "stamp_ns,latitude_deg,longitude_deg,sigma_m\n".to_owned();
+    for (stamp_ns, place) in fixes(late_s) {
+        let [latitude, longitude] = [place.latitude_deg, place.longitude_deg];
+        text += &format!("{stamp_ns},{latitude},{longitude},{SIGMA_M}\n");
     }
     text
+}
+
+/// Writes a bag with the messages of another one, and those of the receiver on `/fix`.
+fn with_fixes(of: &Path, to: &Path) {
+    let (bytes, file) = (fs::read(of).unwrap(), fs::File::create(to).unwrap());
+    let mut bag = WriteOptions::new().profile("ros2").create(file).unwrap();
+    for message in MessageStream::new(&bytes).unwrap() {
+        bag.write(&message.unwrap()).unwrap();
+    }
+    let definition = NavSatFix::DEFINITION;
+    let (name, text) = (definition.type_name(), definition.text());
+    let schema = bag.add_schema(&name, "ros2msg", text.as_bytes()).unwrap();
+    let channel = bag.add_channel(schema, "/fix", "cdr", &BTreeMap::new());
+    let channel_id = channel.unwrap();
+    let mut fix = NavSatFix {
+        position_covariance_type: 2,
+        ..NavSatFix::default()
+    };
+    (fix.position_covariance[0], fix.position_covariance[4]) = (SIGMA_M.powi(2), SIGMA_M.powi(2));
+    for (stamp_ns, place) in fixes(0.0) {
+        fix.header = Header::new(stamp_ns, "gnss");
+        (fix.latitude, fix.longitude) = (place.latitude_deg, place.longitude_deg);
+        let header = MessageHeader {
+            channel_id,
+            sequence: 0,
+            log_time: stamp_ns as u64,
+            publish_time: stamp_ns as u64,
+        };
+        let bytes = encode(&fix).unwrap();
+        bag.write_to_known_channel(&header, &bytes).unwrap();
+    }
+    bag.finish().unwrap();
 }
 
 fn without() -> Run {
@@ -70,20 +122,23 @@ fn run(late_s: f64) -> Run {
     let run = without();
     let file = run.folder().join("gnss.csv");
     fs::write(&file, log(late_s)).unwrap();
-    run.set("gnss.kind=log")
-        .set(&format!("gnss.file={}", file.display()))
-        .set("gnss.correlation_s=0")
+    with_antenna(run.set("gnss.kind=log")).set(&format!("gnss.file={}", file.display()))
+}
+
+fn with_antenna(run: Run) -> Run {
+    run.set("gnss.correlation_s=0")
         .set(&format!("gnss.lever_m=[{}, {}]", LEVER_M[0], LEVER_M[1]))
 }
 
 /// The results that must be the same to the byte.
-fn left(run: &Run) -> [String; 3] {
-    let gnss = &mut run.summary()["gnss"];
-    // The folder of each run is another one.
-    gnss["log"] = "".into();
-    let results = ["trajectory_slam.tum", "loops.csv"].map(|name| run.result(name));
-    let [trajectory, loops] = results;
-    [trajectory, loops, gnss.to_string()]
+fn left(run: &Run) -> ([String; 3], Value) {
+    let mut gnss = run.summary()["gnss"].clone();
+    // The log of each run is another one.
+    for key in ["log", "topic"] {
+        gnss.as_object_mut().unwrap().remove(key);
+    }
+    let results = ["trajectory_slam.tum", "loops.csv", "graph.g2o"];
+    (results.map(|name| run.result(name)), gnss)
 }
 
 fn origin(run: &Run) -> Origin {
@@ -139,6 +194,48 @@ fn odometry_is_the_same_and_the_map_lies_where_the_fixes_say() {
     assert_eq!(drawn.origin(), Some(origin(&run)));
     assert_eq!(Map::open(&draw(&without)).unwrap().origin(), None);
     assert!(without.summary().get("gnss").is_none());
+}
+
+#[test]
+fn fixes_in_a_bag_lead_to_the_results_of_the_same_log_beside_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let [beside, within] = ["beside", "within"].map(|name| folder.path().join(name));
+    for folder in [&beside, &within] {
+        fs::create_dir(folder).unwrap();
+    }
+    let [beside, within] = [beside, within].map(|folder| folder.join("drive.mcap"));
+    let mut export = gyre();
+    export.arg("export").arg(around_a_block());
+    export.arg("--mcap").arg(&beside);
+    Ended::of(export).succeeded();
+    with_fixes(&beside, &within);
+    let of = |bag: &Path| {
+        let run = Run::small().data(bag).set("slam.kind=graph");
+        with_antenna(run.set("gnss.kind=auto"))
+    };
+    let without = of(&beside).finish();
+    without.refused_with(&["has no messages of sensor_msgs/msg/NavSatFix, and no log"]);
+    fs::write(beside.with_file_name("gnss.csv"), log(0.0)).unwrap();
+    let [of_log, of_bag] = [&beside, &within].map(|bag| of(bag));
+    assert_eq!(of_bag.complete(), of_log.complete());
+    assert_eq!(left(&of_bag), left(&of_log));
+    let gnss = &of_bag.summary()["gnss"];
+    assert_eq!(gnss["topic"], "/fix", "{gnss}");
+    assert_eq!(gnss["faults"]["zero"], 1, "{gnss}");
+    assert!(gnss["used"].as_u64().unwrap() > 60, "{gnss}");
+    let named = of(&within).set("gnss.topic='/gps/fix'");
+    named
+        .finish()
+        .refused_with(&["topic /gps/fix", "but on: /fix"]);
+    let mut inspect = gyre();
+    inspect.arg("inspect").arg(&within);
+    let inspected = Ended::of(inspect);
+    inspected.succeeded();
+    assert!(
+        inspected.stdout.contains("gnss          /fix: "),
+        "{}",
+        inspected.stdout
+    );
 }
 
 #[test]
