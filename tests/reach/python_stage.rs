@@ -267,7 +267,7 @@ fn a_run_that_it_cannot_serve_is_refused_before_the_stage_gives_way() {
         return;
     }
     let run = Run::of_recording()
-        .rate("2")
+        .rate("0.5")
         .set("masking.undo_doppler=true");
     let mut running = run.start();
     let own = running.await_poses(2).await_stage("masking");
@@ -276,7 +276,8 @@ fn a_run_that_it_cannot_serve_is_refused_before_the_stage_gives_way() {
     swap.args(["--command", &command().join(" ")]);
     Ended::of(swap).refused_with(&["cannot take over", "set masking.undo_doppler to false"]);
     assert_eq!(running.await_stage("masking"), own);
-    running.finish().succeeded();
+    running.signal(Signal::INT);
+    running.end();
 }
 
 fn swap_masking(run: &Run, command: &[&str]) {
