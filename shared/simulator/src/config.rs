@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::drive::DriveConfig;
 use crate::error::SimulatorError;
+use crate::gnss::SimulatedGnssConfig;
 use crate::gyro::SimulatedGyroConfig;
 use crate::limits::require_within;
 use crate::output::{OutputConfig, OutputFormat};
@@ -32,7 +33,7 @@ pub struct SimulationConfig {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scans: Option<usize>,
     /// The seed of all randomness that has no seed of its own: `town.seed`, `town.changes_seed`,
-    /// `traffic.seed`, `sensor.seed`, `gyro.seed`, `wheels.seed`.
+    /// `traffic.seed`, `sensor.seed`, `gyro.seed`, `wheels.seed`, `gnss.seed`.
     pub seed: u64,
     /// The likeness to a real road: switches of `[simulation.effects]`, `town.belts` and
     /// `sensor.gain_db` that are left out are as it says. Default: `plain`.
@@ -54,6 +55,9 @@ pub struct SimulationConfig {
     /// The speed by the vehicle's wheels. Default: none.
     #[serde(skip_serializing_if = "SimulatedWheelsConfig::is_default")]
     pub wheels: SimulatedWheelsConfig,
+    /// The GNSS receiver beside the radar. Default: none.
+    #[serde(skip_serializing_if = "SimulatedGnssConfig::is_default")]
+    pub gnss: SimulatedGnssConfig,
     /// The weather, section by section of the drive. Default: clear.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub weather: Vec<WeatherConfig>,
@@ -77,6 +81,7 @@ impl Default for SimulationConfig {
             effects: Effects::default(),
             gyro: SimulatedGyroConfig::default(),
             wheels: SimulatedWheelsConfig::default(),
+            gnss: SimulatedGnssConfig::default(),
             weather: Vec::new(),
             tunnels: Vec::new(),
             output: OutputConfig::default(),
@@ -99,6 +104,7 @@ impl SimulationConfig {
         self.sensor.validate()?;
         self.gyro.validate()?;
         self.wheels.validate()?;
+        self.gnss.validate()?;
         self.weather.iter().try_for_each(WeatherConfig::validate)?;
         self.tunnels.iter().try_for_each(TunnelConfig::validate)
     }
@@ -143,6 +149,11 @@ impl SimulationConfig {
     /// The seed of the errors of the wheels.
     pub fn wheels_seed(&self) -> u64 {
         self.wheels.seed.unwrap_or(self.seed)
+    }
+
+    /// The seed of the errors of the GNSS receiver.
+    pub fn gnss_seed(&self) -> u64 {
+        self.gnss.seed.unwrap_or(self.seed)
     }
 
     /// Returns the options with which a reader gets the ranges and angles of the simulated radar.

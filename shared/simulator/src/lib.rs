@@ -37,7 +37,9 @@
 pub mod body;
 pub mod config;
 pub mod drive;
+mod episodes;
 pub mod error;
+pub mod gnss;
 pub mod gyro;
 mod image;
 mod interpolate;
@@ -70,6 +72,7 @@ pub mod writer;
 pub use body::{Body, Movers, Moving};
 pub use config::SimulationConfig;
 pub use error::SimulatorError;
+pub use gnss::SimulatedGnssConfig;
 pub use gyro::{GyroProfile, SimulatedGyroConfig};
 pub use lanes::DrivingSide;
 pub use output::{HostStamps, OutputFormat};

@@ -20,7 +20,7 @@ use crate::sensor::Sensor;
 use crate::sensor::effects::is_on;
 use crate::simulator::Simulator;
 use crate::truth;
-use crate::wheels;
+use crate::{gnss, wheels};
 
 /// A simulated drive in a dataset format.
 #[derive(Clone)]
@@ -182,6 +182,8 @@ impl SimulatedDrive {
             self.wheel_samples()
                 .map(|samples| (wheels::FILE.into(), wheels::csv(&samples))),
         );
+        let fixes = self.simulator.gnss_fixes();
+        files.extend(fixes.map(|fixes| (gnss::FILE.into(), gnss::csv(&fixes))));
         files
     }
 

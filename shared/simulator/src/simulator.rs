@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use gyre_geometry::Pose;
 use gyre_radar::{OwnedScan, ScanLimits, ScanSlot, SweepGeometry};
-use gyre_samples::Sample;
+use gyre_samples::{RawFix, Sample};
 use nalgebra::Point2;
 
 use crate::config::{MAX_SCANS, SimulationConfig};
@@ -22,8 +22,8 @@ use crate::town::{ParkedCar, Town};
 use crate::traffic::{Observer, RoadUser, Traffic};
 use crate::tunnel;
 use crate::weather::WeatherConfig;
-use crate::wheels;
 use crate::world::World;
+use crate::{gnss, wheels};
 
 /// Stamp of the first azimuth of the first scan, microseconds since 1970 (2019-01-10 15:00 UTC).
 /// Readers check that the year is plausible, and it is fixed so that a configuration always gives
@@ -223,8 +223,14 @@ impl Simulator {
         wheels::samples(&self.config.wheels, seed, self.path(), self.span())
     }
 
+    /// The fixes of the GNSS receiver, by their stamps, in degrees. `None` without a receiver.
+    pub fn gnss_fixes(&self) -> Option<Vec<RawFix>> {
+        let config = (&self.config.gnss, self.config.tunnels.as_slice());
+        gnss::fixes(config, self.config.gnss_seed(), self.path(), self.span())
+    }
+
     /// The start of the drive, ns since 1970, and its duration, s.
-    fn span(&self) -> (i64, f64) {
+    pub(crate) fn span(&self) -> (i64, f64) {
         let end_s = self.scans as f64 * self.sampling.period_us as f64 * 1e-6;
         (EPOCH_US * 1000, end_s)
     }

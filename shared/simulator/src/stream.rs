@@ -39,6 +39,14 @@ pub(crate) enum Stream {
     WheelErrors,
     /// Slips of the wheels.
     WheelSlips,
+    /// Noise, lasting errors and losses of the GNSS receiver.
+    GnssErrors,
+    /// Reflections that it takes for satellites,
+    GnssReflections,
+    /// and where these move its fixes.
+    GnssDirections,
+    /// Holes without a fix.
+    GnssHoles,
     /// The lining of a tunnel, by its number.
     Tunnel(u64),
 }
@@ -69,6 +77,10 @@ impl Stream {
             Self::WheelErrors => 1 << 51,
             Self::WheelSlips => 1 << 52,
             Self::Tunnel(number) => (1 << 53) + number,
+            Self::GnssErrors => 1 << 54,
+            Self::GnssReflections => 1 << 55,
+            Self::GnssDirections => 1 << 56,
+            Self::GnssHoles => 1 << 57,
             Self::PitchRoll => u64::MAX - 1,
             Self::FixedEchoes => u64::MAX,
         }
@@ -106,6 +118,10 @@ mod tests {
             Stream::WheelErrors,
             Stream::WheelSlips,
             Stream::Tunnel(0),
+            Stream::GnssErrors,
+            Stream::GnssReflections,
+            Stream::GnssDirections,
+            Stream::GnssHoles,
         ];
         let numbers: BTreeSet<u64> = counted.chain(single).map(Stream::number).collect();
         assert_eq!(numbers.len(), 400_013);

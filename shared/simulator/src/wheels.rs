@@ -10,7 +10,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 
-use crate::{error::SimulatorError, limits::require_within, path::Path, stream::Stream};
+use crate::{episodes::Episodes, error::SimulatorError, limits::require_within};
+use crate::{path::Path, stream::Stream};
 
 /// The file beside the scans.
 pub(crate) const FILE: &str = "wheels.csv";
@@ -133,26 +134,22 @@ struct Wheels<'a> {
     config: &'a SimulatedWheelsConfig,
     path: &'a dyn Path,
     rng: ChaCha8Rng,
-    slips: ChaCha8Rng,
+    slips: Episodes,
     /// Measured speed over the true one.
     scale: f64,
-    /// Number of the slips that were drawn, and the begin of the last one, s.
-    drawn: i64,
-    slip_s: f64,
 }
 
 impl<'a> Wheels<'a> {
     fn new(config: &'a SimulatedWheelsConfig, seed: u64, path: &'a dyn Path) -> Self {
         let mut rng = Stream::WheelErrors.generator(seed);
+        let slips = Stream::WheelSlips.generator(seed);
         let scale = 1.0 + config.scale_sigma * rng.sample::<f64, _>(StandardNormal);
         Self {
             config,
             path,
             rng,
-            slips: Stream::WheelSlips.generator(seed),
+            slips: Episodes::new(config.slip_every_s, config.slip_s, slips),
             scale,
-            drawn: 0,
-            slip_s: f64::NEG_INFINITY,
         }
     }
 
@@ -182,19 +179,8 @@ impl<'a> Wheels<'a> {
 
     /// The share by which the wheels turn too fast.
     fn slip(&mut self, time_s: f64) -> f64 {
-        let (every_s, duration_s) = (self.config.slip_every_s, self.config.slip_s);
-        if every_s <= 0.0 || duration_s <= 0.0 {
-            return 0.0;
-        }
-        while self.drawn as f64 * every_s <= time_s {
-            let begins = self.slips.random::<f64>() * (every_s - duration_s);
-            self.slip_s = self.drawn as f64 * every_s + begins;
-            self.drawn += 1;
-        }
-        match (self.slip_s..self.slip_s + duration_s).contains(&time_s) {
-            true => self.config.slip_share,
-            false => 0.0,
-        }
+        let slip_s = self.slips.begin_s(time_s);
+        slip_s.map_or(0.0, |_| self.config.slip_share)
     }
 }
 

@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
 use super::config::SimulatedGyroConfig;
-use crate::stream::Stream;
+use crate::{episodes::Episodes, stream::Stream};
 
 /// Time between two stamps while a host catches up, ns.
 const CATCH_UP_NS: i64 = 100_000;
@@ -14,23 +14,18 @@ const CATCH_UP_NS: i64 = 100_000;
 pub(super) struct Clock<'a> {
     config: &'a SimulatedGyroConfig,
     rng: ChaCha8Rng,
-    stalls: ChaCha8Rng,
-    /// Number of the stalls that were drawn.
-    drawn: i64,
-    /// Begin of the last one, s.
-    stall_s: f64,
+    stalls: Episodes,
     last_ns: i64,
 }
 
 impl<'a> Clock<'a> {
     /// The clock of a drive.
     pub fn new(config: &'a SimulatedGyroConfig, seed: u64) -> Self {
+        let stalls = Stream::GyroStalls.generator(seed);
         Self {
             config,
             rng: Stream::GyroClock.generator(seed),
-            stalls: Stream::GyroStalls.generator(seed),
-            drawn: 0,
-            stall_s: f64::NEG_INFINITY,
+            stalls: Episodes::new(config.stall_every_s, config.stall_s, stalls),
             last_ns: i64::MIN + CATCH_UP_NS,
         }
     }
@@ -52,18 +47,7 @@ impl<'a> Clock<'a> {
 
     /// The time at which the host handles a sample, s: later if it stalls.
     fn handled_s(&mut self, time_s: f64) -> f64 {
-        let (every_s, duration_s) = (self.config.stall_every_s, self.config.stall_s);
-        if every_s <= 0.0 || duration_s <= 0.0 {
-            return time_s;
-        }
-        while self.drawn as f64 * every_s <= time_s {
-            let begins = self.stalls.random::<f64>() * (every_s - duration_s);
-            self.stall_s = self.drawn as f64 * every_s + begins;
-            self.drawn += 1;
-        }
-        match (self.stall_s..self.stall_s + duration_s).contains(&time_s) {
-            true => self.stall_s + duration_s,
-            false => time_s,
-        }
+        let stall_s = self.stalls.begin_s(time_s);
+        stall_s.map_or(time_s, |begin_s| begin_s + self.config.stall_s)
     }
 }
