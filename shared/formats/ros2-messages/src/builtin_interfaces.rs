@@ -1,4 +1,4 @@
-//! `builtin_interfaces`: times.
+//! `builtin_interfaces`: times and durations.
 
 use serde::{Deserialize, Serialize};
 
@@ -37,3 +37,18 @@ impl Time {
         i64::from(self.sec) * SECOND_NS + i64::from(self.nanosec)
     }
 }
+
+/// A time between two times.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Duration {
+    /// Seconds.
+    pub sec: i32,
+    /// Nanoseconds of the second.
+    pub nanosec: u32,
+}
+message!(
+    Duration,
+    "builtin_interfaces",
+    "int32 sec\nuint32 nanosec\n",
+    []
+);

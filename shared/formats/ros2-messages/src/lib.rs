@@ -7,6 +7,7 @@
 //! - [`Domain`]: where on the network;
 //! - [`encode`], [`decode`]: messages as CDR;
 //! - [`frames`]: poses and motions of Gyre as odometry and transforms;
+//! - [`objects`]: tracked objects of Gyre as detections and markers;
 //! - [`radar`]: Navtech's messages as azimuths of [`gyre_colossus`], and scans as Navtech's
 //!   messages.
 
@@ -21,10 +22,13 @@ pub mod messages;
 mod mounting;
 pub mod nav_msgs;
 pub mod navtech_msgs;
+pub mod objects;
 pub mod radar;
 pub mod sensor_msgs;
 pub mod std_msgs;
 pub mod tf2_msgs;
+pub mod vision_msgs;
+pub mod visualization_msgs;
 
 pub use cdr::{BadMessage, decode, encode};
 pub use definition::{Definition, Ros2Message};

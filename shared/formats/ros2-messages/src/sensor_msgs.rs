@@ -36,6 +36,24 @@ message!(
     [Header]
 );
 
+/// An image as a file.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct CompressedImage {
+    /// Time and frame.
+    pub header: Header,
+    /// The format of the file, such as `png`.
+    pub format: String,
+    /// The bytes of the file.
+    #[serde(with = "serde_bytes")]
+    pub data: Vec<u8>,
+}
+message!(
+    CompressedImage,
+    "sensor_msgs",
+    "std_msgs/Header header\nstring format\nuint8[] data\n",
+    [Header]
+);
+
 /// A sample of an inertial sensor. Covariances are 3 x 3, by rows; the first element is -1 where
 /// there is no such measurement.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

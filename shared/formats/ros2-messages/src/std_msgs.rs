@@ -1,4 +1,4 @@
-//! `std_msgs`: the header of stamped messages.
+//! `std_msgs`: the header of stamped messages, and colours.
 
 use serde::{Deserialize, Serialize};
 
@@ -36,3 +36,22 @@ impl Header {
         }
     }
 }
+
+/// A colour, each part 0 to 1.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ColorRGBA {
+    /// Red.
+    pub r: f32,
+    /// Green.
+    pub g: f32,
+    /// Blue.
+    pub b: f32,
+    /// Opacity.
+    pub a: f32,
+}
+message!(
+    ColorRGBA,
+    "std_msgs",
+    "float32 r\nfloat32 g\nfloat32 b\nfloat32 a\n",
+    []
+);

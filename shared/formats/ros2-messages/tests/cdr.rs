@@ -10,6 +10,8 @@ use gyre_ros2_messages::{
     sensor_msgs::{Imu, NavSatFix},
     std_msgs::Header,
     tf2_msgs::TFMessage,
+    vision_msgs::Detection3DArray,
+    visualization_msgs::{CUBE, MarkerArray},
 };
 use proptest::prelude::*;
 
@@ -232,4 +234,84 @@ fn a_receiver_without_a_fix_or_an_accuracy_says_so() {
     }
     fix.position_covariance_type = 0;
     assert_eq!(fix.variances_m2(), None);
+}
+
+/// A detected object, as rosbags 0.11.9 serialises it.
+const DETECTIONS: &str = "\
+    0001000030eb625c07000000050000006f646f6d000000000100000030eb625c\
+    07000000050000006f646f6d0000000001000000070000006d6f76696e670000\
+    00000000000000000000f03f000000000000f03f000000000000004000000000\
+    0000000000000000000000000000000000000000000000000000000000000000\
+    0000f03f000000000000d03f000000000000e03f000000000000000000000000\
+    0000000000000000000000000000000000000000000000000000e03f00000000\
+    0000e83f00000000000000000000000000000000000000000000000000000000\
+    0000000000000000000000000000000000000000000000000000000000000000\
+    0000000000000000000000000000000000000000000000000000000000000000\
+    0000000000000000000000000000000000000000000000000000000000000000\
+    0000000000000000000000000000000000000000000000000000000000000000\
+    0000000000000000000000000000000000000000000000000000000000000000\
+    0000000000000000000000000000000000000000000000000000000000000000\
+    80842e41000000000000f03f0000000000000040000000000000000000000000\
+    0000000000000000000000000000000000000000000000000000f03f00000000\
+    00001240000000000000fc3f000000000000000003000000313700\
+";
+
+#[test]
+fn detections_of_another_writer_are_read_and_written_alike() {
+    let bytes = bytes_of(DETECTIONS);
+    let read: Detection3DArray = decode(&bytes).unwrap();
+    let [object] = &read.detections[..] else {
+        panic!("{read:?}");
+    };
+    let header = Header::new(1_549_986_608_000_000_007, "odom");
+    assert_eq!((&read.header, &object.header), (&header, &header));
+    let [result] = &object.results[..] else {
+        panic!("{object:?}");
+    };
+    assert_eq!(result.hypothesis.class_id, "moving");
+    assert_eq!(result.hypothesis.score, 1.0);
+    assert_eq!(result.pose.pose, object.bbox.center);
+    let covariance = &result.pose.covariance;
+    let found = [(0, 0), (0, 1), (1, 1), (5, 5)].map(|(row, column)| covariance.at(row, column));
+    assert_eq!(found, [0.25, 0.5, 0.75, 1e6]);
+    let (at, size) = (object.bbox.center.position, object.bbox.size);
+    assert_eq!([at.x, at.y, at.z], [1.0, 2.0, 0.0]);
+    assert_eq!([size.x, size.y, size.z], [4.5, 1.75, 0.0]);
+    assert_eq!(object.id, "17");
+    assert_eq!(encode(&read).unwrap(), bytes);
+}
+
+/// A marker with all its fields, as rosbags 0.11.9 serialises it.
+const MARKERS: &str = "\
+    000100000100000030eb625c07000000050000006f646f6d0000000006000000\
+    626f786573000000030000000100000000000000000000000000f03f00000000\
+    0000004000000000000000000000000000000000000000000000000000000000\
+    00000000000000000000f03f0000000000001240000000000000fc3f00000000\
+    0000f83f0000803f0000003f0000803e0000403f020000000500000001000000\
+    01000000000000000000f03f0000000000000040000000000000084001000000\
+    000000000000003f0000803f0000803f020000007400000030eb625c07000000\
+    020000006900000004000000706e67000300000001020300010000000000003f\
+    0000803e0300000031370000020000006d000000020000006600000001000000\
+    0901\
+";
+
+#[test]
+fn markers_of_another_writer_are_read_and_written_alike() {
+    let bytes = bytes_of(MARKERS);
+    let read: MarkerArray = decode(&bytes).unwrap();
+    let [marker] = &read.markers[..] else {
+        panic!("{read:?}");
+    };
+    assert_eq!((marker.ns.as_str(), marker.id), ("boxes", 3));
+    assert_eq!((marker.r#type, marker.action), (CUBE, 0));
+    assert_eq!((marker.scale.x, marker.color.a), (4.5, 0.75));
+    assert_eq!((marker.lifetime.sec, marker.lifetime.nanosec), (2, 5));
+    assert_eq!(marker.points[0].z, 3.0);
+    assert_eq!(marker.texture.data, [1, 2, 3]);
+    assert_eq!(
+        (marker.text.as_str(), &marker.mesh_file.data[..]),
+        ("17", &[9][..])
+    );
+    assert!(marker.frame_locked && marker.mesh_use_embedded_materials);
+    assert_eq!(encode(&read).unwrap(), bytes);
 }

@@ -3,4 +3,5 @@
 #![allow(clippy::unwrap_used)]
 
 mod cdr;
+mod objects;
 mod radar;

@@ -1,0 +1,189 @@
+//! Tracked objects as detections, and as shapes that viewers draw.
+//!
+//! Both are in the frame `odom`, that of the vehicle at the first scan. In Gyre objects are in that
+//! of the radar, so they are moved and turned by the [`Mounting`].
+
+use gyre_geometry::{Pose, pose as planar};
+use gyre_messages::ListedObject;
+use nalgebra::{Matrix2, Vector2};
+
+use crate::{
+    Mounting,
+    frames::{self, Frames},
+    geometry_msgs::{self, Covariance, PoseWithCovariance, Vector3},
+    std_msgs::{ColorRGBA, Header},
+    vision_msgs::{
+        BoundingBox3D, Detection3D, Detection3DArray, ObjectHypothesis, ObjectHypothesisWithPose,
+    },
+    visualization_msgs::{ADD, ARROW, CUBE, DELETEALL, Marker, MarkerArray, TEXT_VIEW_FACING},
+};
+
+/// The class of an object that moves.
+pub const MOVING: &str = "moving";
+/// The class of an object that moved, and stands now.
+pub const STANDING: &str = "standing";
+
+/// Height at which objects are drawn, m: a radar in the plane does not measure it.
+const DRAWN_HEIGHT_M: f64 = 1.6;
+/// Diameter of an arrow's head, m.
+const ARROW_M: f64 = 0.9;
+/// Height of a letter, m.
+const LETTER_M: f64 = 1.2;
+
+/// Returns the objects of a scan as detections of the class [`MOVING`] or [`STANDING`].
+///
+/// The covariance of a pose is that of the centre along the axes of `odom`. The heading has none in
+/// Gyre, and z, roll and pitch are not measured: their variance is [`frames::UNKNOWN`]. Boxes have
+/// no height, for the same reason.
+pub fn detections(
+    stamp_ns: i64,
+    frames: &Frames,
+    mounting: &Mounting,
+    objects: &[ListedObject],
+) -> Detection3DArray {
+    let header = Header::new(stamp_ns, &frames.odom);
+    let detection = |object: &ListedObject| {
+        let pose = frames::pose(&place(mounting, object));
+        let class_id = if object.is_moving() { MOVING } else { STANDING };
+        Detection3D {
+            header: header.clone(),
+            results: vec![ObjectHypothesisWithPose {
+                hypothesis: ObjectHypothesis {
+                    class_id: class_id.to_owned(),
+                    score: 1.0,
+                },
+                pose: PoseWithCovariance {
+                    pose,
+                    covariance: covariance(mounting, object),
+                },
+            }],
+            bbox: BoundingBox3D {
+                center: pose,
+                size: size(object, 0.0),
+            },
+            id: object.id.to_string(),
+        }
+    };
+    Detection3DArray {
+        detections: objects.iter().map(detection).collect(),
+        header: header.clone(),
+    }
+}
+
+/// Returns the objects of a scan as shapes: a box of 1.6 m height, the way of a second as an arrow
+/// if it moves, and the identity as a text. Those of the scan before are removed.
+pub fn markers(
+    stamp_ns: i64,
+    frames: &Frames,
+    mounting: &Mounting,
+    objects: &[ListedObject],
+) -> MarkerArray {
+    let header = Header::new(stamp_ns, &frames.odom);
+    let drawn = objects.iter().zip(0..).flat_map(|(object, id)| {
+        let moving = object.is_moving().then(|| arrow(mounting, object));
+        let shapes = [cube(mounting, object), name(mounting, object)];
+        shapes.into_iter().chain(moving).map(move |shape| Marker {
+            id,
+            action: ADD,
+            ..shape
+        })
+    });
+    let remove_all = Marker {
+        action: DELETEALL,
+        ..Marker::default()
+    };
+    let all = [remove_all].into_iter().chain(drawn);
+    MarkerArray {
+        markers: all
+            .map(|shape| Marker {
+                header: header.clone(),
+                ..shape
+            })
+            .collect(),
+    }
+}
+
+fn cube(mounting: &Mounting, object: &ListedObject) -> Marker {
+    Marker {
+        ns: "boxes".to_owned(),
+        r#type: CUBE,
+        pose: lifted(&place(mounting, object), 0.5 * DRAWN_HEIGHT_M),
+        scale: size(object, DRAWN_HEIGHT_M),
+        color: colour(object, 0.5),
+        ..Marker::default()
+    }
+}
+
+/// The way of an object in a second.
+fn arrow(mounting: &Mounting, object: &ListedObject) -> Marker {
+    let at = place(mounting, object).translation.vector;
+    let velocity = mounting.radar().rotation * Vector2::new(object.vx_mps, object.vy_mps);
+    let ahead = planar(at.x, at.y, velocity.y.atan2(velocity.x));
+    Marker {
+        ns: "velocities".to_owned(),
+        r#type: ARROW,
+        pose: lifted(&ahead, DRAWN_HEIGHT_M),
+        scale: Vector3 {
+            x: object.speed_mps(),
+            y: ARROW_M,
+            z: ARROW_M,
+        },
+        color: colour(object, 1.0),
+        ..Marker::default()
+    }
+}
+
+fn name(mounting: &Mounting, object: &ListedObject) -> Marker {
+    Marker {
+        ns: "identities".to_owned(),
+        r#type: TEXT_VIEW_FACING,
+        pose: lifted(&place(mounting, object), DRAWN_HEIGHT_M + LETTER_M),
+        scale: Vector3 {
+            z: LETTER_M,
+            ..Vector3::default()
+        },
+        color: colour(object, 1.0),
+        text: object.id.to_string(),
+        ..Marker::default()
+    }
+}
+
+/// Orange if it moves, grey if it stands, as in Gyre's own views.
+fn colour(object: &ListedObject, a: f32) -> ColorRGBA {
+    let [r, g, b] = match object.is_moving() {
+        true => [1.0, 0.55, 0.1],
+        false => [0.6, 0.65, 0.7],
+    };
+    ColorRGBA { r, g, b, a }
+}
+
+/// Returns the centre and the heading of an object in the vehicle's frame at the first scan.
+fn place(mounting: &Mounting, object: &ListedObject) -> Pose {
+    mounting.radar() * planar(object.x_m, object.y_m, object.yaw_rad)
+}
+
+fn lifted(place: &Pose, height_m: f64) -> geometry_msgs::Pose {
+    let mut pose = frames::pose(place);
+    pose.position.z = height_m;
+    pose
+}
+
+fn size(object: &ListedObject, height_m: f64) -> Vector3 {
+    Vector3 {
+        x: object.length_m,
+        y: object.width_m,
+        z: height_m,
+    }
+}
+
+/// Returns the covariance of the centre, turned by the mounting.
+fn covariance(mounting: &Mounting, object: &ListedObject) -> Covariance {
+    let [xx, xy, yy] = object.position_covariance;
+    let turn = mounting.radar().rotation.to_rotation_matrix();
+    let turned = turn * Matrix2::new(xx, xy, xy, yy) * turn.transpose();
+    let mut covariance = frames::covariance(None);
+    for (row, column) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+        covariance.set(row, column, turned[(row, column)]);
+    }
+    covariance
+}
