@@ -137,6 +137,26 @@ fn odometry_transforms_and_the_map_are_those_of_the_run_to_another_reader() {
 }
 
 #[test]
+fn the_objects_of_a_run_and_of_its_recording_are_those_of_the_results_to_another_reader() {
+    let run = Run::small().data(recording::around_a_block());
+    let recorded = bag(&run, "drive.mcap");
+    let run = run.argument("--record", recorded.to_str().unwrap());
+    let run = run
+        .set("run.window=32")
+        .set("objects.kind=tracks")
+        .rate("20");
+    run.complete();
+    for (source, name) in [(run.out(), "of_run"), (&recorded, "of_recording.mcap")] {
+        let path = bag(&run, name);
+        export(source, &path, &["--scans", "none"]).succeeded();
+        let Some(figures) = checked(&path, run.out(), None) else {
+            return;
+        };
+        assert!(figures["objects"].as_u64() > Some(20), "{figures}");
+    }
+}
+
+#[test]
 #[ignore = "nightly: a bag of a recording of a run"]
 fn a_recorded_run_becomes_the_same_bag() {
     let whole = completed();

@@ -100,6 +100,31 @@ def check_turned(bag, turned):
     assert (turned_cells != -1).sum() < 1.01 * len(rows)
 
 
+def check_objects(detections, markers, out):
+    """Each object of objects.csv is a detection of its scan, and an arrow of the length of its speed if it moves."""
+    scans = {}
+    for row in csv.DictReader((out / "objects.csv").open()):
+        scans.setdefault(int(row["stamp_ns"]), {})[row["object"]] = row
+    for (logged, array), (_, drawn) in zip(detections, markers, strict=True):
+        rows = scans.pop(stamp_ns(array.header), {})
+        assert logged == stamp_ns(array.header) and array.header.frame_id == "odom"
+        assert {it.id for it in array.detections} == rows.keys() and len(array.detections) == len(rows)
+        for it in array.detections:
+            row, box, (result,) = rows[it.id], it.bbox, it.results
+            assert it.header == array.header
+            assert result.hypothesis.class_id == ("moving" if row["moving"] == "1" else "standing")
+            position, size, covariance = box.center.position, box.size, result.pose.covariance.reshape(6, 6)
+            found = [position.x, position.y, size.x, size.y, *covariance[[0, 0, 1], [0, 1, 1]]]
+            names = ["x_m", "y_m", "length_m", "width_m", "cov_xx", "cov_xy", "cov_yy"]
+            close(found, [float(row[name]) for name in names], 1e-3, "object")
+            close(math.cos(yaw(box.center.orientation) - float(row["yaw_rad"])), 1, 1e-6, "heading")
+            assert list(covariance[[2, 3, 4, 5], [2, 3, 4, 5]]) == [UNKNOWN] * 4
+        speeds = sorted(math.hypot(float(row["vx_m_s"]), float(row["vy_m_s"])) for row in rows.values() if row["moving"] == "1")
+        close(sorted(it.scale.x for it in drawn.markers if it.ns == "velocities"), speeds, 1e-3, "arrows")
+    assert not scans, f"{len(scans)} scans with objects have none in the bag"
+    return sum(len(array.detections) for _, array in detections)
+
+
 def main():
     bag, out = Path(sys.argv[1]), Path(sys.argv[2])
     rows = list(csv.DictReader((out / "odometry.csv").open()))
@@ -153,6 +178,9 @@ def main():
             (_, grid), = messages
             assert grid.data.size == grid.info.width * grid.info.height and set(numpy.unique(grid.data)) <= {-1, 0, 100}
             assert (grid.data == 100).any() and grid.header.frame_id == "map"
+    if ("/objects", "vision_msgs/msg/Detection3DArray") in by_topic:
+        markers = by_topic["/object_markers", "visualization_msgs/msg/MarkerArray"]
+        figures["objects"] = check_objects(by_topic["/objects", "vision_msgs/msg/Detection3DArray"], markers, out)
     figures["predicted"] = sum(row["outcome"] == "predicted" for row in rows)
     if sys.argv[3:]:
         check_turned(bag, Path(sys.argv[3]))

@@ -7,17 +7,18 @@
 
 use std::path::PathBuf;
 
-use gyre_geometry::{wrap_angle, xy_yaw};
-use gyre_journal::objects::LoggedObjects;
-use gyre_journal::scans::LoggedScan;
-use gyre_messages::{Item, ListedObject, MAX_LISTED, Objects, ObjectsHeader};
+use gyre_geometry::xy_yaw;
+use gyre_journal::{
+    objects::{LoggedObjects, listed},
+    scans::LoggedScan,
+};
+use gyre_messages::{Item, MAX_LISTED, Objects, ObjectsHeader};
 use gyre_objects::{Object, ObjectTracker, ObjectsConfig, PlacedScan};
 use gyre_slam::{RecordLog, RecordReader};
 use gyre_stage::{
     Follower, Launch, StageCounters, StageError,
     follower::{self, LogId, Progress, Step},
 };
-use nalgebra::Matrix2;
 
 /// Runs the follower to the end of the scans, or until SIGTERM.
 ///
@@ -124,28 +125,10 @@ fn header(scan: &LoggedScan, objects: &[Object]) -> ObjectsHeader {
     let away_m = |object: &&Object| (object.position.coords - scan.pose.translation.vector).norm();
     let mut nearest: Vec<&Object> = objects.iter().collect();
     nearest.sort_by(|a, b| away_m(a).total_cmp(&away_m(b)));
-    for (listed, object) in header.list.iter_mut().zip(nearest) {
-        *listed = listed_object(object);
+    for (place, object) in header.list.iter_mut().zip(nearest) {
+        *place = listed(object);
     }
     header
-}
-
-fn listed_object(object: &Object) -> ListedObject {
-    let packed = |matrix: &Matrix2<f64>| [matrix.m11, matrix.m12, matrix.m22];
-    ListedObject {
-        id: object.id,
-        x_m: object.position.x,
-        y_m: object.position.y,
-        yaw_rad: wrap_angle(object.yaw_rad),
-        vx_mps: object.velocity.x,
-        vy_mps: object.velocity.y,
-        length_m: object.length_m,
-        width_m: object.width_m,
-        position_covariance: packed(&object.position_covariance),
-        velocity_covariance: packed(&object.velocity_covariance),
-        moving: object.moving.into(),
-        age: object.age,
-    }
 }
 
 impl Follower for Tracking {

@@ -10,11 +10,15 @@ mod source;
 use std::{path::Path, process::ExitCode};
 
 use gyre_bags::{BagWriter, Kept, Topic};
+use gyre_messages::ListedObject;
 use gyre_ros2_messages::{
     Mounting,
     frames::{self, Frames, Interval},
     nav_msgs::Odometry,
+    objects,
     tf2_msgs::TFMessage,
+    vision_msgs::Detection3DArray,
+    visualization_msgs::MarkerArray,
 };
 use gyre_terminal::{Failure, print};
 
@@ -86,6 +90,8 @@ struct Trajectory {
     odometry: Topic<Odometry>,
     transforms: Topic<TFMessage>,
     fixed: Topic<TFMessage>,
+    /// Of a run that tracks objects, from the first scan that has them.
+    objects: Option<(Topic<Detection3DArray>, Topic<MarkerArray>)>,
     /// True if the mounting has been written.
     is_mounted: bool,
 }
@@ -98,6 +104,7 @@ impl Trajectory {
             odometry: bag.topic("/odom", Kept::ForNobody)?,
             transforms: bag.topic("/tf", Kept::ForNobody)?,
             fixed: bag.topic("/tf_static", Kept::ForLater)?,
+            objects: None,
             is_mounted: false,
         })
     }
@@ -131,6 +138,30 @@ impl Trajectory {
         }));
         bag.write(&self.odometry, stamp_ns, &odometry)?;
         bag.write(&self.transforms, stamp_ns, &TFMessage { transforms })?;
+        match &place.objects {
+            Some(objects) => self.write_objects(bag, stamp_ns, objects),
+            None => Ok(()),
+        }
+    }
+
+    fn write_objects(
+        &mut self,
+        bag: &mut BagWriter,
+        stamp_ns: i64,
+        listed: &[ListedObject],
+    ) -> Result<(), Failure> {
+        let (frames, mounting) = (&self.frames, &self.mounting);
+        let (detections, markers) = match &mut self.objects {
+            Some(topics) => topics,
+            topics => topics.insert((
+                bag.topic("/objects", Kept::ForNobody)?,
+                bag.topic("/object_markers", Kept::ForNobody)?,
+            )),
+        };
+        let detected = objects::detections(stamp_ns, frames, mounting, listed);
+        bag.write(detections, stamp_ns, &detected)?;
+        let drawn = objects::markers(stamp_ns, frames, mounting, listed);
+        bag.write(markers, stamp_ns, &drawn)?;
         Ok(())
     }
 }

@@ -1,12 +1,14 @@
-//! The poses of a run.
+//! The poses of a run, and the objects at each.
 
 use gyre_geometry::{Pose, UncertainMotion};
-use gyre_messages::{PoseHeader, flag, outcome};
+use gyre_messages::{ListedObject, PoseHeader, flag, outcome};
 use gyre_ros2_messages::frames::Interval;
 
 /// A pose of the radar with what led to it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Place {
+    /// The number of the scan in the run.
+    pub seq: u64,
     /// Time of the scan, ns since 1970.
     pub stamp_ns: i64,
     /// The pose in the frame of the first scan.
@@ -15,6 +17,8 @@ pub struct Place {
     pub since: Option<Interval>,
     /// The pose of the odometry frame in the map frame, with SLAM.
     pub map_from_odometry: Option<Pose>,
+    /// The objects, of a run that tracks them; `None` where they are not known.
+    pub objects: Option<Vec<ListedObject>>,
 }
 
 impl Place {
@@ -33,10 +37,12 @@ impl Place {
             is_measured: pose.motion.refinement.outcome != outcome::PREDICTED,
         };
         Some(Self {
+            seq: pose.item.seq,
             stamp_ns: pose.item.stamp_ns,
             pose: pose.pose(),
             since: (!pose.item.is(flag::BREAK)).then_some(since),
             map_from_odometry: None,
+            objects: None,
         })
     }
 }

@@ -1,7 +1,7 @@
 //! The source of an export: a run, a recording of one, or a dataset.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     iter,
     path::{Path, PathBuf},
 };
@@ -10,16 +10,23 @@ use gyre_bags::{BagWriter, Kept};
 use gyre_configuration::Configuration;
 use gyre_datasets::{Dataset, DatasetOptions, ground_truth::read_trajectory};
 use gyre_geometry::Pose;
-use gyre_journal as journal;
+use gyre_journal::{
+    self as journal,
+    objects::{LoggedObjects, listed},
+};
 use gyre_mapping::grid;
 use gyre_maps::map;
-use gyre_messages::{Correction, CorrectionHeader, Message, Pose as PoseTopic, PoseHeader, flag};
+use gyre_messages::{
+    Correction, CorrectionHeader, Message, Objects, ObjectsHeader, Pose as PoseTopic, PoseHeader,
+    flag,
+};
 use gyre_radar::{LostAzimuths, Trajectory};
 use gyre_recording::Recording;
 use gyre_ros2_messages::{
     Mounting,
     frames::{Frames, occupancy_grid},
 };
+use gyre_slam::RecordReader;
 use gyre_terminal::{Failure, print};
 
 use crate::places::Place;
@@ -95,11 +102,13 @@ impl Source {
                 let corrected = self.path.join("trajectory_slam.tum");
                 let corrected = corrected.is_file().then(|| read_trajectory(&corrected));
                 let corrected = corrected.transpose()?;
+                let mut tracked = RecordReader::<LoggedObjects>::open(&self.path)?;
                 let records = journal::records(&journal::path(&self.path))?;
                 let poses = records.into_iter().flatten();
                 Ok(Box::new(poses.filter_map(move |pose| match pose {
                     Ok(pose) => {
-                        Place::of(&pose).map(|place| Ok(corrected_by(place, corrected.as_ref())))
+                        let place = corrected_by(Place::of(&pose)?, corrected.as_ref());
+                        Some(with_objects(place, &mut tracked))
                     }
                     Err(error) => Some(Err(error.into())),
                 })))
@@ -237,7 +246,20 @@ fn corrected_by(place: Place, corrected: Option<&Trajectory>) -> Place {
     }
 }
 
-/// Returns the poses of a recording, each with the correction that was known then.
+/// Adds the objects, if the log has them.
+fn with_objects(place: Place, tracked: &mut RecordReader<LoggedObjects>) -> Result<Place, Failure> {
+    let seq = place.seq as usize;
+    if seq >= tracked.len() {
+        return Ok(place);
+    }
+    let objects = tracked.read(seq)?.objects;
+    Ok(Place {
+        objects: Some(objects.iter().map(listed).collect()),
+        ..place
+    })
+}
+
+/// Returns the poses of a recording, each with its objects, and the correction that was known then.
 fn recorded(mut recording: Recording) -> Result<Places, Failure> {
     let sequences = |recording: &Recording, topic: &str| -> Vec<u64> {
         recording.entries(topic).map(|entry| entry.seq).collect()
@@ -247,19 +269,27 @@ fn recorded(mut recording: Recording) -> Result<Places, Failure> {
         let header: CorrectionHeader = recording.read_header(Correction::TOPIC, seq)?;
         corrections.push((header.item.stamp_ns, header.map_from_odometry()));
     }
+    let tracked: BTreeSet<u64> = sequences(&recording, Objects::TOPIC).into_iter().collect();
     let poses = sequences(&recording, PoseTopic::TOPIC).into_iter();
-    Ok(Box::new(poses.filter_map(move |seq| {
-        let header: PoseHeader = match recording.read_header(PoseTopic::TOPIC, seq) {
-            Ok(header) => header,
-            Err(error) => return Some(Err(error.into())),
+    let mut place = move |seq| -> Result<Option<Place>, Failure> {
+        let header: PoseHeader = recording.read_header(PoseTopic::TOPIC, seq)?;
+        let Some(place) = Place::of(&header) else {
+            return Ok(None);
         };
-        let place = Place::of(&header)?;
+        let objects: Option<ObjectsHeader> = match tracked.contains(&seq) {
+            true => Some(recording.read_header(Objects::TOPIC, seq)?),
+            false => None,
+        };
         let known = corrections
             .iter()
             .take_while(|(ns, _)| *ns <= place.stamp_ns);
-        Some(Ok(Place {
+        Ok(Some(Place {
             map_from_odometry: known.last().map(|(_, correction)| *correction),
+            objects: objects.map(|header| header.list().to_vec()),
             ..place
         }))
-    })))
+    };
+    Ok(Box::new(
+        poses.filter_map(move |seq| place(seq).transpose()),
+    ))
 }

@@ -1,6 +1,8 @@
 //! The objects of each scan of a run, as the follower that tracks them has found them.
 
 use bytemuck::{Pod, Zeroable};
+use gyre_geometry::wrap_angle;
+use gyre_messages::ListedObject;
 use gyre_objects::Object;
 use gyre_slam::Record;
 use gyre_storage::LogMagic;
@@ -17,6 +19,29 @@ pub struct LoggedObjects {
     pub stamp_ns: i64,
     /// The objects, in the frame of the odometry.
     pub objects: Vec<Object>,
+}
+
+/// Returns an object as messages list it.
+pub fn listed(object: &Object) -> ListedObject {
+    ListedObject {
+        id: object.id,
+        x_m: object.position.x,
+        y_m: object.position.y,
+        yaw_rad: wrap_angle(object.yaw_rad),
+        vx_mps: object.velocity.x,
+        vy_mps: object.velocity.y,
+        length_m: object.length_m,
+        width_m: object.width_m,
+        position_covariance: packed(&object.position_covariance),
+        velocity_covariance: packed(&object.velocity_covariance),
+        moving: object.moving.into(),
+        age: object.age,
+    }
+}
+
+/// Returns xx, xy and yy.
+fn packed(matrix: &Matrix2<f64>) -> [f64; 3] {
+    [matrix.m11, matrix.m12, matrix.m22]
 }
 
 /// The part of fixed length in a file.
@@ -81,7 +106,6 @@ impl Record for LoggedObjects {
 
 impl From<&Object> for FixedObject {
     fn from(object: &Object) -> Self {
-        let packed = |matrix: &Matrix2<f64>| [matrix.m11, matrix.m12, matrix.m22];
         Self {
             id: object.id,
             position: [object.position.x, object.position.y],
