@@ -16,3 +16,5 @@ mod ros2;
 mod ros2_driver;
 #[cfg(feature = "ros2")]
 mod ros2_map;
+#[cfg(feature = "ros2")]
+mod ros2_objects;

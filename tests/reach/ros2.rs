@@ -39,7 +39,7 @@ pub(crate) fn can_speak() -> bool {
 /// A domain that only this test of this process uses. Those above 101 share their ports with other
 /// programs.
 pub(crate) fn domain(test: u32) -> String {
-    (1 + (process::id() % 10) * 10 + test).to_string()
+    (1 + (process::id() % 9) * 11 + test).to_string()
 }
 
 /// A program that says lines. Dropped, it is killed.
@@ -120,7 +120,7 @@ pub(crate) fn number(value: &Value) -> f64 {
     value.as_f64().unwrap()
 }
 
-fn stamp_ns(header: &Value) -> i64 {
+pub(crate) fn stamp_ns(header: &Value) -> i64 {
     let part = |name: &str| header["stamp"][name].as_i64().unwrap();
     part("sec") * 1_000_000_000 + part("nanosec")
 }
@@ -357,6 +357,10 @@ fn a_node_of_ros_receives_each_pose_with_its_stamp_frames_and_covariance() {
     assert!(
         !topics.contains_key("/map"),
         "a run without SLAM has no map"
+    );
+    assert!(
+        !topics.contains_key("/objects"),
+        "a run that tracks no objects publishes none"
     );
     let parts: Vec<_> = topics["/diagnostics"]
         .iter()

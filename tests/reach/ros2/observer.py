@@ -22,6 +22,8 @@ readers = {
         ("/tf", ros.TFMessage, {"depth": 1000}),
         ("/tf_static", ros.TFMessage, {"latched": True}),
         ("/diagnostics", ros.DiagnosticArray, {}),
+        (namespace + "/objects", ros.Detection3DArray, {"depth": 1000}),
+        (namespace + "/object_markers", ros.MarkerArray, {"depth": 1000}),
         (namespace + "/map", ros.OccupancyGrid, {"depth": 1, "latched": True}),
     ]
 }

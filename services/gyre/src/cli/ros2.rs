@@ -18,7 +18,7 @@ pub struct Ros2Arguments {
     /// say.
     #[arg(long, value_name = "ADDRESS")]
     pub interface: Option<String>,
-    /// The namespace of the topics odom and map.
+    /// The namespace of the topics odom, map, objects and object_markers.
     #[arg(long, value_name = "NAME", default_value = "/")]
     pub namespace: String,
     /// The frames.

@@ -9,7 +9,9 @@ use gyre_stage::{StageError, clock, wake::Signals};
 
 use crate::{
     MapSettingsOf, NodeError, Settings,
-    following::{POLL_INTERVAL, PoseTopics, follow_corrections, follow_poses},
+    following::{
+        ObjectTopics, POLL_INTERVAL, PoseTopics, follow_corrections, follow_objects, follow_poses,
+    },
     health::report,
     live_map::follow_maps,
     node::{Keep, Node},
@@ -27,6 +29,7 @@ pub struct Bridge {
     shared: Shared,
     map_settings: Option<MapSettingsOf>,
     poses: PoseTopics,
+    objects: ObjectTopics,
     /// Kept open for later readers.
     mounting: Outlet<TFMessage>,
     diagnostics: Outlet<DiagnosticArray>,
@@ -50,6 +53,10 @@ impl Bridge {
                     false => None,
                 },
             },
+            objects: ObjectTopics {
+                detections: node.publish("objects", Keep::Last(DEPTH))?,
+                markers: node.publish("object_markers", Keep::Last(DEPTH))?,
+            },
             mounting: node.publish("/tf_static", Keep::Latched)?,
             diagnostics: node.publish("/diagnostics", Keep::Last(DEPTH))?,
             maps: node.publish("map", Keep::Latched)?,
@@ -69,6 +76,7 @@ impl Bridge {
         thread::scope(|threads| {
             threads.spawn(|| follow_poses(shared, self.poses, say));
             threads.spawn(|| follow_corrections(shared));
+            threads.spawn(|| follow_objects(shared, self.objects, say));
             threads.spawn(|| report(shared, self.diagnostics));
             if let Some(settings) = self.map_settings {
                 threads.spawn(move || follow_maps(shared, settings, self.maps));

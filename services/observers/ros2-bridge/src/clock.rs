@@ -30,11 +30,6 @@ impl Clock {
         }
     }
 
-    /// Returns whether stamps are left as they are.
-    pub fn is_sensors(self) -> bool {
-        self.offset_ns == 0
-    }
-
     /// Returns a time of the run, ns, as a time of ROS, ns since 1970.
     pub fn stamp_ns(self, time_ns: i64) -> i64 {
         time_ns.saturating_add(self.offset_ns)
@@ -51,7 +46,6 @@ mod tests {
     fn stamps_since_1970_are_the_sensors() {
         let recorded_ns = 1_549_981_914_123_456_789;
         let clock = Clock::at(recorded_ns, NOW_NS);
-        assert!(clock.is_sensors());
         assert_eq!(clock.stamp_ns(recorded_ns + 5), recorded_ns + 5);
     }
 
@@ -59,7 +53,6 @@ mod tests {
     fn stamps_since_another_time_begin_now_and_keep_their_intervals() {
         for first_ns in [0, 2_000_000_000, -1, i64::MAX] {
             let clock = Clock::at(first_ns, NOW_NS);
-            assert!(!clock.is_sensors());
             assert_eq!(clock.stamp_ns(first_ns), NOW_NS);
         }
         let clock = Clock::at(2_000_000_000, NOW_NS);

@@ -2,11 +2,14 @@
 
 use std::{thread, time::Duration};
 
-use gyre_messages::{Correction, Pose, PoseHeader, outcome};
+use gyre_messages::{Correction, Objects, ObjectsHeader, Pose, PoseHeader, outcome};
 use gyre_ros2_messages::{
     frames::{self, Interval},
     nav_msgs::Odometry,
+    objects,
     tf2_msgs::TFMessage,
+    vision_msgs::Detection3DArray,
+    visualization_msgs::MarkerArray,
 };
 use gyre_stage::{
     StageError,
@@ -14,7 +17,6 @@ use gyre_stage::{
 };
 
 use crate::{
-    clock::Clock,
     outlet::Outlet,
     run_state::{RunPhase, RunState, Shared, SharedRunState},
 };
@@ -27,6 +29,13 @@ pub struct PoseTopics {
     pub odometry: Outlet<Odometry>,
     /// `None` where another program provides the transforms.
     pub transforms: Option<Outlet<TFMessage>>,
+}
+
+/// The topics that the objects of each scan are published on.
+pub struct ObjectTopics {
+    pub detections: Outlet<Detection3DArray>,
+    /// The same to look at.
+    pub markers: Outlet<MarkerArray>,
 }
 
 /// Calls `follow` for each run, with its state, until the bridge stops. A run that could not be
@@ -80,10 +89,16 @@ pub fn follow_poses(shared: &Shared, mut topics: PoseTopics, say: fn(&str)) {
 
 /// Returns the counts of a run in a sentence.
 fn sentence(state: &RunState) -> String {
-    let first = state.first.unwrap_or_default();
+    let (poses, objects) = (&state.poses, &state.objects);
     format!(
-        "the run has ended: {} poses from number {first} on and {} maps published, {} poses missed; {} messages not sent because readers were behind",
-        state.poses, state.maps, state.missed, state.unsent
+        "the run has ended: {} poses from number {} on, {} maps and the objects of {} scans published, the objects of {} scans and {} poses missed; {} messages not sent because readers were behind",
+        poses.published,
+        poses.first.unwrap_or_default(),
+        state.maps,
+        objects.published,
+        objects.missed,
+        poses.missed,
+        state.unsent
     )
 }
 
@@ -117,25 +132,16 @@ fn publish(
     topics: &mut PoseTopics,
     say: fn(&str),
 ) {
-    let (clock, map_from_odometry) = {
+    let (stamp_ns, map_from_odometry) = {
         let mut state = state.lock();
         // The pose was published before the stream was interrupted.
-        if !state.count(pose.item.seq) {
+        if !state.poses.count(pose.item.seq) {
             return;
         }
-        let is_first = state.clock.is_none();
-        let clock = *state
-            .clock
-            .get_or_insert_with(|| Clock::of(pose.item.stamp_ns));
-        if is_first && !clock.is_sensors() {
-            say(
-                "the times of this run do not count from 1970: its stamps in ROS begin with this computer's time at the first pose",
-            );
-        }
-        (clock, state.map_from_odometry)
+        let stamp_ns = stamp_ns(&mut state, pose.item.stamp_ns, say);
+        (stamp_ns, state.map_from_odometry)
     };
     let (frames, mounting) = (&shared.frames, &shared.mounting);
-    let stamp_ns = clock.stamp_ns(pose.item.stamp_ns);
     let vehicle = mounting.of_vehicle_uncertain(&pose.pose());
     let since = Interval {
         motion: mounting.of_vehicle_uncertain(&pose.motion.motion().alone()),
@@ -154,6 +160,17 @@ fn publish(
     }
     let odometry = frames::odometry(stamp_ns, frames, &vehicle, Some(&since));
     topics.odometry.send(odometry);
+}
+
+/// Returns a time of the run as a time of ROS, and says of the first one if they differ.
+fn stamp_ns(state: &mut RunState, time_ns: i64, say: fn(&str)) -> i64 {
+    let (stamp_ns, is_first) = state.stamp_ns(time_ns);
+    if is_first && stamp_ns != time_ns {
+        say(
+            "the times of this run do not count from 1970: its stamps in ROS begin with this computer's time at the first pose",
+        );
+    }
+    stamp_ns
 }
 
 impl PoseTopics {
@@ -182,4 +199,53 @@ pub fn follow_corrections(shared: &Shared) {
         }
         Ok(())
     });
+}
+
+/// Publishes the objects of each run that tracks them.
+pub fn follow_objects(shared: &Shared, mut topics: ObjectTopics, say: fn(&str)) {
+    each_run(shared, |run, state| {
+        if !run.manifest().window.objects {
+            return Ok(());
+        }
+        let mut tracked = run.observe::<Objects>()?;
+        while !shared.is_stopping() {
+            let unsent = topics.unsent();
+            match tracked.next(POLL_INTERVAL)? {
+                Next::Message(message, _) => topics.publish(shared, state, message.header(), say),
+                Next::Idle => {}
+                Next::Ended => break,
+            }
+            state.lock().unsent += topics.unsent() - unsent;
+        }
+        Ok(())
+    });
+}
+
+impl ObjectTopics {
+    /// Publishes the objects of a scan, also where there are none.
+    fn publish(
+        &mut self,
+        shared: &Shared,
+        state: &SharedRunState,
+        header: &ObjectsHeader,
+        say: fn(&str),
+    ) {
+        let stamp_ns = {
+            let mut state = state.lock();
+            // They were published before the stream was interrupted.
+            if !state.objects.count(header.item.seq) {
+                return;
+            }
+            stamp_ns(&mut state, header.item.stamp_ns, say)
+        };
+        let (frames, mounting, listed) = (&shared.frames, &shared.mounting, header.list());
+        let detections = objects::detections(stamp_ns, frames, mounting, listed);
+        self.detections.send(detections);
+        let markers = objects::markers(stamp_ns, frames, mounting, listed);
+        self.markers.send(markers);
+    }
+
+    fn unsent(&self) -> u64 {
+        self.detections.unsent() + self.markers.unsent()
+    }
 }

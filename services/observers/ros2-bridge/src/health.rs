@@ -72,7 +72,7 @@ fn array(
 /// Returns the diagnostics of the run as a whole.
 fn run(state: &RunState, status: Option<&Status>, before: &mut LastCounts) -> DiagnosticStatus {
     let dropped = status.map(|status| status.dropped);
-    let lost = state.missed + state.unsent;
+    let lost = state.lost();
     let drops = before.dropped.zip(dropped);
     let fell = [
         (
@@ -81,9 +81,9 @@ fn run(state: &RunState, status: Option<&Status>, before: &mut LastCounts) -> Di
         ),
         (lost > before.lost, "the bridge loses messages"),
     ];
-    let poses = state.poses.saturating_sub(before.poses);
+    let poses = state.poses.published.saturating_sub(before.poses);
     *before = LastCounts {
-        poses: state.poses,
+        poses: state.poses.published,
         dropped: dropped.or(before.dropped),
         lost,
     };
@@ -97,8 +97,10 @@ fn run(state: &RunState, status: Option<&Status>, before: &mut LastCounts) -> Di
         (RunPhase::Working, ..) => (OK, format!("{poses} poses in the last second")),
     };
     let of_bridge = [
-        ("poses published", state.poses),
-        ("poses missed", state.missed),
+        ("poses published", state.poses.published),
+        ("poses missed", state.poses.missed),
+        ("objects published", state.objects.published),
+        ("objects missed", state.objects.missed),
         ("messages not sent", state.unsent),
         ("maps published", state.maps),
     ];

@@ -57,14 +57,10 @@ pub struct RunState {
     pub clock: Option<Clock>,
     /// The odometry frame in the map frame, both of the radar, in a run with SLAM.
     pub map_from_odometry: Option<Pose>,
-    /// The number of the first pose that was published: those before it came before the bridge.
-    pub first: Option<u64>,
-    /// The number of the newest pose.
-    pub newest: Option<u64>,
-    /// Poses that were published.
-    pub poses: u64,
-    /// Poses that came too fast for the bridge.
-    pub missed: u64,
+    /// The poses.
+    pub poses: Counts,
+    /// The scans whose objects are published, in a run that tracks them.
+    pub objects: Counts,
     /// Messages for which readers left no room.
     pub unsent: u64,
     /// Maps that were published.
@@ -73,8 +69,21 @@ pub struct RunState {
     pub notice: Option<String>,
 }
 
-impl RunState {
-    /// Counts a pose, and what is missing before it. False for one that was published before.
+/// Counts of the messages of a topic, which have a number for each scan.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// The number of the first one that was published: those before it came before the bridge.
+    pub first: Option<u64>,
+    /// The number of the newest one.
+    pub newest: Option<u64>,
+    /// Those that were published.
+    pub published: u64,
+    /// Those that came too fast for the bridge.
+    pub missed: u64,
+}
+
+impl Counts {
+    /// Counts a message, and what is missing before it. False for one that was published before.
     pub fn count(&mut self, seq: u64) -> bool {
         let next = self.newest.map_or(seq, |newest| newest + 1);
         if seq < next {
@@ -83,8 +92,23 @@ impl RunState {
         self.first.get_or_insert(seq);
         self.missed += seq - next;
         self.newest = Some(seq);
-        self.poses += 1;
+        self.published += 1;
         true
+    }
+}
+
+impl RunState {
+    /// Returns a time of the run as a time of ROS, and whether it is the first one: by that the
+    /// clock is set.
+    pub fn stamp_ns(&mut self, time_ns: i64) -> (i64, bool) {
+        let is_first = self.clock.is_none();
+        let clock = self.clock.get_or_insert_with(|| Clock::of(time_ns));
+        (clock.stamp_ns(time_ns), is_first)
+    }
+
+    /// Returns the number of messages that were not published or not sent.
+    pub fn lost(&self) -> u64 {
+        self.poses.missed + self.objects.missed + self.unsent
     }
 }
 
@@ -165,12 +189,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_pose_is_counted_once_and_gaps_are_missed() {
-        let mut state = RunState::default();
-        let counted: Vec<bool> = [7, 8, 8, 7, 11, 12].map(|seq| state.count(seq)).to_vec();
+    fn each_message_is_counted_once_and_gaps_are_missed() {
+        let mut counts = Counts::default();
+        let counted: Vec<bool> = [7, 8, 8, 7, 11, 12].map(|seq| counts.count(seq)).to_vec();
         assert_eq!(counted, [true, true, false, false, true, true]);
-        assert_eq!((state.first, state.newest), (Some(7), Some(12)));
-        assert_eq!((state.poses, state.missed), (4, 2));
+        assert_eq!((counts.first, counts.newest), (Some(7), Some(12)));
+        assert_eq!((counts.published, counts.missed), (4, 2));
     }
 
     fn shared() -> Shared {
@@ -182,18 +206,19 @@ mod tests {
         let shared = shared();
         let earlier = shared.begin_named("a", false);
         shared.show(&earlier);
-        assert!(earlier.lock().count(7));
+        assert!(earlier.lock().poses.count(7));
         let next = shared.begin_named("b", true);
-        assert!(earlier.lock().count(8));
+        assert!(earlier.lock().poses.count(8));
         earlier.lock().phase = RunPhase::Ended;
         // A thread that begins with the earlier run late gets its state.
-        assert_eq!(shared.begin_named("a", false).lock().poses, 2);
+        assert_eq!(shared.begin_named("a", false).lock().poses.published, 2);
         assert_eq!(next.lock().phase, RunPhase::Working);
-        assert!(next.lock().count(0), "a pose of another run is none before");
+        let is_new = next.lock().poses.count(0);
+        assert!(is_new, "a pose of another run is none before");
         assert_eq!(shared.shown().lock().phase, RunPhase::Ended);
         shared.show(&next);
         let shown = shared.shown().lock().clone();
-        assert_eq!((shown.poses, shown.missed), (1, 0));
+        assert_eq!((shown.poses.published, shown.poses.missed), (1, 0));
         assert!(shown.map_from_odometry.is_some());
     }
 

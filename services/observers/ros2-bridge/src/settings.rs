@@ -15,7 +15,7 @@ pub struct Settings {
     pub out: PathBuf,
     /// The domain and the network.
     pub domain: Domain,
-    /// The namespace of `odom` and `map`, such as `/` or `/robot`.
+    /// The namespace of `odom`, `map` and the objects, such as `/` or `/robot`.
     pub namespace: String,
     /// Names of the frames.
     pub frames: Frames,
