@@ -109,7 +109,7 @@ pub struct ObjectErrors {
     pub precision: f64,
     /// 1 less misses, false positives and switches over the required ones.
     pub mota: f64,
-    /// How well objects are found and keep their identity, in one figure, and its two parts.
+    /// Detection and association in one figure, and each.
     #[serde(flatten)]
     pub hota: Hota,
     /// Switches for each required object.

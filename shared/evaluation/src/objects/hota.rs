@@ -12,7 +12,7 @@ use super::{TrackedObject, TrueObject, distance_m, share};
 /// Similarities from which on two objects are a pair: twentieths, from 0.05 to 0.95.
 const LEVELS: usize = 19;
 const LEVEL_STEP: f64 = 0.05;
-/// What rounding takes from a similarity.
+/// The most that rounding takes from a similarity.
 const ROUNDING: f64 = 1e-12;
 /// Costs of an assignment for a score of 1: its resolution is a thousandth of a cost.
 const SCORE_COSTS: f64 = 1e5;
