@@ -442,16 +442,17 @@ fn it_does_not_take_over_from_a_network_that_looks_at_two_scans() {
     }
     let model = "shared/method/masking/tests/models/pair-127.toml";
     let model = Path::new(crate::PROJECT).join(model);
-    let run = Run::of_recording().rate("2.5").masked_by(&model);
+    let run = Run::of_recording().rate("1").masked_by(&model);
     let run = run.set("masking.backend=rten");
     let mut running = run.start();
-    running.await_poses(4);
+    running.await_poses(2);
     let (_folder, file) = file("def mask(scan):\n    return scan.power > 0\n");
     let mut swap = gyre();
     swap.args(["swap", "masking"]).arg(run.out());
     swap.arg("--python").arg(&file);
     Ended::of(swap).refused_with(&["cannot take over", "one scan at a time"]);
-    running.finish().succeeded();
+    running.signal(Signal::INT);
+    running.end();
     // In a run that begins with it, it takes the network's place.
     let begun = with(Run::of_recording().masked_by(&model), "masking", &file);
     assert_eq!(begun.complete(), undisturbed());
