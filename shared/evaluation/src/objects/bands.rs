@@ -9,8 +9,8 @@ use super::{TrackedObject, TrueObject, distance_m, share};
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Band(f64, f64);
 
-/// Bands of range, m: where a beam of 1.8 degrees is narrower than a car is wide, as wide, and as
-/// wide as a lane.
+/// Bands of range, m. Up to 60 m a beam of 1.8 degrees is no wider than a car, and a step of 0.9
+/// degrees no wider than half of one.
 pub(super) const RANGES_M: [Band; 3] =
     [Band(0.0, 20.0), Band(20.0, 40.0), Band(40.0, f64::INFINITY)];
 /// Bands of speed, m/s: walking pace to a turn, a town, a road.
