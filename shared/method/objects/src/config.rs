@@ -104,7 +104,7 @@ pub struct ObjectsConfig {
     /// 1. Default 0.8.
     pub min_weight: f64,
     /// The score from which on a track is an object: the logarithm of the likelihood of an object
-    /// over that of clutter. More finds less, and less that is false. Default 2.
+    /// over that of clutter. More finds less, and less that is false. Default 3.
     pub confirm_score: f64,
     /// The score below which a track ends. Default -3: clutter is twenty times as likely.
     pub end_score: f64,
@@ -157,7 +157,7 @@ impl Default for ObjectsConfig {
             moving_sigmas: 1.5,
             min_returns: 3,
             min_weight: 0.8,
-            confirm_score: 2.0,
+            confirm_score: 3.0,
             end_score: -3.0,
             max_score: 8.0,
             seen_share: 0.8,

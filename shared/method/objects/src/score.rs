@@ -2,36 +2,38 @@
 //! (Sittler; Blackman and Popoli, "Design and Analysis of Modern Tracking Systems", 1999,
 //! Sec. 6.2).
 //!
-//! The terms are those of a logistic regression over the clusters of the first six simulated drives
-//! on which [docs/objects.md](../../../../docs/objects.md) says that it was built. Clutter comes
-//! back from scan to scan at the same places, so that a scan counts half of what it would by
-//! itself.
+//! The terms are those of a logistic regression over the tracks in their third to eighth scans, on
+//! the simulated drives on which [docs/objects.md](../../../../docs/objects.md) says that it was
+//! built. It is over the sums of a track, not over single clusters: clutter comes back from scan to
+//! scan at the same places, so that a scan counts less than it would by itself, but it does not
+//! move as predicted.
 
 use nalgebra::{Point2, Vector2};
 
 use crate::returns::Return;
 
-/// Weight of a scan's evidence: successive ones are not independent.
-const INDEPENDENCE: f64 = 0.5;
-/// The largest evidence of a cluster for and against an object, before that.
-const LARGEST: f64 = 4.0;
-/// The evidence of a cluster of full weight, at a new place, with nothing around it.
-const BASE: f64 = 4.0;
+/// The least and the largest evidence of a cluster.
+const BOUNDS: [f64; 2] = [-4.0, 2.0];
+/// The evidence of a cluster of full weight, at a new place, with nothing around it, that is where
+/// it was predicted.
+const BASE: f64 = 1.8;
 /// The growth with the logarithm of the mean weight of the returns: vehicles have strong edges,
 /// hedges have none.
-const STRENGTH: f64 = 2.0;
+const STRENGTH: f64 = 1.1;
+/// The growth with the range, 1/m: all weights fall with it.
+const RANGE: f64 = 0.013;
 /// The loss if the place has returned in all scans before.
-const BEFORE: f64 = 4.5;
+const BEFORE: f64 = 1.6;
 /// The loss with the logarithm of the weight around the cluster over its own: vehicles stand free.
-const AROUND: f64 = 1.2;
+const AROUND: f64 = 0.3;
 /// Radius in which that is, m: more than a car is long.
 const AROUND_M: f64 = 5.0;
 /// The loss with the squared Mahalanobis distance from the prediction, up to 20.
-const MISFIT: f64 = 0.1;
+const MISFIT: f64 = 0.2;
 const LARGEST_MISFIT: f64 = 20.0;
 /// The evidence where all places that the object has left are free, and its loss where all are
 /// taken.
-const LEFT: [f64; 2] = [2.8, 4.4];
+const LEFT: [f64; 2] = [1.05, 1.75];
 
 /// Returns the evidence of a cluster.
 pub(crate) fn of_cluster(returns: &[Return], members: &[u32], chi_square: f64) -> f64 {
@@ -45,18 +47,19 @@ pub(crate) fn of_cluster(returns: &[Return], members: &[u32], chi_square: f64) -
     let all: f64 = returns.iter().filter(near).map(|found| found.weight).sum();
     let inner: f64 = own().filter(near).map(|found| found.weight).sum();
     let around = (all - inner).max(0.0) / weight;
-    let evidence = BASE + STRENGTH * (weight / count).ln()
+    let range_m = own().map(|found| found.range_m).sum::<f64>() / count;
+    let evidence = BASE + STRENGTH * (weight / count).ln() + RANGE * range_m
         - BEFORE * before / weight
         - AROUND * (1.0 + around).ln()
         - MISFIT * chi_square.min(LARGEST_MISFIT);
-    INDEPENDENCE * evidence.clamp(-LARGEST, LARGEST)
+    evidence.clamp(BOUNDS[0], BOUNDS[1])
 }
 
 /// Returns the evidence of the places that the object has left, by the share of them where
 /// something is.
 pub(crate) fn of_places_left(taken: f64) -> f64 {
     let [free, loss] = LEFT;
-    INDEPENDENCE * (free - loss * taken)
+    free - loss * taken
 }
 
 #[cfg(test)]
