@@ -105,7 +105,7 @@ impl Drive {
     fn read(arguments: &GnssArguments) -> Result<Self, Failure> {
         let run = &arguments.run;
         let configuration = Configuration::read(&run.join("config.toml"), &arguments.set)?;
-        let log = gnss_log(&configuration)?;
+        let log = gnss_log(&configuration, run)?;
         let log = log.ok_or("the run has no fixes: add --set gnss.kind=auto")?;
         let mut keyframes = RecordReader::<Keyframe>::open(run)?;
         let mut queries = RecordReader::<Query>::open(run)?;

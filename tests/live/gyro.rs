@@ -53,7 +53,7 @@ fn sending(log: PathBuf, address: String) -> JoinHandle<()> {
     })
 }
 
-fn address(test: u32) -> String {
+pub fn address(test: u32) -> String {
     format!(
         "127.0.0.1:{}",
         40_000 + test * 4_000 + process::id() % 4_000

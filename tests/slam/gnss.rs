@@ -72,7 +72,7 @@ fn fixes(late_s: f64) -> Vec<(i64, Geographic)> {
 }
 
 /// The log of that receiver as a table.
-fn log(late_s: f64) -> String {
+pub fn log(late_s: f64) -> String {
     let mut text = "stamp_ns,latitude_deg,longitude_deg,sigma_m\n".to_owned();
     for (stamp_ns, place) in fixes(late_s) {
         let [latitude, longitude] = [place.latitude_deg, place.longitude_deg];
@@ -125,13 +125,13 @@ fn run(late_s: f64) -> Run {
     with_antenna(run.set("gnss.kind=log")).set(&format!("gnss.file={}", file.display()))
 }
 
-fn with_antenna(run: Run) -> Run {
+pub fn with_antenna(run: Run) -> Run {
     run.set("gnss.correlation_s=0")
         .set(&format!("gnss.lever_m=[{}, {}]", LEVER_M[0], LEVER_M[1]))
 }
 
 /// The results that must be the same to the byte.
-fn left(run: &Run) -> ([String; 3], Value) {
+pub fn left(run: &Run) -> ([String; 3], Value) {
     let mut gnss = run.summary()["gnss"].clone();
     // The log of each run is another one.
     for key in ["log", "topic"] {

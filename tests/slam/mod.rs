@@ -2,7 +2,7 @@
 
 mod extended_maps;
 mod followers;
-mod gnss;
+pub mod gnss;
 mod keyframes;
 mod localise;
 mod loops;

@@ -18,6 +18,7 @@ use gyre_journal::{
 };
 use gyre_messages::StageId;
 use gyre_recorder::Ledger;
+use gyre_recording::received_fixes;
 use gyre_results::{Holds, Identity, Out, Programs, SIMULATED_TRUTH, SUMMARY};
 use gyre_run::{BEGUN_WITH, COMPLETE, Mode, Side};
 use gyre_scan_matching::Refiner;
@@ -312,7 +313,7 @@ fn damaged(error: KeyframesError) -> Failure {
 }
 
 /// The files of a run's state.
-fn state(out: &Path) -> [PathBuf; 11] {
+fn state(out: &Path) -> [PathBuf; 12] {
     let [ledger, generations] = state_of_recording(out);
     [
         journal::path(out),
@@ -322,6 +323,7 @@ fn state(out: &Path) -> [PathBuf; 11] {
         records_path::<Query>(out),
         records_path::<LoggedScan>(out),
         records_path::<LoggedObjects>(out),
+        received_fixes(out),
         ledger,
         generations,
         out.join(BEGUN_WITH),

@@ -1,6 +1,6 @@
 //! Checks before the first process is started.
 
-use std::time::Duration;
+use std::{io, net::UdpSocket, path::Path, time::Duration};
 
 use gyre_configuration::{Configuration, Played, gnss_log, open};
 use gyre_datasets::{DEFAULT_TURN_NS, Fingerprint, turn_ns};
@@ -49,6 +49,14 @@ pub enum PreflightError {
         "wheels.kind is of a recording, but the radar is live: set it to `udp`, to `ros2` for a radar behind its driver in ROS 2, or to `none`"
     )]
     LiveWheels,
+    /// An address at which no fixes can be received.
+    #[error("cannot receive the fixes of GNSS at {address} (gnss.listen): {source}")]
+    LiveGnss {
+        /// The address.
+        address: String,
+        /// The system's reason.
+        source: io::Error,
+    },
     /// Chirps of a live radar.
     #[error(
         "doppler.kind is `auto`, but a live radar does not say which of its chirps rise: set it to `none`"
@@ -121,7 +129,7 @@ pub fn check(configuration: &Configuration) -> Result<Preflight, Failure> {
         &configuration.odometry.points,
         &configuration.odometry.masking,
     )?;
-    gnss_log(configuration)?;
+    check_gnss(configuration)?;
     if configuration.slam.is_localised() {
         searched_map::open(&configuration.slam.map, configuration)?;
     }
@@ -267,6 +275,20 @@ impl Scans {
             recording: None,
         })
     }
+}
+
+/// Checks that the fixes of GNSS can be used, or received.
+fn check_gnss(configuration: &Configuration) -> Result<(), Failure> {
+    let config = &configuration.gnss;
+    if !config.is_live() {
+        // Where the results lie does not matter to a log.
+        return Ok(gnss_log(configuration, Path::new("")).map(drop)?);
+    }
+    let opened = UdpSocket::bind(&config.listen).map(drop);
+    Ok(opened.map_err(|source| PreflightError::LiveGnss {
+        address: config.listen.clone(),
+        source,
+    })?)
 }
 
 /// Checks that a process may open as many files as it needs. The transport's own errors would not

@@ -5,6 +5,7 @@ mod resolve;
 use std::{
     env,
     ffi::OsString,
+    fs,
     os::unix::process::CommandExt,
     path::{Path, PathBuf},
     process::{Command, ExitCode},
@@ -12,8 +13,10 @@ use std::{
 };
 
 use gyre_configuration::{Configuration, describe_masks, with_stored_options};
+use gyre_datasets::GnssLog;
 use gyre_messages::StageId;
 use gyre_operate::detach_if_asked;
+use gyre_recording::received_fixes;
 use gyre_results::{Form, Identity, Out, Programs, Results, SIMULATED_TRUTH, Session};
 use gyre_run::{Ending, Mode};
 use gyre_stage::{
@@ -21,7 +24,7 @@ use gyre_stage::{
     run::{RootError, RunRoot, sweep},
     wake::{Signals, let_signals_end_the_process},
 };
-use gyre_storage as storage;
+use gyre_storage::{self as storage, StorageError};
 use gyre_supervise::{Plan, SuperviseError, supervise};
 use gyre_terminal::{Failure, INTERRUPTED, own, print};
 
@@ -328,6 +331,7 @@ fn finish(
     let_signals_end_the_process()?;
     let make_way = |poses| earlier::make_way(out, poses);
     let mut written = gyre_results::write(configuration, out, session, &make_way)?;
+    keep_fixes(configuration, out);
     let has_replaced = earlier::replaces(out, written.poses);
     // With all poses there may be loops to find, and a run that failed may not have kept them.
     let has_followed = match session.ending {
@@ -340,6 +344,23 @@ fn finish(
         written.poses = 0;
     }
     Ok(written)
+}
+
+/// Puts the fixes that a live receiver has sent beside the recording of the run, for its replays.
+/// The run has its results without, as it has without the recording.
+fn keep_fixes(configuration: &Configuration, out: &Out) {
+    let (recording, received) = (&configuration.record.file, received_fixes(out.path()));
+    if recording.as_os_str().is_empty() || !configuration.gnss.is_live() || !received.exists() {
+        return;
+    }
+    let rows = fs::read(&received).map_err(StorageError::at("read", &received));
+    let kept = rows.and_then(|rows| storage::write(&GnssLog::of_recording(recording), rows));
+    if let Err(error) = kept {
+        print::note(format_args!(
+            "the fixes of GNSS are not beside the recording, but in {}: {error}",
+            received.display()
+        ));
+    }
 }
 
 /// The message of a run that failed.

@@ -113,6 +113,11 @@ fn of_recorded_run(data: &Path) -> Result<Automatic, AutomaticError> {
     let mut table = parsed.map_err(|error| AutomaticError::Recorded(error.to_string()))?;
     // The recording itself says what its scans are.
     table.retain(|section, _| section != "dataset" && MethodConfig::SECTIONS.contains(&section));
+    let gnss_kind = table.get_mut("gnss").and_then(|gnss| gnss.get_mut("kind"));
+    if let Some(kind) = gnss_kind.filter(|kind| kind.as_str() == Some("udp")) {
+        // The fixes that arrived then lie beside it.
+        *kind = "auto".into();
+    }
     Ok(Automatic {
         table,
         sentence: "no configuration is named: that of the recorded run is used".to_owned(),

@@ -141,16 +141,17 @@ pub fn simulated_samples(
     Ok(turns.and(speeds))
 }
 
-/// Returns the log of the fixes that the corrected trajectory is made with; `None` without GNSS.
+/// Returns the log of the fixes that the corrected trajectory is made with, of a run with its
+/// results in `out`; `None` without GNSS.
 ///
 /// # Errors
 /// No log, or one that cannot be used.
-pub fn gnss_log(configuration: &Configuration) -> Result<Option<GnssLog>, SourceError> {
+pub fn gnss_log(configuration: &Configuration, out: &Path) -> Result<Option<GnssLog>, SourceError> {
     let (config, data) = (&configuration.gnss, &configuration.source.data);
     let is_in_folder = configuration.streamed().is_none() && !data.as_os_str().is_empty();
     match config.kind == GnssKind::Auto && !is_in_folder {
         true => Err(SourceError::NoGnss),
-        false => Ok(gyre_recording::gnss_log(config, data)?),
+        false => Ok(gyre_recording::gnss_log(config, data, out)?),
     }
 }
 

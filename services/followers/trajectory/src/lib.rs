@@ -1,12 +1,16 @@
 //! The trajectory that agrees with the loops: fuses the motions between keyframes, the loops among
 //! them and the fixes of GNSS.
 //!
-//! It follows `journal/keyframes.log` and `journal/loops.log` and has no file of its own. The log
-//! of the fixes is complete when it starts; a fix counts once both keyframes around it have come.
+//! It follows `journal/keyframes.log` and `journal/loops.log`. The log of the fixes is complete
+//! when it starts, or grows: fixes of a live receiver are written to `journal/gnss.csv` here, until
+//! both other logs have ended. A fix counts once both keyframes around it have come.
+//!
 //! While the run goes on, new loops and fixes are taken into the standing estimate, which may
 //! depend a little on when they came. When both logs have ended the poses are solved anew: the last
 //! correction is a function of the logs, and that of the results, which the supervisor makes from
 //! the same logs.
+
+mod live_fixes;
 
 use std::path::PathBuf;
 
@@ -23,6 +27,8 @@ use gyre_stage::{
     follower::{self, LogId, Progress, Step},
 };
 
+use live_fixes::LiveFixes;
+
 /// Runs the follower to the end of both logs, or until SIGTERM.
 ///
 /// # Errors
@@ -35,17 +41,23 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let kind = slam.kind.estimator().ok_or_else(|| {
         StageError::Configuration("slam.kind is none: there is no trajectory to correct".to_owned())
     })?;
-    let mut trajectory = Trajectory::open(&launch.manifest.out, kind, fixes(launch)?)?;
+    let out = &launch.manifest.out;
+    let config: GnssConfig = launch.section("gnss")?;
+    let mut trajectory = Trajectory::open(out, kind, fixes(launch, &config)?)?;
+    // What arrives when the scans have ended is of another drive.
+    if config.is_live() && !trajectory.keyframes.has_ended() {
+        trajectory.live_fixes = Some(LiveFixes::open(config, out)?);
+    }
     follower::run(launch, &mut trajectory)
 }
 
-/// Returns the fixes of GNSS of the run; none without `[gnss]`.
-fn fixes(launch: &Launch) -> Result<Fixes, StageError> {
-    let config: GnssConfig = launch.section("gnss")?;
+/// Returns the fixes of GNSS that are known by now; none without `[gnss]`.
+fn fixes(launch: &Launch, config: &GnssConfig) -> Result<Fixes, StageError> {
     let source: SourceConfig = launch.section("source")?;
-    let log = gyre_recording::gnss_log(&config, &source.data).map_err(input)?;
-    let fixes = log.map(|log| log.on_radar(&config)).unwrap_or_default();
-    Ok(Fixes::new(fixes, &config))
+    let out = &launch.manifest.out;
+    let log = gyre_recording::gnss_log(config, &source.data, out).map_err(input)?;
+    let fixes = log.map(|log| log.on_radar(config)).unwrap_or_default();
+    Ok(Fixes::new(fixes, config))
 }
 
 struct Trajectory {
@@ -54,6 +66,8 @@ struct Trajectory {
     kind: EstimatorKind,
     /// The fixes, of which no keyframe has one yet.
     fixes: Fixes,
+    /// Those that arrive while the run goes on.
+    live_fixes: Option<LiveFixes>,
     keyframes: RecordReader<Keyframe>,
     queries: RecordReader<Query>,
     estimator: TrajectoryEstimator,
@@ -83,6 +97,7 @@ impl Trajectory {
             queries: RecordReader::open(out)?,
             estimator: TrajectoryEstimator::new(options).with_fixes(fixes.clone()),
             fixes,
+            live_fixes: None,
             newest: None,
             read: [0, 0],
             corrected: None,
@@ -102,7 +117,10 @@ impl Trajectory {
             .zip(unchanged)
             .any(|(read, unchanged)| unchanged < *read);
         if was_cut {
-            *self = Self::open(&self.out.clone(), self.kind, self.fixes.clone())?;
+            *self = Self {
+                live_fixes: self.live_fixes.take(),
+                ..Self::open(&self.out.clone(), self.kind, self.fixes.clone())?
+            };
         }
         Ok(())
     }
@@ -135,6 +153,20 @@ impl Trajectory {
         }
         self.has_changed = true;
         Ok(true)
+    }
+
+    /// Takes the fixes that have arrived; at the end of the run all of them.
+    fn take_live_fixes(&mut self) -> Result<(), StageError> {
+        let Some(live) = &mut self.live_fixes else {
+            return Ok(());
+        };
+        if let Some(fixes) = live.take(self.is_final)? {
+            self.fixes = fixes.clone();
+            if self.estimator.replace_fixes(fixes) {
+                self.corrected = None;
+            }
+        }
+        Ok(())
     }
 
     /// Corrects the poses by all that was read.
@@ -197,6 +229,7 @@ impl Follower for Trajectory {
         self.is_final = has_ended;
         if self.has_changed {
             self.has_changed = false;
+            self.take_live_fixes()?;
             return Ok(Step::Worked(self.correct()?));
         }
         Ok(match has_ended {

@@ -1,7 +1,9 @@
 #![allow(clippy::unwrap_used)]
 
+use std::{net::UdpSocket, path::Path};
+
 use gyre_geometry::{Twist, UncertainMotion, pose};
-use gyre_samples::GnssFix;
+use gyre_samples::{Geographic, GnssFix, GnssKind, LocalPlane};
 use gyre_slam::{LoopCandidate, LoopOutcome, RecordLog};
 use nalgebra::{Matrix3, Vector3};
 
@@ -202,6 +204,57 @@ fn fixes_correct_as_keyframes_come_and_the_last_correction_is_that_of_the_result
     logs.queries.end().unwrap();
     let (correction, has_ended) = follow(&mut trajectory);
     assert!(has_ended);
+    let (restarted, _) = follow(&mut logs.trajectory());
+    assert_eq!(bytes(restarted), bytes(correction));
+}
+
+/// The lines that a live receiver sends of the same fixes.
+fn lines() -> String {
+    let place = Geographic {
+        latitude_deg: 51.75,
+        longitude_deg: -1.26,
+    };
+    let plane = LocalPlane::new(place, 0.0);
+    let step = pose(3.0, 0.0, std::f64::consts::TAU / 40.0);
+    let poses = std::iter::successors(Some(pose(0.0, 0.0, 1.0)), |at| Some(at * step));
+    let line = |(index, at): (i64, gyre_geometry::Pose)| {
+        let place = plane.place([at.translation.x, at.translation.y]);
+        let [latitude, longitude] = [place.latitude_deg, place.longitude_deg];
+        format!("{},{latitude},{longitude},0.1\n", 7 * index)
+    };
+    (0..120).zip(poses).map(line).collect()
+}
+
+#[test]
+fn fixes_that_arrive_are_logged_and_the_last_correction_is_that_of_the_log() {
+    let mut logs = Logs::new();
+    let free = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let address = free.local_addr().unwrap();
+    drop(free);
+    let config = GnssConfig {
+        kind: GnssKind::Udp,
+        listen: address.to_string(),
+        ..GnssConfig::default()
+    };
+    let mut trajectory = logs.trajectory();
+    let live = LiveFixes::open(config.clone(), logs.out.path()).unwrap();
+    trajectory.live_fixes = Some(live);
+    logs.append(50, 0);
+    follow(&mut trajectory);
+    let sender = UdpSocket::bind("127.0.0.1:0").unwrap();
+    sender.send_to(lines().as_bytes(), address).unwrap();
+    sender.send_to(b"no fix", address).unwrap();
+    logs.append(120, 120);
+    logs.keyframes.end().unwrap();
+    logs.queries.end().unwrap();
+    let (correction, has_ended) = follow(&mut trajectory);
+    assert!(has_ended);
+    let yaw_rad = correction.unwrap().yaw_rad;
+    assert!((yaw_rad - 0.06).abs() < 0.02, "{yaw_rad}");
+    let log = gyre_recording::gnss_log(&config, Path::new(""), logs.out.path());
+    let log = log.unwrap().unwrap();
+    assert_eq!((log.fixes.len(), log.faults.unreadable), (120, 1));
+    logs.fixes = Fixes::new(log.on_radar(&config), &config);
     let (restarted, _) = follow(&mut logs.trajectory());
     assert_eq!(bytes(restarted), bytes(correction));
 }

@@ -211,9 +211,10 @@ fn outcome_of_preflight(error: &PreflightError) -> DriveOutcome {
         PreflightError::SharedMemory { .. }
         | PreflightError::OpenFiles { .. }
         | PreflightError::NoSharedMemory(_) => DriveOutcome::Machine,
-        PreflightError::LiveGyro | PreflightError::LiveWheels | PreflightError::LiveDoppler => {
-            DriveOutcome::Configuration
-        }
+        PreflightError::LiveGyro
+        | PreflightError::LiveWheels
+        | PreflightError::LiveDoppler
+        | PreflightError::LiveGnss { .. } => DriveOutcome::Configuration,
     }
 }
 

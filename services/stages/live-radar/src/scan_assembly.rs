@@ -74,7 +74,7 @@ impl ScanAssembly {
         let mut complete = None;
         for (azimuth, stamp_ns) in self.clock.stamp(azimuth, arrival_ns) {
             let fraction = f64::from(azimuth.encoder) / f64::from(self.radar.encoder_size);
-            let is_start = f64::from(azimuth.encoder) <= self.radar.step();
+            let is_start = self.assembler.is_first(azimuth.encoder);
             let time = AzimuthTime {
                 fraction: fraction.fract(),
                 stamp_ns,

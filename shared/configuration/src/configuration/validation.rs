@@ -78,7 +78,8 @@ impl Configuration {
         Ok(())
     }
 
-    /// Fixes are constraints of a graph, and of a recording: their log is complete when it begins.
+    /// Fixes are constraints of a graph. Those of a recording are in a log. Those beside a live
+    /// radar arrive during the run, or are in a log that is complete when it begins.
     fn validate_gnss(&self) -> Result<(), ConfigurationError> {
         let reason = match self.gnss.kind {
             GnssKind::None => return Ok(()),
@@ -89,7 +90,10 @@ impl Configuration {
                 "kind is `log`, but no file is named: set file, or kind to `auto`"
             }
             GnssKind::Auto if self.is_radar() => {
-                "kind is `auto`, but the log of a live radar does not lie beside its scans: name one with kind = \"log\" and file"
+                "kind is `auto`, but the log of a live radar does not lie beside its scans: receive fixes with kind = \"udp\", or name a log with kind = \"log\" and file"
+            }
+            GnssKind::Udp if !self.is_radar() && !self.is_side(Side::Base) => {
+                "kind is `udp`, but the scans are of no live radar: set kind to `auto`, or name a log with kind = \"log\" and file"
             }
             _ => return Ok(()),
         };

@@ -141,6 +141,13 @@ impl SweepAssembler {
         self.state == State::Open || self.kept.is_some()
     }
 
+    /// Returns whether this encoder count is that of the first azimuth of a turn: a stream that
+    /// begins there has all of the turn.
+    pub fn is_first(&self, count: u16) -> bool {
+        let encoder = self.grid.encoder(count);
+        encoder.is_some_and(|encoder| self.grid.is_first(encoder))
+    }
+
     /// Returns the order of the two bytes of 16-bit powers, once it is known. It is not documented:
     /// it is the one in which neighbouring bins differ less. In the wrong order the noise of the
     /// less significant byte is the more significant one.
@@ -186,7 +193,7 @@ impl SweepAssembler {
 
     /// Begins at the first azimuth of a turn; discards those of a turn that has begun before.
     fn start(&mut self, here: Reading, azimuth: &Azimuth<'_>, slot: &mut ScanSlot<'_>) {
-        if f64::from(here.encoder) <= self.grid.step {
+        if self.grid.is_first(here.encoder) {
             self.begin(here, Seam::default(), azimuth, slot);
         } else {
             self.last = Some(here);

@@ -33,6 +33,9 @@ const PLACES: [&str; 8] = [
     "gnss.tum",
 ];
 
+/// The ending of a recording's own log, in place of the recording's.
+const OF_RECORDING: &str = "gnss.csv";
+
 /// The log of a GNSS receiver, on its own clock.
 #[derive(Clone, Debug, Default)]
 pub struct GnssLog {
@@ -47,6 +50,9 @@ pub struct GnssLog {
     pub path: PathBuf,
     /// The topic in the bag; `None` of a file.
     pub topic: Option<String>,
+    /// The reason why there are no fixes, of what a live receiver has sent; of any other log that
+    /// is an error.
+    pub unusable: Option<String>,
 }
 
 /// A fix as it was logged.
@@ -73,6 +79,22 @@ impl GnssLog {
         Self::examined(raw, path)
     }
 
+    /// Reads what a live receiver has sent during a run. A run that has got nothing usable goes on
+    /// without fixes, and with the reason.
+    pub fn received(path: &Path) -> Self {
+        Self::read(path).unwrap_or_else(|error| Self {
+            path: path.to_owned(),
+            unusable: Some(error.to_string()),
+            ..Self::default()
+        })
+    }
+
+    /// Returns where the fixes lie that belong to a recording of a run: beside its first file,
+    /// under the same name.
+    pub fn of_recording(recording: &Path) -> PathBuf {
+        recording.with_extension(OF_RECORDING)
+    }
+
     /// Takes the fixes of this bag.
     ///
     /// # Errors
@@ -95,6 +117,10 @@ impl GnssLog {
     /// # Errors
     /// No log.
     pub fn find(folder: &Path) -> Result<PathBuf, GnssLogError> {
+        let own = Self::of_recording(folder);
+        if folder.is_file() && own.is_file() {
+            return Ok(own);
+        }
         // Of a bag or another recording in one file, the folder in which it lies.
         let folder = match folder.is_file() {
             true => folder.parent().unwrap_or(folder),
@@ -133,6 +159,7 @@ impl GnssLog {
             faults,
             path: path.to_owned(),
             topic: None,
+            unusable: None,
         })
     }
 }
@@ -146,7 +173,7 @@ struct Raw {
     /// Rows that are none of the table, and the line of the first.
     unreadable: usize,
     first_unreadable: usize,
-    /// Messages in which the receiver had no fix.
+    /// Messages or rows in which the receiver had no fix.
     without_fix: usize,
 }
 

@@ -1,20 +1,31 @@
 //! The log of the GNSS receiver that a configuration names.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use gyre_bags::is_bag;
 use gyre_datasets::{GnssLog, GnssLogError};
 use gyre_samples::{GnssConfig, GnssKind};
 
-/// Reads what the section `[gnss]` names for the scans at `data`; `None` without GNSS.
+/// Returns the log of what a live receiver has sent during the run with its results in `out`.
+pub fn received_fixes(out: &Path) -> PathBuf {
+    out.join("journal/gnss.csv")
+}
+
+/// Reads what the section `[gnss]` names for the scans at `data`, of a live receiver what it has
+/// sent so far during the run with its results in `out`; `None` without GNSS.
 ///
 /// # Errors
 /// No log, a topic that is not in the bag or of scans in no bag, or fixes that cannot be used.
-pub fn gnss_log(config: &GnssConfig, data: &Path) -> Result<Option<GnssLog>, GnssLogError> {
+pub fn gnss_log(
+    config: &GnssConfig,
+    data: &Path,
+    out: &Path,
+) -> Result<Option<GnssLog>, GnssLogError> {
     match config.kind {
         GnssKind::None => Ok(None),
         GnssKind::Auto => of_scans(config.topic.as_deref(), data).map(Some),
         GnssKind::Log => GnssLog::read(&config.file.clone().unwrap_or_default()).map(Some),
+        GnssKind::Udp => Ok(Some(GnssLog::received(&received_fixes(out)))),
     }
 }
 
@@ -59,7 +70,8 @@ mod tests {
         for file in [&beside, &named] {
             fs::write(file, "stamp_s,east_m,north_m\n7,1,2\n").unwrap();
         }
-        let log = |config: &GnssConfig| gnss_log(config, folder.path()).unwrap();
+        let out = folder.path();
+        let log = |config: &GnssConfig| gnss_log(config, folder.path(), out).unwrap();
         assert_eq!(log(&auto(None)).unwrap().path, beside);
         let config = GnssConfig {
             kind: GnssKind::Log,
@@ -73,7 +85,8 @@ mod tests {
     #[test]
     fn a_topic_of_scans_that_are_in_no_bag_is_refused() {
         let folder = tempfile::tempdir().unwrap();
-        let refused = gnss_log(&auto(Some("/fix")), folder.path()).unwrap_err();
+        let at = folder.path();
+        let refused = gnss_log(&auto(Some("/fix")), at, at).unwrap_err();
         let refused = refused.to_string();
         assert!(refused.contains("gnss.topic is /fix, but"), "{refused}");
     }

@@ -144,6 +144,29 @@ fn rows_that_the_driver_has_not_written_are_missing() {
     assert!(rows.iter().all(|row| row.azimuth.encoder != 0));
 }
 
+/// A driver whose first azimuth has encoder count 0 publishes an empty turn before it.
+#[test]
+fn a_turn_of_which_the_driver_has_written_nothing_has_no_rows() {
+    let messages = ScanMessages::new(radar(), "radar");
+    let from_zero = |turn| {
+        let mut message = messages.b_scan(scan(turn).view());
+        let encoders = message.encoder_values.iter_mut();
+        encoders.for_each(|encoder| *encoder -= 13);
+        message
+    };
+    let mut empty = from_zero(0);
+    empty.b_scan_img.data.fill(0);
+    empty.encoder_values.fill(0);
+    empty.timestamps.fill(0);
+    assert_eq!(empty.rows(&radar(), 0, START_NS).unwrap().count(), 0);
+    let scans = assembled(&radar(), &[empty, from_zero(0), from_zero(1)], 0, START_NS);
+    assert_eq!(scans.len(), 2);
+    for (turn, found) in scans.iter().enumerate() {
+        assert_eq!(found.geometry, scan(turn as i64).geometry);
+        assert_eq!(found.stamp_ns, scan(turn as i64).stamp_ns);
+    }
+}
+
 /// The driver turns its images by a number of rows, and not the encoder values beside them.
 #[test]
 fn a_turned_image_is_turned_back() {

@@ -22,6 +22,10 @@ pub struct GnssConfig {
     /// = "auto"`. Default: the only one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub topic: Option<String>,
+    /// The address and port at which datagrams of a live receiver arrive, for `kind = "udp"`: lines
+    /// of a stamp (ns since 1970), latitude and longitude (degrees) and, if it is known, the
+    /// standard deviation along each axis (m), with commas between.
+    pub listen: String,
     /// Time by which the stamps of the fixes are late against the radar's, s: it is taken off them.
     pub late_s: f64,
     /// The antenna in the frame of the radar: x forward, y left, m.
@@ -46,6 +50,8 @@ pub enum GnssKind {
     Auto,
     /// The log that `file` names.
     Log,
+    /// Of a live radar: what arrives in datagrams at `listen`.
+    Udp,
 }
 
 impl Default for GnssConfig {
@@ -56,6 +62,7 @@ impl Default for GnssConfig {
             kind: GnssKind::None,
             file: None,
             topic: None,
+            listen: "127.0.0.1:6323".to_owned(),
             late_s: 0.0,
             lever_m: [0.0, 0.0],
             sigma_m: 2.0,
@@ -68,6 +75,11 @@ impl GnssConfig {
     /// Returns whether fixes are used.
     pub fn is_used(&self) -> bool {
         self.kind != GnssKind::None
+    }
+
+    /// Returns whether fixes arrive during the run.
+    pub fn is_live(&self) -> bool {
+        self.kind == GnssKind::Udp
     }
 
     /// Checks every value.

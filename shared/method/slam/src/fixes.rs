@@ -42,7 +42,7 @@ impl std::fmt::Display for FixRefusal {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Elsewhere => f.write_str(
-                "the log has no fix from the first keyframe to the last: it is of another drive, or gnss.late_s is wrong",
+                "there is no fix from the first keyframe to the last: the log is of another drive, or gnss.late_s is wrong",
             ),
             Self::Clock(offset) => write!(
                 f,
@@ -186,6 +186,12 @@ impl Fixes {
         let seconds = (stamp_ns - last_ns) as f64 * 1e-9;
         let half = 0.5 * seconds / self.correlation_s;
         half.tanh().clamp(f64::MIN_POSITIVE, 1.0)
+    }
+
+    /// Takes over what the last solution has found, which is made with the first of the same fixes.
+    pub(crate) fn go_on_from(&mut self, before: &Self) {
+        self.clock = before.clock;
+        self.refusal.clone_from(&before.refusal);
     }
 
     /// Gives the fixes to the graph, from `first` on.

@@ -151,6 +151,27 @@ impl TrajectoryEstimator {
         self
     }
 
+    /// Uses these fixes in place of those before, of which they are all and more, as while a live
+    /// receiver sends them. Returns whether keyframes have others than before.
+    pub fn replace_fixes(&mut self, mut fixes: Fixes) -> bool {
+        for (keyframe, ends) in self.keyframes.windows(2).enumerate() {
+            fixes.advance(keyframe, ends[0].stamped(), ends[1].stamped());
+        }
+        let before = self.fixes.positions();
+        let stand = fixes.positions().starts_with(&before[..self.given_fixes]);
+        let have_changed = fixes.positions() != before;
+        match (stand, &mut self.estimator) {
+            (true, _) => fixes.go_on_from(&self.fixes),
+            (false, Estimator::Graph(graph)) => graph.clear_positions(),
+            (false, Estimator::Filter(_)) => {}
+        }
+        if !stand {
+            (self.judged_fixes, self.given_fixes) = (0, 0);
+        }
+        self.fixes = fixes;
+        have_changed
+    }
+
     /// Takes the next keyframe. The first one stays where odometry has it. Until the next solution,
     /// a keyframe continues from the one before by odometry.
     ///

@@ -103,13 +103,8 @@ impl Drive {
     }
 
     fn with(&self, fixes: Vec<GnssFix>) -> TrajectoryEstimator {
-        let config = GnssConfig {
-            lever_m: LEVER_M,
-            correlation_s: 0.0,
-            ..GnssConfig::default()
-        };
         let estimator = TrajectoryEstimator::new(TrajectoryOptions::default());
-        estimator.with_fixes(Fixes::new(fixes, &config))
+        estimator.with_fixes(of_receiver(fixes))
     }
 
     fn solved(&self, fixes: Vec<GnssFix>) -> TrajectoryEstimator {
@@ -128,6 +123,15 @@ impl Drive {
         let truth = east_north_from_map() * self.truth[keyframe];
         (found.translation.vector - truth.translation.vector).norm()
     }
+}
+
+fn of_receiver(fixes: Vec<GnssFix>) -> Fixes {
+    let config = GnssConfig {
+        lever_m: LEVER_M,
+        correlation_s: 0.0,
+        ..GnssConfig::default()
+    };
+    Fixes::new(fixes, &config)
 }
 
 fn used(estimator: &TrajectoryEstimator) -> usize {
@@ -334,4 +338,49 @@ fn without_fixes_nothing_changes() {
         estimator
     };
     assert_eq!(plain.poses(), drive.solved(Vec::new()).poses());
+}
+
+/// Each keyframe comes before the fixes around it, and some fixes come 20 s late.
+#[test]
+fn fixes_that_arrive_with_the_keyframes_and_late_lead_to_the_same_solution() {
+    let drive = Drive::new(300, 1);
+    let all = drive.fixes(2);
+    let arrives_ns = |(k, fix): (usize, &GnssFix)| match k % 40 {
+        7 => fix.stamp_ns + 20 * SECOND_NS,
+        _ => fix.stamp_ns + SECOND_NS / 5,
+    };
+    let mut live = drive.with(Vec::new());
+    for (k, keyframe) in drive.keyframes.iter().enumerate() {
+        live.push(keyframe).unwrap();
+        if k % 7 == 6 {
+            let arrived = all.iter().enumerate();
+            let arrived = arrived.filter(|it| arrives_ns(*it) <= keyframe.stamp_ns);
+            let arrived: Vec<GnssFix> = arrived.map(|it| *it.1).collect();
+            live.replace_fixes(of_receiver(arrived));
+            live.update().unwrap();
+        }
+    }
+    assert!(live.fixes().taken() > 200, "{:?}", live.fixes().counts());
+    for keyframe in [0, 150, 299] {
+        let error_m = drive.error_m(&mut live, keyframe);
+        assert!(error_m < 1.0, "{keyframe}: {error_m}");
+    }
+    assert!(live.replace_fixes(of_receiver(all.clone())));
+    assert!(!live.replace_fixes(of_receiver(all.clone())));
+    live.solve().unwrap();
+    let whole = drive.solved(all);
+    assert_eq!(live.poses(), whole.poses());
+    assert_eq!(live.positions(), whole.positions());
+}
+
+#[test]
+fn fixes_that_are_taken_back_leave_the_odometry() {
+    let drive = Drive::new(100, 1);
+    let mut live = drive.solved(drive.fixes(2));
+    assert!(used(&live) > 50);
+    assert!(live.replace_fixes(of_receiver(Vec::new())));
+    live.update().unwrap();
+    assert_eq!(live.positions(), []);
+    live.solve().unwrap();
+    assert_eq!(live.poses(), drive.solved(Vec::new()).poses());
 }

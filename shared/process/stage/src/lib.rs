@@ -10,7 +10,8 @@
 //! 5. [`source`], [`stage`], [`sink`]: the loops of the first, the middle and the last processes;
 //!    [`inputs`]: what a middle process waits for.
 //!    [`Generation`]: what tells a number that is given again from one that is sent again.
-//! 6. [`follower`]: the loop of a process that reads durable logs and is not in the stream.
+//! 6. [`follower`]: the loop of a process that reads durable logs and is not in the stream;
+//!    [`GnssReceiver`]: fixes that arrive during a run, as such a log.
 //! 7. [`observer`]: subscribers that the run does not depend on; [`relay`]: stand-ins for stages on
 //!    another machine.
 //! 8. [`processes`], [`usage`]: the processes of the machine, and what they use of it;
@@ -32,9 +33,11 @@ mod allocations;
 pub mod clock;
 pub mod control;
 pub mod counters;
+mod datagrams;
 mod error;
 pub mod follower;
 mod generation;
+mod gnss_receiver;
 pub mod hand_over;
 pub mod heartbeat;
 pub mod inputs;
@@ -66,6 +69,7 @@ pub use allocations::CountingAllocator;
 pub use error::StageError;
 pub use follower::Follower;
 pub use generation::Generation;
+pub use gnss_receiver::GnssReceiver;
 pub use gyre_run::StageCounters;
 pub use launch::Launch;
 pub use manifest::Manifest;

@@ -67,7 +67,7 @@ impl Slam {
             return require_no_poses(out).map(|()| None);
         }
         let queries = queries(out)?;
-        let gnss = gnss_log(configuration)?;
+        let gnss = gnss_log(configuration, out.path())?;
         let config = &configuration.gnss;
         let fixes = gnss.as_ref().map(|log| log.on_radar(config));
         let mut estimator = TrajectoryEstimator::new(TrajectoryOptions {

@@ -117,7 +117,10 @@ impl GnssSummary {
             far: counts.far,
             used: squares.len(),
             refused: counts.taken - squares.len(),
-            refusal: fixes.refusal().map(ToString::to_string),
+            refusal: log
+                .unusable
+                .clone()
+                .or_else(|| fixes.refusal().map(ToString::to_string)),
             late_s: fixes.clock().map(|clock| clock.late_s),
             residual_rms_m: (!squares.is_empty()).then_some(rms_m),
             east_north: frame.as_ref().map(EastNorth::of),

@@ -12,7 +12,7 @@ const BREAK_TURNS: f64 = 0.75;
 pub(super) struct Grid {
     encoder_size: u16,
     /// Counts from azimuth to azimuth.
-    pub(super) step: f64,
+    step: f64,
     ns_per_count: f64,
 }
 
@@ -50,6 +50,11 @@ impl Grid {
     /// recordings.
     pub(super) fn encoder(&self, count: u16) -> Option<u16> {
         (count <= self.encoder_size).then_some(count % self.encoder_size)
+    }
+
+    /// Returns whether no other azimuth fits between zero and this one.
+    pub(super) fn is_first(&self, encoder: u16) -> bool {
+        f64::from(encoder) < self.step
     }
 
     /// Returns whether no further azimuth fits into the turn.

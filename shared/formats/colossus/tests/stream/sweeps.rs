@@ -101,6 +101,18 @@ fn a_sweep_that_began_before_the_stream_is_discarded() {
 }
 
 #[test]
+fn a_stream_that_begins_at_the_second_azimuth_of_a_turn_begins_with_the_next_one() {
+    let radar = configuration(5600, 4);
+    let rows = turns(&radar, 0, START_NS, 2);
+    let mut assembly = Assembly::new(&radar);
+    assert!(assembly.assembler.is_first(0) && !assembly.assembler.is_first(14));
+    assembly.add_rows(&rows[1..]);
+    assert_eq!(assembly.sweeps.len(), 1);
+    assert_eq!(assembly.sweeps[0].1.stamp_ns[0], rows[400].stamp_ns);
+    assert_eq!(assembly.counters().discarded_azimuths, 399);
+}
+
+#[test]
 fn a_sweep_that_lost_its_end_is_returned_at_the_next_one_without_losing_its_first_azimuth() {
     let radar = configuration(5600, 4);
     let rows = turns(&radar, 0, START_NS, 2);

@@ -23,7 +23,7 @@ pub struct GnssFaults {
     /// Line (of a folder of files: number) of the first of them.
     #[serde(skip_serializing_if = "is_zero")]
     pub first_unreadable: usize,
-    /// Messages of a bag in which the receiver had no fix.
+    /// Messages of a bag, and rows with a stamp but no place: the receiver had no fix.
     pub without_fix: usize,
     /// Fixes with a coordinate that is not finite.
     pub not_a_number: usize,

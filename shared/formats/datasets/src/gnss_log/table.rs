@@ -89,8 +89,10 @@ fn parse(text: &str) -> Result<Raw, String> {
     // Without a header the first row is a fix.
     let mut goes_on = is_fix || next(&mut row)?;
     while goes_on {
-        match columns.fix(&row).filter(|_| row.len() == count) {
+        let is_whole = row.len() == count;
+        match columns.fix(&row).filter(|_| is_whole) {
             Some(fix) => raw.rows.push(fix),
+            None if is_whole && columns.has_no_fix(&row) => raw.without_fix += 1,
             None => raw.leave_out(row.position().map_or(0, |at| at.line() as usize)),
         }
         goes_on = next(&mut row)?;
@@ -168,6 +170,13 @@ impl Columns {
                 false => Sigma::Deviations(deviations),
             },
         })
+    }
+
+    /// Returns whether a row has a stamp, and no place beside it.
+    fn has_no_fix(&self, row: &StringRecord) -> bool {
+        let (column, unit) = self.stamp;
+        let is_stamped = row.get(column).and_then(|stamp| unit.ns(stamp)).is_some();
+        is_stamped && self.at.iter().all(|at| row.get(*at) == Some(""))
     }
 
     /// Reads a row; `None` if a field is missing or no number. `nan` is one.

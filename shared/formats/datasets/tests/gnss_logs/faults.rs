@@ -38,7 +38,7 @@ type Fault = (
 
 #[test]
 fn each_fault_is_counted_under_its_name_and_left_out() {
-    let faults: [Fault; 7] = [
+    let faults: [Fault; 8] = [
         (
             "a row that is cut off",
             |k, row| {
@@ -48,6 +48,16 @@ fn each_fault_is_counted_under_its_name_and_left_out() {
             },
             |faults| faults.unreadable,
             1,
+        ),
+        (
+            "a stamp alone",
+            |k, row| {
+                if k % 20 == 9 {
+                    (row[1], row[2]) = (String::new(), String::new());
+                }
+            },
+            |faults| faults.without_fix,
+            3,
         ),
         (
             "not a number",
@@ -142,4 +152,43 @@ fn fixes_that_come_out_of_order_are_sorted_and_counted() {
         log.fixes
             .is_sorted_by(|a, b| a.east_north_m[0] < b.east_north_m[0])
     );
+}
+
+#[test]
+fn what_a_live_receiver_has_sent_may_be_nothing_usable_and_then_says_why() {
+    let folder = tempfile::tempdir().unwrap();
+    let header = "stamp_ns,latitude_deg,longitude_deg,sigma_m\n";
+    for (text, reason) in [
+        ("", "it is empty"),
+        (header, "none of its 0 entries"),
+        (&format!("{header}17,,,0\n"), "1 without a fix"),
+        (&format!("{header}unreadable\n"), "1 of its 1 rows"),
+    ] {
+        let path = super::written(&folder, "gnss.csv", text);
+        let log = GnssLog::received(&path);
+        let unusable = log.unusable.unwrap();
+        assert!(
+            log.fixes.is_empty() && unusable.contains(reason),
+            "{unusable}"
+        );
+    }
+    let text = format!("{header}{START_NS},51.7,-1.2,0\nunreadable\n17,51.7,-1.2,0.5\n");
+    let log = GnssLog::received(&super::written(&folder, "gnss.csv", &text));
+    assert_eq!((log.unusable, log.faults.unreadable), (None, 1));
+    assert_eq!(log.faults.out_of_order, 1);
+    assert_eq!(log.fixes.len(), 2);
+    let missing = GnssLog::received(&folder.path().join("none.csv"));
+    assert!(missing.unusable.unwrap().contains("none.csv"));
+}
+
+#[test]
+fn a_recording_has_the_log_of_its_own_name_before_one_of_the_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let recording = super::written(&folder, "drive.mcap", "");
+    let of_folder = super::written(&folder, "gnss.csv", "");
+    assert_eq!(GnssLog::find(&recording).unwrap(), of_folder);
+    let own = super::written(&folder, "drive.gnss.csv", "");
+    assert_eq!(GnssLog::of_recording(&recording), own);
+    assert_eq!(GnssLog::find(&recording).unwrap(), own);
+    assert_eq!(GnssLog::find(folder.path()).unwrap(), of_folder);
 }

@@ -56,7 +56,8 @@ pub struct TimedAzimuth<'a> {
 impl RadarBScanMsg {
     /// Returns the azimuths in order. Rows that the driver has not written (its index overruns the
     /// image where the encoder's counts are no multiple of the azimuths, and leaves other rows out)
-    /// are none.
+    /// are none. The driver's first turn may have none at all: where the first azimuth that it
+    /// receives has encoder count 0, it publishes the turn before that.
     ///
     /// `arrived_ns` is the host's time at which the message was received.
     ///
@@ -80,12 +81,13 @@ impl RadarBScanMsg {
         let time = TurnTime::new(radar, arrived_ns);
         let unit_ns = unit_ns(radar, encoders, stamps);
         let has_clock = stamps.iter().any(|stamp| *stamp != 0);
+        let has_turned = encoders.iter().any(|encoder| *encoder != 0);
         let mut last = None;
         let written = move |(row, encoder, stamp): &(usize, u16, u64)| {
             let is_written = if has_clock {
                 *stamp != 0
             } else {
-                *row == 0 || *encoder != 0
+                *encoder != 0 || (*row == 0 && has_turned)
             };
             let follows = last.is_none_or(|last| last < *encoder);
             if is_written && follows {

@@ -15,10 +15,10 @@ use gyre_samples::{
 };
 
 use super::Sensor;
-use crate::{Launch, StageError};
-
-/// The largest datagram, bytes: that of UDP.
-const MAX_DATAGRAM: usize = 65_536;
+use crate::{
+    Launch, StageError,
+    datagrams::{MAX_DATAGRAM, lines, listen},
+};
 
 /// The live sensors beside a radar.
 pub(super) struct LiveSensors {
@@ -177,24 +177,12 @@ impl Live {
     }
 }
 
-/// Opens the socket of a section.
-fn listen(section: &str, address: &str) -> Result<UdpSocket, StageError> {
-    let bound = UdpSocket::bind(address);
-    let opened = bound.and_then(|socket| socket.set_nonblocking(true).map(|()| socket));
-    opened.map_err(|error| {
-        StageError::Input(format!(
-            "cannot receive the {section} at {address} ({section}.listen): {error}"
-        ))
-    })
-}
-
 /// Returns the samples of a datagram, line by line; `None` for one that is no sample.
 fn samples_in(
     datagram: &[u8],
     parse: fn(&str) -> Option<Sample>,
 ) -> impl Iterator<Item = Option<Sample>> {
-    let text = str::from_utf8(datagram).unwrap_or("not text");
-    text.lines().map(parse)
+    lines(datagram).map(parse)
 }
 
 /// Parses a sample of a gyro: a stamp, ns, and the rates about x, y and z, rad/s; then, if they are

@@ -1,0 +1,310 @@
+//! The fixes of a live GNSS receiver: what arrives in datagrams is appended to a log, which is what
+//! the corrected trajectory is made with.
+
+use std::{
+    io::{self, ErrorKind},
+    net::UdpSocket,
+    path::Path,
+    sync::{
+        Arc, Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
+    thread::{self, JoinHandle},
+    time::Duration,
+};
+
+use gyre_storage::{File, GroupSync, StorageError};
+
+use crate::{
+    StageError,
+    datagrams::{MAX_DATAGRAM, lines, listen},
+};
+
+/// The first row of the log.
+const HEADER: &str = "stamp_ns,latitude_deg,longitude_deg,sigma_m\n";
+/// The row of a line that is no fix: readers of the log count it.
+const UNREADABLE: &str = "unreadable\n";
+/// Time between two looks whether reception is to end.
+const WAIT: Duration = Duration::from_millis(50);
+
+/// Receives fixes in a thread of its own, so that none waits while the trajectory is solved, and
+/// appends a row for each line of a datagram, in the order in which they arrive.
+pub struct GnssReceiver {
+    thread: Option<JoinHandle<Result<(), StageError>>>,
+    shared: Arc<Shared>,
+    /// Datagrams of which the log was read.
+    read: Option<u64>,
+}
+
+/// The state that both threads have.
+struct Shared {
+    ends: AtomicBool,
+    /// Datagrams in the log. It is written and read while this is locked.
+    datagrams: Mutex<u64>,
+}
+
+impl Shared {
+    fn lock(&self) -> MutexGuard<'_, u64> {
+        self.datagrams
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl GnssReceiver {
+    /// Receives at an address, and goes on with the log if there is one.
+    ///
+    /// # Errors
+    /// An address at which nothing can be received, or a file that cannot be written.
+    pub fn open(address: &str, log: &Path) -> Result<Self, StageError> {
+        let socket = listen("gnss", address)?;
+        let log = Log::open(log).map_err(unwritten)?;
+        let timeout = socket.set_read_timeout(Some(WAIT));
+        timeout.map_err(|error| StageError::transport("receive fixes", error))?;
+        let shared = Arc::new(Shared {
+            ends: AtomicBool::new(false),
+            datagrams: Mutex::new(0),
+        });
+        let reception = Reception {
+            socket,
+            log,
+            shared: shared.clone(),
+        };
+        tracing::info!(address, "waiting for fixes of GNSS");
+        Ok(Self {
+            thread: Some(thread::spawn(|| reception.run())),
+            shared,
+            read: None,
+        })
+    }
+
+    /// Returns what `read` makes of the log, which meanwhile does not change; `None` if it has not
+    /// grown since the last call.
+    ///
+    /// # Errors
+    /// Reception has failed.
+    pub fn if_grown<T>(&mut self, read: impl FnOnce() -> T) -> Result<Option<T>, StageError> {
+        if self.thread.as_ref().is_some_and(JoinHandle::is_finished) {
+            self.finish()?;
+        }
+        let datagrams = self.shared.lock();
+        let is_read = self.read.replace(*datagrams) == Some(*datagrams);
+        Ok((!is_read).then(read))
+    }
+
+    /// Takes what has arrived by now, and ends reception: the log does not change any more.
+    ///
+    /// # Errors
+    /// Reception has failed.
+    pub fn finish(&mut self) -> Result<(), StageError> {
+        self.shared.ends.store(true, Ordering::Relaxed);
+        match self.thread.take().map(JoinHandle::join) {
+            None => Ok(()),
+            Some(Ok(ended)) => ended,
+            Some(Err(_)) => {
+                let reason = "the thread has ended without a reason";
+                Err(StageError::transport("receive fixes", reason))
+            }
+        }
+    }
+}
+
+impl Drop for GnssReceiver {
+    fn drop(&mut self) {
+        // Who drops it does not need the log.
+        let _ = self.finish();
+    }
+}
+
+fn unwritten(StorageError { path, source, .. }: StorageError) -> StageError {
+    StageError::File { path, source }
+}
+
+/// The log, which is written at its end.
+struct Log {
+    file: File,
+    end: u64,
+    sync: GroupSync,
+}
+
+impl Log {
+    /// Opens a log at its end. A row that a kill has cut is ended.
+    fn open(path: &Path) -> Result<Self, StorageError> {
+        let file = File::open_or_create(path)?;
+        let (end, mut last) = (file.length()?, [b'\n']);
+        let is_new = end == 0 || !file.read_at(&mut last, end - 1)?;
+        let mut log = Self {
+            sync: GroupSync::start(&file)?,
+            file,
+            end,
+        };
+        match (is_new, last) {
+            (true, _) => log.append(HEADER)?,
+            (false, [b'\n']) => {}
+            (false, _) => log.append("\n")?,
+        }
+        Ok(log)
+    }
+
+    fn append(&mut self, rows: &str) -> Result<(), StorageError> {
+        self.file.write_at(rows.as_bytes(), self.end)?;
+        self.end += rows.len() as u64;
+        Ok(())
+    }
+}
+
+/// The thread that receives.
+struct Reception {
+    socket: UdpSocket,
+    log: Log,
+    shared: Arc<Shared>,
+}
+
+impl Reception {
+    fn run(mut self) -> Result<(), StageError> {
+        let failed = |error: io::Error| StageError::transport("receive fixes", error);
+        let mut datagram = vec![0; MAX_DATAGRAM];
+        let mut has_arrived = false;
+        loop {
+            let ends = self.shared.ends.load(Ordering::Relaxed);
+            // At the end only what is there is taken: a receiver goes on sending.
+            self.socket.set_nonblocking(ends).map_err(failed)?;
+            match self.socket.recv(&mut datagram) {
+                Ok(bytes) => {
+                    self.append(&datagram[..bytes])?;
+                    if !std::mem::replace(&mut has_arrived, true) {
+                        tracing::info!("fixes of GNSS arrive");
+                    }
+                }
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Err(error)
+                    if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) =>
+                {
+                    if ends {
+                        return self.log.sync.finish().map_err(unwritten);
+                    }
+                }
+                Err(error) => return Err(failed(error)),
+            }
+        }
+    }
+
+    fn append(&mut self, datagram: &[u8]) -> Result<(), StageError> {
+        let rows: String = lines(datagram).map(row).collect();
+        let mut datagrams = self.shared.lock();
+        self.log.append(&rows).map_err(unwritten)?;
+        *datagrams += 1;
+        // Readers do not wait for the disk.
+        drop(datagrams);
+        self.log.sync.changed().map_err(unwritten)
+    }
+}
+
+/// Returns the row of a line: a stamp, ns, latitude and longitude, degrees, both of which are empty
+/// without a fix, and the standard deviation, m, if the receiver knows it.
+fn row(line: &str) -> String {
+    let fields: Vec<&str> = line.split(',').map(str::trim).collect();
+    let row = match fields[..] {
+        [stamp, "", ""] | [stamp, "", "", _] => no_fix(stamp),
+        [stamp, latitude, longitude] | [stamp, latitude, longitude, ""] => {
+            fix(stamp, [latitude, longitude, "0"])
+        }
+        [stamp, latitude, longitude, sigma_m] => fix(stamp, [latitude, longitude, sigma_m]),
+        _ => None,
+    };
+    row.unwrap_or_else(|| UNREADABLE.to_owned())
+}
+
+fn no_fix(stamp: &str) -> Option<String> {
+    let stamp_ns: i64 = stamp.parse().ok()?;
+    Some(format!("{stamp_ns},,,0\n"))
+}
+
+fn fix(stamp: &str, numbers: [&str; 3]) -> Option<String> {
+    let stamp_ns: i64 = stamp.parse().ok()?;
+    let numbers = numbers.map(|number| number.parse::<f64>().ok());
+    let [Some(latitude), Some(longitude), Some(sigma_m)] = numbers else {
+        return None;
+    };
+    // The shortest text that is read back as the same number.
+    Some(format!("{stamp_ns},{latitude},{longitude},{sigma_m}\n"))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::fs;
+
+    use super::*;
+
+    #[test]
+    fn a_line_becomes_a_row_that_a_log_can_have() {
+        for (line, expected) in [
+            ("17, 51.75,-1.26 ,0.4", "17,51.75,-1.26,0.4\n"),
+            ("17,51.75,-1.26", "17,51.75,-1.26,0\n"),
+            ("17,51.75,-1.26,", "17,51.75,-1.26,0\n"),
+            ("17,,", "17,,,0\n"),
+            ("17,,,3", "17,,,0\n"),
+            ("17,nan,1,1", "17,NaN,1,1\n"),
+            ("17,51.75", UNREADABLE),
+            ("1.5,51.75,-1.26", UNREADABLE),
+            ("17,51.75,,1", UNREADABLE),
+            ("17,51.75,-1.26,0.4,5", UNREADABLE),
+            ("stamp_ns,latitude_deg,longitude_deg", UNREADABLE),
+            ("\"17", UNREADABLE),
+            ("", UNREADABLE),
+        ] {
+            assert_eq!(row(line), expected, "{line}");
+        }
+    }
+
+    /// Sends datagrams to a receiver at this port.
+    fn send(address: &str, datagrams: &[&[u8]]) {
+        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+        for datagram in datagrams {
+            socket.send_to(datagram, address).unwrap();
+        }
+    }
+
+    fn free_address() -> String {
+        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+        socket.local_addr().unwrap().to_string()
+    }
+
+    #[test]
+    fn all_that_has_arrived_is_in_the_log_at_the_end_and_the_next_receiver_goes_on() {
+        let folder = tempfile::tempdir().unwrap();
+        let log = folder.path().join("gnss.csv");
+        let address = free_address();
+        let mut receiver = GnssReceiver::open(&address, &log).unwrap();
+        let read = || fs::read_to_string(&log).unwrap();
+        assert_eq!(
+            receiver.if_grown(read).unwrap().as_deref(),
+            Some(HEADER),
+            "what an earlier one has left counts too"
+        );
+        assert_eq!(receiver.if_grown(read).unwrap(), None);
+        send(&address, &[b"1,2,3\n2,2,3,4\n", b"\xff"]);
+        receiver.finish().unwrap();
+        let expected = format!("{HEADER}1,2,3,0\n2,2,3,4\n{UNREADABLE}");
+        assert_eq!(
+            receiver.if_grown(read).unwrap().as_deref(),
+            Some(&*expected)
+        );
+        fs::write(&log, format!("{HEADER}1,2,3,0\n2,2,")).unwrap();
+        let mut next = GnssReceiver::open(&address, &log).unwrap();
+        send(&address, &[b"3,2,3"]);
+        next.finish().unwrap();
+        assert_eq!(read(), format!("{HEADER}1,2,3,0\n2,2,\n3,2,3,0\n"));
+    }
+
+    #[test]
+    fn an_address_that_another_one_has_is_named() {
+        let taken = UdpSocket::bind("127.0.0.1:0").unwrap();
+        let address = taken.local_addr().unwrap().to_string();
+        let folder = tempfile::tempdir().unwrap();
+        let refused = GnssReceiver::open(&address, &folder.path().join("gnss.csv"));
+        let refused = refused.err().unwrap().to_string();
+        assert!(refused.contains(&address) && refused.contains("gnss.listen"));
+    }
+}

@@ -1,0 +1,164 @@
+//! A live radar with a live GNSS receiver, whose fixes arrive in datagrams.
+
+use std::{
+    net::UdpSocket,
+    path::PathBuf,
+    thread::{self, JoinHandle},
+    time::Duration,
+};
+
+use gyre_messages::FollowerId;
+use rustix::process::Signal;
+use tempfile::TempDir;
+
+use super::{gyro::address, radar::Radar};
+use crate::{
+    common::{
+        Ended, Run, gyre,
+        recording::{self, around_a_block},
+        send,
+    },
+    observers::record::{file, recorded},
+    slam::gnss::{left, log, with_antenna},
+};
+
+/// Scans of the drive, and the fixes of that time: before the reflection.
+const SCANS: usize = 48;
+const FIXES: usize = 58;
+
+/// The beginning of the drive around a block, all rows of which are measured: a radar sends no
+/// others.
+fn drive() -> TempDir {
+    let drive = recording::linked(around_a_block(), |scan| scan < SCANS);
+    for image in recording::images(drive.path()) {
+        recording::complete(&image);
+    }
+    drive
+}
+
+/// A run of a live radar and a receiver that sends to this address.
+fn receiving(radar: &Radar, address: &str, scans: usize) -> Run {
+    let run = radar.run(scans).set("slam.kind=graph");
+    let run = run.set("gnss.kind=udp").set("run.window=32");
+    with_antenna(run.set(&format!("gnss.listen='{address}'")))
+}
+
+/// The log of a run's fixes.
+fn received(run: &Run) -> PathBuf {
+    run.out().join("journal/gnss.csv")
+}
+
+/// A receiver that sends the fixes of the drive once the run takes them: one late, one twice, one
+/// that is none, one line that is no fix.
+fn sending(run: &Run, address: String) -> JoinHandle<()> {
+    let received = received(run);
+    thread::spawn(move || {
+        let text = log(0.0);
+        let mut lines: Vec<&str> = text.lines().skip(1).take(FIXES).collect();
+        lines.swap(20, 21);
+        lines.insert(30, lines[29]);
+        lines.insert(40, "hello");
+        let stamp = lines[50].split(',').next().unwrap();
+        let without = format!("{stamp},,");
+        lines.insert(50, &without);
+        while !received.exists() {
+            thread::sleep(Duration::from_millis(5));
+        }
+        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+        for datagram in lines.chunks(10) {
+            let text = datagram.join("\n");
+            socket.send_to(text.as_bytes(), &address).unwrap();
+            thread::sleep(Duration::from_millis(200));
+        }
+    })
+}
+
+#[test]
+fn fixes_of_a_live_receiver_correct_the_trajectory_and_the_recording_replays_to_it() {
+    let drive = drive();
+    let address = address(3);
+    let radar = Radar::playing(drive.path(), &[]);
+    let run = recorded(&receiving(&radar, &address, SCANS));
+    let receiver = sending(&run, address);
+    let live = run.complete();
+    receiver.join().unwrap();
+    assert_eq!(run.summary()["dropped"], 0);
+    let without = Run::small().data(drive.path()).set("slam.kind=graph");
+    assert_eq!(live, without.complete());
+    let corrected = |run: &Run| run.result("trajectory_slam.tum");
+    assert_ne!(corrected(&run), corrected(&without));
+    let gnss = run.summary()["gnss"].clone();
+    let faults = [
+        "unreadable",
+        "without_fix",
+        "repeated",
+        "out_of_order",
+        "zero",
+    ];
+    for fault in faults {
+        assert_eq!(gnss["faults"][fault], 1, "{fault}: {gnss}");
+    }
+    assert!(gnss["used"].as_u64().unwrap() > 20, "{gnss}");
+    assert_replays(&run);
+}
+
+/// The recording of a run, and the fixes beside it, lead to the same results.
+fn assert_replays(run: &Run) {
+    let again = Run::configured("");
+    let mut replay = gyre();
+    replay.arg("run").arg("--data").arg(file(run));
+    replay.arg("--out").arg(again.out());
+    Ended::of(replay).succeeded();
+    assert_eq!(left(&again), left(run));
+}
+
+#[test]
+#[ignore = "nightly: another live run"]
+fn a_trajectory_that_is_killed_goes_on_with_its_log() {
+    let drive = drive();
+    let address = address(5);
+    let radar = Radar::playing(drive.path(), &[]);
+    let run = recorded(&receiving(&radar, &address, SCANS));
+    let mut running = run.start();
+    let receiver = sending(&run, address.clone());
+    running.await_poses_or_end(10);
+    let trajectory = running.stages()[FollowerId::Trajectory.name()];
+    send(trajectory, Signal::KILL);
+    running.await_poses_or_end(20);
+    // By now there is another one.
+    let more = UdpSocket::bind("127.0.0.1:0").unwrap();
+    more.send_to(b"hello", &address).unwrap();
+    running.finish().succeeded();
+    receiver.join().unwrap();
+    let gnss = run.summary()["gnss"].clone();
+    assert!(gnss["fixes"].as_u64().unwrap() > 20, "{gnss}");
+    let text = std::fs::read_to_string(received(&run)).unwrap();
+    assert_eq!(text.matches("stamp_ns").count(), 1, "{text}");
+    assert!(text.ends_with("unreadable\n"), "{text}");
+    assert_replays(&run);
+}
+
+#[test]
+fn a_live_receiver_that_is_silent_leaves_slam_to_the_radar_and_that_is_said() {
+    let radar = Radar::playing(recording::small(), &[]);
+    let run = receiving(&radar, &address(4), 12);
+    let ended = run.finish();
+    ended.succeeded();
+    let expected = "the fixes of GNSS are not used: the log of the GNSS receiver";
+    assert!(ended.stderr.contains(expected), "{}", ended.stderr);
+    assert_eq!(run.summary()["gnss"]["used"], 0);
+    assert!(run.result("trajectory_slam.tum").lines().count() >= 11);
+}
+
+#[test]
+fn fixes_that_cannot_arrive_are_refused_before_the_run() {
+    let recorded = Run::small().set("slam.kind=graph").set("gnss.kind=udp");
+    recorded
+        .finish()
+        .refused_with(&["gnss", "kind is `udp`", "no live radar", "`auto`"]);
+    let taken = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let address = taken.local_addr().unwrap().to_string();
+    let radar = Radar::playing(recording::small(), &[]);
+    let run = receiving(&radar, &address, 4);
+    run.finish().refused_with(&[&address, "gnss.listen"]);
+}
