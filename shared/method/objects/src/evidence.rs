@@ -27,10 +27,11 @@ const BEAM_SECTORS: usize = 2;
 const HIDING_WEIGHT: f64 = 0.3;
 /// Weight of a return by which the beam goes on.
 const BEYOND_WEIGHT: f64 = 0.15;
-/// Planes of the grid: any return, and the strong ones, which stand above the reverberation of a
-/// strong echo in all ranges of its azimuth.
+/// Planes of the grid: any return; the strong ones, which stand above the reverberation of a strong
+/// echo in all ranges of its azimuth; and those that may hide what is behind them.
 const ANY: usize = 0;
 const STRONG: usize = 1;
+const HIDING: usize = 2;
 /// Weight of a strong return: 4.5 dB above the threshold of the masks.
 const STRONG_WEIGHT: f64 = 0.15;
 /// Weight from which on a return outshines weak ones that were there before: 15 dB above those.
@@ -76,8 +77,8 @@ struct View {
 struct Cell {
     /// The place that it stands for, by its cells from the origin.
     place: [i32; 2],
-    /// Bit k is set if there was a return k scans before `scan`: any, and one that is strong.
-    hits: [u64; 2],
+    /// Bit k is set if there was a return k scans before `scan`, in each plane.
+    hits: [u64; 3],
     scan: u32,
 }
 
@@ -225,24 +226,25 @@ impl Evidence {
         for (number, found) in returns.iter().enumerate() {
             if stands(number) {
                 let place = cell_at(&found.at);
-                let is_strong = found.weight >= STRONG_WEIGHT;
                 let scan = self.scan;
-                let hits = [(ANY, true), (STRONG, is_strong)]
-                    .map(|(plane, is_new)| self.hits(place, plane) | u64::from(is_new));
+                let is_in = |least| found.weight >= least;
+                let planes = [true, is_in(STRONG_WEIGHT), is_in(HIDING_WEIGHT)];
+                let hits = [ANY, STRONG, HIDING]
+                    .map(|plane| self.hits(place, plane) | u64::from(planes[plane]));
                 self.cells[index(place)] = Cell { place, hits, scan };
             }
         }
     }
 
-    /// Returns whether something that stands is on the way from the sensor to a place, and not just
-    /// before it.
+    /// Returns whether something that stands and hides is on the way from the sensor to a place,
+    /// and not just before it.
     pub fn is_behind_standing(&self, sensor: &Point2<f64>, place: &Point2<f64>) -> bool {
         let ray = place - sensor;
         let range_m = ray.norm();
         let steps = ((range_m - CLEAR_M - NEAREST_M) / CELL_M).max(0.0) as usize;
         let stands = |step: usize| {
             let at = sensor + ray * ((NEAREST_M + step as f64 * CELL_M) / range_m);
-            let hits = self.hits(cell_at(&at), STRONG);
+            let hits = self.hits(cell_at(&at), HIDING);
             let views = self.views(&at) | hits;
             let share = f64::from(hits.count_ones()) / f64::from(views.count_ones().max(1));
             share >= STANDING_SHARE && views.count_ones() >= STANDING_VIEWS
