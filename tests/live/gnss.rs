@@ -104,12 +104,17 @@ fn fixes_of_a_live_receiver_correct_the_trajectory_and_the_recording_replays_to_
 
 /// The recording of a run, and the fixes beside it, lead to the same results.
 fn assert_replays(run: &Run) {
+    assert_eq!(left(&replayed(run)), left(run));
+}
+
+/// The replay of a run's recording.
+fn replayed(run: &Run) -> Run {
     let again = Run::configured("");
     let mut replay = gyre();
     replay.arg("run").arg("--data").arg(file(run));
     replay.arg("--out").arg(again.out());
     Ended::of(replay).succeeded();
-    assert_eq!(left(&again), left(run));
+    again
 }
 
 #[test]
@@ -141,13 +146,15 @@ fn a_trajectory_that_is_killed_goes_on_with_its_log() {
 #[test]
 fn a_live_receiver_that_is_silent_leaves_slam_to_the_radar_and_that_is_said() {
     let radar = Radar::playing(recording::small(), &[]);
-    let run = receiving(&radar, &address(4), 12);
+    let run = recorded(&receiving(&radar, &address(4), 12));
     let ended = run.finish();
     ended.succeeded();
     let expected = "the fixes of GNSS are not used: the log of the GNSS receiver";
     assert!(ended.stderr.contains(expected), "{}", ended.stderr);
     assert_eq!(run.summary()["gnss"]["used"], 0);
-    assert!(run.result("trajectory_slam.tum").lines().count() >= 11);
+    let trajectory = |run: &Run| run.result("trajectory_slam.tum");
+    assert!(trajectory(&run).lines().count() >= 11);
+    assert_eq!(trajectory(&replayed(&run)), trajectory(&run));
 }
 
 #[test]
@@ -161,4 +168,9 @@ fn fixes_that_cannot_arrive_are_refused_before_the_run() {
     let radar = Radar::playing(recording::small(), &[]);
     let run = receiving(&radar, &address, 4);
     run.finish().refused_with(&[&address, "gnss.listen"]);
+    let of_gyro = format!("gyro.listen='{address}'");
+    let same = receiving(&radar, &address, 4).set("gyro.kind=udp");
+    same.set(&of_gyro)
+        .finish()
+        .refused_with(&["gnss", "as that of gyro"]);
 }

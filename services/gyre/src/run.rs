@@ -330,8 +330,8 @@ fn finish(
     // All poses are kept by now, and the same command writes the results again.
     let_signals_end_the_process()?;
     let make_way = |poses| earlier::make_way(out, poses);
-    let mut written = gyre_results::write(configuration, out, session, &make_way)?;
     keep_fixes(configuration, out);
+    let mut written = gyre_results::write(configuration, out, session, &make_way)?;
     let has_replaced = earlier::replaces(out, written.poses);
     // With all poses there may be loops to find, and a run that failed may not have kept them.
     let has_followed = match session.ending {
@@ -349,12 +349,12 @@ fn finish(
 /// Puts the fixes that a live receiver has sent beside the recording of the run, for its replays.
 /// The run has its results without, as it has without the recording.
 fn keep_fixes(configuration: &Configuration, out: &Out) {
-    let (recording, received) = (&configuration.record.file, received_fixes(out.path()));
-    if recording.as_os_str().is_empty() || !configuration.gnss.is_live() || !received.exists() {
+    let (record, received) = (&configuration.record, received_fixes(out.path()));
+    if !record.is_on() || !configuration.gnss.is_live() || !received.exists() {
         return;
     }
     let rows = fs::read(&received).map_err(StorageError::at("read", &received));
-    let kept = rows.and_then(|rows| storage::write(&GnssLog::of_recording(recording), rows));
+    let kept = rows.and_then(|rows| storage::write(&GnssLog::of_recording(&record.file), rows));
     if let Err(error) = kept {
         print::note(format_args!(
             "the fixes of GNSS are not beside the recording, but in {}: {error}",

@@ -44,7 +44,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let out = &launch.manifest.out;
     let config: GnssConfig = launch.section("gnss")?;
     let mut trajectory = Trajectory::open(out, kind, fixes(launch, &config)?)?;
-    // What arrives when the scans have ended is of another drive.
+    // One that is started after the last scan receives no more: that may be of another drive.
     if config.is_live() && !trajectory.keyframes.has_ended() {
         trajectory.live_fixes = Some(LiveFixes::open(config, out)?);
     }

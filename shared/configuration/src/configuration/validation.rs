@@ -6,7 +6,7 @@ use gyre_ros2_messages::Domain;
 use gyre_run::{
     Limits, Mode, PlayedFault, PlayedFrom, Rate, Side, SourceConfig, SourceKind, StageConfig,
 };
-use gyre_samples::GnssKind;
+use gyre_samples::{GnssKind, GyroKind, WheelsKind};
 use gyre_simulator::OutputFormat;
 use gyre_slam::SlamKind;
 
@@ -56,6 +56,7 @@ impl Configuration {
             return Err(value("slam", reason));
         }
         self.validate_gnss()?;
+        self.validate_listen()?;
         if self.objects.is_on() && self.link.side.is_some() {
             let reason = "kind is `tracks`, but a run that is split between two machines (link.side) logs no points: set kind to `none`";
             return Err(value("objects", reason));
@@ -98,6 +99,26 @@ impl Configuration {
             _ => return Ok(()),
         };
         Err(value("gnss", reason))
+    }
+
+    /// Checks that no two live sensors receive at one address.
+    fn validate_listen(&self) -> Result<(), ConfigurationError> {
+        let odometry = &self.odometry;
+        let (gyro, wheels, gnss) = (&odometry.gyro, &odometry.wheels, &self.gnss);
+        let live = [
+            ("gyro", gyro.kind == GyroKind::Udp, &gyro.listen),
+            ("wheels", wheels.kind == WheelsKind::Udp, &wheels.listen),
+            ("gnss", gnss.kind == GnssKind::Udp, &gnss.listen),
+        ];
+        for (index, (section, is_live, listen)) in live.iter().enumerate() {
+            let same = |(_, is_too, other): &&(_, bool, _)| *is_too && other == listen;
+            let Some((other, ..)) = live[..index].iter().find(same).filter(|_| *is_live) else {
+                continue;
+            };
+            let reason = format!("listen is {listen}, as that of {other}: set another port");
+            return Err(value(section, &reason));
+        }
+        Ok(())
     }
 
     /// A recording that takes the place of stages is a recording of a run, and has the topic of a

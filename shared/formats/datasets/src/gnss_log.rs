@@ -76,17 +76,23 @@ impl GnssLog {
             true => radiate::read(path)?,
             false => table::read(path)?,
         };
-        Self::examined(raw, path)
+        if let Some(reason) = raw.is_another_table() {
+            let path = path.to_owned();
+            return Err(GnssLogError::Unusable { path, reason });
+        }
+        Self::usable(raw, path)
     }
 
-    /// Reads what a live receiver has sent during a run. A run that has got nothing usable goes on
-    /// without fixes, and with the reason.
+    /// Reads what a live receiver has sent during a run, be it among lines that are no fixes. A run
+    /// that has got nothing usable goes on without fixes, and with the reason.
     pub fn received(path: &Path) -> Self {
-        Self::read(path).unwrap_or_else(|error| Self {
+        let read = table::read(path).map(|raw| Self::examined(raw, path));
+        let (log, error) = read.unwrap_or_else(|error| (Self::default(), Some(error)));
+        Self {
             path: path.to_owned(),
-            unusable: Some(error.to_string()),
-            ..Self::default()
-        })
+            unusable: error.map(|error| error.to_string()),
+            ..log
+        }
     }
 
     /// Returns where the fixes lie that belong to a recording of a run: beside its first file,
@@ -107,18 +113,19 @@ impl GnssLog {
         };
         Ok(Self {
             topic: Some(fixes.topic),
-            ..Self::examined(raw, bag)?
+            ..Self::usable(raw, bag)?
         })
     }
 
     /// Returns the log that lies beside the scans of a dataset, which may also be named by the
-    /// folder of the images.
+    /// folder of the images; of the first file of a recording its own, if it has one.
     ///
     /// # Errors
     /// No log.
     pub fn find(folder: &Path) -> Result<PathBuf, GnssLogError> {
         let own = Self::of_recording(folder);
-        if folder.is_file() && own.is_file() {
+        // The first file itself may have been moved away.
+        if !folder.is_dir() && own.is_file() {
             return Ok(own);
         }
         // Of a bag or another recording in one file, the folder in which it lies.
@@ -147,20 +154,30 @@ impl GnssLog {
         fixes.collect()
     }
 
-    fn examined(raw: Raw, path: &Path) -> Result<Self, GnssLogError> {
-        let (fixes, plane, faults) =
-            faults::examine(raw).map_err(|reason| GnssLogError::Unusable {
-                path: path.to_owned(),
-                reason,
-            })?;
-        Ok(Self {
+    fn usable(raw: Raw, path: &Path) -> Result<Self, GnssLogError> {
+        match Self::examined(raw, path) {
+            (log, None) => Ok(log),
+            (_, Some(error)) => Err(error),
+        }
+    }
+
+    /// Examines the fixes. Returns the log, and what is wrong where none can be used.
+    fn examined(raw: Raw, path: &Path) -> (Self, Option<GnssLogError>) {
+        let all = raw.count();
+        let (fixes, plane, faults) = faults::examine(raw);
+        let error = fixes.is_empty().then(|| GnssLogError::Unusable {
+            path: path.to_owned(),
+            reason: faults.without_usable(all),
+        });
+        let log = Self {
             fixes,
             plane,
             faults,
             path: path.to_owned(),
             topic: None,
             unusable: None,
-        })
+        };
+        (log, error)
     }
 }
 
@@ -178,6 +195,22 @@ struct Raw {
 }
 
 impl Raw {
+    /// All entries, those that cannot be used too.
+    fn count(&self) -> usize {
+        self.rows.len() + self.unreadable + self.without_fix
+    }
+
+    /// Returns what is wrong if most of the rows cannot be read.
+    fn is_another_table(&self) -> Option<String> {
+        let (unreadable, all) = (self.unreadable, self.count());
+        (2 * unreadable > all).then(|| {
+            format!(
+                "{unreadable} of its {all} rows cannot be read, the first in line {}: are its stamps, decimal points and columns those that its header names?",
+                self.first_unreadable
+            )
+        })
+    }
+
     fn leave_out(&mut self, line: usize) {
         if self.unreadable == 0 {
             self.first_unreadable = line;

@@ -6,6 +6,8 @@ use gyre_bags::is_bag;
 use gyre_datasets::{GnssLog, GnssLogError};
 use gyre_samples::{GnssConfig, GnssKind};
 
+use crate::parts::first_part_in;
+
 /// Returns the log of what a live receiver has sent during the run with its results in `out`.
 pub fn received_fixes(out: &Path) -> PathBuf {
     out.join("journal/gnss.csv")
@@ -39,7 +41,15 @@ fn of_scans(topic: Option<&str>, data: &Path) -> Result<GnssLog, GnssLogError> {
             Some(fixes) => GnssLog::of(fixes, data),
             None => GnssLog::read(&GnssLog::find(data).map_err(none_in_bag)?),
         },
-        (false, None) => GnssLog::read(&GnssLog::find(data)?),
+        (false, None) => {
+            let first = first_part_in(data).unwrap_or_else(|| data.to_owned());
+            let path = GnssLog::find(&first)?;
+            // A live receiver may have sent nothing that can be used.
+            match path == GnssLog::of_recording(&first) {
+                true => Ok(GnssLog::received(&path)),
+                false => GnssLog::read(&path),
+            }
+        }
         (false, Some(topic)) => Err(GnssLogError::NoBag {
             topic: topic.to_owned(),
             data: data.to_owned(),
@@ -80,6 +90,28 @@ mod tests {
         };
         assert_eq!(log(&config).unwrap().path, named);
         assert!(log(&GnssConfig::default()).is_none());
+    }
+
+    #[test]
+    fn a_recording_has_its_own_fixes_whatever_they_are_and_however_it_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let recording = folder.path().join("drive.mcap");
+        fs::write(&recording, "").unwrap();
+        let own = GnssLog::of_recording(&recording);
+        fs::write(&own, "stamp_ns,latitude_deg,longitude_deg,sigma_m\n7,,,0\n").unwrap();
+        fs::write(
+            folder.path().join("gnss.csv"),
+            "stamp_s,east_m,north_m\n7,1,2\n",
+        )
+        .unwrap();
+        let of = |data: &Path| of_scans(None, data).unwrap();
+        for data in [recording.as_path(), folder.path()] {
+            let log = of(data);
+            assert_eq!((&log.path, log.faults.without_fix), (&own, 1));
+            assert!(log.unusable.is_some());
+        }
+        fs::remove_file(&recording).unwrap();
+        assert_eq!(of(&recording).path, own);
     }
 
     #[test]

@@ -7,16 +7,16 @@ use crate::StageError;
 /// The largest datagram, bytes: that of UDP.
 pub(crate) const MAX_DATAGRAM: usize = 65_536;
 
-/// Opens the socket of a section, which does not block.
+/// Opens the socket for what a section receives, which does not block.
 ///
 /// # Errors
 /// An address at which nothing can be received.
-pub(crate) fn listen(section: &str, address: &str) -> Result<UdpSocket, StageError> {
+pub(crate) fn listen(what: &str, section: &str, address: &str) -> Result<UdpSocket, StageError> {
     let bound = UdpSocket::bind(address);
     let opened = bound.and_then(|socket| socket.set_nonblocking(true).map(|()| socket));
     opened.map_err(|error| {
         StageError::Input(format!(
-            "cannot receive the {section} at {address} ({section}.listen): {error}"
+            "cannot receive the {what} at {address} ({section}.listen): {error}"
         ))
     })
 }

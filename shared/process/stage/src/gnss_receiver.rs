@@ -57,7 +57,7 @@ impl GnssReceiver {
     /// # Errors
     /// An address at which nothing can be received, or a file that cannot be written.
     pub fn open(address: &str, log: &Path) -> Result<Self, StageError> {
-        let socket = listen("gnss", address)?;
+        let socket = listen("fixes of GNSS", "gnss", address)?;
         let log = Log::open(log).map_err(unwritten)?;
         let timeout = socket.set_read_timeout(Some(WAIT));
         timeout.map_err(|error| StageError::transport("receive fixes", error))?;
@@ -190,7 +190,8 @@ impl Reception {
     }
 
     fn append(&mut self, datagram: &[u8]) -> Result<(), StageError> {
-        let rows: String = lines(datagram).map(row).collect();
+        let lines = lines(datagram).filter(|line| !line.trim().is_empty());
+        let rows: String = lines.map(row).collect();
         let mut datagrams = self.shared.lock();
         self.log.append(&rows).map_err(unwritten)?;
         *datagrams += 1;
@@ -252,7 +253,6 @@ mod tests {
             ("17,51.75,-1.26,0.4,5", UNREADABLE),
             ("stamp_ns,latitude_deg,longitude_deg", UNREADABLE),
             ("\"17", UNREADABLE),
-            ("", UNREADABLE),
         ] {
             assert_eq!(row(line), expected, "{line}");
         }
@@ -284,7 +284,7 @@ mod tests {
             "what an earlier one has left counts too"
         );
         assert_eq!(receiver.if_grown(read).unwrap(), None);
-        send(&address, &[b"1,2,3\n2,2,3,4\n", b"\xff"]);
+        send(&address, &[b"1,2,3\n2,2,3,4\n\n", b"\xff"]);
         receiver.finish().unwrap();
         let expected = format!("{HEADER}1,2,3,0\n2,2,3,4\n{UNREADABLE}");
         assert_eq!(

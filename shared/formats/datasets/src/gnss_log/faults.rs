@@ -56,7 +56,7 @@ impl GnssFaults {
     }
 
     /// Returns the reason why none of so many entries is a usable fix.
-    fn without_usable(&self, all: usize) -> String {
+    pub(super) fn without_usable(&self, all: usize) -> String {
         let named = self.named().into_iter();
         let named: Vec<String> = named
             .map(|(count, what)| format!("{count} {what}"))
@@ -88,23 +88,13 @@ impl GnssFaults {
 type Examined = (Vec<LoggedFix>, Option<LocalPlane>, GnssFaults);
 
 /// Leaves out and sorts what the faults name, and counts it.
-///
-/// # Errors
-/// A log without a usable fix, or most of whose rows cannot be read.
-pub(super) fn examine(raw: Raw) -> Result<Examined, String> {
-    let all = raw.rows.len() + raw.unreadable + raw.without_fix;
+pub(super) fn examine(raw: Raw) -> Examined {
     let mut faults = GnssFaults {
         unreadable: raw.unreadable,
         first_unreadable: raw.first_unreadable,
         without_fix: raw.without_fix,
         ..GnssFaults::default()
     };
-    if 2 * raw.unreadable > all {
-        return Err(format!(
-            "{} of its {all} rows cannot be read, the first in line {}: are its stamps, decimal points and columns those that its header names?",
-            raw.unreadable, raw.first_unreadable
-        ));
-    }
     let mut rows = raw.rows;
     faults.not_a_number = leave_out(&mut rows, |row| row.at.iter().any(|it| !it.is_finite()));
     if !raw.is_plane {
@@ -121,10 +111,7 @@ pub(super) fn examine(raw: Raw) -> Result<Examined, String> {
     faults.jumps = rows.len() - kept.len();
     let rows: Vec<RawFix> = kept.into_iter().map(|k| rows[k]).collect();
     let plane = rows.first().filter(|_| !raw.is_plane).map(plane_at);
-    match rows.is_empty() {
-        true => Err(faults.without_usable(all)),
-        false => Ok((in_plane(&rows, plane.as_ref()), plane, faults)),
-    }
+    (in_plane(&rows, plane.as_ref()), plane, faults)
 }
 
 fn finite_or_zero(value: f64) -> f64 {

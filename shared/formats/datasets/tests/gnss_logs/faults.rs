@@ -162,7 +162,7 @@ fn what_a_live_receiver_has_sent_may_be_nothing_usable_and_then_says_why() {
         ("", "it is empty"),
         (header, "none of its 0 entries"),
         (&format!("{header}17,,,0\n"), "1 without a fix"),
-        (&format!("{header}unreadable\n"), "1 of its 1 rows"),
+        (&format!("{header}unreadable\n"), "none of its 1 entries"),
     ] {
         let path = super::written(&folder, "gnss.csv", text);
         let log = GnssLog::received(&path);
@@ -177,6 +177,9 @@ fn what_a_live_receiver_has_sent_may_be_nothing_usable_and_then_says_why() {
     assert_eq!((log.unusable, log.faults.unreadable), (None, 1));
     assert_eq!(log.faults.out_of_order, 1);
     assert_eq!(log.fixes.len(), 2);
+    let noisy = format!("{text}unreadable\nunreadable\n");
+    let log = GnssLog::received(&super::written(&folder, "gnss.csv", &noisy));
+    assert_eq!((log.fixes.len(), log.faults.unreadable), (2, 3));
     let missing = GnssLog::received(&folder.path().join("none.csv"));
     assert!(missing.unusable.unwrap().contains("none.csv"));
 }

@@ -149,7 +149,7 @@ impl Live {
     ) -> Result<Self, StageError> {
         Ok(Self {
             samples: LiveSamples::new(sensor),
-            socket: listens.map(|at| listen(section, at)).transpose()?,
+            socket: listens.map(|at| listen(section, section, at)).transpose()?,
             parse,
             unreadable: 0,
         })
