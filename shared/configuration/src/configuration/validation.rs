@@ -1,5 +1,7 @@
 //! The bounds of all values, and the sections that must fit each other.
 
+use std::collections::BTreeMap;
+
 use gyre_colossus::Address;
 use gyre_messages::StageId;
 use gyre_ros2_messages::Domain;
@@ -105,18 +107,17 @@ impl Configuration {
     fn validate_listen(&self) -> Result<(), ConfigurationError> {
         let odometry = &self.odometry;
         let (gyro, wheels, gnss) = (&odometry.gyro, &odometry.wheels, &self.gnss);
-        let live = [
+        let sensors = [
             ("gyro", gyro.kind == GyroKind::Udp, &gyro.listen),
             ("wheels", wheels.kind == WheelsKind::Udp, &wheels.listen),
             ("gnss", gnss.kind == GnssKind::Udp, &gnss.listen),
         ];
-        for (index, (section, is_live, listen)) in live.iter().enumerate() {
-            let same = |(_, is_too, other): &&(_, bool, _)| *is_too && other == listen;
-            let Some((other, ..)) = live[..index].iter().find(same).filter(|_| *is_live) else {
-                continue;
-            };
-            let reason = format!("listen is {listen}, as that of {other}: set another port");
-            return Err(value(section, &reason));
+        let mut taken = BTreeMap::new();
+        for (section, _, listen) in sensors.into_iter().filter(|(_, is_live, _)| *is_live) {
+            if let Some(other) = taken.insert(listen, section) {
+                let reason = format!("listen is {listen}, as that of {other}: set another port");
+                return Err(value(section, reason));
+            }
         }
         Ok(())
     }

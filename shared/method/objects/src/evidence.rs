@@ -394,6 +394,23 @@ mod tests {
     }
 
     #[test]
+    fn what_stands_hides_if_it_is_9_db_above_the_threshold_and_a_hedge_does_not() {
+        let behind = |weight: f64| {
+            let mut evidence = Evidence::new(8, 70.0);
+            let standing = Return {
+                weight,
+                ..at(20.0, 3.0)
+            };
+            for _ in 0..8 {
+                add(&mut evidence, &[standing]);
+            }
+            evidence.is_hidden(&Point2::new(40.0, 6.0))
+        };
+        assert!(behind(0.5));
+        assert!(!behind(0.2));
+    }
+
+    #[test]
     fn a_strong_return_is_new_where_the_place_has_just_been_empty_and_a_weak_one_is_not() {
         let mut evidence = Evidence::new(20, 70.0);
         let strong = at(20.0, 3.0);

@@ -104,6 +104,11 @@ mod tests {
         }
         let far = [good[0], good[1], at(9.0, 1.0, 0.9), at(-9.0, 1.0, 0.9)];
         assert_eq!(score(&far, 1.0), best);
+        let beyond = good.map(|found| Return {
+            range_m: 50.0,
+            ..found
+        });
+        assert!(score(&beyond, 1.0) > best);
     }
 
     #[test]

@@ -151,8 +151,9 @@ impl TrajectoryEstimator {
         self
     }
 
-    /// Uses these fixes in place of those before, of which they are all and more, as while a live
-    /// receiver sends them. Returns whether keyframes have others than before.
+    /// Uses these fixes in place of those before, as while a live receiver sends them: if keyframes
+    /// that have been solved have others now, the next solution takes all anew. Returns whether any
+    /// keyframe has others.
     pub fn replace_fixes(&mut self, mut fixes: Fixes) -> bool {
         for (keyframe, ends) in self.keyframes.windows(2).enumerate() {
             fixes.advance(keyframe, ends[0].stamped(), ends[1].stamped());
