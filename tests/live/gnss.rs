@@ -23,12 +23,12 @@ use crate::{
 };
 
 /// Scans of the drive, and the fixes of that time: before the reflection.
-const SCANS: usize = 48;
-const FIXES: usize = 58;
+pub const SCANS: usize = 48;
+pub const FIXES: usize = 58;
 
 /// The beginning of the drive around a block, all rows of which are measured: a radar sends no
 /// others.
-fn drive() -> TempDir {
+pub fn drive() -> TempDir {
     let drive = recording::linked(around_a_block(), |scan| scan < SCANS);
     for image in recording::images(drive.path()) {
         recording::complete(&image);
@@ -38,9 +38,22 @@ fn drive() -> TempDir {
 
 /// A run of a live radar and a receiver that sends to this address.
 fn receiving(radar: &Radar, address: &str, scans: usize) -> Run {
-    let run = radar.run(scans).set("slam.kind=graph");
-    let run = run.set("gnss.kind=udp").set("run.window=32");
+    with_graph(radar.run(scans), address).set("gnss.kind=udp")
+}
+
+/// A run whose corrected trajectory takes fixes at this address.
+pub fn with_graph(run: Run, address: &str) -> Run {
+    let run = run.set("slam.kind=graph").set("run.window=32");
     with_antenna(run.set(&format!("gnss.listen='{address}'")))
+}
+
+/// The log of what the receiver sends during the drive.
+pub fn log_of_drive() -> String {
+    let text = log(0.0);
+    text.lines()
+        .take(1 + FIXES)
+        .map(|line| format!("{line}\n"))
+        .collect()
 }
 
 /// The log of a run's fixes.
@@ -53,8 +66,8 @@ fn received(run: &Run) -> PathBuf {
 fn sending(run: &Run, address: String) -> JoinHandle<()> {
     let received = received(run);
     thread::spawn(move || {
-        let text = log(0.0);
-        let mut lines: Vec<&str> = text.lines().skip(1).take(FIXES).collect();
+        let text = log_of_drive();
+        let mut lines: Vec<&str> = text.lines().skip(1).collect();
         lines.swap(20, 21);
         lines.insert(30, lines[29]);
         lines.insert(40, "hello");
@@ -103,7 +116,7 @@ fn fixes_of_a_live_receiver_correct_the_trajectory_and_the_recording_replays_to_
 }
 
 /// The recording of a run, and the fixes beside it, lead to the same results.
-fn assert_replays(run: &Run) {
+pub fn assert_replays(run: &Run) {
     assert_eq!(left(&replayed(run)), left(run));
 }
 
@@ -168,6 +181,10 @@ fn fixes_that_cannot_arrive_are_refused_before_the_run() {
     let radar = Radar::playing(recording::small(), &[]);
     let run = receiving(&radar, &address, 4);
     run.finish().refused_with(&[&address, "gnss.listen"]);
+    let no_driver = receiving(&radar, &address, 4).set("gnss.kind=ros2");
+    no_driver
+        .finish()
+        .refused_with(&["gnss", "kind is `ros2`", "\"udp\""]);
     let of_gyro = format!("gyro.listen='{address}'");
     let same = receiving(&radar, &address, 4).set("gyro.kind=udp");
     same.set(&of_gyro)

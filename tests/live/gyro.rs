@@ -56,7 +56,7 @@ fn sending(log: PathBuf, address: String) -> JoinHandle<()> {
 pub fn address(test: u32) -> String {
     format!(
         "127.0.0.1:{}",
-        40_000 + test * 4_000 + process::id() % 4_000
+        40_000 + test * 3_500 + process::id() % 3_500
     )
 }
 

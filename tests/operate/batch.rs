@@ -324,6 +324,13 @@ fn a_drive_is_computed_again_with_another_configuration_alone() {
         ended.stdout
     );
     assert!(changed() > first);
+
+    // What another version has begun; a batch has no `--fresh`.
+    let begun = drives.batch("begun");
+    let path = journal::path(&begun.results("part-6"));
+    fs::create_dir_all(path.parent().unwrap()).unwrap();
+    fs::write(&path, "gyre journal v9 and what follows").unwrap();
+    begun.finish().succeeded();
 }
 
 #[test]

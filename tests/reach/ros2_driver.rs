@@ -2,6 +2,7 @@
 //! (Cyclone DDS).
 
 use std::{
+    fs,
     io::{BufRead, BufReader},
     path::{Path, PathBuf},
     process::{Child, Stdio},
@@ -9,7 +10,11 @@ use std::{
 
 use crate::{
     common::{Run, gyre, odometry, recording, recording::with_constants},
-    live::gyro::{SCANS, with_log},
+    live::{
+        gnss,
+        gyro::{SCANS, address, with_log},
+    },
+    observers::record::recorded,
     reach::ros2::{Program, can_speak, domain},
 };
 
@@ -29,7 +34,7 @@ impl Driver {
         Self::with_logs(recording, domain, publishes, options, &[])
     }
 
-    /// One beside which a gyro and wheels publish what their logs hold.
+    /// One beside which a gyro, wheels and a GNSS receiver publish what their logs hold.
     fn with_logs(
         recording: &Path,
         domain: &str,
@@ -166,6 +171,27 @@ fn a_gyro_and_wheels_beside_the_driver_are_used() {
             "{live}"
         );
     }
+}
+
+#[test]
+fn a_gnss_receiver_beside_the_driver_corrects_the_trajectory() {
+    if !can_speak() {
+        return;
+    }
+    let drive = gnss::drive();
+    let log = drive.path().join("fixes.csv");
+    fs::write(&log, gnss::log_of_drive()).unwrap();
+    let logs = ["/dev/null".into(), "/dev/null".into(), log];
+    let domain = domain(10);
+    let _driver = Driver::with_logs(drive.path(), &domain, "configured", &[], &logs);
+    let run = receiving(with_constants(Run::small()), &domain, FFT_DATA, gnss::SCANS);
+    let run = recorded(&gnss::with_graph(run, &address(6))).set("gnss.kind=ros2");
+    run.complete();
+    let gnss = run.summary()["gnss"].clone();
+    let fixes = gnss["fixes"].as_u64().unwrap() as usize;
+    assert!(fixes > gnss::FIXES * 3 / 4, "{gnss}: some may be lost");
+    assert!(gnss["used"].as_u64().unwrap() > 20, "{gnss}");
+    gnss::assert_replays(&run);
 }
 
 #[test]

@@ -114,7 +114,7 @@ fn of_recorded_run(data: &Path) -> Result<Automatic, AutomaticError> {
     // The recording itself says what its scans are.
     table.retain(|section, _| section != "dataset" && MethodConfig::SECTIONS.contains(&section));
     let gnss_kind = table.get_mut("gnss").and_then(|gnss| gnss.get_mut("kind"));
-    if let Some(kind) = gnss_kind.filter(|kind| kind.as_str() == Some("udp")) {
+    if let Some(kind) = gnss_kind.filter(|kind| matches!(kind.as_str(), Some("udp" | "ros2"))) {
         // The fixes that arrived then lie beside it, if the run made the recording itself.
         *kind = "auto".into();
     }

@@ -2,8 +2,8 @@
 
 Arguments: the domain, the address of the radar, and what is published: azimuths and the configuration (`configured`), azimuths alone (`silent`), both
 with numbers as bytes, as until 2024 (`older`), turns and the configuration (`turns`), or turns alone (`silent-turns`). The radar is asked for azimuths
-once somebody subscribes to them, who has a second for the configuration. Further arguments are the log of a gyro and that of
-wheels, which are published beside the azimuths by their stamps.
+once somebody subscribes to them, who has a second for the configuration. Further arguments are the logs of a gyro, of
+wheels and of a GNSS receiver, which are published beside the azimuths by their stamps.
 """
 
 import os
@@ -19,7 +19,7 @@ SIGNATURE = bytes.fromhex("000103030707 0f0f1f1f3f3f7f7ffefe".replace(" ", ""))
 CONFIGURATION, REQUEST_CONFIGURATION, START, AZIMUTH = 10, 20, 21, 30
 
 domain, address, publishes = int(sys.argv[1]), *sys.argv[2:4]
-rows, speeds = ([line.split(",") for line in open(log).read().splitlines()[1:]] for log in (sys.argv[4:] + [os.devnull] * 2)[:2])
+rows, speeds, fixes = ([line.split(",") for line in open(log).read().splitlines()[1:]] for log in (sys.argv[4:] + [os.devnull] * 3)[:3])
 is_silent, in_turns = publishes.startswith("silent"), publishes.endswith("turns")
 AZIMUTHS, CONFIGURATIONS = {
     "turns": (ros.RadarBScanMsg, ros.RadarConfigurationMsg),
@@ -33,6 +33,7 @@ scans = DataWriter(participant, ros.topic(participant, name, AZIMUTHS, depth=400
 configurations = DataWriter(participant, ros.topic(participant, "radar_data/configuration_data", CONFIGURATIONS, depth=1), qos=ros.qos(1))
 gyro = DataWriter(participant, ros.topic(participant, "imu/data", ros.Imu, depth=100), qos=ros.best_effort(100)) if rows else None
 wheels = DataWriter(participant, ros.topic(participant, "odom", ros.Odometry, depth=100), qos=ros.qos(100)) if speeds else None
+gnss = DataWriter(participant, ros.topic(participant, "fix", ros.NavSatFix, depth=100), qos=ros.qos(100)) if fixes else None
 host, port = address.split(":")
 radar = socket.create_connection((host, int(port)))
 stream = radar.makefile("rb")
@@ -102,6 +103,12 @@ def measure(until_ns):
         pose = ros.PoseWithCovariance(ros.Pose(ros.Point(0.0, 0.0, 0.0), ros.Quaternion(0.0, 0.0, 0.0, 1.0)), [0.0] * 36)
         twist = ros.TwistWithCovariance(ros.Twist(ros.Vector3(float(speed), 0.0, 0.0), at_rest), [0.0] * 36)
         wheels.write(ros.Odometry(header, "base_link", pose, twist))
+    while fixes and int(fixes[0][0]) <= until_ns:
+        stamp, latitude, longitude, sigma_m = fixes.pop(0)
+        stamp, variance = int(stamp), float(sigma_m) ** 2
+        header, status = ros.Header(ros.Time(stamp // 10**9, stamp % 10**9), "gnss"), ros.NavSatStatus(0, 1)
+        covariance = [variance, 0.0, 0.0, 0.0, variance, 0.0, 0.0, 0.0, 4 * variance]
+        gnss.write(ros.NavSatFix(header, status, float(latitude), float(longitude), 0.0, covariance, 2))
     while rows and int(rows[0][0]) <= until_ns:
         stamp, *values = rows.pop(0)
         stamp, values = int(stamp), [float(value) for value in values]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from cyclonedds.core import Policy, Qos
 from cyclonedds.domain import Domain, DomainParticipant
 from cyclonedds.idl import IdlStruct
-from cyclonedds.idl.types import array, float32, float64, int32, sequence, uint8, uint16, uint32, uint64
+from cyclonedds.idl.types import array, float32, float64, int8, int32, sequence, uint8, uint16, uint32, uint64
 from cyclonedds.topic import Topic
 from cyclonedds.util import duration
 
@@ -73,6 +73,23 @@ class Twist(IdlStruct, typename="geometry_msgs.msg.dds_.Twist_"):
 class TwistWithCovariance(IdlStruct, typename="geometry_msgs.msg.dds_.TwistWithCovariance_"):
     twist: Twist
     covariance: array[float64, 36]
+
+
+@dataclass
+class NavSatStatus(IdlStruct, typename="sensor_msgs.msg.dds_.NavSatStatus_"):
+    status: int8
+    service: uint16
+
+
+@dataclass
+class NavSatFix(IdlStruct, typename="sensor_msgs.msg.dds_.NavSatFix_"):
+    header: Header
+    status: NavSatStatus
+    latitude: float64
+    longitude: float64
+    altitude: float64
+    position_covariance: array[float64, 9]
+    position_covariance_type: uint8
 
 
 @dataclass

@@ -130,11 +130,11 @@ impl Trajectory {
         let [keyframes, queries] = self.read;
         if keyframes < self.keyframes.len() {
             let keyframe = self.keyframes.read_without_points(keyframes)?;
-            let fixes = self.estimator.fixes().taken();
+            let fixes = self.estimator.fixes().settled();
             self.estimator.push(&keyframe).map_err(input)?;
             // Without a new loop or fix the poses before stay where they are.
             let standing = self.corrected.map(|last| last.then(&keyframe.motion));
-            self.corrected = standing.filter(|_| self.estimator.fixes().taken() == fixes);
+            self.corrected = standing.filter(|_| self.estimator.fixes().settled() == fixes);
             self.newest = Some(keyframe);
             self.read[0] += 1;
         } else if queries < self.queries.len() {

@@ -132,9 +132,12 @@ fn finished(out: &Out) -> Result<DriveOutcome, Failure> {
 }
 
 /// Returns whether an unfinished run in the folder, if there is one, goes on with this
-/// configuration. One of another configuration or build is discarded: nobody has seen results of
-/// it.
+/// configuration. One of another configuration, build or version is discarded: nobody has seen
+/// results of it.
 fn continues(out: &Out, configuration: &Configuration) -> Result<bool, Failure> {
+    if earlier::is_of_another_version(out.path()) {
+        return Ok(false);
+    }
     let Ok(begun) = Identity::read(out, Holds::Unfinished(0)) else {
         return Ok(true);
     };

@@ -4,6 +4,7 @@
 mod ask;
 mod configuration_estimate;
 mod driver;
+mod fixes;
 mod radar;
 mod wakeups;
 
@@ -14,10 +15,11 @@ use gyre_datasets::DatasetOptions;
 use gyre_live_radar::{encoder_counts, silence};
 use gyre_ros2_messages::{Domain, DomainError};
 use gyre_run::SourceConfig;
-use gyre_samples::{GyroConfig, GyroKind, WheelsConfig, WheelsKind};
+use gyre_samples::{GnssConfig, GnssKind, GyroConfig, GyroKind, WheelsConfig, WheelsKind};
 use gyre_stage::{Launch, StageCounters, StageError, source};
 
 pub use ask::{AskError, ask};
+pub use fixes::FixSettings;
 pub use gyre_live_radar::Sizes;
 
 /// The topic of an inertial sensor by REP-145.
@@ -36,6 +38,8 @@ pub struct Settings {
     pub gyro_topic: Option<String>,
     /// The topic of the odometry of the wheels, if it is used.
     pub wheels_topic: Option<String>,
+    /// A GNSS receiver, if it is used.
+    pub fixes: Option<FixSettings>,
     /// Encoder counts per turn of a radar whose driver does not publish its configuration.
     pub encoder_counts: u16,
     /// Time without a message after which that is reported.
@@ -59,6 +63,7 @@ impl Settings {
             topic: source.topic.clone(),
             gyro_topic: None,
             wheels_topic: None,
+            fixes: None,
             encoder_counts: encoder_counts(options),
             silence: silence(source),
             scans: source.scans.map(|scans| scans as u64),
@@ -87,6 +92,11 @@ pub fn run(launch: &Launch, mut settings: Settings) -> Result<StageCounters, Sta
     let wheels: WheelsConfig = launch.section("wheels")?;
     let topic = wheels.topic.unwrap_or_else(|| ODOMETRY.to_owned());
     settings.wheels_topic = (wheels.kind == WheelsKind::Ros2).then_some(topic);
+    let gnss: GnssConfig = launch.section("gnss")?;
+    settings.fixes = (gnss.kind == GnssKind::Ros2).then(|| FixSettings {
+        topic: gnss.topic.unwrap_or_else(|| fixes::TOPIC.to_owned()),
+        listen: gnss.listen,
+    });
     let scans = settings.scans;
     let radar = radar::Radar::open(settings).map_err(|error| StageError::Input(error.to_string()));
     source::run_sensor(launch, &mut radar?, scans)

@@ -93,10 +93,13 @@ impl Configuration {
                 "kind is `log`, but no file is named: set file, or kind to `auto`"
             }
             GnssKind::Auto if self.is_radar() => {
-                "kind is `auto`, but the log of a live radar does not lie beside its scans: receive fixes with kind = \"udp\", or name a log with kind = \"log\" and file"
+                "kind is `auto`, but the log of a live radar does not lie beside its scans: receive fixes with kind = \"udp\" or \"ros2\", or name a log with kind = \"log\" and file"
             }
             GnssKind::Udp if !self.is_radar() && !self.is_side(Side::Base) => {
                 "kind is `udp`, but the scans are of no live radar: set kind to `auto`, or name a log with kind = \"log\" and file"
+            }
+            GnssKind::Ros2 if self.source.kind != SourceKind::Ros2 => {
+                "kind is `ros2`, but the radar is not behind its driver in ROS 2: receive fixes with kind = \"udp\", or name a log with kind = \"log\" and file"
             }
             _ => return Ok(()),
         };
@@ -110,7 +113,7 @@ impl Configuration {
         let sensors = [
             ("gyro", gyro.kind == GyroKind::Udp, &gyro.listen),
             ("wheels", wheels.kind == WheelsKind::Udp, &wheels.listen),
-            ("gnss", gnss.kind == GnssKind::Udp, &gnss.listen),
+            ("gnss", gnss.is_live(), &gnss.listen),
         ];
         let mut taken = BTreeMap::new();
         for (section, _, listen) in sensors.into_iter().filter(|(_, is_live, _)| *is_live) {

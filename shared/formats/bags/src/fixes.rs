@@ -47,12 +47,5 @@ pub(crate) fn read(
 
 fn fix(message: &Message) -> Result<Option<RawFix>, String> {
     let fix: NavSatFix = decode(&message.data).map_err(|error| error.to_string())?;
-    let sigma_m = fix.variances_m2().map(RawFix::sigma_of);
-    let raw = RawFix {
-        stamp_ns: fix.header.stamp_or(message.log_ns),
-        at: [fix.latitude, fix.longitude],
-        altitude_m: fix.altitude,
-        sigma_m: sigma_m.unwrap_or(0.0),
-    };
-    Ok(fix.has_fix().then_some(raw))
+    Ok(fix.fix(message.log_ns))
 }

@@ -6,8 +6,6 @@ use gyre_bags::is_bag;
 use gyre_datasets::{GnssLog, GnssLogError};
 use gyre_samples::{GnssConfig, GnssKind};
 
-use crate::parts::first_part_in;
-
 /// Returns the log of what a live receiver has sent during the run with its results in `out`.
 pub fn received_fixes(out: &Path) -> PathBuf {
     out.join("journal/gnss.csv")
@@ -27,7 +25,7 @@ pub fn gnss_log(
         GnssKind::None => Ok(None),
         GnssKind::Auto => of_scans(config.topic.as_deref(), data).map(Some),
         GnssKind::Log => GnssLog::read(&config.file.clone().unwrap_or_default()).map(Some),
-        GnssKind::Udp => Ok(Some(GnssLog::received(&received_fixes(out)))),
+        GnssKind::Udp | GnssKind::Ros2 => Ok(Some(GnssLog::received(&received_fixes(out)))),
     }
 }
 
@@ -42,10 +40,9 @@ fn of_scans(topic: Option<&str>, data: &Path) -> Result<GnssLog, GnssLogError> {
             None => GnssLog::read(&GnssLog::find(data).map_err(none_in_bag)?),
         },
         (false, None) => {
-            let first = first_part_in(data).unwrap_or_else(|| data.to_owned());
-            let path = GnssLog::find(&first)?;
+            let path = GnssLog::find(data)?;
             // A live receiver may have sent nothing that can be used.
-            match path == GnssLog::of_recording(&first) {
+            match GnssLog::is_of_recording(&path) {
                 true => Ok(GnssLog::received(&path)),
                 false => GnssLog::read(&path),
             }

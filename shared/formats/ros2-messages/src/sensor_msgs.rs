@@ -1,6 +1,6 @@
 //! `sensor_msgs`: images, and what an inertial sensor and a GNSS receiver measure.
 
-use gyre_samples::{Sample, SampleKind};
+use gyre_samples::{RawFix, Sample, SampleKind};
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -148,15 +148,30 @@ const FIX: i8 = 0;
 const COVARIANCE_UNKNOWN: u8 = 0;
 
 impl NavSatFix {
-    /// Returns whether the receiver had a fix.
-    pub fn has_fix(&self) -> bool {
-        self.status.status >= FIX
+    /// Returns the fix on the driver's clock ([`Header::stamp_or`]); `None` if the receiver had
+    /// none.
+    pub fn fix(&self, received_ns: i64) -> Option<RawFix> {
+        let sigma_m = match self.position_covariance_type {
+            COVARIANCE_UNKNOWN => 0.0,
+            _ => RawFix::sigma_of([0, 4].map(|at| self.position_covariance[at])),
+        };
+        (self.status.status >= FIX).then_some(RawFix {
+            stamp_ns: self.header.stamp_or(received_ns),
+            at: [self.latitude, self.longitude],
+            altitude_m: self.altitude,
+            sigma_m,
+        })
     }
 
-    /// Returns the variances along east and north, m²; `None` where the receiver does not know
-    /// them.
-    pub fn variances_m2(&self) -> Option<[f64; 2]> {
-        let variances = [0, 4].map(|at| self.position_covariance[at]);
-        (self.position_covariance_type != COVARIANCE_UNKNOWN).then_some(variances)
+    /// Returns the line that a live receiver would send: its time, ns, latitude and longitude,
+    /// degrees, and the standard deviation, m, or 0; without a fix the time alone.
+    pub fn line(&self, received_ns: i64) -> String {
+        match self.fix(received_ns) {
+            Some(fix) => {
+                let (stamp_ns, [latitude, longitude]) = (fix.stamp_ns, fix.at);
+                format!("{stamp_ns},{latitude},{longitude},{}", fix.sigma_m)
+            }
+            None => format!("{},,", self.header.stamp_or(received_ns)),
+        }
     }
 }

@@ -13,6 +13,7 @@ use gyre_ros2_messages::{
     vision_msgs::Detection3DArray,
     visualization_msgs::{CUBE, MarkerArray},
 };
+use gyre_samples::RawFix;
 use proptest::prelude::*;
 
 fn comes_back<T: Ros2Message + PartialEq + std::fmt::Debug>(message: &T) {
@@ -219,8 +220,16 @@ fn a_fix_of_another_writer_is_read_and_written_alike() {
     assert_eq!((fix.status.status, fix.status.service), (2, 9));
     let place = [fix.latitude, fix.longitude, fix.altitude];
     assert_eq!(place, [51.75, -1.26, 64.5]);
-    assert_eq!(fix.variances_m2(), Some([4.0, 9.0]));
     assert_eq!(fix.position_covariance_type, 3);
+    let expected = RawFix {
+        stamp_ns: 1_549_986_608_000_000_007,
+        at: [51.75, -1.26],
+        altitude_m: 64.5,
+        sigma_m: 6.5_f64.sqrt(),
+    };
+    assert_eq!(fix.fix(5), Some(expected));
+    let line = format!("1549986608000000007,51.75,-1.26,{}", 6.5_f64.sqrt());
+    assert_eq!(fix.line(5), line);
     assert_eq!(encode(&fix).unwrap(), bytes);
 }
 
@@ -230,10 +239,12 @@ fn a_receiver_without_a_fix_or_an_accuracy_says_so() {
     // Not yet set, none, and the kinds of fixes.
     for (status, has_fix) in [(-2, false), (-1, false), (0, true), (1, true), (2, true)] {
         fix.status.status = status;
-        assert_eq!(fix.has_fix(), has_fix, "{status}");
+        assert_eq!(fix.fix(5).is_some(), has_fix, "{status}");
     }
     fix.position_covariance_type = 0;
-    assert_eq!(fix.variances_m2(), None);
+    assert_eq!(fix.fix(5).unwrap().sigma_m, 0.0);
+    (fix.status.status, fix.header) = (-1, Header::default());
+    assert_eq!(fix.line(5), "5,,");
 }
 
 /// A detected object, as rosbags 0.11.9 serialises it.

@@ -18,13 +18,14 @@ pub struct GnssConfig {
     /// The log, for `kind = "log"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
-    /// The topic of the fixes in a bag of ROS 2, of the type `sensor_msgs/msg/NavSatFix`, for `kind
-    /// = "auto"`. Default: the only one.
+    /// The topic of the fixes, of the type `sensor_msgs/msg/NavSatFix`: in a bag of ROS 2, for
+    /// `kind = "auto"` (default: the only one), or for `kind = "ros2"` (default: `/fix`).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub topic: Option<String>,
     /// The address and port at which datagrams of a live receiver arrive, for `kind = "udp"`: lines
     /// of a stamp (ns since 1970), latitude and longitude (degrees) and, if it is known, the
-    /// standard deviation along each axis (m), with commas between.
+    /// standard deviation along each axis (m), with commas between. For `kind = "ros2"` those that
+    /// the source passes on.
     pub listen: String,
     /// Time by which the stamps of the fixes are late against the radar's, s: it is taken off them.
     pub late_s: f64,
@@ -52,6 +53,8 @@ pub enum GnssKind {
     Log,
     /// Of a live radar: what arrives in datagrams at `listen`.
     Udp,
+    /// Of a radar behind its driver in ROS 2: the messages on `topic`.
+    Ros2,
 }
 
 impl Default for GnssConfig {
@@ -79,7 +82,7 @@ impl GnssConfig {
 
     /// Returns whether fixes arrive during the run.
     pub fn is_live(&self) -> bool {
-        self.kind == GnssKind::Udp
+        matches!(self.kind, GnssKind::Udp | GnssKind::Ros2)
     }
 
     /// Checks every value.

@@ -1,5 +1,7 @@
 //! The fixes of GNSS of a drive: which keyframe each belongs to, and what became of it.
 
+use std::ops::Range;
+
 use gyre_estimation::{EstimationError, PoseGraph, Position};
 use gyre_geometry::{Pose, interpolate};
 use gyre_radar::{ClockOffset, clock_offset};
@@ -135,6 +137,13 @@ impl Fixes {
         self.taken.len()
     }
 
+    /// Returns how many of them stay: fixes arrive in the order of their stamps, so that those
+    /// between two keyframes are complete once there is one of a later time.
+    pub fn settled(&self) -> usize {
+        let is_complete = self.next < self.fixes.len();
+        self.taken.len() - usize::from(!is_complete && !self.taken.is_empty())
+    }
+
     /// Takes the fix between two keyframes whose place is known best, if there is one: against the
     /// earlier one, with odometry's motion to its own time.
     pub(crate) fn advance(&mut self, keyframe: usize, from: Stamped, to: Stamped) {
@@ -194,9 +203,13 @@ impl Fixes {
         self.refusal.clone_from(&before.refusal);
     }
 
-    /// Gives the fixes to the graph, from `first` on.
-    pub(crate) fn give(&self, graph: &mut PoseGraph, first: usize) -> Result<(), EstimationError> {
-        let mut new = self.taken[first..].iter();
+    /// Gives these fixes to the graph.
+    pub(crate) fn give(
+        &self,
+        graph: &mut PoseGraph,
+        which: Range<usize>,
+    ) -> Result<(), EstimationError> {
+        let mut new = self.taken[which].iter();
         new.try_for_each(|(_, position)| graph.measure(*position))
     }
 
@@ -215,7 +228,7 @@ impl Fixes {
 
     /// Checks that the graph agrees with most of the fixes.
     pub(crate) fn check(&mut self, graph: &PoseGraph) {
-        let taken = self.taken.len();
+        let taken = graph.positions().count();
         let agreeing = graph.positions().filter(|it| it.weight >= LEAST_WEIGHT);
         let agreeing = agreeing.count();
         self.refusal = match graph.frame() {

@@ -152,15 +152,15 @@ impl TrajectoryEstimator {
     }
 
     /// Uses these fixes in place of those before, as while a live receiver sends them: if keyframes
-    /// that have been solved have others now, the next solution takes all anew. Returns whether any
-    /// keyframe has others.
+    /// that have been solved have others now, the next solution takes all anew. Returns whether the
+    /// next solution has others.
     pub fn replace_fixes(&mut self, mut fixes: Fixes) -> bool {
         for (keyframe, ends) in self.keyframes.windows(2).enumerate() {
             fixes.advance(keyframe, ends[0].stamped(), ends[1].stamped());
         }
-        let before = self.fixes.positions();
-        let stand = fixes.positions().starts_with(&before[..self.given_fixes]);
-        let have_changed = fixes.positions() != before;
+        let before = &self.fixes.positions()[..self.given_fixes];
+        let stand = fixes.positions().starts_with(before);
+        let have_changed = !stand || fixes.settled() > self.given_fixes;
         match (stand, &mut self.estimator) {
             (true, _) => fixes.go_on_from(&self.fixes),
             (false, Estimator::Graph(graph)) => graph.clear_positions(),
@@ -237,7 +237,7 @@ impl TrajectoryEstimator {
             EstimatorKind::Graph => {
                 self.judge_all();
                 self.compare_clocks();
-                self.solve_graph()
+                self.solve_graph(self.fixes.taken())
             }
             EstimatorKind::Filter => self.filter(),
         }
@@ -403,9 +403,9 @@ impl TrajectoryEstimator {
         self.judged_fixes = self.fixes.taken();
     }
 
-    /// Solves the graph with all loops that are used and all fixes, from the odometry. If most of
-    /// the fixes contradict the solution it is made without them.
-    fn solve_graph(&mut self) -> Result<(), EstimationError> {
+    /// Solves the graph with all loops that are used and so many fixes, from the odometry. If most
+    /// of the fixes contradict the solution it is made without them.
+    fn solve_graph(&mut self, fixes: usize) -> Result<(), EstimationError> {
         let Estimator::Graph(graph) = &mut self.estimator else {
             return Ok(());
         };
@@ -417,10 +417,10 @@ impl TrajectoryEstimator {
                 graph.apply_tested(&it.constraint, it.chi_square)?;
             }
         }
-        self.given_fixes = self.fixes.taken();
-        let has_fixes = self.given_fixes > 0 && self.fixes.refusal().is_none();
+        self.given_fixes = fixes;
+        let has_fixes = fixes > 0 && self.fixes.refusal().is_none();
         if has_fixes {
-            self.fixes.give(graph, 0)?;
+            self.fixes.give(graph, 0..fixes)?;
         }
         graph.solve_anew()?;
         if has_fixes {
@@ -436,6 +436,7 @@ impl TrajectoryEstimator {
 
     /// Solves the graph with the loops and fixes that are new and used, from the standing poses.
     fn update_graph(&mut self) -> Result<(), EstimationError> {
+        let settled = self.fixes.settled().max(self.given_fixes);
         let has_grown = |now: usize, judged: usize| now > judged + judged / GROWTH;
         match has_grown(self.loops.len(), self.judged) {
             true => self.judge_all(),
@@ -450,7 +451,7 @@ impl TrajectoryEstimator {
         }
         if are_fixes_judged || is_withdrawn || self.loops.iter_mut().filter(new).count() > standing
         {
-            return self.solve_graph();
+            return self.solve_graph(settled);
         }
         let Estimator::Graph(graph) = &mut self.estimator else {
             return Ok(());
@@ -460,9 +461,9 @@ impl TrajectoryEstimator {
             it.is_taken = true;
         }
         if self.fixes.refusal().is_none() {
-            self.fixes.give(graph, self.given_fixes)?;
+            self.fixes.give(graph, self.given_fixes..settled)?;
         }
-        self.given_fixes = self.fixes.taken();
+        self.given_fixes = settled;
         graph.solve()?;
         self.weigh();
         Ok(())

@@ -366,11 +366,33 @@ fn fixes_that_arrive_with_the_keyframes_and_late_lead_to_the_same_solution() {
         assert!(error_m < 1.0, "{keyframe}: {error_m}");
     }
     assert!(live.replace_fixes(of_receiver(all.clone())));
+    live.update().unwrap();
     assert!(!live.replace_fixes(of_receiver(all.clone())));
     live.solve().unwrap();
     let whole = drive.solved(all);
     assert_eq!(live.poses(), whole.poses());
     assert_eq!(live.positions(), whole.positions());
+}
+
+/// Of the fixes around a keyframe the one that is known best is taken, which may be the last one.
+#[test]
+fn a_fix_that_is_taken_stays_however_late_the_fixes_are() {
+    let drive = Drive::new(300, 1);
+    let all = drive.fixes(2);
+    let mut live = drive.with(Vec::new());
+    let mut before = Vec::new();
+    for (k, keyframe) in drive.keyframes.iter().enumerate() {
+        live.push(keyframe).unwrap();
+        let arrived = all.partition_point(|fix| fix.stamp_ns + SECOND_NS / 3 <= keyframe.stamp_ns);
+        live.replace_fixes(of_receiver(all[..arrived].to_vec()));
+        live.update().unwrap();
+        let taken: Vec<_> = live.positions().iter().map(|it| it.position).collect();
+        if k > 50 {
+            assert!(taken.len() > 40 && taken.starts_with(&before), "{k}");
+        }
+        before = taken;
+    }
+    assert!(before.len() > 250, "{}", before.len());
 }
 
 #[test]

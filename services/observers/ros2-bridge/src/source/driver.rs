@@ -16,7 +16,7 @@ use gyre_stage::clock;
 use ros2_client::{Gid, ReadError, Subscription};
 use thiserror::Error;
 
-use super::{Settings, wakeups::Wakeups};
+use super::{Settings, fixes::Fixes, wakeups::Wakeups};
 use crate::{NodeError, node::Node};
 
 /// The name of the node.
@@ -141,6 +141,7 @@ pub struct Driver {
     gyro: Option<Subscription<Imu>>,
     /// The odometry of the wheels.
     wheels: Option<Subscription<Odometry>>,
+    fixes: Option<Fixes>,
 }
 
 /// The radar's description of itself.
@@ -169,6 +170,8 @@ impl Driver {
         let gyro = gyro.map(|topic| node.subscribe_to_sensor(topic, SAMPLES));
         let wheels = settings.wheels_topic.as_ref();
         let wheels = wheels.map(|topic| node.subscribe_to_sensor(topic, SAMPLES));
+        let fixes = settings.fixes.as_ref();
+        let fixes = fixes.map(|settings| Fixes::open(&mut node, &mut wakeups, settings));
         Ok(Self {
             topic: settings.topic.clone(),
             dds_name: node.dds_name(&settings.topic)?,
@@ -180,6 +183,7 @@ impl Driver {
             azimuths: None,
             gyro: gyro.transpose()?,
             wheels: wheels.transpose()?,
+            fixes: fixes.transpose()?,
         })
     }
 
@@ -292,6 +296,13 @@ impl Driver {
                 Ok(Some((odometry, _))) => return Some(odometry.sample(clock::since_1970_ns())),
                 Err(_) => {}
             }
+        }
+    }
+
+    /// Passes the fixes of GNSS on that have arrived.
+    pub fn pass_fixes_on(&mut self) {
+        if let Some(fixes) = &mut self.fixes {
+            fixes.pass_on();
         }
     }
 

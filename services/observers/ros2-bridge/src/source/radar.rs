@@ -245,6 +245,7 @@ impl Sensor for Radar {
         let input = |error: DriverError| StageError::Input(error.to_string());
         let is_received = self.driver.receive().map_err(input)?;
         self.driver.clear().map_err(|error| input(error.into()))?;
+        self.driver.pass_fixes_on();
         self.take_configuration(bytes.len())?;
         if let Some((turn, rows)) = self.turn.take()
             && self.add_turn(turn, rows, header, bytes)
