@@ -20,6 +20,11 @@ const SCALE: f64 = 0.99;
 
 /// A vehicle that leaves a town for a tunnel and slows down there, and its scans.
 fn into_a_tunnel() -> (Drive, Vec<Vec<SparsePoint>>) {
+    between_walls_and(Vec::new())
+}
+
+/// As in a tunnel, but with something beside the walls.
+fn between_walls_and(more: Vec<Reflector>) -> (Drive, Vec<Vec<SparsePoint>>) {
     let drive = Drive {
         acceleration_mps2: -0.2,
         ..Drive::steady(10.0, 0.0, SCANS)
@@ -29,6 +34,7 @@ fn into_a_tunnel() -> (Drive, Vec<Vec<SparsePoint>>) {
     // At every place of a wall another point in each scan: speckle.
     let walls = [3.0, -6.5].map(|y| wall([0.0, y], [400.0, y], 2500));
     scene.extend(walls);
+    scene.extend(more);
     (drive, scans(&scene, &drive, &NOISY))
 }
 
@@ -38,6 +44,20 @@ fn refine_with(
     wheels: impl Fn(usize) -> Option<f64>,
 ) -> Vec<Refined> {
     let mut numbers = Numbers(7);
+    // Inside the search finds any way.
+    let search = |k: usize| match k < INSIDE {
+        true => searched(drive, k - 1),
+        false => pose(2.0 + numbers.within(6.0), 0.0, 0.0),
+    };
+    refine_searched(refiner, (drive, scans), wheels, search)
+}
+
+fn refine_searched(
+    refiner: &mut Refiner,
+    (drive, scans): (&Drive, &[Vec<SparsePoint>]),
+    wheels: impl Fn(usize) -> Option<f64>,
+    mut search: impl FnMut(usize) -> Pose,
+) -> Vec<Refined> {
     let mut refine = |k: usize| {
         let [from_m, to_m] = [k - 1, k].map(|k| drive.length_m(k as f64 * SWEEP_S));
         let distance = |factor: f64| WheelDistance {
@@ -47,12 +67,7 @@ fn refine_with(
             interval_s: SWEEP_S,
         };
         refiner.expect_distance(wheels(k).map(distance));
-        // Inside the search finds any way.
-        let searched = match k < INSIDE {
-            true => searched(drive, k - 1),
-            false => pose(2.0 + numbers.within(6.0), 0.0, 0.0),
-        };
-        refiner.refine(k as u64, &scans[k], &scans[k - 1], &searched, SWEEP_S)
+        refiner.refine(k as u64, &scans[k], &scans[k - 1], &search(k), SWEEP_S)
     };
     (1..scans.len()).map(&mut refine).collect()
 }
@@ -131,4 +146,20 @@ fn wheels_that_fall_silent_inside_leave_the_speed_that_they_measured() {
         "{off}, {sigma_m} m"
     );
     assert_eq!(refiner.state().sliding, 12);
+}
+
+/// The map does not tell posts beside such walls from speckle, but the search finds them.
+#[test]
+fn as_long_as_the_search_sees_the_way_it_is_seen() {
+    let posts = posts([[0.0, 400.0], [5.0, 30.0]], 15.0, 9);
+    let (drive, scans) = between_walls_and(posts);
+    let search = |k: usize| searched(&drive, k - 1);
+    let refined = refine_searched(&mut refiner(), (&drive, &scans), |_| None, search);
+    let (off, sigma_m) = inside(&drive, &refined);
+    println!("{off}, sigma {sigma_m:.2} m");
+    assert!(!refined.iter().any(slid));
+    assert!(
+        off.translation.vector.norm() < 1.0 && sigma_m < 2.0,
+        "{off}, {sigma_m} m"
+    );
 }

@@ -2,9 +2,10 @@
 //! the vehicle drives.
 //!
 //! The place along them is the predicted one, by wheels, by Doppler or at constant velocity, with
-//! the covariance of that; across them and of the heading the radar tells as elsewhere.
+//! the covariance of that; across them and of the heading the radar tells as elsewhere. As long as
+//! the search, which compares two scans and no map, finds about that place, it is between both.
 
-use gyre_geometry::UncertainMotion;
+use gyre_geometry::{Pose, UncertainMotion};
 use nalgebra::UnitVector2;
 
 use super::{
@@ -30,8 +31,14 @@ impl Refiner {
         let Some(along) = along.filter(|_| best.fits) else {
             return best.is_plausible.then_some((registered, None));
         };
+        let is_searched = self.begins(scan) && self.is_near(&scan.searched, scan, along);
         let [predicted, _] = self.state.predict(&scan.step);
-        let apart = predicted.translation.vector - best.alignment.pose.translation.vector;
+        let mut place = predicted.translation.vector;
+        if is_searched {
+            // The search is noisier than the prediction, which does not know of accelerations.
+            place = (place + scan.searched.translation.vector) * 0.5;
+        }
+        let apart = place - best.alignment.pose.translation.vector;
         let mut initial = best.alignment.pose;
         initial.translation.vector += along.into_inner() * along.dot(&apart);
         let mut registration = self.registration(scan);
@@ -40,7 +47,13 @@ impl Refiner {
             return None;
         }
         let registered = self.registered(&alignment)?;
-        Some((self.slid(scan, registered, along, uncertainty), Some(along)))
+        Some(match is_searched {
+            true => (
+                self.placed(registered, along, self.step_m(scan).powi(2)),
+                None,
+            ),
+            false => (self.slid(scan, registered, along, uncertainty), Some(along)),
+        })
     }
 
     /// Returns the direction along the axes of the map in which the place of a registered pose is
@@ -55,7 +68,28 @@ impl Refiner {
         let contradicts = || self.contradicts_distance(scan, registered);
         let is_undetermined = weakest.is_undetermined()
             || (weakest.is_doubtful() && (self.state.sliding > 0 || contradicts()));
-        is_undetermined.then_some(weakest.along)
+        let is_near = |pose: &Pose| self.is_near(pose, scan, weakest.along);
+        let is_seen = || self.begins(scan) && is_near(&scan.searched) && is_near(&alignment.pose);
+        (is_undetermined && !is_seen()).then_some(weakest.along)
+    }
+
+    /// Returns whether the radar has seen until now how far the vehicle drives, and nothing else
+    /// says it.
+    fn begins(&self, scan: &Scan<'_>) -> bool {
+        self.state.sliding == 0 && scan.step.distance.is_none()
+    }
+
+    /// Returns whether a pose is about the predicted one in a direction. In a tunnel the match is
+    /// soon metres away, and then the search; elsewhere neither is.
+    fn is_near(&self, pose: &Pose, scan: &Scan<'_>, along: UnitVector2<f64>) -> bool {
+        let [predicted, _] = self.state.predict(&scan.step);
+        let apart = pose.translation.vector - predicted.translation.vector;
+        along.dot(&apart).abs() < self.step_m(scan)
+    }
+
+    /// By how much a vehicle drives farther in an interval if it accelerates, m.
+    fn step_m(&self, scan: &Scan<'_>) -> f64 {
+        self.config.acceleration_mps2 * scan.step.interval_s.powi(2)
     }
 
     /// Returns a registered pose with the covariance that the prediction has in a direction in
@@ -71,14 +105,23 @@ impl Refiner {
             Some(_) => 0,
             None => self.state.sliding,
         };
+        let ahead = self.state.pose.rotation.inverse() * along.into_inner();
+        self.placed(registered, along, uncertainty.of_sliding(ahead, sliding))
+    }
+
+    /// Returns a registered pose with this variance in a direction of the map, all of which
+    /// accumulates, m².
+    fn placed(
+        &self,
+        registered: UncertainMotion,
+        along: UnitVector2<f64>,
+        variance: f64,
+    ) -> UncertainMotion {
         let along = self.state.pose.rotation.inverse() * along.into_inner();
-        let variance = uncertainty.of_sliding(along, sliding);
-        // The error of the prediction accumulates whole.
         let drift_share = uncertainty::drift_share(self.map.len(), &self.config);
-        let covariance = registered.covariance;
         UncertainMotion {
             covariance: uncertainty::with_variance(
-                &covariance,
+                &registered.covariance,
                 along.push(0.0),
                 variance / drift_share,
             ),
