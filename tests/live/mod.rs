@@ -1,6 +1,6 @@
 //! Live runs: a radar does not wait.
 
-mod gnss;
+pub mod gnss;
 pub mod gyro;
 mod load;
 pub mod radar;
