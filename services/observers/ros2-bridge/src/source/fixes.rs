@@ -1,6 +1,7 @@
 //! The fixes of a GNSS receiver that is beside the driver.
 
-use std::net::UdpSocket;
+use std::io;
+use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, ToSocketAddrs, UdpSocket};
 
 use gyre_ros2_messages::sensor_msgs::NavSatFix;
 use gyre_stage::clock;
@@ -28,7 +29,7 @@ pub struct FixSettings {
 pub struct Fixes {
     topic: Subscription<NavSatFix>,
     socket: UdpSocket,
-    listen: String,
+    listen: SocketAddr,
     has_failed: bool,
 }
 
@@ -36,7 +37,7 @@ impl Fixes {
     /// Subscribes.
     ///
     /// # Errors
-    /// The name of the topic is none, or the system gives no socket.
+    /// The name of the topic or the address is none, or the system gives no socket.
     pub fn open(
         node: &mut Node,
         wakeups: &mut Wakeups,
@@ -44,10 +45,17 @@ impl Fixes {
     ) -> Result<Self, DriverError> {
         let mut topic = node.subscribe_to_sensor(&settings.topic, FIXES)?;
         wakeups.add(&mut topic)?;
+        let mut addresses = settings.listen.to_socket_addrs()?;
+        let listen = addresses.next().ok_or(io::ErrorKind::InvalidInput);
+        let listen = listen.map_err(io::Error::from)?;
+        let from: SocketAddr = match listen.is_ipv4() {
+            true => (Ipv4Addr::UNSPECIFIED, 0).into(),
+            false => (Ipv6Addr::UNSPECIFIED, 0).into(),
+        };
         Ok(Self {
             topic,
-            socket: UdpSocket::bind("0.0.0.0:0")?,
-            listen: settings.listen.clone(),
+            socket: UdpSocket::bind(from)?,
+            listen,
             has_failed: false,
         })
     }
@@ -60,11 +68,10 @@ impl Fixes {
                 Ok(Some((message, _))) => message.line(clock::since_1970_ns()),
                 Err(error) => error.to_string(),
             };
-            if let Err(error) = self.socket.send_to(line.as_bytes(), &self.listen)
+            if let Err(error) = self.socket.send_to(line.as_bytes(), self.listen)
                 && !std::mem::replace(&mut self.has_failed, true)
             {
-                let listen = &self.listen;
-                tracing::warn!(listen, "fixes of GNSS cannot be passed on: {error}");
+                tracing::warn!(listen = %self.listen, "fixes of GNSS cannot be passed on: {error}");
             }
         }
     }
