@@ -182,10 +182,11 @@ fn a_gnss_receiver_beside_the_driver_corrects_the_trajectory() {
     let log = drive.path().join("fixes.csv");
     fs::write(&log, gnss::log_of_drive()).unwrap();
     let logs = ["/dev/null".into(), "/dev/null".into(), log];
-    let domain = domain(10);
+    let domain = domain(11);
     let _driver = Driver::with_logs(drive.path(), &domain, "configured", &[], &logs);
     let run = receiving(with_constants(Run::small()), &domain, FFT_DATA, gnss::SCANS);
     let run = recorded(&gnss::with_graph(run, &address(6))).set("gnss.kind=ros2");
+    let run = run.set("gnss.topic='/fix'");
     run.complete();
     let gnss = run.summary()["gnss"].clone();
     let fixes = gnss["fixes"].as_u64().unwrap() as usize;

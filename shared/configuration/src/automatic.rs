@@ -113,10 +113,15 @@ fn of_recorded_run(data: &Path) -> Result<Automatic, AutomaticError> {
     let mut table = parsed.map_err(|error| AutomaticError::Recorded(error.to_string()))?;
     // The recording itself says what its scans are.
     table.retain(|section, _| section != "dataset" && MethodConfig::SECTIONS.contains(&section));
-    let gnss_kind = table.get_mut("gnss").and_then(|gnss| gnss.get_mut("kind"));
-    if let Some(kind) = gnss_kind.filter(|kind| matches!(kind.as_str(), Some("udp" | "ros2"))) {
+    let gnss = table.get_mut("gnss").and_then(Value::as_table_mut);
+    let is_live = |gnss: &&mut Table| {
+        let kind = gnss.get("kind").and_then(Value::as_str);
+        matches!(kind, Some("udp" | "ros2"))
+    };
+    if let Some(gnss) = gnss.filter(is_live) {
         // The fixes that arrived then lie beside it, if the run made the recording itself.
-        *kind = "auto".into();
+        gnss.insert("kind".to_owned(), "auto".into());
+        gnss.remove("topic");
     }
     Ok(Automatic {
         table,

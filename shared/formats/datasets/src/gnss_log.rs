@@ -101,12 +101,6 @@ impl GnssLog {
         recording.with_extension(OF_RECORDING)
     }
 
-    /// Returns whether this log is named as that of a recording of a run.
-    pub fn is_of_recording(path: &Path) -> bool {
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        name.ends_with(&format!(".{OF_RECORDING}"))
-    }
-
     /// Takes the fixes of this bag.
     ///
     /// # Errors
@@ -124,12 +118,14 @@ impl GnssLog {
     }
 
     /// Returns the log that lies beside the scans of a dataset, which may also be named by the
-    /// folder of the images; of a recording, or the only one in a folder, its own, if it has one.
+    /// folder of the images; of the first file of a recording its own, if it has one.
     ///
     /// # Errors
     /// No log.
     pub fn find(folder: &Path) -> Result<PathBuf, GnssLogError> {
-        if let Some(own) = own_of(folder) {
+        let own = Self::of_recording(folder);
+        // The first file itself may have been moved away.
+        if !folder.is_dir() && own.is_file() {
             return Ok(own);
         }
         // Of a bag or another recording in one file, the folder in which it lies.
@@ -221,16 +217,4 @@ impl Raw {
         }
         self.unreadable += 1;
     }
-}
-
-/// Returns the log that belongs to a recording by its first file, which may have been moved away
-/// itself, or by the folder in which it is the only one.
-fn own_of(recording: &Path) -> Option<PathBuf> {
-    let Ok(files) = recording.read_dir() else {
-        return Some(GnssLog::of_recording(recording)).filter(|own| own.is_file());
-    };
-    let files = files.flatten().map(|file| file.path());
-    let mut logs = files.filter(|path| GnssLog::is_of_recording(path));
-    let first = logs.next();
-    first.filter(|_| logs.next().is_none())
 }

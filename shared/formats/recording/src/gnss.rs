@@ -6,6 +6,8 @@ use gyre_bags::is_bag;
 use gyre_datasets::{GnssLog, GnssLogError};
 use gyre_samples::{GnssConfig, GnssKind};
 
+use crate::parts::first_part_in;
+
 /// Returns the log of what a live receiver has sent during the run with its results in `out`.
 pub fn received_fixes(out: &Path) -> PathBuf {
     out.join("journal/gnss.csv")
@@ -40,9 +42,10 @@ fn of_scans(topic: Option<&str>, data: &Path) -> Result<GnssLog, GnssLogError> {
             None => GnssLog::read(&GnssLog::find(data).map_err(none_in_bag)?),
         },
         (false, None) => {
-            let path = GnssLog::find(data)?;
+            let first = first_part_in(data).unwrap_or_else(|| data.to_owned());
+            let path = GnssLog::find(&first)?;
             // A live receiver may have sent nothing that can be used.
-            match GnssLog::is_of_recording(&path) {
+            match path == GnssLog::of_recording(&first) {
                 true => Ok(GnssLog::received(&path)),
                 false => GnssLog::read(&path),
             }

@@ -2,8 +2,9 @@
 //! the vehicle drives.
 //!
 //! The place along them is the predicted one, by wheels, by Doppler or at constant velocity, with
-//! the covariance of that; across them and of the heading the radar tells as elsewhere. As long as
-//! the search, which compares two scans and no map, finds about that place, it is between both.
+//! the covariance of that; across them and of the heading the radar tells as elsewhere. Until the
+//! search, which compares two scans and no map, contradicts the prediction, the place is that of
+//! the match, or the mean of prediction and search.
 
 use gyre_geometry::{Pose, UncertainMotion};
 use nalgebra::UnitVector2;
@@ -19,7 +20,8 @@ use super::{
 impl Refiner {
     /// Returns the pose of the best match with the covariance of its motion; `None` where it is not
     /// plausible. Beside it the direction in which nothing determines the place, if there is one:
-    /// there the predicted place is taken, which has to be plausible instead.
+    /// there the predicted place is taken, which has to be plausible instead. The mean of
+    /// prediction and search counts as a match.
     pub(super) fn plausible_match(
         &mut self,
         scan: &Scan<'_>,
