@@ -132,8 +132,8 @@ fn finished(out: &Out) -> Result<DriveOutcome, Failure> {
 }
 
 /// Returns whether an unfinished run in the folder, if there is one, goes on with this
-/// configuration. One of another configuration, build or version is discarded, as are
-/// complete results of such a run.
+/// configuration. One of another configuration, build or version is discarded, as are complete
+/// results of such a run.
 fn continues(out: &Out, configuration: &Configuration) -> Result<bool, Failure> {
     if earlier::is_of_another_version(out.path()) {
         return Ok(false);

@@ -26,6 +26,8 @@ pub use gyre_live_radar::Sizes;
 const IMU: &str = "/imu/data";
 /// The topic of the odometry of wheels, as drivers of bases name it.
 const ODOMETRY: &str = "/odom";
+/// The topic of a GNSS receiver, as `nmea_navsat_driver` names it.
+const FIX: &str = "/fix";
 
 /// The topics of a driver, and the properties of its radar that it does not publish.
 #[derive(Clone, Debug, PartialEq)]
@@ -94,7 +96,7 @@ pub fn run(launch: &Launch, mut settings: Settings) -> Result<StageCounters, Sta
     settings.wheels_topic = (wheels.kind == WheelsKind::Ros2).then_some(topic);
     let gnss: GnssConfig = launch.section("gnss")?;
     settings.fixes = (gnss.kind == GnssKind::Ros2).then(|| FixSettings {
-        topic: gnss.topic.unwrap_or_else(|| fixes::TOPIC.to_owned()),
+        topic: gnss.topic.unwrap_or_else(|| FIX.to_owned()),
         listen: gnss.listen,
     });
     let scans = settings.scans;

@@ -16,7 +16,11 @@ use gyre_stage::clock;
 use ros2_client::{Gid, ReadError, Subscription};
 use thiserror::Error;
 
-use super::{Settings, fixes::Fixes, wakeups::Wakeups};
+use super::{
+    Settings,
+    fixes::{FixError, Fixes},
+    wakeups::Wakeups,
+};
 use crate::{NodeError, node::Node};
 
 /// The name of the node.
@@ -34,6 +38,9 @@ pub enum DriverError {
     /// The node cannot be made.
     #[error(transparent)]
     Node(#[from] NodeError),
+    /// Fixes of GNSS cannot be received, or not be passed on.
+    #[error(transparent)]
+    Fixes(#[from] FixError),
     /// The system refuses a descriptor.
     #[error("cannot wait for topics of ROS 2: {0}")]
     Wait(#[from] io::Error),
@@ -141,6 +148,7 @@ pub struct Driver {
     gyro: Option<Subscription<Imu>>,
     /// The odometry of the wheels.
     wheels: Option<Subscription<Odometry>>,
+    /// A GNSS receiver, whose fixes others need.
     fixes: Option<Fixes>,
 }
 

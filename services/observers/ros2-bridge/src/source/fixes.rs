@@ -6,14 +6,29 @@ use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, ToSocketAddrs, UdpSocket};
 use gyre_ros2_messages::sensor_msgs::NavSatFix;
 use gyre_stage::clock;
 use ros2_client::Subscription;
+use thiserror::Error;
 
-use super::{driver::DriverError, wakeups::Wakeups};
-use crate::node::Node;
+use super::wakeups::Wakeups;
+use crate::{NodeError, node::Node};
 
-/// The topic of a receiver, as `nmea_navsat_driver` names it.
-pub const TOPIC: &str = "/fix";
 /// Fixes that are kept: ten seconds of 20 a second.
 const FIXES: usize = 200;
+
+/// Fixes that cannot be received, or not be passed on.
+#[derive(Debug, Error)]
+pub enum FixError {
+    /// The name of the topic is none.
+    #[error(transparent)]
+    Node(#[from] NodeError),
+    /// The address is none, or the system gives no socket.
+    #[error("cannot pass the fixes of GNSS on to {listen} (gnss.listen): {source}")]
+    Address {
+        /// The address.
+        listen: String,
+        /// The cause.
+        source: io::Error,
+    },
+}
 
 /// Where fixes come from, and where they go to.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,19 +57,17 @@ impl Fixes {
         node: &mut Node,
         wakeups: &mut Wakeups,
         settings: &FixSettings,
-    ) -> Result<Self, DriverError> {
-        let mut topic = node.subscribe_to_sensor(&settings.topic, FIXES)?;
-        wakeups.add(&mut topic)?;
-        let mut addresses = settings.listen.to_socket_addrs()?;
-        let listen = addresses.next().ok_or(io::ErrorKind::InvalidInput);
-        let listen = listen.map_err(io::Error::from)?;
-        let from: SocketAddr = match listen.is_ipv4() {
-            true => (Ipv4Addr::UNSPECIFIED, 0).into(),
-            false => (Ipv6Addr::UNSPECIFIED, 0).into(),
+    ) -> Result<Self, FixError> {
+        let failed = |source| FixError::Address {
+            listen: settings.listen.clone(),
+            source,
         };
+        let (socket, listen) = socket_to(&settings.listen).map_err(failed)?;
+        let mut topic = node.subscribe_to_sensor(&settings.topic, FIXES)?;
+        wakeups.add(&mut topic).map_err(failed)?;
         Ok(Self {
             topic,
-            socket: UdpSocket::bind(from)?,
+            socket,
             listen,
             has_failed: false,
         })
@@ -75,4 +88,15 @@ impl Fixes {
             }
         }
     }
+}
+
+/// Returns a socket that can send to an address.
+fn socket_to(address: &str) -> io::Result<(UdpSocket, SocketAddr)> {
+    let first = address.to_socket_addrs()?.next();
+    let to = first.ok_or(io::ErrorKind::AddrNotAvailable)?;
+    let from: SocketAddr = match to.is_ipv4() {
+        true => (Ipv4Addr::UNSPECIFIED, 0).into(),
+        false => (Ipv6Addr::UNSPECIFIED, 0).into(),
+    };
+    Ok((UdpSocket::bind(from)?, to))
 }

@@ -33,7 +33,7 @@ impl Refiner {
         let Some(along) = along.filter(|_| best.fits) else {
             return best.is_plausible.then_some((registered, None));
         };
-        let is_searched = self.begins(scan) && self.is_near(&scan.searched, scan, along);
+        let is_searched = self.asks_search(scan) && self.is_near(&scan.searched, scan, along);
         let [predicted, _] = self.state.predict(&scan.step);
         let mut place = predicted.translation.vector;
         if is_searched {
@@ -59,7 +59,8 @@ impl Refiner {
     }
 
     /// Returns the direction along the axes of the map in which the place of a registered pose is
-    /// undetermined, if there is one. In one that is doubtful wheels or Doppler decide.
+    /// undetermined, if there is one. In one that is doubtful wheels or Doppler decide. While the
+    /// search is asked, there is none where both match and search are near the prediction.
     pub(super) fn undetermined(
         &self,
         scan: &Scan<'_>,
@@ -71,25 +72,26 @@ impl Refiner {
         let is_undetermined = weakest.is_undetermined()
             || (weakest.is_doubtful() && (self.state.sliding > 0 || contradicts()));
         let is_near = |pose: &Pose| self.is_near(pose, scan, weakest.along);
-        let is_seen = || self.begins(scan) && is_near(&scan.searched) && is_near(&alignment.pose);
+        let is_seen =
+            || self.asks_search(scan) && is_near(&scan.searched) && is_near(&alignment.pose);
         (is_undetermined && !is_seen()).then_some(weakest.along)
     }
 
-    /// Returns whether the radar has seen until now how far the vehicle drives, and nothing else
-    /// says it.
-    fn begins(&self, scan: &Scan<'_>) -> bool {
+    /// Returns whether the way was not guessed before, and neither wheels nor Doppler say it.
+    fn asks_search(&self, scan: &Scan<'_>) -> bool {
         self.state.sliding == 0 && scan.step.distance.is_none()
     }
 
-    /// Returns whether a pose is about the predicted one in a direction. In a tunnel the match is
-    /// soon metres away, and then the search; elsewhere neither is.
+    /// Returns whether a pose is near the predicted one in a direction. In a tunnel that of the
+    /// match soon is metres away, and some scans later that of the search too. Elsewhere both stay
+    /// near.
     fn is_near(&self, pose: &Pose, scan: &Scan<'_>, along: UnitVector2<f64>) -> bool {
         let [predicted, _] = self.state.predict(&scan.step);
         let apart = pose.translation.vector - predicted.translation.vector;
         along.dot(&apart).abs() < self.step_m(scan)
     }
 
-    /// By how much a vehicle drives farther in an interval if it accelerates, m.
+    /// Returns how much farther a vehicle drives in an interval if it accelerates, m.
     fn step_m(&self, scan: &Scan<'_>) -> f64 {
         self.config.acceleration_mps2 * scan.step.interval_s.powi(2)
     }
