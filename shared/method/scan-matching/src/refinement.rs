@@ -342,28 +342,30 @@ impl Refiner {
         best: &Candidate,
         uncertainty: &Uncertainty,
     ) -> Accepted {
-        let Some((registered, along)) = self.plausible_match(scan, best, uncertainty) else {
+        let Some(found) = self.plausible_match(scan, best, uncertainty) else {
             return self.predicted(scan, uncertainty);
         };
-        let is_certain = self.is_firm(scan, best, along);
+        let is_certain = self.is_firm(scan, best, found.undetermined);
         let is_firm = is_certain || self.state.doubtful >= MAX_DOUBTFUL;
         let (outcome, factor) = match is_firm {
             true => (Outcome::Refined, 1.0),
             false => (Outcome::Weak, uncertainty::WEAK_FACTOR),
         };
         let registered = UncertainMotion {
-            covariance: registered.covariance * factor,
-            ..registered
+            covariance: found.registered.covariance * factor,
+            ..found.registered
         };
-        match along {
-            Some(_) => self.slide(scan, &registered),
-            None if self.weigh_distance(scan, &registered, is_certain) => self.state.sliding = 0,
-            None => return self.predicted(scan, uncertainty),
+        if found.slides {
+            self.slide(scan, &registered);
+        } else if self.weigh_distance(scan, &registered, is_certain) {
+            (self.state.along_walls, self.state.sliding) = (0, 0);
+        } else {
+            return self.predicted(scan, uncertainty);
         }
         Accepted {
             outcome,
             pose: self.with_gyro_heading(scan, registered),
-            slides: along.is_some(),
+            slides: found.slides,
         }
     }
 

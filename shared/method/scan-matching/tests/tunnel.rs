@@ -148,6 +148,18 @@ fn wheels_that_fall_silent_inside_leave_the_speed_that_they_measured() {
     assert_eq!(refiner.state().sliding, 12);
 }
 
+#[test]
+fn one_scan_without_wheels_inside_does_not_ask_the_search() {
+    let (drive, scans) = into_a_tunnel();
+    let mut refiner = refiner().with_wheels(&WheelsConfig::default());
+    let measured = |k: usize| (k % 5 > 0).then_some(SCALE);
+    let refined = refine_with(&mut refiner, (&drive, &scans), measured);
+    assert!(refined[INSIDE..].iter().all(slid));
+    let (off, sigma_m) = inside(&drive, &refined);
+    println!("{off}, sigma {sigma_m:.2} m");
+    assert!(off.translation.x.abs() < 1.4, "{off}");
+}
+
 /// The map does not tell posts beside such walls from speckle, but the search finds them.
 #[test]
 fn as_long_as_the_search_sees_the_way_it_is_seen() {

@@ -17,21 +17,34 @@ use super::{
     uncertainty::{self, Uncertainty},
 };
 
+/// A plausible match of a scan.
+pub(super) struct Match {
+    /// Its pose, with the covariance of the motion to it.
+    pub registered: UncertainMotion,
+    /// The direction along the axes of the map in which nothing determines the place.
+    pub undetermined: Option<UnitVector2<f64>>,
+    /// The place in that direction is the predicted one.
+    pub slides: bool,
+}
+
 impl Refiner {
     /// Returns the pose of the best match with the covariance of its motion; `None` where it is not
-    /// plausible. Beside it the direction in which nothing determines the place, if there is one:
-    /// there the predicted place is taken, which has to be plausible instead. The mean of
-    /// prediction and search counts as a match.
+    /// plausible. In a direction in which nothing determines the place the predicted one is taken,
+    /// which has to be plausible instead, or the mean of prediction and search.
     pub(super) fn plausible_match(
         &mut self,
         scan: &Scan<'_>,
         best: &Candidate,
         uncertainty: &Uncertainty,
-    ) -> Option<(UncertainMotion, Option<UnitVector2<f64>>)> {
+    ) -> Option<Match> {
         let registered = self.registered(&best.alignment)?;
         let along = self.undetermined(scan, &best.alignment, &registered);
         let Some(along) = along.filter(|_| best.fits) else {
-            return best.is_plausible.then_some((registered, None));
+            return best.is_plausible.then_some(Match {
+                registered,
+                undetermined: None,
+                slides: false,
+            });
         };
         let is_searched = self.asks_search(scan) && self.is_near(&scan.searched, scan, along);
         let [predicted, _] = self.state.predict(&scan.step);
@@ -49,12 +62,13 @@ impl Refiner {
             return None;
         }
         let registered = self.registered(&alignment)?;
-        Some(match is_searched {
-            true => (
-                self.placed(registered, along, self.step_m(scan).powi(2)),
-                None,
-            ),
-            false => (self.slid(scan, registered, along, uncertainty), Some(along)),
+        Some(Match {
+            registered: match is_searched {
+                true => self.placed(registered, along, self.step_m(scan).powi(2)),
+                false => self.slid(scan, registered, along, uncertainty),
+            },
+            undetermined: Some(along),
+            slides: !is_searched,
         })
     }
 
@@ -77,9 +91,10 @@ impl Refiner {
         (is_undetermined && !is_seen()).then_some(weakest.along)
     }
 
-    /// Returns whether the way was not guessed before, and neither wheels nor Doppler say it.
+    /// Returns whether the search says how far: the scan before was not moved along walls, and
+    /// neither wheels nor Doppler measure the way.
     fn asks_search(&self, scan: &Scan<'_>) -> bool {
-        self.state.sliding == 0 && scan.step.distance.is_none()
+        self.state.along_walls == 0 && scan.step.distance.is_none()
     }
 
     /// Returns whether a pose is near the predicted one in a direction. In a tunnel that of the
@@ -91,9 +106,10 @@ impl Refiner {
         along.dot(&apart).abs() < self.step_m(scan)
     }
 
-    /// Returns how much farther a vehicle drives in an interval if it accelerates, m.
+    /// Returns how much farther than predicted a vehicle drives if it accelerates, m.
     fn step_m(&self, scan: &Scan<'_>) -> f64 {
-        self.config.acceleration_mps2 * scan.step.interval_s.powi(2)
+        let age_s = self.state.anchors[0].map_or(0.0, |anchor| anchor.age_s);
+        self.config.acceleration_mps2 * (age_s + scan.step.interval_s).powi(2)
     }
 
     /// Returns a registered pose with the covariance that the prediction has in a direction in
@@ -135,6 +151,7 @@ impl Refiner {
 
     /// Takes a scan whose place along the walls is the predicted one.
     pub(super) fn slide(&mut self, scan: &Scan<'_>, registered: &UncertainMotion) {
+        self.state.along_walls = self.state.along_walls.saturating_add(1);
         self.state.sliding = match scan.step.distance {
             Some(_) => 0,
             None => self.state.sliding.saturating_add(1),

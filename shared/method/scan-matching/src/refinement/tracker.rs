@@ -30,8 +30,9 @@ pub struct TrackerState {
     pub doubtful: u32,
     /// Number of scans in a row that were predicted.
     pub unmatched: u32,
-    /// Number of scans in a row that were moved along walls without structure at constant velocity:
-    /// nothing says how far.
+    /// Number of scans in a row whose place along walls without structure was the predicted one.
+    pub along_walls: u32,
+    /// Number of the last of these at constant velocity: nothing says how far.
     pub sliding: u32,
     /// The place where the vehicle stands, for the reported motions.
     pub standstill: Standstill,
@@ -75,6 +76,7 @@ impl Default for TrackerState {
             mean_weight: 0.0,
             doubtful: 0,
             unmatched: 0,
+            along_walls: 0,
             sliding: 0,
             standstill: Standstill::default(),
             heading: None,

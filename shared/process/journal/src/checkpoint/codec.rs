@@ -23,7 +23,7 @@ const ANCHOR_WORDS: usize = 9;
 /// Where the means and counts of a tracker state begin, its standstill, its heading, its wheels and
 /// its velocity by Doppler.
 const REST: usize = 4 + 2 * ANCHOR_WORDS;
-const STANDSTILL: usize = REST + 5;
+const STANDSTILL: usize = REST + 6;
 const HEADING: usize = STANDSTILL + STANDSTILL_WORDS;
 const WHEELS: usize = HEADING + HEADING_WORDS;
 const DOPPLER: usize = WHEELS + WHEEL_WORDS;
@@ -109,6 +109,7 @@ fn tracker_words(state: &TrackerState) -> [u64; TRACKER_WORDS] {
         state.mean_weight.to_bits(),
         state.doubtful.into(),
         state.unmatched.into(),
+        state.along_walls.into(),
         state.sliding.into(),
     ];
     words[REST..STANDSTILL].copy_from_slice(&rest);
@@ -233,7 +234,8 @@ fn tracker_from(words: &[u64; TRACKER_WORDS]) -> TrackerState {
         mean_weight: f64::from_bits(rest[1]),
         doubtful: rest[2] as u32,
         unmatched: rest[3] as u32,
-        sliding: rest[4] as u32,
+        along_walls: rest[4] as u32,
+        sliding: rest[5] as u32,
         standstill: standstill_from(&words[STANDSTILL..]),
         heading: heading_from(&words[HEADING..]),
         wheels: wheels_from(&words[WHEELS..]),
