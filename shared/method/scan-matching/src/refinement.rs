@@ -51,7 +51,7 @@ pub use heading::{GyroBias, Heading, Verdict};
 pub use initial_guess::InitialGuess;
 pub use keyframe_aligner::KeyframeAligner;
 pub use local_map::Keyframe;
-use nalgebra::UnitVector2;
+use nalgebra::{UnitVector2, Vector2};
 pub use standstill::Standstill;
 pub use submap::Submap;
 pub use tracker::{Anchor, TrackerState};
@@ -107,8 +107,9 @@ pub struct Refined {
 struct Accepted {
     outcome: Outcome,
     pose: UncertainMotion,
-    /// The radar does not see how far the vehicle has driven.
-    slides: bool,
+    guess: InitialGuess,
+    /// From its place to where the vehicle goes on in the map, m.
+    ahead_m: Vector2<f64>,
 }
 
 /// Refines motions scan by scan against a map of the last keyframes.
@@ -233,16 +234,16 @@ impl Refiner {
             },
         };
         let predictions = self.ensure_map(&scan, earlier);
-        let best = self.best_match(&mut scan);
+        let mut best = self.best_match(&mut scan);
         let uncertainty =
             Uncertainty::before(&scan, &self.map, &self.state, predictions, &self.config);
-        let accepted = self.accept_or_predict(&scan, &best, &uncertainty);
+        let accepted = self.accept_or_predict(&scan, &mut best, &uncertainty);
         let outcome = accepted.outcome;
         let gyro = self.turn.and(self.state.heading);
         let wheels = self.distance.and(self.state.wheels);
         let doppler = self.way.and(self.state.doppler);
         let report = self.hold_standstill(&scan, &accepted);
-        self.update(&scan, &best, outcome, &accepted.pose.motion);
+        self.update(&scan, &best, &accepted);
         Refined {
             motion: OdometryMotion {
                 motion: report.motion.motion,
@@ -252,11 +253,7 @@ impl Refiner {
             },
             overlap: best.overlap,
             support: best.support,
-            guess: match outcome {
-                Outcome::Predicted => InitialGuess::Prediction,
-                Outcome::Refined | Outcome::Weak if accepted.slides => InitialGuess::AlongWalls,
-                Outcome::Refined | Outcome::Weak => best.guess,
-            },
+            guess: accepted.guess,
             outcome,
             stationary: report.stationary,
             gyro: gyro.map(|it| it.bias()),
@@ -339,7 +336,7 @@ impl Refiner {
     fn accept_or_predict(
         &mut self,
         scan: &Scan<'_>,
-        best: &Candidate,
+        best: &mut Candidate,
         uncertainty: &Uncertainty,
     ) -> Accepted {
         let Some(found) = self.plausible_match(scan, best, uncertainty) else {
@@ -355,7 +352,7 @@ impl Refiner {
             covariance: found.registered.covariance * factor,
             ..found.registered
         };
-        if found.slides {
+        if best.guess == InitialGuess::AlongWalls {
             self.slide(scan, &registered);
         } else if self.weigh_distance(scan, &registered, is_certain) {
             (self.state.along_walls, self.state.sliding) = (0, 0);
@@ -365,7 +362,8 @@ impl Refiner {
         Accepted {
             outcome,
             pose: self.with_gyro_heading(scan, registered),
-            slides: found.slides,
+            guess: best.guess,
+            ahead_m: found.ahead_m,
         }
     }
 
@@ -396,7 +394,8 @@ impl Refiner {
         Accepted {
             outcome: Outcome::Predicted,
             pose: UncertainMotion { motion, covariance },
-            slides: false,
+            guess: InitialGuess::Prediction,
+            ahead_m: Vector2::zeros(),
         }
     }
 
@@ -442,9 +441,9 @@ impl Refiner {
         let estimate = Estimate {
             pose: accepted.pose,
             previous: self.state.pose,
-            outcome: match accepted.slides {
-                true => Outcome::Predicted,
-                false => accepted.outcome,
+            outcome: match accepted.guess {
+                InitialGuess::AlongWalls => Outcome::Predicted,
+                _ => accepted.outcome,
             },
             rolls: scan.step.distance.is_some_and(|it| it.is_certain()),
             interval_s: scan.step.interval_s,
@@ -456,16 +455,19 @@ impl Refiner {
     }
 
     /// Updates the tracker state and the map with the accepted or predicted pose.
-    fn update(&mut self, scan: &Scan<'_>, best: &Candidate, outcome: Outcome, pose: &Pose) {
+    fn update(&mut self, scan: &Scan<'_>, best: &Candidate, accepted: &Accepted) {
+        let (pose, outcome) = (&accepted.pose.motion, accepted.outcome);
         let (config, fit) = (&self.config, [best.overlap, best.weight]);
         let twist = self.state.twist_to(pose, &scan.step);
         self.state.update(*pose, outcome, fit, &scan.step, config);
+        self.state.shift(accepted.ahead_m);
+        let pose = self.state.pose;
         if self.state.unmatched >= config.max_unmatched {
             // A new map starts with this scan at the next call, and so on until two scans match.
             self.map.clear();
             self.state.leave_map();
-        } else if outcome == Outcome::Refined && self.map.needs_keyframe(pose, config) {
-            self.insert_keyframe(scan.id, scan.points, pose, &twist);
+        } else if outcome == Outcome::Refined && self.map.needs_keyframe(&pose, config) {
+            self.insert_keyframe(scan.id, scan.points, &pose, &twist);
             if let Some(heading) = &mut self.state.heading {
                 heading.follow(self.map.len());
             }

@@ -128,7 +128,7 @@ fn radar_alone_says_that_it_does_not_know_how_far() {
     assert!(off.translation.x > 10.0, "{off}");
     assert!(off.translation.x < 3.0 * sigma_m, "{off}, {sigma_m} m");
     assert!(
-        off.translation.y.abs() < 0.5 && off.rotation.angle().abs() < 5e-3,
+        off.translation.y.abs() < 1.0 && off.rotation.angle().abs() < 5e-3,
         "{off}"
     );
 }
@@ -152,11 +152,16 @@ fn wheels_that_fall_silent_inside_leave_the_speed_that_they_measured() {
 fn one_scan_without_wheels_inside_does_not_ask_the_search() {
     let (drive, scans) = into_a_tunnel();
     let mut refiner = refiner().with_wheels(&WheelsConfig::default());
-    let measured = |k: usize| (k % 5 > 0).then_some(SCALE);
-    let refined = refine_with(&mut refiner, (&drive, &scans), measured);
-    assert!(refined[INSIDE..].iter().all(slid));
+    let measured = |k: usize| (!k.is_multiple_of(5)).then_some(SCALE);
+    // It is wrong, but not by so much as to contradict the wheels.
+    let search = |k: usize| match k < INSIDE {
+        true => searched(&drive, k - 1),
+        false => searched(&drive, k - 1) * pose(0.3, 0.0, 0.0),
+    };
+    let refined = refine_searched(&mut refiner, (&drive, &scans), measured, search);
     let (off, sigma_m) = inside(&drive, &refined);
     println!("{off}, sigma {sigma_m:.2} m");
+    assert!(refined[INSIDE..].iter().all(slid));
     assert!(off.translation.x.abs() < 1.4, "{off}");
 }
 
@@ -166,12 +171,48 @@ fn as_long_as_the_search_sees_the_way_it_is_seen() {
     let posts = posts([[0.0, 400.0], [5.0, 30.0]], 15.0, 9);
     let (drive, scans) = between_walls_and(posts);
     let search = |k: usize| searched(&drive, k - 1);
+    for wheels in [None, Some(SCALE)] {
+        let mut refiner = refiner().with_wheels(&WheelsConfig::default());
+        let refined = refine_searched(&mut refiner, (&drive, &scans), |_| wheels, search);
+        let (off, sigma_m) = inside(&drive, &refined);
+        println!("{wheels:?}: {off}, sigma {sigma_m:.2} m");
+        assert!(!refined.iter().any(slid));
+        assert!(
+            off.translation.vector.norm() < 1.0 && sigma_m < 2.0,
+            "{off}, {sigma_m} m"
+        );
+    }
+}
+
+/// The vehicle slows down in the tunnel, so that the way through it is guessed too long.
+#[test]
+fn behind_a_tunnel_the_way_is_seen_again() {
+    let drive = Drive {
+        acceleration_mps2: -0.12,
+        ..Drive::steady(10.0, 0.0, 160)
+    };
+    let mut scene = town([[-110.0, -10.0], [-60.0, 60.0]], 1);
+    scene.extend([3.0, -6.5].map(|y| wall([0.0, y], [250.0, y], 1600)));
+    scene.extend(town([[250.0, 400.0], [-60.0, 60.0]], 2));
+    let scans = scans(&scene, &drive, &NOISY);
+    let mut numbers = Numbers(7);
+    let is_inside = |k: usize| (85.0..155.0).contains(&drive.pose(k).translation.x);
+    let search = |k: usize| match is_inside(k) {
+        true => pose(2.0 + numbers.within(6.0), 0.0, 0.0),
+        false => searched(&drive, k - 1),
+    };
     let refined = refine_searched(&mut refiner(), (&drive, &scans), |_| None, search);
-    let (off, sigma_m) = inside(&drive, &refined);
-    println!("{off}, sigma {sigma_m:.2} m");
-    assert!(!refined.iter().any(slid));
-    assert!(
-        off.translation.vector.norm() < 1.0 && sigma_m < 2.0,
-        "{off}, {sigma_m} m"
-    );
+    let last = refined.iter().rposition(slid).unwrap();
+    let from = drive.pose(last + 1);
+    println!("until {:.1} m", from.translation.x);
+    assert!((155.0..260.0).contains(&from.translation.x), "{from}");
+    let mut composed = ComposedMotion::of(&refined[last + 1].motion);
+    for refined in &refined[last + 2..] {
+        composed = composed.then(&refined.motion);
+    }
+    let off = from
+        .inv_mul(&drive.pose(refined.len()))
+        .inv_mul(&composed.motion().motion);
+    println!("{off}");
+    assert!(off.translation.vector.norm() < 0.5, "{off}");
 }

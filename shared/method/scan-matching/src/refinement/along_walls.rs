@@ -4,13 +4,17 @@
 //! The place along them is the predicted one, by wheels, by Doppler or at constant velocity, with
 //! the covariance of that; across them and of the heading the radar tells as elsewhere. Until the
 //! search, which compares two scans and no map, contradicts the prediction, the place is that of
-//! the match, or the mean of prediction and search.
+//! the match, or at constant velocity the mean of prediction and search.
+//!
+//! At constant velocity the vehicle may drive faster or slower. Keyframes at such places would
+//! share no structure, and so not tell where the walls end. So in the map the vehicle goes on to
+//! where the search finds it: while it finds anything, behind the walls, that is right.
 
 use gyre_geometry::{Pose, UncertainMotion};
-use nalgebra::UnitVector2;
+use nalgebra::{UnitVector2, Vector2};
 
 use super::{
-    Refiner,
+    InitialGuess, Refiner,
     alignment::Alignment,
     registration::{Candidate, Scan},
     structure::WeakestDirection,
@@ -23,18 +27,18 @@ pub(super) struct Match {
     pub registered: UncertainMotion,
     /// The direction along the axes of the map in which nothing determines the place.
     pub undetermined: Option<UnitVector2<f64>>,
-    /// The place in that direction is the predicted one.
-    pub slides: bool,
+    /// From its place to where the vehicle goes on in the map, m.
+    pub ahead_m: Vector2<f64>,
 }
 
 impl Refiner {
     /// Returns the pose of the best match with the covariance of its motion; `None` where it is not
     /// plausible. In a direction in which nothing determines the place the predicted one is taken,
-    /// which has to be plausible instead, or the mean of prediction and search.
+    /// or the mean of prediction and search: that becomes the best match, and has to be reachable.
     pub(super) fn plausible_match(
         &mut self,
         scan: &Scan<'_>,
-        best: &Candidate,
+        best: &mut Candidate,
         uncertainty: &Uncertainty,
     ) -> Option<Match> {
         let registered = self.registered(&best.alignment)?;
@@ -43,32 +47,48 @@ impl Refiner {
             return best.is_plausible.then_some(Match {
                 registered,
                 undetermined: None,
-                slides: false,
+                ahead_m: Vector2::zeros(),
             });
         };
-        let is_searched = self.asks_search(scan) && self.is_near(&scan.searched, scan, along);
+        let is_guessed = scan.step.distance.is_none();
+        let is_searched =
+            is_guessed && self.asks_search() && self.is_near(&scan.searched, scan, along);
         let [predicted, _] = self.state.predict(&scan.step);
         let mut place = predicted.translation.vector;
         if is_searched {
             // The search is noisier than the prediction, which does not know of accelerations.
             place = (place + scan.searched.translation.vector) * 0.5;
         }
-        let apart = place - best.alignment.pose.translation.vector;
+        let to = |place: Vector2<f64>, from: &Pose| {
+            along.into_inner() * along.dot(&(place - from.translation.vector))
+        };
         let mut initial = best.alignment.pose;
-        initial.translation.vector += along.into_inner() * along.dot(&apart);
+        initial.translation.vector += to(place, &initial);
+        let guess = match is_searched {
+            true => InitialGuess::Search,
+            false => InitialGuess::AlongWalls,
+        };
         let mut registration = self.registration(scan);
-        let alignment = registration.align_across(&initial, along);
-        if !registration.is_reachable(&alignment.pose, best.support) {
+        let across = registration.align_across(guess, &initial, along);
+        if !registration.is_reachable(&across.alignment.pose, across.support) {
             return None;
         }
-        let registered = self.registered(&alignment)?;
-        Some(Match {
-            registered: match is_searched {
-                true => self.placed(registered, along, self.step_m(scan).powi(2)),
-                false => self.slid(scan, registered, along, uncertainty),
+        let registered = self.registered(&across.alignment)?;
+        *best = across;
+        Some(match is_searched {
+            true => Match {
+                registered: self.placed(registered, along, self.step_m(scan).powi(2)),
+                undetermined: Some(along),
+                ahead_m: Vector2::zeros(),
             },
-            undetermined: Some(along),
-            slides: !is_searched,
+            false => Match {
+                registered: self.slid(scan, registered, along, uncertainty),
+                undetermined: Some(along),
+                ahead_m: match is_guessed {
+                    true => to(scan.searched.translation.vector, &registered.motion),
+                    false => Vector2::zeros(),
+                },
+            },
         })
     }
 
@@ -86,15 +106,13 @@ impl Refiner {
         let is_undetermined = weakest.is_undetermined()
             || (weakest.is_doubtful() && (self.state.sliding > 0 || contradicts()));
         let is_near = |pose: &Pose| self.is_near(pose, scan, weakest.along);
-        let is_seen =
-            || self.asks_search(scan) && is_near(&scan.searched) && is_near(&alignment.pose);
+        let is_seen = || self.asks_search() && is_near(&scan.searched) && is_near(&alignment.pose);
         (is_undetermined && !is_seen()).then_some(weakest.along)
     }
 
-    /// Returns whether the search says how far: the scan before was not moved along walls, and
-    /// neither wheels nor Doppler measure the way.
-    fn asks_search(&self, scan: &Scan<'_>) -> bool {
-        self.state.along_walls == 0 && scan.step.distance.is_none()
+    /// Returns whether the search is asked: the scan before was not moved along walls.
+    fn asks_search(&self) -> bool {
+        self.state.along_walls == 0
     }
 
     /// Returns whether a pose is near the predicted one in a direction. In a tunnel that of the

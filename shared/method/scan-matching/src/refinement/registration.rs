@@ -153,7 +153,12 @@ impl Registration<'_> {
     }
 
     /// Aligns the scan from a pose whose place in a direction along the map's axes stays.
-    pub fn align_across(&mut self, initial: &Pose, locked: UnitVector2<f64>) -> Alignment {
+    pub fn align_across(
+        &mut self,
+        guess: InitialGuess,
+        initial: &Pose,
+        locked: UnitVector2<f64>,
+    ) -> Candidate {
         self.deskew(initial);
         self.points.thin(COARSE_STRIDE);
         let (coarse, points) = (self.map.coarse(), &*self.points);
@@ -165,7 +170,8 @@ impl Registration<'_> {
         for _ in 1..FINE_ROUNDS {
             pose = fine(&pose).pose;
         }
-        fine(&pose)
+        let alignment = fine(&pose);
+        self.assess(guess, alignment)
     }
 
     /// Deskews the scan with the motion that leads to `pose`.
