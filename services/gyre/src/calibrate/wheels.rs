@@ -37,12 +37,12 @@ impl Wheels {
             is_named: named.is_some(),
         };
         if let Some(file) = named {
-            return Ok(Some(of(WheelLog::read(file)?)));
+            return Ok(Some(of(WheelLog::read(file, configured.m_per_tick)?)));
         }
         let Ok(file) = WheelLog::find(&configuration.source.data) else {
             return Ok(None);
         };
-        match WheelLog::read(&file) {
+        match WheelLog::read(&file, configured.m_per_tick) {
             Ok(log) => Ok(Some(of(log))),
             Err(error) => {
                 print::note(format_args!("the wheels are left alone: {error}"));

@@ -141,8 +141,8 @@ pub(crate) struct Raw {
     /// Rows that are none of the table, and the line of the first.
     unreadable: usize,
     first_unreadable: usize,
-    /// The unit of the rates is named nowhere.
-    unit_is_assumed: bool,
+    /// The unit of the values is named nowhere.
+    pub(crate) unit_is_assumed: bool,
 }
 
 impl Raw {

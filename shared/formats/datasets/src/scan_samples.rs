@@ -61,11 +61,14 @@ impl ScanSamples {
                 let own = dataset.logged(SampleKind::Wheels, wheels.topic.as_deref())?;
                 Some(match own {
                     Some(samples) => WheelLog::of(samples, folder)?,
-                    None => WheelLog::read(&WheelLog::find(folder)?)?,
+                    None => WheelLog::read(&WheelLog::find(folder)?, wheels.m_per_tick)?,
                 })
             }
             WheelsKind::Udp | WheelsKind::Ros2 => return Err(LogError::Live(SampleKind::Wheels)),
-            WheelsKind::Log => Some(WheelLog::read(&wheels.file.clone().unwrap_or_default())?),
+            WheelsKind::Log => {
+                let file = wheels.file.clone().unwrap_or_default();
+                Some(WheelLog::read(&file, wheels.m_per_tick)?)
+            }
         };
         let of_gyro = turns.map(|log| Self::of_gyro(&log, gyro, dataset));
         let of_wheels = speeds.map(|log| Self::of_wheels(&log, wheels, dataset));

@@ -1,9 +1,15 @@
 //! The log of the wheels' speed as a file: a table as CSV.
+//!
+//! `counts`: that of an encoder or an odometer, of which speeds are made.
+
+mod counts;
 
 use std::path::{Path, PathBuf};
 
 use csv::StringRecord;
 use gyre_samples::{Sample, SampleKind, WheelsConfig};
+
+use counts::CountColumns;
 
 use crate::{
     LogError, LogFaults, SampleTrack,
@@ -18,7 +24,13 @@ use crate::{
 use gyre_storage::quoted;
 
 /// Logs relative to the root of a dataset, in order of precedence.
-const PLACES: [&str; 4] = ["wheels.csv", "wheel_speed.csv", "speed.csv", "odometer.csv"];
+const PLACES: [&str; 5] = [
+    "wheels.csv",
+    "wheel_speed.csv",
+    "speed.csv",
+    "odometer.csv",
+    "encoder.csv",
+];
 
 /// The speeds of a vehicle on wheels.
 const SPEEDS: Plausible = Plausible {
@@ -40,13 +52,21 @@ pub struct WheelLog {
 }
 
 impl WheelLog {
-    /// Reads a log. Its first row names the columns, as in `stamp_ns,speed_m_s`.
+    /// Reads a log. Its first row names the columns, as in `stamp_ns,speed_m_s`, or those of
+    /// ticks, `stamp_ns,ticks`, of which each is so many metres long.
     ///
     /// # Errors
-    /// A file that cannot be read or has no speed, and one whose stamps or speeds cannot be those
-    /// of wheels.
-    pub fn read(path: &Path) -> Result<Self, LogError> {
-        Self::examined(table::read::<SpeedColumns>(path)?, path)
+    /// A file that cannot be read or has no speed, one whose stamps or speeds cannot be those of
+    /// wheels, and ticks whose length is not given.
+    pub fn read(path: &Path, m_per_tick: Option<f64>) -> Result<Self, LogError> {
+        let no_speed = match table::read::<SpeedColumns>(path) {
+            Ok(raw) => return Self::examined(raw, path),
+            Err(error) => error,
+        };
+        match table::read::<CountColumns>(path) {
+            Ok(raw) => Ok(Self::with(counts::speeds(raw, path, m_per_tick)?, path)),
+            Err(_) => Err(no_speed),
+        }
     }
 
     /// Returns the log that lies beside the scans of a dataset folder, which may also be that of
@@ -77,12 +97,15 @@ impl WheelLog {
     }
 
     fn examined(raw: Raw, path: &Path) -> Result<Self, LogError> {
-        let (samples, faults) = examine(raw, path, &SPEEDS)?;
-        Ok(Self {
+        Ok(Self::with(examine(raw, path, &SPEEDS)?, path))
+    }
+
+    fn with((samples, faults): (Vec<Sample>, LogFaults), path: &Path) -> Self {
+        Self {
             samples,
             faults,
             path: path.to_owned(),
-        })
+        }
     }
 }
 
@@ -109,7 +132,7 @@ const UNITS: [(&str, f64); 8] = [
 ];
 
 /// The remedy, for messages.
-const REMEDY: &str = "the first row must name the columns, as in `stamp_ns,speed_m_s` (also stamp_us, stamp_s; speed_km_h)";
+const REMEDY: &str = "the first row must name the columns, as in `stamp_ns,speed_m_s` (also stamp_us, stamp_s; speed_km_h; ticks, distance_m)";
 
 /// Where a table has what.
 struct SpeedColumns {

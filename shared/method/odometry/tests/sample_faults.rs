@@ -103,7 +103,7 @@ impl Drive {
         let dataset = self.dataset.as_ref();
         let turns = GyroLog::read(&gyro)
             .and_then(|log| ScanSamples::of_gyro(&log, &self.config.gyro, dataset));
-        let speeds = WheelLog::read(&wheels)
+        let speeds = WheelLog::read(&wheels, None)
             .and_then(|log| ScanSamples::of_wheels(&log, &self.config.wheels, dataset));
         let text = |error: gyre_datasets::LogError| error.to_string();
         Ok(turns.map_err(text)?.and(speeds.map_err(text)?))

@@ -61,9 +61,11 @@ impl Wheels {
         // What a speed is rounded by stays while the speed does.
         let by_speed = self.config.noise_mps * integral.interval_s;
         let by_time = self.config.time_sigma_s * integral.change;
+        // Both ends are anywhere within a tick.
+        let by_ticks_m2 = self.config.m_per_tick.unwrap_or_default().powi(2) / 6.0;
         Some(WheelDistance {
             distance_m: integral.sum,
-            variance_m2: of_rolling + by_speed * by_speed + by_time * by_time,
+            variance_m2: of_rolling + by_speed * by_speed + by_time * by_time + by_ticks_m2,
             side_variance_m2: of_rolling,
             interval_s: integral.interval_s,
         })

@@ -33,6 +33,9 @@ pub struct WheelsConfig {
     pub late_s: f64,
     /// Distance by which the radar is ahead of the axle that does not steer, m.
     pub radar_ahead_m: f64,
+    /// Distance of one tick of a log that counts them, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub m_per_tick: Option<f64>,
     /// True speed over the measured one.
     pub scale: f64,
     /// Standard deviation of that scale: tyres wear and warm, and a tachometer may show too much.
@@ -78,6 +81,7 @@ impl Default for WheelsConfig {
             max_wait_ms: 20.0,
             late_s: 0.0,
             radar_ahead_m: 0.0,
+            m_per_tick: None,
             scale: 1.0,
             scale_sigma: 0.02,
             scale_walk_per_sqrt_s: 1e-5,
@@ -118,6 +122,10 @@ impl WheelsConfig {
         bounds.max_wait_ms(self.max_wait_ms)?;
         let expected = "metres, -10 to 10";
         bounds.within("radar_ahead_m", self.radar_ahead_m, [-10.0, 10.0], expected)?;
+        if let Some(m_per_tick) = self.m_per_tick {
+            let expected = "metres, 0.000001 to 10";
+            bounds.within("m_per_tick", m_per_tick, [1e-6, 10.0], expected)?;
+        }
         bounds.scale([self.scale, self.scale_sigma])?;
         bounds.noise("scale_walk_per_sqrt_s", self.scale_walk_per_sqrt_s)?;
         bounds.noise("noise_m_per_sqrt_m", self.noise_m_per_sqrt_m)?;

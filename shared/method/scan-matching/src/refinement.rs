@@ -108,8 +108,10 @@ struct Accepted {
     outcome: Outcome,
     pose: UncertainMotion,
     guess: InitialGuess,
-    /// From its place to where the vehicle goes on in the map, m.
+    /// Way by which the search leads beyond a place that is a guess, m.
     ahead_m: Vector2<f64>,
+    /// Walls without structure have ended: the map is left.
+    leaves_map: bool,
 }
 
 /// Refines motions scan by scan against a map of the last keyframes.
@@ -343,7 +345,7 @@ impl Refiner {
             return self.predicted(scan, uncertainty);
         };
         let is_certain = self.is_firm(scan, best, found.undetermined);
-        let is_firm = is_certain || self.state.doubtful >= MAX_DOUBTFUL;
+        let is_firm = is_certain || found.leaves_map || self.state.doubtful >= MAX_DOUBTFUL;
         let (outcome, factor) = match is_firm {
             true => (Outcome::Refined, 1.0),
             false => (Outcome::Weak, uncertainty::WEAK_FACTOR),
@@ -364,6 +366,7 @@ impl Refiner {
             pose: self.with_gyro_heading(scan, registered),
             guess: best.guess,
             ahead_m: found.ahead_m,
+            leaves_map: found.leaves_map,
         }
     }
 
@@ -396,6 +399,7 @@ impl Refiner {
             pose: UncertainMotion { motion, covariance },
             guess: InitialGuess::Prediction,
             ahead_m: Vector2::zeros(),
+            leaves_map: false,
         }
     }
 
@@ -460,14 +464,14 @@ impl Refiner {
         let (config, fit) = (&self.config, [best.overlap, best.weight]);
         let twist = self.state.twist_to(pose, &scan.step);
         self.state.update(*pose, outcome, fit, &scan.step, config);
-        self.state.shift(accepted.ahead_m);
-        let pose = self.state.pose;
-        if self.state.unmatched >= config.max_unmatched {
+        self.state.ahead_m += accepted.ahead_m;
+        let ahead_m = self.state.ahead_m;
+        if accepted.leaves_map || self.state.unmatched >= config.max_unmatched {
             // A new map starts with this scan at the next call, and so on until two scans match.
             self.map.clear();
             self.state.leave_map();
-        } else if outcome == Outcome::Refined && self.map.needs_keyframe(&pose, config) {
-            self.insert_keyframe(scan.id, scan.points, &pose, &twist);
+        } else if outcome == Outcome::Refined && self.map.needs_keyframe(pose, ahead_m, config) {
+            self.insert_keyframe(scan.id, scan.points, pose, &twist);
             if let Some(heading) = &mut self.state.heading {
                 heading.follow(self.map.len());
             }
@@ -476,6 +480,6 @@ impl Refiner {
 
     fn insert_keyframe(&mut self, id: u64, points: &[SparsePoint], pose: &Pose, twist: &Twist) {
         self.points.deskew(points, twist);
-        self.map.insert(id, &self.points, pose);
+        self.map.insert(id, &self.points, pose, self.state.ahead_m);
     }
 }

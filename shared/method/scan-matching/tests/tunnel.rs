@@ -128,7 +128,7 @@ fn radar_alone_says_that_it_does_not_know_how_far() {
     assert!(off.translation.x > 10.0, "{off}");
     assert!(off.translation.x < 3.0 * sigma_m, "{off}, {sigma_m} m");
     assert!(
-        off.translation.y.abs() < 1.0 && off.rotation.angle().abs() < 5e-3,
+        off.translation.y.abs() < 0.5 && off.rotation.angle().abs() < 5e-3,
         "{off}"
     );
 }

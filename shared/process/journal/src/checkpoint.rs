@@ -31,7 +31,7 @@ use codec::{
 };
 
 /// The start of the file, with the version of the slots.
-const MAGIC: [u8; 16] = *b"gyre map v8     ";
+const MAGIC: [u8; 16] = *b"gyre map v9     ";
 /// The largest window. The layout of the file is the same for all windows, so a run can be
 /// continued with another one.
 const MAX_WINDOW: usize = 66;

@@ -112,6 +112,8 @@ fn state_bits(refinement: &Refiner) -> Vec<u64> {
     }
     words.extend([tracker.mean_overlap, tracker.mean_weight].map(f64::to_bits));
     words.extend([tracker.doubtful, tracker.unmatched].map(u64::from));
+    words.extend([tracker.along_walls, tracker.sliding].map(u64::from));
+    words.extend([tracker.ahead_m.x, tracker.ahead_m.y].map(f64::to_bits));
     let standstill = &tracker.standstill;
     words.extend(pose(&standstill.reported));
     words.extend(pose(&standstill.anchor));
@@ -120,6 +122,7 @@ fn state_bits(refinement: &Refiner) -> Vec<u64> {
     for keyframe in refinement.keyframes() {
         words.push(keyframe.id);
         words.extend(pose(&keyframe.pose));
+        words.extend([keyframe.ahead_m.x, keyframe.ahead_m.y].map(f64::to_bits));
         for (corner, cells) in keyframe.images() {
             words.extend(corner.iter().map(|v| *v as u64));
             words.extend(cells.iter().map(|v| u64::from(*v)));

@@ -14,7 +14,7 @@ use gyre_samples::{Sample, SampleKind};
 /// Rates beyond this one are no vehicle's, rad/s.
 const ABSURD_RADPS: f64 = 10.0;
 /// Share of absurd rates above which the unit must be another one.
-const ABSURD_SHARE: f64 = 0.01;
+pub(crate) const ABSURD_SHARE: f64 = 0.01;
 /// Longest time between two samples that is no gap, median periods, whatever stamps round to.
 const GAP_PERIODS: f64 = 3.0 + 1e-6;
 

@@ -28,7 +28,7 @@ pub struct WheelReport {
 /// Examines the log beside the scans; `None` if there is none.
 pub(super) fn examine(root: &Path, timing: Option<&TimingReport>) -> Option<WheelReport> {
     let file = WheelLog::find(root).ok()?;
-    let log = match WheelLog::read(&file) {
+    let log = match WheelLog::read(&file, None) {
         Ok(log) => log,
         Err(error) => {
             return Some(WheelReport {

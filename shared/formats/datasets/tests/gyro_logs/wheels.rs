@@ -10,7 +10,7 @@ const MS: i64 = 1_000_000;
 
 fn read(text: &str) -> Result<WheelLog, LogError> {
     let folder = TempDir::new().unwrap();
-    WheelLog::read(&written(&folder, "wheels.csv", text))
+    WheelLog::read(&written(&folder, "wheels.csv", text), None)
 }
 
 /// Rows of 20 Hz, each with a speed.
@@ -72,6 +72,87 @@ fn what_is_no_log_of_wheels_is_refused_with_the_remedy() {
     assert!(fast.contains("if they are in km/h"), "{fast}");
     let empty = read("stamp_ns,speed_m_s\n").unwrap_err().to_string();
     assert!(empty.contains("it has no samples"), "{empty}");
+}
+
+/// Counts of 100 Hz, of a vehicle that drives now faster, now slower.
+fn ticks(header: &str, m_per_tick: f64, row: impl Fn(usize, f64) -> String) -> String {
+    let place_m = |k: usize| {
+        let time_s = k as f64 * 0.01;
+        8.0 * time_s + 3.0 * time_s.sin()
+    };
+    let stamp = |k: usize| START_NS + 10 * MS * k as i64;
+    let rows = (0..1000).map(|k| {
+        let count = (place_m(k) / m_per_tick).floor();
+        format!("{},{}\n", stamp(k), row(k, count))
+    });
+    format!("{header}\n{}", rows.collect::<String>())
+}
+
+fn read_ticks(text: &str, m_per_tick: Option<f64>) -> Result<WheelLog, LogError> {
+    let folder = TempDir::new().unwrap();
+    WheelLog::read(&written(&folder, "encoder.csv", text), m_per_tick)
+}
+
+/// The distance between the first and the last sample, m.
+fn path_m(log: &WheelLog) -> f64 {
+    let of_pair = |pair: &[gyre_samples::Sample]| {
+        let seconds = (pair[1].stamp_ns - pair[0].stamp_ns) as f64 * 1e-9;
+        0.5 * (pair[0].values[0] + pair[1].values[0]) * seconds
+    };
+    log.samples.windows(2).map(of_pair).sum()
+}
+
+#[test]
+fn counts_become_speeds_whose_way_is_that_of_the_counts() {
+    for (header, m_per_tick, both) in [
+        ("stamp_ns,ticks", 0.05, false),
+        ("timestamp,left_count,right_count", 0.02, true),
+        ("stamp_ns,distance_m", 1.0, false),
+    ] {
+        let is_in_metres = m_per_tick == 1.0;
+        let row = |_: usize, count: f64| match (both, is_in_metres) {
+            (true, _) => format!("{},{}", count - 40.0, count + 40.0),
+            (_, true) => format!("{}", count + 0.5),
+            _ => format!("{count}"),
+        };
+        let text = ticks(header, m_per_tick, row);
+        let log = read_ticks(&text, (!is_in_metres).then_some(m_per_tick)).unwrap();
+        assert_eq!(log.faults, gyre_datasets::LogFaults::default(), "{header}");
+        let at = |sample: &gyre_samples::Sample| (sample.stamp_ns - START_NS) as f64 * 1e-9;
+        let [first, last] = [log.samples.first(), log.samples.last()].map(|it| at(it.unwrap()));
+        let driven = 8.0 * (last - first) + 3.0 * (last.sin() - first.sin());
+        let off_m = path_m(&log) - driven;
+        assert!(off_m.abs() < 2.0 * m_per_tick, "{header}: {off_m} m");
+        for sample in &log.samples {
+            let off_mps = sample.values[0] - (8.0 + 3.0 * at(sample).cos());
+            assert!(
+                off_mps.abs() < m_per_tick / 0.09 + 0.05,
+                "{header}: {off_mps} m/s"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_counter_that_starts_anew_costs_one_speed() {
+    let row = |k: usize, count: f64| format!("{}", count + if k < 500 { 65_000.0 } else { 0.0 });
+    let text = ticks("stamp_ns,ticks", 0.05, row);
+    let log = read_ticks(&text, Some(0.05)).unwrap();
+    assert_eq!(log.faults.absurd, 1);
+    assert!(log.samples.len() > 95, "{}", log.samples.len());
+    assert!(log.samples.iter().all(|sample| sample.values[0] < 12.0));
+}
+
+#[test]
+fn ticks_need_their_length() {
+    let text = ticks("stamp_ns,ticks", 0.05, |_, count| format!("{count}"));
+    let missing = read_ticks(&text, None).unwrap_err().to_string();
+    assert!(missing.contains("wheels.m_per_tick"), "{missing}");
+    let wrong = read_ticks(&text, Some(1.0)).unwrap_err().to_string();
+    assert!(
+        wrong.contains("is the distance of a tick in metres?"),
+        "{wrong}"
+    );
 }
 
 #[test]

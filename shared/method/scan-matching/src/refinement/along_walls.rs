@@ -6,9 +6,9 @@
 //! search, which compares two scans and no map, contradicts the prediction, the place is that of
 //! the match, or at constant velocity the mean of prediction and search.
 //!
-//! At constant velocity the vehicle may drive faster or slower. Keyframes at such places would
-//! share no structure, and so not tell where the walls end. So in the map the vehicle goes on to
-//! where the search finds it: while it finds anything, behind the walls, that is right.
+//! At constant velocity the way is a guess, and keyframes that lie so share no structure behind the
+//! walls either. So the search says how far the vehicle would have come instead: where keyframes
+//! that lie as it says share structure, the walls have ended, and a new map starts.
 
 use gyre_geometry::{Pose, UncertainMotion};
 use nalgebra::{UnitVector2, Vector2};
@@ -23,12 +23,14 @@ use super::{
 
 /// A plausible match of a scan.
 pub(super) struct Match {
-    /// Its pose, with the covariance of the motion to it.
+    /// Pose in the map, with the covariance of the motion to it.
     pub registered: UncertainMotion,
     /// The direction along the axes of the map in which nothing determines the place.
     pub undetermined: Option<UnitVector2<f64>>,
-    /// From its place to where the vehicle goes on in the map, m.
+    /// Way by which the search leads beyond a place that is a guess, m.
     pub ahead_m: Vector2<f64>,
+    /// Walls without structure have ended: the map is left.
+    pub leaves_map: bool,
 }
 
 impl Refiner {
@@ -48,26 +50,36 @@ impl Refiner {
                 registered,
                 undetermined: None,
                 ahead_m: Vector2::zeros(),
+                leaves_map: false,
             });
         };
+        self.match_across(scan, best, along, uncertainty)
+    }
+
+    /// Replaces a match by that whose place in a direction is the predicted one, or the mean of
+    /// prediction and search; `None` where it is out of reach.
+    fn match_across(
+        &mut self,
+        scan: &Scan<'_>,
+        best: &mut Candidate,
+        along: UnitVector2<f64>,
+        uncertainty: &Uncertainty,
+    ) -> Option<Match> {
         let is_guessed = scan.step.distance.is_none();
         let is_searched =
             is_guessed && self.asks_search() && self.is_near(&scan.searched, scan, along);
         let [predicted, _] = self.state.predict(&scan.step);
-        let mut place = predicted.translation.vector;
-        if is_searched {
+        let [predicted, searched] = [&predicted, &scan.searched].map(|it| it.translation.vector);
+        let (guess, place) = match is_searched {
             // The search is noisier than the prediction, which does not know of accelerations.
-            place = (place + scan.searched.translation.vector) * 0.5;
-        }
-        let to = |place: Vector2<f64>, from: &Pose| {
-            along.into_inner() * along.dot(&(place - from.translation.vector))
+            true => (InitialGuess::Search, (predicted + searched) * 0.5),
+            false => (InitialGuess::AlongWalls, predicted),
+        };
+        let ahead_to = |place: Vector2<f64>, pose: &Pose| {
+            along.into_inner() * along.dot(&(place - pose.translation.vector))
         };
         let mut initial = best.alignment.pose;
-        initial.translation.vector += to(place, &initial);
-        let guess = match is_searched {
-            true => InitialGuess::Search,
-            false => InitialGuess::AlongWalls,
-        };
+        initial.translation.vector += ahead_to(place, &initial);
         let mut registration = self.registration(scan);
         let across = registration.align_across(guess, &initial, along);
         if !registration.is_reachable(&across.alignment.pose, across.support) {
@@ -75,21 +87,37 @@ impl Refiner {
         }
         let registered = self.registered(&across.alignment)?;
         *best = across;
-        Some(match is_searched {
-            true => Match {
-                registered: self.placed(registered, along, self.step_m(scan).powi(2)),
-                undetermined: Some(along),
-                ahead_m: Vector2::zeros(),
-            },
-            false => Match {
-                registered: self.slid(scan, registered, along, uncertainty),
-                undetermined: Some(along),
-                ahead_m: match is_guessed {
-                    true => to(scan.searched.translation.vector, &registered.motion),
-                    false => Vector2::zeros(),
-                },
-            },
-        })
+        let mut found = Match {
+            registered,
+            undetermined: Some(along),
+            ahead_m: Vector2::zeros(),
+            leaves_map: false,
+        };
+        if is_guessed && !is_searched {
+            let mut by_search = registered;
+            found.ahead_m = ahead_to(searched, &registered.motion);
+            by_search.motion.translation.vector += found.ahead_m;
+            if self.sees_by_search(scan, &by_search.motion) {
+                best.guess = InitialGuess::Search;
+                (found.registered, found.leaves_map) = (by_search, true);
+            }
+        }
+        found.registered = match best.guess {
+            InitialGuess::AlongWalls => self.slid(scan, found.registered, along, uncertainty),
+            _ => self.placed(found.registered, along, self.step_m(scan).powi(2)),
+        };
+        Some(found)
+    }
+
+    /// Returns whether walls that were driven along by guesses have ended: keyframes that lie to
+    /// each other as the search says share structure that determines the place by the search.
+    fn sees_by_search(&mut self, scan: &Scan<'_>, place: &Pose) -> bool {
+        if self.state.sliding == 0 {
+            return false;
+        }
+        self.registration(scan).deskew(place);
+        WeakestDirection::by_search(&self.map, &self.points, place, self.state.ahead_m)
+            .is_some_and(|weakest| !weakest.is_doubtful())
     }
 
     /// Returns the direction along the axes of the map in which the place of a registered pose is

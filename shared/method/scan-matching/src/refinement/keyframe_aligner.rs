@@ -1,6 +1,7 @@
 //! Alignment of two keyframes of the same place, however far apart in time.
 
 use gyre_geometry::{Pose, UncertainMotion};
+use nalgebra::Vector2;
 
 use super::{
     DeskewedPoints, RefinementConfig, Submap, alignment::align, local_map::LocalMap,
@@ -76,7 +77,8 @@ impl KeyframeAligner {
         initial: &Pose,
     ) -> Option<UncertainMotion> {
         self.map.clear();
-        self.map.insert(0, earlier, &Pose::identity());
+        self.map
+            .insert(0, earlier, &Pose::identity(), Vector2::zeros());
         let points = &later.keyframe;
         self.thinned.clear();
         self.thinned.extend(points, &Pose::identity());

@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use gyre_geometry::Pose;
+use nalgebra::Vector2;
 use ndarray::{ArrayView2, ArrayViewMut2};
 
 use super::{
@@ -18,6 +19,8 @@ pub struct Keyframe {
     pub id: u64,
     /// Pose in the first scan's frame.
     pub pose: Pose,
+    /// [`super::TrackerState::ahead_m`] of its scan.
+    pub ahead_m: Vector2<f64>,
     fine: Image,
     coarse: Image,
 }
@@ -54,6 +57,7 @@ impl LocalMap {
         let keyframe = Keyframe {
             id: 0,
             pose: Pose::identity(),
+            ahead_m: Vector2::zeros(),
             fine: fine.new_image(),
             coarse: coarse.new_image(),
         };
@@ -89,7 +93,7 @@ impl LocalMap {
     }
 
     /// Adds a keyframe in place of the oldest one, if the map is full.
-    pub fn insert(&mut self, id: u64, points: &DeskewedPoints, pose: &Pose) {
+    pub fn insert(&mut self, id: u64, points: &DeskewedPoints, pose: &Pose, ahead_m: Vector2<f64>) {
         let oldest = self.spare.is_empty().then(|| self.used.pop_front());
         if let Some(oldest) = oldest.flatten() {
             self.fine.subtract(&oldest.fine);
@@ -99,7 +103,7 @@ impl LocalMap {
         let Some(mut keyframe) = self.spare.pop() else {
             return;
         };
-        (keyframe.id, keyframe.pose) = (id, *pose);
+        (keyframe.id, keyframe.pose, keyframe.ahead_m) = (id, *pose, ahead_m);
         self.fine.draw(points, pose, &mut keyframe.fine);
         self.coarse.draw(points, pose, &mut keyframe.coarse);
         let used = self.used.iter();
@@ -135,21 +139,30 @@ impl LocalMap {
         self.fine.view()
     }
 
-    /// The fine image of each keyframe.
-    pub fn fine_images(&self) -> impl Iterator<Item = ImageView<'_>> {
-        let view = |keyframe| ImageView::new(keyframe, self.fine.cell_m);
-        self.used.iter().map(move |keyframe| view(&keyframe.fine))
+    /// The fine image of each keyframe, and its [`Keyframe::ahead_m`].
+    pub fn fine_images(&self) -> impl Iterator<Item = (ImageView<'_>, Vector2<f64>)> {
+        let cell_m = self.fine.cell_m;
+        let used = self.used.iter();
+        used.map(move |it| (ImageView::new(&it.fine, cell_m), it.ahead_m))
     }
 
     pub fn coarse(&self) -> MapView<'_> {
         self.coarse.view()
     }
 
-    /// Returns whether `pose` is far enough from the last keyframe for another one.
-    pub fn needs_keyframe(&self, pose: &Pose, config: &RefinementConfig) -> bool {
+    /// Returns whether `pose` is far enough from the last keyframe for another one, also by the
+    /// search.
+    pub fn needs_keyframe(
+        &self,
+        pose: &Pose,
+        ahead_m: Vector2<f64>,
+        config: &RefinementConfig,
+    ) -> bool {
         self.used.back().is_none_or(|last| {
             let moved = last.pose.inv_mul(pose);
-            moved.translation.vector.norm() >= config.keyframe_distance_m
+            let moved_m = pose.translation.vector - last.pose.translation.vector;
+            let by_search_m = moved_m + ahead_m - last.ahead_m;
+            moved_m.norm().max(by_search_m.norm()) >= config.keyframe_distance_m
                 || moved.rotation.angle().abs() >= config.keyframe_angle_deg.to_radians()
         })
     }
@@ -182,7 +195,12 @@ mod tests {
                 assert!(map.fine().sum.iter().all(|sum| *sum == 0));
             }
             let at = id as f64;
-            map.insert(id, &points, &pose(2.3 * at, -1.1 * at, 0.2 * at));
+            map.insert(
+                id,
+                &points,
+                &pose(2.3 * at, -1.1 * at, 0.2 * at),
+                Vector2::zeros(),
+            );
             let kept = [map.fine().sum.to_vec(), map.coarse().sum.to_vec()];
             map.sum_images();
             assert_eq!(kept, [map.fine().sum, map.coarse().sum], "{id}");

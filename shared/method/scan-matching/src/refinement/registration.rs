@@ -175,7 +175,7 @@ impl Registration<'_> {
     }
 
     /// Deskews the scan with the motion that leads to `pose`.
-    fn deskew(&mut self, pose: &Pose) {
+    pub fn deskew(&mut self, pose: &Pose) {
         let twist = self.state.twist_to(pose, &self.scan.step);
         self.points.deskew(self.scan.points, &twist);
     }

@@ -46,7 +46,30 @@ impl WeakestDirection {
         if map.len() < MIN_KEYFRAMES || all.min() >= SAFE_RATIO * all.max() {
             return None;
         }
-        let informations = Informations::of(map, points, &alignment.pose);
+        Self::at(map, points, &alignment.pose, |_| Vector2::zeros())
+    }
+
+    /// Finds it for a scan that is where the search says, in a map whose keyframes lie to each
+    /// other as the search says: it is [`Keyframe::ahead_m`](super::Keyframe::ahead_m) beyond them.
+    pub fn by_search(
+        map: &LocalMap,
+        points: &DeskewedPoints,
+        pose: &Pose,
+        ahead_m: Vector2<f64>,
+    ) -> Option<Self> {
+        if map.len() < MIN_KEYFRAMES {
+            return None;
+        }
+        Self::at(map, points, pose, |of_keyframe| ahead_m - of_keyframe)
+    }
+
+    fn at(
+        map: &LocalMap,
+        points: &DeskewedPoints,
+        pose: &Pose,
+        beyond_m: impl Fn(Vector2<f64>) -> Vector2<f64>,
+    ) -> Option<Self> {
+        let informations = Informations::of(map, points, pose, beyond_m);
         let (whole, structure) = (of_place(&informations.whole)?, informations.by_structure()?);
         let eigen = SymmetricEigen::new(structure);
         let (weakest, strongest) = (eigen.eigenvalues.imin(), eigen.eigenvalues.max());
@@ -94,7 +117,12 @@ struct Informations {
 }
 
 impl Informations {
-    fn of(map: &LocalMap, points: &DeskewedPoints, pose: &Pose) -> Self {
+    fn of(
+        map: &LocalMap,
+        points: &DeskewedPoints,
+        pose: &Pose,
+        beyond_m: impl Fn(Vector2<f64>) -> Vector2<f64>,
+    ) -> Self {
         let (mut whole, mut of_squares) = (Matrix3::zeros(), Matrix3::zeros());
         let keyframes = map.len() as f64;
         let places = points.x_m.iter().zip(&points.y_m).zip(&points.weight);
@@ -103,8 +131,8 @@ impl Informations {
             let arm = pose.rotation * Vector2::new(f64::from(*x_m), f64::from(*y_m));
             let place = pose.translation.vector + arm;
             let (mut sum, mut squares) = (Vector3::zeros(), Matrix3::zeros());
-            for image in map.fine_images() {
-                let slope = image.slope(place);
+            for (image, ahead_m) in map.fine_images() {
+                let slope = image.slope(place + beyond_m(ahead_m));
                 let gradient = Vector3::new(slope.x, slope.y, arm.x * slope.y - arm.y * slope.x);
                 sum += gradient;
                 squares += gradient * gradient.transpose();

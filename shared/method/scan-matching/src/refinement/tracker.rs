@@ -34,6 +34,8 @@ pub struct TrackerState {
     pub along_walls: u32,
     /// Number of the last of these at constant velocity: nothing says how far.
     pub sliding: u32,
+    /// Way by which the search has led beyond such guesses, m, along the axes of the map.
+    pub ahead_m: Vector2<f64>,
     /// The place where the vehicle stands, for the reported motions.
     pub standstill: Standstill,
     /// The bias of the gyro, and the like; `None` until it has measured a turn.
@@ -78,6 +80,7 @@ impl Default for TrackerState {
             unmatched: 0,
             along_walls: 0,
             sliding: 0,
+            ahead_m: Vector2::zeros(),
             standstill: Standstill::default(),
             heading: None,
             wheels: None,
@@ -107,23 +110,20 @@ impl Anchor {
     }
 
     /// Returns whether a vehicle can have come from here to `pose`: within the limits of
-    /// acceleration, also during `guessed_s` before, of which the velocity is a guess, and
-    /// `jitter_share` (0 to 1) of the jitter of a match.
+    /// acceleration, and `jitter_share` (0 to 1) of the jitter of a match.
     fn can_reach(
         &self,
         pose: &Pose,
         interval_s: f64,
         heading: Option<UnitComplex<f64>>,
         jitter_share: f64,
-        guessed_s: f64,
         config: &RefinementConfig,
     ) -> bool {
         let time_s = self.age_s + interval_s;
         let twist = self.twist_to(pose, interval_s);
         let moved = (twist.linear_mps() - self.twist.linear_mps()) * time_s;
         let turned = (twist.yaw_rate_radps - self.twist.yaw_rate_radps) * time_s;
-        let shift = config.jitter_m * jitter_share
-            + config.acceleration_mps2 * time_s * (time_s + guessed_s);
+        let shift = config.jitter_m * jitter_share + config.acceleration_mps2 * time_s.powi(2);
         let jitter = config.jitter_deg * jitter_share;
         let (turned, turn) = match heading {
             Some(heading) => (heading.rotation_to(&pose.rotation).angle(), jitter),
@@ -191,12 +191,10 @@ impl TrackerState {
         config: &RefinementConfig,
     ) -> bool {
         let (interval_s, heading) = (step.interval_s, self.heading_at(step));
-        let guessed_s = f64::from(self.sliding) * interval_s;
         let mut anchors = self.anchors.iter().flatten().peekable();
         anchors.peek().is_none()
-            || anchors.any(|anchor| {
-                anchor.can_reach(pose, interval_s, heading, jitter_share, guessed_s, config)
-            })
+            || anchors
+                .any(|anchor| anchor.can_reach(pose, interval_s, heading, jitter_share, config))
     }
 
     /// Leaves the map: a new one starts with the last scan, or a later one. Where wheels have led
@@ -249,22 +247,6 @@ impl TrackerState {
         self.pose = pose;
     }
 
-    /// Moves the vehicle in the map, and what is known of its places, m.
-    pub(super) fn shift(&mut self, shift: Vector2<f64>) {
-        let poses = [
-            &mut self.pose,
-            &mut self.standstill.reported,
-            &mut self.standstill.anchor,
-        ];
-        let anchors = self.anchors.iter_mut().flatten();
-        for pose in poses
-            .into_iter()
-            .chain(anchors.map(|anchor| &mut anchor.pose))
-        {
-            pose.translation.vector += shift;
-        }
-    }
-
     /// Makes `pose`, to which wheels lead, the newest anchor. The last refined scan stays behind
     /// it, in case they slip meanwhile.
     fn carry_anchor(&mut self, pose: Pose, step: &Step) {
@@ -292,7 +274,7 @@ impl TrackerState {
             .anchors
             .iter()
             .flatten()
-            .find(|anchor| anchor.can_reach(&pose, interval_s, heading, 1.0, 0.0, config))
+            .find(|anchor| anchor.can_reach(&pose, interval_s, heading, 1.0, config))
             .copied();
         let twist = match &valid {
             Some(anchor) => anchor

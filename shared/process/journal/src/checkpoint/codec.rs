@@ -23,12 +23,14 @@ const ANCHOR_WORDS: usize = 9;
 /// Where the means and counts of a tracker state begin, its standstill, its heading, its wheels and
 /// its velocity by Doppler.
 const REST: usize = 4 + 2 * ANCHOR_WORDS;
-const STANDSTILL: usize = REST + 6;
+const STANDSTILL: usize = REST + 8;
 const HEADING: usize = STANDSTILL + STANDSTILL_WORDS;
 const WHEELS: usize = HEADING + HEADING_WORDS;
 const DOPPLER: usize = WHEELS + WHEEL_WORDS;
-/// Words of a keyframe's slot before its cells: checksum, id, pose, corners of both levels.
-pub(super) const KEYFRAME_WORDS: usize = 2 + 4 + 4;
+/// Words of a keyframe's slot before its cells: checksum, id, pose, way by the search, corners of
+/// both levels.
+pub(super) const KEYFRAME_WORDS: usize = CORNERS + 4;
+const CORNERS: usize = 2 + 4 + 2;
 /// The checksum of an empty slot. No content has it.
 pub(super) const EMPTY: [u8; 8] = [0; 8];
 
@@ -111,6 +113,8 @@ fn tracker_words(state: &TrackerState) -> [u64; TRACKER_WORDS] {
         state.unmatched.into(),
         state.along_walls.into(),
         state.sliding.into(),
+        state.ahead_m.x.to_bits(),
+        state.ahead_m.y.to_bits(),
     ];
     words[REST..STANDSTILL].copy_from_slice(&rest);
     words[STANDSTILL..HEADING].copy_from_slice(&standstill_words(&state.standstill));
@@ -236,6 +240,7 @@ fn tracker_from(words: &[u64; TRACKER_WORDS]) -> TrackerState {
         unmatched: rest[3] as u32,
         along_walls: rest[4] as u32,
         sliding: rest[5] as u32,
+        ahead_m: [6, 7].map(|k| f64::from_bits(rest[k])).into(),
         standstill: standstill_from(&words[STANDSTILL..]),
         heading: heading_from(&words[HEADING..]),
         wheels: wheels_from(&words[WHEELS..]),
@@ -286,8 +291,10 @@ pub(super) fn decode_state(
 /// Fills the slot of a keyframe, and returns the name of its content.
 pub(super) fn encode_keyframe(keyframe: &Keyframe, slot: &mut [u8]) -> Name {
     set_word(slot, 1, keyframe.id);
+    let ahead = [keyframe.ahead_m.x, keyframe.ahead_m.y].map(f64::to_bits);
     pose_words(&keyframe.pose)
         .into_iter()
+        .chain(ahead)
         .enumerate()
         .for_each(|(k, value)| set_word(slot, k + 2, value));
     let mut at = KEYFRAME_WORDS * 8;
@@ -295,7 +302,7 @@ pub(super) fn encode_keyframe(keyframe: &Keyframe, slot: &mut [u8]) -> Name {
         corner
             .iter()
             .enumerate()
-            .for_each(|(k, value)| set_word(slot, 6 + 2 * level + k, *value as u64));
+            .for_each(|(k, value)| set_word(slot, CORNERS + 2 * level + k, *value as u64));
         slot[at..]
             .iter_mut()
             .zip(cells)
@@ -321,9 +328,10 @@ pub(super) fn keyframe_name(slot: &[u8]) -> Option<Name> {
 pub(super) fn decode_keyframe(slot: &[u8], name: Name, keyframe: &mut Keyframe) -> bool {
     keyframe.id = word(slot, 1);
     keyframe.pose = pose_from(&std::array::from_fn::<u64, 4, _>(|k| word(slot, k + 2)));
+    keyframe.ahead_m = [6, 7].map(|k| f64::from_bits(word(slot, k))).into();
     let mut at = KEYFRAME_WORDS * 8;
     for (level, (corner, cells)) in keyframe.images_mut().into_iter().enumerate() {
-        *corner = [0, 1].map(|k| word(slot, 6 + 2 * level + k) as i64);
+        *corner = [0, 1].map(|k| word(slot, CORNERS + 2 * level + k) as i64);
         let count = cells.len();
         cells
             .into_iter()
@@ -332,4 +340,20 @@ pub(super) fn decode_keyframe(slot: &[u8], name: Name, keyframe: &mut Keyframe) 
         at += count;
     }
     keyframe_name(slot) == Some(name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Each word of a state is of a field that comes back.
+    #[test]
+    fn no_field_of_a_state_is_lost() {
+        let mut words = std::array::from_fn(|k| k as u64 + 2);
+        let flags = [4, 4 + ANCHOR_WORDS, HEADING, WHEELS, DOPPLER];
+        let slips = [WHEELS + WHEEL_WORDS - 1, DOPPLER + WHEEL_WORDS - 1];
+        flags.into_iter().chain(slips).for_each(|k| words[k] = 1);
+        words[HEADING + HEADING_WORDS - 1] = Verdict::Refused as u64;
+        assert_eq!(tracker_words(&tracker_from(&words)), words);
+    }
 }

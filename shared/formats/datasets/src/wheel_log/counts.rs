@@ -1,0 +1,145 @@
+//! Logs that count: the ticks of an encoder, or the metres of an odometer, since some time.
+
+use std::path::Path;
+
+use csv::StringRecord;
+use gyre_samples::{Sample, SampleKind};
+
+use super::SPEEDS;
+use crate::{
+    LogError, LogFaults,
+    gyro_log::{
+        Raw,
+        columns::{StampUnit, plain, stamp_unit},
+        faults::{ABSURD_SHARE, Plausible, examine},
+        table::SampleColumns,
+    },
+};
+
+/// Shortest time over which a speed is that of two counts: over less, ticks are too coarse.
+const SPAN_NS: i64 = 90_000_000;
+
+/// Names of the ticks of one wheel, or of an axle.
+const TICKS: [&str; 7] = [
+    "ticks",
+    "tick",
+    "pulses",
+    "counts",
+    "count",
+    "encoder",
+    "encoder_ticks",
+];
+/// Those of two wheels of an axle, whose mean counts.
+const LEFT_AND_RIGHT: [[&str; 2]; 4] = [
+    ["left_ticks", "right_ticks"],
+    ["left_count", "right_count"],
+    ["ticks_left", "ticks_right"],
+    ["left", "right"],
+];
+/// Names of the metres.
+const METRES: [&str; 3] = ["distance_m", "odometer_m", "mileage_m"];
+
+/// Any count: what is plausible are the speeds.
+const COUNTS: Plausible = Plausible {
+    of: SampleKind::Wheels,
+    values: 1,
+    most: f64::MAX,
+    beyond: "",
+};
+
+/// Where a table has counts. A sample of it has the count in the place of the speed.
+pub(super) struct CountColumns {
+    stamp: (usize, StampUnit),
+    /// One, or one of each wheel.
+    counts: Vec<usize>,
+    is_in_ticks: bool,
+}
+
+impl SampleColumns for CountColumns {
+    const OF: SampleKind = SampleKind::Wheels;
+
+    fn of(first: &StringRecord) -> Result<Self, String> {
+        let names: Vec<String> = first.iter().map(plain).collect();
+        let at = |name: &str| names.iter().position(|it| it == name);
+        let one = |all: &[&str]| all.iter().find_map(|name| Some(vec![at(name)?]));
+        let both = || {
+            let mut pairs = LEFT_AND_RIGHT.iter();
+            pairs.find_map(|[left, right]| Some(vec![at(left)?, at(right)?]))
+        };
+        let metres = one(&METRES);
+        let is_in_ticks = metres.is_none();
+        let counts = metres.or_else(|| one(&TICKS)).or_else(both);
+        let stamps = names.iter().enumerate();
+        let stamp = stamps
+            .clone()
+            .find_map(|(k, name)| Some((k, stamp_unit(name)?)));
+        Ok(Self {
+            stamp: stamp.ok_or("it has no stamps")?,
+            counts: counts.ok_or("it counts nothing")?,
+            is_in_ticks,
+        })
+    }
+
+    fn unit_is_assumed(&self) -> bool {
+        self.is_in_ticks
+    }
+
+    fn sample(&self, row: &StringRecord) -> Option<Sample> {
+        let (column, unit) = self.stamp;
+        let stamp_ns = unit.ns(row.get(column)?)?;
+        let mut sum = 0.0;
+        for column in &self.counts {
+            sum += row.get(*column)?.parse::<f64>().ok()?;
+        }
+        Some(Sample::speed(stamp_ns, sum / self.counts.len() as f64))
+    }
+}
+
+/// Makes speeds of counts: each is the mean of the time between two, and has the stamp of its
+/// middle. Speeds that no vehicle has, as where a counter starts anew, are left out.
+///
+/// # Errors
+/// Ticks whose length is not given, stamps that cannot be those of a sensor, and speeds of which
+/// many are those of no vehicle.
+pub(super) fn speeds(
+    mut raw: Raw,
+    path: &Path,
+    m_per_tick: Option<f64>,
+) -> Result<(Vec<Sample>, LogFaults), LogError> {
+    let unusable = |reason: String| LogError::Unusable {
+        of: SampleKind::Wheels,
+        path: path.to_owned(),
+        reason,
+    };
+    let is_in_ticks = std::mem::take(&mut raw.unit_is_assumed);
+    let m_per_count = match is_in_ticks {
+        true => m_per_tick.ok_or_else(|| {
+            let missing =
+                "it counts ticks: give the distance of one, in metres, as wheels.m_per_tick";
+            unusable(missing.to_owned())
+        })?,
+        false => 1.0,
+    };
+    let (counts, mut faults) = examine(raw, path, &COUNTS)?;
+    let mut speeds = Vec::with_capacity(counts.len());
+    let mut from = counts[0];
+    for to in &counts {
+        let span_ns = to.stamp_ns - from.stamp_ns;
+        if span_ns >= SPAN_NS {
+            let way_m = (to.values[0] - from.values[0]) * m_per_count;
+            let speed_mps = way_m / (span_ns as f64 * 1e-9);
+            speeds.push(Sample::speed(from.stamp_ns + span_ns / 2, speed_mps));
+            from = *to;
+        }
+    }
+    let before = speeds.len();
+    speeds.retain(|speed| speed.values[0].abs() <= SPEEDS.most);
+    let absurd = before - speeds.len();
+    if absurd as f64 > ABSURD_SHARE * before as f64 && absurd > 1 || speeds.is_empty() {
+        return Err(unusable(format!(
+            "{absurd} of its {before} speeds are beyond 100 m/s: is the distance of a tick in metres?"
+        )));
+    }
+    faults.absurd += absurd;
+    Ok((speeds, faults))
+}
