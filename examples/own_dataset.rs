@@ -8,8 +8,8 @@
 use std::{env, error::Error, f32::consts::TAU, fs, io, path::Path};
 
 use gyre_datasets::{
-    Dataset, DatasetOptions, FileList, Format, ImageSize, ReadError, inspect_dataset, turn_ns,
-    write_tum,
+    Dataset, DatasetOptions, FileList, Format, ImageSize, InspectedLogs, ReadError,
+    inspect_dataset, turn_ns, write_tum,
 };
 use gyre_odometry::{Odometry, OdometryConfig};
 use gyre_radar::{OwnedScan, ScanLimits, ScanSlot, Sense, SweepGeometry, Trajectory, scan::flag};
@@ -121,7 +121,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (dataset, options) = (RawSweeps::open(folder)?, DatasetOptions::default());
     eprintln!(
         "{}",
-        inspect_dataset(folder, Box::new(dataset), &options, None, None)
+        inspect_dataset(
+            folder,
+            Box::new(dataset),
+            &options,
+            &InspectedLogs::default(),
+            None
+        )
     );
     let trajectory = drive(&mut RawSweeps::open(folder)?)?;
     Ok(write_tum(&trajectory, &mut io::stdout().lock())?)

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use gyre_datasets::InspectedLogs;
 use pyo3::prelude::*;
 
 use crate::{config::Config, errors, trajectory::Trajectory, values};
@@ -18,16 +19,16 @@ pub fn inspect(
     config: Option<&Bound<'_, Config>>,
 ) -> PyResult<Report> {
     let method = Config::method(config);
-    let (options, topic) = (method.dataset, method.gnss.topic);
+    let options = method.dataset;
+    let logs = InspectedLogs {
+        gnss_topic: method.gnss.topic,
+        m_per_tick: method.odometry.wheels.m_per_tick,
+    };
     let trajectory = trajectory.map(|it| &it.get().0);
     let report = py.detach(|| {
         let dataset = gyre_recording::open(&data, &options)?;
         Ok(gyre_datasets::inspect_dataset(
-            &data,
-            dataset,
-            &options,
-            topic.as_deref(),
-            trajectory,
+            &data, dataset, &options, &logs, trajectory,
         ))
     });
     report.map(Report).map_err(errors::open)

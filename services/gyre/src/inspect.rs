@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use gyre_configuration::Configuration;
-use gyre_datasets::ground_truth::read_trajectory;
+use gyre_datasets::{InspectedLogs, ground_truth::read_trajectory};
 use gyre_inputs::Inputs;
 use gyre_terminal::{Failure, print};
 
@@ -31,9 +31,12 @@ pub fn inspect(arguments: &InspectArguments) -> Result<ExitCode, Failure> {
         return Err("name the recording to inspect: a folder, NAME.mcap or a bag of ROS 2".into());
     }
     let dataset = gyre_recording::open(&path, &options)?;
-    let topic = configuration.gnss.topic.as_deref();
+    let logs = InspectedLogs {
+        gnss_topic: configuration.gnss.topic,
+        m_per_tick: configuration.odometry.wheels.m_per_tick,
+    };
     let report =
-        gyre_datasets::inspect_dataset(&path, dataset, &options, topic, trajectory.as_ref());
+        gyre_datasets::inspect_dataset(&path, dataset, &options, &logs, trajectory.as_ref());
     match arguments.json {
         true => print::line(serde_json::to_string_pretty(&report)?)?,
         false => print::values(report)?,

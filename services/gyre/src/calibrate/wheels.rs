@@ -91,5 +91,7 @@ pub(super) fn section(logs: &[(&Wheels, &Drive)]) -> Result<Section, Failure> {
     }
     // A relative path is one of the file's folder.
     let file = first.is_named.then(|| absolute(&first.log.path));
-    Ok(Section::told(found.toml(file.transpose()?.as_deref())))
+    let file = file.transpose()?;
+    let m_per_tick = first.configured.m_per_tick;
+    Ok(Section::told(found.toml(file.as_deref(), m_per_tick)))
 }

@@ -108,16 +108,25 @@ pub fn inspect(
     trajectory: Option<&Trajectory>,
 ) -> Result<Report, OpenError> {
     let dataset = open(root, options)?;
-    Ok(inspect_dataset(root, dataset, options, None, trajectory))
+    let logs = InspectedLogs::default();
+    Ok(inspect_dataset(root, dataset, options, &logs, trajectory))
 }
 
-/// Examines an open dataset, which was opened at `root` with `options`. The fixes of GNSS in a bag
-/// are those on this topic, else on the only one.
+/// Settings by which the logs beside the scans are read.
+#[derive(Clone, Debug, Default)]
+pub struct InspectedLogs {
+    /// The topic of GNSS in a bag, else the only one.
+    pub gnss_topic: Option<String>,
+    /// Distance of one tick of the wheels, m.
+    pub m_per_tick: Option<f64>,
+}
+
+/// Examines an open dataset, which was opened at `root` with `options`.
 pub fn inspect_dataset(
     root: &Path,
     mut dataset: Box<dyn Dataset>,
     options: &DatasetOptions,
-    gnss_topic: Option<&str>,
+    logs: &InspectedLogs,
     trajectory: Option<&Trajectory>,
 ) -> Report {
     let timing = timing::examine(dataset.as_ref());
@@ -125,8 +134,9 @@ pub fn inspect_dataset(
     let mut report = assemble(root, dataset.as_ref(), read, timing);
     report.ground_truths = ground_truth::examine(root, dataset.as_ref(), trajectory);
     report.gyro = gyro::examine(root, report.timing.as_ref());
-    report.wheels = wheels::examine(root, report.timing.as_ref());
-    report.gnss = gnss::examine(root, dataset.as_mut(), gnss_topic, report.timing.as_ref());
+    report.wheels = wheels::examine(root, logs.m_per_tick, report.timing.as_ref());
+    let topic = logs.gnss_topic.as_deref();
+    report.gnss = gnss::examine(root, dataset.as_mut(), topic, report.timing.as_ref());
     report.findings = findings::list(&report, dataset.notes(), options);
     report
 }

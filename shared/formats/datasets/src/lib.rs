@@ -34,7 +34,7 @@ pub use ground_truth::{
     TrajectoryError, find_ground_truth, parse_trajectory, read_trajectory, write_kitti, write_tum,
 };
 pub use gyro_log::{GyroLog, LogError, LogFaults, LogGap, SampleTrack};
-pub use inspect::{Report, inspect, inspect_dataset};
+pub use inspect::{InspectedLogs, Report, inspect, inspect_dataset};
 pub use plain_words::in_plain_words;
 pub use scan_samples::ScanSamples;
 pub use wheel_log::WheelLog;

@@ -168,7 +168,7 @@ impl ScanSamples {
         }
         let named = |sentence| format!("{}: {sentence}", path.display());
         let jumps = track.leave_out_jumps(of);
-        let faults = faults.sentences().into_iter().chain(jumps);
+        let faults = faults.sentences(of).into_iter().chain(jumps);
         let faults = faults.map(named).collect();
         Ok(Self::Log { track, faults })
     }

@@ -24,13 +24,7 @@ use crate::{
 use gyre_storage::quoted;
 
 /// Logs relative to the root of a dataset, in order of precedence.
-const PLACES: [&str; 5] = [
-    "wheels.csv",
-    "wheel_speed.csv",
-    "speed.csv",
-    "odometer.csv",
-    "encoder.csv",
-];
+const PLACES: [&str; 4] = ["wheels.csv", "wheel_speed.csv", "speed.csv", "odometer.csv"];
 
 /// The speeds of a vehicle on wheels.
 const SPEEDS: Plausible = Plausible {

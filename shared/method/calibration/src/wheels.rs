@@ -165,15 +165,18 @@ impl WheelCalibration {
         })
     }
 
-    /// Returns the section `[wheels]`, with the log if it does not lie beside the scans.
-    pub fn toml(&self, file: Option<&Path>) -> String {
+    /// Returns the section `[wheels]`, with the log if it does not lie beside the scans, and the
+    /// distance of a tick that the scale is of.
+    pub fn toml(&self, file: Option<&Path>, m_per_tick: Option<f64>) -> String {
+        let tick = m_per_tick.map(|metres| format!("m_per_tick = {metres}\n"));
+        let tick = tick.unwrap_or_default();
         let kind = match file.map(|file| toml::Value::from(file.display().to_string())) {
             Some(file) => format!("kind = \"log\"\nfile = {file}\n"),
             None => "kind = \"auto\"\n".to_owned(),
         };
         let (late, scale) = (self.late_s, self.scale);
         format!(
-            "\n[wheels]\n{kind}late_s = {:.4}\ntime_sigma_s = {:.4}\nscale = {:.4}\nscale_sigma = {:.4} # correlation {:.3} of {} distances with those of the radar\n",
+            "\n[wheels]\n{kind}{tick}late_s = {:.4}\ntime_sigma_s = {:.4}\nscale = {:.4}\nscale_sigma = {:.4} # correlation {:.3} of {} distances with those of the radar\n",
             late.value,
             late.sigma.max(1e-4),
             scale.value,

@@ -13,7 +13,7 @@ mod own_sensor;
 
 use std::fs;
 
-use gyre_datasets::{DatasetOptions, inspect_dataset};
+use gyre_datasets::{DatasetOptions, InspectedLogs, inspect_dataset};
 use gyre_odometry::Outcome;
 use gyre_radar::RasterConfig;
 use gyre_simulator::{Profile, SimulatedDrive, SimulationConfig, Simulator};
@@ -53,7 +53,14 @@ fn an_own_dataset_is_registered_and_inspected() {
     fs::write(damaged.unwrap().path(), "too short").unwrap();
     let dataset = Box::new(RawSweeps::open(folder.path()).unwrap());
     let options = DatasetOptions::default();
-    let report = inspect_dataset(folder.path(), dataset, &options, None, None).to_string();
+    let report = inspect_dataset(
+        folder.path(),
+        dataset,
+        &options,
+        &InspectedLogs::default(),
+        None,
+    )
+    .to_string();
     assert!(
         report.contains("other") && report.contains("has 9 bytes"),
         "{report}"

@@ -33,7 +33,7 @@ pub struct WheelsConfig {
     pub late_s: f64,
     /// Distance by which the radar is ahead of the axle that does not steer, m.
     pub radar_ahead_m: f64,
-    /// Distance of one tick of a log that counts them, m.
+    /// Distance of one tick of a log that counts them, or to which an odometer rounds, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub m_per_tick: Option<f64>,
     /// True speed over the measured one.

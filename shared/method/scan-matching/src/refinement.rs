@@ -394,11 +394,15 @@ impl Refiner {
             covariance,
         };
         self.carry(scan, &alone);
+        let ahead_m = match self.state.sliding > 0 && scan.step.distance.is_none() {
+            true => scan.searched.translation.vector - motion.translation.vector,
+            false => Vector2::zeros(),
+        };
         Accepted {
             outcome: Outcome::Predicted,
             pose: UncertainMotion { motion, covariance },
             guess: InitialGuess::Prediction,
-            ahead_m: Vector2::zeros(),
+            ahead_m,
             leaves_map: false,
         }
     }
@@ -449,7 +453,7 @@ impl Refiner {
                 InitialGuess::AlongWalls => Outcome::Predicted,
                 _ => accepted.outcome,
             },
-            rolls: scan.step.distance.is_some_and(|it| it.is_certain()),
+            moves: scan.step.moves(),
             interval_s: scan.step.interval_s,
         };
         match self.config.hold_standstill {

@@ -1,7 +1,7 @@
 //! The fixes of GNSS receivers in bags.
 
 use gyre_bags::fixes;
-use gyre_datasets::{GnssLog, inspect_dataset};
+use gyre_datasets::{GnssLog, InspectedLogs, inspect_dataset};
 use gyre_ros2_messages::{
     builtin_interfaces::Time,
     sensor_msgs::{Imu, NavSatFix, NavSatStatus},
@@ -236,10 +236,14 @@ fn fixes_are_read_without_scans_and_beside_other_sensors() {
 #[test]
 fn a_report_has_the_fixes_of_the_bag_or_why_they_cannot_be_used() {
     let folder = Folder::new();
-    let inspected = |messages: &Messages, topic| {
+    let inspected = |messages: &Messages, topic: Option<&str>| {
         let path = folder.bag(messages);
         let dataset = opened(&path);
-        inspect_dataset(&path, dataset, &DatasetOptions::default(), topic, None)
+        let logs = InspectedLogs {
+            gnss_topic: topic.map(str::to_owned),
+            ..InspectedLogs::default()
+        };
+        inspect_dataset(&path, dataset, &DatasetOptions::default(), &logs, None)
     };
     let two = with(&[FIX, "/gps/fix"], |number, fix| {
         fix.status.status = -i8::from(number == 0);

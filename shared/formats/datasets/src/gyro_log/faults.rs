@@ -25,9 +25,9 @@ pub struct LogFaults {
     pub unreadable: usize,
     /// Line (of a folder of files: number) of the first of them.
     pub first_unreadable: usize,
-    /// Samples with a rate that is not finite: left out.
+    /// Samples with a value that is not finite: left out.
     pub not_a_number: usize,
-    /// Samples with a rate beyond 10 rad/s: left out.
+    /// Samples with a rate beyond 10 rad/s, or a speed beyond 100 m/s: left out.
     pub absurd: usize,
     /// Samples with the stamp of another one: left out.
     pub repeated: usize,
@@ -43,7 +43,7 @@ pub struct LogFaults {
     pub gaps: Vec<LogGap>,
     /// Samples that are missing one or two at a time: the value is interpolated.
     pub bridged: usize,
-    /// The header names no unit of the rates: rad/s is assumed.
+    /// The header names no unit: rad/s or m/s is assumed.
     pub unit_is_assumed: bool,
 }
 
@@ -72,8 +72,20 @@ impl LogFaults {
         self.gaps.iter().map(|gap| gap.seconds).fold(0.0, f64::max)
     }
 
-    /// Returns a sentence for each kind of fault.
-    pub fn sentences(&self) -> Vec<String> {
+    /// Returns a sentence for each kind of fault of the log of a sensor.
+    pub fn sentences(&self, of: SampleKind) -> Vec<String> {
+        let [values, absurd, unit] = match of {
+            SampleKind::Gyro => [
+                "rates",
+                "rates beyond 10 rad/s, at which no vehicle turns",
+                "of the rates: rad/s is assumed; `gyre calibrate` tells deg/s by its scale",
+            ],
+            SampleKind::Wheels => [
+                "speeds",
+                "speeds beyond 100 m/s, at which no vehicle drives",
+                "of the speed: m/s is assumed; `gyre calibrate` tells km/h by its scale",
+            ],
+        };
         let counted = |count: usize, sentence: String| (count > 0).then_some(sentence);
         let steps = self
             .clock_steps_s
@@ -89,11 +101,11 @@ impl LogFaults {
             ),
             counted(
                 self.not_a_number,
-                format!("{} samples have rates that are not finite: left out.", self.not_a_number),
+                format!("{} samples have {values} that are not finite: left out.", self.not_a_number),
             ),
             counted(
                 self.absurd,
-                format!("{} samples have rates beyond {ABSURD_RADPS} rad/s, at which no vehicle turns: left out.", self.absurd),
+                format!("{} samples have {absurd}: left out.", self.absurd),
             ),
             counted(
                 self.repeated,
@@ -130,9 +142,8 @@ impl LogFaults {
                     self.bridged
                 ),
             ),
-            self.unit_is_assumed.then(|| {
-                "The header names no unit of the rates: rad/s is assumed; `gyre calibrate` tells deg/s by its scale.".to_owned()
-            }),
+            self.unit_is_assumed
+                .then(|| format!("The header names no unit {unit}.")),
         ]
         .into_iter()
         .flatten()

@@ -7,6 +7,7 @@ use super::{
 };
 use crate::dataset::{DatasetOptions, Format};
 use gyre_radar::MAX_OFFSET_S;
+use gyre_samples::SampleKind;
 
 /// Maximum number of scans that are listed; more are counted.
 const MAX_LISTED: usize = 8;
@@ -44,7 +45,7 @@ fn gyro(report: &GyroReport) -> Vec<String> {
     if let Some(error) = &report.error {
         return vec![unusable("a gyro", &report.file, error)];
     }
-    let faults = report.faults.sentences().into_iter();
+    let faults = report.faults.sentences(SampleKind::Gyro).into_iter();
     let mut found: Vec<String> = faults.map(|it| format!("Gyro: {it}")).collect();
     found.extend(
         report
@@ -63,7 +64,7 @@ fn wheels(report: &WheelReport) -> Vec<String> {
     if let Some(error) = &report.error {
         return vec![unusable("the wheels", &report.file, error)];
     }
-    let faults = report.faults.sentences().into_iter();
+    let faults = report.faults.sentences(SampleKind::Wheels).into_iter();
     let mut found: Vec<String> = faults.map(|it| format!("Wheels: {it}")).collect();
     let name = report.file.file_name().unwrap_or_default().display();
     let clocks = of_clocks(&report.times);

@@ -26,9 +26,13 @@ pub struct WheelReport {
 }
 
 /// Examines the log beside the scans; `None` if there is none.
-pub(super) fn examine(root: &Path, timing: Option<&TimingReport>) -> Option<WheelReport> {
+pub(super) fn examine(
+    root: &Path,
+    m_per_tick: Option<f64>,
+    timing: Option<&TimingReport>,
+) -> Option<WheelReport> {
     let file = WheelLog::find(root).ok()?;
-    let log = match WheelLog::read(&file, None) {
+    let log = match WheelLog::read(&file, m_per_tick) {
         Ok(log) => log,
         Err(error) => {
             return Some(WheelReport {

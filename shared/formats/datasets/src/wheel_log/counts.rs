@@ -20,21 +20,12 @@ use crate::{
 const SPAN_NS: i64 = 90_000_000;
 
 /// Names of the ticks of one wheel, or of an axle.
-const TICKS: [&str; 7] = [
-    "ticks",
-    "tick",
-    "pulses",
-    "counts",
-    "count",
-    "encoder",
-    "encoder_ticks",
-];
+const TICKS: [&str; 4] = ["ticks", "pulses", "wheel_ticks", "encoder_ticks"];
 /// Those of two wheels of an axle, whose mean counts.
-const LEFT_AND_RIGHT: [[&str; 2]; 4] = [
+const LEFT_AND_RIGHT: [[&str; 2]; 3] = [
     ["left_ticks", "right_ticks"],
-    ["left_count", "right_count"],
     ["ticks_left", "ticks_right"],
-    ["left", "right"],
+    ["left_count", "right_count"],
 ];
 /// Names of the metres.
 const METRES: [&str; 3] = ["distance_m", "odometer_m", "mileage_m"];
@@ -68,7 +59,7 @@ impl SampleColumns for CountColumns {
         };
         let metres = one(&METRES);
         let is_in_ticks = metres.is_none();
-        let counts = metres.or_else(|| one(&TICKS)).or_else(both);
+        let counts = metres.or_else(both).or_else(|| one(&TICKS));
         let stamps = names.iter().enumerate();
         let stamp = stamps
             .clone()
@@ -133,11 +124,20 @@ pub(super) fn speeds(
         }
     }
     let before = speeds.len();
+    if before == 0 {
+        return Err(unusable("it is shorter than 0.09 s".to_owned()));
+    }
     speeds.retain(|speed| speed.values[0].abs() <= SPEEDS.most);
     let absurd = before - speeds.len();
     if absurd as f64 > ABSURD_SHARE * before as f64 && absurd > 1 || speeds.is_empty() {
+        let remedy = match is_in_ticks {
+            true => {
+                "is wheels.m_per_tick in metres, and does the counter not start anew at each turn?"
+            }
+            false => "is the distance in metres?",
+        };
         return Err(unusable(format!(
-            "{absurd} of its {before} speeds are beyond 100 m/s: is the distance of a tick in metres?"
+            "{absurd} of its {before} speeds are beyond 100 m/s: {remedy}"
         )));
     }
     faults.absurd += absurd;

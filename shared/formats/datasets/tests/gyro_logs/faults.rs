@@ -1,5 +1,6 @@
 //! Faults of logs: none of them changes a sample in silence.
 
+use gyre_samples::SampleKind;
 use proptest::prelude::*;
 
 use super::{START_NS, read};
@@ -98,7 +99,7 @@ proptest! {
         };
         prop_assert_eq!(counted, one);
         prop_assert_eq!(faults.bridged, usize::from(lost.is_some()));
-        prop_assert!(!faults.sentences().is_empty());
+        prop_assert!(!faults.sentences(SampleKind::Gyro).is_empty());
     }
 
     /// Whatever a file holds, reading it ends with samples in the order of their stamps, which are
@@ -131,7 +132,7 @@ fn gaps_are_told_with_the_longest() {
     );
     assert!((log.faults.longest_gap_s() - 0.81).abs() < 1e-9);
     let sentence = "Samples are missing in 2 places, for up to 0.81 s (2.0 s after the first).";
-    assert_eq!(log.faults.sentences(), [sentence]);
+    assert_eq!(log.faults.sentences(SampleKind::Gyro), [sentence]);
 }
 
 #[test]
@@ -172,7 +173,7 @@ fn a_clock_that_was_set_leaves_the_longer_part() {
         assert_eq!(faults.clock_steps_s.len(), 1);
         assert_eq!(log.samples.len(), kept.len(), "{step_ms}");
         assert_eq!(log.samples[0].values[2], rows[kept.start].1);
-        let sentences = faults.sentences();
+        let sentences = faults.sentences(SampleKind::Gyro);
         assert!(
             sentences[0].contains("The clock steps 1 times"),
             "{sentences:?}"
@@ -225,7 +226,7 @@ fn a_log_in_degrees_is_refused_or_its_unit_said_to_be_assumed() {
     let unnamed = text(&rows(300)).replace("_radps", "");
     let log = read("imu.csv", &unnamed).unwrap();
     assert!(
-        log.faults.sentences()[0].contains("rad/s is assumed"),
+        log.faults.sentences(SampleKind::Gyro)[0].contains("rad/s is assumed"),
         "{:?}",
         log.faults
     );

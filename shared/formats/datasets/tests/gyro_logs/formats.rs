@@ -3,6 +3,7 @@
 use std::{env, path::PathBuf};
 
 use gyre_datasets::GyroLog;
+use gyre_samples::SampleKind;
 use tempfile::TempDir;
 
 use super::{START_NS, read, written};
@@ -63,7 +64,7 @@ fn tables_of_datasets_are_read_by_their_headers() {
     ] {
         let log = read(name, &text).unwrap();
         assert_close(values(&log), ALL, name);
-        assert_eq!(log.faults.sentences(), [""; 0], "{name}");
+        assert_eq!(log.faults.sentences(SampleKind::Gyro), [""; 0], "{name}");
     }
 }
 

@@ -36,7 +36,7 @@ pub(super) struct Match {
 impl Refiner {
     /// Returns the pose of the best match with the covariance of its motion; `None` where it is not
     /// plausible. In a direction in which nothing determines the place the predicted one is taken,
-    /// or the mean of prediction and search: that becomes the best match, and has to be reachable.
+    /// or the mean of prediction and search: that becomes the best match, and has to be plausible.
     pub(super) fn plausible_match(
         &mut self,
         scan: &Scan<'_>,
@@ -57,7 +57,7 @@ impl Refiner {
     }
 
     /// Replaces a match by that whose place in a direction is the predicted one, or the mean of
-    /// prediction and search; `None` where it is out of reach.
+    /// prediction and search; `None` where that is not plausible.
     fn match_across(
         &mut self,
         scan: &Scan<'_>,
@@ -80,9 +80,8 @@ impl Refiner {
         };
         let mut initial = best.alignment.pose;
         initial.translation.vector += ahead_to(place, &initial);
-        let mut registration = self.registration(scan);
-        let across = registration.align_across(guess, &initial, along);
-        if !registration.is_reachable(&across.alignment.pose, across.support) {
+        let across = self.registration(scan).align_across(guess, &initial, along);
+        if !across.is_plausible {
             return None;
         }
         let registered = self.registered(&across.alignment)?;
@@ -94,17 +93,21 @@ impl Refiner {
             leaves_map: false,
         };
         if is_guessed && !is_searched {
-            let mut by_search = registered;
             found.ahead_m = ahead_to(searched, &registered.motion);
-            by_search.motion.translation.vector += found.ahead_m;
-            if self.sees_by_search(scan, &by_search.motion) {
+            let mut place = registered.motion;
+            place.translation.vector += found.ahead_m;
+            if self.sees_by_search(scan, &place) {
                 best.guess = InitialGuess::Search;
-                (found.registered, found.leaves_map) = (by_search, true);
+                found.registered.motion = place;
+                (found.ahead_m, found.leaves_map) = (Vector2::zeros(), true);
             }
         }
+        let of_search = self.step_m(scan).powi(2);
         found.registered = match best.guess {
             InitialGuess::AlongWalls => self.slid(scan, found.registered, along, uncertainty),
-            _ => self.placed(found.registered, along, self.step_m(scan).powi(2)),
+            // Without its map nothing takes back an error of the place.
+            _ if found.leaves_map => self.placed(found.registered, along, of_search, 1.0),
+            _ => self.placed(found.registered, along, of_search, self.drift_share()),
         };
         Some(found)
     }
@@ -134,7 +137,17 @@ impl Refiner {
         let is_undetermined = weakest.is_undetermined()
             || (weakest.is_doubtful() && (self.state.sliding > 0 || contradicts()));
         let is_near = |pose: &Pose| self.is_near(pose, scan, weakest.along);
-        let is_seen = || self.asks_search() && is_near(&scan.searched) && is_near(&alignment.pose);
+        let agree = || {
+            let apart = scan.searched.translation.vector - alignment.pose.translation.vector;
+            weakest.along.dot(&apart).abs() < 2.0 * self.acceleration_m(scan.step.interval_s)
+        };
+        let is_seen = || {
+            self.asks_search()
+                && !contradicts()
+                && is_near(&scan.searched)
+                && is_near(&alignment.pose)
+                && agree()
+        };
         (is_undetermined && !is_seen()).then_some(weakest.along)
     }
 
@@ -152,10 +165,19 @@ impl Refiner {
         along.dot(&apart).abs() < self.step_m(scan)
     }
 
-    /// Returns how much farther than predicted a vehicle drives if it accelerates, m.
+    /// Returns how much farther than predicted a vehicle drives if it accelerates, m: since the
+    /// last refined scan, or since the scan before if the way is measured.
     fn step_m(&self, scan: &Scan<'_>) -> f64 {
-        let age_s = self.state.anchors[0].map_or(0.0, |anchor| anchor.age_s);
-        self.config.acceleration_mps2 * (age_s + scan.step.interval_s).powi(2)
+        let age_s = match (scan.step.distance, &self.state.anchors[0]) {
+            (None, Some(anchor)) => anchor.age_s,
+            _ => 0.0,
+        };
+        self.acceleration_m(age_s + scan.step.interval_s)
+    }
+
+    /// Returns how much farther a vehicle drives in a time if it accelerates, m.
+    fn acceleration_m(&self, time_s: f64) -> f64 {
+        self.config.acceleration_mps2 * time_s.powi(2)
     }
 
     /// Returns a registered pose with the covariance that the prediction has in a direction in
@@ -172,19 +194,24 @@ impl Refiner {
             None => self.state.sliding,
         };
         let ahead = self.state.pose.rotation.inverse() * along.into_inner();
-        self.placed(registered, along, uncertainty.of_sliding(ahead, sliding))
+        let variance = uncertainty.of_sliding(ahead, sliding);
+        self.placed(registered, along, variance, self.drift_share())
     }
 
-    /// Returns a registered pose with this variance in a direction of the map, all of which
-    /// accumulates, m².
+    fn drift_share(&self) -> f64 {
+        uncertainty::drift_share(self.map.len(), &self.config)
+    }
+
+    /// Returns a registered pose with this variance in a direction of the map, m², all of which
+    /// accumulates, where of a covariance this share does.
     fn placed(
         &self,
         registered: UncertainMotion,
         along: UnitVector2<f64>,
         variance: f64,
+        drift_share: f64,
     ) -> UncertainMotion {
         let along = self.state.pose.rotation.inverse() * along.into_inner();
-        let drift_share = uncertainty::drift_share(self.map.len(), &self.config);
         UncertainMotion {
             covariance: uncertainty::with_variance(
                 &registered.covariance,

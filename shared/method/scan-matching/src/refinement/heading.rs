@@ -100,6 +100,11 @@ impl PredictedTurn {
             + self.scale_variance * grown(self.yaw_rad, angle_rad)
     }
 
+    /// Returns whether the vehicle has certainly turned.
+    pub fn is_certain(&self) -> bool {
+        self.yaw_rad.powi(2) > GATE * self.variance_rad2
+    }
+
     /// The registered heading against the predicted one, rad. `previous` is the pose of the scan
     /// before.
     fn apart_rad(&self, registered: &UncertainMotion, previous: &Pose) -> f64 {

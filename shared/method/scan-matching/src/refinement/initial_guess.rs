@@ -10,7 +10,7 @@ const YAW_OFFSETS_RAD: [f64; 4] = [-0.1, 0.1, -0.2, 0.2];
 pub enum InitialGuess {
     /// Constant velocity.
     Prediction,
-    /// The motion that the search found.
+    /// The motion that the search found; along walls also the mean of that and the prediction.
     Search,
     /// The prediction with a yaw offset, tried if nothing else gave a plausible match.
     YawOffset,

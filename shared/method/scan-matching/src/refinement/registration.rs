@@ -206,7 +206,7 @@ impl Registration<'_> {
 
     /// Returns whether a vehicle can have driven to a pose, where the weight of the points is this
     /// share of its mean.
-    pub fn is_reachable(&self, pose: &Pose, support: f64) -> bool {
+    fn is_reachable(&self, pose: &Pose, support: f64) -> bool {
         self.state
             .can_reach(pose, &self.scan.step, support.min(1.0), self.config)
     }

@@ -61,8 +61,8 @@ pub(super) struct Estimate {
     /// The estimate of the scan before.
     pub previous: Pose,
     pub outcome: Outcome,
-    /// The wheels say that the vehicle has moved since the scan before.
-    pub rolls: bool,
+    /// Wheels, Doppler or the gyro say that the vehicle has moved since the scan before.
+    pub moves: bool,
     /// Time since the scan before, s.
     pub interval_s: f64,
 }
@@ -118,7 +118,12 @@ impl Standstill {
         } else {
             self.stay(estimate);
         }
-        let covariance = estimate.pose.covariance * self.covariance_factor(&before);
+        let factor = match estimate.outcome {
+            // Nobody has seen that the vehicle still stands.
+            Outcome::Predicted => 1.0,
+            Outcome::Refined | Outcome::Weak => self.covariance_factor(&before),
+        };
+        let covariance = estimate.pose.covariance * factor;
         let motion = if self.stands() {
             Pose::identity()
         } else {
@@ -132,10 +137,10 @@ impl Standstill {
     }
 
     /// Returns whether the vehicle is no longer at the anchor. A prediction cannot tell, and
-    /// continues what was, unless the wheels turn.
+    /// continues what was, unless another sensor says that it moves.
     fn is_left_by(&self, estimate: &Estimate) -> bool {
         match estimate.outcome {
-            Outcome::Predicted => estimate.rolls || !self.stands(),
+            Outcome::Predicted => estimate.moves || !self.stands(),
             Outcome::Refined | Outcome::Weak => {
                 let variance = 1.0 + 1.0 / f64::from(self.scans.min(MEAN_SCANS));
                 squared_distance(&self.anchor, estimate)

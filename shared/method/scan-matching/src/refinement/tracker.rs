@@ -30,7 +30,8 @@ pub struct TrackerState {
     pub doubtful: u32,
     /// Number of scans in a row that were predicted.
     pub unmatched: u32,
-    /// Number of scans in a row whose place along walls without structure was the predicted one.
+    /// Number of scans in a row, but for predicted ones, whose place along walls without structure
+    /// was the predicted one.
     pub along_walls: u32,
     /// Number of the last of these at constant velocity: nothing says how far.
     pub sliding: u32,
@@ -56,6 +57,14 @@ pub(super) struct Step {
     pub turn: Option<PredictedTurn>,
     /// The distance since then, by wheels that do not slip, or by Doppler.
     pub distance: Option<PredictedDistance>,
+}
+
+impl Step {
+    /// Returns whether wheels, Doppler or the gyro say that the vehicle has moved.
+    pub fn moves(&self) -> bool {
+        self.distance.is_some_and(|it| it.is_certain())
+            || self.turn.is_some_and(|it| it.is_certain())
+    }
 }
 
 /// A refined scan from which the next poses are predicted.

@@ -18,7 +18,9 @@ const MIN_DRIFT_SHARE: f64 = 1e-3;
 /// The uncertainty of a motion by what comes before its scan: the map, and the predictions since
 /// the last match.
 pub(super) struct Uncertainty {
-    /// The covariance of one prediction over the scan's interval.
+    /// The covariance of a prediction over the scan's interval, behind a match.
+    of_step: Matrix3<f64>,
+    /// The same behind the predictions in a row before it.
     of_prediction: Matrix3<f64>,
     /// Predictions in a row whose error a match takes back.
     predictions: u32,
@@ -37,13 +39,20 @@ impl Uncertainty {
         predictions: u32,
         config: &RefinementConfig,
     ) -> Self {
-        let of_prediction = of_prediction(state, &scan.step, config);
+        let of_prediction = |grown: f64| of_prediction(state, &scan.step, grown, config);
+        let [before, together] = [state.unmatched, predictions].map(f64::from);
+        // As long as a match can take them back, the last pose has the error of all.
+        let growth = match before == together {
+            true => (together + 1.0).powi(2),
+            false => grown(1.0, before),
+        };
         let of_predictions = match state.wheels.or(state.doppler) {
             Some(distance) if predictions > 0 => distance.unmatched,
-            _ => of_prediction * f64::from(predictions),
+            _ => of_prediction(together) * together,
         };
         Self {
-            of_prediction,
+            of_step: of_prediction(1.0),
+            of_prediction: of_prediction(growth),
             predictions,
             of_predictions,
             of_map: drift_share(map.len(), config),
@@ -59,7 +68,7 @@ impl Uncertainty {
     /// such that those of a row of such scans add up; `before` of them at constant velocity, whose
     /// error is that of all.
     pub fn of_sliding(&self, along: Vector2<f64>, before: u32) -> f64 {
-        let place = self.of_prediction.fixed_view::<2, 2>(0, 0);
+        let place = self.of_step.fixed_view::<2, 2>(0, 0);
         let variance = (along.transpose() * place * along)[0];
         variance * grown(1.0, f64::from(before))
     }
@@ -149,11 +158,18 @@ pub(super) fn drift_share(keyframes: usize, config: &RefinementConfig) -> f64 {
 }
 
 /// The covariance of a motion predicted at constant velocity, whose acceleration is within the
-/// limits; of its turn, by the gyro if there is one; of its distance, by wheels or Doppler.
-fn of_prediction(state: &TrackerState, step: &Step, config: &RefinementConfig) -> Matrix3<f64> {
+/// limits; of its turn, by the gyro if there is one; of its distance, by wheels or Doppler. An
+/// error of the velocity is that of all predictions in a row: its part is `grown`.
+fn of_prediction(
+    state: &TrackerState,
+    step: &Step,
+    grown: f64,
+    config: &RefinementConfig,
+) -> Matrix3<f64> {
     let interval_s = step.interval_s;
-    let variance =
-        |jitter: f64, acceleration: f64| (jitter + acceleration * interval_s.powi(2)).powi(2) / 3.0;
+    let variance = |jitter: f64, acceleration: f64| {
+        grown * (jitter + acceleration * interval_s.powi(2)).powi(2) / 3.0
+    };
     let shift = variance(config.jitter_m, config.acceleration_mps2);
     let turn = variance(
         config.jitter_deg.to_radians(),

@@ -72,7 +72,7 @@ impl Drive {
         self.estimate = pose(self.true_m + x_m + off_m, y_m, yaw_rad);
         let variances = Vector3::from(SIGMA.map(|sigma| sigma * sigma));
         let report = self.standstill.next(&Estimate {
-            rolls: false,
+            moves: false,
             pose: UncertainMotion {
                 motion: self.estimate,
                 covariance: Matrix3::from_diagonal(&variances),
