@@ -466,7 +466,10 @@ impl Refiner {
     fn update(&mut self, scan: &Scan<'_>, best: &Candidate, accepted: &Accepted) {
         let (pose, outcome) = (&accepted.pose.motion, accepted.outcome);
         let (config, fit) = (&self.config, [best.overlap, best.weight]);
-        let twist = self.state.twist_to(pose, &scan.step);
+        // Along guessed ways keyframes lie as the search says, and are deskewed so.
+        let mut by_search = *pose;
+        by_search.translation.vector += accepted.ahead_m;
+        let twist = self.state.twist_to(&by_search, &scan.step);
         self.state.update(*pose, outcome, fit, &scan.step, config);
         self.state.ahead_m += accepted.ahead_m;
         let ahead_m = self.state.ahead_m;
