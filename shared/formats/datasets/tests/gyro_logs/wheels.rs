@@ -148,11 +148,11 @@ fn ticks_need_their_length() {
     let text = ticks("stamp_ns,ticks", 0.05, |_, count| format!("{count}"));
     let missing = read_ticks(&text, None).unwrap_err().to_string();
     assert!(missing.contains("wheels.m_per_tick"), "{missing}");
+    let short: String = text.lines().take(9).map(|row| format!("{row}\n")).collect();
+    let short = read_ticks(&short, Some(0.05)).unwrap_err().to_string();
+    assert!(short.contains("it is shorter than 0.09 s"), "{short}");
     let wrong = read_ticks(&text, Some(1.0)).unwrap_err().to_string();
-    assert!(
-        wrong.contains("is the distance of a tick in metres?"),
-        "{wrong}"
-    );
+    assert!(wrong.contains("is wheels.m_per_tick in metres"), "{wrong}");
 }
 
 #[test]
