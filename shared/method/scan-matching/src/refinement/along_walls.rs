@@ -125,7 +125,7 @@ impl Refiner {
 
     /// Returns the direction along the axes of the map in which the place of a registered pose is
     /// undetermined, if there is one. In one that is doubtful wheels or Doppler decide. While the
-    /// search is asked, there is none where both match and search are near the prediction.
+    /// search is asked, there is none where match, search and prediction are near each other.
     pub(super) fn undetermined(
         &self,
         scan: &Scan<'_>,
