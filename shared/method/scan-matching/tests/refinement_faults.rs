@@ -331,3 +331,26 @@ fn a_chain_may_start_with_any_scan_number() {
     let off = drive.pose(1).inv_mul(&refined.motion.motion);
     assert!(off.translation.vector.norm() < 0.2 && refiner.state().pose != Pose::identity());
 }
+
+#[test]
+fn the_variance_of_a_predicted_pose_grows_with_the_square_of_the_predictions() {
+    let drive = Drive::steady(10.0, 0.0, 14);
+    let scene = town([[-110.0, 200.0], [-60.0, 60.0]], 1);
+    let scans = scans(&scene, &drive, &NOISY);
+    let mut refiner = refiner();
+    let mut variances = Vec::new();
+    for k in 1..scans.len() {
+        let later: &[_] = if k < 10 { &scans[k] } else { &[] };
+        let search = searched(&drive, k - 1);
+        let refined = refiner.refine(k as u64, later, &scans[k - 1], &search, SWEEP_S);
+        assert_eq!(refined.outcome == Outcome::Predicted, k >= 10, "{k}");
+        if k >= 10 {
+            variances.push(refined.motion.covariance[(0, 0)]);
+        }
+    }
+    // A motion has the errors of both of its poses.
+    for (n, variance) in (1..).zip(&variances) {
+        let (times, expected) = (variance / variances[0], n * n + (n - 1) * (n - 1));
+        assert!((times - f64::from(expected)).abs() < 1e-9, "{n}: {times}");
+    }
+}

@@ -17,8 +17,8 @@ pub(super) const GATE: f64 = 16.0;
 /// 1.4 s drifts with it by 0.1 degrees in a minute, as the radar alone does on six simulated roads.
 const LEAN_SIGMA_RAD: f64 = 4e-5;
 const LEAN_TIME_S: f64 = 60.0;
-/// Noise of the turn about the vertical where the gyro's axis tilts with the vehicle, rad/√s. It is
-/// what the best bias and scale leave of the turns in 4 to 16 s on six simulated roads, whose
+/// Noise of the turn about the vertical where the gyro's axis tilts with the vehicle, rad/√s.
+/// It is what the best bias and scale leave of the turns in 4 to 16 s on six simulated roads, whose
 /// gradient is 2.6 % RMS along and across.
 const TILT_RAD_PER_SQRT_S: f64 = 3e-4;
 /// Time over which an error of the bias counts as new, s: for covariances of motions, which are

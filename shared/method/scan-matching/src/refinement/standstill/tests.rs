@@ -183,6 +183,28 @@ fn predictions_neither_begin_nor_end_a_standstill() {
     assert!(!drive.standstill.stands());
 }
 
+/// Nobody sees that it still stands; the gyro, for one, sees that it does not.
+#[test]
+fn a_standing_vehicle_that_is_not_seen_is_as_uncertain_as_its_prediction() {
+    let mut drive = Drive::with_jitter(0.0);
+    drive.drive(80, [0.0, 0.0]);
+    let mut estimate = Estimate {
+        moves: false,
+        pose: UncertainMotion {
+            motion: pose(0.0, 0.0, 0.1),
+            covariance: Matrix3::identity(),
+        },
+        previous: drive.estimate,
+        outcome: Outcome::Predicted,
+        interval_s: INTERVAL_S,
+    };
+    let held = drive.standstill.next(&estimate);
+    assert!(held.stationary && held.motion.covariance == Matrix3::identity());
+    estimate.moves = true;
+    let moved = drive.standstill.next(&estimate);
+    assert!(!moved.stationary && (moved.motion.motion.rotation.angle() - 0.1).abs() < 1e-9);
+}
+
 #[test]
 fn motions_of_a_moving_vehicle_are_the_estimates_to_the_bit() {
     let mut drive = Drive::with_jitter(1.0);
