@@ -6,7 +6,7 @@ from pathlib import Path
 import torch
 
 from . import recipe as recipes
-from . import compare, step_time
+from . import compare, objects, step_time
 from .distil import Distiller
 from .drift import drift, motions
 from .export import OnnxMasks
@@ -31,6 +31,7 @@ def run(arguments: list[str]) -> None:
     add_plot(commands)
     compare.register(commands)
     step_time.register(commands)
+    objects.register(commands)
     options = parser.parse_args(arguments)
     if options.threads:
         torch.set_num_threads(options.threads)

@@ -1,0 +1,271 @@
+//! Where the network sees vehicles that move.
+
+use std::fmt::Display;
+use std::sync::Arc;
+
+use gyre_geometry::{Pose, SparsePoint, wrap_angle};
+use nalgebra::{Matrix2, Point2, Vector2};
+use rten::{Model, ModelOptions, RunOptions, ThreadPool, Value};
+
+use gyre_objects::PlacedScan;
+
+use crate::raster::{Memory, PLANES, SIDE};
+
+/// Cells of the output, a side: each is as large as two by two of the input.
+const OUT: usize = SIDE / 2;
+/// Values of a cell.
+const VALUES: usize = 11;
+/// Side of a cell of the output, m.
+const OUT_M: f64 = 2.0 * crate::raster::CELL_M;
+/// Unit of its velocities, m/s.
+const SPEED_MPS: f64 = 8.0;
+/// Length and width whose ratios it gives, m.
+const SIZE_M: [f64; 2] = [4.5, 1.9];
+/// Distance within which only the most likely detection counts, m.
+const ALONE_M: f64 = 2.5;
+
+/// The network cannot be loaded or computed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("the network that finds moving objects fails: {0}")]
+pub struct NetworkError(pub(crate) String);
+
+/// Finds vehicles that move in the last scans.
+pub(crate) struct Detector {
+    network: Arc<Model>,
+    thread: Arc<ThreadPool>,
+    memory: Memory,
+}
+
+/// A vehicle as a scan shows it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Detection {
+    /// The centre in the frame of the odometry at the time of its azimuth, with the Doppler shift
+    /// of its motion, m.
+    pub at: Point2<f64>,
+    /// The velocity, m/s.
+    pub velocity: Vector2<f64>,
+    /// Unit vector in its heading.
+    pub heading: Vector2<f64>,
+    /// Length and width, m.
+    pub size_m: [f64; 2],
+    /// The likelihood that a vehicle which moves is there, 0 to 1.
+    pub likely: f64,
+    /// Standard deviation of each component of the centre, m.
+    pub sigma_m: f64,
+    /// Standard deviation of each component of the velocity, m/s.
+    pub sigma_mps: f64,
+    /// The change of `at` by the velocity, s: it is seen at its own time, and lengthened or
+    /// shortened by the Doppler shift.
+    pub by_velocity: Matrix2<f64>,
+}
+
+impl Detector {
+    /// Loads a network from an ONNX file.
+    pub fn new(network: Vec<u8>) -> Result<Self, NetworkError> {
+        let network = ModelOptions::with_all_ops().load(network);
+        let network = network.map_err(|error| failed(&error))?;
+        Ok(Self {
+            network: Arc::new(network),
+            thread: Arc::new(ThreadPool::with_num_threads(1)),
+            memory: Memory::default(),
+        })
+    }
+
+    /// Forgets all scans.
+    pub fn clear(&mut self) {
+        self.memory.clear();
+    }
+
+    /// Finds the vehicles of the next scan that are likelier than `least`, the likeliest first.
+    pub fn detect(
+        &mut self,
+        scan: &PlacedScan,
+        points: &[SparsePoint],
+        least: f64,
+    ) -> Result<Vec<Detection>, NetworkError> {
+        self.memory.add(scan, points);
+        let output = unfolded(&self.run(self.memory.draw(&scan.pose))?);
+        let mut found: Vec<Detection> = Vec::new();
+        for cell in peaks(&output, least) {
+            let detection = read(&output, cell);
+            let is_far = |other: &Detection| (other.at - detection.at).norm() > ALONE_M;
+            if found.iter().all(is_far) {
+                found.push(detection);
+            }
+        }
+        let azimuths = azimuths(scan, points);
+        for detection in &mut found {
+            detection.place(&scan.pose, &azimuths);
+        }
+        Ok(found)
+    }
+
+    /// Computes the network.
+    fn run(&self, planes: Vec<f32>) -> Result<Vec<f32>, NetworkError> {
+        let input = Value::from_shape([1, PLANES, SIDE, SIDE], planes);
+        let input = input.map_err(|error| failed(&error))?;
+        let options = RunOptions::default().with_thread_pool(Some(self.thread.clone()));
+        let output = self.network.run_one(input.into(), Some(options));
+        let output = output.map_err(|error| failed(&error))?;
+        let output = output.into_shape_vec::<f32, 4>();
+        output
+            .map(|(_, values)| values)
+            .map_err(|error| failed(&error))
+    }
+}
+
+fn failed(error: &dyn Display) -> NetworkError {
+    NetworkError(error.to_string())
+}
+
+/// Returns the planes of the output, OUT x OUT each. The network gives each in four, of every other
+/// row and column.
+fn unfolded(folded: &[f32]) -> Vec<f32> {
+    const HALF: usize = OUT / 2;
+    let mut planes = vec![0.0; VALUES * OUT * OUT];
+    for (index, value) in folded.iter().enumerate() {
+        let (part, cell) = (index / (HALF * HALF), index % (HALF * HALF));
+        let row = 2 * (cell / HALF) + part % 4 / 2;
+        let column = 2 * (cell % HALF) + part % 2;
+        planes[part / 4 * OUT * OUT + row * OUT + column] = *value;
+    }
+    planes
+}
+
+/// Returns the cells that are at least as likely as those around them, the likeliest first.
+fn peaks(output: &[f32], least: f64) -> Vec<usize> {
+    let least = (least / (1.0 - least)).ln() as f32;
+    let is_peak = |cell: &usize| {
+        let (row, column) = (cell / OUT, cell % OUT);
+        let around = |at: usize| at.saturating_sub(1)..=(at + 1).min(OUT - 1);
+        let value = output[*cell];
+        value > least
+            && around(row).all(|row| around(column).all(|at| output[row * OUT + at] <= value))
+    };
+    let mut found: Vec<usize> = (0..OUT * OUT).filter(is_peak).collect();
+    found.sort_by(|a, b| output[*b].total_cmp(&output[*a]));
+    found
+}
+
+/// Reads what the network says of a cell, in the frame of the sensor.
+fn read(output: &[f32], cell: usize) -> Detection {
+    let value = |plane: usize| f64::from(output[plane * OUT * OUT + cell]);
+    let centre = [cell / OUT, cell % OUT].map(|at| (at as f64 + 0.5 - (OUT / 2) as f64) * OUT_M);
+    let heading = Vector2::new(value(5), value(6));
+    Detection {
+        at: Point2::new(centre[0] + value(1), centre[1] + value(2)),
+        velocity: Vector2::new(value(3), value(4)) * SPEED_MPS,
+        heading: heading.try_normalize(1e-6).unwrap_or_else(Vector2::x),
+        size_m: [
+            SIZE_M[0] * value(7).clamp(-2.0, 2.0).exp(),
+            SIZE_M[1] * value(8).clamp(-2.0, 2.0).exp(),
+        ],
+        likely: 1.0 / (1.0 + (-value(0)).exp()),
+        sigma_m: value(9).clamp(-3.0, 2.0).exp(),
+        sigma_mps: value(10).clamp(-3.0, 3.0).exp(),
+        by_velocity: Matrix2::zeros(),
+    }
+}
+
+impl Detection {
+    /// Takes it from the frame of the sensor into that of the odometry, at the time of the azimuth
+    /// that shows it.
+    fn place(&mut self, pose: &Pose, azimuths: &[Azimuth]) {
+        let apart_rad = |it: &Azimuth| wrap_angle(it.bearing_rad - bearing_rad(&self.at)).abs();
+        let shown_by = azimuths
+            .iter()
+            .min_by(|a, b| apart_rad(a).total_cmp(&apart_rad(b)));
+        let (time_s, doppler_s) = shown_by.map_or((0.0, 0.0), |it| (it.time_s, it.doppler_s));
+        let away = pose.rotation * self.at.coords.normalize();
+        self.at = pose * self.at;
+        self.velocity = pose.rotation * self.velocity;
+        self.heading = pose.rotation * self.heading;
+        self.by_velocity = Matrix2::identity() * time_s + away * away.transpose() * doppler_s;
+    }
+}
+
+/// Where and when a point was seen.
+struct Azimuth {
+    bearing_rad: f64,
+    time_s: f64,
+    doppler_s: f64,
+}
+
+/// Returns where and when each point was seen.
+fn azimuths(scan: &PlacedScan, points: &[SparsePoint]) -> Vec<Azimuth> {
+    let azimuth = |point: &SparsePoint| Azimuth {
+        bearing_rad: bearing_rad(&point.deskewed(&scan.twist)),
+        time_s: point.time_s.into(),
+        doppler_s: point.doppler_s.into(),
+    };
+    points.iter().map(azimuth).collect()
+}
+
+fn bearing_rad(at: &Point2<f64>) -> f64 {
+    at.y.atan2(at.x)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gyre_geometry::{Twist, pose};
+    use std::f64::consts::FRAC_PI_2;
+
+    #[test]
+    fn four_planes_are_one_of_every_other_row_and_column() {
+        const HALF: usize = OUT / 2;
+        let mut folded = vec![0.0; 4 * VALUES * HALF * HALF];
+        // Value 3 in the third of its planes: an odd row, an even column.
+        folded[(4 * 3 + 2) * HALF * HALF + 5 * HALF + 7] = 1.0;
+        let planes = unfolded(&folded);
+        assert_eq!(planes[3 * OUT * OUT + 11 * OUT + 14], 1.0);
+        assert_eq!(planes.iter().sum::<f32>(), 1.0);
+    }
+
+    #[test]
+    fn a_detection_is_the_likeliest_cell_of_its_surroundings_and_has_its_values() {
+        let mut output = vec![0.0; VALUES * OUT * OUT];
+        output[..OUT * OUT].fill(-9.0);
+        let cell = 80 * OUT + 70;
+        let values = [2.0, 0.25, -0.5, 1.0, -0.5, 0.0, 2.0, 0.0, 0.0, 0.0, -9.0];
+        for (plane, value) in values.into_iter().enumerate() {
+            output[plane * OUT * OUT + cell] = value;
+        }
+        output[cell + 1] = 1.0;
+        output[cell + 5] = 0.0;
+        assert_eq!(peaks(&output, 0.3), [cell, cell + 5]);
+        assert_eq!(peaks(&output, 0.6), [cell]);
+        let found = read(&output, cell);
+        assert_eq!(found.at, Point2::new(16.75, 6.0));
+        assert_eq!(found.velocity, Vector2::new(8.0, -4.0));
+        assert_eq!(found.heading, Vector2::y());
+        assert_eq!((found.size_m, found.sigma_m), (SIZE_M, 1.0));
+        assert!((found.likely - 0.881).abs() < 1e-3);
+        // The network is not believed beyond what it was trained for.
+        assert!((found.sigma_mps - (-3f64).exp()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_detection_has_the_time_and_the_doppler_factor_of_the_azimuth_that_shows_it() {
+        let scan = PlacedScan {
+            stamp_ns: 0,
+            pose: pose(100.0, 0.0, FRAC_PI_2),
+            twist: Twist::default(),
+        };
+        let ahead = SparsePoint::from([20.0, 0.0, -0.1, 1.0, 0.05]);
+        let aside = SparsePoint::from([0.0, 20.0, 0.07, 1.0, 0.05]);
+        let mut output = vec![0.0; VALUES * OUT * OUT];
+        output[5 * OUT * OUT..6 * OUT * OUT].fill(1.0);
+        // At 30.5 m to the left.
+        let mut found = read(&output, OUT / 2 * OUT + OUT / 2 + 30);
+        found.place(&scan.pose, &azimuths(&scan, &[ahead, aside]));
+        assert!(
+            (found.at - Point2::new(69.5, 0.5)).norm() < 1e-9,
+            "{found:?}"
+        );
+        assert!((found.heading - Vector2::y()).norm() < 1e-9);
+        // Seen along the world's -x.
+        let wanted = Matrix2::new(0.12, 0.0, 0.0, 0.07);
+        assert!((found.by_velocity - wanted).norm() < 2e-3, "{found:?}");
+    }
+}

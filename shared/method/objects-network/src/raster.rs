@@ -1,0 +1,175 @@
+//! The input of the network: where the last scans had returns, around the sensor.
+
+use std::collections::VecDeque;
+
+use gyre_geometry::Pose;
+
+use gyre_geometry::SparsePoint;
+use gyre_objects::PlacedScan;
+use nalgebra::Point2;
+
+/// Cells a side.
+pub(crate) const SIDE: usize = 256;
+/// Side of a cell, m.
+pub(crate) const CELL_M: f64 = 0.5;
+/// Planes: one for each of the last scans, the share of those before, and the range.
+pub(crate) const PLANES: usize = RECENT + 2;
+/// Scans with a plane of their own.
+const RECENT: usize = 6;
+/// Scans that are remembered: those without a plane of their own show what stands.
+const REMEMBERED: usize = 20;
+/// The time from one plane to the next, ns: that of a turn of the radars of the training.
+const TURN_NS: i64 = 250_000_000;
+/// A weight that the network takes for the least.
+const LEAST_WEIGHT: f32 = 1.0 / 255.0;
+
+/// A return of a scan, as if the sensor had stood.
+#[derive(Clone, Copy, Debug)]
+struct Return {
+    /// Position in the frame of the odometry at the time of its azimuth, m.
+    at: Point2<f64>,
+    /// Weight from 0 to 1.
+    weight: f32,
+}
+
+/// Places the points of a scan in the frame of the odometry, without the vehicle's motion and
+/// Doppler shift.
+fn place(scan: &PlacedScan, points: &[SparsePoint]) -> Vec<Return> {
+    let placed = points.iter().map(|point| Return {
+        at: scan.pose * point.deskewed(&scan.twist),
+        weight: point.weight,
+    });
+    placed.collect()
+}
+
+/// The last scans.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Memory {
+    /// The newest first.
+    scans: VecDeque<(i64, Vec<Return>)>,
+}
+
+impl Memory {
+    /// Adds a scan.
+    pub fn add(&mut self, scan: &PlacedScan, points: &[SparsePoint]) {
+        self.scans.push_front((scan.stamp_ns, place(scan, points)));
+        self.scans.truncate(REMEMBERED);
+    }
+
+    /// Forgets all scans.
+    pub fn clear(&mut self) {
+        self.scans.clear();
+    }
+
+    /// Draws the scans around the sensor at the pose of the newest one: planes x SIDE x SIDE, x
+    /// ahead in rows, y to the left in columns.
+    ///
+    /// A plane of a scan has the largest weight of its returns in each cell; the next one the share
+    /// of all scans before these that had a return there, and the last one the range over 64 m.
+    pub fn draw(&self, pose: &Pose) -> Vec<f32> {
+        const CELLS: usize = SIDE * SIDE;
+        let mut planes = vec![0.0f32; PLANES * CELLS];
+        let (recent, rest) = planes.split_at_mut(RECENT * CELLS);
+        let (share, range) = rest.split_at_mut(CELLS);
+        let sensor = pose.inverse();
+        let newest_ns = self.scans.front().map_or(0, |scan| scan.0);
+        // The last scan that counted in each cell.
+        let mut counted = vec![0u8; CELLS];
+        let mut before = 0;
+        for (stamp_ns, returns) in &self.scans {
+            let turns = (newest_ns.saturating_sub(*stamp_ns) + TURN_NS / 2) / TURN_NS;
+            let plane = usize::try_from(turns).ok().filter(|turns| *turns < RECENT);
+            before += u8::from(plane.is_none());
+            for found in returns {
+                let at = sensor * found.at;
+                let Some(cell) = cell(at.x, at.y) else {
+                    continue;
+                };
+                if let Some(plane) = plane {
+                    let weight = &mut recent[plane * CELLS + cell];
+                    *weight = weight.max(found.weight.clamp(LEAST_WEIGHT, 1.0));
+                } else if counted[cell] != before {
+                    counted[cell] = before;
+                    share[cell] += 1.0;
+                }
+            }
+        }
+        let before = f32::from(before.max(1));
+        share.iter_mut().for_each(|count| *count /= before);
+        for (cell, range) in range.iter_mut().enumerate() {
+            let [x, y] = [cell / SIDE, cell % SIDE].map(|at| centre_m(at) as f32);
+            *range = x.hypot(y) / 64.0;
+        }
+        planes
+    }
+}
+
+fn cell(x_m: f64, y_m: f64) -> Option<usize> {
+    let at = |metres: f64| {
+        let at = (metres / CELL_M).floor() + (SIDE / 2) as f64;
+        (0.0..SIDE as f64).contains(&at).then_some(at as usize)
+    };
+    Some(at(x_m)? * SIDE + at(y_m)?)
+}
+
+fn centre_m(at: usize) -> f64 {
+    (at as f64 + 0.5 - (SIDE / 2) as f64) * CELL_M
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gyre_geometry::{Twist, pose};
+    use nalgebra::Point2;
+    use std::f64::consts::FRAC_PI_2;
+
+    const CELLS: usize = SIDE * SIDE;
+
+    /// Scans from a vehicle that drives to the left, with a post at one place of the world.
+    fn memory(stamps_s: &[f64]) -> (Memory, Pose) {
+        let mut memory = Memory::default();
+        let mut last = Pose::identity();
+        for stamp_s in stamps_s {
+            last = pose(10.0, 8.0 * stamp_s, FRAC_PI_2);
+            let seen = last.inverse() * Point2::new(9.8, 40.2);
+            let scan = PlacedScan {
+                stamp_ns: (stamp_s * 1e9) as i64,
+                pose: last,
+                twist: Twist::default(),
+            };
+            let point = SparsePoint::from([seen.x as f32, seen.y as f32, 0.0, 0.7, 0.0]);
+            memory.add(&scan, &[point]);
+        }
+        (memory, last)
+    }
+
+    #[test]
+    fn what_stands_is_in_one_cell_of_all_planes_wherever_the_vehicle_was() {
+        let stamps_s: Vec<f64> = (0..12).map(|scan| 0.25 * f64::from(scan)).collect();
+        let (memory, pose) = memory(&stamps_s);
+        let planes = memory.draw(&pose);
+        // 40.2 - 22 = 18.2 m ahead, and 0.2 m to the left.
+        let cell = (36 + SIDE / 2) * SIDE + SIDE / 2;
+        for plane in 0..RECENT {
+            assert_eq!(planes[plane * CELLS + cell], 0.7, "{plane}");
+        }
+        assert_eq!(planes[RECENT * CELLS + cell], 1.0);
+        let others = &planes[..(RECENT + 1) * CELLS];
+        assert_eq!(others.iter().filter(|value| **value > 0.0).count(), 7);
+        // Sides of the cell at 18.25 and 0.25 m.
+        let range = planes[(PLANES - 1) * CELLS + cell];
+        assert!((range - 18.25f32.hypot(0.25) / 64.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_scan_that_was_lost_leaves_its_plane_empty() {
+        let (memory, pose) = memory(&[0.0, 0.25, 0.75, 1.0]);
+        let planes = memory.draw(&pose);
+        let is_drawn = |plane: usize| {
+            let plane = &planes[plane * CELLS..(plane + 1) * CELLS];
+            plane.iter().any(|value| *value > 0.0)
+        };
+        let drawn: Vec<bool> = (0..=RECENT).map(is_drawn).collect();
+        assert_eq!(drawn, [true, true, false, true, true, false, false]);
+    }
+}

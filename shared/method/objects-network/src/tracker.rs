@@ -1,0 +1,162 @@
+//! The tracker: the whole method on one page.
+
+use gyre_geometry::SparsePoint;
+use gyre_objects::{Object, PlacedScan, assign};
+
+use crate::detector::{Detection, Detector};
+use crate::track::Track;
+use crate::{NetworkConfig, NetworkError};
+
+/// Tracks moving objects from scan to scan.
+pub struct NetworkTracker {
+    config: NetworkConfig,
+    detector: Detector,
+    tracks: Vec<Track>,
+    objects: Vec<Object>,
+    next_id: u64,
+    stamp_ns: Option<i64>,
+}
+
+impl NetworkTracker {
+    /// Creates a tracker without objects, with a network from an ONNX file.
+    ///
+    /// # Errors
+    /// A network that cannot be loaded.
+    pub fn new(config: &NetworkConfig, network: Vec<u8>) -> Result<Self, NetworkError> {
+        Ok(Self {
+            config: config.clone(),
+            detector: Detector::new(network)?,
+            tracks: Vec::new(),
+            objects: Vec::new(),
+            next_id: 1,
+            stamp_ns: None,
+        })
+    }
+
+    /// Takes the points of the next scan, as measured. Returns the objects at its time: those that
+    /// move, and those that did and stand now.
+    ///
+    /// A scan that is not later than the one before, or by more than two seconds, ends all tracks.
+    ///
+    /// # Errors
+    /// A network that cannot be computed.
+    pub fn update(
+        &mut self,
+        scan: &PlacedScan,
+        points: &[SparsePoint],
+    ) -> Result<&[Object], NetworkError> {
+        self.predict(scan.stamp_ns);
+        let least = self.config.least_likely;
+        let found = self.detector.detect(scan, points, least)?;
+        let rest = self.assign(found);
+        self.begin(&rest);
+        self.judge();
+        let objects = self.tracks.iter().filter_map(|it| it.object(&self.config));
+        self.objects.clear();
+        self.objects.extend(objects);
+        Ok(&self.objects)
+    }
+
+    /// Forgets all objects and all that was seen; identities are not given again.
+    pub fn restart(&mut self) {
+        self.detector.clear();
+        self.tracks.clear();
+        self.objects.clear();
+        self.stamp_ns = None;
+    }
+
+    /// Predicts all tracks at the scan's time.
+    fn predict(&mut self, stamp_ns: i64) {
+        if let Some(before_ns) = self.stamp_ns {
+            let dt_s = stamp_ns.saturating_sub(before_ns) as f64 * 1e-9;
+            match dt_s > 0.0 && dt_s <= self.config.max_gap_s {
+                true => {
+                    let config = &self.config;
+                    self.tracks
+                        .iter_mut()
+                        .for_each(|track| track.predict(dt_s, config));
+                }
+                false => self.restart(),
+            }
+        }
+        self.stamp_ns = Some(stamp_ns);
+    }
+
+    /// Updates the tracks by what the scan shows, objects first. Returns what is left.
+    fn assign(&mut self, found: Vec<Detection>) -> Vec<Detection> {
+        let (objects, others): (Vec<usize>, Vec<usize>) = (0..self.tracks.len())
+            .filter(|index| !self.tracks[*index].is_lost(&self.config))
+            .partition(|index| self.tracks[*index].is_object());
+        let rest = self.assign_to(&objects, found);
+        self.assign_to(&others, rest)
+    }
+
+    fn assign_to(&mut self, tracks: &[usize], found: Vec<Detection>) -> Vec<Detection> {
+        let config = &self.config;
+        let costs: Vec<Vec<Option<f64>>> = tracks
+            .iter()
+            .map(|track| {
+                let track = &self.tracks[*track];
+                let costs = found.iter().map(|it| track.cost(it, config));
+                costs.collect()
+            })
+            .collect();
+        let mut is_left = vec![true; found.len()];
+        for (track, assigned) in tracks.iter().zip(assign(&costs)) {
+            let track = &mut self.tracks[*track];
+            match assigned {
+                Some(detection) => {
+                    is_left[detection] = false;
+                    track.update(&found[detection], config);
+                }
+                None => track.miss(config),
+            }
+        }
+        let left = found.into_iter().zip(is_left);
+        left.filter_map(|(detection, is_left)| is_left.then_some(detection))
+            .collect()
+    }
+
+    /// Begins tracks at what belongs to none.
+    fn begin(&mut self, rest: &[Detection]) {
+        let tracks = rest.iter().map(|it| Track::new(it, &self.config));
+        self.tracks.extend(tracks);
+    }
+
+    /// Ends tracks, also those that have become one with an older one, and decides which move.
+    fn judge(&mut self) {
+        let config = &self.config;
+        self.tracks.retain(|track| !track.is_over(config));
+        for index in 0..self.tracks.len() {
+            if self.tracks[index].judge(&self.config) {
+                let id = self.identity(index);
+                self.tracks[index].confirm(id);
+            }
+        }
+        let mut index = 0;
+        while index < self.tracks.len() {
+            let (older, rest) = self.tracks.split_at(index);
+            let is_same = |older: &Track| !older.is_lost(&self.config) && older.is_same(&rest[0]);
+            match older.iter().any(is_same) && !rest[0].is_lost(&self.config) {
+                true => _ = self.tracks.remove(index),
+                false => index += 1,
+            }
+        }
+    }
+
+    /// Returns the identity of a track that becomes an object: that of the lost one which would be
+    /// there now, or a new one.
+    fn identity(&mut self, index: usize) -> u64 {
+        let found = &self.tracks[index];
+        let lost = self.tracks.iter().enumerate();
+        let lost =
+            lost.filter_map(|(lost, track)| Some((lost, track.distance(found, &self.config)?)));
+        match lost.min_by(|a, b| a.1.total_cmp(&b.1)) {
+            Some((lost, _)) => self.tracks[lost].give_up(),
+            None => {
+                self.next_id += 1;
+                self.next_id - 1
+            }
+        }
+    }
+}
