@@ -22,7 +22,7 @@ RECENT, REMEMBERED = 6, 20
 PLANES = RECENT + 2
 """A cell of the output is two by two of the input."""
 OUT, OUT_M = SIDE // 2, 2 * CELL_M
-"""Likelihood, centre (2), velocity (2), heading (2), size (2), logarithms of two standard deviations."""
+"""Likelihood, centre (2), velocity (2), heading (2), size (2), logarithms of two deviations."""
 VALUES = 11
 SPEED_MPS, SIZE_M = 8.0, (4.5, 1.9)
 """Scans of a drive that have nothing before them."""
@@ -91,7 +91,7 @@ class Sample:
 
 
 def samples(scans: list[Scan], stride: int = 1) -> list[Sample]:
-    """Draws scans of a drive with those before them: with a stride as if all had driven so many times as fast."""
+    """Draws scans of a drive with those before them: with a stride as if all drove faster by it."""
     scans = scans[::stride]
     placed = [rotated(deskewed(it.points, it.twist), it.pose[2]) + it.pose[:2] for it in scans]
     drawn = [sample(scans[: index + 1], placed[: index + 1]) for index in range(FIRST, len(scans))]
@@ -138,8 +138,8 @@ ROWS_M, COLUMNS_M = np.meshgrid(CENTRES_M, CENTRES_M, indexing="ij")
 
 
 def roughened(it: Sample, random: np.random.Generator) -> Sample:
-    """Returns a sample as of a real road, where less of a scan is seen again in the next one: the poses are less sure,
-    returns come and go, echoes are weaker or stronger, and there is clutter."""
+    """Returns a sample as of a real road, where less of a scan is seen again in the next one: the
+    poses are less sure, returns come and go, echoes are weaker or stronger, and there is clutter."""
     plane, rows, columns = it.cells // SIDE**2, it.cells // SIDE % SIDE - SIDE / 2, it.cells % SIDE - SIDE / 2
     values = it.values * random.uniform(0.5, 1.3)
     users = it.users.copy()
@@ -165,7 +165,7 @@ def roughened(it: Sample, random: np.random.Generator) -> Sample:
 
 
 def fade(user: np.ndarray, plane: np.ndarray, rows: np.ndarray, columns: np.ndarray, values: np.ndarray, random: np.random.Generator) -> None:
-    """Weakens the echoes of a road user by up to 20 dB, of 30 in all values. What is hardly seen need not be found."""
+    """Weakens the echoes of a road user by up to 20 dB. What is hardly seen need not be found."""
     x, y, vx, vy, _, length, *_ = user
     ago_s = 0.25 * plane
     off = np.hypot(rows * CELL_M - x + vx * ago_s, columns * CELL_M - y + vy * ago_s)
@@ -225,7 +225,7 @@ def convolution(inputs: int, outputs: int, stride: int = 1, size: int = 3) -> nn
 
 
 class Network(nn.Module):
-    """Planes of scans in, values of cells out: each value in four planes, of every other row and column."""
+    """Planes of scans in, values of cells out, each in four planes of every other row and column."""
 
     def __init__(self, widths: tuple[int, ...] = (16, 32, 48, 64)):
         super().__init__()
@@ -258,8 +258,9 @@ class Network(nn.Module):
 
 
 def loss(values: torch.Tensor, likely: torch.Tensor, counts: torch.Tensor, true: torch.Tensor, near: torch.Tensor) -> torch.Tensor:
-    """The focal loss of the likelihoods ("Objects as Points", Eq. 1), and for the cells near a centre the negative
-    logarithms of the likelihoods of centre and velocity, and the differences of heading and size."""
+    """The focal loss of the likelihoods ("Objects as Points", Eq. 1), and for the cells near a centre
+    the negative logarithms of the likelihoods of centre and velocity, and the differences of heading
+    and size."""
     values = functional.pixel_shuffle(values.float(), 2)
     said = torch.sigmoid(values[:, 0]).clamp(1e-5, 1 - 1e-5)
     is_centre = likely == 1.0

@@ -1,17 +1,16 @@
 //! The settings of the tracking.
 
-use serde::Deserialize;
+use gyre_objects::ObjectsConfig;
 
 /// The tracking of moving objects by a network.
 ///
 /// The constants are those of road vehicles, and of radars that turn four times a second; those of
 /// the score were chosen on simulated drives.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct NetworkConfig {
-    /// Time between two scans beyond which all tracks end, s. Default 2: by then a car at walking
-    /// pace is elsewhere.
-    pub max_gap_s: f64,
+    /// The motion of objects: of these settings the accelerations, turn rates, speeds of what stands
+    /// and of a heading, and the largest gap.
+    pub motion: ObjectsConfig,
     /// Likelihood, by the network, from which on a place counts as one of a vehicle that moves.
     /// Default 0.1: what is less likely keeps no track alive.
     pub least_likely: f64,
@@ -34,7 +33,7 @@ pub struct NetworkConfig {
     /// Time that a track is continued without being seen, s: a car that passes hides another for
     /// about one. Default 1.
     pub coast_s: f64,
-    /// Time for which an object that is not seen keeps its identity, s. Default 5: then it may be
+    /// Time for which an object that is not seen keeps its identity, s. Default 8: then it may be
     /// anywhere.
     pub lost_s: f64,
     /// The same of one that had stopped, s. Default 60: a red light.
@@ -52,23 +51,7 @@ pub struct NetworkConfig {
     pub velocity_sigmas: f64,
     /// Standard deviation of the heading that the network gives, rad. Default 0.2.
     pub heading_sigma_rad: f64,
-    /// Standard deviation of an object's acceleration along its way, m/s²: vehicles brake and
-    /// accelerate with 1 to 3. Default 1.5.
-    pub acceleration_mps2: f64,
-    /// Standard deviation of its acceleration across its way beyond that of a turn, m/s²: a lane is
-    /// changed with about 1. Default 1.
-    pub lateral_acceleration_mps2: f64,
-    /// Largest turn rate, rad/s: a car turns off at 7 m/s on a radius of 10 m. Default 0.7.
-    pub turn_rate_radps: f64,
-    /// Mean time for which a turn rate lasts, s: a driver steers into a corner, and out of it, in
-    /// about that. Default 0.5.
-    pub turn_lasts_s: f64,
-    /// Speed up to which an object counts as standing, m/s: the odometry's own error, and what
-    /// wind moves. Default 0.8.
-    pub standing_mps: f64,
-    /// Speed above which its direction is the heading, m/s. Default 1: below, noise turns it.
-    pub heading_mps: f64,
-    /// Standard deviations by which the speed must exceed `standing_mps` for an object to be
+    /// Standard deviations by which the speed must exceed `motion.standing_mps` for an object to be
     /// moving. Default 1.
     pub moving_sigmas: f64,
 }
@@ -76,7 +59,7 @@ pub struct NetworkConfig {
 impl Default for NetworkConfig {
     fn default() -> Self {
         Self {
-            max_gap_s: 2.0,
+            motion: ObjectsConfig::default(),
             least_likely: 0.1,
             even_likely: 0.35,
             confirm_score: 2.0,
@@ -93,12 +76,6 @@ impl Default for NetworkConfig {
             place_sigmas: 1.0,
             velocity_sigmas: 2.0,
             heading_sigma_rad: 0.2,
-            acceleration_mps2: 1.5,
-            lateral_acceleration_mps2: 1.0,
-            turn_rate_radps: 0.7,
-            turn_lasts_s: 0.5,
-            standing_mps: 0.8,
-            heading_mps: 1.0,
             moving_sigmas: 1.0,
         }
     }

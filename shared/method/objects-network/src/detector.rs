@@ -4,10 +4,9 @@ use std::fmt::Display;
 use std::sync::Arc;
 
 use gyre_geometry::{Pose, SparsePoint, wrap_angle};
+use gyre_objects::PlacedScan;
 use nalgebra::{Matrix2, Point2, Vector2};
 use rten::{Model, ModelOptions, RunOptions, ThreadPool, Value};
-
-use gyre_objects::PlacedScan;
 
 use crate::raster::{Memory, PLANES, SIDE};
 
@@ -31,7 +30,7 @@ pub struct NetworkError(pub(crate) String);
 
 /// Finds vehicles that move in the last scans.
 pub(crate) struct Detector {
-    network: Arc<Model>,
+    network: Model,
     thread: Arc<ThreadPool>,
     memory: Memory,
 }
@@ -65,9 +64,9 @@ impl Detector {
         let network = ModelOptions::with_all_ops().load(network);
         let network = network.map_err(|error| failed(&error))?;
         Ok(Self {
-            network: Arc::new(network),
+            network,
             thread: Arc::new(ThreadPool::with_num_threads(1)),
-            memory: Memory::default(),
+            memory: Memory::new(),
         })
     }
 

@@ -7,9 +7,7 @@
 //!
 //! - `raster`: the last scans around the vehicle, drawn as planes,
 //! - `detector`: vehicles that move, by the network,
-//! - `filter`: the filter of a track, Kalman filters of several turn rates with the time of each
-//!   azimuth,
-//! - `track`: birth, confirmation, coasting and death.
+//! - `track`: birth, confirmation, coasting and death, with the filter of [`gyre_objects`].
 //!
 //! # Frames and units
 //! Those of [`gyre_geometry`]: x forward, y left, yaw counter-clockwise; m, rad, s. Objects are in
@@ -17,7 +15,6 @@
 
 mod config;
 mod detector;
-mod filter;
 mod raster;
 mod track;
 mod tracker;

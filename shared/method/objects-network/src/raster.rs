@@ -2,14 +2,13 @@
 
 use std::collections::VecDeque;
 
-use gyre_geometry::Pose;
-
-use gyre_geometry::SparsePoint;
+use gyre_geometry::{Pose, SparsePoint};
 use gyre_objects::PlacedScan;
 use nalgebra::Point2;
 
 /// Cells a side.
 pub(crate) const SIDE: usize = 256;
+const CELLS: usize = SIDE * SIDE;
 /// Side of a cell, m.
 pub(crate) const CELL_M: f64 = 0.5;
 /// Planes: one for each of the last scans, the share of those before, and the range.
@@ -43,13 +42,26 @@ fn place(scan: &PlacedScan, points: &[SparsePoint]) -> Vec<Return> {
 }
 
 /// The last scans.
-#[derive(Clone, Debug, Default)]
 pub(crate) struct Memory {
-    /// The newest first.
+    /// Time, ns, and returns of each, the newest first.
     scans: VecDeque<(i64, Vec<Return>)>,
+    /// The plane of the range.
+    range: Vec<f32>,
 }
 
 impl Memory {
+    /// Creates a memory of nothing.
+    pub fn new() -> Self {
+        let range = |cell: usize| {
+            let [x, y] = [cell / SIDE, cell % SIDE].map(|at| centre_m(at) as f32);
+            x.hypot(y) / 64.0
+        };
+        Self {
+            scans: VecDeque::new(),
+            range: (0..CELLS).map(range).collect(),
+        }
+    }
+
     /// Adds a scan.
     pub fn add(&mut self, scan: &PlacedScan, points: &[SparsePoint]) {
         self.scans.push_front((scan.stamp_ns, place(scan, points)));
@@ -67,7 +79,6 @@ impl Memory {
     /// A plane of a scan has the largest weight of its returns in each cell; the next one the share
     /// of all scans before these that had a return there, and the last one the range over 64 m.
     pub fn draw(&self, pose: &Pose) -> Vec<f32> {
-        const CELLS: usize = SIDE * SIDE;
         let mut planes = vec![0.0f32; PLANES * CELLS];
         let (recent, rest) = planes.split_at_mut(RECENT * CELLS);
         let (share, range) = rest.split_at_mut(CELLS);
@@ -96,10 +107,7 @@ impl Memory {
         }
         let before = f32::from(before.max(1));
         share.iter_mut().for_each(|count| *count /= before);
-        for (cell, range) in range.iter_mut().enumerate() {
-            let [x, y] = [cell / SIDE, cell % SIDE].map(|at| centre_m(at) as f32);
-            *range = x.hypot(y) / 64.0;
-        }
+        range.copy_from_slice(&self.range);
         planes
     }
 }
@@ -120,14 +128,11 @@ fn centre_m(at: usize) -> f64 {
 mod tests {
     use super::*;
     use gyre_geometry::{Twist, pose};
-    use nalgebra::Point2;
     use std::f64::consts::FRAC_PI_2;
-
-    const CELLS: usize = SIDE * SIDE;
 
     /// Scans from a vehicle that drives to the left, with a post at one place of the world.
     fn memory(stamps_s: &[f64]) -> (Memory, Pose) {
-        let mut memory = Memory::default();
+        let mut memory = Memory::new();
         let mut last = Pose::identity();
         for stamp_s in stamps_s {
             last = pose(10.0, 8.0 * stamp_s, FRAC_PI_2);

@@ -1,17 +1,17 @@
 //! A track: an object from its birth to its death.
 
-use nalgebra::{Point2, Vector2};
-
-use crate::detector::Detection;
-use crate::filter::{Filter, Sighting};
-use gyre_objects::Object;
+use gyre_objects::{Filter, Object, Sighting};
+use nalgebra::{Matrix2, Point2, Vector2};
 
 use crate::NetworkConfig;
+use crate::detector::Detection;
 
 /// Distance between the centres of two tracks of one vehicle, m: less than a car is long.
 const SAME_M: f64 = 3.0;
 /// Speed of a vehicle's centre across its heading, m/s: it has its place by the rear axle.
 const SLIP_MPS: f64 = 0.1;
+/// Standard deviation of a velocity before it is measured, m/s: that of any vehicle.
+const UNKNOWN_MPS: f64 = 30.0;
 
 /// An object that may be one.
 #[derive(Clone, Debug)]
@@ -37,8 +37,10 @@ pub(crate) struct Track {
 impl Track {
     /// Begins a track.
     pub fn new(detection: &Detection, config: &NetworkConfig) -> Self {
+        let mut filter = Filter::new(&sighting(detection, config), UNKNOWN_MPS);
+        measure_velocity(&mut filter, detection, config);
         Self {
-            filter: Filter::new(&Sighting::of(detection, config)),
+            filter,
             heading: detection.heading,
             size_m: detection.size_m,
             weight: detection.likely,
@@ -55,7 +57,7 @@ impl Track {
     /// Predicts it some seconds later.
     pub fn predict(&mut self, dt_s: f64, config: &NetworkConfig) {
         if !self.has_stopped(config) {
-            self.filter.predict(dt_s, &self.heading, config);
+            self.filter.predict(dt_s, &self.heading, &config.motion);
             self.turn(config);
         }
         self.age = self.age.saturating_add(1);
@@ -66,13 +68,19 @@ impl Track {
 
     /// Returns what it costs that a scan shows it there; `None` outside of its gate.
     pub fn cost(&self, detection: &Detection, config: &NetworkConfig) -> Option<f64> {
-        let (chi_square, cost) = self.filter.distance(&Sighting::of(detection, config));
-        (chi_square <= config.gate).then_some(cost)
+        let place = self.filter.innovation(&sighting(detection, config));
+        let variance = (detection.sigma_mps * config.velocity_sigmas).powi(2);
+        let covariance = self.filter.velocity_covariance() + Matrix2::identity() * variance;
+        let faster = detection.velocity - self.filter.velocity();
+        let chi_square = (faster.transpose() * covariance.try_inverse()? * faster)[0];
+        let cost = place.cost() + chi_square + covariance.determinant().ln();
+        (place.chi_square() + chi_square <= config.gate).then_some(cost)
     }
 
     /// Updates it by what a scan shows.
     pub fn update(&mut self, detection: &Detection, config: &NetworkConfig) {
-        self.filter.update(&Sighting::of(detection, config));
+        self.filter.update(&sighting(detection, config));
+        measure_velocity(&mut self.filter, detection, config);
         let speed_mps = self.filter.velocity().norm();
         let sigma_mps = SLIP_MPS + config.heading_sigma_rad * speed_mps;
         self.filter.align(&detection.heading, sigma_mps);
@@ -96,7 +104,7 @@ impl Track {
     /// Turns the heading into the direction of the motion.
     fn turn(&mut self, config: &NetworkConfig) {
         let velocity = self.filter.velocity();
-        if velocity.norm() > config.heading_mps {
+        if velocity.norm() > config.motion.heading_mps {
             self.heading = velocity.normalize();
         }
     }
@@ -144,7 +152,7 @@ impl Track {
     /// uncertainty explains. Returns whether it becomes an object by that.
     pub fn judge(&mut self, config: &NetworkConfig) -> bool {
         let (speed_mps, sigma_mps) = self.filter.speed();
-        self.moving = speed_mps - config.standing_mps > config.moving_sigmas * sigma_mps;
+        self.moving = speed_mps - config.motion.standing_mps > config.moving_sigmas * sigma_mps;
         self.moving
             && !self.is_object()
             && self.hits >= config.birth_hits
@@ -187,6 +195,24 @@ impl Track {
     }
 }
 
+/// Returns where a detection says that an object is.
+fn sighting(detection: &Detection, config: &NetworkConfig) -> Sighting {
+    let sigma_m = detection.sigma_m * config.place_sigmas;
+    Sighting {
+        at: detection.at,
+        noise: Matrix2::identity() * sigma_m.powi(2),
+        by_velocity: detection.by_velocity,
+    }
+}
+
+/// Updates a filter by the velocity of a detection.
+fn measure_velocity(filter: &mut Filter, detection: &Detection, config: &NetworkConfig) {
+    let sigma_mps = detection.sigma_mps * config.velocity_sigmas;
+    for axis in [Vector2::x(), Vector2::y()] {
+        filter.measure(&axis, detection.velocity.dot(&axis), sigma_mps);
+    }
+}
+
 /// Returns the logarithm of how much likelier an object is than none, by what a scan shows.
 fn evidence(detection: &Detection, config: &NetworkConfig) -> f64 {
     let odds = |likely: f64| {
@@ -194,4 +220,85 @@ fn evidence(detection: &Detection, config: &NetworkConfig) -> f64 {
         (likely / (1.0 - likely)).ln()
     };
     odds(detection.likely) - odds(config.even_likely)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn detection(at: [f64; 2], velocity: [f64; 2]) -> Detection {
+        let velocity = Vector2::from(velocity);
+        Detection {
+            at: at.into(),
+            velocity,
+            heading: velocity.normalize(),
+            size_m: [4.5, 1.9],
+            likely: 0.9,
+            sigma_m: 0.3,
+            sigma_mps: 1.0,
+            by_velocity: Matrix2::identity() * 0.1,
+        }
+    }
+
+    /// A track that has been seen so many times.
+    fn seen(times: u32, config: &NetworkConfig) -> Track {
+        let mut track = Track::new(&detection([20.0, 3.0], [-10.0, 0.0]), config);
+        for scan in 1..times {
+            track.predict(0.25, config);
+            let x = 20.0 - 2.5 * f64::from(scan);
+            track.update(&detection([x, 3.0], [-10.0, 0.0]), config);
+        }
+        track
+    }
+
+    #[test]
+    fn a_track_is_where_the_vehicle_was_at_the_time_of_the_scan_and_becomes_an_object() {
+        let config = NetworkConfig::default();
+        let mut track = seen(1, &config);
+        assert!((track.position() - Point2::new(21.0, 3.0)).norm() < 0.05);
+        assert!(!track.judge(&config));
+        let mut track = seen(3, &config);
+        assert!((track.position() - Point2::new(16.0, 3.0)).norm() < 0.05);
+        assert!(track.judge(&config));
+        track.confirm(7);
+        let object = track.object(&config).expect("it is one");
+        assert!(object.id == 7 && object.moving && object.age == 3);
+    }
+
+    #[test]
+    fn what_drives_the_other_way_at_the_same_place_is_not_its_own() {
+        let config = NetworkConfig::default();
+        let mut track = seen(4, &config);
+        track.predict(0.25, &config);
+        assert!(
+            track
+                .cost(&detection([10.0, 3.0], [-9.0, 0.0]), &config)
+                .is_some()
+        );
+        let other = detection([12.0, 3.0], [10.0, 0.0]);
+        assert_eq!(track.cost(&other, &config), None);
+    }
+
+    #[test]
+    fn a_lost_object_is_what_begins_where_it_would_be_and_nothing_that_was_beside_it() {
+        let config = NetworkConfig::default();
+        let mut lost = seen(4, &config);
+        lost.confirm(1);
+        for _ in 0..8 {
+            lost.predict(0.25, &config);
+            lost.miss(&config);
+        }
+        assert!(lost.is_lost(&config) && !lost.is_over(&config));
+        assert_eq!(lost.object(&config), None);
+        let begun = |known_s: f64, x: f64| Track {
+            known_s,
+            ..Track::new(&detection([x, 3.0], [-10.0, 0.0]), &config)
+        };
+        // It is 20 m on, at 13.5 - 20 m.
+        assert!(lost.distance(&begun(0.5, -7.5), &config).is_some());
+        assert_eq!(lost.distance(&begun(0.5, 60.0), &config), None);
+        assert_eq!(lost.distance(&begun(3.0, -7.5), &config), None);
+        assert_eq!(lost.give_up(), 1);
+        assert!(lost.is_over(&config));
+    }
 }

@@ -69,7 +69,7 @@ impl NetworkTracker {
     fn predict(&mut self, stamp_ns: i64) {
         if let Some(before_ns) = self.stamp_ns {
             let dt_s = stamp_ns.saturating_sub(before_ns) as f64 * 1e-9;
-            match dt_s > 0.0 && dt_s <= self.config.max_gap_s {
+            match dt_s > 0.0 && dt_s <= self.config.motion.max_gap_s {
                 true => {
                     let config = &self.config;
                     self.tracks

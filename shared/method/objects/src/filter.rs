@@ -19,7 +19,7 @@ const SHARES: [f64; 5] = [0.075, 0.075, 0.7, 0.075, 0.075];
 
 /// Position and velocity with their covariance, by models of different turn rates.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Filter {
+pub struct Filter {
     models: [Model; TURNS.len()],
     /// Mean and covariance of all models.
     mean: Estimate,
@@ -41,7 +41,7 @@ struct Estimate {
 
 /// A measured position of an object.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Sighting {
+pub struct Sighting {
     /// The position, m, as if the object stood.
     pub at: Point2<f64>,
     /// Covariance of it, m².
@@ -53,7 +53,7 @@ pub(crate) struct Sighting {
 
 impl Sighting {
     /// The near end of a cluster, whatever its heading is.
-    pub fn of_near_end(measured: &Measurement, noise: &Matrix2<f64>) -> Self {
+    pub(crate) fn of_near_end(measured: &Measurement, noise: &Matrix2<f64>) -> Self {
         Self {
             at: measured.at,
             noise: *noise,
@@ -64,7 +64,7 @@ impl Sighting {
 
 /// The difference of a measurement to what was predicted.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Innovation {
+pub struct Innovation {
     /// Measured less predicted, m.
     pub difference: Vector2<f64>,
     /// Covariance of that, m².
@@ -192,23 +192,38 @@ impl Filter {
     /// Updates the state by a heading, a unit vector, across which the velocity is zero but for a
     /// standard deviation: a vehicle drives where it points to.
     pub fn align(&mut self, heading: &Vector2<f64>, sigma_mps: f64) {
-        let side = Vector4::new(0.0, 0.0, -heading.y, heading.x);
+        self.measure(&Vector2::new(-heading.y, heading.x), 0.0, sigma_mps);
+    }
+
+    /// Updates the state by the velocity in a direction, a unit vector, with a standard deviation.
+    pub fn measure(&mut self, direction: &Vector2<f64>, wanted_mps: f64, sigma_mps: f64) {
+        let along = Vector4::new(0.0, 0.0, direction.x, direction.y);
         let variance = |estimate: &Estimate| {
-            (side.transpose() * estimate.covariance * side)[0] + sigma_mps.powi(2)
+            (along.transpose() * estimate.covariance * along)[0] + sigma_mps.powi(2)
         };
+        let off_mps = |estimate: &Estimate| wanted_mps - along.dot(&estimate.state);
         let costs = self.models.map(|model| {
             let variance = variance(&model.estimate);
-            side.dot(&model.estimate.state).powi(2) / variance + variance.ln()
+            off_mps(&model.estimate).powi(2) / variance + variance.ln()
         });
         for model in &mut self.models {
             let estimate = &mut model.estimate;
-            let gain = estimate.covariance * side / variance(estimate);
-            estimate.state -= gain * side.dot(&estimate.state);
-            let rest = Matrix4::identity() - gain * side.transpose();
+            let gain = estimate.covariance * along / variance(estimate);
+            estimate.state += gain * off_mps(estimate);
+            let rest = Matrix4::identity() - gain * along.transpose();
             estimate.covariance = rest * estimate.covariance * rest.transpose()
                 + gain * gain.transpose() * sigma_mps.powi(2);
         }
         self.weigh(&costs);
+    }
+
+    /// Returns the squared Mahalanobis distance of another state from this one.
+    pub fn apart(&self, other: &Self) -> f64 {
+        let difference = self.mean.state - other.mean.state;
+        let covariance = self.mean.covariance + other.mean.covariance;
+        covariance.try_inverse().map_or(f64::INFINITY, |inverse| {
+            (difference.transpose() * inverse * difference)[0]
+        })
     }
 
     /// Weighs the models by minus twice the logarithms of their likelihoods.
@@ -513,6 +528,21 @@ mod tests {
         let mut same = before;
         same.align(&heading, 1e6);
         assert!((same.velocity() - before.velocity()).norm() < 1e-6);
+    }
+
+    #[test]
+    fn a_measured_velocity_is_taken_in_its_direction_and_states_are_apart_by_it() {
+        let noise = Matrix2::identity() * SIGMA_M.powi(2);
+        let place = measurement(Vector2::new(20.0, -7.0));
+        let still = Filter::new(&Sighting::of_near_end(&place, &noise), 8.0);
+        let mut moving = still;
+        moving.measure(&Vector2::x(), 6.0, 0.1);
+        assert!((moving.velocity() - Vector2::new(6.0, 0.0)).norm() < 0.01);
+        assert!((moving.velocity_covariance()[(0, 0)] - 0.01).abs() < 1e-4);
+        assert_eq!(moving.velocity_covariance()[(1, 1)], 64.0);
+        assert_eq!(still.apart(&still), 0.0);
+        // 6 m/s with a variance of 64 and 0.01 (m/s)².
+        assert!((still.apart(&moving) - 36.0 / 64.01).abs() < 0.01);
     }
 
     #[test]

@@ -32,6 +32,7 @@ mod tracker;
 
 pub use assignment::assign;
 pub use config::{ObjectsConfig, ObjectsError, ObjectsKind};
+pub use filter::{Filter, Innovation, Sighting};
 pub use object::Object;
 pub use returns::PlacedScan;
 pub use tracker::ObjectTracker;
