@@ -8,8 +8,8 @@ use gyre_objects::ObjectsConfig;
 /// the score were chosen on simulated drives.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NetworkConfig {
-    /// The motion of objects: of these settings the accelerations, turn rates, speeds of what stands
-    /// and of a heading, and the largest gap.
+    /// The motion of objects: of these settings the accelerations, turn rates, speeds of what
+    /// stands and of a heading, and the largest gap.
     pub motion: ObjectsConfig,
     /// Likelihood, by the network, from which on a place counts as one of a vehicle that moves.
     /// Default 0.1: what is less likely keeps no track alive.
