@@ -1,7 +1,7 @@
-"""Trains the network that finds moving objects: `lab/objects.onnx`.
+"""Trains the network that finds moving objects: `models/objects.onnx`.
 
-A scan is drawn with those before it, as `shared/method/objects-network/src/raster.rs` does; the network
-says where the centre of a vehicle that moves is, its velocity, heading and size, and how wrong it
+A scan is drawn with those before it, as `shared/method/objects/src/raster.rs` does; the network says
+where the centre of a vehicle that moves is, its velocity, heading and size, and how wrong it
 may be (Zhou, Wang and Krähenbühl, "Objects as Points", 2019; Kendall and Gal, "What uncertainties
 do we need in Bayesian deep learning for computer vision?", 2017). The truth is the simulator's.
 
@@ -133,6 +133,110 @@ def shown(scan: Scan) -> np.ndarray:
     return np.array(rows, np.float32).reshape(-1, 9)
 
 
+@dataclass
+class Look:
+    """The look of one vehicle's echoes. Simulated ones are a few corners and panels that stay as
+    they are; real ones are specks all over the body that come and go, and fewer when near."""
+
+    fixed: np.ndarray
+    """Places of what lasts, from -1 to 1 along the vehicle and across it."""
+    lasting: float
+    """Share of the scans in which each of these is seen."""
+    fleeting: float
+    """Mean number of places, beyond one, that only one scan shows."""
+    returns: float
+    """Mean number of returns beyond 20 m, and the power of the range by which they are fewer
+    nearer."""
+    fewer_near: float
+    weight: float
+    """Mean weight, and its deviations from place to place and from scan to scan."""
+    uneven: float
+    flicker: float
+    depth_m: float
+    """Depth behind the near end at which echoes are weaker by a factor of e."""
+    along_m: float
+    """Scatter of the returns of a place along the beam, and that of what comes later."""
+    late_m: float
+
+
+def look(random: np.random.Generator) -> Look:
+    fixed = random.uniform(-1, 1, (random.integers(2, 12), 2))
+    is_edge = random.random(len(fixed)) < random.random()
+    is_end = np.abs(fixed[:, 0]) > np.abs(fixed[:, 1])
+    fixed[is_edge & is_end, 0] = np.sign(fixed[is_edge & is_end, 0])
+    fixed[is_edge & ~is_end, 1] = np.sign(fixed[is_edge & ~is_end, 1])
+    return Look(
+        fixed=fixed,
+        lasting=random.uniform(0.3, 0.95),
+        fleeting=random.uniform(0, 8),
+        returns=np.exp(random.uniform(np.log(10), np.log(60))),
+        fewer_near=random.uniform(0, 1.5),
+        weight=random.uniform(0.15, 0.95),
+        uneven=random.uniform(0.05, 0.3),
+        flicker=random.uniform(0.02, 0.25),
+        depth_m=np.exp(random.uniform(0, np.log(12))),
+        along_m=random.uniform(0.1, 0.5),
+        late_m=random.choice([0.0, random.uniform(0, 1.5)]),
+    )
+
+
+REPAINTED = 0.85
+"""Share of the vehicles whose echoes are made anew."""
+
+
+def repainted(scans: list[Scan], random: np.random.Generator) -> list[Scan]:
+    """Returns a drive with other echoes of its vehicles, where the simulation shows any. Those
+    that have none left are not seen."""
+    looks: dict[float, Look | None] = {}
+    drive = []
+    for scan in scans:
+        here, users = deskewed(scan.points, scan.twist), scan.users.copy()
+        points, is_gone = [], np.zeros(len(here), bool)
+        for user, seen in zip(users, shown(scan)):
+            x, y, vx, vy, yaw, length, width, is_wanted, _ = seen
+            if not is_wanted or np.hypot(vx, vy) < 0.3:
+                continue
+            if user[0] not in looks:
+                looks[user[0]] = look(random) if random.random() < REPAINTED else None
+            its = looks[user[0]]
+            ahead, aside = np.abs(rotated(here - (x, y), np.full(len(here), -yaw))).T
+            is_own = (ahead < length / 2 + 0.7) & (aside < width / 2 + 0.7) & ~is_gone
+            if its is None or not is_own.any():
+                continue
+            is_gone |= is_own
+            in_view = min(1.0, np.count_nonzero(is_own) / 10)
+            points.append(echoes(its, seen, in_view, scan, here, random))
+            user[7] *= len(points[-1]) > 1
+        drive.append(Scan(scan.pose, scan.twist, np.concatenate([scan.points[~is_gone], *points]), users))
+    return drive
+
+
+def echoes(its: Look, seen: np.ndarray, in_view: float, scan: Scan, here: np.ndarray, random: np.random.Generator) -> np.ndarray:
+    """Returns the points of a vehicle, a row each, as in the scan."""
+    x, y, _, _, yaw, length, width, *_ = seen
+    range_m = max(np.hypot(x, y), 1.0)
+    ray = np.array([x, y]) / range_m
+    fleeting = random.uniform(-1, 1, (1 + random.poisson(its.fleeting), 2))
+    places = np.concatenate([its.fixed[random.random(len(its.fixed)) < its.lasting], fleeting])
+    places = rotated(places * (length / 2, width / 2), np.full(len(places), yaw)) + (x, y)
+    depth_m = places @ ray
+    fades = np.exp(-(depth_m - depth_m.min()) / its.depth_m)
+    weights = its.weight + its.flicker * random.normal() + its.uneven * random.normal(size=len(places))
+    weights = weights.clip(0.02, 1) * (0.5 + 0.5 * fades)
+    mean = its.returns * in_view * min(1.0, range_m / 20) ** its.fewer_near * np.sqrt(length / SIZE_M[0])
+    count = random.poisson(mean)
+    of = random.choice(len(places), count, p=(fades + 0.02) / np.sum(fades + 0.02))
+    along_m = random.normal(0, its.along_m, count) + its.late_m * random.exponential(1, count) * (random.random(count) < 0.3)
+    across_m = random.normal(0, 0.15 + 0.007 * range_m, count)
+    wanted = places[of] + np.outer(along_m, ray) + np.outer(across_m, [-ray[1], ray[0]])
+    apart = np.arctan2(*here.T[::-1])[None] - np.arctan2(*wanted.T[::-1])[:, None]
+    azimuth = np.argmin(np.abs((apart + np.pi) % (2 * np.pi) - np.pi), axis=1)
+    points = np.column_stack([wanted, scan.points[azimuth, 2], (weights[of] * random.uniform(0.3, 1.1, count)).clip(0.02, 1), scan.points[azimuth, 4]])
+    for _ in range(2):  # Where the sensor measured what is there.
+        points[:, :2] += wanted - deskewed(points, scan.twist)
+    return points
+
+
 CENTRES_M = (np.arange(OUT) + 0.5 - OUT / 2) * OUT_M
 ROWS_M, COLUMNS_M = np.meshgrid(CENTRES_M, CENTRES_M, indexing="ij")
 
@@ -225,7 +329,8 @@ def convolution(inputs: int, outputs: int, stride: int = 1, size: int = 3) -> nn
 
 
 class Network(nn.Module):
-    """Planes of scans in, values of cells out, each in four planes of every other row and column."""
+    """Planes of scans in, values of cells out, each in four planes of every other row and
+    column."""
 
     def __init__(self, widths: tuple[int, ...] = (16, 32, 48, 64)):
         super().__init__()
@@ -258,8 +363,8 @@ class Network(nn.Module):
 
 
 def loss(values: torch.Tensor, likely: torch.Tensor, counts: torch.Tensor, true: torch.Tensor, near: torch.Tensor) -> torch.Tensor:
-    """The focal loss of the likelihoods ("Objects as Points", Eq. 1), and for the cells near a centre
-    the negative logarithms of the likelihoods of centre and velocity, and the differences of heading
+    """The focal loss of the likelihoods ("Objects as Points", Eq. 1), and for the cells near a
+    centre the negative logarithms of the likelihoods of centre and velocity, and the differences of heading
     and size."""
     values = functional.pixel_shuffle(values.float(), 2)
     said = torch.sigmoid(values[:, 0]).clamp(1e-5, 1 - 1e-5)
@@ -332,8 +437,13 @@ def register(commands) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
+    random = np.random.default_rng(1)
     drives = sorted(options.drives.iterdir())
-    data = [it for drive in drives for stride in STRIDES for it in samples(read(drive), stride)]
+    data = []
+    for drive in map(read, drives):
+        data += samples(drive)[::2]
+        other = repainted(drive, random)
+        data += [it for stride in STRIDES for it in samples(other, stride)]
     print(f"{len(drives)} drives, {len(data)} scans", flush=True)
     network = train(data, options.steps)
     options.out.parent.mkdir(parents=True, exist_ok=True)

@@ -52,6 +52,31 @@ def test_a_car_is_wanted_where_the_beam_shows_it():
     assert np.allclose(values[:, row, column], [0.0, -0.5, -10.0, 0.0, -1.0, 0.0, 0.0, 0.0], atol=2e-3)
 
 
+def test_a_repainted_car_has_other_echoes_where_it_is_and_what_stands_keeps_its_own():
+    def sight(index: int) -> objects.Scan:
+        car = (7, 25.0 - 2.5 * index, 6.0, -10.0, 0.0, np.pi, 1, 1, 4.5, 1.9)
+        plain = scan(0.0, [car])
+        x, y = objects.shown(plain)[0, :2]
+        corners = np.array([[x + ahead, y + aside, 0.1, 0.9, 0.05] for ahead in (-2.2, 2.2) for aside in (-0.9, 0.9)])
+        return objects.Scan(plain.pose, plain.twist, np.concatenate([plain.points, corners]), plain.users)
+
+    drive = [sight(index) for index in range(6)]
+    random = np.random.default_rng(3)
+    counts = []
+    for _ in range(20):
+        for before, after in zip(drive, objects.repainted(drive, random)):
+            assert np.array_equal(after.points[0], before.points[0])
+            off = objects.deskewed(after.points[1:], after.twist) - objects.shown(before)[0, :2]
+            counts.append(len(off))
+            if len(off):
+                assert np.median(np.abs(off[:, 0])) < 3.5 and np.abs(off[:, 1]).max() < 3.0
+                assert (after.points[1:, 3] > 0).all() and (after.points[1:, 3] <= 1).all()
+    assert 4 < np.mean(counts) < 30 and len(set(counts)) > 10
+    # A vehicle that is hidden stays so.
+    hidden = [scan(0.0, [(7, 25.0, 0.0, -10.0, 0.0, np.pi, 1, 0, 4.5, 1.9)])] * 3
+    assert all(len(it.points) == 1 for it in objects.repainted(hidden, random))
+
+
 def test_what_is_hidden_or_a_pedestrian_counts_neither_way():
     hidden = (7, 20.0, 0.0, -10.0, 0.0, np.pi, 1, 0, 4.5, 1.9)
     pedestrian = (8, 20.0, 15.0, 1.4, 0.0, 0.0, 0, 1, 0.5, 0.5)

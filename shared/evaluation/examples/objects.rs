@@ -20,7 +20,6 @@ use gyre_datasets::{Dataset, DatasetOptions, ScanSamples};
 use gyre_evaluation::{ObjectOptions, ObjectScan, TrackedObject, TrueObject, object_errors};
 use gyre_geometry::{Pose, SparsePoint, Twist, xy_yaw};
 use gyre_objects::{Object, ObjectTracker, ObjectsConfig, ObjectsKind, PlacedScan};
-use gyre_objects_network::{NetworkConfig, NetworkTracker};
 use gyre_odometry::{Odometry, OdometryConfig};
 use gyre_radar::OwnedScan;
 use gyre_simulator::drive::DriveKind;
@@ -84,32 +83,12 @@ fn main() -> Outcome<()> {
     Ok(())
 }
 
-/// Tracks the objects of a drive: with the network that `OBJECTS_NETWORK` names, or as the program.
+/// Tracks the objects of a drive, and puts those of each scan beside the true ones.
 fn track(drive: &[DriveScan], config: &ObjectsConfig) -> Outcome<Vec<ObjectScan>> {
-    match env::var_os("OBJECTS_NETWORK") {
-        Some(path) => {
-            let mut tracker = NetworkTracker::new(&NetworkConfig::default(), fs::read(path)?)?;
-            compared(drive, |it| {
-                Ok(tracker.update(&it.placed, &it.points)?.to_vec())
-            })
-        }
-        None => {
-            let mut tracker = ObjectTracker::new(config)?;
-            compared(drive, |it| {
-                Ok(tracker.update(&it.placed, &it.points).to_vec())
-            })
-        }
-    }
-}
-
-/// Puts the objects of each scan beside the true ones.
-fn compared(
-    drive: &[DriveScan],
-    mut update: impl FnMut(&DriveScan) -> Outcome<Vec<Object>>,
-) -> Outcome<Vec<ObjectScan>> {
+    let mut tracker = ObjectTracker::new(config)?;
     let scan = |scan: &DriveScan| {
         let sensor = scan.placed.pose.inverse();
-        let objects = update(scan)?;
+        let objects = tracker.update(&scan.placed, &scan.points)?;
         let tracked = objects.iter().map(|object| seen_from(&sensor, object));
         Ok(ObjectScan {
             truth: scan.truth.clone(),
@@ -467,11 +446,7 @@ mod tests {
     #[test]
     fn a_network_finds_the_vehicles_of_a_simulated_town_and_little_else() -> Outcome<()> {
         let drive = simulated("cts350x-radiate:21:dry:60")?;
-        let network = concat!(env!("CARGO_MANIFEST_DIR"), "/../../lab/objects.onnx");
-        let mut tracker = NetworkTracker::new(&NetworkConfig::default(), fs::read(network)?)?;
-        let scans = compared(&drive, |it| {
-            Ok(tracker.update(&it.placed, &it.points)?.to_vec())
-        })?;
+        let scans = track(&drive, &ObjectsConfig::default())?;
         let errors = object_errors(&scans, &ObjectOptions::default());
         assert!(errors.required > 100, "{errors}");
         // Of this drive's 14 vehicles a hidden one is a tenth; over 24 drives it is 92 and 99 %.

@@ -1,4 +1,4 @@
-//! The program's own files: its configurations, the networks that they mask with, and a trajectory.
+//! The program's own files: its configurations, the networks, and a trajectory.
 //!
 //! Each has a path that begins with `gyre:`, as `gyre:configs/oxford.toml`, by which [`bytes`]
 //! returns its content. What is not in the program itself may be in the folder `share/gyre` of its
@@ -49,6 +49,7 @@ const FILES: &[(&str, &[u8])] = files![
     "models/gyre-255.toml"
     "models/light-255.onnx"
     "models/light-255.toml"
+    "models/objects.onnx"
 ];
 
 /// Returns whether a path begins with `gyre:`.

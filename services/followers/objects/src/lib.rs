@@ -86,7 +86,10 @@ impl Tracking {
             pose: scan.pose,
             twist: scan.twist,
         };
-        let objects = self.tracker.update(&placed, &scan.points);
+        let objects = self
+            .tracker
+            .update(&placed, &scan.points)
+            .map_err(|error| StageError::Input(error.to_string()))?;
         let known = self.read < self.tracked.len();
         self.read += 1;
         if known {

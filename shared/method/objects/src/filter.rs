@@ -10,7 +10,6 @@
 use nalgebra::{Matrix2, Matrix2x4, Matrix4, Point2, Vector2, Vector4};
 
 use crate::ObjectsConfig;
-use crate::clusters::Measurement;
 
 /// Turn rates of the models over the largest one.
 const TURNS: [f64; 5] = [-1.0, -0.5, 0.0, 0.5, 1.0];
@@ -51,24 +50,13 @@ pub struct Sighting {
     pub by_velocity: Matrix2<f64>,
 }
 
-impl Sighting {
-    /// The near end of a cluster, whatever its heading is.
-    pub(crate) fn of_near_end(measured: &Measurement, noise: &Matrix2<f64>) -> Self {
-        Self {
-            at: measured.at,
-            noise: *noise,
-            by_velocity: by_time_and_doppler(measured),
-        }
-    }
-}
-
 /// The difference of a measurement to what was predicted.
 #[derive(Clone, Copy, Debug)]
 pub struct Innovation {
     /// Measured less predicted, m.
-    pub difference: Vector2<f64>,
+    difference: Vector2<f64>,
     /// Covariance of that, m².
-    pub covariance: Matrix2<f64>,
+    covariance: Matrix2<f64>,
     jacobian: Matrix2x4<f64>,
     noise: Matrix2<f64>,
 }
@@ -243,18 +231,6 @@ impl Filter {
         self.combine();
     }
 
-    /// Refers the position to another point of the object, so far away, m, with a covariance.
-    pub fn shift(&mut self, by: &Vector2<f64>, covariance: &Matrix2<f64>) {
-        for model in &mut self.models {
-            let estimate = &mut model.estimate;
-            let mut position = estimate.state.fixed_rows_mut::<2>(0);
-            position += by;
-            let mut variance = estimate.covariance.fixed_view_mut::<2, 2>(0, 0);
-            variance += covariance;
-        }
-        self.combine();
-    }
-
     fn combine(&mut self) {
         let models = self.models.iter();
         self.mean = mixture(models.map(|model| (model.probability, &model.estimate)));
@@ -347,13 +323,6 @@ fn acceleration_noise(dt_s: f64, heading: &Vector2<f64>, config: &ObjectsConfig)
     noise
 }
 
-/// The change of a measured position by the velocity: it is seen at its own time, and lengthened or
-/// shortened by the Doppler shift.
-pub(crate) fn by_time_and_doppler(measured: &Measurement) -> Matrix2<f64> {
-    let away = measured.direction;
-    Matrix2::identity() * measured.time_s + away * away.transpose() * measured.doppler_s
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -362,16 +331,13 @@ mod tests {
 
     const DT_S: f64 = 0.25;
     const SIGMA_M: f64 = 0.4;
+    const SPEED_SIGMA_MPS: f64 = 8.0;
 
-    fn measurement(at: Vector2<f64>) -> Measurement {
-        Measurement {
+    fn sighting(at: Vector2<f64>) -> Sighting {
+        Sighting {
             at: at.into(),
-            time_s: 0.0,
-            doppler_s: 0.0,
-            direction: Vector2::x(),
-            range_m: 30.0,
-            weight: 1.0,
-            returns: 4,
+            noise: Matrix2::identity() * SIGMA_M.powi(2),
+            by_velocity: Matrix2::zeros(),
         }
     }
 
@@ -428,19 +394,16 @@ mod tests {
         rng: &mut ChaCha8Rng,
         mut step: impl FnMut(&mut Vehicle, &mut ChaCha8Rng),
     ) -> Filter {
-        let noise = Matrix2::identity() * SIGMA_M.powi(2);
         let measured = |vehicle: &Vehicle, rng: &mut ChaCha8Rng| {
-            measurement(vehicle.position + normal(rng) * SIGMA_M)
+            sighting(vehicle.position + normal(rng) * SIGMA_M)
         };
-        let sighting = |measured: Measurement| Sighting::of_near_end(&measured, &noise);
-        let first = sighting(measured(vehicle, rng));
-        let mut filter = Filter::new(&first, config.speed_sigma_mps);
+        let mut filter = Filter::new(&measured(vehicle, rng), SPEED_SIGMA_MPS);
         for _ in 1..scans {
             step(vehicle, rng);
             let velocity = filter.velocity();
             let heading = velocity.try_normalize(1e-9).unwrap_or_else(Vector2::x);
             filter.predict(DT_S, &heading, config);
-            filter.update(&sighting(measured(vehicle, rng)));
+            filter.update(&measured(vehicle, rng));
         }
         filter
     }
@@ -451,7 +414,7 @@ mod tests {
         let config = ObjectsConfig::default();
         let (mut nees, mut squares_m2, runs) = (0.0, 0.0, 600);
         for _ in 0..runs {
-            let velocity = normal(&mut rng) * config.speed_sigma_mps;
+            let velocity = normal(&mut rng) * SPEED_SIGMA_MPS;
             let mut vehicle = Vehicle {
                 position: Vector2::new(20.0, -7.0),
                 velocity,
@@ -532,9 +495,8 @@ mod tests {
 
     #[test]
     fn a_measured_velocity_is_taken_in_its_direction_and_states_are_apart_by_it() {
-        let noise = Matrix2::identity() * SIGMA_M.powi(2);
-        let place = measurement(Vector2::new(20.0, -7.0));
-        let still = Filter::new(&Sighting::of_near_end(&place, &noise), 8.0);
+        let place = sighting(Vector2::new(20.0, -7.0));
+        let still = Filter::new(&place, SPEED_SIGMA_MPS);
         let mut moving = still;
         moving.measure(&Vector2::x(), 6.0, 0.1);
         assert!((moving.velocity() - Vector2::new(6.0, 0.0)).norm() < 0.01);
@@ -546,14 +508,14 @@ mod tests {
     }
 
     #[test]
-    fn a_standing_vehicle_has_no_speed_and_a_shift_moves_nothing_but_the_position() {
+    fn a_standing_vehicle_has_no_speed() {
         let mut rng = ChaCha8Rng::seed_from_u64(3);
         let mut vehicle = Vehicle {
             position: Vector2::new(20.0, -7.0),
             velocity: Vector2::zeros(),
             model: 2,
         };
-        let mut filter = tracked(
+        let filter = tracked(
             &mut vehicle,
             (20, &ObjectsConfig::default()),
             &mut rng,
@@ -564,9 +526,5 @@ mod tests {
             speed_mps < 3.0 * sigma_mps && sigma_mps < 1.0,
             "{speed_mps} {sigma_mps}"
         );
-        let (before, velocity) = (filter.position(), filter.velocity());
-        filter.shift(&Vector2::new(2.0, -1.0), &Matrix2::identity());
-        assert!((filter.position() - before - Vector2::new(2.0, -1.0)).norm() < 1e-9);
-        assert!((filter.velocity() - velocity).norm() < 1e-9);
     }
 }

@@ -1,287 +1,119 @@
 //! A track: an object from its birth to its death.
 
-use std::collections::VecDeque;
-use std::f64::consts::FRAC_PI_4;
-
 use nalgebra::{Matrix2, Point2, Vector2};
 
-use crate::clusters::Cluster;
-use crate::evidence::Evidence;
-use crate::extent::{Extent, Sight};
-use crate::filter::{Filter, Sighting, by_time_and_doppler};
-use crate::returns::Return;
-use crate::{Object, ObjectsConfig, score};
+use crate::detector::Detection;
+use crate::filter::{Filter, Sighting};
+use crate::{Object, ObjectsConfig};
 
-/// Scans of which the places of its returns are kept, and how many places of each.
-const TRAIL_SCANS: usize = 5;
-const TRAIL_POINTS: usize = 8;
-/// Distance from all of its returns at which it has left a place, m: beyond the neighbouring cells.
-const LEFT_M: f64 = 2.0;
-/// Length in which returns are an object's, while its own is not known to be longer, m: a van.
-const CLAIMED_M: f64 = 5.6;
-/// Chi-square of two degrees of freedom that one pair of ends in a hundred exceeds.
-const ALIKE: f64 = 9.2;
-/// Standard deviations of its place within which a return at a new place is an object's.
-const NEW_SIGMAS: f64 = 3.0;
-/// Distance beyond an outline within which the first returns of another track are of it, m.
-const BESIDE_M: f64 = 1.0;
-/// Share of the size that is uncertain when an object becomes a box.
-const SIZE_SIGMA: f64 = 0.15;
-
-/// Bounds of the standard deviation of a predicted heading, rad: that of a vehicle which drives
-/// straight, and one beyond which its side may be its end.
-const LEAST_TURN_RAD: f64 = 0.02;
-const LARGEST_TURN_RAD: f64 = 0.5;
+/// Distance between the centres of two tracks of one vehicle, m: less than a car is long.
+const SAME_M: f64 = 3.0;
 /// Speed of a vehicle's centre across its heading, m/s: it has its place by the rear axle.
 const SLIP_MPS: f64 = 0.1;
-/// Factor of the standard deviation of a heading by the returns of one scan: the differences
-/// between edges and scatterers last for several.
-const LASTING: f64 = 2.0;
+/// Standard deviation of a velocity before it is measured, m/s: that of any vehicle.
+const UNKNOWN_MPS: f64 = 30.0;
 
-/// An object that may be one.
+/// A vehicle that may be there: its filter, score and identity.
 #[derive(Clone, Debug)]
 pub(crate) struct Track {
-    pub filter: Filter,
-    pub extent: Extent,
+    filter: Filter,
     heading: Vector2<f64>,
-    /// The line of sight to it when it was last seen.
-    direction: Vector2<f64>,
-    /// True if the filter's position is the centre of a box, false if it is the near end of what is
-    /// seen.
-    is_box: bool,
-    /// From one end to the other of what was last seen, along the heading and relative to the
-    /// position, m.
-    span_m: [f64; 2],
-    /// True for what began behind something that stands: it becomes no object, and ends a scan
-    /// later, so that what has come out from behind an obstacle begins anew.
-    pub is_image: bool,
+    /// Length and width, m: the mean of what was seen, weighed by how likely it was.
+    size_m: [f64; 2],
+    weight: f64,
     /// Identity of an object that was moving once; before it has none.
-    pub id: Option<u64>,
-    /// Scans since its first cluster, that one included, and those with a cluster.
+    id: Option<u64>,
+    /// Scans since it was first seen, that one included, and those that showed it.
     age: u32,
     hits: u32,
-    /// Time since its last cluster, s.
+    /// Time since it was first seen, and since it was last seen, s.
+    known_s: f64,
     unseen_s: f64,
     moving: bool,
-    /// Where its returns were in the last scans, the newest first, m.
-    trail: VecDeque<Vec<Point2<f64>>>,
-    /// Logarithm of the likelihood of an object over that of clutter: see [`score`].
+    /// True if it is neither seen nor expected any more, and if it was about to stand then: the
+    /// network finds what moves.
+    lost: bool,
+    stopped: bool,
+    /// Logarithm of the likelihood of an object over that of clutter.
     score: f64,
 }
 
 impl Track {
-    /// Begins a track at a cluster.
-    pub fn new(
-        returns: &[Return],
-        cluster: &Cluster,
-        noise: &Matrix2<f64>,
-        config: &ObjectsConfig,
-    ) -> Self {
-        let mut track = Self {
-            filter: Filter::new(
-                &Sighting::of_near_end(&cluster.measured, noise),
-                config.speed_sigma_mps,
-            ),
-            extent: Extent::new(config),
-            heading: cluster.measured.direction,
-            direction: cluster.measured.direction,
-            is_box: false,
-            span_m: [0.0; 2],
-            is_image: false,
+    /// Begins a track.
+    pub fn new(detection: &Detection, config: &ObjectsConfig) -> Self {
+        let mut filter = Filter::new(&sighting(detection), UNKNOWN_MPS);
+        measure_velocity(&mut filter, detection, config);
+        Self {
+            filter,
+            heading: detection.heading,
+            size_m: detection.size_m,
+            weight: detection.likely,
             id: None,
             age: 1,
             hits: 1,
+            known_s: 0.0,
             unseen_s: 0.0,
             moving: false,
-            score: 0.0,
-            trail: VecDeque::new(),
-        };
-        track.leave(returns, cluster);
-        track
+            lost: false,
+            stopped: false,
+            score: evidence(detection, config),
+        }
     }
 
     /// Predicts it some seconds later.
     pub fn predict(&mut self, dt_s: f64, config: &ObjectsConfig) {
-        self.filter.predict(dt_s, &self.heading, config);
-        self.turn(config);
+        if !self.stopped {
+            self.filter.predict(dt_s, &self.heading, config);
+            self.turn(config);
+        }
         self.age = self.age.saturating_add(1);
-        if self.unseen_s > 0.0 {
-            self.score += (1.0 - config.seen_share).ln();
-        }
+        self.known_s += dt_s;
         self.unseen_s += dt_s;
+        self.moving = false;
     }
 
-    /// Returns whether it has been confirmed as an object.
-    pub fn is_confirmed(&self) -> bool {
-        self.id.is_some()
+    /// Returns what it costs that a scan shows it there; `None` outside of its gate.
+    pub fn cost(&self, detection: &Detection, config: &ObjectsConfig) -> Option<f64> {
+        let place = self.filter.innovation(&sighting(detection));
+        let variance = (detection.sigma_mps * config.velocity_sigmas).powi(2);
+        let covariance = self.filter.velocity_covariance() + Matrix2::identity() * variance;
+        let faster = detection.velocity - self.filter.velocity();
+        let chi_square = (faster.transpose() * covariance.try_inverse()? * faster)[0];
+        let spread = covariance.determinant().max(f64::MIN_POSITIVE).ln();
+        let cost = place.cost() + chi_square + spread;
+        (place.chi_square() + chi_square <= config.gate).then_some(cost)
     }
 
-    /// Returns whether its position is the centre of a box.
-    pub fn is_box(&self) -> bool {
-        self.is_box
-    }
-
-    /// Returns whether it is an object that moves.
-    pub fn is_moving(&self) -> bool {
-        self.is_confirmed() && self.moving
-    }
-
-    /// Returns the distance of a return from the predicted outline, in units of the margin around
-    /// it: up to 1 it belongs to the object. The margin is wider for a return at a new place.
-    pub fn distance(&self, found: &Return, config: &ObjectsConfig) -> f64 {
-        let place = found.at_scan(&self.filter.velocity()) - self.filter.position();
-        let side = Vector2::new(-self.heading.y, self.heading.x);
-        let [length_m, width_m] = self.extent.size_m;
-        let variance = self.filter.position_covariance();
-        let is_new = found.share < config.standing_share;
-        let sigmas = if is_new { NEW_SIGMAS } else { 1.0 };
-        let beyond = |axis: &Vector2<f64>, size_m: f64| {
-            let sigma_m = (axis.transpose() * variance * axis)[0].max(0.0).sqrt();
-            // The bearing of a single return is off by about its range over a hundred.
-            let margin_m = config.margin_m + sigmas * sigma_m + 0.01 * found.range_m;
-            (place.dot(axis).abs() - 0.5 * size_m).max(0.0) / margin_m
-        };
-        beyond(&self.heading, length_m.max(CLAIMED_M)).hypot(beyond(&side, width_m))
-    }
-
-    /// Returns where a cluster says that the filter's position is. `noise` is the covariance of the
-    /// place of an end.
-    pub fn sighting(
-        &self,
-        returns: &[Return],
-        cluster: &Cluster,
-        noise: &Matrix2<f64>,
-    ) -> Sighting {
-        let measured = &cluster.measured;
-        if !self.is_box {
-            return Sighting::of_near_end(measured, noise);
-        }
-        let known = (&self.filter.position(), &self.filter.velocity());
-        let sight = self.sight(cluster, noise);
-        let outline = Extent::outline(cluster.body(returns), known, &sight.heading);
-        let found = self.extent.centre(&outline, &sight);
-        let by_velocity = by_time_and_doppler(measured);
-        Sighting {
-            at: known.0 + found.offset + by_velocity * known.1,
-            noise: found.noise,
-            by_velocity,
-        }
-    }
-
-    /// Turns the heading to that of the box by its returns. Returns the heading that these alone
-    /// say, and its standard deviation, rad; `None` where they say nothing, or it has no direction
-    /// of motion that tells one end from the other.
-    fn measure_heading(
-        &mut self,
-        returns: &[Return],
-        cluster: &Cluster,
-        noise: &Matrix2<f64>,
-        config: &ObjectsConfig,
-    ) -> Option<(Vector2<f64>, f64)> {
-        let velocity = self.filter.velocity();
-        if !self.is_box || velocity.norm() < config.heading_mps {
-            return None;
-        }
-        let sigma_rad = self.heading_sigma_rad();
-        let known = (&self.filter.position(), &velocity);
-        let sight = self.sight(cluster, noise);
-        let turn = self
-            .extent
-            .turn(cluster.body(returns), known, (&sight, sigma_rad));
-        self.heading = sight.turned(turn.mean_rad).heading;
-        // What the returns add to the prediction: the quotient of the two distributions.
-        let information = 1.0 / turn.variance_rad2 - 1.0 / sigma_rad.powi(2);
-        let alone_rad = turn.mean_rad / turn.variance_rad2 / information;
-        let is_measured = information > 0.0 && alone_rad.abs() < FRAC_PI_4;
-        is_measured.then(|| (sight.turned(alone_rad).heading, information.sqrt().recip()))
-    }
-
-    /// The standard deviation of the direction of the predicted velocity, rad.
-    fn heading_sigma_rad(&self) -> f64 {
-        let side = Vector2::new(-self.heading.y, self.heading.x);
-        let variance = (side.transpose() * self.filter.velocity_covariance() * side)[0];
+    /// Updates it by what a scan shows.
+    pub fn update(&mut self, detection: &Detection, config: &ObjectsConfig) {
+        self.filter.update(&sighting(detection));
+        measure_velocity(&mut self.filter, detection, config);
         let speed_mps = self.filter.velocity().norm();
-        (variance.max(0.0).sqrt() / speed_mps).clamp(LEAST_TURN_RAD, LARGEST_TURN_RAD)
-    }
-
-    /// Updates the filter by where a cluster says that it is and points to. Returns the squared
-    /// Mahalanobis distance of the place from the prediction.
-    fn update_filter(&mut self, sighting: &Sighting, heading: Option<(Vector2<f64>, f64)>) -> f64 {
-        let chi_square = self.filter.innovation(sighting).chi_square();
-        self.filter.update(sighting);
-        if let Some((heading, sigma_rad)) = heading {
-            let speed_mps = self.filter.velocity().norm();
-            let sigma_mps = SLIP_MPS + LASTING * sigma_rad * speed_mps;
-            self.filter.align(&heading, sigma_mps);
-        }
-        chi_square
-    }
-
-    fn sight(&self, cluster: &Cluster, noise: &Matrix2<f64>) -> Sight {
-        Sight {
-            heading: self.heading,
-            direction: cluster.measured.direction,
-            predicted: self.filter.position_covariance(),
-            noise: *noise,
-        }
-    }
-
-    /// Updates it by a cluster. `noise` is the covariance of the place of an end.
-    pub fn update(
-        &mut self,
-        returns: &[Return],
-        cluster: &Cluster,
-        noise: &Matrix2<f64>,
-        config: &ObjectsConfig,
-    ) {
-        let heading = self.measure_heading(returns, cluster, noise, config);
-        self.resize(returns, cluster, noise, config);
-        let sighting = self.sighting(returns, cluster, noise);
-        let chi_square = self.update_filter(&sighting, heading);
-        let evidence = score::of_cluster(returns, &cluster.members, chi_square);
-        self.add(evidence, config);
-        self.direction = cluster.measured.direction;
-        self.leave(returns, cluster);
-        self.unseen_s = 0.0;
-        self.hits = self.hits.saturating_add(1);
+        let sigma_mps = SLIP_MPS + config.heading_sigma_rad * speed_mps;
+        self.filter.align(&detection.heading, sigma_mps);
+        self.heading = detection.heading;
         self.turn(config);
-        if self.has_heading(config) {
-            self.become_box();
+        self.weight += detection.likely;
+        let share = detection.likely / self.weight;
+        for (size_m, seen_m) in self.size_m.iter_mut().zip(detection.size_m) {
+            *size_m += share * (seen_m - *size_m);
         }
+        self.score = (self.score + evidence(detection, config)).min(config.max_score);
+        self.hits = self.hits.saturating_add(1);
+        self.unseen_s = 0.0;
+        self.lose(config);
     }
 
-    /// Takes the size that a cluster shows.
-    fn resize(
-        &mut self,
-        returns: &[Return],
-        cluster: &Cluster,
-        noise: &Matrix2<f64>,
-        config: &ObjectsConfig,
-    ) {
-        if self.is_box {
-            let known = (&self.filter.position(), &self.filter.velocity());
-            let outline = Extent::outline(cluster.body(returns), known, &self.heading);
-            let sight = self.sight(cluster, noise);
-            let moved = self.extent.update(&outline, &sight, config);
-            self.filter.shift(&moved, &Matrix2::zeros());
-            self.span_m = outline.spans_m[0].map(|at_m| at_m - moved.dot(&self.heading));
-        }
+    /// Notes that a scan does not show it.
+    pub fn miss(&mut self, config: &ObjectsConfig) {
+        self.score -= config.missed_loss;
+        self.lose(config);
     }
 
-    /// Refers the position to the centre instead of the near end: half of the size, as it is seen,
-    /// beyond it.
-    fn become_box(&mut self) {
-        if !self.is_box {
-            let side = Vector2::new(-self.heading.y, self.heading.x);
-            let [length_m, width_m] = self.extent.size_m;
-            let depth_m = length_m * self.heading.dot(&self.direction).abs()
-                + width_m * side.dot(&self.direction).abs();
-            let line = self.direction * self.direction.transpose();
-            let variance = line * (SIZE_SIGMA * depth_m).powi(2);
-            self.filter
-                .shift(&(self.direction * (0.5 * depth_m)), &variance);
-            self.is_box = true;
-        }
+    /// Decides whether it is lost.
+    fn lose(&mut self, config: &ObjectsConfig) {
+        self.lost = self.unseen_s > config.coast_s || self.score < config.end_score;
+        self.stopped = self.lost && self.filter.velocity().norm() < config.stopping_mps;
     }
 
     /// Turns the heading into the direction of the motion.
@@ -292,93 +124,78 @@ impl Track {
         }
     }
 
-    /// Notes where its returns are.
-    fn leave(&mut self, returns: &[Return], cluster: &Cluster) {
-        let step = cluster.members.len().div_ceil(TRAIL_POINTS);
-        let places = cluster
-            .members
-            .iter()
-            .step_by(step.max(1))
-            .map(|member| returns[*member as usize].at);
-        self.trail.push_front(places.collect());
-        self.trail.truncate(TRAIL_SCANS);
+    pub fn is_object(&self) -> bool {
+        self.id.is_some()
     }
 
-    /// Looks at what is now where it was: behind an object the way is free, while a surface that
-    /// has come into view, scan by scan, stays.
-    pub fn look_back(&mut self, evidence: &Evidence, config: &ObjectsConfig) {
-        let Some(now) = self.trail.front().filter(|_| self.unseen_s == 0.0) else {
-            // An obstacle may hide it, but it is not where the beam goes on.
-            if evidence.is_occupied(&self.filter.position()) == Some(false) {
-                self.add(-config.missed_loss, config);
-            }
-            return;
-        };
-        let has_left = |place: &&Point2<f64>| now.iter().all(|at| (at - *place).norm() > LEFT_M);
-        let left = self.trail.iter().skip(1).flatten().filter(has_left);
-        let seen = left.filter_map(|place| evidence.is_occupied(place));
-        let (count, taken) = seen.fold((0, 0), |(count, taken), is_taken| {
-            (count + 1, taken + usize::from(is_taken))
-        });
-        if count >= 2 {
-            let evidence = score::of_places_left(taken as f64 / f64::from(count));
-            self.add(evidence, config);
-        }
+    pub fn is_lost(&self) -> bool {
+        self.lost
     }
 
-    fn add(&mut self, evidence: f64, config: &ObjectsConfig) {
-        self.score = (self.score + evidence).min(config.max_score);
-    }
-
-    /// Returns whether the direction of its motion is known.
-    fn has_heading(&self, config: &ObjectsConfig) -> bool {
-        let (speed_mps, sigma_mps) = self.filter.speed();
-        let is_sure = speed_mps > config.heading_mps + 2.0 * sigma_mps;
-        self.is_confirmed() || (self.hits > 2 && is_sure)
-    }
-
-    /// Returns whether it has come to its end.
+    /// Returns whether it has come to its end. An object keeps its identity for longer.
     pub fn is_over(&self, config: &ObjectsConfig) -> bool {
-        let missed = self.age - self.hits;
-        let is_given_up = self.score < config.end_score && self.age > 1;
-        match self.is_confirmed() {
-            true => self.unseen_s > config.coast_s || is_given_up,
-            false => {
-                is_given_up
-                    || self.is_image && self.age > 1
-                    || missed > config.birth_scans - config.birth_hits
-            }
-        }
+        let ends_s = match (self.is_object(), self.stopped) {
+            (false, _) => 0.0,
+            (true, false) => config.lost_s,
+            (true, true) => config.stopped_s,
+        };
+        self.lost && (self.unseen_s > ends_s || !self.is_object())
+    }
+
+    /// Returns how far from where a lost object would be now a track is that has become an object;
+    /// `None` if it is another one, as what was seen before this one was lost.
+    pub fn distance(&self, found: &Self, config: &ObjectsConfig) -> Option<f64> {
+        let may_be = self.is_object() && self.lost && found.known_s < self.unseen_s;
+        let chi_square = self.filter.apart(&found.filter);
+        (may_be && chi_square <= config.gate).then_some(chi_square)
     }
 
     /// Decides whether it moves: whether its speed is above that of what stands by more than its
     /// uncertainty explains. Returns whether it becomes an object by that.
     pub fn judge(&mut self, config: &ObjectsConfig) -> bool {
         let (speed_mps, sigma_mps) = self.filter.speed();
-        let excess = speed_mps - config.standing_mps;
-        self.moving = excess > config.moving_sigmas * sigma_mps;
+        self.moving = speed_mps - config.standing_mps > config.moving_sigmas * sigma_mps;
         self.moving
-            && !self.is_confirmed()
-            && !self.is_image
+            && !self.is_object()
             && self.hits >= config.birth_hits
-            && self.score > config.confirm_score
+            && self.score >= config.confirm_score
     }
 
-    /// Makes it an object.
+    /// Makes it a new object.
     pub fn confirm(&mut self, id: u64) {
         self.id = Some(id);
-        self.become_box();
+    }
+
+    /// Makes it the object that another track has lost, which ends.
+    pub fn take_over(&mut self, lost: &mut Self) {
+        self.id = lost.id.take();
+        self.age = lost.age;
+        let share = lost.weight / (lost.weight + self.weight);
+        for (size_m, lost_m) in self.size_m.iter_mut().zip(lost.size_m) {
+            *size_m += share * (lost_m - *size_m);
+        }
+        self.weight += lost.weight;
+    }
+
+    /// Returns whether another track is of the same vehicle.
+    pub fn is_same(&self, other: &Self) -> bool {
+        (self.position() - other.position()).norm() < SAME_M
+    }
+
+    fn position(&self) -> Point2<f64> {
+        self.filter.position()
     }
 
     /// Returns the object, if it is one that is seen, or has been seen well until a moment ago: one
     /// that may have gone elsewhere keeps its identity in case that it is seen again.
     pub fn object(&self, config: &ObjectsConfig) -> Option<Object> {
-        let is_there = self.unseen_s == 0.0 || self.score > config.confirm_score;
-        let id = self.id.filter(|_| is_there)?;
-        let [length_m, width_m] = self.extent.size_m;
+        let is_seen = self.unseen_s == 0.0 && self.score >= config.keep_score;
+        let is_there = is_seen || self.score >= config.confirm_score;
+        let id = self.id.filter(|_| is_there && !self.lost)?;
+        let [length_m, width_m] = self.size_m;
         Some(Object {
             id,
-            position: self.filter.position(),
+            position: self.position(),
             velocity: self.filter.velocity(),
             yaw_rad: self.heading.y.atan2(self.heading.x),
             length_m,
@@ -391,69 +208,111 @@ impl Track {
     }
 }
 
-impl Track {
-    /// Returns whether another track is of the same object: it lies within the outline or touches
-    /// it, and moves alike.
-    pub fn is_same(&self, other: &Self, config: &ObjectsConfig) -> bool {
-        let (along_m, aside_m) = self.apart(&other.filter.position());
-        let [length_m, width_m] = self.extent.size_m;
-        let beyond_m = match other.is_box {
-            true => 0.5 * other.extent.size_m[0],
-            false => BESIDE_M,
+/// Returns where a detection says that an object is.
+fn sighting(detection: &Detection) -> Sighting {
+    Sighting {
+        at: detection.at,
+        noise: Matrix2::identity() * detection.sigma_m.powi(2),
+        by_velocity: detection.by_velocity,
+    }
+}
+
+/// Updates a filter by the velocity of a detection.
+fn measure_velocity(filter: &mut Filter, detection: &Detection, config: &ObjectsConfig) {
+    let sigma_mps = detection.sigma_mps * config.velocity_sigmas;
+    for axis in [Vector2::x(), Vector2::y()] {
+        filter.measure(&axis, detection.velocity.dot(&axis), sigma_mps);
+    }
+}
+
+/// Returns the logarithm of how much likelier an object is than none, by what a scan shows.
+fn evidence(detection: &Detection, config: &ObjectsConfig) -> f64 {
+    let odds = |likely: f64| {
+        let likely = likely.clamp(1e-3, 1.0 - 1e-3);
+        (likely / (1.0 - likely)).ln()
+    };
+    odds(detection.likely) - odds(config.even_likely)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn detection(at: [f64; 2], velocity: [f64; 2]) -> Detection {
+        let velocity = Vector2::from(velocity);
+        Detection {
+            at: at.into(),
+            velocity,
+            heading: velocity.normalize(),
+            size_m: [4.5, 1.9],
+            likely: 0.9,
+            sigma_m: 0.3,
+            sigma_mps: 1.0,
+            by_velocity: Matrix2::identity() * 0.1,
+        }
+    }
+
+    /// A track that has been seen so many times.
+    fn seen(times: u32, config: &ObjectsConfig) -> Track {
+        let mut track = Track::new(&detection([20.0, 3.0], [-10.0, 0.0]), config);
+        for scan in 1..times {
+            track.predict(0.25, config);
+            let x = 20.0 - 2.5 * f64::from(scan);
+            track.update(&detection([x, 3.0], [-10.0, 0.0]), config);
+        }
+        track
+    }
+
+    #[test]
+    fn a_track_is_where_the_vehicle_was_at_the_time_of_the_scan_and_becomes_an_object() {
+        let config = ObjectsConfig::default();
+        let mut track = seen(1, &config);
+        assert!((track.position() - Point2::new(21.0, 3.0)).norm() < 0.05);
+        assert!(!track.judge(&config));
+        let mut track = seen(3, &config);
+        assert!((track.position() - Point2::new(16.0, 3.0)).norm() < 0.05);
+        assert!(track.judge(&config));
+        track.confirm(7);
+        let object = track.object(&config).expect("it is one");
+        assert!(object.id == 7 && object.moving && object.age == 3);
+    }
+
+    #[test]
+    fn what_drives_the_other_way_at_the_same_place_is_not_its_own() {
+        let config = ObjectsConfig::default();
+        let mut track = seen(4, &config);
+        track.predict(0.25, &config);
+        assert!(
+            track
+                .cost(&detection([10.0, 3.0], [-9.0, 0.0]), &config)
+                .is_some()
+        );
+        let other = detection([12.0, 3.0], [10.0, 0.0]);
+        assert_eq!(track.cost(&other, &config), None);
+    }
+
+    #[test]
+    fn a_lost_object_is_what_begins_where_it_would_be_and_nothing_that_was_beside_it() {
+        let config = ObjectsConfig::default();
+        let mut lost = seen(4, &config);
+        lost.confirm(1);
+        for _ in 0..8 {
+            lost.predict(0.25, &config);
+            lost.miss(&config);
+        }
+        assert!(lost.is_lost() && !lost.is_over(&config));
+        assert_eq!(lost.object(&config), None);
+        let begun = |known_s: f64, x: f64| Track {
+            known_s,
+            ..Track::new(&detection([x, 3.0], [-10.0, 0.0]), &config)
         };
-        let is_inside = along_m.abs() < 0.5 * length_m;
-        let is_beside = along_m.abs() < 0.5 * length_m + beyond_m;
-        aside_m.abs() < width_m && (is_inside || is_beside && self.moves_like(other, config))
-    }
-
-    /// Takes over another track if the two are the ends of one long object, between which nothing
-    /// is seen: they move alike, one behind the other, and neither is as long as a vehicle.
-    /// Returns whether they are.
-    pub fn unite(&mut self, other: &Self, config: &ObjectsConfig) -> bool {
-        let is_end =
-            |track: &Self| track.is_box && track.unseen_s == 0.0 && track.extent.is_an_end(config);
-        let (_, aside_m) = self.apart(&other.filter.position());
-        let is_behind = aside_m.abs() < self.extent.size_m[1];
-        if !(is_end(self) && is_end(other) && is_behind && self.moves_like(other, config)) {
-            return false;
-        }
-        let ends = other.span_m.map(|at_m| {
-            let end = other.filter.position() + other.heading * at_m;
-            self.apart(&end).0
-        });
-        self.stretch(&ends, config)
-    }
-
-    /// Makes it as long as from what was seen of it to some other ends of it, m along the heading.
-    /// Returns whether a vehicle can be that long.
-    fn stretch(&mut self, ends_m: &[f64], config: &ObjectsConfig) -> bool {
-        let all = self.span_m.iter().chain(ends_m);
-        let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), at_m| {
-            (low.min(*at_m), high.max(*at_m))
-        });
-        let fits = self.extent.lengthen(high - low, config);
-        if fits {
-            let middle_m = 0.5 * (low + high);
-            let variance = Matrix2::identity() * config.margin_m.powi(2);
-            self.filter.shift(&(self.heading * middle_m), &variance);
-            self.span_m = [low, high].map(|at_m| at_m - middle_m);
-        }
-        fits
-    }
-
-    /// Returns how far a place is from the position along the heading and to its left, m.
-    fn apart(&self, place: &Point2<f64>) -> (f64, f64) {
-        let apart = place - self.filter.position();
-        (apart.dot(&self.heading), self.heading.perp(&apart))
-    }
-
-    /// Returns whether another track has the same velocity, within some m/s and the uncertainty.
-    fn moves_like(&self, other: &Self, config: &ObjectsConfig) -> bool {
-        let faster = other.filter.velocity() - self.filter.velocity();
-        let variance = self.filter.velocity_covariance() + other.filter.velocity_covariance();
-        let chi_square = variance.try_inverse().map_or(f64::INFINITY, |inverse| {
-            (faster.transpose() * inverse * faster)[0]
-        });
-        faster.norm() < config.alike_mps && chi_square < ALIKE
+        // It is 20 m on, at 13.5 - 20 m.
+        assert!(lost.distance(&begun(0.5, -7.5), &config).is_some());
+        assert_eq!(lost.distance(&begun(0.5, 60.0), &config), None);
+        assert_eq!(lost.distance(&begun(3.0, -7.5), &config), None);
+        let mut found = begun(0.5, -7.5);
+        found.take_over(&mut lost);
+        assert!(found.id == Some(1) && found.age == 12);
+        assert!(lost.is_over(&config) && !found.is_over(&config));
     }
 }

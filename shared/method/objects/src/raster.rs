@@ -2,8 +2,8 @@
 
 use std::collections::VecDeque;
 
+use crate::PlacedScan;
 use gyre_geometry::{Pose, SparsePoint};
-use gyre_objects::PlacedScan;
 use nalgebra::Point2;
 
 /// Cells a side.

@@ -1,15 +1,19 @@
-//! Where the network sees vehicles that move.
+//! The detection of vehicles that move, by the network.
 
+use std::f64::consts::TAU;
 use std::fmt::Display;
+use std::path::Path;
 use std::sync::Arc;
 
-use gyre_geometry::{Pose, SparsePoint, wrap_angle};
-use gyre_objects::PlacedScan;
+use gyre_geometry::{Pose, SparsePoint};
 use nalgebra::{Matrix2, Point2, Vector2};
 use rten::{Model, ModelOptions, RunOptions, ThreadPool, Value};
 
 use crate::raster::{Memory, PLANES, SIDE};
+use crate::{ObjectsError, PlacedScan};
 
+/// The network in the program.
+const NETWORK: &str = "gyre:models/objects.onnx";
 /// Cells of the output, a side: each is as large as two by two of the input.
 const OUT: usize = SIDE / 2;
 /// Values of a cell.
@@ -22,11 +26,6 @@ const SPEED_MPS: f64 = 8.0;
 const SIZE_M: [f64; 2] = [4.5, 1.9];
 /// Distance within which only the most likely detection counts, m.
 const ALONE_M: f64 = 2.5;
-
-/// The network cannot be loaded or computed.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("the network that finds moving objects fails: {0}")]
-pub struct NetworkError(pub(crate) String);
 
 /// Finds vehicles that move in the last scans.
 pub(crate) struct Detector {
@@ -59,9 +58,10 @@ pub(crate) struct Detection {
 }
 
 impl Detector {
-    /// Loads a network from an ONNX file.
-    pub fn new(network: Vec<u8>) -> Result<Self, NetworkError> {
-        let network = ModelOptions::with_all_ops().load(network);
+    /// Loads the network.
+    pub fn new() -> Result<Self, ObjectsError> {
+        let network = gyre_shipped::bytes(Path::new(NETWORK)).unwrap_or_default();
+        let network = ModelOptions::with_all_ops().load_static_slice(network);
         let network = network.map_err(|error| failed(&error))?;
         Ok(Self {
             network,
@@ -81,7 +81,7 @@ impl Detector {
         scan: &PlacedScan,
         points: &[SparsePoint],
         least: f64,
-    ) -> Result<Vec<Detection>, NetworkError> {
+    ) -> Result<Vec<Detection>, ObjectsError> {
         self.memory.add(scan, points);
         let output = unfolded(&self.run(self.memory.draw(&scan.pose))?);
         let mut found: Vec<Detection> = Vec::new();
@@ -100,21 +100,23 @@ impl Detector {
     }
 
     /// Computes the network.
-    fn run(&self, planes: Vec<f32>) -> Result<Vec<f32>, NetworkError> {
+    fn run(&self, planes: Vec<f32>) -> Result<Vec<f32>, ObjectsError> {
         let input = Value::from_shape([1, PLANES, SIDE, SIDE], planes);
         let input = input.map_err(|error| failed(&error))?;
         let options = RunOptions::default().with_thread_pool(Some(self.thread.clone()));
         let output = self.network.run_one(input.into(), Some(options));
         let output = output.map_err(|error| failed(&error))?;
         let output = output.into_shape_vec::<f32, 4>();
-        output
-            .map(|(_, values)| values)
-            .map_err(|error| failed(&error))
+        let (shape, values) = output.map_err(|error| failed(&error))?;
+        match shape == [1, 4 * VALUES, OUT / 2, OUT / 2] {
+            true => Ok(values),
+            false => Err(failed(&format_args!("it gives {shape:?}"))),
+        }
     }
 }
 
-fn failed(error: &dyn Display) -> NetworkError {
-    NetworkError(error.to_string())
+fn failed(error: &dyn Display) -> ObjectsError {
+    ObjectsError::Network(error.to_string())
 }
 
 /// Returns the planes of the output, OUT x OUT each. The network gives each in four, of every other
@@ -170,12 +172,16 @@ impl Detection {
     /// Takes it from the frame of the sensor into that of the odometry, at the time of the azimuth
     /// that shows it.
     fn place(&mut self, pose: &Pose, azimuths: &[Azimuth]) {
-        let apart_rad = |it: &Azimuth| wrap_angle(it.bearing_rad - bearing_rad(&self.at)).abs();
+        let here_rad = bearing_rad(&self.at);
+        let apart_rad = |it: &Azimuth| {
+            let apart_rad = (it.bearing_rad - here_rad).abs();
+            apart_rad.min(TAU - apart_rad)
+        };
         let shown_by = azimuths
             .iter()
             .min_by(|a, b| apart_rad(a).total_cmp(&apart_rad(b)));
         let (time_s, doppler_s) = shown_by.map_or((0.0, 0.0), |it| (it.time_s, it.doppler_s));
-        let away = pose.rotation * self.at.coords.normalize();
+        let away = pose.rotation * self.at.coords.try_normalize(1e-9).unwrap_or_default();
         self.at = pose * self.at;
         self.velocity = pose.rotation * self.velocity;
         self.heading = pose.rotation * self.heading;
@@ -183,14 +189,14 @@ impl Detection {
     }
 }
 
-/// Where and when a point was seen.
+/// The bearing and the time of a point.
 struct Azimuth {
     bearing_rad: f64,
     time_s: f64,
     doppler_s: f64,
 }
 
-/// Returns where and when each point was seen.
+/// Returns the bearings and times of points.
 fn azimuths(scan: &PlacedScan, points: &[SparsePoint]) -> Vec<Azimuth> {
     let azimuth = |point: &SparsePoint| Azimuth {
         bearing_rad: bearing_rad(&point.deskewed(&scan.twist)),
