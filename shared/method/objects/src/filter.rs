@@ -18,7 +18,7 @@ const SHARES: [f64; 5] = [0.075, 0.075, 0.7, 0.075, 0.075];
 
 /// Position and velocity with their covariance, by models of different turn rates.
 #[derive(Clone, Copy, Debug)]
-pub struct Filter {
+pub(crate) struct Filter {
     models: [Model; TURNS.len()],
     /// Mean and covariance of all models.
     mean: Estimate,
@@ -40,7 +40,7 @@ struct Estimate {
 
 /// A measured position of an object.
 #[derive(Clone, Copy, Debug)]
-pub struct Sighting {
+pub(crate) struct Sighting {
     /// The position, m, as if the object stood.
     pub at: Point2<f64>,
     /// Covariance of it, m².
@@ -52,7 +52,7 @@ pub struct Sighting {
 
 /// The difference of a measurement to what was predicted.
 #[derive(Clone, Copy, Debug)]
-pub struct Innovation {
+pub(crate) struct Innovation {
     /// Measured less predicted, m.
     difference: Vector2<f64>,
     /// Covariance of that, m².
@@ -324,207 +324,4 @@ fn acceleration_noise(dt_s: f64, heading: &Vector2<f64>, config: &ObjectsConfig)
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use rand::{Rng, SeedableRng};
-    use rand_chacha::ChaCha8Rng;
-
-    const DT_S: f64 = 0.25;
-    const SIGMA_M: f64 = 0.4;
-    const SPEED_SIGMA_MPS: f64 = 8.0;
-
-    fn sighting(at: Vector2<f64>) -> Sighting {
-        Sighting {
-            at: at.into(),
-            noise: Matrix2::identity() * SIGMA_M.powi(2),
-            by_velocity: Matrix2::zeros(),
-        }
-    }
-
-    /// Two numbers of a normal distribution.
-    fn normal(rng: &mut ChaCha8Rng) -> Vector2<f64> {
-        Vector2::from_fn(|_, _| (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0)
-    }
-
-    /// A vehicle whose turn rate and accelerations are those of the models.
-    struct Vehicle {
-        position: Vector2<f64>,
-        velocity: Vector2<f64>,
-        model: usize,
-    }
-
-    impl Vehicle {
-        fn step(&mut self, config: &ObjectsConfig, rng: &mut ChaCha8Rng) {
-            if rng.random::<f64>() > (-DT_S / config.turn_lasts_s).exp() {
-                let mut left = rng.random::<f64>();
-                self.model = (0..SHARES.len() - 1)
-                    .find(|model| {
-                        left -= SHARES[*model];
-                        left < 0.0
-                    })
-                    .unwrap_or(SHARES.len() - 1);
-            }
-            let heading = self.velocity.normalize();
-            let side = Vector2::new(-heading.y, heading.x);
-            let pushed = normal(rng);
-            let acceleration = heading * (config.acceleration_mps2 * pushed.x)
-                + side * (config.lateral_acceleration_mps2 * pushed.y);
-            self.turn(TURNS[self.model] * config.turn_rate_radps);
-            self.position += acceleration * (0.5 * DT_S * DT_S);
-            self.velocity += acceleration * DT_S;
-        }
-
-        /// Drives on in steps so small that each is straight.
-        fn turn(&mut self, turn_rate_radps: f64) {
-            let steps = 1000;
-            let dt_s = DT_S / f64::from(steps);
-            for _ in 0..steps {
-                let turned = nalgebra::Rotation2::new(0.5 * turn_rate_radps * dt_s);
-                self.velocity = turned * self.velocity;
-                self.position += self.velocity * dt_s;
-                self.velocity = turned * self.velocity;
-            }
-        }
-    }
-
-    /// Tracks a vehicle for some scans, and returns the filter.
-    fn tracked(
-        vehicle: &mut Vehicle,
-        (scans, config): (usize, &ObjectsConfig),
-        rng: &mut ChaCha8Rng,
-        mut step: impl FnMut(&mut Vehicle, &mut ChaCha8Rng),
-    ) -> Filter {
-        let measured = |vehicle: &Vehicle, rng: &mut ChaCha8Rng| {
-            sighting(vehicle.position + normal(rng) * SIGMA_M)
-        };
-        let mut filter = Filter::new(&measured(vehicle, rng), SPEED_SIGMA_MPS);
-        for _ in 1..scans {
-            step(vehicle, rng);
-            let velocity = filter.velocity();
-            let heading = velocity.try_normalize(1e-9).unwrap_or_else(Vector2::x);
-            filter.predict(DT_S, &heading, config);
-            filter.update(&measured(vehicle, rng));
-        }
-        filter
-    }
-
-    #[test]
-    fn the_covariance_is_that_of_the_errors_over_vehicles_that_drive_as_the_models() {
-        let mut rng = ChaCha8Rng::seed_from_u64(1);
-        let config = ObjectsConfig::default();
-        let (mut nees, mut squares_m2, runs) = (0.0, 0.0, 600);
-        for _ in 0..runs {
-            let velocity = normal(&mut rng) * SPEED_SIGMA_MPS;
-            let mut vehicle = Vehicle {
-                position: Vector2::new(20.0, -7.0),
-                velocity,
-                model: 2,
-            };
-            let filter = tracked(&mut vehicle, (16, &config), &mut rng, |vehicle, rng| {
-                vehicle.step(&config, rng);
-            });
-            let error = filter.velocity() - vehicle.velocity;
-            let inverse = filter.velocity_covariance().try_inverse();
-            nees += (error.transpose() * inverse.unwrap_or_default() * error)[0] / 2.0;
-            squares_m2 += (filter.position().coords - vehicle.position).norm_squared();
-        }
-        let nees = nees / f64::from(runs);
-        assert!((0.75..1.25).contains(&nees), "{nees}");
-        // It is better than the measurement.
-        let error_m = (squares_m2 / 2.0 / f64::from(runs)).sqrt();
-        assert!(error_m < SIGMA_M, "{error_m}");
-    }
-
-    #[test]
-    fn the_turn_rate_of_a_vehicle_that_goes_on_turning_is_found_and_a_straight_one_has_none() {
-        let mut rng = ChaCha8Rng::seed_from_u64(2);
-        let config = ObjectsConfig {
-            turn_lasts_s: 4.0,
-            ..ObjectsConfig::default()
-        };
-        for wanted_radps in [-0.6, -0.35, 0.0, 0.35, 0.6] {
-            let (mut found_radps, mut error_mps, runs) = (0.0, 0.0, 40);
-            for _ in 0..runs {
-                let mut vehicle = Vehicle {
-                    position: Vector2::new(20.0, -7.0),
-                    velocity: Vector2::new(-6.0, 5.0),
-                    model: 2,
-                };
-                let filter = tracked(&mut vehicle, (14, &config), &mut rng, |vehicle, _| {
-                    vehicle.turn(wanted_radps);
-                });
-                found_radps += filter.turn() * config.turn_rate_radps / f64::from(runs);
-                error_mps += (filter.velocity() - vehicle.velocity).norm() / f64::from(runs);
-            }
-            assert!(
-                (found_radps - wanted_radps).abs() < 0.2,
-                "{found_radps} {wanted_radps}"
-            );
-            assert!(error_mps < 1.2, "{error_mps} at {wanted_radps}");
-        }
-    }
-
-    #[test]
-    fn a_heading_turns_the_velocity_towards_it_and_makes_it_certain_across_it_alone() {
-        let mut rng = ChaCha8Rng::seed_from_u64(4);
-        let mut vehicle = Vehicle {
-            position: Vector2::new(20.0, -7.0),
-            velocity: Vector2::new(6.0, 0.0),
-            model: 2,
-        };
-        let config = ObjectsConfig::default();
-        let mut filter = tracked(&mut vehicle, (6, &config), &mut rng, |vehicle, _| {
-            vehicle.turn(0.0);
-        });
-        let before = filter;
-        let heading = Vector2::new(0.3f64.cos(), 0.3f64.sin());
-        let side = Vector2::new(-heading.y, heading.x);
-        let variance = |filter: &Filter, of: &Vector2<f64>| {
-            (of.transpose() * filter.velocity_covariance() * of)[0]
-        };
-        filter.align(&heading, 0.1);
-        let across_mps = [&before, &filter].map(|filter| filter.velocity().dot(&side).abs());
-        assert!(across_mps[1] < 0.2 * across_mps[0], "{across_mps:?}");
-        assert!(variance(&filter, &side) <= 0.011);
-        assert!(variance(&filter, &heading) > 0.5 * variance(&before, &heading));
-        // A heading that may be anything changes nothing.
-        let mut same = before;
-        same.align(&heading, 1e6);
-        assert!((same.velocity() - before.velocity()).norm() < 1e-6);
-    }
-
-    #[test]
-    fn a_measured_velocity_is_taken_in_its_direction_and_states_are_apart_by_it() {
-        let place = sighting(Vector2::new(20.0, -7.0));
-        let still = Filter::new(&place, SPEED_SIGMA_MPS);
-        let mut moving = still;
-        moving.measure(&Vector2::x(), 6.0, 0.1);
-        assert!((moving.velocity() - Vector2::new(6.0, 0.0)).norm() < 0.01);
-        assert!((moving.velocity_covariance()[(0, 0)] - 0.01).abs() < 1e-4);
-        assert_eq!(moving.velocity_covariance()[(1, 1)], 64.0);
-        assert_eq!(still.apart(&still), 0.0);
-        // 6 m/s with a variance of 64 and 0.01 (m/s)².
-        assert!((still.apart(&moving) - 36.0 / 64.01).abs() < 0.01);
-    }
-
-    #[test]
-    fn a_standing_vehicle_has_no_speed() {
-        let mut rng = ChaCha8Rng::seed_from_u64(3);
-        let mut vehicle = Vehicle {
-            position: Vector2::new(20.0, -7.0),
-            velocity: Vector2::zeros(),
-            model: 2,
-        };
-        let filter = tracked(
-            &mut vehicle,
-            (20, &ObjectsConfig::default()),
-            &mut rng,
-            |_, _| {},
-        );
-        let (speed_mps, sigma_mps) = filter.speed();
-        assert!(
-            speed_mps < 3.0 * sigma_mps && sigma_mps < 1.0,
-            "{speed_mps} {sigma_mps}"
-        );
-    }
-}
+mod tests;

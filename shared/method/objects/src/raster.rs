@@ -2,9 +2,10 @@
 
 use std::collections::VecDeque;
 
-use crate::PlacedScan;
 use gyre_geometry::{Pose, SparsePoint};
 use nalgebra::Point2;
+
+use crate::PlacedScan;
 
 /// Cells a side.
 pub(crate) const SIDE: usize = 256;

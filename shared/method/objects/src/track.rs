@@ -134,12 +134,11 @@ impl Track {
 
     /// Returns whether it has come to its end. An object keeps its identity for longer.
     pub fn is_over(&self, config: &ObjectsConfig) -> bool {
-        let ends_s = match (self.is_object(), self.stopped) {
-            (false, _) => 0.0,
-            (true, false) => config.lost_s,
-            (true, true) => config.stopped_s,
+        let kept_s = match self.stopped {
+            true => config.stopped_s,
+            false => config.lost_s,
         };
-        self.lost && (self.unseen_s > ends_s || !self.is_object())
+        self.lost && (!self.is_object() || self.unseen_s > kept_s)
     }
 
     /// Returns how far from where a lost object would be now a track is that has become an object;
@@ -157,6 +156,7 @@ impl Track {
         self.moving = speed_mps - config.standing_mps > config.moving_sigmas * sigma_mps;
         self.moving
             && !self.is_object()
+            && !self.lost
             && self.hits >= config.birth_hits
             && self.score >= config.confirm_score
     }
@@ -314,5 +314,22 @@ mod tests {
         found.take_over(&mut lost);
         assert!(found.id == Some(1) && found.age == 12);
         assert!(lost.is_over(&config) && !found.is_over(&config));
+    }
+
+    #[test]
+    fn a_lost_object_that_gave_its_identity_away_becomes_none_again_whatever_its_score_is() {
+        let config = ObjectsConfig {
+            missed_loss: 0.0,
+            ..ObjectsConfig::default()
+        };
+        let mut lost = seen(4, &config);
+        lost.confirm(1);
+        for _ in 0..5 {
+            lost.predict(0.25, &config);
+            lost.miss(&config);
+        }
+        assert!(lost.is_lost() && lost.score > config.confirm_score);
+        Track::new(&detection([0.0, 3.0], [-10.0, 0.0]), &config).take_over(&mut lost);
+        assert!(!lost.judge(&config) && lost.is_over(&config));
     }
 }
