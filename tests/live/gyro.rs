@@ -40,22 +40,26 @@ fn sending(log: PathBuf, address: String) -> JoinHandle<()> {
     thread::spawn(move || {
         let text = fs::read_to_string(log).unwrap();
         let lines: Vec<&str> = text.lines().skip(1).collect();
-        while UdpSocket::bind(&address).is_ok() {
-            thread::sleep(Duration::from_millis(5));
-        }
         let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+        socket.connect(&address).unwrap();
+        // While nobody receives, the call after one that has sent says so.
+        let probe = || {
+            socket.send(b"")?;
+            thread::sleep(Duration::from_millis(5));
+            socket.send(b"")
+        };
+        while probe().is_err() {}
         for datagram in lines.chunks(10) {
-            socket
-                .send_to(datagram.join("\n").as_bytes(), &address)
-                .unwrap();
+            socket.send(datagram.join("\n").as_bytes()).unwrap();
         }
-        socket.send_to(b"no sample", &address).unwrap();
+        socket.send(b"no sample").unwrap();
     })
 }
 
+/// Returns an address that stays free: senders take their ports on 127.0.0.1.
 pub fn address(test: u32) -> String {
     format!(
-        "127.0.0.1:{}",
+        "127.0.0.2:{}",
         40_000 + test * 3_500 + process::id() % 3_500
     )
 }

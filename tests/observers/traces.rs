@@ -148,7 +148,8 @@ fn a_collector_receives_a_trace_of_each_pose_with_the_spans_of_all_stages() {
 #[test]
 fn a_collector_that_is_away_is_said_and_counted_and_the_run_is_the_same() {
     let undisturbed = driving("max").complete();
-    let free = TcpListener::bind("127.0.0.1:0").unwrap();
+    // Others take their ports on 127.0.0.1, so that nobody listens at this one.
+    let free = TcpListener::bind("127.0.0.2:0").unwrap();
     let url = format!("http://{}", free.local_addr().unwrap());
     drop(free);
     let run = driving("12");

@@ -37,8 +37,9 @@ fn sides(cut: &str) -> [Run; 2] {
     ]
 }
 
+/// Returns an address that stays free: those who connect take their ports on 127.0.0.1.
 fn endpoint() -> String {
-    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let listener = TcpListener::bind("127.0.0.2:0").unwrap();
     format!("tcp/{}", listener.local_addr().unwrap())
 }
 
@@ -237,8 +238,8 @@ fn another_drive_is_not_put_behind_the_one_that_was_received() {
 
 #[test]
 fn nobody_connects_without_a_certificate_of_the_authority() {
-    let ours = Certificates::of("127.0.0.1", "127.0.0.1");
-    let theirs = Certificates::of("127.0.0.1", "127.0.0.1");
+    let ours = Certificates::of("127.0.0.2", "127.0.0.2");
+    let theirs = Certificates::of("127.0.0.2", "127.0.0.2");
     let run = Run::of_recording().rate("0.2");
     let mut running = run.start();
     running.await_poses(2);

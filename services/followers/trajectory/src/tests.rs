@@ -228,7 +228,8 @@ fn lines() -> String {
 #[test]
 fn fixes_that_arrive_are_logged_and_the_last_correction_is_that_of_the_log() {
     let mut logs = Logs::new();
-    let free = UdpSocket::bind("127.0.0.1:0").unwrap();
+    // Senders take their ports on 127.0.0.1, so that this one stays free.
+    let free = UdpSocket::bind("127.0.0.2:0").unwrap();
     let address = free.local_addr().unwrap();
     drop(free);
     let config = GnssConfig {

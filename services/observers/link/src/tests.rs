@@ -48,8 +48,9 @@ fn seq(bytes: &[u8]) -> u64 {
     bytemuck::pod_read_unaligned::<Item>(&bytes[..size_of::<Item>()]).seq
 }
 
+/// Returns an address that stays free: those who connect take their ports on 127.0.0.1.
 fn endpoint() -> String {
-    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let listener = TcpListener::bind("127.0.0.2:0").unwrap();
     format!("tcp/{}", listener.local_addr().unwrap())
 }
 

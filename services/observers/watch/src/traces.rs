@@ -162,8 +162,8 @@ mod tests {
 
     #[test]
     fn without_a_collector_traces_are_dropped_and_counted() {
-        // A port that nobody listens at.
-        let free = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+        // A port at which nobody listens: others take theirs on 127.0.0.1.
+        let free = std::net::TcpListener::bind("127.0.0.2:0").unwrap();
         let url = format!("http://{}", free.local_addr().unwrap());
         drop(free);
         let exporter = Exporter::start(&url, |_| {}).unwrap();

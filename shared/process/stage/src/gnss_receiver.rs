@@ -266,8 +266,9 @@ mod tests {
         }
     }
 
+    /// Returns an address that stays free: senders take their ports on 127.0.0.1.
     fn free_address() -> String {
-        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+        let socket = UdpSocket::bind("127.0.0.2:0").unwrap();
         socket.local_addr().unwrap().to_string()
     }
 
