@@ -16,6 +16,9 @@ const TURNS: [f64; 5] = [-1.0, -0.5, 0.0, 0.5, 1.0];
 /// Their shares of the time: vehicles drive straight for most of it.
 const SHARES: [f64; 5] = [0.075, 0.075, 0.7, 0.075, 0.075];
 
+/// Distance by which an object that stood may be seen behind its place, m: less than its length.
+const BEHIND_M: f64 = 4.0;
+
 /// Position and velocity with their covariance, by models of different turn rates.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Filter {
@@ -209,6 +212,27 @@ impl Filter {
     pub fn apart(&self, other: &Self) -> f64 {
         let difference = self.mean.state - other.mean.state;
         let covariance = self.mean.covariance + other.mean.covariance;
+        covariance.try_inverse().map_or(f64::INFINITY, |inverse| {
+            (difference.transpose() * inverse * difference)[0]
+        })
+    }
+
+    /// Returns the squared Mahalanobis distance of the place at which another one began to drive
+    /// from that of this one, which stood: it came so fast with the usual acceleration. It is
+    /// infinite for one that has yet to come to that place.
+    pub fn apart_from_start(&self, started: &Self, config: &ObjectsConfig) -> f64 {
+        let velocity = started.velocity();
+        let ahead = started.position() - self.position();
+        if ahead.dot(&velocity) < -BEHIND_M * velocity.norm() {
+            return f64::INFINITY;
+        }
+        let way_s = velocity.norm() / (2.0 * config.acceleration_mps2);
+        let way = velocity * way_s;
+        let difference = ahead - way;
+        // The way is as uncertain as the acceleration: by half of it.
+        let covariance = self.position_covariance()
+            + started.position_covariance()
+            + way * way.transpose() * 0.25;
         covariance.try_inverse().map_or(f64::INFINITY, |inverse| {
             (difference.transpose() * inverse * difference)[0]
         })

@@ -141,11 +141,16 @@ impl Track {
         self.lost && (!self.is_object() || self.unseen_s > kept_s)
     }
 
-    /// Returns how far from where a lost object would be now a track is that has become an object;
-    /// `None` if it is another one, as what was seen before this one was lost.
+    /// Returns how far from where a lost object would be now a track is that has become an object,
+    /// or from where one that stopped would have begun to drive; `None` if it is another one, as
+    /// what was seen before this one was lost.
     pub fn distance(&self, found: &Self, config: &ObjectsConfig) -> Option<f64> {
-        let may_be = self.is_object() && self.lost && found.known_s < self.unseen_s;
-        let chi_square = self.filter.apart(&found.filter);
+        let is_along = !self.stopped || self.heading.dot(&found.heading) > 0.0;
+        let may_be = self.is_object() && self.lost && found.known_s < self.unseen_s && is_along;
+        let chi_square = match self.stopped {
+            true => self.filter.apart_from_start(&found.filter, config),
+            false => self.filter.apart(&found.filter),
+        };
         (may_be && chi_square <= config.gate).then_some(chi_square)
     }
 
@@ -314,6 +319,34 @@ mod tests {
         found.take_over(&mut lost);
         assert!(found.id == Some(1) && found.age == 12);
         assert!(lost.is_over(&config) && !found.is_over(&config));
+    }
+
+    #[test]
+    fn an_object_that_stopped_is_what_begins_to_drive_from_there() {
+        let config = ObjectsConfig::default();
+        let slow = |scan: u32| detection([20.0 - 0.375 * f64::from(scan), 3.0], [-1.5, 0.0]);
+        let mut stopped = Track::new(&slow(0), &config);
+        stopped.confirm(1);
+        for scan in 1..12 {
+            stopped.predict(0.25, &config);
+            stopped.update(&slow(scan), &config);
+        }
+        for _ in 0..60 {
+            stopped.predict(0.25, &config);
+            stopped.miss(&config);
+        }
+        assert!(stopped.is_lost() && !stopped.is_over(&config));
+        let place = stopped.position();
+        let begun = |ahead_m: f64, velocity: [f64; 2]| {
+            let at = [place.x - ahead_m, place.y];
+            let mut begun = Track::new(&detection(at, velocity), &config);
+            begun.known_s = 0.5;
+            stopped.distance(&begun, &config).is_some()
+        };
+        // 4 m/s are reached after 5 m.
+        assert!(begun(5.0, [-4.0, 0.0]) && begun(2.0, [-4.0, 0.0]) && begun(0.5, [-1.5, 0.0]));
+        assert!(!begun(-5.0, [-4.0, 0.0]) && !begun(40.0, [-4.0, 0.0]));
+        assert!(!begun(5.0, [4.0, 0.0]));
     }
 
     #[test]
