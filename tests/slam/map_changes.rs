@@ -48,7 +48,7 @@ fn parked_cars_that_have_come_and_gone_are_reported_and_a_drive_has_not_changed_
     let mut rows = table.lines();
     assert_eq!(
         rows.next(),
-        Some("change,kind,x_m,y_m,yaw_rad,length_m,width_m,area_m2,share,confidence")
+        Some("change,kind,x_m,y_m,yaw_rad,length_m,width_m,confidence")
     );
     assert_eq!(rows.count() as u64, counts[0] + counts[1]);
     assert!(out.join("changes.png").is_file());

@@ -6,7 +6,7 @@ from pathlib import Path
 import torch
 
 from . import recipe as recipes
-from . import compare, objects, step_time
+from . import changes, compare, objects, step_time
 from .distil import Distiller
 from .drift import drift, motions
 from .export import OnnxMasks
@@ -32,6 +32,7 @@ def run(arguments: list[str]) -> None:
     compare.register(commands)
     step_time.register(commands)
     objects.register(commands)
+    changes.register(commands)
     options = parser.parse_args(arguments)
     if options.threads:
         torch.set_num_threads(options.threads)

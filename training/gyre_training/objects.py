@@ -17,6 +17,8 @@ import torch
 import torch.nn.functional as functional
 from torch import nn
 
+from .planes import computed, convolution, export, level, optimise
+
 CELL_M, SIDE = 0.5, 256
 RECENT, REMEMBERED = 6, 20
 PLANES = RECENT + 2
@@ -322,12 +324,6 @@ def wanted(it: Sample, mirrored: bool) -> tuple[np.ndarray, ...]:
     return likely, counts, values, near
 
 
-def convolution(inputs: int, outputs: int, stride: int = 1, size: int = 3) -> nn.Sequential:
-    return nn.Sequential(
-        nn.Conv2d(inputs, outputs, size, stride, size // 2, bias=False), nn.BatchNorm2d(outputs), nn.ReLU(inplace=True)
-    )
-
-
 class Network(nn.Module):
     """Planes of scans in, values of cells out, each in four planes of every other row and
     column."""
@@ -336,9 +332,9 @@ class Network(nn.Module):
         super().__init__()
         half, quarter, eighth, sixteenth = widths
         self.at_half = convolution(PLANES, half, 2)
-        self.at_quarter = self.level(half, quarter)
-        self.at_eighth = self.level(quarter, eighth)
-        self.at_sixteenth = self.level(eighth, sixteenth)
+        self.at_quarter = level(half, quarter)
+        self.at_eighth = level(quarter, eighth)
+        self.at_sixteenth = level(eighth, sixteenth)
         self.to_eighth = convolution(sixteenth, eighth, size=1)
         self.of_eighth = convolution(eighth, eighth)
         self.to_quarter = convolution(eighth, quarter, size=1)
@@ -347,10 +343,6 @@ class Network(nn.Module):
         self.values = nn.Conv2d(quarter, 4 * VALUES, 1)
         nn.init.zeros_(self.values.bias)
         self.values.bias.data[:4] = -4.6  # One place in a hundred.
-
-    @staticmethod
-    def level(inputs: int, outputs: int) -> nn.Sequential:
-        return nn.Sequential(convolution(inputs, outputs, 2), convolution(outputs, outputs), convolution(outputs, outputs))
 
     def forward(self, planes: torch.Tensor) -> torch.Tensor:
         quarter = self.at_quarter(self.at_half(planes))
@@ -366,7 +358,7 @@ def loss(values: torch.Tensor, likely: torch.Tensor, counts: torch.Tensor, true:
     """The focal loss of the likelihoods ("Objects as Points", Eq. 1), and for the cells near a
     centre the negative logarithms of the likelihoods of centre and velocity, and the differences of heading
     and size."""
-    values = functional.pixel_shuffle(values.float(), 2)
+    values = functional.pixel_shuffle(values, 2)
     said = torch.sigmoid(values[:, 0]).clamp(1e-5, 1 - 1e-5)
     is_centre = likely == 1.0
     right = -((1 - said) ** 2 * said.log() * is_centre).sum()
@@ -390,42 +382,23 @@ def loss(values: torch.Tensor, likely: torch.Tensor, counts: torch.Tensor, true:
     )
 
 
-def train(data: list[Sample], steps: int, rate: float = 2e-3, batch: int = 8) -> Network:
-    """Trains for some steps, with a rate that rises and falls once."""
+def train(data: list[Sample], steps: int, batch: int = 8) -> Network:
     random = np.random.default_rng(0)
     torch.manual_seed(0)
-    network = Network().to(memory_format=torch.channels_last).train()
-    optimiser = torch.optim.AdamW(network.parameters(), weight_decay=1e-2)
-    order, losses = [], []
-    for step in range(steps):
-        done = step / steps
-        for group in optimiser.param_groups:
-            group["lr"] = rate * min(1, done / 0.03 + 0.05) * 0.5 * (1 + np.cos(np.pi * done)) + 1e-5
+    network = Network().to(memory_format=torch.channels_last)
+    order = []
+
+    def next_loss() -> torch.Tensor:
+        nonlocal order
         order = order if len(order) >= batch else list(random.permutation(len(data)))
         chosen = [(data[order.pop()], bool(random.integers(2))) for _ in range(batch)]
         shown = [(roughened(it, random) if random.random() < 0.7 else it, mirrored) for it, mirrored in chosen]
         planes = torch.from_numpy(np.stack([drawn(*it) for it in shown]))
         targets = [torch.from_numpy(np.stack(it)) for it in zip(*(wanted(*it) for it in chosen))]
-        with torch.autocast("cpu", dtype=torch.bfloat16):
-            values = network(planes.contiguous(memory_format=torch.channels_last))
-        value = loss(values, *targets)
-        optimiser.zero_grad()
-        value.backward()
-        nn.utils.clip_grad_norm_(network.parameters(), 5.0)
-        optimiser.step()
-        losses.append(value.item())
-        if len(losses) == 500:
-            print(f"step {step + 1} of {steps}: loss {np.mean(losses):.3f}", flush=True)
-            losses = []
+        return loss(computed(network, planes), *targets)
+
+    optimise(network, steps, next_loss)
     return network
-
-
-def export(network: Network, path: Path) -> None:
-    """Writes the network as ONNX."""
-    empty = torch.zeros(1, PLANES, SIDE, SIDE)
-    torch.onnx.export(
-        network.eval(), (empty,), path, input_names=["scans"], output_names=["objects"], opset_version=17, dynamo=False
-    )
 
 
 def register(commands) -> None:
@@ -446,5 +419,4 @@ def run(options: argparse.Namespace) -> None:
         data += [it for stride in STRIDES for it in samples(other, stride)]
     print(f"{len(drives)} drives, {len(data)} scans", flush=True)
     network = train(data, options.steps)
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    export(network, options.out)
+    export(network, torch.zeros(1, PLANES, SIDE, SIDE), options.out)

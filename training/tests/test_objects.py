@@ -4,6 +4,7 @@ import numpy as np
 import onnxruntime
 import torch
 from gyre_training import objects
+from gyre_training.planes import export
 
 POST = (20.2, 0.2)
 
@@ -102,8 +103,8 @@ def test_it_learns_and_is_written_as_it_is(tmp_path):
     before = objects.loss(objects.Network().eval()(planes), *targets).item()
     network = objects.train(objects.samples(drive), steps=80, batch=2)
     assert objects.loss(network.eval()(planes), *targets).item() < 0.5 * before
-    objects.export(network, tmp_path / "network.onnx")
+    export(network, torch.zeros(1, objects.PLANES, objects.SIDE, objects.SIDE), tmp_path / "network.onnx")
     session = onnxruntime.InferenceSession(tmp_path / "network.onnx")
-    (given,) = session.run(None, {"scans": planes.numpy()})
+    (given,) = session.run(None, {"planes": planes.numpy()})
     assert given.shape == (1, 4 * objects.VALUES, objects.OUT // 2, objects.OUT // 2)
     assert np.allclose(given, network(planes).detach().numpy(), atol=1e-3)

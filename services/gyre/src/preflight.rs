@@ -129,6 +129,9 @@ pub fn check(configuration: &Configuration) -> Result<Preflight, Failure> {
         &configuration.odometry.points,
         &configuration.odometry.masking,
     )?;
+    if configuration.objects.is_on() {
+        gyre_objects_follower::tracker(&configuration.objects, &configuration.odometry.masking)?;
+    }
     check_gnss(configuration)?;
     if configuration.slam.is_localised() {
         searched_map::open(&configuration.slam.map, configuration)?;

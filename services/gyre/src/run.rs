@@ -12,7 +12,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_configuration::{Configuration, describe_masks, with_stored_options};
+use gyre_configuration::{Configuration, describe_masks, describe_objects, with_stored_options};
 use gyre_datasets::GnssLog;
 use gyre_messages::StageId;
 use gyre_operate::detach_if_asked;
@@ -200,6 +200,7 @@ fn play(
     }
 
     describe_masks(resolved)?.iter().for_each(print::note);
+    describe_objects(resolved)?.iter().for_each(print::note);
     resolved.link.describe().iter().for_each(print::note);
     let resumed = unfinished.map_or(0, |begun| begun.poses as usize);
     let mut progress = Progress::new(checked.scans, resumed, &checked.footprint);

@@ -1,9 +1,10 @@
-//! The library that computes learned masks, and what their training had otherwise.
+//! The library that computes networks, and what the training of masks had otherwise.
 
 use std::error::Error;
 
-use gyre_masking::{Library, MaskKind, model::Card, runtime::INSTALL};
+use gyre_masking::{Library, MaskKind, MaskingConfig, model::Card};
 use gyre_messages::StageId;
+use gyre_networks::runtime::{INSTALL, RuntimeError};
 use gyre_odometry::OdometryConfig;
 
 use crate::configuration::Configuration;
@@ -46,18 +47,7 @@ pub fn describe_masks(
         return Ok(Vec::new());
     };
     let card = card.display();
-    let mut sentences = vec![match Library::find(masking)? {
-        Library::OnnxRuntime(path) => {
-            format!(
-                "the masks of {card} are computed by ONNX Runtime, {}",
-                path.display()
-            )
-        }
-        Library::Rten => format!(
-            "the masks of {card} are computed by rten, in one thread; ONNX Runtime is several times faster: \
-             `{INSTALL}` installs it"
-        ),
-    }];
+    let mut sentences = vec![computed(&format!("the masks of {card} are"), masking)?];
     let unlike = Card::read(masking)?.training_mismatches(masking, raster);
     if !unlike.is_empty() {
         sentences.push(format!(
@@ -66,4 +56,29 @@ pub fn describe_masks(
         ));
     }
     Ok(sentences)
+}
+
+/// Returns a sentence: which library computes the network of moving objects. `None` without these.
+///
+/// # Errors
+/// ONNX Runtime is missing where it is required.
+pub fn describe_objects(
+    configuration: &Configuration,
+) -> Result<Option<String>, Box<dyn Error + Send + Sync>> {
+    let masking = &configuration.odometry.masking;
+    let is_on = configuration.objects.is_on();
+    Ok(is_on
+        .then(|| computed("moving objects are", masking))
+        .transpose()?)
+}
+
+fn computed(what: &str, masking: &MaskingConfig) -> Result<String, RuntimeError> {
+    Ok(match Library::find(masking)? {
+        Library::OnnxRuntime(path) => {
+            format!("{what} computed by ONNX Runtime, {}", path.display())
+        }
+        Library::Rten => format!(
+            "{what} computed by rten, in one thread; ONNX Runtime is several times faster: `{INSTALL}` installs it"
+        ),
+    })
 }

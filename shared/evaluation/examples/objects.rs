@@ -19,6 +19,7 @@ use std::{env, fs};
 use gyre_datasets::{Dataset, DatasetOptions, ScanSamples};
 use gyre_evaluation::{ObjectOptions, ObjectScan, TrackedObject, TrueObject, object_errors};
 use gyre_geometry::{Pose, SparsePoint, Twist, xy_yaw};
+use gyre_networks::runtime;
 use gyre_objects::{Object, ObjectTracker, ObjectsConfig, ObjectsKind, PlacedScan};
 use gyre_odometry::{Odometry, OdometryConfig};
 use gyre_radar::OwnedScan;
@@ -85,7 +86,8 @@ fn main() -> Outcome<()> {
 
 /// Tracks the objects of a drive, and puts those of each scan beside the true ones.
 fn track(drive: &[DriveScan], config: &ObjectsConfig) -> Outcome<Vec<ObjectScan>> {
-    let mut tracker = ObjectTracker::new(config)?;
+    let runtime = runtime::find(None).ok();
+    let mut tracker = ObjectTracker::new(config, runtime.as_deref())?;
     let scan = |scan: &DriveScan| {
         let sensor = scan.placed.pose.inverse();
         let objects = tracker.update(&scan.placed, &scan.points)?;

@@ -12,6 +12,7 @@ use gyre_journal::{
     objects::{LoggedObjects, listed},
     scans::LoggedScan,
 };
+use gyre_masking::{Library, MaskingConfig};
 use gyre_messages::{Item, MAX_LISTED, Objects, ObjectsHeader};
 use gyre_objects::{Object, ObjectTracker, ObjectsConfig, PlacedScan};
 use gyre_slam::{RecordLog, RecordReader};
@@ -29,12 +30,14 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
         return Ok(StageCounters::default());
     }
     let config: ObjectsConfig = launch.section("objects")?;
+    let masking: MaskingConfig = launch.section("masking")?;
     let out = launch.manifest.out.clone();
     let mut tracking = Tracking {
         scans: RecordReader::open(&out)?,
         tracked: RecordLog::open(&out)?,
-        tracker: tracker(&config)?,
+        tracker: tracker(&config, &masking)?,
         config,
+        masking,
         out,
         read: 0,
     };
@@ -42,14 +45,25 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     follower::run(launch, &mut tracking)
 }
 
-fn tracker(config: &ObjectsConfig) -> Result<ObjectTracker, StageError> {
-    ObjectTracker::new(config).map_err(|error| StageError::Configuration(error.to_string()))
+/// Returns a tracker whose network is computed by the library of learned masks.
+///
+/// # Errors
+/// An invalid configuration, or a library that cannot be used.
+pub fn tracker(
+    config: &ObjectsConfig,
+    masking: &MaskingConfig,
+) -> Result<ObjectTracker, StageError> {
+    let library = Library::find(masking);
+    let library = library.map_err(|error| StageError::Configuration(error.to_string()))?;
+    ObjectTracker::new(config, library.onnx_runtime())
+        .map_err(|error| StageError::Configuration(error.to_string()))
 }
 
 struct Tracking {
     /// The folder of the results.
     out: PathBuf,
     config: ObjectsConfig,
+    masking: MaskingConfig,
     scans: RecordReader<LoggedScan>,
     tracked: RecordLog<LoggedObjects>,
     tracker: ObjectTracker,
@@ -64,7 +78,7 @@ impl Tracking {
         if self.scans.unchanged() < self.read {
             self.tracked.cut(self.scans.unchanged())?;
             self.scans = RecordReader::open(&self.out)?;
-            self.tracker = tracker(&self.config)?;
+            self.tracker = tracker(&self.config, &self.masking)?;
             self.read = 0;
         }
         Ok(())

@@ -57,6 +57,9 @@ pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
         configuration.source.data = PathBuf::new();
     }
     configuration.odometry.masking.resolve()?;
+    if configuration.objects.is_on() {
+        configuration.odometry.masking.resolve_library()?;
+    }
     let functions = configuration.stages.values_mut();
     let functions = functions.filter_map(|stage| stage.python.as_mut());
     // Absolute, so that the resolved configuration repeats the run from any folder. The reader

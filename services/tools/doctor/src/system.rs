@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeSet, fs};
 
-use gyre_masking::runtime::{self, RuntimeError};
+use gyre_networks::runtime::{self, RuntimeError};
 use gyre_python_function::Interpreter;
 use gyre_results::machine::Machine;
 use gyre_run::MOST_OPEN_FILES;
@@ -149,8 +149,12 @@ pub fn onnx_runtime() -> Finding {
         Ok(path) => Finding::good("ONNX Runtime", path.display().to_string()),
         Err(error) => {
             let found = match error {
-                RuntimeError::Missing => "none: rten computes learned masks, which takes longer",
-                _ => "cannot be used: no learned masks, unless masking.backend is `rten`",
+                RuntimeError::Missing => {
+                    "none: rten computes learned masks and moving objects, which takes longer"
+                }
+                _ => {
+                    "cannot be used: no learned masks and moving objects, unless masking.backend is `rten`"
+                }
             };
             Finding::good("ONNX Runtime", found).limited(error.to_string())
         }

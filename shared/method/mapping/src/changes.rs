@@ -1,58 +1,51 @@
 //! The changes between two drives through one place: what has appeared, and what has gone.
 //!
-//! - `survey`: [`Survey`], how much each place returned of how often one drive looked at it;
-//! - `noise`: how far two looks at one unchanged place differ, learnt from both drives;
+//! - `survey`: [`Survey`], how one drive saw each place;
 //! - `clusters`: changed places joined to things with an outline.
 //!
 //! # Method
 //! 1. Each drive is drawn into cells of 0.5 m. A keyframe that looks at a cell adds its strongest
 //!    return there, weighed as the look; free space is a look without a return. Strengths are those
-//!    of a thing at 20 m, so that they tell what it is and not how far it is away. Two sums are
-//!    kept: of solid returns, as of a car, and of any, as of leaves and kerbs.
-//! 2. A place that is occupied by something solid in the one drive is compared with what the other
-//!    one saw there and half a metre around, however weak: branches and leaves are never at the
-//!    same places again.
-//! 3. Between two halves of one drive, stretches of the path in turn, nothing has changed: how
-//!    often both see such shares together is what two looks at one place may show. Of a place that
-//!    has changed they see two things that have nothing to do with each other. The ratio of both is
-//!    the evidence of a change. So what is seen at some angles only, traffic and speckle are as
-//!    uncertain as they are in these two drives.
-//! 4. The share of the occupied places that have changed is that by which both drives are most
-//!    likely (expectation and maximisation).
-//! 5. A place has changed if it is occupied in one drive and free in the other, and that is more
-//!    likely than not. What one drive did not look at is neither.
-//! 6. Neighbouring places that have changed in the same sense are one thing. One of the size of a
-//!    car or more is reported, with the mean of the log odds of its places as confidence: they are
-//!    seen by the same looks, and so are no independent witnesses.
+//!    of a thing at 20 m, so that they tell what it is and not how far it is away. Of each cell
+//!    there are how well it was looked at, the mean strength, and the shares of the looks with any
+//!    return and with a solid one.
+//! 2. A network is shown both drives, a square of 192 m at once, and says of each cell how likely a
+//!    car stood in it on the first one and none does on the second one. It was trained on simulated
+//!    pairs: it knows what a car looks like from a few sides, and what undergrowth that has grown
+//!    anew, traffic, speckle and shadows look like instead. What has appeared is gone with the
+//!    drives exchanged.
+//! 3. Neighbouring places that may have changed in the same sense are one thing, with the largest
+//!    log odds of its places as confidence. What one drive did not look at is not compared.
 
 mod clusters;
-mod noise;
 mod survey;
 
 use std::collections::BTreeMap;
 use std::fmt;
 
+use gyre_networks::{PlanesError, PlanesNetwork};
 use nalgebra::{Point2, Vector2};
 use serde::Serialize;
 
-use clusters::{Cluster, Odds};
-use noise::Noise;
+use crate::tile::{TILE_CELLS, TileIndex};
+use clusters::Cluster;
 pub use survey::Survey;
-use survey::{CELL_M, Pair, Part};
+use survey::{CELL_M, PLANES};
 
-/// Looks from nearby of each drive at a place that is compared.
-const MIN_LOOKED: f64 = 4.0;
-/// The share of the looks with a solid return from which on a place is occupied, as
-/// [`Occupancy`](crate::Occupancy) has it.
-const OCCUPIED: f64 = 1.0 / 16.0;
-/// The share of the looks with any return below which a place is free.
-const FREE: f64 = 0.4;
-/// A change that is reported has a side of this length, m, returns in this share of its looks, and
-/// an area of which what returned in each look would fill this, m²: of a parked car those sides are
-/// seen that face the road.
-const MIN_LENGTH_M: f64 = 2.0;
-const MIN_SHARE: f64 = 0.2;
-const MIN_RETURNED_M2: f64 = 0.8;
+/// The network in the program.
+const NETWORK: &str = "gyre:models/changes.onnx";
+/// The least that both drives know of a place that is compared: two thirds of a look from nearby.
+const LEAST_KNOWN: f32 = 0.2;
+/// The logarithm of the odds from which on a place may have changed, and that of the likeliest
+/// place of a change that is reported.
+const LEAST_LOG_ODDS: f32 = -1.5;
+const CERTAIN_LOG_ODDS: f64 = 0.0;
+/// Cells of the least change that is reported.
+const MIN_CELLS: usize = 4;
+/// Cells around a tile that the network is shown too.
+const MARGIN: usize = 64;
+/// Cells a side that it is shown.
+const SIDE: usize = TILE_CELLS + 2 * MARGIN;
 
 /// The sense of a change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -88,11 +81,6 @@ pub struct Change {
     pub length_m: f64,
     /// The shorter side of the rectangle, m.
     pub width_m: f64,
-    /// The area of its changed places, m².
-    pub area_m2: f64,
-    /// The mean share of the looks at its places that returned power, on the drive on which it
-    /// stood: that of a wall is near 1, and that of a few leaves near 0.
-    pub share: f64,
     /// The probability that it has changed, from 0.5 to 1.
     pub confidence: f64,
 }
@@ -118,74 +106,145 @@ impl Change {
 pub struct Changes {
     /// The area that both drives have looked at, m².
     pub compared_m2: f64,
-    /// The share of the occupied places that have changed, by the drives themselves.
-    pub changed_share: f64,
     /// The changes, the most certain first.
     pub changes: Vec<Change>,
 }
 
 /// Returns what has appeared and gone between two drives.
-pub fn changes(earlier: &Survey, later: &Survey) -> Changes {
-    let noise = Noise::learn([earlier, later]);
-    let whole = |survey| (survey, Part::Whole);
-    let gone = earlier
-        .pairs(Part::Whole, whole(later), MIN_LOOKED)
-        .collect();
-    let appeared = later
-        .pairs(Part::Whole, whole(earlier), MIN_LOOKED)
-        .collect();
-    let pairs: [(ChangeKind, Vec<Pair>); 2] =
-        [(ChangeKind::Gone, gone), (ChangeKind::Appeared, appeared)];
-    let compared = pairs[0].1.len();
-    let occupied = pairs.iter().flat_map(|(_, pairs)| pairs);
-    let changed_share = noise.changed_share(occupied.filter(|pair| pair.own >= OCCUPIED));
-    let changed = pairs.iter().flat_map(|(kind, pairs)| {
-        let places = changed_places(pairs, &noise, changed_share);
-        let clusters = clusters::connected(&places).into_iter();
-        clusters.filter_map(|cluster| change(*kind, &cluster))
-    });
-    let mut changes: Vec<Change> = changed.collect();
+///
+/// # Errors
+/// The network cannot be computed.
+pub fn changes(earlier: &Survey, later: &Survey) -> Result<Changes, PlanesError> {
+    let shapes = [[2 * PLANES, SIDE, SIDE], [1, SIDE, SIDE]];
+    let mut network = PlanesNetwork::load(NETWORK, None, shapes)?;
+    let (mut gone, mut appeared) = (BTreeMap::new(), BTreeMap::new());
+    let mut compared = 0;
+    let is_of_later = |tile: &TileIndex| later.tiles().any(|other| other == *tile);
+    for tile in earlier.tiles().filter(is_of_later) {
+        let window = Window::around(tile);
+        let drawn = [earlier, later].map(|survey| survey.draw(window.corner, [SIDE; 2]));
+        let [before, after] = drawn.each_ref().map(Vec::as_slice);
+        let is_compared = |at: usize| before[at] >= LEAST_KNOWN && after[at] >= LEAST_KNOWN;
+        let cells: Vec<(usize, [i64; 2])> = window.cells().filter(|it| is_compared(it.0)).collect();
+        compared += cells.len();
+        if cells.is_empty() {
+            continue;
+        }
+        for (drives, changed) in [
+            ([before, after], &mut gone),
+            ([after, before], &mut appeared),
+        ] {
+            let log_odds = log_odds(&mut network, &drives.concat())?;
+            let likely = cells.iter().filter(|it| log_odds[it.0] > LEAST_LOG_ODDS);
+            changed.extend(likely.map(|(at, cell)| (*cell, f64::from(log_odds[*at]))));
+        }
+    }
+    let found = |kind, places: &BTreeMap<_, _>| {
+        let clusters = clusters::connected(places).into_iter();
+        let found = clusters.filter_map(|cluster| change(kind, &cluster));
+        found.collect::<Vec<Change>>()
+    };
+    let mut changes = [
+        found(ChangeKind::Gone, &gone),
+        found(ChangeKind::Appeared, &appeared),
+    ]
+    .concat();
     changes.sort_by(|a, b| {
         let by_confidence = b.confidence.total_cmp(&a.confidence);
         by_confidence.then(a.x_m.total_cmp(&b.x_m))
     });
-    Changes {
+    Ok(Changes {
         compared_m2: compared as f64 * CELL_M * CELL_M,
-        changed_share,
         changes,
-    }
+    })
 }
 
-/// Returns the log odds of each place that is occupied in the one and free in the other, and has
-/// more likely changed than not.
-fn changed_places(pairs: &[Pair], noise: &Noise, changed_share: f64) -> BTreeMap<[i64; 2], Odds> {
-    let prior = (changed_share / (1.0 - changed_share)).ln();
-    let differing = pairs
-        .iter()
-        .filter(|pair| pair.own >= OCCUPIED && pair.other < FREE);
-    let odds = differing.map(|pair| {
-        let (log_odds, share) = (prior + noise.log_odds(pair), pair.own);
-        (pair.cell, Odds { log_odds, share })
-    });
-    odds.filter(|(_, odds)| odds.log_odds > 0.0).collect()
+/// Returns the mean of what the network says of both drives as they are and mirrored, the logarithm
+/// of the odds of each cell: it errs in other places then.
+fn log_odds(network: &mut PlanesNetwork, planes: &[f32]) -> Result<Vec<f32>, PlanesError> {
+    const SIDES: [[bool; 2]; 4] = [[false, false], [false, true], [true, false], [true, true]];
+    let mut mean = vec![0.0; SIDE * SIDE];
+    for sides in SIDES {
+        let said = mirrored(&network.compute(mirrored(planes, sides))?, sides);
+        let share = 1.0 / SIDES.len() as f32;
+        mean.iter_mut()
+            .zip(said)
+            .for_each(|(mean, said)| *mean += share * said);
+    }
+    Ok(mean)
+}
+
+/// Mirrors planes of SIDE x SIDE cells: their rows, their columns, both or neither.
+fn mirrored(planes: &[f32], [rows, columns]: [bool; 2]) -> Vec<f32> {
+    let mut mirrored = planes.to_vec();
+    for plane in mirrored.chunks_exact_mut(SIDE * SIDE) {
+        if rows != columns {
+            plane.chunks_exact_mut(SIDE).for_each(<[f32]>::reverse);
+        }
+        if rows {
+            plane.reverse();
+        }
+    }
+    mirrored
+}
+
+/// The cells that the network is shown for a tile: its own, and a margin.
+struct Window {
+    corner: [i64; 2],
+}
+
+impl Window {
+    fn around(tile: TileIndex) -> Self {
+        Self {
+            corner: tile.corner().map(|at| at - MARGIN as i64),
+        }
+    }
+
+    /// The cells of the tile, by their number in the window.
+    fn cells(&self) -> impl Iterator<Item = (usize, [i64; 2])> {
+        let inner = MARGIN..SIDE - MARGIN;
+        let at = |row: usize, column: usize| {
+            let cell = [self.corner[0] + row as i64, self.corner[1] + column as i64];
+            (row * SIDE + column, cell)
+        };
+        inner
+            .clone()
+            .flat_map(move |row| inner.clone().map(move |column| at(row, column)))
+    }
 }
 
 /// Returns the change that a cluster is, if it is large enough.
 fn change(kind: ChangeKind, cluster: &Cluster) -> Option<Change> {
     let outline = cluster.outline();
-    let area_m2 = cluster.cells.len() as f64 * CELL_M * CELL_M;
-    let is_large = outline.length_m >= MIN_LENGTH_M
-        && cluster.share >= MIN_SHARE
-        && cluster.share * area_m2 >= MIN_RETURNED_M2;
-    is_large.then(|| Change {
+    let is_one = cluster.cells.len() >= MIN_CELLS && cluster.log_odds >= CERTAIN_LOG_ODDS;
+    is_one.then(|| Change {
         kind,
         x_m: outline.centre.x,
         y_m: outline.centre.y,
         yaw_rad: outline.yaw_rad,
         length_m: outline.length_m,
         width_m: outline.width_m,
-        area_m2,
-        share: cluster.share,
         confidence: 1.0 / (1.0 + (-cluster.log_odds).exp()),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn planes_are_mirrored_by_rows_and_by_columns_and_back() {
+        let mut planes = vec![0.0; 2 * SIDE * SIDE];
+        planes[SIDE * SIDE + 3 * SIDE + 5] = 1.0;
+        for (sides, [row, column]) in [
+            ([false, false], [3, 5]),
+            ([true, false], [SIDE - 4, 5]),
+            ([false, true], [3, SIDE - 6]),
+            ([true, true], [SIDE - 4, SIDE - 6]),
+        ] {
+            let there = mirrored(&planes, sides);
+            assert_eq!(there[SIDE * SIDE + row * SIDE + column], 1.0, "{sides:?}");
+            assert_eq!(mirrored(&there, sides), planes);
+        }
+    }
 }

@@ -23,16 +23,16 @@ pub struct MaskingConfig {
     /// SHA-256 of the network, to refuse another one. Default: the one of its card.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sha256: Option<String>,
-    /// The library that computes the network: `onnxruntime`; `rten`, which is built in and slower,
-    /// and leaves networks of one scan in 8 bits to Gyre itself; or `auto`: ONNX Runtime where it
-    /// is found, else rten.
+    /// The library that computes the network, and that of moving objects: `onnxruntime`; `rten`,
+    /// which is built in and slower, and leaves networks of one scan in 8 bits to Gyre itself; or
+    /// `auto`: ONNX Runtime where it is found, else rten.
     #[serde(deserialize_with = "backend::deserialize")]
     pub backend: Backend,
     /// The library of ONNX Runtime, or its folder. Default: it is searched for, see docs/masks.md.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub runtime: Option<PathBuf>,
-    /// Threads of ONNX Runtime, 1 to 64; rten computes with one. The other stages work at the same
-    /// time.
+    /// Threads of ONNX Runtime, 1 to 64; rten computes with one, and so do both moving objects. The
+    /// other stages work at the same time.
     pub threads: usize,
     /// Execution provider of the network: `cpu`, or `cuda`, `tensorrt` or `openvino` in a build
     /// with that feature.

@@ -2,8 +2,8 @@
 //!
 //! Reading order: [`Masker`]; `compensation` (motion-compensated rasters above the threshold);
 //! `learned` and [`network`] (masks of a network); [`MaskFunction`] (masks of your own); `points`
-//! (weights of sparse points); [`model`] (networks and their cards), [`Library`] (what computes
-//! them) and [`runtime`] (the search for ONNX Runtime).
+//! (weights of sparse points); [`model`] (networks and their cards) and [`Library`] (what computes
+//! them).
 
 pub mod backend;
 mod compensation;
@@ -17,7 +17,6 @@ pub mod model;
 pub mod network;
 mod points;
 mod resolve;
-pub mod runtime;
 mod sweep;
 
 #[cfg(test)]

@@ -1,11 +1,10 @@
 //! The library that computes the networks.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use crate::{
-    Backend, MaskingConfig, Provider,
-    runtime::{self, RuntimeError},
-};
+use gyre_networks::runtime::{self, RuntimeError};
+
+use crate::{Backend, MaskingConfig, Provider};
 
 /// The library that a configuration chooses on this machine.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,6 +31,14 @@ impl Library {
         match runtime::find(config.runtime.as_deref()) {
             Err(RuntimeError::Missing) if !is_required => Ok(Self::Rten),
             found => Ok(Self::OnnxRuntime(found?)),
+        }
+    }
+
+    /// Returns the path of ONNX Runtime; `None` for rten.
+    pub fn onnx_runtime(&self) -> Option<&Path> {
+        match self {
+            Self::OnnxRuntime(path) => Some(path),
+            Self::Rten => None,
         }
     }
 

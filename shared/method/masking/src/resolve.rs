@@ -1,4 +1,6 @@
-//! Resolves the inputs of a learned mask.
+//! Resolves the inputs of a network.
+
+use gyre_networks::runtime::RuntimeError;
 
 use crate::{Library, MaskKind, MaskingConfig, model::Card, network::NetworkError};
 
@@ -12,17 +14,26 @@ impl MaskingConfig {
     pub fn resolve(&mut self) -> Result<(), NetworkError> {
         if self.kind == MaskKind::Learned {
             self.sha256 = Some(Card::read(self)?.model.sha256);
-            let library = Library::find(self)?;
-            self.backend = library.backend();
-            self.runtime = match library {
-                Library::OnnxRuntime(path) => Some(path),
-                Library::Rten => None,
-            };
+            self.resolve_library()?;
             self.model = self
                 .model
                 .take()
                 .map(|card| card.canonicalize().unwrap_or(card));
         }
+        Ok(())
+    }
+
+    /// Resolves the library alone: its absolute path, and the backend.
+    ///
+    /// # Errors
+    /// ONNX Runtime missing where it is required.
+    pub fn resolve_library(&mut self) -> Result<(), RuntimeError> {
+        let library = Library::find(self)?;
+        self.backend = library.backend();
+        self.runtime = match library {
+            Library::OnnxRuntime(path) => Some(path),
+            Library::Rten => None,
+        };
         Ok(())
     }
 }

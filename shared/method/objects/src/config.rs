@@ -1,5 +1,6 @@
 //! The section `[objects]` of a configuration.
 
+use gyre_networks::PlanesError;
 use serde::{Deserialize, Serialize};
 
 /// The kind of the tracking.
@@ -131,8 +132,14 @@ pub enum ObjectsError {
         bounds: &'static str,
     },
     /// The network cannot be loaded or computed.
-    #[error("the network that finds moving objects fails: {0}")]
+    #[error("{0}")]
     Network(String),
+}
+
+impl From<PlanesError> for ObjectsError {
+    fn from(error: PlanesError) -> Self {
+        Self::Network(error.to_string())
+    }
 }
 
 impl ObjectsConfig {

@@ -1,13 +1,11 @@
 //! The detection of vehicles that move, by the network.
 
 use std::f64::consts::TAU;
-use std::fmt::Display;
 use std::path::Path;
-use std::sync::Arc;
 
 use gyre_geometry::{Pose, SparsePoint};
+use gyre_networks::PlanesNetwork;
 use nalgebra::{Matrix2, Point2, Vector2};
-use rten::{Model, ModelOptions, RunOptions, ThreadPool, Value};
 
 use crate::raster::{Memory, PLANES, SIDE};
 use crate::{ObjectsError, PlacedScan};
@@ -29,8 +27,7 @@ const ALONE_M: f64 = 2.5;
 
 /// Finds vehicles that move in the last scans.
 pub(crate) struct Detector {
-    network: Model,
-    thread: Arc<ThreadPool>,
+    network: PlanesNetwork,
     memory: Memory,
 }
 
@@ -58,14 +55,12 @@ pub(crate) struct Detection {
 }
 
 impl Detector {
-    /// Loads the network.
-    pub fn new() -> Result<Self, ObjectsError> {
-        let network = gyre_shipped::bytes(Path::new(NETWORK)).unwrap_or_default();
-        let network = ModelOptions::with_all_ops().load_static_slice(network);
-        let network = network.map_err(|error| failed(&error))?;
+    /// Loads the network, into the ONNX Runtime at a path or else into rten.
+    pub fn new(runtime: Option<&Path>) -> Result<Self, ObjectsError> {
+        // The network gives each plane in four, of every other row and column.
+        let shapes = [[PLANES, SIDE, SIDE], [4 * VALUES, OUT / 2, OUT / 2]];
         Ok(Self {
-            network,
-            thread: Arc::new(ThreadPool::with_num_threads(1)),
+            network: PlanesNetwork::load(NETWORK, runtime, shapes)?,
             memory: Memory::new(),
         })
     }
@@ -83,7 +78,7 @@ impl Detector {
         least: f64,
     ) -> Result<Vec<Detection>, ObjectsError> {
         self.memory.add(scan, points);
-        let output = unfolded(&self.run(self.memory.draw(&scan.pose))?);
+        let output = unfolded(&self.network.compute(self.memory.draw(&scan.pose))?);
         let mut found: Vec<Detection> = Vec::new();
         for cell in peaks(&output, least) {
             let detection = read(&output, cell);
@@ -98,25 +93,6 @@ impl Detector {
         }
         Ok(found)
     }
-
-    /// Computes the network.
-    fn run(&self, planes: Vec<f32>) -> Result<Vec<f32>, ObjectsError> {
-        let input = Value::from_shape([1, PLANES, SIDE, SIDE], planes);
-        let input = input.map_err(|error| failed(&error))?;
-        let options = RunOptions::default().with_thread_pool(Some(self.thread.clone()));
-        let output = self.network.run_one(input.into(), Some(options));
-        let output = output.map_err(|error| failed(&error))?;
-        let output = output.into_shape_vec::<f32, 4>();
-        let (shape, values) = output.map_err(|error| failed(&error))?;
-        match shape == [1, 4 * VALUES, OUT / 2, OUT / 2] {
-            true => Ok(values),
-            false => Err(failed(&format_args!("it gives {shape:?}"))),
-        }
-    }
-}
-
-fn failed(error: &dyn Display) -> ObjectsError {
-    ObjectsError::Network(error.to_string())
 }
 
 /// Returns the planes of the output, OUT x OUT each. The network gives each in four, of every other

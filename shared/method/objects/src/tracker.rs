@@ -1,5 +1,7 @@
 //! The tracker: the whole method on one page.
 
+use std::path::Path;
+
 use gyre_geometry::SparsePoint;
 
 use crate::assignment::assign;
@@ -18,15 +20,16 @@ pub struct ObjectTracker {
 }
 
 impl ObjectTracker {
-    /// Creates a tracker without objects.
+    /// Creates a tracker without objects. The ONNX Runtime at a path computes its network, or else
+    /// rten, which takes four times as long.
     ///
     /// # Errors
     /// The first setting out of its bounds; a network that cannot be loaded.
-    pub fn new(config: &ObjectsConfig) -> Result<Self, ObjectsError> {
+    pub fn new(config: &ObjectsConfig, runtime: Option<&Path>) -> Result<Self, ObjectsError> {
         config.validate()?;
         Ok(Self {
             config: config.clone(),
-            detector: Detector::new()?,
+            detector: Detector::new(runtime)?,
             tracks: Vec::new(),
             objects: Vec::new(),
             next_id: 1,

@@ -66,7 +66,7 @@ impl Scene {
     fn settled() -> Self {
         let mut scene = Self {
             sensor_mps: 8.0,
-            tracker: ObjectTracker::new(&ObjectsConfig::default()).unwrap(),
+            tracker: ObjectTracker::new(&ObjectsConfig::default(), None).unwrap(),
             random: ChaCha8Rng::seed_from_u64(5),
             scan: 0,
         };

@@ -55,8 +55,8 @@ pub fn compare(arguments: &MapArguments, later: &Path) -> Result<ExitCode, Failu
     // folder.
     let locked = out.exists().then(|| Out::lock(out)).transpose()?;
     let placed = placing::place(&graph, &mut keyframes, &mut localiser, [later, earlier])?;
-    let surveys = survey(&localiser, &mut keyframes, &placed, &configuration)?;
-    let found = changes(&surveys[0], &surveys[1]);
+    let surveys = survey(&localiser, &mut keyframes, &placed)?;
+    let found = changes(&surveys[0], &surveys[1])?;
     if found.compared_m2 == 0.0 {
         return Err(format!(
             "{} and {} have looked at no place in common often enough to compare it",
@@ -93,10 +93,8 @@ fn survey(
     localiser: &Localiser,
     keyframes: &mut RecordReader<Keyframe>,
     placed: &PlacedDrive,
-    configuration: &Configuration,
 ) -> Result<[Survey; 2], Failure> {
-    let options = map_options(configuration);
-    let (mut before, mut after) = (Survey::new(&options)?, Survey::new(&options)?);
+    let (mut before, mut after) = (Survey::default(), Survey::default());
     for keyframe in localiser.map().keyframes() {
         before.add(keyframe, &keyframe.pose.motion);
     }
@@ -110,21 +108,12 @@ fn survey(
 
 /// Returns `changes.csv`.
 fn table(changes: &[Change]) -> Result<Vec<u8>, Failure> {
-    let mut text =
-        b"change,kind,x_m,y_m,yaw_rad,length_m,width_m,area_m2,share,confidence\n".to_vec();
+    let mut text = b"change,kind,x_m,y_m,yaw_rad,length_m,width_m,confidence\n".to_vec();
     for (number, it) in (1..).zip(changes) {
         writeln!(
             text,
-            "{number},{},{:.2},{:.2},{:.3},{:.2},{:.2},{:.2},{:.3},{:.3}",
-            it.kind,
-            it.x_m,
-            it.y_m,
-            it.yaw_rad,
-            it.length_m,
-            it.width_m,
-            it.area_m2,
-            it.share,
-            it.confidence
+            "{number},{},{:.2},{:.2},{:.3},{:.2},{:.2},{:.3}",
+            it.kind, it.x_m, it.y_m, it.yaw_rad, it.length_m, it.width_m, it.confidence
         )?;
     }
     Ok(text)

@@ -16,18 +16,8 @@ const DIRECTIONS: i32 = 30;
 pub(super) struct Cluster {
     /// The cells, at least one.
     pub cells: Vec<[i64; 2]>,
-    /// The mean of their log odds.
+    /// The largest of their log odds.
     pub log_odds: f64,
-    /// The mean share of the looks at them that returned power, where they are occupied.
-    pub share: f64,
-}
-
-/// The log odds of a place, and the share of the looks at it that returned power where it is
-/// occupied.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Odds {
-    pub log_odds: f64,
-    pub share: f64,
 }
 
 /// The smallest rectangle around a cluster.
@@ -41,29 +31,26 @@ pub(super) struct Outline {
 }
 
 /// Joins neighbouring cells, each with its log odds.
-pub(super) fn connected(places: &BTreeMap<[i64; 2], Odds>) -> Vec<Cluster> {
+pub(super) fn connected(places: &BTreeMap<[i64; 2], f64>) -> Vec<Cluster> {
     let mut left = places.clone();
     let mut clusters = Vec::new();
-    while let Some((first, odds)) = left.pop_first() {
-        let (mut cells, mut sums) = (vec![first], [odds.log_odds, odds.share]);
+    while let Some((first, log_odds)) = left.pop_first() {
+        let (mut cells, mut largest) = (vec![first], log_odds);
         let mut next = 0;
         while let Some(&[x, y]) = cells.get(next) {
             for beside in (-NEAR_CELLS..=NEAR_CELLS)
                 .flat_map(|dx| (-NEAR_CELLS..=NEAR_CELLS).map(move |dy| [x + dx, y + dy]))
             {
-                if let Some(odds) = left.remove(&beside) {
-                    sums[0] += odds.log_odds;
-                    sums[1] += odds.share;
+                if let Some(log_odds) = left.remove(&beside) {
+                    largest = largest.max(log_odds);
                     cells.push(beside);
                 }
             }
             next += 1;
         }
-        let [log_odds, share] = sums.map(|sum| sum / cells.len() as f64);
         clusters.push(Cluster {
             cells,
-            log_odds,
-            share,
+            log_odds: largest,
         });
     }
     clusters
@@ -119,16 +106,12 @@ mod tests {
     #[test]
     fn cells_with_a_gap_of_one_are_one_thing_and_with_two_they_are_not() {
         let places = [([0, 0], 1.0), ([2, 1], 3.0), ([5, 1], 2.0)];
-        let places = places.map(|(cell, log_odds)| {
-            let share = 0.5;
-            (cell, Odds { log_odds, share })
-        });
         let clusters = connected(&places.into_iter().collect());
         let sizes: Vec<_> = clusters
             .iter()
             .map(|it| (it.cells.len(), it.log_odds))
             .collect();
-        assert_eq!(sizes, [(2, 2.0), (1, 2.0)]);
+        assert_eq!(sizes, [(2, 3.0), (1, 2.0)]);
     }
 
     #[test]
@@ -137,7 +120,6 @@ mod tests {
         let outline = Cluster {
             cells,
             log_odds: 0.0,
-            share: 0.5,
         }
         .outline();
         assert!((outline.yaw_rad + 0.46).abs() < 0.06, "{outline:?}");

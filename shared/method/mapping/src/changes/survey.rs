@@ -7,9 +7,9 @@ use gyre_geometry::Pose;
 use gyre_slam::Keyframe;
 use nalgebra::Point2;
 
+use crate::MapOptions;
 use crate::tile::{CELLS, TILE_CELLS, TileIndex};
 use crate::view::View;
-use crate::{MapOptions, OptionError};
 
 /// Side of a cell, m: a car is nine long and four wide.
 pub(super) const CELL_M: f64 = 0.5;
@@ -18,9 +18,6 @@ const REACH_M: f64 = 60.0;
 /// A return marks the cells whose middles are within this distance of it, m, and as much more as
 /// its bearing is uncertain: the cell that it is in at least.
 const AROUND_M: f64 = CELL_M * FRAC_1_SQRT_2;
-/// A thing is still there if something returns from a cell that is at most so many cells away:
-/// leaves and branches are never at the same places again.
-const AROUND_CELLS: i64 = 1;
 /// Power falls with the square of the range near by, where the receiver filters low beat
 /// frequencies, and a weight of 1 is 30 dB: the weight that a thing loses with ten times the range.
 const WEIGHT_PER_DECADE: f64 = 20.0 / 30.0;
@@ -30,112 +27,77 @@ const STRENGTH_M: f64 = 20.0;
 /// some m²; and any, from 20 dB below.
 const SOLID: [f32; 2] = [0.4, 0.8];
 const ANY: [f32; 2] = [0.0, 0.2];
-/// Length of the stretches of the path that the halves of a drive have in turn, m.
-const STRETCH_M: f64 = 10.0;
+/// Looks from nearby of a cell that is well known.
+const WELL_LOOKED: f32 = 16.0;
+/// Planes of a drive.
+pub(super) const PLANES: usize = 4;
 
 /// The looks of a drive at each place, from its keyframes.
 ///
 /// Memory: 1 MB for each square of 128 m that it has looked at.
 pub struct Survey {
-    options: MapOptions,
     view: View,
-    tiles: BTreeMap<TileIndex, Vec<Place>>,
+    /// Uncertainty of the bearing of a return.
+    bearing_rad: f64,
+    tiles: BTreeMap<TileIndex, Vec<Looks>>,
     window: Window,
 }
-
-/// The looks of both halves of the drive at a cell.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Place([Looks; 2]);
 
 /// The looks at a cell.
 #[derive(Clone, Copy, Debug, Default)]
 struct Looks {
     /// Number of looks, each weighed from 0 to 1 as it was from nearby.
     looked: f32,
-    /// The sum of their solid returns there, from 0 to the number of looks.
-    solid: f32,
-    /// That of any returns.
+    /// The sum of the strengths of what returned there, from 0 to the number of looks.
+    strength: f32,
+    /// That of the looks with any return, and with a solid one.
     any: f32,
+    solid: f32,
 }
 
 impl Looks {
-    /// Returns the shares of the looks with a solid return and with any; `None` for fewer looks
-    /// than `min_looked`.
-    fn share(self, min_looked: f64) -> Option<[f64; 2]> {
-        let looked = f64::from(self.looked);
-        let share = |sum: f32| (f64::from(sum) / looked).min(1.0);
-        (looked >= min_looked).then(|| [self.solid, self.any].map(share))
+    /// Returns the values of the planes: looks, and the means of the others.
+    fn values(self) -> [f32; PLANES] {
+        let looked = self.looked.max(f32::MIN_POSITIVE);
+        let mean = |sum: f32| (sum / looked).min(1.0);
+        let known = (self.looked / WELL_LOOKED).min(1.0).sqrt();
+        [known, mean(self.strength), mean(self.any), mean(self.solid)]
     }
 }
 
-impl Place {
-    fn share(self, part: Part, min_looked: f64) -> Option<[f64; 2]> {
-        let [one, other] = self.0;
-        let looks = match part {
-            Part::Half(half) => self.0[half],
-            Part::Whole => Looks {
-                looked: one.looked + other.looked,
-                solid: one.solid + other.solid,
-                any: one.any + other.any,
-            },
+impl Default for Survey {
+    /// Starts without a keyframe. Places are looked at as in the training of the network, whatever
+    /// the options of the map.
+    fn default() -> Self {
+        let options = MapOptions {
+            cell_m: CELL_M,
+            reach_m: REACH_M,
+            ..MapOptions::default()
         };
-        looks.share(min_looked)
+        Self {
+            view: View::new(&options),
+            tiles: BTreeMap::new(),
+            window: Window::new(REACH_M),
+            bearing_rad: options.bearing_deg.to_radians(),
+        }
     }
-}
-
-/// A cell that was looked at twice, and how it was then.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Pair {
-    /// The numbers of the cell along x and y.
-    pub cell: [i64; 2],
-    /// The share of the looks of the one with a solid return.
-    pub own: f64,
-    /// The largest share of those of the other one with any return, there and in the cells around.
-    pub other: f64,
-}
-
-/// The looks that are taken together: those of one half of the drive, or all.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Part {
-    Half(usize),
-    Whole,
 }
 
 impl Survey {
-    /// Starts without a keyframe. Of the options the cells do not matter.
-    ///
-    /// # Errors
-    /// An option that is out of bounds.
-    pub fn new(options: &MapOptions) -> Result<Self, OptionError> {
-        let options = MapOptions {
-            cell_m: CELL_M,
-            reach_m: options.reach_m.min(REACH_M),
-            ..options.clone()
-        };
-        options.validate()?;
-        Ok(Self {
-            view: View::new(&options),
-            tiles: BTreeMap::new(),
-            window: Window::new(options.reach_m),
-            options,
-        })
-    }
-
     /// Adds a keyframe at `pose` in the frame of both drives.
     pub fn add(&mut self, keyframe: &Keyframe, pose: &Pose) {
         self.view.take(keyframe);
         self.mark_returns(pose);
-        let half = (keyframe.path_m / STRETCH_M) as usize % 2;
         let (centre, inverse) = (Point2::from(pose.translation.vector), pose.inverse());
-        for tile in TileIndex::around(&centre, self.options.reach_m, CELL_M) {
+        for tile in TileIndex::around(&centre, REACH_M, CELL_M) {
             let entry = self.tiles.entry(tile);
-            let places = entry.or_insert_with(|| vec![Place::default(); CELLS]);
-            for (cell, place) in cells(tile).zip(places) {
+            let places = entry.or_insert_with(|| vec![Looks::default(); CELLS]);
+            for (cell, looks) in cells(tile).zip(places) {
                 let look = self.view.look(&(inverse * middle_m(cell)).coords) as f32;
                 if look > 0.0 {
-                    let looks = &mut place.0[half];
-                    looks.looked += look;
                     let strength = self.window.strongest(cell);
+                    looks.looked += look;
+                    looks.strength += look * strength.min(1.0);
                     looks.solid += look * counted(strength, SOLID);
                     looks.any += look * counted(strength, ANY);
                 }
@@ -146,9 +108,8 @@ impl Survey {
     /// Marks the cells around each return with its strength.
     fn mark_returns(&mut self, pose: &Pose) {
         self.window.clear(&Point2::from(pose.translation.vector));
-        let bearing_rad = self.options.bearing_deg.to_radians();
         for (place, weight) in self.view.points() {
-            let around_m = AROUND_M + bearing_rad * place.norm();
+            let around_m = AROUND_M + self.bearing_rad * place.norm();
             let strength = weight + WEIGHT_PER_DECADE * (place.norm() / STRENGTH_M).log10();
             let at = pose * Point2::from(place);
             let [least, most] = [-around_m, around_m].map(|by| cell_at(&at.map(|it| it + by)));
@@ -162,48 +123,48 @@ impl Survey {
         }
     }
 
-    /// Returns the cells that this drive and another one, or two parts of one drive, have looked at
-    /// so often, tile by tile.
-    pub(super) fn pairs<'a>(
-        &'a self,
-        part: Part,
-        (other, other_part): (&'a Self, Part),
-        min_looked: f64,
-    ) -> impl Iterator<Item = Pair> + 'a {
-        let seen = self
-            .tiles
-            .iter()
-            .flat_map(|(tile, places)| cells(*tile).zip(places));
-        seen.filter_map(move |(cell, place)| {
-            let [own, _] = place.share(part, min_looked)?;
-            let other = other.around(cell, other_part, min_looked)?;
-            Some(Pair { cell, own, other })
-        })
+    /// Returns the tiles that were looked at.
+    pub(super) fn tiles(&self) -> impl Iterator<Item = TileIndex> + '_ {
+        self.tiles.keys().copied()
     }
 
-    /// Returns the largest share in the cells around one; `None` if that one was not looked at so
-    /// often.
-    fn around(&self, [x, y]: [i64; 2], part: Part, min_looked: f64) -> Option<f64> {
-        let [_, mut largest] = self.share([x, y], part, min_looked)?;
-        for dy in -AROUND_CELLS..=AROUND_CELLS {
-            for dx in -AROUND_CELLS..=AROUND_CELLS {
-                if dx * dx + dy * dy <= AROUND_CELLS * AROUND_CELLS {
-                    let share = self.share([x + dx, y + dy], part, min_looked);
-                    largest = largest.max(share.map_or(0.0, |it| it[1]));
+    /// Returns the corner and the size, in cells, of all that this drive or another one has looked
+    /// at, for [`Survey::draw`].
+    pub fn bounds(&self, other: &Self) -> ([i64; 2], [usize; 2]) {
+        let corners = || self.tiles().chain(other.tiles()).map(TileIndex::corner);
+        let least = |axis: usize| corners().map(|it| it[axis]).min().unwrap_or(0);
+        let most = |axis: usize| corners().map(|it| it[axis]).max().unwrap_or(0);
+        let corner = [0, 1].map(least);
+        let size = [0, 1].map(|axis| (most(axis) - corner[axis]) as usize + TILE_CELLS);
+        (corner, size)
+    }
+
+    /// Draws the cells from a corner on: four planes of `size[0]` rows along x and `size[1]`
+    /// columns along y.
+    ///
+    /// They are how well each was looked at, the mean strength of the returns, and the shares of
+    /// the looks with any return and with a solid one, all from 0 to 1.
+    pub fn draw(&self, corner: [i64; 2], size: [usize; 2]) -> Vec<f32> {
+        let area = size[0] * size[1];
+        let mut planes = vec![0.0; PLANES * area];
+        let side = TILE_CELLS as i64;
+        let [xs, ys] = [0, 1].map(|axis| {
+            let last = corner[axis] + size[axis] as i64 - 1;
+            corner[axis].div_euclid(side) as i32..=last.div_euclid(side) as i32
+        });
+        let indices = xs.flat_map(|x| ys.clone().map(move |y| TileIndex { x, y }));
+        let tiles = indices.filter_map(|index| Some((index, self.tiles.get(&index)?)));
+        for (cell, looks) in tiles.flat_map(|(index, looks)| cells(index).zip(looks)) {
+            let [row, column] = [0, 1].map(|axis| cell[axis] - corner[axis]);
+            let [rows, columns] = size.map(|cells| 0..cells as i64);
+            if looks.looked > 0.0 && rows.contains(&row) && columns.contains(&column) {
+                let at = row as usize * size[1] + column as usize;
+                for (plane, value) in looks.values().into_iter().enumerate() {
+                    planes[plane * area + at] = value;
                 }
             }
         }
-        Some(largest)
-    }
-
-    fn share(&self, [x, y]: [i64; 2], part: Part, min_looked: f64) -> Option<[f64; 2]> {
-        let side = TILE_CELLS as i64;
-        let tile = TileIndex {
-            x: x.div_euclid(side) as i32,
-            y: y.div_euclid(side) as i32,
-        };
-        let index = y.rem_euclid(side) * side + x.rem_euclid(side);
-        self.tiles.get(&tile)?[index as usize].share(part, min_looked)
+        planes
     }
 }
 
@@ -265,7 +226,7 @@ impl Window {
         }
     }
 
-    /// Returns the strongest return in a cell, from 0 to 1.
+    /// Returns the strength of the strongest return in a cell; 0 without any.
     fn strongest(&self, cell: [i64; 2]) -> f32 {
         self.index(cell).map_or(0.0, |index| self.strongest[index])
     }

@@ -3,19 +3,15 @@
 use std::f64::consts::FRAC_PI_2;
 
 use gyre_geometry::pose;
-use gyre_mapping::{Change, ChangeKind, Changes, MapOptions, Survey, changes};
+use gyre_mapping::{Change, ChangeKind, Changes, Survey, changes};
 use nalgebra::{Point2, Vector2};
 
 use crate::scenes::*;
 
-/// The outline of a car along the x axis, a point every 0.3 m.
+/// Returns of a car along the x axis: its corners.
 fn car(x_m: f64, y_m: f64) -> Vec<Point2<f64>> {
-    let along =
-        (0..15).flat_map(|k| [-0.9, 0.9].map(|y| Vector2::new(-2.1 + 0.3 * f64::from(k), y)));
-    let across =
-        (0..7).flat_map(|k| [-2.1, 2.1].map(|x| Vector2::new(x, -0.9 + 0.3 * f64::from(k))));
-    let centre = Point2::new(x_m, y_m);
-    along.chain(across).map(|by| centre + by).collect()
+    let corners = [[-2.1, -0.9], [-2.1, 0.9], [2.1, -0.9], [2.1, 0.9]];
+    corners.map(|[x, y]| Point2::new(x_m + x, y_m + y)).to_vec()
 }
 
 /// Random numbers from 0 to 1.
@@ -35,11 +31,13 @@ impl Random {
 /// A drive along the x axis that sees a wall beyond `things`, and bushes in between of which each
 /// look shows others.
 fn survey(things: &[Vec<Point2<f64>>], seed: u64) -> Survey {
-    let mut survey = Survey::new(&MapOptions::default()).unwrap();
+    let mut survey = Survey::default();
     let mut random = Random(seed);
     for seq in 0..40 {
         let at = pose(-40.0 + 2.0 * seq as f64, 0.0, 0.0);
+        // What returns comes and goes.
         let mut places = [wall(), things.concat()].concat();
+        places.retain(|_| random.next() < 0.7);
         for bush in -14..14 {
             let bush = Point2::new(2.0 * f64::from(bush), 15.0);
             if random.next() < 0.4 {
@@ -47,15 +45,13 @@ fn survey(things: &[Vec<Point2<f64>>], seed: u64) -> Survey {
                 places.push(bush + by);
             }
         }
-        let mut keyframe = keyframe(seq, &at, &places);
-        keyframe.path_m = 2.0 * seq as f64;
-        survey.add(&keyframe, &at);
+        survey.add(&keyframe(seq, &at, &places), &at);
     }
     survey
 }
 
 fn found(before: &[Vec<Point2<f64>>], after: &[Vec<Point2<f64>>]) -> Changes {
-    changes(&survey(before, 1), &survey(after, 2))
+    changes(&survey(before, 1), &survey(after, 2)).unwrap()
 }
 
 fn is_car(change: &Change, kind: ChangeKind, x_m: f64, y_m: f64) -> bool {
@@ -69,19 +65,14 @@ fn is_car(change: &Change, kind: ChangeKind, x_m: f64, y_m: f64) -> bool {
 #[test]
 fn a_car_that_has_come_and_one_that_has_gone_are_found() {
     let (stays, goes, comes) = (car(-10.0, 8.0), car(0.0, 8.0), car(10.0, 8.0));
-    let Changes {
-        changes,
-        changed_share,
-        ..
-    } = found(&[stays.clone(), goes], &[stays, comes]);
+    let Changes { changes, .. } = found(&[stays.clone(), goes], &[stays, comes]);
     assert_eq!(changes.len(), 2, "{changes:?}");
     let has = |kind, x_m| changes.iter().any(|it| is_car(it, kind, x_m, 8.0));
     assert!(
         has(ChangeKind::Gone, 0.0) && has(ChangeKind::Appeared, 10.0),
         "{changes:?}"
     );
-    assert!(changes.iter().all(|it| it.confidence > 0.9), "{changes:?}");
-    assert!((0.005..0.3).contains(&changed_share), "{changed_share}");
+    assert!(changes.iter().all(|it| it.confidence > 0.8), "{changes:?}");
 }
 
 #[test]
@@ -90,7 +81,6 @@ fn a_street_that_stays_has_no_changes_and_neither_have_its_bushes() {
     let found = found(&stays, &stays);
     assert_eq!(found.changes, []);
     assert!(found.compared_m2 > 500.0, "{}", found.compared_m2);
-    assert!(found.changed_share < 0.02, "{}", found.changed_share);
 }
 
 #[test]
@@ -116,8 +106,6 @@ fn the_corners_of_a_change_are_those_of_its_rectangle() {
         yaw_rad: FRAC_PI_2,
         length_m: 4.0,
         width_m: 2.0,
-        area_m2: 8.0,
-        share: 0.5,
         confidence: 1.0,
     };
     let corners = change.corners();

@@ -81,8 +81,6 @@ fn a_picture_has_what_has_appeared_and_gone_in_it() {
         yaw_rad: 0.3,
         length_m: 4.0,
         width_m: 2.0,
-        area_m2: 5.0,
-        share: 0.5,
         confidence: 0.9,
     };
     let changes = [

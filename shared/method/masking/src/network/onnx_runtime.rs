@@ -10,8 +10,9 @@ use ort::{
     value::{Outlet, TensorRef, ValueType},
 };
 
-use super::{NetworkError, fill, fold, one_line};
-use crate::{Backend, MaskingConfig, Provider, model::Model, runtime};
+use super::{NetworkError, fill, fold};
+use crate::{Backend, MaskingConfig, Provider, model::Model};
+use gyre_networks::{one_line, runtime};
 
 /// A session of ONNX Runtime.
 #[derive(Debug)]
@@ -54,22 +55,14 @@ impl OnnxRuntime {
     }
 }
 
-/// Returns a session builder for bitwise reproducible results.
+/// Returns a session builder with the configured threads and provider.
 fn builder(
     environment: &Environment,
     config: &MaskingConfig,
 ) -> Result<SessionBuilder, NetworkError> {
     let providers = execution_providers(config.provider)?;
-    let build = || -> ort::Result<SessionBuilder> {
-        let builder = Session::builder(environment)?
-            .with_intra_threads(config.threads)?
-            .with_inter_threads(1)?;
-        // No spinning: between scans the other stages need the processor.
-        Ok(builder
-            .with_intra_op_spinning(false)?
-            .with_deterministic_compute(true)?)
-    };
-    let builder = build().map_err(|error| NetworkError::Run(one_line(error.message())))?;
+    let builder = runtime::session(environment, config.threads)
+        .map_err(|error| NetworkError::Run(one_line(error.message())))?;
     builder
         .with_execution_providers(providers)
         .map_err(|error| NetworkError::Provider {

@@ -6,13 +6,14 @@ use std::{
     sync::Arc,
 };
 
+use gyre_networks::one_line;
 use ndarray::{Array3, ArrayView3, ArrayViewMut3};
 use rten::{ModelOptions, RunOptions, ThreadPool, Value};
 use rten_onnx::onnx::{
     AttributeProto, AttributeType, DataType, Dimension, GraphProto, ModelProto, ValueInfoProto,
 };
 
-use super::{NetworkError, fill, one_line};
+use super::{NetworkError, fill};
 use crate::{Backend, model::Model};
 
 /// The newest operators with which the models of `models/` agree with ONNX Runtime.

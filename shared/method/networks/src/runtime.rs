@@ -1,4 +1,4 @@
-//! Finds and opens the library of ONNX Runtime at run time. It computes learned masks fastest.
+//! Finds and opens the library of ONNX Runtime at run time. It computes networks fastest.
 
 use std::{
     env,
@@ -9,7 +9,12 @@ use std::{
     sync::{Arc, Mutex, OnceLock, PoisonError},
 };
 
-use ort::{LoadDynamicError, environment::Environment, logging::LogLevel};
+use ort::{
+    LoadDynamicError,
+    environment::Environment,
+    logging::LogLevel,
+    session::{Session, builder::SessionBuilder},
+};
 use thiserror::Error;
 
 /// The command that installs it in the user's data folder: the release of `models/onnxruntime.txt`.
@@ -230,6 +235,20 @@ pub fn open(path: &Path) -> Result<Environment, RuntimeError> {
     let environment = environment.map_err(|error| unusable(error.to_string()))?;
     environment.set_log_level(LogLevel::Error);
     Ok(opened.insert(environment).clone())
+}
+
+/// Returns a builder of sessions whose results are the same to the byte each time.
+///
+/// # Errors
+/// What the library says.
+pub fn session(environment: &Environment, threads: usize) -> ort::Result<SessionBuilder> {
+    let builder = Session::builder(environment)?
+        .with_intra_threads(threads)?
+        .with_inter_threads(1)?;
+    // No spinning: between scans the other stages need the processor.
+    Ok(builder
+        .with_intra_op_spinning(false)?
+        .with_deterministic_compute(true)?)
 }
 
 #[cfg(test)]

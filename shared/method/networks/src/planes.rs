@@ -1,0 +1,176 @@
+//! A network in the program that is shown planes of cells.
+
+use std::fmt::Display;
+use std::path::Path;
+use std::sync::Arc;
+
+use ort::{session::Session, value::TensorRef};
+use rten::{Model, ModelOptions, RunOptions, ThreadPool, Value};
+use thiserror::Error;
+
+use crate::one_line;
+use crate::runtime::{self, RuntimeError};
+
+/// A network could not be loaded or computed.
+#[derive(Debug, Error)]
+pub enum PlanesError {
+    /// ONNX Runtime cannot be used.
+    #[error(transparent)]
+    Runtime(#[from] RuntimeError),
+    /// The library does not compute it.
+    #[error("{network} cannot be computed: {reason}")]
+    Network {
+        /// The name of the file.
+        network: &'static str,
+        /// The library's reason.
+        reason: String,
+    },
+}
+
+/// A network in the program that is shown planes of cells and gives planes. One thread computes it.
+#[derive(Debug)]
+pub struct PlanesNetwork {
+    name: &'static str,
+    engine: Engine,
+    /// Planes, rows and columns of what it is shown, and of what it gives.
+    shown: [usize; 3],
+    given: [usize; 3],
+}
+
+#[derive(Debug)]
+enum Engine {
+    OnnxRuntime(Session),
+    Rten(Box<Model>, Arc<ThreadPool>),
+}
+
+impl PlanesNetwork {
+    /// Loads the network of a name in `gyre_shipped`, into the ONNX Runtime at a path or, without
+    /// one, into rten, which takes four times as long.
+    ///
+    /// # Errors
+    /// A library or a network that cannot be used.
+    pub fn load(
+        name: &'static str,
+        runtime: Option<&Path>,
+        [shown, given]: [[usize; 3]; 2],
+    ) -> Result<Self, PlanesError> {
+        let bytes = gyre_shipped::bytes(Path::new(name)).unwrap_or_default();
+        let engine = match runtime {
+            Some(path) => {
+                let environment = runtime::open(path)?;
+                let session = runtime::session(&environment, 1)
+                    .and_then(|mut builder| builder.commit_from_memory(bytes));
+                session
+                    .map(Engine::OnnxRuntime)
+                    .map_err(|it| one_line(it.message()))
+            }
+            None => {
+                let model = ModelOptions::with_all_ops().load_static_slice(bytes);
+                let thread = Arc::new(ThreadPool::with_num_threads(1));
+                let model = model.map_err(|error| error.to_string());
+                model.map(|model| Engine::Rten(Box::new(model), thread))
+            }
+        };
+        Ok(Self {
+            name,
+            engine: engine.map_err(|reason| failed(name, reason))?,
+            shown,
+            given,
+        })
+    }
+
+    /// Computes it, for planes row after row.
+    ///
+    /// # Errors
+    /// Planes of another size, or what the library says.
+    pub fn compute(&mut self, planes: Vec<f32>) -> Result<Vec<f32>, PlanesError> {
+        let [depth, rows, columns] = self.shown;
+        let shape = [1, depth, rows, columns];
+        let (given, values) = match &mut self.engine {
+            Engine::OnnxRuntime(session) => by_onnx_runtime(session, shape, &planes),
+            Engine::Rten(model, thread) => by_rten(model, thread, shape, planes),
+        }
+        .map_err(|reason| failed(self.name, reason))?;
+        match given.strip_prefix(&[1]) == Some(&self.given) {
+            true => Ok(values),
+            false => Err(failed(self.name, format_args!("it gives {given:?}"))),
+        }
+    }
+}
+
+fn failed(network: &'static str, reason: impl Display) -> PlanesError {
+    PlanesError::Network {
+        network,
+        reason: reason.to_string(),
+    }
+}
+
+type Given = (Vec<usize>, Vec<f32>);
+
+fn by_onnx_runtime(
+    session: &mut Session,
+    shape: [usize; 4],
+    planes: &[f32],
+) -> Result<Given, String> {
+    let mut compute = || -> ort::Result<Given> {
+        let input = TensorRef::from_array_view((shape, planes))?;
+        let outputs = session.run(ort::inputs![input])?;
+        let (shape, values) = outputs[0].try_extract_tensor::<f32>()?;
+        let shape = shape.iter().map(|side| *side as usize).collect();
+        Ok((shape, values.to_vec()))
+    };
+    compute().map_err(|error| one_line(error.message()))
+}
+
+fn by_rten(
+    model: &Model,
+    thread: &Arc<ThreadPool>,
+    shape: [usize; 4],
+    planes: Vec<f32>,
+) -> Result<Given, String> {
+    let input = Value::from_shape(shape, planes).map_err(|error| error.to_string())?;
+    let options = RunOptions::default().with_thread_pool(Some(thread.clone()));
+    let output = model.run_one(input.into(), Some(options));
+    let output = output.map_err(|error| error.to_string())?;
+    let output = output.into_shape_vec::<f32, 4>();
+    let (shape, values) = output.map_err(|error| error.to_string())?;
+    Ok((shape.to_vec(), values))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    const NAME: &str = "gyre:models/objects.onnx";
+    const SHAPES: [[usize; 3]; 2] = [[8, 256, 256], [44, 64, 64]];
+
+    #[test]
+    fn both_libraries_compute_the_same() {
+        let mut by_rten = PlanesNetwork::load(NAME, None, SHAPES).unwrap();
+        let mut planes = vec![0.0; 8 * 256 * 256];
+        (0..planes.len())
+            .step_by(97)
+            .for_each(|cell| planes[cell] = 0.6);
+        let one = by_rten.compute(planes.clone()).unwrap();
+        assert_eq!(one.len(), 44 * 64 * 64);
+        let Ok(runtime) = runtime::find(None) else {
+            return println!("skipped: ONNX Runtime is not installed");
+        };
+        let mut by_runtime = PlanesNetwork::load(NAME, Some(&runtime), SHAPES).unwrap();
+        let other = by_runtime.compute(planes).unwrap();
+        let apart = one.iter().zip(&other).map(|(a, b)| (a - b).abs());
+        assert!(apart.fold(0.0, f32::max) < 1e-3);
+    }
+
+    #[test]
+    fn planes_that_do_not_fit_and_a_network_that_is_not_there_are_said() {
+        let shapes = [SHAPES[0], [44, 128, 128]];
+        let mut network = PlanesNetwork::load(NAME, None, shapes).unwrap();
+        let wrong = network.compute(vec![0.0; 8 * 256 * 256]).unwrap_err();
+        let said = "gyre:models/objects.onnx cannot be computed: it gives [1, 44, 64, 64]";
+        assert_eq!(wrong.to_string(), said);
+        assert!(network.compute(vec![0.0; 5]).is_err());
+        assert!(PlanesNetwork::load("gyre:models/none.onnx", None, SHAPES).is_err());
+    }
+}
