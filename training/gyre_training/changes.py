@@ -38,16 +38,16 @@ class Pair:
     planes: np.ndarray
     """How both drives saw each cell: 2 x PLANES x cells along x and y, of 255."""
     cars: np.ndarray
-    """Is gone, x, y, yaw, length, width, is in sight, distance from the way, a row each."""
+    """Is gone, x, y, yaw, length, width, is in sight, a row each."""
 
 
 def read(path: Path) -> Pair:
     """Reads the file of a pair."""
     values = np.fromfile(path, dtype="<f4")
     corner, size, cars = values[:2], values[2:4].astype(int), int(values[4])
-    rows, planes = values[5 : 5 + 8 * cars], values[5 + 8 * cars :]
+    rows, planes = values[5 : 5 + 7 * cars], values[5 + 7 * cars :]
     planes = np.rint(planes * 255).astype(np.uint8)
-    return Pair(corner, planes.reshape(2, PLANES, *size), rows.reshape(cars, 8).astype(np.float64))
+    return Pair(corner, planes.reshape(2, PLANES, *size), rows.reshape(cars, 7).astype(np.float64))
 
 
 def places(pair: Pair) -> np.ndarray:
@@ -109,7 +109,7 @@ def sample(pair: Pair, centre: np.ndarray, random: np.random.Generator) -> tuple
         planes[1:] *= random.uniform(0.85, 1.15)
     drawn = (drawn / 255).clip(0, 1).reshape(2 * PLANES, SIDE, SIDE)
     is_gone, counts = np.zeros((SIDE, SIDE), np.float32), np.minimum(drawn[0], drawn[PLANES]) >= LEAST_KNOWN
-    for gone, x, y, yaw, length, width, in_sight, _ in pair.cars:
+    for gone, x, y, yaw, length, width, in_sight in pair.cars:
         row, column = ((x, y) / np.array(CELL_M) - pair.corner - 0.5 - centre) @ turn + MIDDLE
         around = tuple(slice(max(int(it) - 9, 0), max(int(it) + 10, 0)) for it in (row, column))
         away_m = (STEPS[around] - (row - MIDDLE, column - MIDDLE)) * CELL_M

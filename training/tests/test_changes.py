@@ -24,9 +24,9 @@ def pair(cars) -> Pair:
     return Pair(CORNER, planes, np.array(cars, float))
 
 
-GONE = (1.0, 10.0, 40.0, 0.6, 4.5, 1.9, 1.0, 10.0)
-APPEARED = (0.0, 22.0, 52.0, -0.4, 4.5, 1.9, 1.0, 10.0)
-HIDDEN = (1.0, 5.0, 55.0, 0.0, 4.5, 1.9, 0.0, 10.0)
+GONE = (1.0, 10.0, 40.0, 0.6, 4.5, 1.9, 1.0)
+APPEARED = (0.0, 22.0, 52.0, -0.4, 4.5, 1.9, 1.0)
+HIDDEN = (1.0, 5.0, 55.0, 0.0, 4.5, 1.9, 0.0)
 
 
 def test_a_file_is_read_as_the_example_writes_it(tmp_path):

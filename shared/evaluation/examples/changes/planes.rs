@@ -12,8 +12,8 @@ use crate::{Outcome, Pair};
 impl Pair {
     /// Writes what the network is trained with as numbers of 4 bytes: corner and size of both
     /// drives' cells, the number of cars that have come or gone, a row for each (1 if gone, x, y,
-    /// yaw in the frame of the first drive, length, width, 1 if in sight, distance from the way),
-    /// and the planes of both drives.
+    /// yaw in the frame of the first drive, length, width, 1 if in sight), and the planes of both
+    /// drives.
     pub fn draw(&self, file: &Path) -> Outcome<()> {
         let surveys = self.surveys();
         let (corner, size) = surveys[0].bounds(&surveys[1]);
@@ -27,9 +27,7 @@ impl Pair {
             let is_gone = f64::from(car.kind == ChangeKind::Gone);
             let in_sight = f64::from(u8::from(car.is_in_sight));
             let yaw_rad = pose.rotation.angle();
-            let row = [
-                is_gone, at.x, at.y, yaw_rad, length_m, width_m, in_sight, car.away_m,
-            ];
+            let row = [is_gone, at.x, at.y, yaw_rad, length_m, width_m, in_sight];
             values.extend(row.map(|it| it as f32));
         }
         for survey in &surveys {

@@ -20,7 +20,7 @@
 mod clusters;
 mod survey;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 use gyre_networks::{PlanesError, PlanesNetwork};
@@ -119,13 +119,13 @@ pub fn changes(earlier: &Survey, later: &Survey) -> Result<Changes, PlanesError>
     let mut network = PlanesNetwork::load(NETWORK, None, shapes)?;
     let (mut gone, mut appeared) = (BTreeMap::new(), BTreeMap::new());
     let mut compared = 0;
-    let is_of_later = |tile: &TileIndex| later.tiles().any(|other| other == *tile);
-    for tile in earlier.tiles().filter(is_of_later) {
-        let window = Window::around(tile);
-        let drawn = [earlier, later].map(|survey| survey.draw(window.corner, [SIDE; 2]));
+    let of_later: BTreeSet<TileIndex> = later.tiles().collect();
+    for tile in earlier.tiles().filter(|tile| of_later.contains(tile)) {
+        let corner = tile.corner().map(|at| at - MARGIN as i64);
+        let drawn = [earlier, later].map(|survey| survey.draw(corner, [SIDE; 2]));
         let [before, after] = drawn.each_ref().map(Vec::as_slice);
         let is_compared = |at: usize| before[at] >= LEAST_KNOWN && after[at] >= LEAST_KNOWN;
-        let cells: Vec<(usize, [i64; 2])> = window.cells().filter(|it| is_compared(it.0)).collect();
+        let cells: Vec<(usize, [i64; 2])> = cells(corner).filter(|it| is_compared(it.0)).collect();
         compared += cells.len();
         if cells.is_empty() {
             continue;
@@ -188,29 +188,17 @@ fn mirrored(planes: &[f32], [rows, columns]: [bool; 2]) -> Vec<f32> {
     mirrored
 }
 
-/// The cells that the network is shown for a tile: its own, and a margin.
-struct Window {
-    corner: [i64; 2],
-}
-
-impl Window {
-    fn around(tile: TileIndex) -> Self {
-        Self {
-            corner: tile.corner().map(|at| at - MARGIN as i64),
-        }
-    }
-
-    /// The cells of the tile, by their number in the window.
-    fn cells(&self) -> impl Iterator<Item = (usize, [i64; 2])> {
-        let inner = MARGIN..SIDE - MARGIN;
-        let at = |row: usize, column: usize| {
-            let cell = [self.corner[0] + row as i64, self.corner[1] + column as i64];
-            (row * SIDE + column, cell)
-        };
-        inner
-            .clone()
-            .flat_map(move |row| inner.clone().map(move |column| at(row, column)))
-    }
+/// Returns the cells of a tile with their numbers in the square that the network is shown, whose
+/// first cell is `corner`.
+fn cells(corner: [i64; 2]) -> impl Iterator<Item = (usize, [i64; 2])> {
+    let inner = MARGIN..SIDE - MARGIN;
+    let places = inner
+        .clone()
+        .flat_map(move |row| inner.clone().map(move |column| [row, column]));
+    places.map(move |[row, column]| {
+        let cell = [corner[0] + row as i64, corner[1] + column as i64];
+        (row * SIDE + column, cell)
+    })
 }
 
 /// Returns the change that a cluster is, if it is large enough.

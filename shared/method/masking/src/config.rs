@@ -31,8 +31,8 @@ pub struct MaskingConfig {
     /// The library of ONNX Runtime, or its folder. Default: it is searched for, see docs/masks.md.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub runtime: Option<PathBuf>,
-    /// Threads of ONNX Runtime, 1 to 64; rten computes with one, and both do for moving objects.
-    /// The other stages work at the same time.
+    /// Threads of ONNX Runtime for masks, 1 to 64. rten has one, and so has the network of moving
+    /// objects. The other stages work at the same time.
     pub threads: usize,
     /// Execution provider of the network: `cpu`, or `cuda`, `tensorrt` or `openvino` in a build
     /// with that feature.

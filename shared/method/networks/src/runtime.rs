@@ -240,7 +240,7 @@ pub fn open(path: &Path) -> Result<Environment, RuntimeError> {
 /// Returns a builder of sessions whose results are the same to the byte each time.
 ///
 /// # Errors
-/// What the library says.
+/// A setting that the library refuses.
 pub fn session(environment: &Environment, threads: usize) -> ort::Result<SessionBuilder> {
     let builder = Session::builder(environment)?
         .with_intra_threads(threads)?

@@ -77,7 +77,9 @@ impl Detector {
         points: &[SparsePoint],
         least: f64,
     ) -> Result<Vec<Detection>, ObjectsError> {
-        self.memory.add(scan, points);
+        let deskewed = points.iter().map(|point| point.deskewed(&scan.twist));
+        let deskewed: Vec<Point2<f64>> = deskewed.collect();
+        self.memory.add(scan, points, &deskewed);
         let output = unfolded(&self.network.compute(self.memory.draw(&scan.pose))?);
         let mut found: Vec<Detection> = Vec::new();
         for cell in peaks(&output, least) {
@@ -87,7 +89,7 @@ impl Detector {
                 found.push(detection);
             }
         }
-        let azimuths = azimuths(scan, points);
+        let azimuths = azimuths(points, &deskewed);
         for detection in &mut found {
             detection.place(&scan.pose, &azimuths);
         }
@@ -173,13 +175,14 @@ struct Azimuth {
 }
 
 /// Returns the bearings and times of points.
-fn azimuths(scan: &PlacedScan, points: &[SparsePoint]) -> Vec<Azimuth> {
-    let azimuth = |point: &SparsePoint| Azimuth {
-        bearing_rad: bearing_rad(&point.deskewed(&scan.twist)),
+fn azimuths(points: &[SparsePoint], deskewed: &[Point2<f64>]) -> Vec<Azimuth> {
+    let both = points.iter().zip(deskewed);
+    let azimuths = both.map(|(point, from_sensor)| Azimuth {
+        bearing_rad: bearing_rad(from_sensor),
         time_s: point.time_s.into(),
         doppler_s: point.doppler_s.into(),
-    };
-    points.iter().map(azimuth).collect()
+    });
+    azimuths.collect()
 }
 
 fn bearing_rad(at: &Point2<f64>) -> f64 {
@@ -239,7 +242,8 @@ mod tests {
         output[5 * OUT * OUT..6 * OUT * OUT].fill(1.0);
         // At 30.5 m to the left.
         let mut found = read(&output, OUT / 2 * OUT + OUT / 2 + 30);
-        found.place(&scan.pose, &azimuths(&scan, &[ahead, aside]));
+        let deskewed = [ahead, aside].map(|point| point.deskewed(&scan.twist));
+        found.place(&scan.pose, &azimuths(&[ahead, aside], &deskewed));
         assert!(
             (found.at - Point2::new(69.5, 0.5)).norm() < 1e-9,
             "{found:?}"

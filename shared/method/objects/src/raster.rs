@@ -32,16 +32,6 @@ struct Return {
     weight: f32,
 }
 
-/// Places the points of a scan in the frame of the odometry, without the vehicle's motion and
-/// Doppler shift.
-fn place(scan: &PlacedScan, points: &[SparsePoint]) -> Vec<Return> {
-    let placed = points.iter().map(|point| Return {
-        at: scan.pose * point.deskewed(&scan.twist),
-        weight: point.weight,
-    });
-    placed.collect()
-}
-
 /// The last scans.
 pub(crate) struct Memory {
     /// Time, ns, and returns of each, the newest first.
@@ -63,9 +53,17 @@ impl Memory {
         }
     }
 
-    /// Adds a scan.
-    pub fn add(&mut self, scan: &PlacedScan, points: &[SparsePoint]) {
-        self.scans.push_front((scan.stamp_ns, place(scan, points)));
+    /// Adds a scan: its points, and where they are from the sensor without its motion and Doppler
+    /// shift.
+    pub fn add(&mut self, scan: &PlacedScan, points: &[SparsePoint], deskewed: &[Point2<f64>]) {
+        let returns = points
+            .iter()
+            .zip(deskewed)
+            .map(|(point, from_sensor)| Return {
+                at: scan.pose * from_sensor,
+                weight: point.weight,
+            });
+        self.scans.push_front((scan.stamp_ns, returns.collect()));
         self.scans.truncate(REMEMBERED);
     }
 
@@ -115,7 +113,8 @@ impl Memory {
 
 fn cell(x_m: f64, y_m: f64) -> Option<usize> {
     let at = |metres: f64| {
-        let at = (metres / CELL_M).floor() + (SIDE / 2) as f64;
+        let at = metres / CELL_M + (SIDE / 2) as f64;
+        // The whole part is that below, since none is negative.
         (0.0..SIDE as f64).contains(&at).then_some(at as usize)
     };
     Some(at(x_m)? * SIDE + at(y_m)?)
@@ -144,7 +143,7 @@ mod tests {
                 twist: Twist::default(),
             };
             let point = SparsePoint::from([seen.x as f32, seen.y as f32, 0.0, 0.7, 0.0]);
-            memory.add(&scan, &[point]);
+            memory.add(&scan, &[point], &[seen]);
         }
         (memory, last)
     }

@@ -21,7 +21,7 @@ pub struct ObjectTracker {
 
 impl ObjectTracker {
     /// Creates a tracker without objects. The ONNX Runtime at a path computes its network, or else
-    /// rten, which takes four times as long.
+    /// rten, which takes several times as long.
     ///
     /// # Errors
     /// The first setting out of its bounds; a network that cannot be loaded.
