@@ -286,7 +286,7 @@ fn shadows_that_fall_behind_again_and_again_are_compared_exactly() {
 #[test]
 fn shadows_are_compared_exactly_across_a_break_of_the_chain() {
     let recording = breaks::with_a_gap();
-    let run = breaks::run_of(&recording).rate("1");
+    let run = breaks::run_of(&recording).rate("0.5");
     let run = run.masked_by(&card(TWO_SCANS));
     let running = held(&run);
     let shadows = STAGES.map(|stage| Shadow::start(&run, stage, stage, &[]));

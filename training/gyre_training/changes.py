@@ -16,7 +16,7 @@ import torch
 import torch.nn.functional as functional
 from torch import nn
 
-from .planes import computed, convolution, export, level, optimise
+from .planes import batches, convolution, export, level, optimise
 
 CELL_M, SIDE = 0.5, 128
 """Cells a side that the program shows the network at once."""
@@ -173,18 +173,15 @@ def loss(log_odds: torch.Tensor, is_gone: torch.Tensor, counts: torch.Tensor) ->
 
 
 def train(pairs: list[Pair], steps: int, batch: int = 16) -> Network:
-    random = np.random.default_rng(0)
     torch.manual_seed(0)
     network = Network().to(memory_format=torch.channels_last)
     centres = [places(pair) for pair in pairs]
 
-    def next_loss() -> torch.Tensor:
-        chosen = random.integers(len(pairs), size=batch)
-        drawn = [sample(pairs[it], random.choice(centres[it]), random) for it in chosen]
-        planes, *targets = [torch.from_numpy(np.stack(it)) for it in zip(*drawn)]
-        return loss(computed(network, planes), *targets)
+    def draw(random: np.random.Generator) -> tuple[np.ndarray, ...]:
+        chosen = random.integers(len(pairs))
+        return sample(pairs[chosen], random.choice(centres[chosen]), random)
 
-    optimise(network, steps, next_loss)
+    optimise(network, batches(draw, steps, batch), loss)
     return network
 
 

@@ -17,7 +17,7 @@ import torch
 import torch.nn.functional as functional
 from torch import nn
 
-from .planes import computed, convolution, export, level, optimise
+from .planes import batches, convolution, export, level, optimise
 
 CELL_M, SIDE = 0.5, 256
 RECENT, REMEMBERED = 6, 20
@@ -248,8 +248,7 @@ def roughened(it: Sample, random: np.random.Generator) -> Sample:
     poses are less sure, returns come and go, echoes are weaker or stronger, and there is clutter."""
     plane, rows, columns = it.cells // SIDE**2, it.cells // SIDE % SIDE - SIDE / 2, it.cells % SIDE - SIDE / 2
     values = it.values * random.uniform(0.5, 1.3)
-    users = it.users.copy()
-    for user in users:
+    for user in it.users:
         fade(user, plane, rows, columns, values, random)
     values[plane == RECENT] = it.values[plane == RECENT] * random.uniform(0.4, 1.0)
     # The newest scan is where it is: the truth is relative to it.
@@ -267,18 +266,16 @@ def roughened(it: Sample, random: np.random.Generator) -> Sample:
     is_kept &= (at[0] >= 0) & (at[0] < SIDE) & (at[1] >= 0) & (at[1] < SIDE)
     cells = plane * SIDE**2 + at[0].astype(int) * SIDE + at[1].astype(int)
     is_kept &= values > 0
-    return Sample(cells[is_kept], values[is_kept].clip(1, 255), users)
+    return Sample(cells[is_kept], values[is_kept].clip(1, 255), it.users)
 
 
 def fade(user: np.ndarray, plane: np.ndarray, rows: np.ndarray, columns: np.ndarray, values: np.ndarray, random: np.random.Generator) -> None:
-    """Weakens the echoes of a road user by up to 20 dB. What is hardly seen need not be found."""
+    """Weakens the echoes of a road user by up to 20 dB."""
     x, y, vx, vy, _, length, *_ = user
     ago_s = 0.25 * plane
     off = np.hypot(rows * CELL_M - x + vx * ago_s, columns * CELL_M - y + vy * ago_s)
     its = (off < 0.5 * length + 0.8) & (plane < RECENT)
     values[its] -= 255 * random.uniform(0, 0.65)
-    if np.count_nonzero(values[its & (plane < 3)] > 0) < 6:
-        user[8] = 0.0
 
 
 def drawn(it: Sample, mirrored: bool) -> np.ndarray:
@@ -383,21 +380,15 @@ def loss(values: torch.Tensor, likely: torch.Tensor, counts: torch.Tensor, true:
 
 
 def train(data: list[Sample], steps: int, batch: int = 8) -> Network:
-    random = np.random.default_rng(0)
     torch.manual_seed(0)
     network = Network().to(memory_format=torch.channels_last)
-    order = []
 
-    def next_loss() -> torch.Tensor:
-        nonlocal order
-        order = order if len(order) >= batch else list(random.permutation(len(data)))
-        chosen = [(data[order.pop()], bool(random.integers(2))) for _ in range(batch)]
-        shown = [(roughened(it, random) if random.random() < 0.7 else it, mirrored) for it, mirrored in chosen]
-        planes = torch.from_numpy(np.stack([drawn(*it) for it in shown]))
-        targets = [torch.from_numpy(np.stack(it)) for it in zip(*(wanted(*it) for it in chosen))]
-        return loss(computed(network, planes), *targets)
+    def draw(random: np.random.Generator) -> tuple[np.ndarray, ...]:
+        it, mirrored = data[random.integers(len(data))], bool(random.integers(2))
+        shown = roughened(it, random) if random.random() < 0.7 else it
+        return drawn(shown, mirrored), *wanted(it, mirrored)
 
-    optimise(network, steps, next_loss)
+    optimise(network, batches(draw, steps, batch), loss)
     return network
 
 

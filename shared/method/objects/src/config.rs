@@ -58,7 +58,7 @@ pub struct ObjectsConfig {
     /// pace is elsewhere.
     pub max_gap_s: f64,
     /// Squared Mahalanobis distance, by place and velocity, between what a scan shows and a
-    /// prediction, up to which the two can be one object. Default 30: more than its own noise, so
+    /// prediction, up to which the two can be one object. Default 50: more than its own noise, so
     /// that one that brakes hard or turns off is within it.
     pub gate: f64,
     /// Factor of the standard deviation that the network gives of a velocity. Default 2: five of
@@ -104,7 +104,7 @@ impl Default for ObjectsConfig {
             stopped_s: 60.0,
             stopping_mps: 2.0,
             max_gap_s: 2.0,
-            gate: 30.0,
+            gate: 50.0,
             velocity_sigmas: 2.0,
             heading_sigma_rad: 0.2,
             acceleration_mps2: 1.5,

@@ -4,10 +4,9 @@ use nalgebra::{Matrix2, Point2, Vector2};
 
 use crate::detector::Detection;
 use crate::filter::{Filter, Sighting};
+use crate::object::Outline;
 use crate::{Object, ObjectsConfig};
 
-/// Distance between the centres of two tracks of one vehicle, m: less than a car is long.
-const SAME_M: f64 = 3.0;
 /// Speed of a vehicle's centre across its heading, m/s: it has its place by the rear axle.
 const SLIP_MPS: f64 = 0.1;
 /// Standard deviation of a velocity before it is measured, m/s: that of any vehicle.
@@ -91,7 +90,9 @@ impl Track {
         let speed_mps = self.filter.velocity().norm();
         let sigma_mps = SLIP_MPS + config.heading_sigma_rad * speed_mps;
         self.filter.align(&detection.heading, sigma_mps);
-        self.heading = detection.heading;
+        // What hardly moves shows its axis, but not which end is ahead. What moves is turned into
+        // its direction.
+        self.heading = detection.heading * detection.heading.dot(&self.heading).signum();
         self.turn(config);
         self.weight += detection.likely;
         let share = detection.likely / self.weight;
@@ -182,9 +183,17 @@ impl Track {
         self.weight += lost.weight;
     }
 
-    /// Returns whether another track is of the same vehicle.
+    /// Returns whether another track is of the same vehicle: no two are at one place.
     pub fn is_same(&self, other: &Self) -> bool {
-        (self.position() - other.position()).norm() < SAME_M
+        self.outline().overlaps(&other.outline())
+    }
+
+    fn outline(&self) -> Outline {
+        Outline {
+            centre: self.position(),
+            heading: self.heading,
+            size_m: self.size_m,
+        }
     }
 
     fn position(&self) -> Point2<f64> {
@@ -294,6 +303,20 @@ mod tests {
         );
         let other = detection([12.0, 3.0], [10.0, 0.0]);
         assert_eq!(track.cost(&other, &config), None);
+    }
+
+    #[test]
+    fn what_stops_keeps_its_heading_though_it_looks_the_same_from_both_ends() {
+        let config = ObjectsConfig::default();
+        let mut track = seen(4, &config);
+        for _ in 0..12 {
+            track.predict(0.25, &config);
+            let mut standing = detection([12.0, 3.0], [-0.1, 0.0]);
+            standing.heading = Vector2::new(1.0, 0.05).normalize();
+            track.update(&standing, &config);
+        }
+        assert!(track.filter.velocity().norm() < config.heading_mps);
+        assert!(track.heading.x < -0.99 && track.heading.y < 0.0);
     }
 
     #[test]
