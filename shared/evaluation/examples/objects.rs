@@ -451,7 +451,7 @@ mod tests {
         let scans = track(&drive, &ObjectsConfig::default())?;
         let errors = object_errors(&scans, &ObjectOptions::default());
         assert!(errors.required > 100, "{errors}");
-        // Of this drive's 14 vehicles a hidden one is a tenth; over 24 drives it is 92 and 97 %.
+        // Of this drive's 14 vehicles a hidden one is a tenth; over 24 drives it is 92 and 98 %.
         assert!(errors.recall > 0.7 && errors.precision > 0.85, "{errors}");
         assert!(errors.velocity_rmse_mps < 1.5, "{errors}");
         assert!(errors.heading_rmse_deg < 10.0, "{errors}");
