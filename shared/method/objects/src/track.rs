@@ -306,6 +306,16 @@ mod tests {
     }
 
     #[test]
+    fn tracks_of_one_vehicle_are_in_one_lane_and_less_than_its_length_apart() {
+        let config = ObjectsConfig::default();
+        let track = |x: f64, y: f64| Track::new(&detection([x, y], [-10.0, 0.0]), &config);
+        let first = track(20.0, 3.0);
+        assert!(first.is_same(&track(24.0, 3.5)));
+        assert!(!first.is_same(&track(25.0, 3.0)));
+        assert!(!first.is_same(&track(20.0, 5.5)));
+    }
+
+    #[test]
     fn what_stops_keeps_its_heading_though_it_looks_the_same_from_both_ends() {
         let config = ObjectsConfig::default();
         let mut track = seen(4, &config);
