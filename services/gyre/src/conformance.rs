@@ -198,6 +198,6 @@ fn manifest(
         live: false,
         refines: configuration.has(StageId::Refinement),
         rate: None,
-        build: program::sha256(&own())?,
+        build: program::digest(&own())?,
     })
 }

@@ -6,45 +6,45 @@
 
 use std::{collections::BTreeMap, io, path::Path};
 
+use blake3::Hasher;
 use gyre_configuration::Configuration;
 use gyre_results::Programs;
 use gyre_run::StageConfig;
 use gyre_supervise::StagePlan;
 use gyre_terminal::own;
-use sha2::{Digest, Sha256};
 
 use crate::plan::stage_plans;
 
-/// Returns the SHA-256 of a file.
+/// Returns the BLAKE3 digest of a file.
 ///
 /// # Errors
 /// A file that cannot be read.
-pub fn sha256(path: &Path) -> io::Result<String> {
-    let mut digest = Sha256::new();
-    io::copy(&mut gyre_storage::open(path)?, &mut digest)?;
-    Ok(format!("{:x}", digest.finalize()))
+pub fn digest(path: &Path) -> io::Result<String> {
+    let mut digest = Hasher::new();
+    digest.update_reader(gyre_storage::open(path)?)?;
+    Ok(digest.finalize().to_string())
 }
 
-/// Returns the SHA-256 of the words of what replaces each stage and of the files that it names.
+/// Returns the BLAKE3 digest of the words of what replaces each stage and of the files that it names.
 ///
 /// # Errors
 /// A file that cannot be read.
 pub fn replaced(configuration: &Configuration) -> io::Result<BTreeMap<String, String>> {
     let stages = stage_plans(configuration, &own());
     let replaced = stages.iter().filter(|stage| !stage.programs.is_empty());
-    let digest = |stage: &StagePlan| -> io::Result<(String, String)> {
-        let mut digest = Sha256::new();
+    let of = |stage: &StagePlan| -> io::Result<(String, String)> {
+        let mut both = Hasher::new();
         let replacement = configuration.stages.get(&stage.name);
         for word in replacement.map_or_else(Vec::new, StageConfig::replacement) {
-            digest.update((word.len() as u64).to_le_bytes());
-            digest.update(word);
+            both.update(&(word.len() as u64).to_le_bytes());
+            both.update(word.as_bytes());
         }
         for program in &stage.programs {
-            digest.update(sha256(program.path())?);
+            both.update(digest(program.path())?.as_bytes());
         }
-        Ok((stage.name.clone(), format!("{:x}", digest.finalize())))
+        Ok((stage.name.clone(), both.finalize().to_string()))
     };
-    replaced.map(digest).collect()
+    replaced.map(of).collect()
 }
 
 /// Returns the programs of a run that is started now.
@@ -52,5 +52,5 @@ pub fn replaced(configuration: &Configuration) -> io::Result<BTreeMap<String, St
 /// # Errors
 /// A program that cannot be read.
 pub fn now(configuration: &Configuration) -> io::Result<Programs> {
-    Ok(Programs::new(sha256(&own())?, replaced(configuration)?))
+    Ok(Programs::new(digest(&own())?, replaced(configuration)?))
 }

@@ -94,7 +94,7 @@ fn require_same_build(manifest: &Manifest) -> Result<(), StageError> {
     if file(&path).is_some_and(|own| file(&supervisor) == Some(own)) {
         return Ok(());
     }
-    let build = program::sha256(&path).map_err(|source| StageError::File { path, source })?;
+    let build = program::digest(&path).map_err(|source| StageError::File { path, source })?;
     match build == manifest.build {
         true => Ok(()),
         false => Err(StageError::Configuration(

@@ -193,7 +193,7 @@ fn provenance(
         machine: Machine::this().to_string(),
         kernel: uname.release().to_string_lossy().into_owned(),
         gyre: env!("CARGO_PKG_VERSION").to_owned(),
-        build: program::sha256(&own())?,
+        build: program::digest(&own())?,
         configuration: file.map_or_else(|| configuration.data(), |file| file.display().to_string()),
         source: configuration.data(),
         load_before: load.split(' ').next().and_then(|load| load.parse().ok()),

@@ -50,14 +50,14 @@ pub enum Holds {
 pub struct Programs {
     /// Gyre's version.
     version: String,
-    /// SHA-256 of Gyre's program.
+    /// BLAKE3 digest of Gyre's program.
     pub build: String,
-    /// SHA-256 of each replaced stage's command and of the files that it names.
+    /// BLAKE3 digest of each replaced stage's command and of the files that it names.
     replaced: BTreeMap<String, String>,
 }
 
 impl Programs {
-    /// Returns those of a run: the SHA-256 of Gyre's program, and of each stage that is replaced.
+    /// Returns those of a run: the BLAKE3 digest of Gyre's program, and of each stage that is replaced.
     pub fn new(build: String, replaced: BTreeMap<String, String>) -> Self {
         Self {
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -68,7 +68,7 @@ impl Programs {
 
     fn difference(&self, now: &Self) -> Option<String> {
         if self.build != now.build {
-            let short = |sha256: &str| sha256.get(..12).unwrap_or_default().to_owned();
+            let short = |digest: &str| digest.get(..12).unwrap_or_default().to_owned();
             return Some(format!(
                 "gyre was build {} of version {} and is now build {} of version {}",
                 short(&self.build),
