@@ -165,7 +165,7 @@ fn log_odds(network: &mut PlanesNetwork, planes: &[f32]) -> Result<Vec<f32>, Pla
     const SIDES: [[bool; 2]; 4] = [[false, false], [false, true], [true, false], [true, true]];
     let mut mean = vec![0.0; SIDE * SIDE];
     for sides in SIDES {
-        let said = mirrored(&network.compute(mirrored(planes, sides))?, sides);
+        let said = mirrored(&network.compute(&mirrored(planes, sides))?, sides);
         let share = 1.0 / SIDES.len() as f32;
         mean.iter_mut()
             .zip(said)

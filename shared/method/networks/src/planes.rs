@@ -83,11 +83,11 @@ impl PlanesNetwork {
     ///
     /// # Errors
     /// Planes of another size, or what the library says.
-    pub fn compute(&mut self, planes: Vec<f32>) -> Result<Vec<f32>, PlanesError> {
+    pub fn compute(&mut self, planes: &[f32]) -> Result<Vec<f32>, PlanesError> {
         let [depth, rows, columns] = self.shown;
         let shape = [1, depth, rows, columns];
         let (given, values) = match &mut self.engine {
-            Engine::OnnxRuntime(session) => by_onnx_runtime(session, shape, &planes),
+            Engine::OnnxRuntime(session) => by_onnx_runtime(session, shape, planes),
             Engine::Rten(model, thread) => by_rten(model, thread, shape, planes),
         }
         .map_err(|reason| failed(self.name, reason))?;
@@ -126,9 +126,9 @@ fn by_rten(
     model: &Model,
     thread: &Arc<ThreadPool>,
     shape: [usize; 4],
-    planes: Vec<f32>,
+    planes: &[f32],
 ) -> Result<Given, String> {
-    let input = Value::from_shape(shape, planes).map_err(|error| error.to_string())?;
+    let input = Value::from_shape(shape, planes.to_vec()).map_err(|error| error.to_string())?;
     let options = RunOptions::default().with_thread_pool(Some(thread.clone()));
     let output = model.run_one(input.into(), Some(options));
     let output = output.map_err(|error| error.to_string())?;

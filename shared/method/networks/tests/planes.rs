@@ -14,13 +14,13 @@ fn both_libraries_compute_the_same() {
     (0..planes.len())
         .step_by(97)
         .for_each(|cell| planes[cell] = 0.6);
-    let one = by_rten.compute(planes.clone()).unwrap();
+    let one = by_rten.compute(&planes).unwrap();
     assert_eq!(one.len(), 44 * 64 * 64);
     let Ok(runtime) = runtime::find(None) else {
         return println!("skipped: ONNX Runtime is not installed");
     };
     let mut by_runtime = PlanesNetwork::load(NAME, Some(&runtime), SHAPES).unwrap();
-    let other = by_runtime.compute(planes).unwrap();
+    let other = by_runtime.compute(&planes).unwrap();
     let apart = one.iter().zip(&other).map(|(a, b)| (a - b).abs());
     assert!(apart.fold(0.0, f32::max) < 1e-3);
 }
@@ -29,9 +29,9 @@ fn both_libraries_compute_the_same() {
 fn planes_that_do_not_fit_and_a_network_that_is_not_there_are_said() {
     let shapes = [SHAPES[0], [44, 128, 128]];
     let mut network = PlanesNetwork::load(NAME, None, shapes).unwrap();
-    let wrong = network.compute(vec![0.0; 8 * 256 * 256]).unwrap_err();
+    let wrong = network.compute(&vec![0.0; 8 * 256 * 256]).unwrap_err();
     let said = "gyre:models/objects.onnx cannot be computed: it gives [1, 44, 64, 64]";
     assert_eq!(wrong.to_string(), said);
-    assert!(network.compute(vec![0.0; 5]).is_err());
+    assert!(network.compute(&[0.0; 5]).is_err());
     assert!(PlanesNetwork::load("gyre:models/none.onnx", None, SHAPES).is_err());
 }

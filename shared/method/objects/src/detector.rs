@@ -80,10 +80,10 @@ impl Detector {
         let deskewed = points.iter().map(|point| point.deskewed(&scan.twist));
         let deskewed: Vec<Point2<f64>> = deskewed.collect();
         self.memory.add(scan, points, &deskewed);
-        let output = unfolded(&self.network.compute(self.memory.draw(&scan.pose))?);
+        let output = Output(self.network.compute(self.memory.draw(&scan.pose))?);
         let mut found: Vec<Detection> = Vec::new();
-        for cell in peaks(&output, least) {
-            let detection = read(&output, cell);
+        for cell in output.peaks(least) {
+            let detection = output.read(cell);
             let is_far = |other: &Detection| (other.at - detection.at).norm() > ALONE_M;
             if found.iter().all(is_far) {
                 found.push(detection);
@@ -97,52 +97,50 @@ impl Detector {
     }
 }
 
-/// Returns the planes of the output, OUT x OUT each. The network gives each in four, of every other
-/// row and column.
-fn unfolded(folded: &[f32]) -> Vec<f32> {
-    const HALF: usize = OUT / 2;
-    let mut planes = vec![0.0; VALUES * OUT * OUT];
-    for (index, value) in folded.iter().enumerate() {
-        let (part, cell) = (index / (HALF * HALF), index % (HALF * HALF));
-        let row = 2 * (cell / HALF) + part % 4 / 2;
-        let column = 2 * (cell % HALF) + part % 2;
-        planes[part / 4 * OUT * OUT + row * OUT + column] = *value;
+/// What the network gives: each plane in four, of every other row and column.
+struct Output(Vec<f32>);
+
+impl Output {
+    /// Returns a value of the cell in a row and a column.
+    fn value(&self, plane: usize, [row, column]: [usize; 2]) -> f32 {
+        const HALF: usize = OUT / 2;
+        let part = 4 * plane + 2 * (row % 2) + column % 2;
+        self.0[(part * HALF + row / 2) * HALF + column / 2]
     }
-    planes
-}
 
-/// Returns the cells that are at least as likely as those around them, the likeliest first.
-fn peaks(output: &[f32], least: f64) -> Vec<usize> {
-    let least = (least / (1.0 - least)).ln() as f32;
-    let is_peak = |cell: &usize| {
-        let (row, column) = (cell / OUT, cell % OUT);
+    /// Returns the cells that are at least as likely as those around them, the likeliest first.
+    fn peaks(&self, least: f64) -> Vec<[usize; 2]> {
+        let least = (least / (1.0 - least)).ln() as f32;
         let around = |at: usize| at.saturating_sub(1)..=(at + 1).min(OUT - 1);
-        let value = output[*cell];
-        value > least
-            && around(row).all(|row| around(column).all(|at| output[row * OUT + at] <= value))
-    };
-    let mut found: Vec<usize> = (0..OUT * OUT).filter(is_peak).collect();
-    found.sort_by(|a, b| output[*b].total_cmp(&output[*a]));
-    found
-}
+        let is_peak = |[row, column]: &[usize; 2]| {
+            let value = self.value(0, [*row, *column]);
+            let mut near = around(*row).flat_map(|row| around(*column).map(move |at| [row, at]));
+            value > least && near.all(|cell| self.value(0, cell) <= value)
+        };
+        let cells = (0..OUT * OUT).map(|cell| [cell / OUT, cell % OUT]);
+        let mut found: Vec<[usize; 2]> = cells.filter(is_peak).collect();
+        found.sort_by(|a, b| self.value(0, *b).total_cmp(&self.value(0, *a)));
+        found
+    }
 
-/// Reads what the network says of a cell, in the frame of the sensor.
-fn read(output: &[f32], cell: usize) -> Detection {
-    let value = |plane: usize| f64::from(output[plane * OUT * OUT + cell]);
-    let centre = [cell / OUT, cell % OUT].map(|at| (at as f64 + 0.5 - (OUT / 2) as f64) * OUT_M);
-    let heading = Vector2::new(value(5), value(6));
-    Detection {
-        at: Point2::new(centre[0] + value(1), centre[1] + value(2)),
-        velocity: Vector2::new(value(3), value(4)) * SPEED_MPS,
-        heading: heading.try_normalize(1e-6).unwrap_or_else(Vector2::x),
-        size_m: [
-            SIZE_M[0] * value(7).clamp(-2.0, 2.0).exp(),
-            SIZE_M[1] * value(8).clamp(-2.0, 2.0).exp(),
-        ],
-        likely: 1.0 / (1.0 + (-value(0)).exp()),
-        sigma_m: value(9).clamp(-3.0, 2.0).exp(),
-        sigma_mps: value(10).clamp(-3.0, 3.0).exp(),
-        by_velocity: Matrix2::zeros(),
+    /// Reads what it says of a cell, in the frame of the sensor.
+    fn read(&self, cell: [usize; 2]) -> Detection {
+        let value = |plane: usize| f64::from(self.value(plane, cell));
+        let centre = cell.map(|at| (at as f64 + 0.5 - (OUT / 2) as f64) * OUT_M);
+        let heading = Vector2::new(value(5), value(6));
+        Detection {
+            at: Point2::new(centre[0] + value(1), centre[1] + value(2)),
+            velocity: Vector2::new(value(3), value(4)) * SPEED_MPS,
+            heading: heading.try_normalize(1e-6).unwrap_or_else(Vector2::x),
+            size_m: [
+                SIZE_M[0] * value(7).clamp(-2.0, 2.0).exp(),
+                SIZE_M[1] * value(8).clamp(-2.0, 2.0).exp(),
+            ],
+            likely: 1.0 / (1.0 + (-value(0)).exp()),
+            sigma_m: value(9).clamp(-3.0, 2.0).exp(),
+            sigma_mps: value(10).clamp(-3.0, 3.0).exp(),
+            by_velocity: Matrix2::zeros(),
+        }
     }
 }
 
@@ -195,32 +193,34 @@ mod tests {
     use gyre_geometry::{Twist, pose};
     use std::f64::consts::FRAC_PI_2;
 
-    #[test]
-    fn four_planes_are_one_of_every_other_row_and_column() {
-        const HALF: usize = OUT / 2;
-        let mut folded = vec![0.0; 4 * VALUES * HALF * HALF];
-        // Value 3 in the third of its planes: an odd row, an even column.
-        folded[(4 * 3 + 2) * HALF * HALF + 5 * HALF + 7] = 1.0;
-        let planes = unfolded(&folded);
-        assert_eq!(planes[3 * OUT * OUT + 11 * OUT + 14], 1.0);
-        assert_eq!(planes.iter().sum::<f32>(), 1.0);
+    /// An output of values that are the same in each cell.
+    fn output(values: [f32; VALUES]) -> Output {
+        let cells = values.map(|value| vec![value; OUT * OUT]);
+        Output(cells.concat())
+    }
+
+    impl Output {
+        fn set(&mut self, plane: usize, [row, column]: [usize; 2], value: f32) {
+            // Parts of 64 x 64 cells each.
+            let part = [[0, 1], [2, 3]][row % 2][column % 2];
+            self.0[((4 * plane + part) * 64 + row / 2) * 64 + column / 2] = value;
+        }
     }
 
     #[test]
     fn a_detection_is_the_likeliest_cell_of_its_surroundings_and_has_its_values() {
-        let mut output = vec![0.0; VALUES * OUT * OUT];
-        output[..OUT * OUT].fill(-9.0);
-        let cell = 80 * OUT + 70;
+        let mut output = output([-9.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        let (cell, far) = ([80, 71], [81, 76]);
         let values = [2.0, 0.25, -0.5, 1.0, -0.5, 0.0, 2.0, 0.0, 0.0, 0.0, -9.0];
         for (plane, value) in values.into_iter().enumerate() {
-            output[plane * OUT * OUT + cell] = value;
+            output.set(plane, cell, value);
         }
-        output[cell + 1] = 1.0;
-        output[cell + 5] = 0.0;
-        assert_eq!(peaks(&output, 0.3), [cell, cell + 5]);
-        assert_eq!(peaks(&output, 0.6), [cell]);
-        let found = read(&output, cell);
-        assert_eq!(found.at, Point2::new(16.75, 6.0));
+        output.set(0, [80, 72], 1.0);
+        output.set(0, far, 0.0);
+        assert_eq!(output.peaks(0.3), [cell, far]);
+        assert_eq!(output.peaks(0.6), [cell]);
+        let found = output.read(cell);
+        assert_eq!(found.at, Point2::new(16.75, 7.0));
         assert_eq!(found.velocity, Vector2::new(8.0, -4.0));
         assert_eq!(found.heading, Vector2::y());
         assert_eq!((found.size_m, found.sigma_m), (SIZE_M, 1.0));
@@ -238,10 +238,9 @@ mod tests {
         };
         let ahead = SparsePoint::from([20.0, 0.0, -0.1, 1.0, 0.05]);
         let aside = SparsePoint::from([0.0, 20.0, 0.07, 1.0, 0.05]);
-        let mut output = vec![0.0; VALUES * OUT * OUT];
-        output[5 * OUT * OUT..6 * OUT * OUT].fill(1.0);
+        let output = output([0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
         // At 30.5 m to the left.
-        let mut found = read(&output, OUT / 2 * OUT + OUT / 2 + 30);
+        let mut found = output.read([OUT / 2, OUT / 2 + 30]);
         let deskewed = [ahead, aside].map(|point| point.deskewed(&scan.twist));
         found.place(&scan.pose, &azimuths(&[ahead, aside], &deskewed));
         assert!(

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use gyre_geometry::{Pose, SparsePoint};
-use nalgebra::Point2;
+use nalgebra::{Isometry2, Point2};
 
 use crate::PlacedScan;
 
@@ -26,18 +26,25 @@ const LEAST_WEIGHT: f32 = 1.0 / 255.0;
 /// A return of a scan, as if the sensor had stood.
 #[derive(Clone, Copy, Debug)]
 struct Return {
-    /// Position in the frame of the odometry at the time of its azimuth, m.
-    at: Point2<f64>,
+    /// Position from the sensor at the time of its azimuth, m.
+    at: Point2<f32>,
     /// Weight from 0 to 1.
     weight: f32,
 }
 
+/// A scan that is remembered.
+struct Seen {
+    stamp_ns: i64,
+    pose: Pose,
+    returns: Vec<Return>,
+}
+
 /// The last scans.
 pub(crate) struct Memory {
-    /// Time, ns, and returns of each, the newest first.
-    scans: VecDeque<(i64, Vec<Return>)>,
-    /// The plane of the range.
-    range: Vec<f32>,
+    /// The newest first.
+    scans: VecDeque<Seen>,
+    /// What was drawn last: new memory each time would take as long as the drawing.
+    planes: Vec<f32>,
 }
 
 impl Memory {
@@ -47,23 +54,27 @@ impl Memory {
             let [x, y] = [cell / SIDE, cell % SIDE].map(|at| centre_m(at) as f32);
             x.hypot(y) / 64.0
         };
+        let mut planes = vec![0.0; (PLANES - 1) * CELLS];
+        planes.extend((0..CELLS).map(range));
         Self {
             scans: VecDeque::new(),
-            range: (0..CELLS).map(range).collect(),
+            planes,
         }
     }
 
     /// Adds a scan: its points, and where they are from the sensor without its motion and Doppler
     /// shift.
     pub fn add(&mut self, scan: &PlacedScan, points: &[SparsePoint], deskewed: &[Point2<f64>]) {
-        let returns = points
-            .iter()
-            .zip(deskewed)
-            .map(|(point, from_sensor)| Return {
-                at: scan.pose * from_sensor,
-                weight: point.weight,
-            });
-        self.scans.push_front((scan.stamp_ns, returns.collect()));
+        let returns = points.iter().zip(deskewed);
+        let returns = returns.map(|(point, from_sensor)| Return {
+            at: from_sensor.cast(),
+            weight: point.weight.clamp(LEAST_WEIGHT, 1.0),
+        });
+        self.scans.push_front(Seen {
+            stamp_ns: scan.stamp_ns,
+            pose: scan.pose,
+            returns: returns.collect(),
+        });
         self.scans.truncate(REMEMBERED);
     }
 
@@ -77,27 +88,28 @@ impl Memory {
     ///
     /// A plane of a scan has the largest weight of its returns in each cell; the next one the share
     /// of all scans before these that had a return there, and the last one the range over 64 m.
-    pub fn draw(&self, pose: &Pose) -> Vec<f32> {
-        let mut planes = vec![0.0f32; PLANES * CELLS];
-        let (recent, rest) = planes.split_at_mut(RECENT * CELLS);
-        let (share, range) = rest.split_at_mut(CELLS);
-        let sensor = pose.inverse();
-        let newest_ns = self.scans.front().map_or(0, |scan| scan.0);
+    pub fn draw(&mut self, pose: &Pose) -> &[f32] {
+        let (recent, rest) = self.planes.split_at_mut(RECENT * CELLS);
+        let share = &mut rest[..CELLS];
+        recent.fill(0.0);
+        share.fill(0.0);
+        let newest_ns = self.scans.front().map_or(0, |scan| scan.stamp_ns);
         // The last scan that counted in each cell.
         let mut counted = vec![0u8; CELLS];
         let mut before = 0;
-        for (stamp_ns, returns) in &self.scans {
-            let turns = (newest_ns.saturating_sub(*stamp_ns) + TURN_NS / 2) / TURN_NS;
+        for scan in &self.scans {
+            let turns = (newest_ns.saturating_sub(scan.stamp_ns) + TURN_NS / 2) / TURN_NS;
             let plane = usize::try_from(turns).ok().filter(|turns| *turns < RECENT);
             before += u8::from(plane.is_none());
-            for found in returns {
-                let at = sensor * found.at;
+            let there: Isometry2<f32> = pose.inv_mul(&scan.pose).cast();
+            for found in &scan.returns {
+                let at = there * found.at;
                 let Some(cell) = cell(at.x, at.y) else {
                     continue;
                 };
                 if let Some(plane) = plane {
                     let weight = &mut recent[plane * CELLS + cell];
-                    *weight = weight.max(found.weight.clamp(LEAST_WEIGHT, 1.0));
+                    *weight = weight.max(found.weight);
                 } else if counted[cell] != before {
                     counted[cell] = before;
                     share[cell] += 1.0;
@@ -106,16 +118,15 @@ impl Memory {
         }
         let before = f32::from(before.max(1));
         share.iter_mut().for_each(|count| *count /= before);
-        range.copy_from_slice(&self.range);
-        planes
+        &self.planes
     }
 }
 
-fn cell(x_m: f64, y_m: f64) -> Option<usize> {
-    let at = |metres: f64| {
-        let at = metres / CELL_M + (SIDE / 2) as f64;
+fn cell(x_m: f32, y_m: f32) -> Option<usize> {
+    let at = |metres: f32| {
+        let at = metres / CELL_M as f32 + (SIDE / 2) as f32;
         // The whole part is that below, since none is negative.
-        (0.0..SIDE as f64).contains(&at).then_some(at as usize)
+        (0.0..SIDE as f32).contains(&at).then_some(at as usize)
     };
     Some(at(x_m)? * SIDE + at(y_m)?)
 }
@@ -151,7 +162,7 @@ mod tests {
     #[test]
     fn what_stands_is_in_one_cell_of_all_planes_wherever_the_vehicle_was() {
         let stamps_s: Vec<f64> = (0..12).map(|scan| 0.25 * f64::from(scan)).collect();
-        let (memory, pose) = memory(&stamps_s);
+        let (mut memory, pose) = memory(&stamps_s);
         let planes = memory.draw(&pose);
         // 40.2 - 22 = 18.2 m ahead, and 0.2 m to the left.
         let cell = (36 + SIDE / 2) * SIDE + SIDE / 2;
@@ -168,7 +179,7 @@ mod tests {
 
     #[test]
     fn a_scan_that_was_lost_leaves_its_plane_empty() {
-        let (memory, pose) = memory(&[0.0, 0.25, 0.75, 1.0]);
+        let (mut memory, pose) = memory(&[0.0, 0.25, 0.75, 1.0]);
         let planes = memory.draw(&pose);
         let is_drawn = |plane: usize| {
             let plane = &planes[plane * CELLS..(plane + 1) * CELLS];
