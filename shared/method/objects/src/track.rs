@@ -125,6 +125,11 @@ impl Track {
         }
     }
 
+    /// Is lost to another track, which is of the same vehicle.
+    pub fn give_way(&mut self) {
+        self.lost = true;
+    }
+
     pub fn is_object(&self) -> bool {
         self.id.is_some()
     }
@@ -183,9 +188,11 @@ impl Track {
         self.weight += lost.weight;
     }
 
-    /// Returns whether another track is of the same vehicle: no two are at one place.
+    /// Returns whether another track is of the same vehicle: no two are at one place, but the
+    /// outlines of two that meet may overlap, as their places are not exact.
     pub fn is_same(&self, other: &Self) -> bool {
-        self.outline().overlaps(&other.outline())
+        let is_along = self.filter.velocity().dot(&other.filter.velocity()) > 0.0;
+        is_along && self.outline().overlaps(&other.outline())
     }
 
     fn outline(&self) -> Outline {
@@ -309,10 +316,13 @@ mod tests {
     fn tracks_of_one_vehicle_are_in_one_lane_and_less_than_its_length_apart() {
         let config = ObjectsConfig::default();
         let track = |x: f64, y: f64| Track::new(&detection([x, y], [-10.0, 0.0]), &config);
+        let other = Track::new(&detection([22.0, 3.5], [8.0, 1.0]), &config);
         let first = track(20.0, 3.0);
         assert!(first.is_same(&track(24.0, 3.5)));
         assert!(!first.is_same(&track(25.0, 3.0)));
         assert!(!first.is_same(&track(20.0, 5.5)));
+        // It drives the other way.
+        assert!(!first.is_same(&other));
     }
 
     #[test]

@@ -128,21 +128,20 @@ impl ObjectTracker {
         self.tracks.extend(tracks);
     }
 
-    /// Ends tracks, also those of one vehicle but the first, and decides which move.
+    /// Ends tracks, also those of one vehicle but the first, and decides which move. What was an
+    /// object keeps its identity: two vehicles that are close may have been taken for one.
     fn judge(&mut self) {
         let config = &self.config;
-        self.tracks.retain(|track| !track.is_over(config));
         // Objects first, then the older ones.
         self.tracks.sort_by_key(|track| !track.is_object());
-        let mut index = 0;
-        while index < self.tracks.len() {
-            let (first, rest) = self.tracks.split_at(index);
+        for index in 0..self.tracks.len() {
+            let (first, rest) = self.tracks.split_at_mut(index);
             let is_known = |first: &Track| !first.is_lost() && first.is_same(&rest[0]);
-            match !rest[0].is_lost() && first.iter().any(is_known) {
-                true => _ = self.tracks.remove(index),
-                false => index += 1,
+            if first.iter().any(is_known) {
+                rest[0].give_way();
             }
         }
+        self.tracks.retain(|track| !track.is_over(config));
         for index in 0..self.tracks.len() {
             if self.tracks[index].judge(&self.config) {
                 self.confirm(index);
