@@ -25,7 +25,7 @@ pub fn digest(path: &Path) -> io::Result<String> {
     Ok(digest.finalize().to_string())
 }
 
-/// Returns the BLAKE3 digest of the words of what replaces each stage and of the files that it names.
+/// Returns the BLAKE3 digest of what replaces each stage: of its words and the files that it names.
 ///
 /// # Errors
 /// A file that cannot be read.

@@ -57,7 +57,7 @@ pub struct Programs {
 }
 
 impl Programs {
-    /// Returns those of a run: the BLAKE3 digest of Gyre's program, and of each stage that is replaced.
+    /// Returns those of a run: the BLAKE3 digests of Gyre's program and of each replaced stage.
     pub fn new(build: String, replaced: BTreeMap<String, String>) -> Self {
         Self {
             version: env!("CARGO_PKG_VERSION").to_owned(),

@@ -97,7 +97,7 @@ impl Detector {
     }
 }
 
-/// What the network gives: each plane in four, of every other row and column.
+/// The network's output: each plane in four, of every other row and column.
 struct Output(Vec<f32>);
 
 impl Output {

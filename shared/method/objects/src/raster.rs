@@ -43,7 +43,7 @@ struct Seen {
 pub(crate) struct Memory {
     /// The newest first.
     scans: VecDeque<Seen>,
-    /// What was drawn last: new memory each time would take as long as the drawing.
+    /// The planes that were drawn last, kept since fresh memory costs a page fault for each page.
     planes: Vec<f32>,
 }
 
