@@ -34,7 +34,7 @@ pub struct Provenance {
     pub kernel: String,
     /// Gyre's version.
     pub gyre: String,
-    /// SHA-256 of the program.
+    /// BLAKE3 digest of the program.
     pub build: String,
     /// The file of the configuration; the resolved one lies beside the report.
     pub configuration: String,

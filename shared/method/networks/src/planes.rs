@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use ort::{session::Session, value::TensorRef};
-use rten::{Model, ModelOptions, RunOptions, ThreadPool, Value};
+use rten::{Model, ModelOptions, RunOptions, ThreadPool, ValueView};
 use thiserror::Error;
 
 use crate::one_line;
@@ -128,7 +128,7 @@ fn by_rten(
     shape: [usize; 4],
     planes: &[f32],
 ) -> Result<Given, String> {
-    let input = Value::from_shape(shape, planes.to_vec()).map_err(|error| error.to_string())?;
+    let input = ValueView::from_shape(shape, planes).map_err(|error| error.to_string())?;
     let options = RunOptions::default().with_thread_pool(Some(thread.clone()));
     let output = model.run_one(input.into(), Some(options));
     let output = output.map_err(|error| error.to_string())?;

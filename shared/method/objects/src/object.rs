@@ -52,7 +52,7 @@ pub(crate) struct Outline {
 
 impl Outline {
     /// Returns whether it overlaps another one: whether no line along a side of one of them is
-    /// between them (the theorem of separating axes). The outlines of two vehicles do not.
+    /// between them (the theorem of separating axes).
     pub fn overlaps(&self, other: &Self) -> bool {
         let apart = other.centre - self.centre;
         let is_between =

@@ -26,9 +26,9 @@ const LEAST_WEIGHT: f32 = 1.0 / 255.0;
 /// A return of a scan, as if the sensor had stood.
 #[derive(Clone, Copy, Debug)]
 struct Return {
-    /// Position from the sensor at the time of its azimuth, m.
+    /// Position from the sensor at the scan's time, m.
     at: Point2<f32>,
-    /// Weight from 0 to 1.
+    /// Weight from `LEAST_WEIGHT` to 1.
     weight: f32,
 }
 
@@ -175,6 +175,16 @@ mod tests {
         // Sides of the cell at 18.25 and 0.25 m.
         let range = planes[(PLANES - 1) * CELLS + cell];
         assert!((range - 18.25f32.hypot(0.25) / 64.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn what_was_drawn_before_is_gone() {
+        let stamps_s: Vec<f64> = (0..12).map(|scan| 0.25 * f64::from(scan)).collect();
+        let (mut memory, pose) = memory(&stamps_s);
+        let range = memory.draw(&pose)[(PLANES - 1) * CELLS..].to_vec();
+        memory.clear();
+        let (drawn, same) = memory.draw(&pose).split_at((PLANES - 1) * CELLS);
+        assert!(drawn.iter().all(|value| *value == 0.0) && same == range);
     }
 
     #[test]

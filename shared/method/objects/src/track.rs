@@ -29,8 +29,8 @@ pub(crate) struct Track {
     known_s: f64,
     unseen_s: f64,
     moving: bool,
-    /// True if it is neither seen nor expected any more, and if it was about to stand then: the
-    /// network finds what moves.
+    /// True if it is neither seen nor expected any more, or has given way to another one, and if it
+    /// was about to stand then: the network finds what moves.
     lost: bool,
     stopped: bool,
     /// Logarithm of the likelihood of an object over that of clutter.
@@ -102,19 +102,26 @@ impl Track {
         self.score = (self.score + evidence(detection, config)).min(config.max_score);
         self.hits = self.hits.saturating_add(1);
         self.unseen_s = 0.0;
-        self.lose(config);
+        self.judge_sight(config);
     }
 
     /// Notes that a scan does not show it.
     pub fn miss(&mut self, config: &ObjectsConfig) {
         self.score -= config.missed_loss;
-        self.lose(config);
+        self.judge_sight(config);
     }
 
     /// Decides whether it is lost.
-    fn lose(&mut self, config: &ObjectsConfig) {
-        self.lost = self.unseen_s > config.coast_s || self.score < config.end_score;
-        self.stopped = self.lost && self.filter.velocity().norm() < config.stopping_mps;
+    fn judge_sight(&mut self, config: &ObjectsConfig) {
+        if self.unseen_s > config.coast_s || self.score < config.end_score {
+            self.lose(config);
+        }
+    }
+
+    /// Makes it lost: what may be seen again, or has given way to a track of the same vehicle.
+    pub fn lose(&mut self, config: &ObjectsConfig) {
+        self.lost = true;
+        self.stopped = self.filter.velocity().norm() < config.stopping_mps;
     }
 
     /// Turns the heading into the direction of the motion.
@@ -123,11 +130,6 @@ impl Track {
         if velocity.norm() > config.heading_mps {
             self.heading = velocity.normalize();
         }
-    }
-
-    /// Is lost to another track, which is of the same vehicle.
-    pub fn give_way(&mut self) {
-        self.lost = true;
     }
 
     pub fn is_object(&self) -> bool {
@@ -190,9 +192,10 @@ impl Track {
 
     /// Returns whether another track is of the same vehicle: no two are at one place, but the
     /// outlines of two that meet may overlap, as their places are not exact.
-    pub fn is_same(&self, other: &Self) -> bool {
-        let is_along = self.filter.velocity().dot(&other.filter.velocity()) > 0.0;
-        is_along && self.outline().overlaps(&other.outline())
+    pub fn is_same(&self, other: &Self, config: &ObjectsConfig) -> bool {
+        let [one, two] = [self, other].map(|track| track.filter.velocity());
+        let is_slow = one.norm().min(two.norm()) < config.heading_mps;
+        (is_slow || one.dot(&two) > 0.0) && self.outline().overlaps(&other.outline())
     }
 
     fn outline(&self) -> Outline {
@@ -316,13 +319,14 @@ mod tests {
     fn tracks_of_one_vehicle_are_in_one_lane_and_less_than_its_length_apart() {
         let config = ObjectsConfig::default();
         let track = |x: f64, y: f64| Track::new(&detection([x, y], [-10.0, 0.0]), &config);
-        let other = Track::new(&detection([22.0, 3.5], [8.0, 1.0]), &config);
+        let oncoming = |mps: f64| Track::new(&detection([22.0, 3.5], [mps, 0.1]), &config);
         let first = track(20.0, 3.0);
-        assert!(first.is_same(&track(24.0, 3.5)));
-        assert!(!first.is_same(&track(25.0, 3.0)));
-        assert!(!first.is_same(&track(20.0, 5.5)));
-        // It drives the other way.
-        assert!(!first.is_same(&other));
+        assert!(first.is_same(&track(24.0, 3.5), &config));
+        assert!(!first.is_same(&track(25.0, 3.0), &config));
+        assert!(!first.is_same(&track(20.0, 5.5), &config));
+        assert!(!first.is_same(&oncoming(8.0), &config));
+        // The direction of what hardly moves is noise.
+        assert!(first.is_same(&oncoming(0.2), &config));
     }
 
     #[test]
@@ -362,6 +366,19 @@ mod tests {
         found.take_over(&mut lost);
         assert!(found.id == Some(1) && found.age == 12);
         assert!(lost.is_over(&config) && !found.is_over(&config));
+    }
+
+    #[test]
+    fn what_gave_way_keeps_its_identity_if_it_has_one() {
+        let config = ObjectsConfig::default();
+        let mut track = seen(4, &config);
+        track.lose(&config);
+        assert!(track.is_over(&config));
+        track.confirm(1);
+        assert!(!track.is_over(&config) && track.object(&config).is_none());
+        track.predict(0.5, &config);
+        let begun = Track::new(&detection([8.5, 3.0], [-10.0, 0.0]), &config);
+        assert!(track.distance(&begun, &config).is_some());
     }
 
     #[test]

@@ -136,9 +136,9 @@ impl ObjectTracker {
         self.tracks.sort_by_key(|track| !track.is_object());
         for index in 0..self.tracks.len() {
             let (first, rest) = self.tracks.split_at_mut(index);
-            let is_known = |first: &Track| !first.is_lost() && first.is_same(&rest[0]);
-            if first.iter().any(is_known) {
-                rest[0].give_way();
+            let is_known = |first: &Track| !first.is_lost() && first.is_same(&rest[0], config);
+            if !rest[0].is_lost() && first.iter().any(is_known) {
+                rest[0].lose(config);
             }
         }
         self.tracks.retain(|track| !track.is_over(config));

@@ -33,7 +33,7 @@ pub struct Manifest {
     /// Speed of playback relative to the sensor's clock; `None`: as fast as the window admits
     /// scans.
     pub rate: Option<f64>,
-    /// SHA-256 of the supervisor's program, which all stages of its own must be.
+    /// BLAKE3 digest of the supervisor's program, which all stages of its own must be.
     pub build: String,
 }
 
