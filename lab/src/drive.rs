@@ -6,8 +6,9 @@ use gyre_configuration::Configuration;
 use gyre_datasets::{find_ground_truth, read_trajectory};
 use gyre_estimation::places::{KeyframeSelector, MAX_NEIGHBOURS, PlaceOptions, neighbours};
 use gyre_evaluation::TimedMotion;
-use gyre_geometry::{ComposedMotion, Pose, SparsePoint, Twist, UncertainMotion};
-use gyre_masking::{MaskKind, Masker};
+use gyre_geometry::{ComposedMotion, Pose, Twist, UncertainMotion};
+use gyre_masking::MaskKind;
+use gyre_odometry::Odometry;
 use gyre_radar::{OwnedScan, Trajectory};
 use gyre_results::odometry;
 use gyre_scan_matching::{RefinementConfig, Submap};
@@ -84,13 +85,11 @@ impl Drive {
         options: &PlaceOptions,
     ) -> Result<(), Failure> {
         let mut dataset = gyre_datasets::open(data, &configuration.dataset)?;
-        let (odometry, mut scan) = (
-            &configuration.odometry,
-            OwnedScan::with_limits(dataset.limits()),
-        );
-        let mut masker = Masker::new(&odometry.raster, &odometry.points, &odometry.masking)?;
+        let mut scan = OwnedScan::with_limits(dataset.limits());
+        // Where azimuths were lost, points are right only if they are put back, for which the
+        // scans before are needed.
+        let mut odometry = Odometry::new(&configuration.odometry)?;
         let mut selector = KeyframeSelector::new(options);
-        let mut points = vec![SparsePoint::default(); self.capacity];
         let stamps = self.estimate.stamp_ns.clone().unwrap_or_default();
         if motions.len() + 1 != stamps.len() {
             return Err("odometry.csv and trajectory.tum are not of one run".into());
@@ -101,10 +100,11 @@ impl Drive {
             if let Some(motion) = motion {
                 (reckoned, since) = (reckoned.then(&motion), since.then(&motion.drift()));
             }
+            scan.geometry = dataset.read(k, scan.slot())?;
+            odometry.register(&scan.view(), &[])?;
             let Some(path_m) = selector.next(pose) else {
                 continue;
             };
-            scan.geometry = dataset.read(k, scan.slot())?;
             if scan.geometry.stamp_ns.abs_diff(stamps[k]) > SAME_TIME_NS {
                 return Err(format!(
                     "pose {k} is not that of scan {k}: the run must have used all scans"
@@ -112,7 +112,6 @@ impl Drive {
                 .into());
             }
             let twist = twist(&self.estimate, &stamps, k);
-            let count = masker.points(&scan.view(), Some(twist), &mut points)?;
             self.keyframes.push(Keyframe {
                 seq: k as u64,
                 scan: k as u64,
@@ -125,7 +124,7 @@ impl Drive {
                 noise: motion.unwrap_or_default().noise_of_pose(),
                 twist,
                 path_m,
-                points: points[..count].to_vec(),
+                points: odometry.points().to_vec(),
             });
             self.truths.push(self.truth.near(stamps[k], SAME_TIME_NS));
             self.path_m.push(path_m);
