@@ -4,15 +4,15 @@ use std::{convert::Infallible, path::Path};
 
 use gyre_configuration::Configuration;
 use gyre_datasets::{find_ground_truth, read_trajectory};
-use gyre_estimation::places::{KeyframeSelector, MAX_NEIGHBOURS, PlaceOptions, neighbours};
+use gyre_estimation::places::{MAX_NEIGHBOURS, PlaceOptions, neighbours};
 use gyre_evaluation::TimedMotion;
-use gyre_geometry::{ComposedMotion, Pose, Twist, UncertainMotion};
+use gyre_geometry::{ComposedMotion, Pose, UncertainMotion};
 use gyre_masking::MaskKind;
 use gyre_odometry::Odometry;
 use gyre_radar::{OwnedScan, Trajectory};
 use gyre_results::odometry;
 use gyre_scan_matching::{RefinementConfig, Submap};
-use gyre_slam::{Keyframe, KeyframeSource};
+use gyre_slam::{Keyframe, KeyframeBuilder, KeyframeSource, ScanPose};
 use gyre_terminal::Failure;
 
 /// Poses of a run and of the truth belong to a scan if they are this near in time.
@@ -89,20 +89,30 @@ impl Drive {
         // Where azimuths were lost, points are right only if they are put back, for which the
         // scans before are needed.
         let mut odometry = Odometry::new(&configuration.odometry)?;
-        let mut selector = KeyframeSelector::new(options);
+        let mut builder = KeyframeBuilder::new(options);
         let stamps = self.estimate.stamp_ns.clone().unwrap_or_default();
         if motions.len() + 1 != stamps.len() {
             return Err("odometry.csv and trajectory.tum are not of one run".into());
         }
-        let (mut reckoned, mut since) = (ComposedMotion::new(), UncertainMotion::identity());
+        let mut reckoned = ComposedMotion::new();
         for (k, pose) in self.estimate.poses.iter().enumerate() {
-            let motion = k.checked_sub(1).map(|last| motions[last].estimate);
-            if let Some(motion) = motion {
-                (reckoned, since) = (reckoned.then(&motion), since.then(&motion.drift()));
-            }
             scan.geometry = dataset.read(k, scan.slot())?;
             odometry.register(&scan.view(), &[])?;
-            let Some(path_m) = selector.next(pose) else {
+            let last = k.checked_sub(1);
+            let motion = last.map_or_else(Default::default, |last| motions[last].estimate);
+            reckoned = reckoned.then(&motion);
+            let placed = ScanPose {
+                seq: k as u64,
+                scan: k as u64,
+                stamp_ns: stamps[k],
+                pose: UncertainMotion {
+                    motion: *pose,
+                    covariance: reckoned.motion().covariance,
+                },
+                motion,
+                interval_s: last.map_or(0.0, |last| (stamps[k] - stamps[last]) as f64 * 1e-9),
+            };
+            let Some(keyframe) = builder.next(&placed) else {
                 continue;
             };
             if scan.geometry.stamp_ns.abs_diff(stamps[k]) > SAME_TIME_NS {
@@ -111,23 +121,12 @@ impl Drive {
                 )
                 .into());
             }
-            let twist = twist(&self.estimate, &stamps, k);
-            self.keyframes.push(Keyframe {
-                seq: k as u64,
-                scan: k as u64,
-                stamp_ns: stamps[k],
-                pose: UncertainMotion {
-                    motion: *pose,
-                    covariance: reckoned.motion().covariance,
-                },
-                motion: std::mem::replace(&mut since, UncertainMotion::identity()),
-                noise: motion.unwrap_or_default().noise_of_pose(),
-                twist,
-                path_m,
-                points: odometry.points().to_vec(),
-            });
             self.truths.push(self.truth.near(stamps[k], SAME_TIME_NS));
-            self.path_m.push(path_m);
+            self.path_m.push(keyframe.path_m);
+            self.keyframes.push(Keyframe {
+                points: odometry.points().to_vec(),
+                ..keyframe
+            });
         }
         Ok(())
     }
@@ -155,11 +154,4 @@ impl KeyframeSource for &Drive {
     fn keyframe(&mut self, index: usize) -> Result<Keyframe, Infallible> {
         Ok(self.keyframes[index].clone())
     }
-}
-
-/// The velocity at pose `k`, from the poses around it.
-fn twist(estimate: &Trajectory, stamps: &[i64], k: usize) -> Twist {
-    let (before, after) = (k.saturating_sub(1), (k + 1).min(estimate.len() - 1));
-    let motion = estimate.poses[before].inv_mul(&estimate.poses[after]);
-    Twist::from_chord(&motion, (stamps[after] - stamps[before]) as f64 * 1e-9)
 }
