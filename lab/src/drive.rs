@@ -5,14 +5,10 @@ use std::{convert::Infallible, path::Path};
 use gyre_configuration::Configuration;
 use gyre_datasets::{find_ground_truth, read_trajectory};
 use gyre_estimation::places::{MAX_NEIGHBOURS, PlaceOptions, neighbours};
-use gyre_evaluation::TimedMotion;
-use gyre_geometry::{ComposedMotion, Pose, UncertainMotion};
-use gyre_masking::MaskKind;
-use gyre_odometry::Odometry;
-use gyre_radar::{OwnedScan, Trajectory};
-use gyre_results::odometry;
+use gyre_geometry::Pose;
+use gyre_radar::Trajectory;
 use gyre_scan_matching::{RefinementConfig, Submap};
-use gyre_slam::{Keyframe, KeyframeBuilder, KeyframeSource, ScanPose};
+use gyre_slam::{Keyframe, KeyframeSource, RecordReader};
 use gyre_terminal::Failure;
 
 /// Poses of a run and of the truth belong to a scan if they are this near in time.
@@ -37,36 +33,40 @@ pub struct Drive {
 }
 
 impl Drive {
-    /// Selects the keyframes of the run in the folder `run`, and extracts their points from its
-    /// recording. A learned mask is not applied.
+    /// Reads the keyframes of the run in the folder `run`, which must have had SLAM.
     ///
     /// # Errors
-    /// Results or a recording that cannot be read, or have no ground truth.
+    /// Results that cannot be read, or a recording without ground truth.
     pub fn read(run: &Path, options: &PlaceOptions) -> Result<Self, Failure> {
-        let mut configuration = Configuration::read(&run.join("config.toml"), &[])?;
-        if configuration.odometry.masking.kind == MaskKind::Learned {
-            configuration.odometry.masking.kind = MaskKind::Threshold;
-        }
-        let data = configuration.source.data.clone();
+        let configuration = Configuration::read(&run.join("config.toml"), &[])?;
+        let data = &configuration.source.data;
         let truth = configuration.run.ground_truth.clone();
         let truth = truth
-            .or_else(|| find_ground_truth(&data))
+            .or_else(|| find_ground_truth(data))
             .ok_or_else(|| format!("{} has no ground truth", data.display()))?;
-        let motions = odometry::read(&run.join("odometry.csv"))?;
+        let truth = read_trajectory(&truth)?;
+        let mut keyframes = RecordReader::<Keyframe>::open(run)?;
+        if keyframes.is_empty() {
+            return Err("the run has no keyframes: add --set slam.kind=graph".into());
+        }
+        let keyframes: Vec<Keyframe> = (0..keyframes.len())
+            .map(|index| keyframes.read(index))
+            .collect::<Result<_, _>>()?;
         let capacity = configuration.odometry.points.capacity;
-        let mut drive = Self {
+        Ok(Self {
             estimate: read_trajectory(&run.join("trajectory.tum"))?,
-            truth: read_trajectory(&truth)?,
-            keyframes: Vec::new(),
-            truths: Vec::new(),
-            path_m: Vec::new(),
-            refinement: configuration.odometry.refinement.clone(),
+            truths: keyframes
+                .iter()
+                .map(|it| truth.near(it.stamp_ns, SAME_TIME_NS))
+                .collect(),
+            path_m: keyframes.iter().map(|it| it.path_m).collect(),
+            keyframes,
+            truth,
+            refinement: configuration.odometry.refinement,
             capacity,
             submaps: [0, 1].map(|_| Submap::with_capacity(capacity * (2 * MAX_NEIGHBOURS + 1))),
             submap_reach_m: options.submap_reach_m,
-        };
-        drive.select(&configuration, &data, &motions, options)?;
-        Ok(drive)
+        })
     }
 
     /// Returns the distance of two keyframes by the truth, m; infinite where it is unknown.
@@ -75,60 +75,6 @@ impl Drive {
             (Some(a), Some(b)) => (a.translation.vector - b.translation.vector).norm(),
             _ => f64::INFINITY,
         }
-    }
-
-    fn select(
-        &mut self,
-        configuration: &Configuration,
-        data: &Path,
-        motions: &[TimedMotion],
-        options: &PlaceOptions,
-    ) -> Result<(), Failure> {
-        let mut dataset = gyre_datasets::open(data, &configuration.dataset)?;
-        let mut scan = OwnedScan::with_limits(dataset.limits());
-        // Where azimuths were lost, points are right only if they are put back, for which the
-        // scans before are needed.
-        let mut odometry = Odometry::new(&configuration.odometry)?;
-        let mut builder = KeyframeBuilder::new(options);
-        let stamps = self.estimate.stamp_ns.clone().unwrap_or_default();
-        if motions.len() + 1 != stamps.len() {
-            return Err("odometry.csv and trajectory.tum are not of one run".into());
-        }
-        let mut reckoned = ComposedMotion::new();
-        for (k, pose) in self.estimate.poses.iter().enumerate() {
-            scan.geometry = dataset.read(k, scan.slot())?;
-            odometry.register(&scan.view(), &[])?;
-            let last = k.checked_sub(1);
-            let motion = last.map_or_else(Default::default, |last| motions[last].estimate);
-            reckoned = reckoned.then(&motion);
-            let placed = ScanPose {
-                seq: k as u64,
-                scan: k as u64,
-                stamp_ns: stamps[k],
-                pose: UncertainMotion {
-                    motion: *pose,
-                    covariance: reckoned.motion().covariance,
-                },
-                motion,
-                interval_s: last.map_or(0.0, |last| (stamps[k] - stamps[last]) as f64 * 1e-9),
-            };
-            let Some(keyframe) = builder.next(&placed) else {
-                continue;
-            };
-            if scan.geometry.stamp_ns.abs_diff(stamps[k]) > SAME_TIME_NS {
-                return Err(format!(
-                    "pose {k} is not that of scan {k}: the run must have used all scans"
-                )
-                .into());
-            }
-            self.truths.push(self.truth.near(stamps[k], SAME_TIME_NS));
-            self.path_m.push(keyframe.path_m);
-            self.keyframes.push(Keyframe {
-                points: odometry.points().to_vec(),
-                ..keyframe
-            });
-        }
-        Ok(())
     }
 
     /// Makes the submap around a keyframe the query's (0) or the candidate's (1).

@@ -26,8 +26,7 @@ const WRONG_DEG: f64 = 5.0;
 
 #[derive(Debug, Args)]
 pub struct PlacesArguments {
-    /// The results of a run: a folder with config.toml and trajectory.tum. The recording needs a
-    /// ground truth.
+    /// The results of a run with `slam.kind=graph` or `filter`. Its recording needs a ground truth.
     pub run: PathBuf,
     /// Least length of the path between a keyframe and the earlier ones that it is compared with,
     /// m.
@@ -60,7 +59,7 @@ struct Checked {
 /// Recognises the places of a run, verifies the loops, and compares both with the ground truth.
 ///
 /// # Errors
-/// Results or a recording that cannot be read, or have no ground truth.
+/// Results that cannot be read or have no keyframes, or a recording without ground truth.
 pub fn places(arguments: &PlacesArguments) -> Result<ExitCode, Failure> {
     let options = PlaceOptions::default();
     let mut drive = Drive::read(&arguments.run, &options)?;

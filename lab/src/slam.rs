@@ -21,8 +21,7 @@ use figures::{Figures, loops_table};
 
 #[derive(Debug, Args)]
 pub struct SlamArguments {
-    /// The results of a run: a folder with config.toml, odometry.csv and trajectory.tum. The
-    /// recording needs a ground truth.
+    /// The results of a run with `slam.kind=graph` or `filter`. Its recording needs a ground truth.
     pub run: PathBuf,
     /// A loop is wrong if it is farther from the ground truth, m.
     #[arg(long, default_value = "2")]
@@ -41,7 +40,7 @@ pub struct SlamArguments {
 /// Closes loops, corrects, and measures.
 ///
 /// # Errors
-/// Results or a recording that cannot be read, or have no ground truth.
+/// Results that cannot be read or have no keyframes, or a recording without ground truth.
 pub fn slam(arguments: &SlamArguments) -> Result<ExitCode, Failure> {
     let options = LoopOptions::default();
     let drive = Drive::read(&arguments.run, &options.places)?;

@@ -150,7 +150,7 @@ fn assert_identical((code, report): (Option<i32>, Value)) {
     assert_eq!(code, Some(0), "{report:#}");
     assert_eq!(report["verdict"], "identical");
     assert!(
-        report["counts"]["compared"].as_u64() >= Some(5),
+        report["counts"]["compared"].as_u64() > Some(0),
         "{report:#}"
     );
     assert!(report["work"]["shadow"]["p50_us"].as_f64() > Some(0.0));

@@ -25,7 +25,8 @@ const GAP_M: f64 = 100.0;
 /// The figures of a trajectory.
 pub struct Figures {
     ate_m: f64,
-    /// Loops taken, and those that the gate rejected or the kernel weighs less than a quarter.
+    /// Loops, and those among them that are rejected or that the kernel leaves less than a quarter
+    /// of their weight.
     loops: [usize; 2],
     residual_m: Option<f64>,
     /// NEES of the keyframes' poses, of the whole pose, over its expectation.
@@ -87,7 +88,7 @@ impl Figures {
 
     pub fn row(&self, name: &str) -> Record {
         record(json!({
-            "trajectory": name, "ate_m": self.ate_m, "loops": self.loops[0], "outvoted": self.loops[1],
+            "trajectory": name, "ate_m": self.ate_m, "loops": self.loops[0], "weak": self.loops[1],
             "residual_m": self.residual_m, "nees": self.nees, "scale": self.scale, "solved_ms": self.solved.as_secs_f64() * 1e3,
         }))
     }
@@ -100,7 +101,7 @@ pub fn table(rows: Vec<Record>) -> Table {
             ("trajectory", "trajectory", 0),
             ("ate_m", "ATE m", 2),
             ("loops", "loops", 0),
-            ("outvoted", "rejected", 0),
+            ("weak", "with less than 1/4 of their weight", 0),
             ("residual_m", "residual rms m", 3),
             ("nees", "NEES", 2),
             ("scale", "scale of covariances", 2),
