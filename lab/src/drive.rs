@@ -29,15 +29,16 @@ pub struct Drive {
     pub capacity: usize,
     /// The submap of a query and that of a candidate.
     pub submaps: [Submap; 2],
-    submap_reach_m: f64,
+    /// The settings by which the run selected keyframes and recognised places.
+    pub places: PlaceOptions,
 }
 
 impl Drive {
-    /// Reads the keyframes of the run in the folder `run`, which must have had SLAM.
+    /// Reads the keyframes of the run in the folder `run`, one with `slam.kind=graph` or `filter`.
     ///
     /// # Errors
-    /// Results that cannot be read, or a recording without ground truth.
-    pub fn read(run: &Path, options: &PlaceOptions) -> Result<Self, Failure> {
+    /// Results that cannot be read or have no keyframes, or a recording without ground truth.
+    pub fn read(run: &Path) -> Result<Self, Failure> {
         let configuration = Configuration::read(&run.join("config.toml"), &[])?;
         let data = &configuration.source.data;
         let truth = configuration.run.ground_truth.clone();
@@ -65,7 +66,7 @@ impl Drive {
             refinement: configuration.odometry.refinement,
             capacity,
             submaps: [0, 1].map(|_| Submap::with_capacity(capacity * (2 * MAX_NEIGHBOURS + 1))),
-            submap_reach_m: options.submap_reach_m,
+            places: configuration.slam.places,
         })
     }
 
@@ -82,7 +83,8 @@ impl Drive {
         let middle = &self.keyframes[keyframe];
         let submap = &mut self.submaps[submap];
         submap.start(&middle.points, &middle.twist);
-        for k in neighbours(&self.path_m, keyframe, self.submap_reach_m).filter(|k| *k != keyframe)
+        for k in neighbours(&self.path_m, keyframe, self.places.submap_reach_m)
+            .filter(|k| *k != keyframe)
         {
             let other = &self.keyframes[k];
             submap.add(

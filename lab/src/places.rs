@@ -5,9 +5,7 @@ mod counts;
 use std::{fmt::Write, path::PathBuf, process::ExitCode, time::Instant};
 
 use clap::Args;
-use gyre_estimation::places::{
-    Describer, Descriptor, LoopVerifier, PlaceIndex, PlaceOptions, Verification,
-};
+use gyre_estimation::places::{Describer, Descriptor, LoopVerifier, PlaceIndex, Verification};
 use gyre_geometry::xy_yaw;
 use gyre_terminal::Failure;
 use nalgebra::Vector3;
@@ -61,12 +59,11 @@ struct Checked {
 /// # Errors
 /// Results that cannot be read or have no keyframes, or a recording without ground truth.
 pub fn places(arguments: &PlacesArguments) -> Result<ExitCode, Failure> {
-    let options = PlaceOptions::default();
-    let mut drive = Drive::read(&arguments.run, &options)?;
+    let mut drive = Drive::read(&arguments.run)?;
     let start = Instant::now();
     let (mut index, descriptors) = describe(&mut drive)?;
     let mut counts = Counts::new(start.elapsed());
-    let mut verifier = LoopVerifier::new(&options, &drive.refinement, drive.capacity)?;
+    let mut verifier = LoopVerifier::new(&drive.places, &drive.refinement, drive.capacity)?;
     let mut rows = String::from(HEADER);
     for (query, descriptor) in descriptors.iter().enumerate() {
         let eligible = index.places_until(drive.path_m[query] - arguments.gap_m);

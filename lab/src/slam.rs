@@ -42,11 +42,10 @@ pub struct SlamArguments {
 /// # Errors
 /// Results that cannot be read or have no keyframes, or a recording without ground truth.
 pub fn slam(arguments: &SlamArguments) -> Result<ExitCode, Failure> {
-    let options = LoopOptions::default();
-    let drive = Drive::read(&arguments.run, &options.places)?;
+    let drive = Drive::read(&arguments.run)?;
     make_folder(&arguments.out)?;
     let start = Instant::now();
-    let queries = queries(&drive, options)?;
+    let queries = queries(&drive)?;
     let closing = start.elapsed();
     let trajectory = TrajectoryOptions {
         kind: match arguments.filter {
@@ -80,7 +79,11 @@ pub fn slam(arguments: &SlamArguments) -> Result<ExitCode, Failure> {
 }
 
 /// Closes all loops.
-fn queries(drive: &Drive, options: LoopOptions) -> Result<Vec<Query>, Failure> {
+fn queries(drive: &Drive) -> Result<Vec<Query>, Failure> {
+    let options = LoopOptions {
+        places: drive.places.clone(),
+        ..LoopOptions::default()
+    };
     let mut closer = LoopCloser::new(options, &drive.refinement, drive.capacity)?;
     let (mut source, mut queries) = (drive, Vec::new());
     for keyframe in &drive.keyframes {

@@ -101,7 +101,7 @@ pub fn table(rows: Vec<Record>) -> Table {
             ("trajectory", "trajectory", 0),
             ("ate_m", "ATE m", 2),
             ("loops", "loops", 0),
-            ("weak", "with less than 1/4 of their weight", 0),
+            ("weak", "rejected or below 1/4 weight", 0),
             ("residual_m", "residual rms m", 3),
             ("nees", "NEES", 2),
             ("scale", "scale of covariances", 2),

@@ -61,7 +61,7 @@ fn breach(has_joined: bool, waited: &Waited) -> String {
         (false, Waited::TimedOut) => {
             "told to stand by it neither says that it does nor starts, within the start timeout".to_owned()
         }
-        (false, Waited::Done) => "told to stand by it said that it does, and ended".to_owned(),
+        (false, Waited::Done) => "told to stand by it ended at once".to_owned(),
         (false, waited) => format!("told to stand by {waited}"),
     }
 }

@@ -24,6 +24,8 @@ impl Examination<'_> {
         }
         joins(&mut session)?;
         let has_ended = reaches_the_end(&mut session)?;
+        // It may have subscribed to a feedback since.
+        asks_for_history(&mut session)?;
         let services = session.harness.rig().services();
         let created = services.difference(&before).count();
         session
@@ -76,18 +78,26 @@ pub(super) fn starts(session: &mut Session<'_>) -> Result<bool, ConformanceError
     Ok(is_open)
 }
 
-/// Requires the subscribe handshake of each input.
+/// Requires that it subscribes to its inputs, and the handshake of each.
 fn joins(session: &mut Session<'_>) -> Result<(), ConformanceError> {
     session.findings.checked(Rule::AsksForHistory);
-    let waited = session.wait(session.demands().item_timeout, |session| {
-        session.not_notified().is_empty() && session.not_read().is_empty()
+    session.wait(session.demands().item_timeout, |session| {
+        session.not_read().is_empty()
     })?;
-    // A feedback may be subscribed to after that, and its publisher notified a moment later.
+    for topic in session.not_read() {
+        let sentence = format!("it has not subscribed to `{topic}`");
+        session.findings.broken(Rule::AsksForHistory, sentence);
+    }
+    asks_for_history(session)?;
+    Ok(session.harness.connect()?)
+}
+
+/// Requires that it notifies the publisher of each topic that it has subscribed to.
+fn asks_for_history(session: &mut Session<'_>) -> Result<(), ConformanceError> {
+    let waited = session.wait(session.demands().item_timeout, |session| {
+        session.not_notified().is_empty()
+    })?;
     if !waited.is_done() {
-        for topic in session.not_read() {
-            let sentence = format!("it has not subscribed to `{topic}`");
-            session.findings.broken(Rule::AsksForHistory, sentence);
-        }
         for topic in session.not_notified() {
             let sentence = format!(
                 "it has subscribed to `{topic}` without notifying `{topic}_handshake`: it would wait for the history until the next item"
@@ -95,7 +105,7 @@ fn joins(session: &mut Session<'_>) -> Result<(), ConformanceError> {
             session.findings.broken(Rule::AsksForHistory, sentence);
         }
     }
-    Ok(session.harness.connect()?)
+    Ok(())
 }
 
 /// Requires an item for each, and the end.
