@@ -1,4 +1,4 @@
-//! Observers of a run: the recorder, the page, viewers, traces, shadows.
+//! Observers of a run: the recorder, the page, viewers, shadows.
 
 mod foxglove;
 mod page;
@@ -6,5 +6,4 @@ pub mod record;
 mod record_live;
 mod record_moved;
 mod shadow;
-mod traces;
 mod undisturbed;

@@ -1,11 +1,11 @@
-//! `gyre watch`: shows a running run in a browser, and to Prometheus, Foxglove and OpenTelemetry.
+//! `gyre watch`: shows a running run in a browser, and to Prometheus and Foxglove.
 
 use std::{net::SocketAddr, process::ExitCode};
 
 use gyre_results::absolute;
 use gyre_stage::{observer::ObservedRun, wake::Signals};
 use gyre_terminal::{Failure, print};
-use gyre_watch::{Endpoint, Exporter, Server, Token};
+use gyre_watch::{Endpoint, Server, Token};
 
 use crate::{cli::WatchArguments, earlier};
 
@@ -26,9 +26,6 @@ pub fn watch(arguments: &WatchArguments) -> Result<ExitCode, Failure> {
     };
     let page = listen(arguments.listen)?;
     let foxglove = arguments.foxglove.map(listen).transpose()?;
-    let say = |sentence: &str| print::note(format_args!("gyre: {sentence}"));
-    let traces = arguments.otlp.as_deref();
-    let traces = traces.map(|url| Exporter::start(url, say)).transpose()?;
     let out = absolute(&run)?;
     print::note(format_args!(
         "gyre: {} is shown at {}",
@@ -46,9 +43,7 @@ pub fn watch(arguments: &WatchArguments) -> Result<ExitCode, Failure> {
             "gyre: whoever knows such an address can look on, and the network between carries it unencrypted",
         );
     }
-    let server = Server::new(page)
-        .with_foxglove(foxglove)
-        .with_traces(traces);
+    let server = Server::new(page).with_foxglove(foxglove);
     let signals = Signals::install()?;
     server.show(out, earlier::is_complete, &signals)?;
     Ok(ExitCode::SUCCESS)

@@ -19,10 +19,6 @@ pub struct WatchArguments {
     /// loopback's needs the token.
     #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "127.0.0.1:8765")]
     pub foxglove: Option<SocketAddr>,
-    /// Send a trace of each pose to this collector of OpenTelemetry too (OTLP over HTTP):
-    /// http://127.0.0.1:4318.
-    #[arg(long, value_name = "URL")]
-    pub otlp: Option<String>,
     /// The file of the token, which is written with a random one if it is missing. Default: another
     /// token at each start.
     #[arg(long, value_name = "FILE")]

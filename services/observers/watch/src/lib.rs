@@ -1,5 +1,5 @@
 //! A page that shows a run in a browser, and metrics for Prometheus; on request also topics for
-//! Foxglove and traces.
+//! Foxglove.
 //!
 //! The process is an observer: the run does not wait for it, and missed messages are counted.
 //! Reading order:
@@ -9,8 +9,7 @@
 //! 2. `observing`: the threads that follow the run, and write to the `run_view`.
 //! 3. `track`, `delays`, `pictures`, `processes`: the parts of the view, in bounded memory.
 //! 4. `stream`: one browser, which receives `messages`; `metrics`: one scrape of Prometheus.
-//! 5. `foxglove`: the topics for Foxglove; `traces`: a trace of each pose for a collector of
-//!    OpenTelemetry.
+//! 5. `foxglove`: the topics for Foxglove.
 
 mod access;
 mod connections;
@@ -29,9 +28,7 @@ mod recent_drift;
 mod run_view;
 mod server;
 mod stream;
-mod traces;
 mod track;
 
 pub use access::Token;
 pub use server::{Endpoint, Server, WatchError};
-pub use traces::{Exporter, TraceError};

@@ -23,8 +23,6 @@ struct Snapshot {
     is_up: bool,
     counts: RunCounts,
     processes: Vec<Process>,
-    /// Traces that were sent and dropped, where they were asked for.
-    traces: Option<[u64; 2]>,
 }
 
 /// Returns the type of the answer and its text: OpenMetrics if accepted, else the older format.
@@ -62,7 +60,6 @@ fn open_metrics(view: &RunView) -> String {
         is_up: run.state.is_up(),
         counts: view.counts(),
         processes: view.processes(),
-        traces: view.traces.get().map(|counts| counts.both()),
     }));
     let mut text = String::new();
     // Writing to a string does not fail.
@@ -137,12 +134,6 @@ impl Snapshot {
         counter(encoder, "poses", "Poses of the trajectory.", counts.poses)?;
         let help = "Scans that live mode has dropped.";
         counter(encoder, "scans_dropped", help, counts.dropped)?;
-        if let Some([sent, dropped]) = self.traces {
-            let help = "Traces that the collector has taken.";
-            counter(encoder, "traces_sent", help, sent)?;
-            let help = "Traces that the collector has not taken.";
-            counter(encoder, "traces_dropped", help, dropped)?;
-        }
         gauge(encoder, "up", "1 while a run works, else 0.", self.is_up)?;
         let help = "Scans that were published and have no pose yet.";
         gauge(encoder, "scans_in_flight", help, counts.in_flight)
@@ -396,7 +387,6 @@ mod tests {
             is_up: true,
             counts: view().counts(),
             processes: vec![source],
-            traces: None,
         };
         let mut registry = Registry::with_prefix("gyre");
         registry.register_collector(Box::new(snapshot));
@@ -445,7 +435,6 @@ mod tests {
             is_up: true,
             counts: view().counts(),
             processes: Vec::new(),
-            traces: None,
         };
         let text = |snapshot: Snapshot| {
             let mut registry = Registry::with_prefix("gyre");

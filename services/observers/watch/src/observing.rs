@@ -20,7 +20,6 @@ use crate::{
     pictures,
     processes::ProcessMeter,
     run_view::RunView,
-    traces::Exporter,
 };
 
 /// Time between two polls for a run, for browsers that want a layer, and for a request to stop.
@@ -39,8 +38,6 @@ pub struct Followed {
     pub is_complete: fn(&Path) -> bool,
     /// The view of the run.
     pub view: Arc<RunView>,
-    /// The exporter of a trace of each pose.
-    pub traces: Option<Exporter>,
 }
 
 /// Starts the threads. They end when the view is stopped.
@@ -136,9 +133,6 @@ fn follow_poses(
                 let pose = message.header();
                 view.add_pose(pose);
                 track.see(pose, |pose| view.add_to_track(pose));
-                if let Some(traces) = &followed.traces {
-                    traces.add(&run.manifest().prefix, pose);
-                }
             }
             Next::Idle => {}
             Next::Ended => {

@@ -3,7 +3,7 @@
 use std::{
     collections::VecDeque,
     sync::{
-        Arc, Mutex, MutexGuard, OnceLock, PoisonError,
+        Arc, Mutex, MutexGuard, PoisonError,
         atomic::{AtomicUsize, Ordering},
     },
 };
@@ -26,7 +26,6 @@ use crate::{
     pictures::PackedPoints,
     processes::Process,
     recent_drift::RecentDrift,
-    traces::TraceCounts,
     track::{Cursor, Track, Vertex},
 };
 
@@ -44,8 +43,6 @@ pub struct RunView {
     wanted: [AtomicUsize; 4],
     /// Delays of all poses.
     pub histograms: Histograms,
-    /// The traces, where they are sent.
-    pub traces: OnceLock<Arc<TraceCounts>>,
 }
 
 /// The newest of each kind of message to a browser.
@@ -102,7 +99,6 @@ impl RunView {
             },
             wanted: Default::default(),
             histograms: Histograms::default(),
-            traces: OnceLock::new(),
         };
         view.update_run(|run| out.clone_into(&mut run.out));
         view

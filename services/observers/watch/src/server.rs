@@ -33,7 +33,6 @@ use crate::{
     page,
     run_view::RunView,
     stream,
-    traces::Exporter,
 };
 
 /// The most browsers at once, and the most viewers.
@@ -73,11 +72,10 @@ pub struct Endpoint {
     token: Option<Token>,
 }
 
-/// The server of a page, and on request of Foxglove and traces.
+/// The server of a page, and on request of Foxglove.
 pub struct Server {
     page: Endpoint,
     foxglove: Option<Endpoint>,
-    traces: Option<Exporter>,
 }
 
 #[derive(Clone)]
@@ -149,18 +147,12 @@ impl Server {
         Self {
             page,
             foxglove: None,
-            traces: None,
         }
     }
 
     /// Serves Foxglove too.
     pub fn with_foxglove(self, foxglove: Option<Endpoint>) -> Self {
         Self { foxglove, ..self }
-    }
-
-    /// Sends a trace of each pose to a collector too.
-    pub fn with_traces(self, traces: Option<Exporter>) -> Self {
-        Self { traces, ..self }
     }
 
     /// Shows the runs that write to `out`, one after the other, until a signal arrives.
@@ -170,21 +162,17 @@ impl Server {
     /// # Errors
     /// The system refuses a thread or the listener.
     pub fn show(
-        mut self,
+        self,
         out: PathBuf,
         is_complete: fn(&Path) -> bool,
         signals: &Signals,
     ) -> Result<(), WatchError> {
         let view = Arc::new(RunView::new(&out.display().to_string()));
-        if let Some(traces) = &self.traces {
-            let _ = view.traces.set(traces.counts());
-        }
         let hub = Arc::new(Hub::default());
         let followed = Arc::new(Followed {
             out,
             is_complete,
             view: Arc::clone(&view),
-            traces: self.traces.take(),
         });
         let mut threads = observing::start(&followed)?;
         if self.foxglove.is_some() {
