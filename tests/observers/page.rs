@@ -163,6 +163,7 @@ fn the_page_shows_poses_a_killed_stage_and_the_end_of_each_run() {
     browser.until("document.getElementById('state').textContent === 'Running'");
     browser.until(&format!("{POSES} > 3"));
     browser.until("document.getElementById('scan-caption').textContent.startsWith('Scan ')");
+    shows_what_can_be_told_apart(&mut browser);
     browser.until("document.querySelectorAll('#stages tr').length === 6");
     running.kill("masking");
     let restarted = "[...document.querySelectorAll('#processes tr')].some(row => row.cells[0].textContent === 'masking' && Number(row.cells[2].textContent) > 0)";
@@ -191,6 +192,20 @@ fn the_page_shows_poses_a_killed_stage_and_the_end_of_each_run() {
     assert_eq!(browser.errors, [""; 0]);
     server.interrupt();
     browser.until("document.getElementById('state').textContent === 'Connection lost'");
+}
+
+/// Asserts that the caption says the range that was chosen, that points and objects have colours of
+/// their own, and that labels at one place are written one above the other.
+fn shows_what_can_be_told_apart(browser: &mut Browser) {
+    browser.evaluate("range.value = '25', range.dispatchEvent(new Event('change'))");
+    browser.until("document.getElementById('scan-caption').textContent.includes('to 25 m,')");
+    let distinct = "import('/canvas.js').then(({ Labels, colour }) => {
+        const lines = new Set(), labels = new Labels(), fillText = (_, x, y) => lines.add(y);
+        const context = { measureText: () => ({ width: 30 }), strokeText() {}, fillText };
+        for (let k = 0; k < 9; k += 1) labels.write(context, '', 20 + 3 * k, 90);
+        return [lines.size, new Set(['points', 'object', 'accent'].map(colour)).size];
+    })";
+    assert_eq!(browser.evaluate(distinct), serde_json::json!([9, 3]));
 }
 
 /// Asserts that nothing is wider than a phone, and that nothing has moved since the page was

@@ -53,6 +53,26 @@ export function roundUp(value) {
 
 export const FONT = '12px system-ui, "Segoe UI", Roboto, "DejaVu Sans", sans-serif';
 
+const LINE = 15; // Pixels between two lines of labels.
+
+/** The labels of a drawing, none of which lies on another one. */
+export class Labels {
+  constructor() {
+    this.taken = [];
+  }
+
+  /** Writes a label in the free line that is nearest to a place. */
+  write(context, text, x, y) {
+    context.font = FONT;
+    const end = x + context.measureText(text).width + 4;
+    const isFree = (line) => this.taken.every((it) => Math.abs(it.line - line) >= LINE || it.end <= x || end <= it.x);
+    let line = y;
+    for (let k = 1; !isFree(line); k += 1) line = y + LINE * Math.ceil(k / 2) * (k % 2 ? 1 : -1);
+    this.taken.push({ line, x, end });
+    label(context, text, x, line);
+  }
+}
+
 /** Writes a label with a halo, so that it is read on any ground. */
 export function label(context, text, x, y, align = "left") {
   context.font = FONT;

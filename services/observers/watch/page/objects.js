@@ -1,7 +1,7 @@
 // Moving objects over a scan: a box with the way of a second as an arrow, and the places of the
 // last scans.
 
-import { colour, label } from "./canvas.js";
+import { colour } from "./canvas.js";
 
 const TRAIL = 20; // Places of each object.
 const HEAD = 7; // Length of an arrow's head, pixels.
@@ -24,7 +24,7 @@ export class Objects {
   }
 
   /** Draws around the vehicle in the middle, ahead is up. */
-  draw(context, scale) {
+  draw(context, scale, labels) {
     if (!this.message) return;
     const [x, y, yaw] = this.message.pose;
     const [cos, sin] = [Math.cos(yaw), Math.sin(yaw)];
@@ -32,13 +32,13 @@ export class Objects {
     const turned = ([east, north]) => [(sin * east - cos * north) * scale, -(cos * east + sin * north) * scale];
     const at = (place) => turned([place[0] - x, place[1] - y]);
     for (const object of this.message.objects) {
-      context.strokeStyle = context.fillStyle = colour(object.moving ? "second" : "muted");
+      context.strokeStyle = context.fillStyle = colour(object.moving ? "object" : "muted");
       drawTrail(context, this.trails.get(object.id).map(at));
       drawBox(context, at(object.pose), yaw - object.pose[2], object.size.map((side) => side * scale));
       if (object.moving) drawArrow(context, at(object.pose), turned(object.velocity));
       const [right, down] = at(object.pose);
       const speed = Math.hypot(...object.velocity);
-      label(context, object.moving ? `${object.id}: ${speed.toFixed(1)} m/s` : `${object.id}`, right + 8, down - 8);
+      labels.write(context, object.moving ? `${object.id}: ${speed.toFixed(1)} m/s` : `${object.id}`, right + 8, down - 8);
     }
   }
 }

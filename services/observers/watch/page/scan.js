@@ -1,6 +1,6 @@
 // The newest scan, drawn as the antenna turns: powers or the masked raster, and the points.
 
-import { Drawing, colour, isDark, label, roundUp } from "./canvas.js";
+import { Drawing, Labels, colour, isDark, roundUp } from "./canvas.js";
 import { Objects } from "./objects.js";
 
 const SIDE = 600; // Pixels of the picture on each side.
@@ -87,14 +87,20 @@ export class ScanView {
     this.drawing.request();
   }
 
+  // What is shown: the raster, if it is that, and the distance from the middle to the edge.
+  view() {
+    const raster = this.layer === "raster" ? this.raster : null;
+    const fullM = raster ? raster.header.width_m / 2 : this.header?.max_range_m ?? 100;
+    return { raster, rangeM: this.rangeM ? Math.min(this.rangeM, fullM) : fullM };
+  }
+
   describe() {
-    const { header, raster } = this;
-    if (this.layer === "raster" && raster) {
-      const width = raster.header.width_m.toFixed(0);
+    const { raster, rangeM } = this.view();
+    if (raster) {
+      const width = (2 * rangeM).toFixed(0);
       this.caption.textContent = `Masked raster of ${width} m × ${width} m, ahead is up`;
-    } else if (header) {
-      const range = header.max_range_m.toFixed(0);
-      this.caption.textContent = `Scan ${header.scan}, to ${range} m, ahead is up`;
+    } else if (this.header) {
+      this.caption.textContent = `Scan ${this.header.scan}, to ${rangeM.toFixed(0)} m, ahead is up`;
     }
   }
 
@@ -143,9 +149,8 @@ export class ScanView {
 
   draw(context, width, height) {
     const size = Math.min(width, height);
-    const raster = this.layer === "raster" && this.raster;
-    const fullM = raster ? raster.header.width_m / 2 : this.header?.max_range_m ?? 100;
-    const rangeM = this.rangeM ? Math.min(this.rangeM, fullM) : fullM;
+    const { raster, rangeM } = this.view();
+    const labels = new Labels();
     const scale = size / 2 / rangeM;
     context.save();
     context.translate(width / 2, height / 2);
@@ -161,8 +166,8 @@ export class ScanView {
       if (this.swept < 1) this.drawBeam(context, rangeM * scale);
     }
     if (this.withPoints && this.points) this.drawPoints(context, scale);
-    drawRings(context, scale, rangeM, width, height);
-    if (this.withObjects) this.objects.draw(context, scale);
+    drawRings(context, labels, scale, rangeM, width, height);
+    if (this.withObjects) this.objects.draw(context, scale, labels);
     drawVehicle(context);
     context.restore();
   }
@@ -243,7 +248,7 @@ function shadesOf({ low, high }) {
   });
 }
 
-function drawRings(context, scale, rangeM, width, height) {
+function drawRings(context, labels, scale, rangeM, width, height) {
   const stepM = roundUp(rangeM / 6);
   const reach = Math.hypot(width, height) / 2;
   for (let radius = stepM; radius * scale < reach && radius <= rangeM * 1.001; radius += stepM) {
@@ -254,7 +259,7 @@ function drawRings(context, scale, rangeM, width, height) {
     context.arc(0, 0, radius * scale, 0, 2 * Math.PI);
     context.stroke();
     context.globalAlpha = 1;
-    label(context, `${radius} m`, radius * scale * Math.SQRT1_2, -radius * scale * Math.SQRT1_2);
+    labels.write(context, `${radius} m`, radius * scale * Math.SQRT1_2, -radius * scale * Math.SQRT1_2);
   }
 }
 
