@@ -227,6 +227,11 @@ fn what_cannot_be_loaded_or_returned_is_said() {
             "def mask(scan):\n    return scan.raster * float('nan')\n",
             "not all from 0 to 1",
         ),
+        ("def mask(s):\n    return 1j * s.raster\n", "complex"),
+        (
+            "from numpy.ma import *\nmask = lambda _: masked_all(9)\n",
+            "masked",
+        ),
         (
             "import os\ndef mask(scan):\n    os._exit(3)\n",
             "Python has ended",
@@ -241,6 +246,7 @@ fn what_cannot_be_loaded_or_returned_is_said() {
         ("0.1, -0.1", "0 or more"),
         ("0.1", "TypeError"),
         ("float('nan'), 0.1", "not finite"),
+        ("0.1, 1j", "complex numbers"),
     ] {
         let text = format!("def rotation(scan, previous):\n    return {returned}\n");
         let (_folder, file) = file(&text);

@@ -45,6 +45,16 @@ def refuse_with_place(path: pathlib.Path, error: BaseException) -> None:
     refuse(f"{path}{place}: {type(error).__name__}: {' '.join(words.split())}")
 
 
+def whole(result):
+    """Returns what a function has returned, unless numpy would leave a part of it out."""
+    for part in result if isinstance(result, (tuple, list)) else [result]:
+        if np.iscomplexobj(part):
+            raise ValueError("it returned complex numbers: return real ones, as of `.real` or `abs()`")
+        if np.ma.is_masked(part):
+            raise ValueError("it returned masked values: replace them, as with `.filled(0)`")
+    return result
+
+
 def mask(result, scan) -> tuple[dict, memoryview]:
     result = np.asarray(result)
     # A quarter of the bytes, where they are all 0 or 1.
@@ -123,7 +133,7 @@ def main(path: pathlib.Path, name: str) -> None:
     while request := requests.readline():
         arguments = [argument(description) for description in json.loads(request)]
         try:
-            header, data = RETURNS[name](function(*arguments), *arguments)
+            header, data = RETURNS[name](whole(function(*arguments)), *arguments)
         except BaseException as error:
             refuse_with_place(path, error)
             return
