@@ -1,6 +1,6 @@
 //! `gyre stress`: whether a pipeline meets its deadline on this computer.
 
-use std::{fs, io::IsTerminal, process::ExitCode, time::Duration};
+use std::{fs, process::ExitCode, time::Duration};
 
 use gyre_configuration::Configuration;
 use gyre_messages::{Masked, Message, Motion, Scan, StageId, topics};
@@ -114,14 +114,13 @@ fn carry_out(arguments: &StressArguments) -> Result<Report, Failure> {
     };
     require_stages(&tested, &options.stages)?;
     let provenance = provenance(arguments, &configuration)?;
-    let mut report = gyre_stress::stress(&tested, &options, &mut |line| print::note(line));
+    let mut printed = Ok(());
+    let judged = &mut |verdict: &str| printed = print::line(verdict);
+    let note = &mut |line: &str| print::note(line);
+    let mut report = gyre_stress::stress(&tested, &options, note, judged);
     report.provenance = provenance;
     report.write(out.path())?;
-    // A person has seen each when it was there.
-    if !std::io::stdout().is_terminal() {
-        let mut outcomes = report.outcomes.iter();
-        outcomes.try_for_each(|outcome| print::line(outcome.sentence()))?;
-    }
+    printed?;
     print::line(format_args!(
         "report in {}: report.md, report.json, report.svg",
         out.path().display()

@@ -50,10 +50,15 @@ pub struct Options {
     pub seed: u64,
 }
 
-/// Carries out all scenarios. `note` receives lines about the progress.
+/// Carries out all scenarios. `note` receives lines about the progress, `judged` each verdict.
 ///
 /// A scenario that could not be carried out has that as its verdict, and the next ones follow.
-pub fn stress(tested: &TestedPipeline, options: &Options, note: &mut dyn FnMut(&str)) -> Report {
+pub fn stress(
+    tested: &TestedPipeline,
+    options: &Options,
+    note: &mut dyn FnMut(&str),
+    judged: &mut dyn FnMut(&str),
+) -> Report {
     let mut outcomes = Vec::new();
     for scenario in &options.scenarios {
         note(&format!("{scenario}: {}", scenario.line()));
@@ -69,7 +74,7 @@ pub fn stress(tested: &TestedPipeline, options: &Options, note: &mut dyn FnMut(&
             problem: Some(error.to_string()),
             ..campaign.empty()
         });
-        note(&outcome.sentence());
+        judged(&outcome.sentence());
         outcomes.push(outcome);
     }
     // Helpers that were killed have left files in shared memory.
