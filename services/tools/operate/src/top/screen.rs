@@ -2,6 +2,7 @@
 
 use gyre_latency::{HopLatency, Percentiles};
 use gyre_stage::control::{Activity, ProcessStatus, Status};
+use gyre_terminal::wrap;
 use ratatui::{
     Frame,
     layout::{Constraint, Layout, Rect},
@@ -47,15 +48,15 @@ fn columns(width: u16) -> Vec<usize> {
 /// Draws a snapshot.
 pub fn draw(frame: &mut Frame<'_>, snapshot: &Snapshot) {
     let rows = snapshot.status.processes.len() as u16;
+    let lines = head_lines(snapshot, frame.area().width);
     let [head, latency, table, foot] = Layout::vertical([
-        Constraint::Length(5),
+        Constraint::Length(lines.len() as u16),
         Constraint::Max(12),
         Constraint::Length(rows + 3),
         Constraint::Length(1),
     ])
     .areas(frame.area());
-    let lines: Vec<Line<'_>> = head_lines(snapshot).into_iter().map(Line::from).collect();
-    let mut title = lines;
+    let mut title: Vec<Line<'_>> = lines.into_iter().map(Line::from).collect();
     title[0] = title[0].clone().bold();
     frame.render_widget(ratatui::text::Text::from(title), head);
     draw_latency(frame, snapshot, latency);
@@ -102,7 +103,7 @@ fn draw_processes(frame: &mut Frame<'_>, snapshot: &Snapshot, area: Rect) {
 
 /// Returns a snapshot as text of this width at most, as far as its columns can be left out.
 pub fn text(snapshot: &Snapshot, width: u16) -> String {
-    let mut lines = head_lines(snapshot).to_vec();
+    let mut lines = head_lines(snapshot, width);
     let shown = columns(width);
     let line = |cells: [String; COLUMNS.len()]| {
         let cells = shown.iter().map(|it| (&cells[*it], COLUMNS[*it]));
@@ -116,7 +117,8 @@ pub fn text(snapshot: &Snapshot, width: u16) -> String {
     lines.join("\n")
 }
 
-fn head_lines(snapshot: &Snapshot) -> [String; 5] {
+/// Returns what is above the table, in lines that fit this width.
+fn head_lines(snapshot: &Snapshot, width: u16) -> Vec<String> {
     let status = &snapshot.status;
     let in_flight = snapshot
         .in_flight
@@ -127,13 +129,12 @@ fn head_lines(snapshot: &Snapshot) -> [String; 5] {
         max_us,
         ..
     } = snapshot.latency.sensor_to_pose;
-    [
+    let lines = [
         status.out.display().to_string(),
         summary(status),
         format!(
-            "{:.1} scans/s, {in_flight} in flight, {} dropped{}{}",
+            "{:.1} scans/s, {in_flight} in flight{}{}",
             snapshot.rate,
-            status.dropped,
             missed_by_recorder(status),
             status
                 .processes
@@ -150,7 +151,8 @@ fn head_lines(snapshot: &Snapshot) -> [String; 5] {
             snapshot.latency.scans
         ),
         witnesses(snapshot),
-    ]
+    ];
+    wrap(&lines.join("\n"), width.into())
 }
 
 /// Returns what the newest motion rests on, how often gyro, wheels and Doppler were used, and the
