@@ -59,7 +59,7 @@ fn open_files(
         return Err(OpenError::BadOption {
             key: "azimuth_source",
             value: "uniform".to_owned(),
-            format: Format::Ros2Bag.to_string(),
+            format: Some(Format::Ros2Bag),
             reason: "its azimuths are those of the encoder; leave the key out",
         });
     }

@@ -78,7 +78,7 @@ impl Scans {
             Err(OpenError::BadOption {
                 key,
                 value,
-                format: Format::Mcap.to_string(),
+                format: Some(Format::Mcap),
                 reason: "its scans have the constants that they were recorded with; leave the key out",
             })
         };

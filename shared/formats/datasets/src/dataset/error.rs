@@ -67,14 +67,14 @@ pub enum OpenError {
         remedy: &'static str,
     },
     /// An option that is out of bounds, or does not apply to the format.
-    #[error("{key} = {value} is invalid for a {format} dataset: {reason}")]
+    #[error("{key} = {value} is invalid{}: {reason}", .format.map_or_else(String::new, |it| format!(" for the format {it}")))]
     BadOption {
         /// The key.
         key: &'static str,
         /// The value.
         value: String,
-        /// The format, or "any".
-        format: String,
+        /// The format, if only that has no use for it.
+        format: Option<Format>,
         /// The permitted values.
         reason: &'static str,
     },

@@ -186,7 +186,7 @@ impl DatasetOptions {
         OpenError::BadOption {
             key,
             value: value.map(|v| v.to_string()).unwrap_or_default(),
-            format: self.format.map_or("any".to_owned(), |f| f.to_string()),
+            format: self.format,
             reason,
         }
     }
