@@ -54,7 +54,7 @@ fn a_configuration_of_the_program_is_run_by_its_name_on_a_recording() {
     assert!(odometry.is_file());
     at(folder.path(), &["run", "oxfrod"])
         .refused_with(&["`oxfrod` is no file or folder", "did you mean `oxford`?"]);
-    at(folder.path(), &["evaluate", "out/simulated-oxford"]).succeeded();
+    at(folder.path(), &["evaluate", "out/simulated-oxford", data]).succeeded();
 }
 
 #[test]

@@ -89,16 +89,22 @@ pub enum TrajectoryFormat {
 
 /// Reads a trajectory of any known format, detected from its first line, and converts it to
 /// REP-103. TUM and KITTI files may be of a vehicle (z up or down) or of a camera (z forward): the
-/// plane in which they move is found.
+/// plane in which they move is found. Of a folder, its ground truth is read.
 ///
 /// # Errors
-/// A file that cannot be read, or is not of a known format.
+/// A file that cannot be read, or is not of a known format; a folder without ground truth.
 pub fn read_trajectory(path: &Path) -> Result<Trajectory, TrajectoryError> {
-    let text = gyre_storage::read_text(path, MAX_BYTES).map_err(|source| TrajectoryError::Io {
+    let failed = |source| TrajectoryError::Io {
         path: path.to_owned(),
         source,
-    })?;
-    parse_trajectory(&text, path)
+    };
+    let missing = "it is a folder without a ground truth at a usual place: name the file";
+    let file = match path.is_dir() {
+        true => find_ground_truth(path).ok_or_else(|| failed(io::Error::other(missing)))?,
+        false => path.to_owned(),
+    };
+    let text = gyre_storage::read_text(&file, MAX_BYTES).map_err(failed)?;
+    parse_trajectory(&text, &file)
 }
 
 /// As [`read_trajectory`], from a text; `path` is the name in errors.

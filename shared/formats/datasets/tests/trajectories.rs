@@ -201,6 +201,9 @@ fn invalid_files_are_rejected_with_their_line() {
         read_trajectory("/nonexistent/a.tum".as_ref()),
         Err(TrajectoryError::Io { .. })
     ));
+    let folder = read_trajectory("/proc/self/fdinfo".as_ref());
+    let error = folder.unwrap_err().to_string();
+    assert!(error.contains("without a ground truth"), "{error}");
 }
 
 #[test]

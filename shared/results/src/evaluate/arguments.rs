@@ -12,8 +12,9 @@ pub struct EvaluateArguments {
     /// dataset's own format.
     #[arg(required_unless_present = "named_estimate")]
     pub estimate: Option<PathBuf>,
-    /// The ground truth: TUM, KITTI, Oxford radar_odometry.csv, Boreas radar_poses.csv, MulRan
-    /// global_pose.csv. Default: that of the run.
+    /// The ground truth: the folder of a recording that has one, or a file in TUM, KITTI, Oxford
+    /// radar_odometry.csv, Boreas radar_poses.csv, MulRan global_pose.csv. Default: that of the
+    /// run.
     pub ground_truth: Option<PathBuf>,
     /// The trajectory, in another place on the command line.
     #[arg(
