@@ -69,6 +69,8 @@ fn one_scan_makes_no_motion() {
         .set("source.first=23")
         .finish()
         .refused_with(&["has 1 scan:", "a motion is between two"]);
+    let beyond = Run::of_recording().set("source.first=24").finish();
+    beyond.refused_with(&["source.first is 24", "24 scans, from 0 to 23"]);
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! The scans that a configuration names: a recording, or a simulation that is rendered while it is
 //! read.
 
-use std::path::Path;
+use std::{ops::Range, path::Path};
 
 use gyre_datasets::{
     Dataset, Fingerprint, GnssLog, GnssLogError, GyroLog, LogError, OpenError, ScanSamples,
@@ -35,6 +35,9 @@ pub enum SourceError {
     /// The recording cannot be opened.
     #[error(transparent)]
     Open(#[from] OpenError),
+    /// The first scan to play is behind the last one.
+    #[error("source.first is {0}, but {1} has {n} scans, from {start} to {last}: give a smaller one", n = .2.len(), start = .2.start, last = .2.end - 1)]
+    BeyondEnd(usize, String, Range<usize>),
     /// The log of the gyro or of the wheels cannot be used.
     #[error(transparent)]
     Log(#[from] LogError),
@@ -86,6 +89,7 @@ pub fn open(configuration: &Configuration) -> Result<Played, SourceError> {
     if let Some(simulation) = configuration.streamed() {
         let drive = SimulatedDrive::new(simulation)?;
         let mut dataset = drive.open(options)?;
+        check_first(configuration, dataset.as_ref())?;
         check_doppler(&method.doppler, dataset.as_mut())?;
         return Ok(Played {
             samples: simulated_samples(&drive, (&method.gyro, &method.wheels), dataset.as_mut())?,
@@ -97,12 +101,22 @@ pub fn open(configuration: &Configuration) -> Result<Played, SourceError> {
         return Err(SourceError::NoData);
     }
     let mut dataset = gyre_recording::open(data, options)?;
+    check_first(configuration, dataset.as_ref())?;
     check_doppler(&method.doppler, dataset.as_mut())?;
     Ok(Played {
         samples: ScanSamples::open(&method.gyro, &method.wheels, data, dataset.as_mut())?,
         dataset,
         truth: None,
     })
+}
+
+/// Checks that the first scan to play is one of those that there are.
+fn check_first(configuration: &Configuration, dataset: &dyn Dataset) -> Result<(), SourceError> {
+    let (first, scans) = (configuration.source.first, dataset.scans());
+    match first >= scans.end && !scans.is_empty() {
+        true => Err(SourceError::BeyondEnd(first, configuration.data(), scans)),
+        false => Ok(()),
+    }
 }
 
 /// Checks that the radar says its velocity by Doppler, if that is used.
