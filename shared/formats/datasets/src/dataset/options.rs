@@ -39,11 +39,11 @@ pub struct DatasetOptions {
     /// The file format. Default: detected from the folder, else from the first image.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub format: Option<Format>,
-    /// Depth of a range bin, m. Default: Oxford, OORD and FoMo 0.0438, Boreas 0.0596 (0.04381 from
+    /// Depth of a range bin, 0.02 to 1.5 m. Default: Oxford, OORD and FoMo 0.0438, Boreas 0.0596 (0.04381 from
     /// 2021-09-21), Boreas-RT 0.04381, MulRan 200/3360, RADIATE 100/576.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub range_resolution_m: Option<f32>,
-    /// Offset of the ranges, m. Default: Boreas and Boreas-RT -0.31, FoMo -0.32, all others 0.
+    /// Offset of the ranges, -5 to 5 m. Default: Boreas and Boreas-RT -0.31, FoMo -0.32, all others 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub range_offset_m: Option<f32>,
     /// Doppler coefficient, s: metres to add to a range for each m/s of closing speed, see
@@ -91,14 +91,14 @@ impl DatasetOptions {
         check(
             "range_resolution_m",
             self.range_resolution_m,
-            1e-3..=10.0,
-            "it must be from 0.001 to 10 m",
+            0.02..=1.5,
+            "radars of 0.1 to 7.5 GHz bandwidth have bins of 1.5 to 0.02 m",
         )?;
         check(
             "range_offset_m",
             self.range_offset_m,
-            -100.0..=100.0,
-            "it must be from -100 to 100 m",
+            -5.0..=5.0,
+            "the delays inside radars make -5 to 5 m",
         )?;
         check(
             "doppler_s",

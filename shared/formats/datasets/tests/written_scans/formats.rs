@@ -206,8 +206,11 @@ fn folders_without_a_dataset_are_rejected() {
 fn options_out_of_bounds_are_rejected() {
     let root = folder();
     write_radiate(root.path(), 2);
-    let edits: [fn(&mut DatasetOptions); 7] = [
+    let edits: [fn(&mut DatasetOptions); 10] = [
         |o| o.range_resolution_m = Some(0.0),
+        |o| o.range_resolution_m = Some(0.01757),
+        |o| o.range_resolution_m = Some(1.736),
+        |o| o.range_offset_m = Some(-80.0),
         |o| o.range_resolution_m = Some(f32::NAN),
         |o| o.range_offset_m = Some(f32::INFINITY),
         |o| o.doppler_s = Some(f32::NAN),
