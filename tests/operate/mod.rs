@@ -6,6 +6,7 @@ pub mod commands;
 mod doctor;
 mod evaluate;
 mod front_door;
+mod places;
 mod resources;
 mod scheduling;
 mod slurm;

@@ -3,7 +3,7 @@
 
 use std::{fs, path::Path, process::Command};
 
-use crate::common::{Ended, Run, recording, undisturbed};
+use crate::common::{Ended, Run, gyre, recording, undisturbed};
 use rustix::process::Signal;
 
 const MODERATE: &str = "6";
@@ -152,6 +152,22 @@ fn a_complete_run_stays_until_another_one_has_results() {
     is_there();
     run.complete();
     is_there();
+}
+
+#[test]
+fn results_of_the_run_before_are_not_reported_beside_the_configuration_of_a_killed_one() {
+    let complete = Run::of_recording();
+    complete.complete();
+    let cases = [(complete, "has not ended"), (interrupted(), "summary.json")];
+    for (run, reason) in cases {
+        let mut running = futile(&run, "exec sleep 60").start();
+        running.await_stage("radar-replay");
+        running.kill_supervisor();
+        let mut report = gyre();
+        report.arg("report").arg(run.out());
+        Ended::of(report).refused_with(&[run.out().to_str().unwrap(), reason]);
+        assert!(!run.out().join("report.html").exists());
+    }
 }
 
 /// A run that begins anew ends, as by a kill, when it has removed what there was.

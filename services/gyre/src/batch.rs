@@ -14,7 +14,7 @@ use gyre_batch::{
     Batch, DriveOutcome, Ended, List, Settings, Slice, Table, collect, compute, table,
 };
 use gyre_configuration::paths::shipped;
-use gyre_results::Out;
+use gyre_results::{Content, Out};
 use gyre_stage::wake::Signals;
 use gyre_terminal::{Failure, INTERRUPTED, own, print};
 
@@ -40,7 +40,10 @@ pub fn batch(arguments: &BatchArguments) -> Result<ExitCode, Failure> {
         return concluded(&table.counts(), 0, &out, false);
     }
     // Tasks share the folder. Alone, this one has it for itself, and writes the table.
-    let lock = slice.is_none().then(|| Out::lock(&arguments.out));
+    Content::BATCH.require_place(&arguments.out)?;
+    let lock = slice
+        .is_none()
+        .then(|| Out::lock(&arguments.out, Content::BATCH));
     let _lock = lock.transpose()?;
     fs::create_dir_all(&arguments.out)
         .map_err(|error| format!("cannot write to {}: {error}", arguments.out.display()))?;

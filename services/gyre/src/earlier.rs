@@ -19,7 +19,7 @@ use gyre_journal::{
 use gyre_messages::StageId;
 use gyre_recorder::Ledger;
 use gyre_recording::received_fixes;
-use gyre_results::{Holds, Identity, Out, Programs, SIMULATED_TRUTH, SUMMARY};
+use gyre_results::{FILES, Holds, Identity, Out, Programs, SIMULATED_TRUTH, SUMMARY};
 use gyre_run::{BEGUN_WITH, COMPLETE, Mode, Side};
 use gyre_scan_matching::Refiner;
 use gyre_slam::{Keyframe, Place, Query, RecordReader, records_path};
@@ -343,8 +343,9 @@ fn state_of_recording(out: &Path) -> [PathBuf; 2] {
 }
 
 /// Removes the state of an unfinished run, puts that of a complete one aside, and says what the new
-/// one begins with. The journal goes first: without it nothing else is taken for part of a run.
-/// Results stay until the new run has its own, and what its recording needs if that goes on.
+/// one begins with. The journal goes first: without it nothing else is taken for part of a run. The
+/// results of an unfinished run go before the new configuration is there, those of a complete one
+/// stay until the new run has its own, and what its recording needs if that goes on.
 ///
 /// # Errors
 /// A file that cannot be removed or written.
@@ -365,7 +366,11 @@ pub fn begin(
         kept.extend(state_of_recording(out.path()));
     }
     // The truth of a simulation is no result: it is there when the run begins.
-    let others = LOGS.into_iter().chain([SIMULATED_TRUTH]);
+    let results = match replaced::is_kept(out) {
+        true => &[SIMULATED_TRUTH][..],
+        false => &FILES[..],
+    };
+    let others = LOGS.into_iter().chain(results.iter().copied());
     state(out.path())
         .into_iter()
         .filter(|path| !kept.contains(path))

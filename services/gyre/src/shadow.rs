@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use gyre_messages::{FollowerId, Footprint, StageId, Window};
 use gyre_operate::chosen;
+use gyre_results::{Content, Out};
 use gyre_run::{Scheduling, StageConfig};
 use gyre_shadow::{Options, STAGES};
 use gyre_stage::{control::Control, observer::ObservedRun};
@@ -20,6 +21,9 @@ use crate::{cli::ShadowArguments, preflight};
 pub fn shadow(arguments: &ShadowArguments) -> Result<ExitCode, Failure> {
     let stage = stage(&arguments.stage)?;
     let options = options(arguments, stage)?;
+    let report = arguments.report.as_deref();
+    let report = report.map(|folder| Out::lock(folder, Content::SHADOW));
+    let _locked = report.transpose()?;
     let control = chosen(&arguments.run)?;
     require_stage(&control, stage)?;
     let run = ObservedRun::writing_to(control.out())?;

@@ -6,6 +6,7 @@ use std::{
 };
 
 use gyre_configuration::{Configuration, strict::path_value};
+use gyre_results::Content;
 use gyre_simulator::{SimulationConfig, SimulatorError, Summary, remove_dataset, write_dataset_on};
 use gyre_terminal::{Failure, print};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -17,6 +18,7 @@ use crate::cli::SimulateArguments;
 /// # Errors
 /// A configuration that cannot be simulated, a folder that cannot be written.
 pub fn simulate(arguments: &SimulateArguments) -> Result<ExitCode, Failure> {
+    Content::SIMULATION.require_place(&arguments.out)?;
     let overrides = overrides(arguments)?;
     let configuration = match &arguments.configuration {
         Some(named) => gyre_inputs::configuration(named, &overrides)?,

@@ -5,7 +5,7 @@ use std::{fs, process::ExitCode, time::Duration};
 use gyre_configuration::Configuration;
 use gyre_messages::{Masked, Message, Motion, Scan, StageId, topics};
 use gyre_results::{
-    Out,
+    Content, Out,
     machine::{Machine, today},
 };
 use gyre_run::Scenario;
@@ -66,7 +66,7 @@ pub fn help(arguments: &[String]) -> Result<ExitCode, Failure> {
 }
 
 fn carry_out(arguments: &StressArguments) -> Result<Report, Failure> {
-    let out = Out::lock(&arguments.out)?;
+    let out = Out::lock(&arguments.out, Content::STRESS)?;
     let mut configuration = resolve(&RunArguments {
         inputs: arguments.inputs.clone(),
         ..RunArguments::default()

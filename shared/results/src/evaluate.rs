@@ -4,7 +4,6 @@ mod arguments;
 mod objects;
 
 use std::{
-    fs,
     path::{Path, PathBuf},
     process::ExitCode,
 };
@@ -18,6 +17,7 @@ use gyre_terminal::{Failure, print};
 use crate::{
     judgement::{Judgement, judge, judge_motions, note_time_offset, without_time_offset},
     odometry,
+    out::{Content, Out, require_results},
     results::truth_of,
 };
 
@@ -59,8 +59,10 @@ pub fn evaluate(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> {
         false => print::line(format_args!("{judgement:#}"))?,
     }
     if let Some(directory) = &arguments.plots {
-        fs::create_dir_all(directory)
-            .map_err(|error| format!("cannot make {}: {error}", directory.display()))?;
+        // A run may get the plots of its own evaluation.
+        let is_of_estimate = files.estimate.parent() == Some(directory);
+        let locked = (!is_of_estimate).then(|| Out::lock(directory, Content::PLOTS));
+        let _locked = locked.transpose()?;
         for (name, plot) in judgement.plots()? {
             gyre_storage::write(&directory.join(name), plot)?;
         }
@@ -95,6 +97,7 @@ impl Files {
         let given = named(&arguments.ground_truth, &arguments.named_ground_truth);
         let estimate = estimate.ok_or("name a trajectory, or a run: the folder of its results")?;
         let run = estimate.is_dir().then(|| estimate.clone());
+        run.as_deref().map_or(Ok(()), require_results)?;
         let truth = match (given, &run) {
             (Some(truth), _) => truth,
             (None, Some(run)) => truth_of_run(run)?,

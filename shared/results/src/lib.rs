@@ -1,6 +1,7 @@
 //! The files that a run leaves in the folder of its results, written and read; and reports of them.
 //!
-//! - [`Out`]: the folder, which one run at a time may change;
+//! - [`Out`]: the folder, which one run at a time may change; [`Content`] decides what may be written
+//!   to a place that a user names;
 //! - [`write`](write()): all results, made from the journal in one pass;
 //! - [`odometry`]: the rows of `odometry.csv`; [`Summary`]: `summary.json`; [`judgement`]: the
 //!   evaluation in it;
@@ -21,8 +22,8 @@ mod summary;
 
 pub use georeference::georeference;
 pub use identity::{Holds, Identity, Programs};
-pub use out::{Out, OutError, absolute};
-pub use results::{Results, SIMULATED_TRUTH, SUMMARY, map_options, write};
+pub use out::{Content, Out, OutError, REPLACED, absolute, require_results, write_page};
+pub use results::{FILES, Results, SIMULATED_TRUTH, SUMMARY, map_options, truth_of, write};
 pub use summary::{
     Counter, Counts, Course, Form, GnssSummary, LostCounts, Measured, MotionCounts, Problem,
     Session, SlamSummary, Summary,

@@ -1,22 +1,149 @@
-//! The folder of results, which one command at a time may change.
+//! The places that a user names for what a command writes: which of them it may write to, and the
+//! lock of a folder, which one command at a time may change.
 
 use std::{
-    fs::File,
-    io,
+    fs::{self, File, OpenOptions},
+    io::{self, Write},
+    os::unix::fs::FileTypeExt,
     path::{Path, PathBuf},
 };
 
 use gyre_storage::{
-    create_folder,
+    self as storage, SETTINGS, create_folder,
     lock::{Attempt, try_lock},
+    read_text,
 };
 use thiserror::Error;
 
-/// The lock of the folder. It lies beside the results and not in shared memory, which two runs need
-/// not have in common: containers have their own.
+/// The lock of the folder, with the name of the command that fills it. It lies beside the results
+/// and not in shared memory, which two runs need not have in common: containers have their own.
 const LOCK: &str = ".lock";
+/// The folder of a run's state.
+const JOURNAL: &str = "journal";
+/// The journal of a complete run while another run takes its place: until that has results, those in
+/// the folder are of the complete run.
+pub const REPLACED: &str = "journal.replaced";
+/// The largest file that can be a page of Gyre's own, bytes.
+const LARGEST_PAGE: u64 = 256 << 20;
 
-/// Why a folder cannot be that of the results.
+/// What a command writes into a folder: the command, the file or folder by which an earlier content
+/// of its own is recognised, and the names of the files that it replaces.
+#[derive(Clone, Copy, Debug)]
+pub struct Content(&'static str, &'static str, &'static str);
+
+#[rustfmt::skip]
+impl Content {
+    /// A run.
+    pub const RUN: Self = Self("gyre run", LOCK, "config.toml log.jsonl odometry.csv poses.csv objects.csv trajectory.tum trajectory.svg errors.svg bands.svg map.png latency.json summary.json ground_truth.tum");
+    /// A map, or the changes between two.
+    pub const MAP: Self = Self("gyre map", LOCK, "map.toml map.png map.tif map.pgm map.yaml keyframes.log changes.csv changes.png");
+    /// Places of scans in a map.
+    pub const FIXES: Self = Self("gyre localise", LOCK, "fixes.csv fixes.tum fixes.png");
+    /// Pictures of masks.
+    pub const MASKS: Self = Self("gyre masks", LOCK, "masks.png");
+    /// Constants of a radar.
+    pub const CALIBRATION: Self = Self("gyre calibrate", LOCK, "calibration.toml calibration.svg calibration-2.svg");
+    /// Plots of an evaluation.
+    pub const PLOTS: Self = Self("gyre evaluate", LOCK, "trajectory.svg errors.svg bands.svg");
+    /// The report of a stress test.
+    pub const STRESS: Self = Self("gyre stress", LOCK, "config.toml report.json report.md report.svg");
+    /// The report of a shadow.
+    pub const SHADOW: Self = Self("gyre shadow", LOCK, "shadow.csv shadow.json shadow.txt");
+    /// The drives of a batch, whose tasks share the folder without a lock.
+    pub const BATCH: Self = Self("gyre batch", "rows", "results.csv times.csv");
+    /// A simulated recording, without a lock.
+    pub const SIMULATION: Self = Self("gyre simulate", "simulation.toml", "dataset.toml ground_truth.tum azimuth_poses.npy objects.csv imu.csv wheels.csv gnss.csv Navtech_Polar.txt");
+}
+
+impl Content {
+    /// Checks that this content replaces nothing in a folder but earlier content of the same
+    /// command.
+    ///
+    /// # Errors
+    /// A file in the place of the folder, a folder that another command has filled, or files of the
+    /// same names by somebody else.
+    pub fn require_place(&self, folder: &Path) -> Result<(), OutError> {
+        let (Self(command, mark, files), path) = (self, folder.display());
+        let refused = |reason| Err(OutError::Refused(reason));
+        if fs::metadata(folder).is_ok_and(|there| !there.is_dir()) {
+            return refused(format!(
+                "{path} is a file, and `{command}` fills a folder: name another place"
+            ));
+        }
+        let is_run = folder.join(JOURNAL).is_dir();
+        match owner(folder).or(is_run.then(|| Self::RUN.0.to_owned())) {
+            Some(owner) if owner == *command => return Ok(()),
+            Some(owner) => {
+                return refused(format!(
+                    "{path} has the files of `{owner}`, which `{command}` would replace or mix with its own: name another folder"
+                ));
+            }
+            None => {}
+        }
+        let mut files = files.split(' ').map(|name| folder.join(name));
+        match files.find(|file| file.exists() && !folder.join(mark).exists()) {
+            None => Ok(()),
+            Some(file) => refused(format!(
+                "{} was not written by `{command}`, which would replace it: name another folder, or move the file",
+                file.display()
+            )),
+        }
+    }
+}
+
+/// Returns the command that has filled a folder; `None` where it is unknown.
+fn owner(folder: &Path) -> Option<String> {
+    let owner = read_text(&folder.join(LOCK), SETTINGS).ok()?;
+    Some(owner.trim().to_owned()).filter(|owner| !owner.is_empty())
+}
+
+/// Writes a page to a path that a user has named: into a new file, in the place of a file that
+/// contains the mark of such pages, or to a FIFO or a device.
+///
+/// # Errors
+/// Anything else at the path, or a file that cannot be written.
+pub fn write_page(to: &Path, page: &str, mark: &str) -> Result<(), OutError> {
+    let unwritable = |source| OutError::Unwritable {
+        path: to.to_owned(),
+        source,
+    };
+    let Ok(there) = fs::metadata(to) else {
+        let written = storage::write(to, page);
+        return written.map_err(|error| unwritable(error.source));
+    };
+    let kind = there.file_type();
+    if kind.is_fifo() || kind.is_char_device() {
+        let opened = OpenOptions::new().write(true).open(to);
+        let written = opened.and_then(|mut file| file.write_all(page.as_bytes()));
+        return written.map_err(unwritable);
+    }
+    let is_page = || read_text(to, LARGEST_PAGE).is_ok_and(|text| text.contains(mark));
+    if !(kind.is_file() && (there.len() == 0 || is_page())) {
+        return Err(OutError::Refused(format!(
+            "{} exists and is not a page of Gyre's own: name another file, or remove it",
+            to.display()
+        )));
+    }
+    // What a link leads to is replaced, and not the link.
+    let file = to.canonicalize().map_err(unwritable)?;
+    storage::write(&file, page).map_err(|error| unwritable(error.source))
+}
+
+/// Checks that the results in the folder of a run are those of its configuration.
+///
+/// # Errors
+/// A run that has taken the place of another one has not ended.
+pub fn require_results(run: &Path) -> Result<(), OutError> {
+    match run.join(REPLACED).exists() {
+        false => Ok(()),
+        true => Err(OutError::Refused(format!(
+            "the run in {} has not ended, and the results in it are of the run before: start the same command again, and it continues",
+            run.display()
+        ))),
+    }
+}
+
+/// Why a place cannot be that of what a command writes, or of results.
 #[derive(Debug, Error)]
 pub enum OutError {
     /// It cannot be written.
@@ -35,6 +162,9 @@ pub enum OutError {
         /// The process, where the system tells: `, process 123 (gyre)`.
         holder: String,
     },
+    /// Something else is there, which the sentence names.
+    #[error("{0}")]
+    Refused(String),
 }
 
 /// The folder of the results, locked for this command while it lives.
@@ -53,19 +183,26 @@ pub fn absolute(out: &Path) -> io::Result<PathBuf> {
 }
 
 impl Out {
-    /// Creates and locks the folder. Nothing else in it is changed.
+    /// Creates and locks the folder for this content. Nothing else in it is changed.
     ///
     /// # Errors
-    /// A folder that cannot be written, or to which another command is writing.
-    pub fn lock(path: &Path) -> Result<Self, OutError> {
+    /// A folder that has other content, that cannot be written, or to which another command is
+    /// writing.
+    pub fn lock(path: &Path, content: Content) -> Result<Self, OutError> {
         let unwritable = |source| OutError::Unwritable {
             path: path.to_owned(),
             source,
         };
+        content.require_place(path)?;
         create_folder(path).map_err(|error| unwritable(error.source))?;
         let path = path.canonicalize().map_err(unwritable)?;
         match try_lock(&path.join(LOCK)).map_err(unwritable)? {
-            Attempt::Locked(lock) => Ok(Self { path, _lock: lock }),
+            Attempt::Locked(mut lock) => {
+                if owner(&path).is_none() {
+                    lock.write_all(content.0.as_bytes()).map_err(unwritable)?;
+                }
+                Ok(Self { path, _lock: lock })
+            }
             Attempt::Held(holder) => Err(OutError::Held {
                 path,
                 holder: holder.map_or(String::new(), |holder| format!(", {holder}")),

@@ -6,7 +6,7 @@ use std::{ffi::OsStr, fs, path::Path};
 
 use gyre_journal::{self as journal, JournalError};
 use gyre_messages::flag;
-use gyre_results::{Out, SIMULATED_TRUTH};
+use gyre_results::{Out, REPLACED as ASIDE, SIMULATED_TRUTH};
 use gyre_run::COMPLETE;
 use gyre_storage::{self as storage, StorageError};
 use gyre_terminal::{Failure, print};
@@ -14,8 +14,7 @@ use gyre_terminal::{Failure, print};
 use super::{CONFIGURATION, is_complete, state};
 
 const JOURNAL: &str = "journal";
-/// The journal of the complete run, and what the new run overwrites before it has results.
-const ASIDE: &str = "journal.replaced";
+/// What the new run overwrites before it has results.
 const BESIDE: [&str; 2] = [CONFIGURATION, SIMULATED_TRUTH];
 /// Poses with which a run has a motion, and so results of its own.
 pub(super) const WITH_MOTION: usize = 2;
@@ -153,6 +152,7 @@ mod tests {
 
     use gyre_journal::Journal;
     use gyre_messages::{Item, PoseHeader};
+    use gyre_results::Content;
     use tempfile::TempDir;
 
     use super::{super::make_way, *};
@@ -175,7 +175,7 @@ mod tests {
     /// The folder of a complete run, the journal of which is put aside.
     fn being_replaced() -> (TempDir, Out) {
         let folder = tempfile::tempdir().unwrap();
-        let out = Out::lock(folder.path()).unwrap();
+        let out = Out::lock(folder.path(), Content::RUN).unwrap();
         compute(&out, 0..3);
         storage::write(&out.join(COMPLETE), "poses = 3\n").unwrap();
         assert!(!is_untouched(&out).unwrap());

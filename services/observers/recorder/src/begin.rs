@@ -80,7 +80,9 @@ pub fn require_own(file: &Path, out: &Path) -> Result<(), RecorderError> {
 /// # Errors
 /// There is one.
 pub fn require_new(file: &Path) -> Result<(), RecorderError> {
-    match parts(file).into_iter().next() {
+    let first = parts(file).into_iter().next();
+    // Also something else of that name, a folder for instance.
+    match first.or(file.exists().then(|| file.to_owned())) {
         Some(there) => Err(RecorderError::Exists(there)),
         None => Ok(()),
     }

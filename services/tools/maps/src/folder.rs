@@ -8,7 +8,7 @@ use std::{
 
 use gyre_localisation::Map;
 use gyre_mapping::{Evidence, Origin, require_tiles_only, write_map};
-use gyre_results::{Out, OutError};
+use gyre_results::{Content, Out, OutError};
 use gyre_slam::{Keyframe, Record};
 use gyre_storage::{self as storage, StorageError};
 use gyre_terminal::Failure;
@@ -32,11 +32,12 @@ pub fn settle(map: &Path) -> Result<(), Failure> {
         return Ok(());
     }
     let path = map.display();
-    let _locked = Out::lock(map).map_err(|error| match error {
+    let _locked = Out::lock(map, Content::MAP).map_err(|error| match error {
         OutError::Held { holder, .. } => {
             format!("the map {path} is being replaced by another command{holder}: wait for it")
         }
         OutError::Unwritable { source, .. } => unfinished(&path, &source),
+        other => other.to_string(),
     })?;
     Ok(finish(map).map_err(|error| unfinished(&path, &error.source))?)
 }
@@ -189,7 +190,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let map = folder.path();
         write_all(&map.join(NEXT), "later");
-        let writing = Out::lock(map).unwrap();
+        let writing = Out::lock(map, Content::MAP).unwrap();
         let refused = settle(map).unwrap_err().to_string();
         assert!(
             refused.starts_with("the map ") && refused.contains("is being replaced by another"),

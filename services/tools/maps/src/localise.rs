@@ -24,7 +24,7 @@ use gyre_inputs::Inputs;
 use gyre_localisation::{Localisation, Localiser, Status};
 use gyre_mapping::{Map, Overlay, map_png};
 use gyre_radar::Trajectory;
-use gyre_results::Out;
+use gyre_results::{Content, Out};
 use gyre_storage::{self as storage, Draft};
 use gyre_terminal::{Failure, print};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -81,7 +81,7 @@ pub fn localise(arguments: &LocaliseArguments) -> Result<ExitCode, Failure> {
     let mut localiser = searched_map::open(&arguments.map, &configuration)?;
     let mut scans = Scans::open(&configuration)?;
     let out = &arguments.out;
-    let _locked = Out::lock(out)?;
+    let _locked = Out::lock(out, Content::FIXES)?;
     let mut fixes = Draft::create(&out.join(FIXES))?;
     let mut path = Fixed {
         stamps_ns: Vec::new(),

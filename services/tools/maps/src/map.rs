@@ -20,7 +20,7 @@ use gyre_mapping::{
     Drawing, Evidence, MapOptions, Origin, write_geotiff, write_pgm, write_web_tiles,
 };
 use gyre_radar::Trajectory;
-use gyre_results::{Out, georeference, map_options};
+use gyre_results::{Content, Out, georeference, map_options, require_results};
 use gyre_slam::{Keyframe, RecordReader, records_path};
 use gyre_storage::StorageError;
 use gyre_terminal::{Failure, print};
@@ -63,7 +63,7 @@ fn draw_run(arguments: &MapArguments) -> Result<Drawing, Failure> {
     let poses = read_trajectory(&trajectory)?;
     let loops = loops::used_loops(&arguments.run.join(LOOPS))?;
     let configuration = configuration(&arguments.run)?;
-    let _locked = Out::lock(&arguments.out)?;
+    let _locked = Out::lock(&arguments.out, Content::MAP)?;
     let options = MapOptions {
         cell_m: arguments.cell_m,
         ..map_options(&configuration)
@@ -139,6 +139,7 @@ fn configuration(run: &Path) -> Result<Configuration, Failure> {
 }
 
 fn open(run: &Path) -> Result<RecordReader<Keyframe>, Failure> {
+    require_results(run)?;
     let path = records_path::<Keyframe>(run);
     match exists(&path)? {
         true => Ok(RecordReader::open(run)?),
@@ -339,7 +340,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         run(folder.path());
         let out = folder.path().join("map");
-        let other = Out::lock(&out).unwrap();
+        let other = Out::lock(&out, Content::MAP).unwrap();
         let refused = map(&arguments(folder.path())).unwrap_err().to_string();
         assert!(
             refused.starts_with("another command is writing to")
@@ -371,7 +372,7 @@ mod tests {
             ..arguments(folder.path())
         };
         let refused = || map(&arguments).unwrap_err().to_string();
-        let other = Out::lock(&extended).unwrap();
+        let other = Out::lock(&extended, Content::MAP).unwrap();
         assert!(refused().starts_with("another command"), "{}", refused());
         drop(other);
         assert!(

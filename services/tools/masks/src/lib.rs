@@ -9,11 +9,12 @@ mod inspection;
 mod inspector;
 pub mod picture;
 
-use std::{fs, num::NonZeroUsize, ops::Range, path::PathBuf, process::ExitCode};
+use std::{num::NonZeroUsize, ops::Range, path::PathBuf, process::ExitCode};
 
 use clap::Args;
 use gyre_configuration::describe_masks_in_process;
 use gyre_inputs::Inputs;
+use gyre_results::{Content, Out};
 use gyre_terminal::{Failure, print};
 
 use drawing::Canvas;
@@ -61,8 +62,7 @@ pub fn masks(arguments: &MasksArguments) -> Result<ExitCode, Failure> {
         .iter()
         .for_each(print::note);
     let out = &arguments.out;
-    fs::create_dir_all(out)
-        .map_err(|error| format!("cannot write to {}: {error}", out.display()))?;
+    let _locked = Out::lock(out, Content::MASKS)?;
     if !arguments.json {
         print::line(inspection::HEADER)?;
     }

@@ -17,10 +17,10 @@ use std::{
 
 use clap::Args;
 use gyre_datasets::read_trajectory;
-use gyre_results::evaluate::truth_of_run;
+use gyre_results::{evaluate::truth_of_run, write_page};
 use gyre_terminal::{Failure, print};
 
-use page::page;
+use page::{MADE_BY, page};
 use subject::Subject;
 
 /// The arguments of `gyre report`.
@@ -33,8 +33,8 @@ pub struct ReportArguments {
     /// The ground truth of all. Default: that of the first run that has one.
     #[arg(long, value_name = "FILE")]
     pub ground_truth: Option<PathBuf>,
-    /// The page to write. Default: report.html in the folder of a run, of several comparison.html
-    /// in that of the first.
+    /// The page to write: a new file, a page of gyre report, a FIFO or a device. Default:
+    /// report.html in the folder of a run, of several comparison.html in that of the first.
     #[arg(long, value_name = "FILE")]
     pub to: Option<PathBuf>,
     /// Open the page in the browser.
@@ -58,7 +58,7 @@ pub fn report(arguments: &ReportArguments) -> Result<ExitCode, Failure> {
         .to
         .clone()
         .unwrap_or_else(|| default_page(&arguments.subjects));
-    gyre_storage::write(&to, page(&subjects?)?)?;
+    write_page(&to, &page(&subjects?)?, MADE_BY)?;
     print::line(to.display())?;
     if arguments.open {
         open(&to)?;

@@ -9,7 +9,7 @@ use gyre_datasets::read_trajectory;
 use gyre_evaluation::{Evaluation, Options};
 use gyre_geometry::Pose;
 use gyre_radar::Trajectory;
-use gyre_results::{SUMMARY, judgement::judge};
+use gyre_results::{SUMMARY, judgement::judge, require_results};
 use gyre_terminal::{Failure, print};
 use serde_json::Value;
 
@@ -86,6 +86,7 @@ impl Subject {
 
 impl Run {
     fn read(folder: &Path) -> Result<Self, Failure> {
+        require_results(folder)?;
         let text = |name: &str| {
             let path = folder.join(name);
             fs::read_to_string(&path).map_err(|error| {

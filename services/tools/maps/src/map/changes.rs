@@ -13,7 +13,7 @@ use gyre_localisation::{Localiser, PlacedDrive};
 use gyre_mapping::{
     Change, ChangeKind, Changes, Evidence, Overlay, Survey, changes, legible, map_png,
 };
-use gyre_results::{Out, map_options};
+use gyre_results::{Content, Out, map_options};
 use gyre_slam::{Keyframe, RecordReader, records_path};
 use gyre_storage as storage;
 use gyre_terminal::{Failure, print};
@@ -53,7 +53,10 @@ pub fn compare(arguments: &MapArguments, later: &Path) -> Result<ExitCode, Failu
     let mut localiser = open_earlier(earlier, &configuration)?;
     // Before the search, which takes minutes for a long drive. Drives that are refused make no
     // folder.
-    let locked = out.exists().then(|| Out::lock(out)).transpose()?;
+    let locked = out
+        .exists()
+        .then(|| Out::lock(out, Content::MAP))
+        .transpose()?;
     let placed = placing::place(&graph, &mut keyframes, &mut localiser, [later, earlier])?;
     let surveys = survey(&localiser, &mut keyframes, &placed)?;
     let found = changes(&surveys[0], &surveys[1])?;
@@ -65,7 +68,7 @@ pub fn compare(arguments: &MapArguments, later: &Path) -> Result<ExitCode, Failu
         )
         .into());
     }
-    let _locked = locked.map_or_else(|| Out::lock(out), Ok)?;
+    let _locked = locked.map_or_else(|| Out::lock(out, Content::MAP), Ok)?;
     storage::write(&out.join(TABLE), table(&found.changes)?)?;
     let picture = draw(out, &mut keyframes, &placed.poses, &configuration, &found)?;
     storage::write(&out.join(PICTURE), picture)?;
