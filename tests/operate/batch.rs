@@ -173,11 +173,12 @@ fn drives_with_failures() -> Drives {
         .line("missing", &folder.join("nowhere"), "")
         .line("empty", &folder.join("empty"), "")
         .line("refused", &folder.join("part-20"), "raster.m=3")
+        .line("unsure", &folder.join("part-24"), "masking.threshold=250")
         // Relative to the list.
         .line("simulated", Path::new("simulated.toml"), "")
 }
 
-const OUTCOMES: [(&str, &str); 8] = [
+const OUTCOMES: [(&str, &str); 9] = [
     ("part-20", "complete"),
     ("part-22", "complete"),
     ("part-24", "complete"),
@@ -185,6 +186,7 @@ const OUTCOMES: [(&str, &str); 8] = [
     ("missing", "missing"),
     ("empty", "not-a-dataset"),
     ("refused", "configuration"),
+    ("unsure", "unsure"),
     ("simulated", "complete"),
 ];
 
@@ -203,7 +205,8 @@ fn a_batch_that_is_killed_gives_the_table_of_one_that_is_not() {
         .map(|(a, b)| (a.as_str(), b.as_str()))
         .collect();
     assert_eq!(outcomes, OUTCOMES);
-    let said = "8 drives: 4 complete, 1 corrupt, 1 missing, 1 not-a-dataset, 1 configuration";
+    let said =
+        "9 drives: 4 complete, 1 corrupt, 1 unsure, 1 missing, 1 not-a-dataset, 1 configuration";
     assert!(ended.stdout.contains(said), "{}", ended.stdout);
     // A line for each.
     let lines =
@@ -213,10 +216,11 @@ fn a_batch_that_is_killed_gives_the_table_of_one_that_is_not() {
         "missing: missing: there is nothing at",
         "empty: not-a-dataset: ",
         "refused: configuration: [raster] has no key `m`",
+        "unsure: unsure: 0 weak and 23 predicted motions of 23",
     ] {
         assert_eq!(lines(&ended, words), 1, "{words}:\n{}", ended.stderr);
     }
-    assert_eq!(ended.stderr.lines().count(), 8, "{}", ended.stderr);
+    assert_eq!(ended.stderr.lines().count(), 9, "{}", ended.stderr);
 
     let killed = drives.batch("killed").with(&paced);
     let mut started = killed.start();

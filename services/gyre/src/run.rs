@@ -382,11 +382,16 @@ fn failed(failure: &SuperviseError, out: &Out, written: Result<Results, Failure>
 /// Prints the summary and returns the exit code.
 fn conclude(session: &Session<'_>, written: &Results, form: Form) -> Result<ExitCode, Failure> {
     let problem = written.summary.problem();
-    if problem.is_none() || written.poses >= 2 {
+    let is_printed = problem.is_none() || written.poses >= 2;
+    if is_printed {
         print::line(written.summary.text(form)?)?;
     }
     if let Some(problem) = problem {
-        return Err(problem.clone().into());
+        // The five lines have it.
+        return match is_printed && form == Form::Brief {
+            true => Ok(ExitCode::FAILURE),
+            false => Err(problem.clone().into()),
+        };
     }
     Ok(match session.ending == Some(Ending::Complete) {
         true => ExitCode::SUCCESS,

@@ -126,7 +126,7 @@ fn finished(out: &Out) -> Result<DriveOutcome, Failure> {
         None => DriveOutcome::Complete,
         Some(problem) => {
             print::note(format_args!("gyre: {problem}"));
-            DriveOutcome::Corrupt
+            outcome_of_problem(problem)
         }
     })
 }
@@ -190,11 +190,18 @@ fn outcome_of(failure: &Failure) -> DriveOutcome {
     match failure.downcast_ref::<OpenError>() {
         Some(error) => outcome_of_open(error),
         None if is_configuration => DriveOutcome::Configuration,
-        None if failure.is::<Problem>() => DriveOutcome::Corrupt,
+        None if failure.is::<Problem>() => outcome_of_problem(&failure.to_string()),
         None if matches!(failure.downcast_ref(), Some(OutError::Held { .. })) => {
             DriveOutcome::InUse
         }
         None => DriveOutcome::Failed,
+    }
+}
+
+fn outcome_of_problem(sentence: &str) -> DriveOutcome {
+    match Problem::is_of_motions(sentence) {
+        true => DriveOutcome::Unsure,
+        false => DriveOutcome::Corrupt,
     }
 }
 

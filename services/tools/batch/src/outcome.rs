@@ -43,6 +43,8 @@ outcomes! {
     Complete: "complete",
     /// All scans have been played, but too many of them cannot be read.
     Corrupt: "corrupt",
+    /// All scans have been played, but too many of the motions are weak or predicted.
+    Unsure: "unsure",
     /// There is nothing at its path.
     Missing: "missing",
     /// The path leads to no recording, or to one with too few scans or an unreadable first one.
@@ -69,7 +71,7 @@ outcomes! {
 impl DriveOutcome {
     /// Returns whether all scans were played, so that there are results of the whole drive.
     pub fn has_results(self) -> bool {
-        matches!(self, Self::Complete | Self::Corrupt)
+        matches!(self, Self::Complete | Self::Corrupt | Self::Unsure)
     }
 
     /// Returns the outcome of a failure, by its sentence, if a disk, a quota or shared memory is

@@ -25,7 +25,10 @@ pub struct Group {
 type Text = fn(&Subject) -> Option<String>;
 type Error = fn(&Evaluation) -> Option<f64>;
 
-const DRIVE: [(&str, Text); 4] = [
+const DRIVE: [(&str, Text); 5] = [
+    ("problem", |it| {
+        Some(it.run.as_ref()?.word("/problem")?.to_owned())
+    }),
     ("path, m", |it| {
         Some(format!("{:.1}", it.trajectory.path_length_m()))
     }),

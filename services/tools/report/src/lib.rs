@@ -53,7 +53,8 @@ pub fn report(arguments: &ReportArguments) -> Result<ExitCode, Failure> {
     };
     let truth = truth.as_deref().map(read_trajectory).transpose()?;
     let read = |path: &PathBuf| Subject::read(path, truth.as_ref());
-    let subjects: Result<Vec<Subject>, Failure> = arguments.subjects.iter().map(read).collect();
+    let subjects = with_corrected(&arguments.subjects);
+    let subjects: Result<Vec<Subject>, Failure> = subjects.iter().map(read).collect();
     let to = arguments
         .to
         .clone()
@@ -64,6 +65,15 @@ pub fn report(arguments: &ReportArguments) -> Result<ExitCode, Failure> {
         open(&to)?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Returns the runs and trajectories, each run with the trajectory that its loops have corrected.
+fn with_corrected(subjects: &[PathBuf]) -> Vec<PathBuf> {
+    let both = |path: &PathBuf| {
+        let corrected = path.join("trajectory_slam.tum");
+        [Some(path.clone()), corrected.is_file().then_some(corrected)]
+    };
+    subjects.iter().flat_map(both).flatten().collect()
 }
 
 /// Returns the ground truth of the first run that has one.

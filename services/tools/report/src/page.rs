@@ -292,7 +292,7 @@ mod tests {
 
     use super::*;
 
-    const SUMMARY: &str = r#"{"dropped": 3, "period_s": 0.25, "version": "0.1.0", "latency": {"sensor_to_pose":
+    const SUMMARY: &str = r#"{"problem": "a mask", "dropped": 3, "period_s": 0.25, "version": "0.1.0", "latency": {"sensor_to_pose":
         {"p50_us": 31000.0, "p99_us": 58000.0}, "stages": {"masking": {"work": {"p50_us": 5000.0}, "busy": 0.2}}}}"#;
 
     /// A drive of 200 m straight ahead at 10 m/s, which ends so far to the left.
@@ -313,6 +313,8 @@ mod tests {
 
     fn page_of(paths: &[&Path], truth: &Path) -> String {
         let truth = read_trajectory(truth).unwrap();
+        let paths: Vec<_> = paths.iter().map(|path| (*path).to_owned()).collect();
+        let paths = crate::with_corrected(&paths);
         let subjects = paths
             .iter()
             .map(|path| Subject::read(path, Some(&truth)).unwrap());
@@ -328,6 +330,7 @@ mod tests {
         fs::write(a.join("map.png"), [0x89, b'P', 0xff]).unwrap();
         let page = page_of(&[&a], &truth);
         for part in [
+            "<tr><th>problem</th><td>a mask</td></tr>",
             "<tr><th>path, m</th><td>200.0</td></tr>",
             "<tr><th>ATE, rmse, m</th><td>0.000</td></tr>",
             "<tr><th>scans dropped</th><td>3</td></tr>",
@@ -341,6 +344,10 @@ mod tests {
         }
         assert!(!page.contains("<a>") && page.contains("&lt;a&gt;"));
         assert!(!page.contains("src=\"http") && !page.contains("href="));
+        fs::write(a.join("trajectory_slam.tum"), tum(4.0)).unwrap();
+        let page = page_of(&[&a], &truth);
+        let rows = "<tr><th>path, m</th><td>200.0</td><td>200.0</td></tr>";
+        assert!(page.contains(rows) && page.contains("&gt;/trajectory_slam.tum</th>"));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Counts of scans and motions.
 
 use gyre_messages::{
-    Item, MotionEstimate, PoseHeader, doppler, flag, gyro, initial_guess, outcome, wheels,
+    Basis, Item, MotionEstimate, PoseHeader, doppler, flag, gyro, initial_guess, outcome, wheels,
 };
 use serde::Serialize;
 
@@ -15,6 +15,9 @@ const MAX_UNREADABLE_SHARE: f64 = 0.2;
 const MAX_REFUSED_SHARE: f64 = 0.1;
 const MAX_SLIPPING_SHARE: f64 = 0.5;
 const MIN_CONTRADICTIONS: u64 = 10;
+/// Largest share of motions without a firm match in a run that succeeds. With more, the constants
+/// or the mask hide what the radar measures.
+const MAX_UNSURE_SHARE: f64 = 0.2;
 
 /// Motions from which the radar's period is taken, so that longer runs take no more memory.
 const MOTIONS_OF_PERIOD: usize = 1 << 16;
@@ -185,6 +188,8 @@ pub struct MotionCounts {
     pub predicted: u64,
     /// Weak or predicted.
     pub doubtful: u64,
+    /// Those of them whose distance neither wheels nor Doppler measured.
+    pub unsure: u64,
     /// Refined ones whose initial guess was not the prediction.
     pub second_hypothesis: u64,
     /// Those of a standing vehicle.
@@ -209,12 +214,20 @@ impl MotionCounts {
             _ => {}
         }
         self.doubtful = self.weak + self.predicted;
+        let is_unsure = refinement.outcome == outcome::WEAK || refinement.basis() == Basis::Guessed;
+        self.unsure += u64::from(is_unsure);
         self.stationary += u64::from(refinement.is_stationary());
         self.along_walls += u64::from(refinement.initial_guess == initial_guess::ALONG_WALLS);
     }
 }
 
 impl Counts {
+    /// Returns the counts of motions of which too many have no firm match.
+    pub fn too_many_are_unsure(&self) -> Option<&MotionCounts> {
+        let motions = self.motions.as_ref();
+        motions.filter(|it| too_many(it.unsure, it.refined + it.doubtful, MAX_UNSURE_SHARE))
+    }
+
     /// Returns the counts of a gyro that contradicts the radar so often that its settings must be
     /// wrong.
     pub fn gyro_contradicts(&self) -> Option<&GyroCounts> {

@@ -12,20 +12,37 @@ const NAMES: usize = 12;
 
 /// The way a run has gone, of which all results tell parts.
 impl Summary {
-    /// Returns five lines: the path, its accuracy, the latency, what is unusual, and where to look.
+    /// Returns five lines: the path, its accuracy, the latency, what is unusual, and where to look;
+    /// with SLAM one of the loops, and one of a problem.
     pub fn in_brief(&self) -> String {
+        let problem = self.problem.as_ref().map(ToString::to_string);
         let lines = [
-            (self.ending_word(), self.path()),
-            ("accuracy", self.accuracy()),
-            ("latency", self.pace()),
-            ("unusual", self.unusual()),
-            ("look at", self.places()),
+            (self.ending_word(), Some(self.path())),
+            ("problem", problem),
+            ("accuracy", Some(self.accuracy())),
+            ("loops", self.loops()),
+            ("latency", Some(self.pace())),
+            ("unusual", Some(self.unusual())),
+            ("look at", Some(self.places())),
         ];
-        let lines = lines.map(|(name, text)| {
-            let indent = format!("\n{:NAMES$}", "");
-            format!("{name:NAMES$}{}", wrap(&text, WIDTH - NAMES).join(&indent))
+        let lines = lines.into_iter().filter_map(|(name, text)| {
+            let (text, indent) = (text?, format!("\n{:NAMES$}", ""));
+            let text = wrap(&text, WIDTH - NAMES).join(&indent);
+            Some(format!("{name:NAMES$}{text}"))
         });
-        lines.join("\n")
+        lines.collect::<Vec<_>>().join("\n")
+    }
+
+    /// Returns what the loops have corrected, and the map that is drawn with them.
+    fn loops(&self) -> Option<String> {
+        let slam = self.slam.as_ref()?;
+        let corrected = slam.ate_m.map_or(String::new(), |ate_m| {
+            format!("; corrected: ATE {ate_m:.2} m")
+        });
+        Some(format!(
+            "{} between {} keyframes, {} rejected{corrected}; trajectory_slam.tum, map.png",
+            slam.loops_used, slam.keyframes, slam.loops_rejected
+        ))
     }
 
     fn ending_word(&self) -> &'static str {
@@ -153,7 +170,7 @@ mod tests {
 
     use super::*;
     use crate::summary::{
-        Counts, Course, Measured, MotionCounts, Session,
+        Counts, Course, Measured, MotionCounts, Problem, Session, SlamSummary,
         counts::{GyroCounts, WheelCounts},
     };
 
@@ -205,6 +222,22 @@ unusual     nothing
 look at     gyre report out/radiate --open; all figures:
             out/radiate/summary.json, or -v";
         assert_eq!(text, expected);
+        let mut with_loops = summary("realtime", Counts::default(), 58_000.0);
+        with_loops.slam = Some(SlamSummary {
+            keyframes: 395,
+            loops_used: 142,
+            loops_rejected: 3,
+            odometry: None,
+            ground_truth: None,
+            ate_m: Some(0.5),
+        });
+        let expected =
+            "\nloops       142 between 395 keyframes, 3 rejected; corrected: ATE 0.50 m;\n";
+        let text = with_loops.in_brief();
+        assert!(
+            text.contains(expected) && text.contains("map.png\n"),
+            "{text}"
+        );
     }
 
     #[test]
@@ -229,8 +262,8 @@ look at     gyre report out/radiate --open; all figures:
     }
 
     #[test]
-    fn a_gyro_or_wheels_that_contradict_the_radar_throughout_are_a_problem() {
-        let problem = |refused, slips| {
+    fn motions_without_a_match_and_sensors_that_contradict_the_radar_are_a_problem() {
+        let problem_of = |refused, slips, unsure| {
             let gyro = GyroCounts {
                 motions: 400,
                 refused,
@@ -241,15 +274,33 @@ look at     gyre report out/radiate --open; all figures:
                 slips,
                 ..WheelCounts::default()
             };
+            let motions = MotionCounts {
+                refined: 465 - unsure,
+                doubtful: unsure,
+                weak: unsure,
+                unsure,
+                ..MotionCounts::default()
+            };
             let counts = Counts {
                 processed: 466,
+                motions: Some(motions),
                 gyro: Some(gyro),
                 wheels: Some(wheels),
                 ..Counts::default()
             };
-            let summary = summary("max", counts, 1e6);
+            summary("max", counts, 1e6)
+        };
+        let problem = |refused, slips| {
+            let summary = problem_of(refused, slips, 93);
             summary.problem().map(ToString::to_string)
         };
+        let unsure = problem_of(0, 0, 94);
+        let said = unsure.problem().unwrap().to_string();
+        assert!(
+            Problem::is_of_motions(&said) && said.starts_with("94 weak"),
+            "{said}"
+        );
+        assert!(unsure.in_brief().contains("\nproblem     94 weak"));
         assert_eq!(problem(40, 200), None);
         assert!(problem(41, 0).unwrap().contains("41 of its 400 turns"));
         assert!(problem(0, 201).unwrap().contains("201 of their 400"));
