@@ -163,12 +163,14 @@ fn a_drive_through_another_town_is_lost_and_gets_no_fix() {
     let (run, folder) = (mapped(), folder());
     let out = folder.path().join("lost");
     let ended = localise(&map_of(&run), OTHER_TOWN, &out);
-    // All is written, and the answer is no.
+    // The answer is no before all scans were looked for.
     ended.failed_with(&[
         "no scan of ",
         "was found in ",
         map_of(&run).to_str().unwrap(),
+        "the first 20 and 40 that are spread over the drive were looked for",
     ]);
+    assert_eq!(rows(&out).len(), 20);
     assert!(
         ended.stdout.starts_with("no scan was found in the map"),
         "{}",
