@@ -1,6 +1,7 @@
 //! `gyre calibrate`: finds the constants of a radar from drives alone, the clock and the axes of a
 //! gyro beside it, and the clock and the scale of the wheels.
 
+mod check;
 mod gyro;
 mod wheels;
 
@@ -14,11 +15,13 @@ use gyre_calibration::{Configured, Drive, Found, Study, svg, toml};
 use gyre_configuration::{Configuration, Played, describe_masks_in_process};
 use gyre_datasets::DatasetOptions;
 use gyre_radar::{OwnedScan, SweepGeometry};
+use gyre_results::{Content, Out};
 use gyre_samples::{GyroKind, WheelsKind};
 use gyre_storage as storage;
 use gyre_terminal::{Failure, print};
 
 use crate::cli::CalibrateArguments;
+use check::Check;
 use gyro::Gyro;
 use wheels::Wheels;
 
@@ -38,8 +41,9 @@ const EVERY: Duration = Duration::from_secs(5);
 pub fn calibrate(arguments: &CalibrateArguments) -> Result<ExitCode, Failure> {
     let started = Instant::now();
     let file = arguments.out.join(SECTION);
-    storage::create_folder(&arguments.out)?;
-    let drives = read_drives(arguments)?;
+    let _locked = Out::lock(&arguments.out, Content::CALIBRATION)?;
+    let configuration = arguments.inputs.configuration()?;
+    let drives = read_drives(configuration.clone(), arguments)?;
     let logs = drives.iter();
     let of_gyro = logs.filter_map(|it| Some((it.gyro.as_ref()?, &it.drive)));
     let gyro = gyro::section(&of_gyro.collect::<Vec<_>>())?;
@@ -47,8 +51,12 @@ pub fn calibrate(arguments: &CalibrateArguments) -> Result<ExitCode, Failure> {
     let of_wheels = logs.filter_map(|it| Some((it.wheels.as_ref()?, &it.drive)));
     let wheels = wheels::section(&of_wheels.collect::<Vec<_>>())?;
     let radar = found_by(drives, &arguments.out);
+    let check = radar.as_ref().ok();
+    let check = check.and_then(|found| Check::of(&configuration, found, arguments));
+    let worse = check.as_ref().filter(|it| it.is_worse());
+    let remark = worse.map_or(String::new(), |it| format!("# NOT recommended: {it}\n"));
     let text = match &radar {
-        Ok(found) => toml(found),
+        Ok(found) => remark + &toml(found),
         // A drive may tell the others alone, as one that stands and turns tells the gyro.
         Err(error) if gyro.is_told || wheels.is_told => {
             print::note(format_args!("the radar is not calibrated: {error}"));
@@ -58,9 +66,13 @@ pub fn calibrate(arguments: &CalibrateArguments) -> Result<ExitCode, Failure> {
     };
     storage::write(&file, text + &gyro.text + &wheels.text)?;
     print::line(format_args!(
-        "{:.0} s; {} for `gyre run --calibration`{}",
+        "{:.0} s; {} {}{}",
         started.elapsed().as_secs_f64(),
         file.display(),
+        match worse {
+            Some(_) => "is NOT recommended for a run",
+            None => "for `gyre run --calibration`",
+        },
         if radar.is_ok() {
             format!(", {PICTURE} beside it")
         } else {
@@ -68,6 +80,9 @@ pub fn calibrate(arguments: &CalibrateArguments) -> Result<ExitCode, Failure> {
         }
     ))?;
     if let Ok(found) = radar {
+        let unknown = "compare a run with the file to one without before you keep it".to_owned();
+        let check = check.map_or(unknown, |check| check.to_string());
+        print::line(format_args!("{:<21} {check}", "check"))?;
         print::line(found.overlap())?;
     }
     let refused = gyro.refused.or(wheels.refused);
@@ -109,8 +124,10 @@ impl Section {
 }
 
 /// Reads the drive and the others of the same radar.
-fn read_drives(arguments: &CalibrateArguments) -> Result<Vec<Recorded>, Failure> {
-    let configuration = arguments.inputs.configuration()?;
+fn read_drives(
+    configuration: Configuration,
+    arguments: &CalibrateArguments,
+) -> Result<Vec<Recorded>, Failure> {
     let mut drives = vec![Recorded::read(configuration, arguments)?];
     for data in &arguments.with {
         let configuration = arguments.inputs.configuration_with(data)?;
@@ -202,7 +219,10 @@ impl Recorded {
 
     /// Finds the constants, prints them, and draws the drive.
     fn study(self, picture: &Path) -> Result<Study, Failure> {
-        print::note(format_args!("comparing the scans of {}", self.name));
+        let (name, scans) = (&self.name, self.drive.sweeps.len());
+        print::note(format_args!(
+            "comparing the {scans} scans of {name}, which takes about a second each"
+        ));
         let study = Study::new(self.drive, &self.configured)?;
         print::line(format_args!("{}: {}", self.name, study.found))?;
         storage::write(picture, svg(&study.drive, &study.calibration))?;
