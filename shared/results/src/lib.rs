@@ -1,7 +1,7 @@
 //! The files that a run leaves in the folder of its results, written and read; and reports of them.
 //!
-//! - [`Out`]: the folder, which one run at a time may change; [`Content`] decides what may be written
-//!   to a place that a user names;
+//! - [`Out`]: the folder, which one run at a time may change; [`Content`] decides what may be
+//!   written to a place that a user names;
 //! - [`write`](write()): all results, made from the journal in one pass;
 //! - [`odometry`]: the rows of `odometry.csv`; [`Summary`]: `summary.json`; [`judgement`]: the
 //!   evaluation in it;

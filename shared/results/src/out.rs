@@ -20,14 +20,14 @@ use thiserror::Error;
 const LOCK: &str = ".lock";
 /// The folder of a run's state.
 const JOURNAL: &str = "journal";
-/// The journal of a complete run while another run takes its place: until that has results, those in
-/// the folder are of the complete run.
+/// The journal of a complete run while another run takes its place: until that has results, those
+/// in the folder are of the complete run.
 pub const REPLACED: &str = "journal.replaced";
 /// The largest file that can be a page of Gyre's own, bytes.
 const LARGEST_PAGE: u64 = 256 << 20;
 
-/// What a command writes into a folder: the command, the file or folder by which an earlier content
-/// of its own is recognised, and the names of the files that it replaces.
+/// The content that a command writes into a folder: the command, the file or folder by which an
+/// earlier content of its own is recognised, and the names of the files that it replaces.
 #[derive(Clone, Copy, Debug)]
 pub struct Content(&'static str, &'static str, &'static str);
 

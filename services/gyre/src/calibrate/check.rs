@@ -1,5 +1,5 @@
-//! The check of a calibration: odometry as configured and with the constants that were found, by the
-//! ground truth of the drive.
+//! The check of a calibration: odometry as configured and with the constants that were found, by
+//! the ground truth of the drive.
 
 use std::{fmt, path::Path};
 

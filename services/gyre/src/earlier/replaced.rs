@@ -14,7 +14,7 @@ use gyre_terminal::{Failure, print};
 use super::{CONFIGURATION, is_complete, state};
 
 const JOURNAL: &str = "journal";
-/// What the new run overwrites before it has results.
+/// Files that the new run overwrites before it has results.
 const BESIDE: [&str; 2] = [CONFIGURATION, SIMULATED_TRUTH];
 /// Poses with which a run has a motion, and so results of its own.
 pub(super) const WITH_MOTION: usize = 2;
