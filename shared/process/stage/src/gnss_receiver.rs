@@ -17,7 +17,7 @@ use gyre_storage::{File, GroupSync, StorageError};
 
 use crate::{
     StageError,
-    datagrams::{MAX_DATAGRAM, lines, listen},
+    datagrams::{MAX_DATAGRAM, TURN_BYTES, dropped, lines, listen, receive},
 };
 
 /// The first row of the log.
@@ -165,10 +165,8 @@ impl Reception {
         let failed = |error: io::Error| StageError::transport("receive fixes", error);
         let mut datagram = vec![0; MAX_DATAGRAM];
         let mut has_arrived = false;
-        loop {
-            let ends = self.shared.ends.load(Ordering::Relaxed);
-            // At the end only what is there is taken: a receiver goes on sending.
-            self.socket.set_nonblocking(ends).map_err(failed)?;
+        self.socket.set_nonblocking(false).map_err(failed)?;
+        while !self.shared.ends.load(Ordering::Relaxed) {
             match self.socket.recv(&mut datagram) {
                 Ok(bytes) => {
                     self.append(&datagram[..bytes])?;
@@ -176,17 +174,22 @@ impl Reception {
                         tracing::info!("fixes of GNSS arrive");
                     }
                 }
-                Err(error) if error.kind() == ErrorKind::Interrupted => {}
-                Err(error)
-                    if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) =>
-                {
-                    if ends {
-                        return self.log.sync.finish().map_err(unwritten);
-                    }
-                }
-                Err(error) => return Err(failed(error)),
+                Err(error) => match error.kind() {
+                    ErrorKind::Interrupted | ErrorKind::WouldBlock | ErrorKind::TimedOut => {}
+                    _ => return Err(failed(error)),
+                },
             }
         }
+        // At the end what is there is taken: a receiver goes on sending.
+        self.socket.set_nonblocking(true).map_err(failed)?;
+        let mut left = TURN_BYTES;
+        while let Some(bytes) = receive(&self.socket, &mut datagram, &mut left)? {
+            self.append(&datagram[..bytes])?;
+        }
+        if let lost @ 1.. = dropped(&self.socket) {
+            tracing::warn!(lost, "datagrams with fixes came faster than they are read");
+        }
+        self.log.sync.finish().map_err(unwritten)
     }
 
     fn append(&mut self, datagram: &[u8]) -> Result<(), StageError> {

@@ -156,21 +156,23 @@ impl Signals {
         self.wait_or_readable(data, handshake.as_slice(), None, limit)
     }
 
-    /// As [`wait`](Self::wait) with any number of topics that are published, or until a connection
-    /// has something to read, which it leaves there.
+    /// As [`wait`](Self::wait) with any number of topics that are published, or until one of these
+    /// connections has something to read, which it leaves there.
     ///
     /// # Errors
     /// The system refuses to wait, or a notification cannot be read.
-    pub fn wait_or_readable(
+    pub fn wait_or_readable<'fd>(
         &self,
         data: &[&Listener],
         handshakes: &[&Listener],
-        connection: Option<BorrowedFd<'_>>,
+        connections: impl IntoIterator<Item = BorrowedFd<'fd>>,
         limit: Duration,
     ) -> Result<Woken, StageError> {
         let mut polled = vec![self.stop.as_fd(), self.child.as_fd()];
         polled.extend(data.iter().chain(handshakes).map(|it| it.as_fd()));
-        polled.extend(connection);
+        for connection in connections {
+            polled.push(connection);
+        }
         let mut polled: Vec<_> = polled
             .into_iter()
             .map(|fd| PollFd::from_borrowed_fd(fd, PollFlags::IN))
@@ -252,9 +254,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_request_to_stop_persists_over_later_waits() {
-        let (stop, mut signal) = UnixStream::pair().unwrap();
-        let (child, _open) = UnixStream::pair().unwrap();
+    fn each_connection_wakes_and_a_request_to_stop_persists_over_later_waits() {
+        let [(stop, mut signal), (child, _open), one, two] =
+            [0; 4].map(|_| UnixStream::pair().unwrap());
         [&stop, &child]
             .iter()
             .for_each(|socket| socket.set_nonblocking(true).unwrap());
@@ -265,6 +267,10 @@ mod tests {
             heartbeat: OnceCell::new(),
         };
         let short = Duration::from_millis(1);
+        let both = [one.0.as_fd(), two.0.as_fd()];
+        (&two.1).write_all(&[0]).unwrap();
+        let woken = signals.wait_or_readable(&[], &[], both, Duration::from_secs(600));
+        assert!(!woken.unwrap().timed_out);
         assert!(!signals.wait(&[], None, short).unwrap().stop);
         signal.write_all(&[0]).unwrap();
         assert!(signals.wait(&[], None, short).unwrap().stop);

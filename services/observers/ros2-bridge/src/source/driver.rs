@@ -144,7 +144,9 @@ pub struct Driver {
     /// Of a driver before 2024.
     older: Subscription<RadarConfigurationMessage>,
     azimuths: Option<Azimuths>,
-    /// Samples of an inertial sensor. Azimuths wake often enough for them.
+    /// Wakes for the samples of gyro and wheels alone: a complete scan waits for them.
+    pub sample_wakeups: Wakeups,
+    /// Samples of an inertial sensor.
     gyro: Option<Subscription<Imu>>,
     /// The odometry of the wheels.
     wheels: Option<Subscription<Odometry>>,
@@ -174,10 +176,17 @@ impl Driver {
         let mut older = node.subscribe(&topic, TURNS)?;
         wakeups.add(&mut configurations)?;
         wakeups.add(&mut older)?;
+        let mut sample_wakeups = Wakeups::new()?;
         let gyro = settings.gyro_topic.as_ref();
         let gyro = gyro.map(|topic| node.subscribe_to_sensor(topic, SAMPLES));
+        let mut gyro = gyro.transpose()?;
+        gyro.iter_mut().try_for_each(|it| sample_wakeups.add(it))?;
         let wheels = settings.wheels_topic.as_ref();
         let wheels = wheels.map(|topic| node.subscribe_to_sensor(topic, SAMPLES));
+        let mut wheels = wheels.transpose()?;
+        wheels
+            .iter_mut()
+            .try_for_each(|it| sample_wakeups.add(it))?;
         let fixes = settings.fixes.as_ref();
         let fixes = fixes.map(|settings| Fixes::open(&mut node, &mut wakeups, settings));
         Ok(Self {
@@ -189,8 +198,9 @@ impl Driver {
             configurations,
             older,
             azimuths: None,
-            gyro: gyro.transpose()?,
-            wheels: wheels.transpose()?,
+            sample_wakeups,
+            gyro,
+            wheels,
             fixes: fixes.transpose()?,
         })
     }
@@ -281,30 +291,18 @@ impl Driver {
     /// passed over.
     pub fn gyro_sample(&self) -> Option<Sample> {
         let gyro = self.gyro.as_ref()?;
-        loop {
-            match gyro.take() {
-                Ok(None) => return None,
-                Ok(Some((imu, _))) => {
-                    let sample = imu.sample(clock::since_1970_ns());
-                    if sample.is_some() {
-                        return sample;
-                    }
-                }
-                Err(_) => {}
-            }
-        }
+        let messages = (0..SAMPLES).map_while(|_| gyro.take().transpose());
+        messages
+            .flatten()
+            .find_map(|(imu, _)| imu.sample(clock::since_1970_ns()))
     }
 
     /// Takes the next speed of the wheels. Messages that cannot be read are passed over.
     pub fn wheel_sample(&self) -> Option<Sample> {
         let wheels = self.wheels.as_ref()?;
-        loop {
-            match wheels.take() {
-                Ok(None) => return None,
-                Ok(Some((odometry, _))) => return Some(odometry.sample(clock::since_1970_ns())),
-                Err(_) => {}
-            }
-        }
+        let mut messages = (0..SAMPLES).map_while(|_| wheels.take().transpose());
+        let odometry = messages.find_map(Result::ok)?.0;
+        Some(odometry.sample(clock::since_1970_ns()))
     }
 
     /// Passes the fixes of GNSS on that have arrived.

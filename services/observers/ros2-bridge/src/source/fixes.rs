@@ -73,9 +73,10 @@ impl Fixes {
         })
     }
 
-    /// Passes on what has arrived. Those who receive it count lines that are no fix.
+    /// Passes on what has arrived, as many as are kept at most. Those who receive it count lines
+    /// that are no fix.
     pub fn pass_on(&mut self) {
-        loop {
+        for _ in 0..FIXES {
             let line = match self.topic.take() {
                 Ok(None) => return,
                 Ok(Some((message, _))) => message.line(clock::since_1970_ns()),

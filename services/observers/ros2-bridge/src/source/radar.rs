@@ -76,13 +76,14 @@ impl Radar {
 
     /// Takes the newest configuration.
     fn take_configuration(&mut self, room: usize) -> Result<(), StageError> {
-        loop {
+        for _ in 0..MAX_MESSAGES {
             match self.driver.configuration() {
                 Ok(Some(described)) => self.configure(described, room)?,
-                Ok(None) => return Ok(()),
+                Ok(None) => break,
                 Err(error) => self.intake.damaged(error, 0),
             }
         }
+        Ok(())
     }
 
     fn configure(&mut self, described: DescribedRadar, room: usize) -> Result<(), StageError> {
@@ -270,7 +271,12 @@ impl Sensor for Radar {
         Ok(Arrival::Nothing(Duration::ZERO))
     }
 
+    fn samples(&self) -> Option<BorrowedFd<'_>> {
+        Some(self.driver.sample_wakeups.descriptor())
+    }
+
     fn sample(&mut self, of: SampleKind) -> Option<Sample> {
+        self.driver.sample_wakeups.clear().ok()?;
         match of {
             SampleKind::Gyro => self.driver.gyro_sample(),
             SampleKind::Wheels => self.driver.wheel_sample(),

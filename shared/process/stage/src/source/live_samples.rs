@@ -2,7 +2,6 @@
 //! radar, is handed over with the scan that it belongs to.
 
 use std::{
-    io::ErrorKind,
     net::UdpSocket,
     os::fd::{AsFd, BorrowedFd},
     str::FromStr,
@@ -11,13 +10,14 @@ use std::{
 
 use gyre_messages::ScanHeader;
 use gyre_samples::{
-    GyroConfig, GyroKind, LiveSamples, LiveSensor, Sample, SampleKind, WheelsConfig, WheelsKind,
+    GyroConfig, GyroKind, LiveSamples, LiveSensor, MAX_SAMPLES, Sample, SampleKind, WheelsConfig,
+    WheelsKind,
 };
 
 use super::Sensor;
 use crate::{
     Launch, StageError,
-    datagrams::{MAX_DATAGRAM, lines, listen},
+    datagrams::{MAX_DATAGRAM, TURN_BYTES, dropped, lines, listen, receive},
 };
 
 /// The live sensors beside a radar.
@@ -41,6 +41,8 @@ struct Live {
     parse: fn(&str) -> Option<Sample>,
     /// Lines of datagrams that are no samples.
     unreadable: usize,
+    /// Datagrams that the system had dropped at the last scan.
+    dropped: u32,
 }
 
 impl LiveSensors {
@@ -81,13 +83,13 @@ impl LiveSensors {
         self.max_wait
     }
 
-    /// The first socket to wait for, if there is one.
-    pub fn socket(&self) -> Option<BorrowedFd<'_>> {
-        let mut sockets = self.all().filter_map(|live| live.socket.as_ref());
-        sockets.next().map(AsFd::as_fd)
+    /// The sockets to wait for.
+    pub fn sockets(&self) -> impl Iterator<Item = BorrowedFd<'_>> {
+        let sockets = self.all().filter_map(|live| live.socket.as_ref());
+        sockets.map(AsFd::as_fd)
     }
 
-    /// Takes what has arrived.
+    /// Takes what has arrived, a turn of it at most.
     ///
     /// # Errors
     /// A socket fails.
@@ -98,9 +100,8 @@ impl LiveSensors {
         ];
         for (kind, live) in sensors {
             let Some(live) = live else { continue };
-            while let Some(sample) = radar.sample(kind) {
-                live.samples.add(&sample);
-            }
+            let arrived = (0..MAX_SAMPLES).map_while(|_| radar.sample(kind));
+            arrived.for_each(|sample| live.samples.add(&sample));
             live.receive(&mut self.datagram)?;
         }
         Ok(())
@@ -119,7 +120,7 @@ impl LiveSensors {
         for live in [&mut self.gyro, &mut self.wheels].into_iter().flatten() {
             let (samples, of_sensor) = live.samples.of_scan(header.span_ns());
             self.of_scan.extend_from_slice(samples);
-            left_out += of_sensor + std::mem::take(&mut live.unreadable);
+            left_out += of_sensor + std::mem::take(&mut live.unreadable) + live.newly_dropped();
         }
         self.of_scan.sort_unstable_by_key(Sample::order);
         header.set_samples(bytes, &self.of_scan, left_out);
@@ -128,7 +129,7 @@ impl LiveSensors {
             let so_far = self.left_out;
             tracing::warn!(
                 so_far,
-                "samples of the gyro or of the wheels are late or unusable, and left out"
+                "samples of the gyro or of the wheels are late, unusable or too many, and left out"
             );
             self.said_at = 2 * so_far;
         }
@@ -152,28 +153,30 @@ impl Live {
             socket: listens.map(|at| listen(section, section, at)).transpose()?,
             parse,
             unreadable: 0,
+            dropped: 0,
         })
+    }
+
+    /// Returns the datagrams that the system has dropped since the last call.
+    fn newly_dropped(&mut self) -> usize {
+        let so_far = self.socket.as_ref().map_or(0, dropped);
+        so_far.wrapping_sub(std::mem::replace(&mut self.dropped, so_far)) as usize
     }
 
     fn receive(&mut self, datagram: &mut [u8]) -> Result<(), StageError> {
         let Some(socket) = &self.socket else {
             return Ok(());
         };
-        loop {
-            match socket.recv(datagram) {
-                Ok(bytes) => {
-                    for sample in samples_in(&datagram[..bytes], self.parse) {
-                        match sample {
-                            Some(sample) => self.samples.add(&sample),
-                            None => self.unreadable += 1,
-                        }
-                    }
+        let mut left = TURN_BYTES;
+        while let Some(bytes) = receive(socket, datagram, &mut left)? {
+            for sample in samples_in(&datagram[..bytes], self.parse) {
+                match sample {
+                    Some(sample) => self.samples.add(&sample),
+                    None => self.unreadable += 1,
                 }
-                Err(error) if error.kind() == ErrorKind::WouldBlock => return Ok(()),
-                Err(error) if error.kind() == ErrorKind::Interrupted => {}
-                Err(error) => return Err(StageError::transport("receive samples", error)),
             }
         }
+        Ok(())
     }
 }
 

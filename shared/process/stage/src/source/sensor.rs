@@ -22,8 +22,6 @@ use crate::{
 /// Time for which the supervisor need not intervene: this loop says again and again that it is not
 /// late, since a radar that is switched off is no reason to restart it.
 pub(crate) const ALIVE_NS: i64 = 5_000_000_000;
-/// Time between two looks for samples that have arrived elsewhere than at the first socket.
-const SAMPLE_POLL: Duration = Duration::from_millis(2);
 /// Time between two such words, ns: it wakes many times for each scan, and a word is a write to a
 /// file.
 const SAID_EVERY_NS: i64 = 1_000_000_000;
@@ -52,6 +50,11 @@ pub trait Sensor {
     /// on its own clock.
     fn sample(&mut self, of: SampleKind) -> Option<Sample> {
         let _ = of;
+        None
+    }
+
+    /// The descriptor that becomes readable when such a sample has come.
+    fn samples(&self) -> Option<BorrowedFd<'_>> {
         None
     }
 
@@ -225,7 +228,7 @@ impl Stream<'_> {
             if live.cover(draft.header()) || left.is_zero() {
                 break;
             }
-            if self.sleep(live.socket(), left.min(SAMPLE_POLL))? {
+            if self.sleep(live.sockets().chain(sensor.samples()), left)? {
                 return Ok(false);
             }
         }
@@ -235,11 +238,11 @@ impl Stream<'_> {
         Ok(true)
     }
 
-    /// Sleeps until the connection has something to read, and answers the handshakes of new
-    /// readers; true on a request to stop.
-    fn sleep(
+    /// Sleeps until a connection has something to read, and answers the handshakes of new readers;
+    /// true on a request to stop.
+    fn sleep<'fd>(
         &mut self,
-        connection: Option<BorrowedFd<'_>>,
+        connections: impl IntoIterator<Item = BorrowedFd<'fd>>,
         limit: Duration,
     ) -> Result<bool, StageError> {
         let now_ns = clock::now_ns();
@@ -250,7 +253,7 @@ impl Stream<'_> {
         let woken = self.launch.signals.wait_or_readable(
             &[self.credit.poses.listener()],
             &[self.scans.listener()],
-            connection,
+            connections,
             limit.min(wake::MAX_WAIT),
         )?;
         self.counters.wakes += 1;
