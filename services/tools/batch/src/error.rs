@@ -29,7 +29,7 @@ pub enum BatchError {
     },
     /// Nothing to do.
     #[error(
-        "{path} names no drive: give a line for each, the path of its recording, or a folder whose sub-folders are recordings",
+        "{path} names no drive: give a line for each, the path of its recording, or a folder whose sub-folders are recordings; `gyre run` computes one",
         path = path.display()
     )]
     Empty {

@@ -6,6 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use gyre_datasets::is_dataset;
 use serde::{Deserialize, Serialize};
 
 use crate::BatchError;
@@ -66,6 +67,8 @@ impl List {
         };
         let absolute = path.canonicalize().map_err(unread)?;
         let (lines, folder) = match absolute.is_dir() {
+            // The sub-folders of a drive are none.
+            true if is_dataset(&absolute) => (Vec::new(), absolute),
             true => (entries(path)?, absolute),
             false => {
                 let text = gyre_storage::read_text(path, MAX_BYTES).map_err(unread)?;
@@ -346,6 +349,10 @@ mod tests {
         let names: Vec<_> = list.drives().iter().map(|it| it.name.as_str()).collect();
         assert_eq!(names, ["a", "b", "run"]);
         assert!(list.resolve(&list.drives()[0].path).is_dir());
+        fs::create_dir(folder.path().join("navtech")).unwrap();
+        fs::write(folder.path().join("navtech/1.png"), "").unwrap();
+        let refused = List::read(folder.path());
+        assert!(matches!(refused, Err(BatchError::Empty { .. })));
     }
 
     #[test]

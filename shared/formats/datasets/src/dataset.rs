@@ -36,6 +36,7 @@ use std::{ops::Range, path::Path};
 use gyre_radar::scan::{ScanLimits, ScanSlot, SweepGeometry};
 use gyre_samples::{BagFixes, Sample, SampleKind};
 
+pub use detect::is_dataset;
 pub use eccentricity::correct_eccentricity;
 pub use encoder::{EncoderTurn, FIRST_TURNS, encoder_counts};
 pub use error::{OpenError, ReadError};

@@ -82,6 +82,12 @@ const LAYOUTS: [(Format, &[&str]); 8] = [
     (Format::BoreasRt, &["radar"]),
 ];
 
+/// Returns whether a folder has images where a dataset has them.
+pub fn is_dataset(root: &Path) -> bool {
+    let mut folders = LAYOUTS.iter().flat_map(|(_, folders)| *folders);
+    folders.any(|folder| has_png(&root.join(folder)))
+}
+
 /// Locates the images at `root`, in the format `forced` or as detected.
 pub(crate) fn locate(root: &Path, forced: Option<Format>) -> Result<Found, OpenError> {
     check_folder(root)?;
