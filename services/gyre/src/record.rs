@@ -3,7 +3,7 @@
 use std::{process::ExitCode, time::Duration};
 
 use gyre_recorder::{Options, Split};
-use gyre_terminal::{Failure, print};
+use gyre_terminal::{Failure, print, seconds};
 
 use crate::cli::{RecordArguments, SplitArguments};
 
@@ -12,11 +12,12 @@ use crate::cli::{RecordArguments, SplitArguments};
 /// # Errors
 /// There is no such run or topic.
 pub fn record(arguments: &RecordArguments) -> Result<ExitCode, Failure> {
+    let span = seconds("--split-s", arguments.split.split_s)?;
     let options = Options {
         out: arguments.run.folder()?,
         to: arguments.to.clone(),
         topics: arguments.topics.clone(),
-        split: split(&arguments.split),
+        split: split(&arguments.split, span),
         continues: arguments.continues,
     };
     Ok(match gyre_recorder::record(&options) {
@@ -35,9 +36,8 @@ pub fn record(arguments: &RecordArguments) -> Result<ExitCode, Failure> {
     })
 }
 
-/// Returns the limits of a file; 0 and what is no time are none.
-fn split(arguments: &SplitArguments) -> Split {
-    let span = Duration::try_from_secs_f64(arguments.split_s).unwrap_or_default();
+/// Returns the limits of a file, of which 0 is none.
+fn split(arguments: &SplitArguments, span: Duration) -> Split {
     let span_ns = i64::try_from(span.as_nanos()).unwrap_or(i64::MAX);
     Split {
         bytes: (arguments.split_mb > 0).then_some(arguments.split_mb.saturating_mul(1_000_000)),

@@ -1,6 +1,6 @@
 //! The help: commands in groups, each with examples.
 
-use clap::{Command, CommandFactory};
+use clap::{Arg, Command, CommandFactory};
 use gyre_terminal::{WIDTH, wrap};
 
 use super::Gyre;
@@ -211,7 +211,12 @@ const NAMES: usize = 16;
 
 /// Returns the command line of `gyre`, with groups and examples in its help.
 pub fn command() -> Command {
-    let mut command = Gyre::command();
+    // A number below zero is no option: the option before it says what it needs.
+    let of_option = |arg: Arg| {
+        let has_value = arg.get_action().takes_values() && !arg.is_positional();
+        arg.allow_negative_numbers(has_value)
+    };
+    let mut command = Gyre::command().mut_subcommands(|it| it.mut_args(of_option));
     for (name, examples) in GROUPS.iter().flat_map(|(_, commands)| *commands) {
         let [first, second] = examples;
         let examples = format!("Examples:\n  {first}\n  {second}");
@@ -275,6 +280,13 @@ mod tests {
                 assert_eq!(parsed.subcommand_name(), Some(*name), "{example}");
             }
         }
+    }
+
+    #[test]
+    fn a_number_below_zero_is_the_value_of_its_option() {
+        let parsed = command().try_get_matches_from(["gyre", "run", "--rate", "-4"]);
+        let refused = parsed.unwrap_err().to_string();
+        assert!(refused.contains("invalid value '-4'"), "{refused}");
     }
 
     #[test]

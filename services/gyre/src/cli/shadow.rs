@@ -31,7 +31,7 @@ pub struct ShadowArguments {
     #[arg(long, value_name = "DIR")]
     pub report: Option<PathBuf>,
     /// Niceness of the program, -20 to 19: the run goes first.
-    #[arg(long, default_value_t = 10, allow_hyphen_values = true, value_parser = clap::value_parser!(i32).range(-20..=19))]
+    #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(i32).range(-20..=19))]
     pub nice: i32,
     /// Time for the program to open its topics, s.
     #[arg(long, default_value_t = 30.0, value_name = "S")]
