@@ -19,7 +19,7 @@ use std::{
 use gyre_configuration::Configuration;
 use gyre_journal::{self as journal, Journal};
 use gyre_messages::{Hop, Item, MotionEstimate, PoseHeader, flag};
-use gyre_results::{Content, Out, Session};
+use gyre_results::{Out, Session};
 use gyre_run::Ending;
 use tempfile::TempDir;
 
@@ -150,7 +150,7 @@ fn results_take_bounded_memory() {
     let (folder, poses) = (folder(), poses());
     forge(folder.path(), poses);
     let configuration = Configuration::of_overrides(&[]).unwrap();
-    let out = Out::lock(folder.path(), Content::RUN).unwrap();
+    let out = Out::lock(folder.path()).unwrap();
     let session = Session {
         scans: Some(poses as usize),
         resumed: 0,

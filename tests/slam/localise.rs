@@ -168,7 +168,7 @@ fn a_drive_through_another_town_is_lost_and_gets_no_fix() {
         "no scan of ",
         "was found in ",
         map_of(&run).to_str().unwrap(),
-        "the first 20 and 40 that are spread over the drive were looked for",
+        ", of 60 that were searched, was found in ",
     ]);
     assert_eq!(rows(&out).len(), 20);
     assert!(

@@ -43,7 +43,7 @@ pub fn batch(arguments: &BatchArguments) -> Result<ExitCode, Failure> {
     Content::BATCH.require_place(&arguments.out)?;
     let lock = slice
         .is_none()
-        .then(|| Out::lock(&arguments.out, Content::BATCH));
+        .then(|| Out::lock_for(&arguments.out, Content::BATCH));
     let _lock = lock.transpose()?;
     fs::create_dir_all(&arguments.out)
         .map_err(|error| format!("cannot write to {}: {error}", arguments.out.display()))?;

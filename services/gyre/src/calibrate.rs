@@ -21,7 +21,6 @@ use gyre_storage as storage;
 use gyre_terminal::{Failure, print};
 
 use crate::cli::CalibrateArguments;
-use check::Check;
 use gyro::Gyro;
 use wheels::Wheels;
 
@@ -41,9 +40,8 @@ const EVERY: Duration = Duration::from_secs(5);
 pub fn calibrate(arguments: &CalibrateArguments) -> Result<ExitCode, Failure> {
     let started = Instant::now();
     let file = arguments.out.join(SECTION);
-    let _locked = Out::lock(&arguments.out, Content::CALIBRATION)?;
-    let configuration = arguments.inputs.configuration()?;
-    let drives = read_drives(configuration.clone(), arguments)?;
+    let _locked = Out::lock_for(&arguments.out, Content::CALIBRATION)?;
+    let drives = read_drives(arguments)?;
     let logs = drives.iter();
     let of_gyro = logs.filter_map(|it| Some((it.gyro.as_ref()?, &it.drive)));
     let gyro = gyro::section(&of_gyro.collect::<Vec<_>>())?;
@@ -51,12 +49,17 @@ pub fn calibrate(arguments: &CalibrateArguments) -> Result<ExitCode, Failure> {
     let of_wheels = logs.filter_map(|it| Some((it.wheels.as_ref()?, &it.drive)));
     let wheels = wheels::section(&of_wheels.collect::<Vec<_>>())?;
     let radar = found_by(drives, &arguments.out);
-    let check = radar.as_ref().ok();
-    let check = check.and_then(|found| Check::of(&configuration, found, arguments));
-    let worse = check.as_ref().filter(|it| it.is_worse());
-    let remark = worse.map_or(String::new(), |it| format!("# NOT recommended: {it}\n"));
+    let found = radar.as_ref().ok();
+    let ates_m = found.and_then(|it| check::ates_m(arguments, it));
+    let is_worse = ates_m.is_some_and(|[before, after]| after > before);
+    let better = if is_worse { "NOT better" } else { "better" };
+    let check = ates_m.map_or(
+        "compare runs with the file and without".to_owned(),
+        |[a, b]| format!("ATE {a:.3} m as configured, {b:.3} m with the file: {better}"),
+    );
     let text = match &radar {
-        Ok(found) => remark + &toml(found),
+        Ok(found) if is_worse => format!("# NOT recommended: {check}\n{}", toml(found)),
+        Ok(found) => toml(found),
         // A drive may tell the others alone, as one that stands and turns tells the gyro.
         Err(error) if gyro.is_told || wheels.is_told => {
             print::note(format_args!("the radar is not calibrated: {error}"));
@@ -69,9 +72,10 @@ pub fn calibrate(arguments: &CalibrateArguments) -> Result<ExitCode, Failure> {
         "{:.0} s; {} {}{}",
         started.elapsed().as_secs_f64(),
         file.display(),
-        match worse {
-            Some(_) => "is NOT recommended for a run",
-            None => "for `gyre run --calibration`",
+        if is_worse {
+            "is NOT recommended"
+        } else {
+            "for `gyre run --calibration`"
         },
         if radar.is_ok() {
             format!(", {PICTURE} beside it")
@@ -80,8 +84,6 @@ pub fn calibrate(arguments: &CalibrateArguments) -> Result<ExitCode, Failure> {
         }
     ))?;
     if let Ok(found) = radar {
-        let unknown = "compare a run with the file to one without before you keep it".to_owned();
-        let check = check.map_or(unknown, |check| check.to_string());
         print::line(format_args!("{:<21} {check}", "check"))?;
         print::line(found.overlap())?;
     }
@@ -124,10 +126,8 @@ impl Section {
 }
 
 /// Reads the drive and the others of the same radar.
-fn read_drives(
-    configuration: Configuration,
-    arguments: &CalibrateArguments,
-) -> Result<Vec<Recorded>, Failure> {
+fn read_drives(arguments: &CalibrateArguments) -> Result<Vec<Recorded>, Failure> {
+    let configuration = arguments.inputs.configuration()?;
     let mut drives = vec![Recorded::read(configuration, arguments)?];
     for data in &arguments.with {
         let configuration = arguments.inputs.configuration_with(data)?;
@@ -221,7 +221,7 @@ impl Recorded {
     fn study(self, picture: &Path) -> Result<Study, Failure> {
         let (name, scans) = (&self.name, self.drive.sweeps.len());
         print::note(format_args!(
-            "comparing the {scans} scans of {name}, which takes about a second each"
+            "comparing {scans} scans of {name}, about a second each"
         ));
         let study = Study::new(self.drive, &self.configured)?;
         print::line(format_args!("{}: {}", self.name, study.found))?;

@@ -366,11 +366,11 @@ pub fn begin(
         kept.extend(state_of_recording(out.path()));
     }
     // The truth of a simulation is no result: it is there when the run begins.
-    let results = match replaced::is_kept(out) {
-        true => &[SIMULATED_TRUTH][..],
-        false => &FILES[..],
-    };
-    let others = LOGS.into_iter().chain(results.iter().copied());
+    let has_complete = replaced::is_kept(out);
+    let results = FILES
+        .into_iter()
+        .filter(|it| !has_complete || *it == SIMULATED_TRUTH);
+    let others = LOGS.into_iter().chain(results);
     state(out.path())
         .into_iter()
         .filter(|path| !kept.contains(path))

@@ -4,7 +4,7 @@ use std::{path::PathBuf, process::ExitCode};
 
 use gyre_link::{Network, ReceiveOptions, SendOptions};
 use gyre_messages::Footprint;
-use gyre_results::{Content, Out};
+use gyre_results::Out;
 use gyre_stage::{run::sweep, wake::Signals};
 use gyre_terminal::{Failure, INTERRUPTED, own, print, seconds};
 
@@ -46,7 +46,7 @@ fn send(arguments: &SendArguments) -> Result<ExitCode, Failure> {
 }
 
 fn receive(arguments: &ReceiveArguments) -> Result<ExitCode, Failure> {
-    let out = Out::lock(&arguments.out, Content::RUN)?;
+    let out = Out::lock(&arguments.out)?;
     sweep();
     let network = network(&arguments.network);
     let signals = Signals::install()?;

@@ -17,7 +17,7 @@ use gyre_datasets::GnssLog;
 use gyre_messages::StageId;
 use gyre_operate::detach_if_asked;
 use gyre_recording::received_fixes;
-use gyre_results::{Content, Form, Identity, Out, Programs, Results, SIMULATED_TRUTH, Session};
+use gyre_results::{Form, Identity, Out, Programs, Results, SIMULATED_TRUTH, Session};
 use gyre_run::{Ending, Mode};
 use gyre_stage::{
     Manifest,
@@ -55,7 +55,7 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
     if configuration.link.side.is_some() {
         split::set_environment()?;
     }
-    let out = Out::lock(&results_folder(arguments)?, Content::RUN)?;
+    let out = Out::lock(&results_folder(arguments)?)?;
     compute(
         configuration,
         out,
@@ -388,10 +388,10 @@ fn conclude(session: &Session<'_>, written: &Results, form: Form) -> Result<Exit
     }
     if let Some(problem) = problem {
         // The five lines have it.
-        return match is_printed && form == Form::Brief {
-            true => Ok(ExitCode::FAILURE),
-            false => Err(problem.clone().into()),
-        };
+        if is_printed && form == Form::Brief {
+            return Ok(ExitCode::FAILURE);
+        }
+        return Err(problem.clone().into());
     }
     Ok(match session.ending == Some(Ending::Complete) {
         true => ExitCode::SUCCESS,

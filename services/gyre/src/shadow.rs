@@ -22,7 +22,7 @@ pub fn shadow(arguments: &ShadowArguments) -> Result<ExitCode, Failure> {
     let stage = stage(&arguments.stage)?;
     let options = options(arguments, stage)?;
     let report = arguments.report.as_deref();
-    let report = report.map(|folder| Out::lock(folder, Content::SHADOW));
+    let report = report.map(|folder| Out::lock_for(folder, Content::SHADOW));
     let _locked = report.transpose()?;
     let control = chosen(&arguments.run)?;
     require_stage(&control, stage)?;

@@ -66,7 +66,7 @@ pub fn help(arguments: &[String]) -> Result<ExitCode, Failure> {
 }
 
 fn carry_out(arguments: &StressArguments) -> Result<Report, Failure> {
-    let out = Out::lock(&arguments.out, Content::STRESS)?;
+    let out = Out::lock_for(&arguments.out, Content::STRESS)?;
     let mut configuration = resolve(&RunArguments {
         inputs: arguments.inputs.clone(),
         ..RunArguments::default()

@@ -59,9 +59,8 @@ pub fn evaluate(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> {
         false => print::line(format_args!("{judgement:#}"))?,
     }
     if let Some(directory) = &arguments.plots {
-        // A run may get the plots of its own evaluation.
         let is_of_estimate = files.estimate.parent() == Some(directory);
-        let locked = (!is_of_estimate).then(|| Out::lock(directory, Content::PLOTS));
+        let locked = (!is_of_estimate).then(|| Out::lock_for(directory, Content::PLOTS));
         let _locked = locked.transpose()?;
         for (name, plot) in judgement.plots()? {
             gyre_storage::write(&directory.join(name), plot)?;

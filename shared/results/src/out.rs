@@ -1,5 +1,4 @@
-//! The places that a user names for what a command writes: which of them it may write to, and the
-//! lock of a folder, which one command at a time may change.
+//! The places that a user names for what a command writes, and the lock of such a folder.
 
 use std::{
     fs::{self, File, OpenOptions},
@@ -18,8 +17,6 @@ use thiserror::Error;
 /// The lock of the folder, with the name of the command that fills it. It lies beside the results
 /// and not in shared memory, which two runs need not have in common: containers have their own.
 const LOCK: &str = ".lock";
-/// The folder of a run's state.
-const JOURNAL: &str = "journal";
 /// The journal of a complete run while another run takes its place: until that has results, those
 /// in the folder are of the complete run.
 pub const REPLACED: &str = "journal.replaced";
@@ -32,36 +29,25 @@ const LARGEST_PAGE: u64 = 256 << 20;
 pub struct Content(&'static str, &'static str, &'static str);
 
 #[rustfmt::skip]
+#[allow(missing_docs, reason = "each names its command")]
 impl Content {
-    /// A run.
     pub const RUN: Self = Self("gyre run", LOCK, "config.toml log.jsonl odometry.csv poses.csv objects.csv trajectory.tum trajectory.svg errors.svg bands.svg map.png latency.json summary.json ground_truth.tum");
-    /// A map, or the changes between two.
     pub const MAP: Self = Self("gyre map", LOCK, "map.toml map.png map.tif map.pgm map.yaml keyframes.log changes.csv changes.png");
-    /// Places of scans in a map.
     pub const FIXES: Self = Self("gyre localise", LOCK, "fixes.csv fixes.tum fixes.png");
-    /// Pictures of masks.
     pub const MASKS: Self = Self("gyre masks", LOCK, "masks.png");
-    /// Constants of a radar.
     pub const CALIBRATION: Self = Self("gyre calibrate", LOCK, "calibration.toml calibration.svg calibration-2.svg");
-    /// Plots of an evaluation.
     pub const PLOTS: Self = Self("gyre evaluate", LOCK, "trajectory.svg errors.svg bands.svg");
-    /// The report of a stress test.
     pub const STRESS: Self = Self("gyre stress", LOCK, "config.toml report.json report.md report.svg");
-    /// The report of a shadow.
     pub const SHADOW: Self = Self("gyre shadow", LOCK, "shadow.csv shadow.json shadow.txt");
-    /// The drives of a batch, whose tasks share the folder without a lock.
     pub const BATCH: Self = Self("gyre batch", "rows", "results.csv times.csv");
-    /// A simulated recording, without a lock.
     pub const SIMULATION: Self = Self("gyre simulate", "simulation.toml", "dataset.toml ground_truth.tum azimuth_poses.npy objects.csv imu.csv wheels.csv gnss.csv Navtech_Polar.txt");
 }
 
 impl Content {
-    /// Checks that this content replaces nothing in a folder but earlier content of the same
-    /// command.
+    /// Checks that this content replaces nothing in a folder but what its command wrote.
     ///
     /// # Errors
-    /// A file in the place of the folder, a folder that another command has filled, or files of the
-    /// same names by somebody else.
+    /// A file in the place of the folder, or content of another command or of somebody else.
     pub fn require_place(&self, folder: &Path) -> Result<(), OutError> {
         let (Self(command, mark, files), path) = (self, folder.display());
         let refused = |reason| Err(OutError::Refused(reason));
@@ -70,7 +56,7 @@ impl Content {
                 "{path} is a file, and `{command}` fills a folder: name another place"
             ));
         }
-        let is_run = folder.join(JOURNAL).is_dir();
+        let is_run = folder.join("journal").is_dir();
         match owner(folder).or(is_run.then(|| Self::RUN.0.to_owned())) {
             Some(owner) if owner == *command => return Ok(()),
             Some(owner) => {
@@ -107,25 +93,24 @@ pub fn write_page(to: &Path, page: &str, mark: &str) -> Result<(), OutError> {
         path: to.to_owned(),
         source,
     };
-    let Ok(there) = fs::metadata(to) else {
-        let written = storage::write(to, page);
-        return written.map_err(|error| unwritable(error.source));
-    };
-    let kind = there.file_type();
-    if kind.is_fifo() || kind.is_char_device() {
+    let kind = fs::metadata(to).map(|it| it.file_type());
+    if kind
+        .as_ref()
+        .is_ok_and(|it| it.is_fifo() || it.is_char_device())
+    {
         let opened = OpenOptions::new().write(true).open(to);
         let written = opened.and_then(|mut file| file.write_all(page.as_bytes()));
         return written.map_err(unwritable);
     }
-    let is_page = || read_text(to, LARGEST_PAGE).is_ok_and(|text| text.contains(mark));
-    if !(kind.is_file() && (there.len() == 0 || is_page())) {
+    let is_page = |text: String| text.is_empty() || text.contains(mark);
+    if kind.is_ok() && !read_text(to, LARGEST_PAGE).is_ok_and(is_page) {
         return Err(OutError::Refused(format!(
             "{} exists and is not a page of Gyre's own: name another file, or remove it",
             to.display()
         )));
     }
     // What a link leads to is replaced, and not the link.
-    let file = to.canonicalize().map_err(unwritable)?;
+    let file = to.canonicalize().unwrap_or(to.to_owned());
     storage::write(&file, page).map_err(|error| unwritable(error.source))
 }
 
@@ -134,10 +119,11 @@ pub fn write_page(to: &Path, page: &str, mark: &str) -> Result<(), OutError> {
 /// # Errors
 /// A run that has taken the place of another one has not ended.
 pub fn require_results(run: &Path) -> Result<(), OutError> {
+    let reason = "has not ended, and the results in it are of the run before: start the same command again, and it continues";
     match run.join(REPLACED).exists() {
         false => Ok(()),
         true => Err(OutError::Refused(format!(
-            "the run in {} has not ended, and the results in it are of the run before: start the same command again, and it continues",
+            "the run in {} {reason}",
             run.display()
         ))),
     }
@@ -183,12 +169,20 @@ pub fn absolute(out: &Path) -> io::Result<PathBuf> {
 }
 
 impl Out {
+    /// Creates and locks the folder for a run. Nothing else in it is changed.
+    ///
+    /// # Errors
+    /// As [`lock_for`](Self::lock_for).
+    pub fn lock(path: &Path) -> Result<Self, OutError> {
+        Self::lock_for(path, Content::RUN)
+    }
+
     /// Creates and locks the folder for this content. Nothing else in it is changed.
     ///
     /// # Errors
     /// A folder that has other content, that cannot be written, or to which another command is
     /// writing.
-    pub fn lock(path: &Path, content: Content) -> Result<Self, OutError> {
+    pub fn lock_for(path: &Path, content: Content) -> Result<Self, OutError> {
         let unwritable = |source| OutError::Unwritable {
             path: path.to_owned(),
             source,

@@ -67,14 +67,9 @@ impl Mask {
 #[serde(transparent)]
 pub struct Problem(String);
 
-/// By this the sentence is recognised that the motions of a run have few firm matches.
-const HARDLY_MEASURED: &str = "the radar hardly measured this trajectory";
-
 impl Problem {
-    /// Returns whether the sentence of a problem is that the motions have few firm matches.
-    pub fn is_of_motions(sentence: &str) -> bool {
-        sentence.contains(HARDLY_MEASURED)
-    }
+    /// The words of a problem of motions that have few firm matches.
+    pub const OF_MOTIONS: &str = "the radar hardly measured this trajectory";
 
     fn of(data: &str, out: &Path, session: &Session<'_>, counts: &Counts) -> Option<Self> {
         let scans = session.scans.unwrap_or(counts.processed as usize);
@@ -93,13 +88,13 @@ impl Problem {
                 "{unreadable} of the {scans} scans of {data} cannot be read: the results are of the others, and {log} says what is wrong with each"
             )));
         }
-        if let Some(motions) = counts.too_many_are_unsure() {
-            let MotionCounts {
-                weak, predicted, ..
-            } = motions;
-            let all = motions.refined + motions.doubtful;
+        if let Some(it) = counts.too_many_are_unsure() {
             return Some(Self(format!(
-                "{weak} weak and {predicted} predicted motions of {all}: {HARDLY_MEASURED}. The mask keeps too little, or a constant in [dataset] is wrong: `gyre masks` and `gyre inspect` show which"
+                "{} weak and {} predicted motions of {}: {}. The mask keeps too little, or a constant in [dataset] is wrong: `gyre masks` and `gyre inspect` show which",
+                it.weak,
+                it.predicted,
+                it.refined + it.doubtful,
+                Self::OF_MOTIONS
             )));
         }
         if let Some(gyro) = counts.gyro_contradicts() {

@@ -15,7 +15,7 @@ use gyre_journal::{
     keyframes::Keyframes,
 };
 use gyre_messages::{Item, MotionEstimate, MotionHeader, PoseHeader, compose, flag};
-use gyre_results::{Content, Identity, Out, Programs, Session};
+use gyre_results::{Identity, Out, Programs, Session};
 use gyre_run::Ending;
 use gyre_scan_matching::Refiner;
 use gyre_slam::{Keyframe, SlamKind, records_path};
@@ -89,7 +89,7 @@ impl Machine {
 
     /// Does what the command does, to the end of the run.
     pub fn run(&self, folder: &Path) -> Result<(), Failure> {
-        let out = Out::lock(folder, Content::RUN)?;
+        let out = Out::lock(folder)?;
         let resumed = match Earlier::of(&out, &self.configuration, &self.programs, false)? {
             Earlier::Ended(begun) => begun.poses,
             Earlier::Unfinished(begun) => self.go_on(&out, Some(begun))?,

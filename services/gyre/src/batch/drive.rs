@@ -14,7 +14,7 @@ use gyre_configuration::{
 };
 use gyre_datasets::OpenError;
 use gyre_masking::MaskerError;
-use gyre_results::{Content, Form, Holds, Identity, Out, OutError, Problem, SUMMARY};
+use gyre_results::{Form, Holds, Identity, Out, OutError, Problem, SUMMARY};
 use gyre_simulator::SimulatorError;
 use gyre_stage::run::end_with;
 use gyre_terminal::{Failure, INTERRUPTED, print};
@@ -99,7 +99,7 @@ fn computed(arguments: &RunArguments) -> Result<(DriveOutcome, bool), Failure> {
 fn locked(path: &Path) -> Result<Out, OutError> {
     let deadline = Instant::now() + ENDING;
     loop {
-        match Out::lock(path, Content::RUN) {
+        match Out::lock(path) {
             Err(OutError::Held { .. }) if Instant::now() < deadline => thread::sleep(LOOK),
             locked => return locked,
         }
@@ -199,7 +199,7 @@ fn outcome_of(failure: &Failure) -> DriveOutcome {
 }
 
 fn outcome_of_problem(sentence: &str) -> DriveOutcome {
-    match Problem::is_of_motions(sentence) {
+    match sentence.contains(Problem::OF_MOTIONS) {
         true => DriveOutcome::Unsure,
         false => DriveOutcome::Corrupt,
     }

@@ -152,7 +152,6 @@ mod tests {
 
     use gyre_journal::Journal;
     use gyre_messages::{Item, PoseHeader};
-    use gyre_results::Content;
     use tempfile::TempDir;
 
     use super::{super::make_way, *};
@@ -175,7 +174,7 @@ mod tests {
     /// The folder of a complete run, the journal of which is put aside.
     fn being_replaced() -> (TempDir, Out) {
         let folder = tempfile::tempdir().unwrap();
-        let out = Out::lock(folder.path(), Content::RUN).unwrap();
+        let out = Out::lock(folder.path()).unwrap();
         compute(&out, 0..3);
         storage::write(&out.join(COMPLETE), "poses = 3\n").unwrap();
         assert!(!is_untouched(&out).unwrap());

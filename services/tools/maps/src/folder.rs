@@ -32,7 +32,7 @@ pub fn settle(map: &Path) -> Result<(), Failure> {
         return Ok(());
     }
     let path = map.display();
-    let _locked = Out::lock(map, Content::MAP).map_err(|error| match error {
+    let _locked = Out::lock_for(map, Content::MAP).map_err(|error| match error {
         OutError::Held { holder, .. } => {
             format!("the map {path} is being replaced by another command{holder}: wait for it")
         }
@@ -190,7 +190,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let map = folder.path();
         write_all(&map.join(NEXT), "later");
-        let writing = Out::lock(map, Content::MAP).unwrap();
+        let writing = Out::lock_for(map, Content::MAP).unwrap();
         let refused = settle(map).unwrap_err().to_string();
         assert!(
             refused.starts_with("the map ") && refused.contains("is being replaced by another"),

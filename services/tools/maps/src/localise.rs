@@ -18,6 +18,7 @@ use std::{
 };
 
 use clap::Args;
+use gyre_configuration::Configuration;
 use gyre_datasets::write_tum;
 use gyre_geometry::Pose;
 use gyre_inputs::Inputs;
@@ -40,9 +41,8 @@ const FIXES: &str = "fixes.csv";
 const TUM: &str = "fixes.tum";
 /// The same, drawn over the map.
 const PICTURE: &str = "fixes.png";
-/// When none of so many scans at the start was found, as many as [`PROBES`] are looked for that are
-/// spread over the drive. If a tenth of the drive is on the map, four probes are too, and of each
-/// 86 % are found at least: that none is found happens once in 2,600 drives.
+/// If none of so many scans at the start is found, so many spread over the drive are searched: with
+/// a tenth of it on the map four, each found by 86 %, and none of them once in 2,600 drives.
 const FIRST: usize = 20;
 const PROBES: usize = 40;
 /// Time between two plain lines.
@@ -86,28 +86,23 @@ pub fn localise(arguments: &LocaliseArguments) -> Result<ExitCode, Failure> {
     let mut localiser = searched_map::open(&arguments.map, &configuration)?;
     let mut scans = Scans::open(&configuration)?;
     let out = &arguments.out;
-    let _locked = Out::lock(out, Content::FIXES)?;
+    let _locked = Out::lock_for(out, Content::FIXES)?;
     let mut fixes = Draft::create(&out.join(FIXES))?;
     let mut path = Fixed {
         stamps_ns: Vec::new(),
         pieces: vec![Vec::new()],
     };
     let (started, mut counts) = (Instant::now(), Counts::default());
-    let is_elsewhere = |localiser: &mut Localiser| {
-        let mut scans = Scans::open_silently(&configuration)?;
-        let is_found = |it: &Observation<'_>| localiser.find(it.points, &it.twist).is_some();
-        Ok(!scans.any_of(PROBES, is_found))
-    };
     let ended = follow(
         &mut scans,
         &mut localiser,
         &mut fixes,
         &mut counts,
         &mut path,
-        &is_elsewhere,
+        &configuration,
     );
-    let looked_for = counts.scans() + PROBES * usize::from(!scans.is_empty());
-    let ms_a_scan = started.elapsed().as_secs_f64() * 1e3 / looked_for.max(1) as f64;
+    let searched = counts.scans() + PROBES * usize::from(!scans.is_empty());
+    let ms_a_scan = started.elapsed().as_secs_f64() * 1e3 / searched.max(1) as f64;
     fixes.commit()?;
     let drawn = draw(&arguments.map, &path, out);
     ended?;
@@ -127,20 +122,13 @@ pub fn localise(arguments: &LocaliseArguments) -> Result<ExitCode, Failure> {
     }
     match counts.has_fix() {
         true => Ok(ExitCode::SUCCESS),
-        false => {
-            let looked_for = match scans.is_empty() {
-                true => String::new(),
-                false => format!(
-                    " (the first {FIRST} and {PROBES} that are spread over the drive were looked for; source.first and source.scans choose a part)"
-                ),
-            };
-            Err(format!(
-                "no scan of {} was found in {}{looked_for}: it may be of another place, or made with settings for another radar",
-                configuration.data(),
-                arguments.map.display()
-            )
-            .into())
-        }
+        false => Err(format!(
+            "no scan of {}, of {searched} that were searched, was found in {}: it may be of another \
+             place, or made with settings for another radar; source.first and source.scans choose a part",
+            configuration.data(),
+            arguments.map.display()
+        )
+        .into()),
     }
 }
 
@@ -173,7 +161,7 @@ fn follow(
     fixes: &mut Draft,
     counts: &mut Counts,
     path: &mut Fixed,
-    is_elsewhere: &dyn Fn(&mut Localiser) -> Result<bool, Failure>,
+    configuration: &Configuration,
 ) -> Result<(), Failure> {
     fixes.append(fixes::HEADER)?;
     let (mut progress, mut row) = (Progress::new(scans.len()), String::new());
@@ -188,9 +176,11 @@ fn follow(
         counts.add(&scan, found.status);
         path.add(scan.observation.stamp_ns, &found);
         progress.show(counts.scans(), found.status);
-        let is_lost = counts.scans() == FIRST && !counts.has_fix();
-        if is_lost && !scans.is_empty() && is_elsewhere(localiser)? {
-            break;
+        if counts.scans() == FIRST && !counts.has_fix() && !scans.is_empty() {
+            let is_found = |it: &Observation<'_>| localiser.find(it.points, &it.twist).is_some();
+            if !Scans::open(configuration)?.any_of(PROBES, is_found)? {
+                break;
+            }
         }
     }
     progress.finish();

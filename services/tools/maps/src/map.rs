@@ -63,7 +63,7 @@ fn draw_run(arguments: &MapArguments) -> Result<Drawing, Failure> {
     let poses = read_trajectory(&trajectory)?;
     let loops = loops::used_loops(&arguments.run.join(LOOPS))?;
     let configuration = configuration(&arguments.run)?;
-    let _locked = Out::lock(&arguments.out, Content::MAP)?;
+    let _locked = Out::lock_for(&arguments.out, Content::MAP)?;
     let options = MapOptions {
         cell_m: arguments.cell_m,
         ..map_options(&configuration)
@@ -340,7 +340,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         run(folder.path());
         let out = folder.path().join("map");
-        let other = Out::lock(&out, Content::MAP).unwrap();
+        let other = Out::lock_for(&out, Content::MAP).unwrap();
         let refused = map(&arguments(folder.path())).unwrap_err().to_string();
         assert!(
             refused.starts_with("another command is writing to")
@@ -372,7 +372,7 @@ mod tests {
             ..arguments(folder.path())
         };
         let refused = || map(&arguments).unwrap_err().to_string();
-        let other = Out::lock(&extended, Content::MAP).unwrap();
+        let other = Out::lock_for(&extended, Content::MAP).unwrap();
         assert!(refused().starts_with("another command"), "{}", refused());
         drop(other);
         assert!(

@@ -62,7 +62,7 @@ pub fn masks(arguments: &MasksArguments) -> Result<ExitCode, Failure> {
         .iter()
         .for_each(print::note);
     let out = &arguments.out;
-    let _locked = Out::lock(out, Content::MASKS)?;
+    let _locked = Out::lock_for(out, Content::MASKS)?;
     if !arguments.json {
         print::line(inspection::HEADER)?;
     }

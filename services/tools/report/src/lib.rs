@@ -20,7 +20,7 @@ use gyre_datasets::read_trajectory;
 use gyre_results::{evaluate::truth_of_run, write_page};
 use gyre_terminal::{Failure, print};
 
-use page::{MADE_BY, page};
+use page::page;
 use subject::Subject;
 
 /// The arguments of `gyre report`.
@@ -59,7 +59,7 @@ pub fn report(arguments: &ReportArguments) -> Result<ExitCode, Failure> {
         .to
         .clone()
         .unwrap_or_else(|| default_page(&arguments.subjects));
-    write_page(&to, &page(&subjects?)?, MADE_BY)?;
+    write_page(&to, &page(&subjects?)?, "<p>by gyre report, ")?;
     print::line(to.display())?;
     if arguments.open {
         open(&to)?;

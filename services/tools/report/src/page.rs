@@ -16,8 +16,6 @@ use crate::{
 
 /// The groups of figures that stand behind the pictures.
 const LAST: [&str; 2] = ["Counts", "Versions"];
-/// By this a page of Gyre's own is recognised.
-pub const MADE_BY: &str = "<p>by gyre report, ";
 /// Larger maps are left out, bytes.
 const LARGEST_MAP: usize = 16 << 20;
 /// Pixels of a bar that stands for the longest time.
@@ -63,7 +61,7 @@ pub fn page(subjects: &[Subject]) -> Result<String, Failure> {
          <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
          <title>{title}</title>\n<style>\n{style}</style>\n</head>\n<body>\n<h1>{title}</h1>\n\
-         {MADE_BY}{version}</p>\n{body}</body>\n</html>\n",
+         <p>by gyre report, {version}</p>\n{body}</body>\n</html>\n",
         title = escaped(&title),
         style = include_str!("style.css"),
         version = env!("CARGO_PKG_VERSION"),

@@ -72,12 +72,11 @@ mod tests {
     use std::fs;
 
     use super::*;
-    use crate::Content;
 
     #[test]
     fn a_result_that_is_not_made_again_is_removed_and_other_files_stay() {
         let folder = tempfile::tempdir().unwrap();
-        let out = Out::lock(folder.path(), Content::RUN).unwrap();
+        let out = Out::lock(folder.path()).unwrap();
         let others = [SIMULATED_TRUTH, "notes.txt"];
         for name in [&others[..], &["odometry.csv", "map.png"]].concat() {
             fs::write(out.join(name), "old").unwrap();

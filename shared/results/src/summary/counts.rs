@@ -15,8 +15,7 @@ const MAX_UNREADABLE_SHARE: f64 = 0.2;
 const MAX_REFUSED_SHARE: f64 = 0.1;
 const MAX_SLIPPING_SHARE: f64 = 0.5;
 const MIN_CONTRADICTIONS: u64 = 10;
-/// Largest share of motions without a firm match in a run that succeeds. With more, the constants
-/// or the mask hide what the radar measures.
+/// Largest share of motions without a firm match in a run that succeeds.
 const MAX_UNSURE_SHARE: f64 = 0.2;
 
 /// Motions from which the radar's period is taken, so that longer runs take no more memory.

@@ -6,7 +6,7 @@ use gyre_evaluation::LoopErrors;
 use serde::Serialize;
 
 /// The counts of loops in the summary.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Default, Serialize)]
 pub struct SlamSummary {
     /// Keyframes.
     pub keyframes: usize,

@@ -6,7 +6,7 @@ use gyre_configuration::{Configuration, describe_masks_in_process};
 use gyre_datasets::{Dataset, ScanSamples};
 use gyre_geometry::Twist;
 use gyre_localisation::Observation;
-use gyre_odometry::{Odometry, Outcome, Registered};
+use gyre_odometry::{Odometry, Outcome};
 use gyre_radar::OwnedScan;
 use gyre_terminal::{Failure, print};
 
@@ -39,19 +39,11 @@ impl Scans {
     /// # Errors
     /// A recording or a configuration that cannot be used.
     pub fn open(configuration: &Configuration) -> Result<Self, Failure> {
+        let played = gyre_configuration::open(configuration)?;
+        let dataset = played.dataset;
         describe_masks_in_process(configuration)?
             .iter()
             .for_each(print::note);
-        Self::open_silently(configuration)
-    }
-
-    /// Opens the same once more.
-    ///
-    /// # Errors
-    /// As [`open`](Self::open).
-    pub fn open_silently(configuration: &Configuration) -> Result<Self, Failure> {
-        let played = gyre_configuration::open(configuration)?;
-        let dataset = played.dataset;
         Ok(Self {
             played: configuration.source.played(dataset.scans()),
             odometry: Odometry::new(&configuration.odometry)?,
@@ -85,7 +77,17 @@ impl Scans {
     /// More scans in a row that cannot be used than the configuration allows.
     pub fn register_next(&mut self) -> Result<Option<RegisteredScan<'_>>, Failure> {
         while let Some(number) = self.played.next() {
-            let registered = match self.register(number) {
+            let registered = match self.dataset.read(number, self.scan.slot()) {
+                Ok(geometry) => {
+                    self.scan.geometry = geometry;
+                    let scan = self.scan.view();
+                    let samples = self.samples.of(self.dataset.as_ref(), scan.span_ns());
+                    let registered = self.odometry.register(&scan, &samples);
+                    registered.map_err(|error| format!("scan {number}: {error}"))
+                }
+                Err(error) => Err(error.to_string()),
+            };
+            let registered = match registered {
                 Ok(registered) => registered,
                 Err(reason) => {
                     self.leave_out(&reason)?;
@@ -93,55 +95,48 @@ impl Scans {
                 }
             };
             self.unreadable = 0;
-            return Ok(Some(self.observed(number, &registered)));
+            let starts = registered.outcome == Outcome::Start;
+            let interval_s = registered.interval_ns as f64 * 1e-9;
+            let twist = match starts {
+                true => Twist::default(),
+                false => Twist::from_chord(&registered.motion.motion, interval_s),
+            };
+            let observation = Observation {
+                stamp_ns: self.scan.geometry.stamp_ns,
+                points: self.odometry.points(),
+                twist,
+                motion: registered.motion.alone(),
+            };
+            return Ok(Some(RegisteredScan {
+                number,
+                observation,
+                starts,
+            }));
         }
         Ok(None)
     }
 
-    /// Registers scans that are spread evenly over the drive, each by the scan before alone, and
-    /// returns whether `is_found` holds for one of them.
+    /// Registers scans that are spread evenly over those that are left, each by the scan before
+    /// alone, and returns whether `is_found` holds for one of them.
+    ///
+    /// # Errors
+    /// As [`register_next`](Self::register_next).
     pub fn any_of(
-        &mut self,
+        mut self,
         probes: usize,
         mut is_found: impl FnMut(&Observation<'_>) -> bool,
-    ) -> bool {
-        let (first, step) = (self.played.start, self.len().div_ceil(probes).max(1));
-        let mut numbers = self.played.clone().skip(step / 2).step_by(step);
-        numbers.any(|number| {
+    ) -> Result<bool, Failure> {
+        let step = self.len().div_ceil(probes).max(1);
+        for number in self.played.clone().skip(step / 2).step_by(step) {
             self.odometry.restart();
-            let before = number.saturating_sub(1).max(first);
-            let registered = self.register(before).and_then(|_| self.register(number));
-            registered.is_ok_and(|it| is_found(&self.observed(number, &it).observation))
-        })
-    }
-
-    fn register(&mut self, number: usize) -> Result<Registered, String> {
-        let read = self.dataset.read(number, self.scan.slot());
-        self.scan.geometry = read.map_err(|error| error.to_string())?;
-        let scan = self.scan.view();
-        let samples = self.samples.of(self.dataset.as_ref(), scan.span_ns());
-        let registered = self.odometry.register(&scan, &samples);
-        registered.map_err(|error| format!("scan {number}: {error}"))
-    }
-
-    fn observed(&self, number: usize, registered: &Registered) -> RegisteredScan<'_> {
-        let starts = registered.outcome == Outcome::Start;
-        let interval_s = registered.interval_ns as f64 * 1e-9;
-        let twist = match starts {
-            true => Twist::default(),
-            false => Twist::from_chord(&registered.motion.motion, interval_s),
-        };
-        let observation = Observation {
-            stamp_ns: self.scan.geometry.stamp_ns,
-            points: self.odometry.points(),
-            twist,
-            motion: registered.motion.alone(),
-        };
-        RegisteredScan {
-            number,
-            observation,
-            starts,
+            self.played = number.saturating_sub(1)..number + 1;
+            while let Some(scan) = self.register_next()? {
+                if scan.number == number && is_found(&scan.observation) {
+                    return Ok(true);
+                }
+            }
         }
+        Ok(false)
     }
 
     fn leave_out(&mut self, reason: &str) -> Result<(), Failure> {

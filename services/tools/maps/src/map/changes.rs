@@ -53,10 +53,8 @@ pub fn compare(arguments: &MapArguments, later: &Path) -> Result<ExitCode, Failu
     let mut localiser = open_earlier(earlier, &configuration)?;
     // Before the search, which takes minutes for a long drive. Drives that are refused make no
     // folder.
-    let locked = out
-        .exists()
-        .then(|| Out::lock(out, Content::MAP))
-        .transpose()?;
+    let lock = || Out::lock_for(out, Content::MAP);
+    let locked = out.exists().then(lock).transpose()?;
     let placed = placing::place(&graph, &mut keyframes, &mut localiser, [later, earlier])?;
     let surveys = survey(&localiser, &mut keyframes, &placed)?;
     let found = changes(&surveys[0], &surveys[1])?;
@@ -68,7 +66,7 @@ pub fn compare(arguments: &MapArguments, later: &Path) -> Result<ExitCode, Failu
         )
         .into());
     }
-    let _locked = locked.map_or_else(|| Out::lock(out, Content::MAP), Ok)?;
+    let _locked = locked.map_or_else(lock, Ok)?;
     storage::write(&out.join(TABLE), table(&found.changes)?)?;
     let picture = draw(out, &mut keyframes, &placed.poses, &configuration, &found)?;
     storage::write(&out.join(PICTURE), picture)?;

@@ -29,16 +29,14 @@ pub fn extend(arguments: &MapArguments, map: &Path) -> Result<Drawing, Failure> 
     let earlier = gyre_mapping::Map::open(map)?;
     // Before the search, which takes minutes for a long drive. A drive that is refused makes no
     // folder.
-    let locked = out
-        .exists()
-        .then(|| Out::lock(out, Content::MAP))
-        .transpose()?;
+    let lock = || Out::lock_for(out, Content::MAP);
+    let locked = out.exists().then(lock).transpose()?;
     let placed = placing::place(&graph, &mut keyframes, &mut localiser, [run, map])?;
     let (known, poses) = (localiser.map(), placed.poses);
     let ends = |it: &FoundKeyframe| [known.pose(it.fix.keyframe), poses[it.keyframe]];
     let loops = placed.agreeing.iter().map(ends).collect();
     let all = all(known.keyframes(), &mut keyframes, &poses)?;
-    let _locked = locked.map_or_else(|| Out::lock(out, Content::MAP), Ok)?;
+    let _locked = locked.map_or_else(lock, Ok)?;
     let mut drawing = Drawing::new(earlier.options(), out)?;
     for keyframe in &all {
         drawing.draw(keyframe, &keyframe.pose.motion)?;

@@ -39,12 +39,11 @@ pub struct DatasetOptions {
     /// The file format. Default: detected from the folder, else from the first image.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub format: Option<Format>,
-    /// Depth of a range bin, 0.02 to 1.5 m. Default: Oxford, OORD and FoMo 0.0438, Boreas 0.0596
-    /// (0.04381 from 2021-09-21), Boreas-RT 0.04381, MulRan 200/3360, RADIATE 100/576.
+    /// Depth of a range bin, m. Default: Oxford, OORD and FoMo 0.0438, Boreas 0.0596 (0.04381 from
+    /// 2021-09-21), Boreas-RT 0.04381, MulRan 200/3360, RADIATE 100/576.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub range_resolution_m: Option<f32>,
-    /// Offset of the ranges, -5 to 5 m. Default: Boreas and Boreas-RT -0.31, FoMo -0.32, all
-    /// others 0.
+    /// Offset of the ranges, m. Default: Boreas and Boreas-RT -0.31, FoMo -0.32, all others 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub range_offset_m: Option<f32>,
     /// Doppler coefficient, s: metres to add to a range for each m/s of closing speed, see
