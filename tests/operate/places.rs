@@ -4,9 +4,7 @@ use std::{fs, os::unix::fs::FileTypeExt, path::Path, process::Command, thread};
 
 use crate::common::{Ended, Run, folder, gyre};
 
-/// Names of files that commands write, in a folder of somebody else.
 const NAMES: &str = "config.toml map.png fixes.csv masks.png calibration.toml trajectory.svg report.json results.csv dataset.toml shadow.csv";
-/// By these words a command refuses a place.
 const REFUSALS: &str = "was not written by|has the files of|fills a folder|exist|is not a page of";
 
 /// Each command that writes to a place that is named, without the place.
@@ -32,8 +30,7 @@ fn commands(run: &Run, files: &Path) -> Vec<String> {
     ]
 }
 
-/// The first of the commands whose place must be new.
-const NEW_FROM: usize = 11;
+const NEW_FROM: usize = 11; // The places of the commands from here on must be new.
 
 fn execute(command: &str, place: &Path) -> Ended {
     let mut process = gyre();

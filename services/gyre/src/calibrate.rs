@@ -219,9 +219,9 @@ impl Recorded {
 
     /// Finds the constants, prints them, and draws the drive.
     fn study(self, picture: &Path) -> Result<Study, Failure> {
-        let (name, scans) = (&self.name, self.drive.sweeps.len());
         print::note(format_args!(
-            "comparing {scans} scans of {name}, about a second each"
+            "comparing the scans of {}, ~1 s each",
+            self.name
         ));
         let study = Study::new(self.drive, &self.configured)?;
         print::line(format_args!("{}: {}", self.name, study.found))?;

@@ -20,8 +20,6 @@ const LOCK: &str = ".lock";
 /// The journal of a complete run while another run takes its place: until that has results, those
 /// in the folder are of the complete run.
 pub const REPLACED: &str = "journal.replaced";
-/// The largest file that can be a page of Gyre's own, bytes.
-const LARGEST_PAGE: u64 = 256 << 20;
 
 /// The content that a command writes into a folder: the command, the file or folder by which an
 /// earlier content of its own is recognised, and the names of the files that it replaces.
@@ -103,7 +101,7 @@ pub fn write_page(to: &Path, page: &str, mark: &str) -> Result<(), OutError> {
         return written.map_err(unwritable);
     }
     let is_page = |text: String| text.is_empty() || text.contains(mark);
-    if kind.is_ok() && !read_text(to, LARGEST_PAGE).is_ok_and(is_page) {
+    if kind.is_ok() && !read_text(to, 256 << 20).is_ok_and(is_page) {
         return Err(OutError::Refused(format!(
             "{} exists and is not a page of Gyre's own: name another file, or remove it",
             to.display()
@@ -169,7 +167,7 @@ pub fn absolute(out: &Path) -> io::Result<PathBuf> {
 }
 
 impl Out {
-    /// Creates and locks the folder for a run. Nothing else in it is changed.
+    /// Creates and locks the folder for a run.
     ///
     /// # Errors
     /// As [`lock_for`](Self::lock_for).

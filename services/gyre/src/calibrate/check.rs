@@ -11,8 +11,7 @@ use gyre_terminal::Failure;
 
 use crate::cli::CalibrateArguments;
 
-/// Returns the ATE by radar alone as configured and with what was found, m; `None` without a ground
-/// truth that can be used.
+/// Returns the ATE by radar alone as configured and as found, m; `None` without a ground truth.
 pub(super) fn ates_m(arguments: &CalibrateArguments, found: &Found) -> Option<[f64; 2]> {
     let mut configuration = arguments.inputs.configuration().ok()?;
     let odometry = &mut configuration.odometry;

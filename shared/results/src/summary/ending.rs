@@ -35,8 +35,8 @@ impl Summary {
 
     fn loops(&self) -> Option<String> {
         let text = self.slam.as_ref()?.to_string();
-        let first = text.lines().next()?.trim_start_matches("slam").trim();
-        Some(format!("{first}; trajectory_slam.tum, map.png"))
+        let first = text.lines().next()?.trim_start_matches("slam");
+        Some(first.trim().to_owned() + "; trajectory_slam.tum, map.png")
     }
 
     fn ending_word(&self) -> &'static str {
