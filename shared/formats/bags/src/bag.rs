@@ -1,6 +1,9 @@
 //! The files of a bag as one, and the description of its radar.
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
 
 use gyre_datasets::DatasetOptions;
 
@@ -10,16 +13,42 @@ use crate::{
     damaged::Span,
     radar::{ENCODER_COUNTS, Survey},
     reading::{BagFile, Channel, Message},
+    spans::TimedSpan,
     topics::{Kind, Topics},
 };
+
+/// What a radar says of itself, or why that cannot be used.
+type OwnDescription = Result<Described, String>;
 
 /// The files of a bag, and the spans of the messages in them.
 pub(crate) struct Bag {
     path: PathBuf,
     pub files: Vec<BagFile>,
-    /// The number of the file of each span, and the span.
-    pub spans: Vec<(usize, Span)>,
+    /// In the order of their first messages.
+    spans: Vec<Placed>,
 }
+
+/// A span of a file.
+struct Placed {
+    file: usize,
+    span: Span,
+    /// When its first message was received, ns.
+    from_ns: i64,
+}
+
+/// The place of a message in the order of time, and then of the files.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Key {
+    /// When the message was received, ns.
+    ns: i64,
+    /// The number of its span.
+    pub span: u32,
+    /// Its number in the span, among those that are wanted.
+    number: u32,
+}
+
+/// A message is put into order among those of so many spans. Chunks have about 1 MB.
+const WINDOW: usize = 64;
 
 impl Bag {
     /// Opens the files, which are in order.
@@ -29,25 +58,90 @@ impl Bag {
             files: Vec::new(),
             spans: Vec::new(),
         };
+        let mut all = Vec::new();
         for (number, path) in paths.iter().enumerate() {
             let (file, spans) = BagFile::open(path)?;
             bag.files.push(file);
-            bag.spans
-                .extend(spans.into_iter().map(|span| (number, span)));
+            all.extend(spans.into_iter().map(|span| (number, span)));
         }
+        let ns = |time: u64| i64::try_from(time).unwrap_or(i64::MAX);
+        all.sort_by_key(|(_, span)| span.times_ns.map(|(first, _)| first));
+        let placed = |(number, (file, timed)): (usize, &(usize, TimedSpan))| {
+            // What comes later than the window reaches is placed at its end.
+            let before = number.checked_sub(WINDOW).and_then(|it| all[it].1.times_ns);
+            let reached_ns = before.map_or(0, |(_, last)| ns(last));
+            Placed {
+                file: *file,
+                span: timed.span,
+                from_ns: timed
+                    .times_ns
+                    .map_or(0, |(first, _)| ns(first))
+                    .max(reached_ns),
+            }
+        };
+        bag.spans = all.iter().enumerate().map(placed).collect();
         Ok(bag)
     }
 
+    /// Returns the file of a span.
+    pub fn file_of(&self, span: u32) -> Option<&BagFile> {
+        self.files.get(self.spans.get(span as usize)?.file)
+    }
+
     /// Returns the messages of a span that are wanted.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or whose messages are compressed. A damaged span has no messages,
+    /// and its file knows that.
     pub fn read(
         &mut self,
-        span: usize,
+        span: u32,
         wanted: impl Fn(&Channel) -> bool,
-    ) -> Result<Vec<Message>, BagError> {
-        let Some(&(file, span)) = self.spans.get(span) else {
+    ) -> Result<Vec<(Key, Message)>, BagError> {
+        let Some(placed) = self.spans.get(span as usize) else {
             return Ok(Vec::new());
         };
-        self.files[file].read(span, wanted)
+        let messages = match self.files[placed.file].read(placed.span, wanted) {
+            Err(BagError::Damaged { .. }) => Vec::new(),
+            read => read?,
+        };
+        let key = |(number, message): (u32, Message)| {
+            let ns = message.log_ns.max(placed.from_ns);
+            (Key { ns, span, number }, message)
+        };
+        Ok((0..).zip(messages).map(key).collect())
+    }
+
+    /// Calls `each` with the messages that are wanted, in the order in which they were received,
+    /// until it returns false.
+    ///
+    /// # Errors
+    /// As [`Bag::read`].
+    pub fn read_in_order(
+        &mut self,
+        wanted: impl Fn(&Channel) -> bool,
+        mut each: impl FnMut(&Self, Key, &Message) -> bool,
+    ) -> Result<(), BagError> {
+        let mut waiting = BTreeMap::new();
+        for span in 0..=self.spans.len() as u32 {
+            let ns = self
+                .spans
+                .get(span as usize)
+                .map_or(i64::MAX, |it| it.from_ns);
+            let next = Key {
+                ns,
+                span,
+                number: 0,
+            };
+            while let Some(first) = waiting.first_entry().filter(|it| *it.key() < next) {
+                let (key, message) = first.remove_entry();
+                if !each(self, key, &message) {
+                    return Ok(());
+                }
+            }
+            waiting.extend(self.read(span, &wanted)?);
+        }
+        Ok(())
     }
 
     pub fn channels(&self) -> Vec<&Channel> {
@@ -57,11 +151,11 @@ impl Bag {
 
     /// Learns all channels. A file without a list of them is read as a whole.
     pub fn learn_channels(&mut self) {
-        for span in 0..self.spans.len() {
-            let (file, _) = self.spans[span];
-            if !self.files[file].has_summary {
+        for placed in &self.spans {
+            let file = &mut self.files[placed.file];
+            if !file.has_summary {
                 // What is damaged has no channels.
-                let _ = self.read(span, |_| false);
+                let _ = file.read(placed.span, |_| false);
             }
         }
     }
@@ -73,7 +167,7 @@ impl Bag {
         topics: &Topics,
         options: &DatasetOptions,
     ) -> Result<(Described, Origin), BagError> {
-        let (survey, own) = self.survey(topics);
+        let (survey, own) = self.survey(topics)?;
         let usual = match &own {
             Some(Ok(own)) => own.radar.encoder_size,
             _ => ENCODER_COUNTS,
@@ -104,37 +198,34 @@ impl Bag {
 
     /// Looks at the first messages with scans, and for the first configuration that can be used, or
     /// why the first one cannot.
-    fn survey(&mut self, topics: &Topics) -> (Survey, Option<Result<Described, String>>) {
+    fn survey(&mut self, topics: &Topics) -> Result<(Survey, Option<OwnDescription>), BagError> {
         let (mut survey, mut own) = (Survey::new(topics.scans.kind), None);
-        for span in 0..self.spans.len() {
-            let file = self.spans[span].0;
-            let messages = self.read(span, |channel| topics.has(channel));
-            for message in messages.unwrap_or_default() {
-                match (self.configuration(file, topics, &message), &own) {
+        self.read_in_order(
+            |channel| topics.has(channel),
+            |bag, key, message| {
+                match (bag.configuration(key.span, topics, message), &own) {
                     (Some(Ok(described)), None | Some(Err(_))) => own = Some(Ok(described)),
                     (Some(Err(reason)), None) => own = Some(Err(reason)),
-                    (None, _) if !survey.is_done() => survey.add(&message),
+                    (None, _) if !survey.is_done() => survey.add(message),
                     _ => {}
                 }
-            }
-            let is_known = topics.configuration.is_none() || matches!(own, Some(Ok(_)));
-            if survey.is_done() && is_known {
-                break;
-            }
-        }
-        (survey, own)
+                let is_known = topics.configuration.is_none() || matches!(own, Some(Ok(_)));
+                !(survey.is_done() && is_known)
+            },
+        )?;
+        Ok((survey, own))
     }
 
     /// Returns what a message says of the radar, if it is of that topic, or why that cannot be
     /// used.
     fn configuration(
         &self,
-        file: usize,
+        span: u32,
         topics: &Topics,
         message: &Message,
-    ) -> Option<Result<Described, String>> {
+    ) -> Option<OwnDescription> {
         let topic = topics.configuration.as_ref()?;
-        let channel = self.files[file].channels.get(&message.channel)?;
+        let channel = self.file_of(span)?.channels.get(&message.channel)?;
         match topic.kind {
             Kind::Configuration(form) if channel.topic == topic.name => {
                 let described = described(form, message);

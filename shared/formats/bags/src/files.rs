@@ -177,7 +177,8 @@ fn listed(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-fn compressed(path: &Path) -> BagError {
+/// The error of a bag of which each message, or each file, is compressed.
+pub(crate) fn compressed(path: &Path) -> BagError {
     BagError::unreadable(
         path,
         "is compressed as a whole or by messages: `ros2 bag convert` with `compression_mode: none` makes one that is read (MCAP's own \

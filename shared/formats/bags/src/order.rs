@@ -3,16 +3,19 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::{BagError, spans::spans};
+use crate::{
+    BagError,
+    spans::{Times, joined, spans},
+};
 
 /// Files of one recorder overlap by no more than this, ns: messages are a little out of order where
 /// one file ends.
 const OVERLAP_NS: u64 = 1_000_000_000;
 
-/// A file and the times at which its first and last message were received, ns since 1970.
+/// A file and the times of its messages.
 struct Timed {
     path: PathBuf,
-    times_ns: Option<(u64, u64)>,
+    times_ns: Times,
 }
 
 /// Returns the files of a folder in the order of their first messages; those without messages come
@@ -24,7 +27,8 @@ pub(crate) fn by_time(folder: &Path, paths: Vec<PathBuf>) -> Result<Vec<PathBuf>
     let mut files = Vec::new();
     for path in paths {
         let file = gyre_storage::open(&path).map_err(|error| BagError::io(&path, error))?;
-        let times_ns = spans(&path, &file)?.times_ns;
+        let spans = spans(&path, &file)?.messages.into_iter();
+        let times_ns = spans.map(|span| span.times_ns).fold(None, joined);
         files.push(Timed { path, times_ns });
     }
     files.sort_by_key(|file| file.times_ns);

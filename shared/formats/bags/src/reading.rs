@@ -1,22 +1,28 @@
 //! The messages of a span.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     fs::File,
     io,
     path::{Path, PathBuf},
 };
 
-use crate::damaged::Span;
+use crate::damaged::{Damage, Span};
 use mcap::{McapError, records::Record};
 
-use crate::{BagError, spans::spans};
+use crate::{
+    BagError,
+    files::compressed,
+    spans::{TimedSpan, spans},
+};
 
 /// The largest number of channels and of schemas of a file, the longest name of a topic, and what
 /// is kept of a schema, bytes.
 const MAX_CHANNELS: usize = 4096;
 const MAX_NAME_BYTES: usize = 1024;
 const MAX_SCHEMA_BYTES: usize = 4096;
+/// The start of what zstd has compressed. No message in CDR begins so.
+const ZSTD: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
 
 /// A channel of a file.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -46,15 +52,19 @@ pub(crate) struct BagFile {
     file: File,
     schemas: BTreeMap<u16, (String, String)>,
     pub channels: BTreeMap<u16, Channel>,
-    /// True if its writer came to its end.
-    pub is_complete: bool,
+    /// The position behind the last record, if the file has no end.
+    cut_at: Option<u64>,
+    /// The places between records that cannot be read.
+    gaps: Damage,
+    /// The positions of the spans that could not be read so far.
+    broken: BTreeSet<u64>,
     /// True if it lists its channels at its end.
     pub has_summary: bool,
 }
 
 impl BagFile {
     /// Opens a file, and returns the spans of its messages.
-    pub fn open(path: &Path) -> Result<(Self, Vec<Span>), BagError> {
+    pub fn open(path: &Path) -> Result<(Self, Vec<TimedSpan>), BagError> {
         let file = gyre_storage::open(path).map_err(|error| BagError::io(path, error))?;
         let found = spans(path, &file)?;
         let mut bag = Self {
@@ -62,14 +72,26 @@ impl BagFile {
             file,
             schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
-            is_complete: found.is_complete,
+            cut_at: (!found.is_complete).then_some(found.end),
+            gaps: found.damage,
+            broken: BTreeSet::new(),
             has_summary: false,
         };
         for span in found.summary {
             bag.read(span, |_| false)?;
         }
-        bag.has_summary = !bag.channels.is_empty();
+        // One that is damaged may lack a channel.
+        bag.has_summary = !bag.channels.is_empty() && found.damage.places == 0;
         Ok((bag, found.messages))
+    }
+
+    /// Returns a sentence about what is damaged or missing, as far as the file has been read.
+    pub fn damage(&self) -> Option<String> {
+        let mut damage = self.gaps;
+        self.broken.iter().for_each(|offset| damage.add(*offset));
+        let first = self.broken.first().copied().unwrap_or(u64::MAX);
+        damage.first = damage.first.min(first);
+        damage.of_file(&self.path, self.cut_at)
     }
 
     /// Returns the messages of a span that are of wanted channels, and learns the channels in it.
@@ -89,12 +111,19 @@ impl BagFile {
             }
             Err(error) => return Err(BagError::io(&self.path, error)),
         };
-        read.map_err(|error| BagError::Damaged {
-            path: self.path.clone(),
-            offset: span.offset,
-            reason: error.to_string(),
-        })?;
-        Ok(messages)
+        if let Err(error) = read {
+            self.broken.insert(span.offset);
+            return Err(BagError::Damaged {
+                path: self.path.clone(),
+                offset: span.offset,
+                reason: error.to_string(),
+            });
+        }
+        let is_compressed = |message: &Message| message.data.starts_with(&ZSTD);
+        match messages.iter().any(is_compressed) {
+            true => Err(compressed(&self.path)),
+            false => Ok(messages),
+        }
     }
 
     fn parse(

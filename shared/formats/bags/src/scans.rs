@@ -3,7 +3,11 @@
 mod index;
 mod notes;
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeMap,
+    ops::RangeInclusive,
+    path::{Path, PathBuf},
+};
 
 use gyre_colossus::{Constants, SweepAssembler};
 use gyre_datasets::{
@@ -16,10 +20,10 @@ use gyre_samples::{BagFixes, Sample, SampleKind};
 use crate::{
     BagError,
     azimuths::{Described, azimuths},
-    bag::Bag,
+    bag::{Bag, Key},
     files::files,
     fixes,
-    reading::Message,
+    reading::{BagFile, Message},
     samples,
     topics::Topics,
 };
@@ -77,8 +81,9 @@ struct Scans {
     files: FileList,
     period_ns: i64,
     notes: Vec<String>,
-    /// The span that was read last, and its messages of scans.
-    kept: Option<(u32, Vec<Message>)>,
+    damage: Option<String>,
+    /// The spans that were read last, and their messages of scans.
+    kept: (Option<RangeInclusive<u32>>, BTreeMap<Key, Message>),
 }
 
 impl Scans {
@@ -97,7 +102,9 @@ impl Scans {
             return Err(BagError::unreadable(path, reason));
         }
         let stamps = index.entries.iter().map(|entry| entry.stamp_ns);
+        let mut damage = bag.files.iter().filter_map(BagFile::damage);
         Ok(Self {
+            damage: damage.next(),
             period_ns: turn_ns(stamps).unwrap_or(DEFAULT_TURN_NS),
             notes: notes(&bag, &topics, &described, &origin, &index),
             files: paths.iter().cloned().collect(),
@@ -107,7 +114,7 @@ impl Scans {
             described,
             constants,
             index,
-            kept: None,
+            kept: (None, BTreeMap::new()),
         })
     }
 
@@ -115,78 +122,70 @@ impl Scans {
         SweepAssembler::new(&self.described.radar, self.constants).ok()
     }
 
-    /// Returns the messages of scans of a span.
-    fn messages(&mut self, span: u32) -> Result<Vec<Message>, BagError> {
-        if let Some((kept, messages)) = self.kept.take_if(|(kept, _)| *kept == span) {
-            debug_assert_eq!(kept, span);
-            return Ok(messages);
-        }
+    /// Reads the messages of scans of some spans, unless they are there.
+    fn keep(&mut self, spans: &RangeInclusive<u32>) -> Result<(), BagError> {
         let topic = &self.topics.scans.name;
-        self.bag
-            .read(span as usize, |channel| channel.topic == *topic)
+        let (there, messages) = (self.kept.0.take(), &mut self.kept.1);
+        messages.retain(|key, _| spans.contains(&key.span));
+        let is_there = |span: &u32| there.as_ref().is_some_and(|there| there.contains(span));
+        for span in spans.clone().filter(|span| !is_there(span)) {
+            messages.extend(self.bag.read(span, |channel| channel.topic == *topic)?);
+        }
+        self.kept.0 = Some(spans.clone());
+        Ok(())
     }
 
     /// Returns why the message of a scan cannot be decoded.
-    fn damage(&mut self, entry: Entry) -> String {
-        let messages = self.messages(entry.start.span).unwrap_or_default();
-        let message = messages.get(entry.start.message as usize);
+    fn why_damaged(&mut self, entry: &Entry) -> Result<String, BagError> {
+        self.keep(&entry.spans)?;
+        let message = self.kept.1.get(&entry.start.message);
         let decoded = message
             .map(|message| azimuths(self.topics.scans.kind, message, &self.described, |_, _| {}));
         let reason = decoded.and_then(Result::err);
-        reason.unwrap_or_else(|| "it is not as it was when the bag was opened".to_owned())
+        Ok(reason.unwrap_or_else(|| "it is not as it was when the bag was opened".to_owned()))
     }
 
     /// Assembles a scan from the azimuths from its entry's start on.
     fn assemble(
         &mut self,
         index: usize,
-        entry: Entry,
+        entry: &Entry,
         mut slot: ScanSlot<'_>,
     ) -> Result<Option<SweepGeometry>, BagError> {
         let Some(mut assembler) = self.assembler() else {
             return Ok(None);
         };
+        self.keep(&entry.spans)?;
         let mut clock = self.index.clock(index);
         let mut found = None;
-        for span in entry.start.span..=entry.end.span {
-            let messages = match self.messages(span) {
-                // The index went on behind it, too.
-                Err(BagError::Damaged { .. }) => Vec::new(),
-                read => read?,
-            };
-            let first = if span == entry.start.span {
-                entry.start.message as usize
-            } else {
-                0
-            };
-            for (number, message) in messages.iter().enumerate().skip(first) {
-                let mut skipped =
-                    match (span, number as u32) == (entry.start.span, entry.start.message) {
-                        true => entry.start.row,
-                        false => 0,
-                    };
-                // A damaged one between was left out of the index, too.
-                let _ = azimuths(
-                    self.topics.scans.kind,
-                    message,
-                    &self.described,
-                    |azimuth, received_ns| {
-                        if skipped > 0 {
-                            skipped -= 1;
-                            return;
-                        }
-                        for (azimuth, stamp_ns) in clock.stamp(azimuth, received_ns) {
-                            if found.is_none() {
-                                found = assembler.add(&azimuth, stamp_ns, reborrow(&mut slot));
-                            }
-                        }
-                    },
-                );
-                if found.is_some() {
-                    break;
-                }
+        for (key, message) in self.kept.1.range(entry.start.message..) {
+            if self.index.repeated.contains(key) {
+                continue;
             }
-            self.kept = Some((span, messages));
+            let mut skipped = match *key == entry.start.message {
+                true => entry.start.row,
+                false => 0,
+            };
+            // A damaged one between was left out of the index, too.
+            let _ = azimuths(
+                self.topics.scans.kind,
+                message,
+                &self.described,
+                |azimuth, received_ns| {
+                    if skipped > 0 {
+                        skipped -= 1;
+                        return;
+                    }
+                    for (azimuth, stamp_ns) in clock.stamp(azimuth, received_ns) {
+                        if found.is_none() {
+                            found = assembler.add(&azimuth, stamp_ns, reborrow(&mut slot));
+                        }
+                    }
+                },
+            );
+            if found.is_some() {
+                break;
+            }
         }
         Ok(found.map(|sweep| sweep.geometry))
     }
@@ -227,8 +226,7 @@ impl Dataset for Scans {
 
     fn file(&self, index: usize) -> &Path {
         let entry = self.index.entries.get(index);
-        let span = entry.and_then(|entry| self.bag.spans.get(entry.end.span as usize));
-        let file = span.and_then(|(file, _)| self.bag.files.get(*file));
+        let file = entry.and_then(|entry| self.bag.file_of(entry.end.message.span));
         file.map_or(Path::new(""), |file| &file.path)
     }
 
@@ -257,6 +255,10 @@ impl Dataset for Scans {
         &self.notes
     }
 
+    fn damage(&self) -> Option<&str> {
+        self.damage.as_deref()
+    }
+
     fn logged(
         &mut self,
         of: SampleKind,
@@ -271,33 +273,30 @@ impl Dataset for Scans {
 
     fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError> {
         let len = self.len();
-        let entry = *self
-            .index
-            .entries
-            .get(index)
-            .ok_or(ReadError::NoSuchScan { index, len })?;
+        let entry = self.index.entries.get(index).cloned();
+        let entry = entry.ok_or(ReadError::NoSuchScan { index, len })?;
         check_capacity(&self.limits(), &slot)?;
         let path = self.file(index).to_owned();
+        let failed = |error| match error {
+            BagError::Io { path, source } => ReadError::Io { path, source },
+            error => ReadError::Damaged {
+                path: path.clone(),
+                reason: error.to_string(),
+            },
+        };
         if entry.is_damaged {
-            let reason = self.damage(entry);
+            let reason = self.why_damaged(&entry).map_err(failed)?;
             return Err(ReadError::Message {
                 path,
                 index,
                 reason,
             });
         }
-        match self.assemble(index, entry, slot) {
-            Ok(Some(geometry)) => Ok(geometry),
-            Ok(None) => Err(ReadError::Damaged {
-                path,
-                reason: format!("scan {index} is not as it was when the bag was opened"),
-            }),
-            Err(BagError::Io { path, source }) => Err(ReadError::Io { path, source }),
-            Err(error) => Err(ReadError::Damaged {
-                path,
-                reason: error.to_string(),
-            }),
-        }
+        let assembled = self.assemble(index, &entry, slot).map_err(failed)?;
+        assembled.ok_or_else(|| ReadError::Damaged {
+            path: path.clone(),
+            reason: format!("scan {index} is not as it was when the bag was opened"),
+        })
     }
 }
 

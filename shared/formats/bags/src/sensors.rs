@@ -21,7 +21,7 @@ pub(crate) struct Sensor<T: 'static> {
 /// The measurements on a topic.
 pub(crate) struct Measured<T> {
     pub topic: String,
-    /// In the order of the bag.
+    /// In the order in which the bag received them.
     pub measurements: Vec<T>,
 }
 
@@ -41,20 +41,24 @@ impl<T> Sensor<T> {
         let Some((topic, decode)) = self.choose(bag, path, wished)? else {
             return Ok(None);
         };
-        let mut measurements = Vec::new();
-        for span in 0..bag.spans.len() {
-            let messages = match bag.read(span, |channel| channel.topic == topic) {
-                Err(BagError::Damaged { .. }) => continue,
-                read => read?,
-            };
-            for message in &messages {
-                let decoded = decode(message).map_err(|reason| {
-                    let of = self.measurements;
-                    let reason = format!("has messages on {topic} that are no {of}: {reason}");
-                    BagError::unreadable(path, reason)
-                })?;
-                measurements.push(decoded);
-            }
+        let (mut measurements, mut refused) = (Vec::new(), None);
+        bag.read_in_order(
+            |channel| channel.topic == topic,
+            |_, _, message| match decode(message) {
+                Ok(measurement) => {
+                    measurements.push(measurement);
+                    true
+                }
+                Err(reason) => {
+                    refused = Some(reason);
+                    false
+                }
+            },
+        )?;
+        if let Some(reason) = refused {
+            let of = self.measurements;
+            let reason = format!("has messages on {topic} that are no {of}: {reason}");
+            return Err(BagError::unreadable(path, reason));
         }
         Ok(Some(Measured {
             topic,

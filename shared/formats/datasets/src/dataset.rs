@@ -120,6 +120,12 @@ pub trait Dataset: Send {
         &[]
     }
 
+    /// The first place at which the recording is damaged or ends too early, so that scans may be
+    /// missing: a sentence without its full stop. `None` if all that was recorded is there.
+    fn damage(&self) -> Option<&str> {
+        None
+    }
+
     /// Decodes a scan into `slot`, whose slices are at least as long as [`Dataset::limits`].
     ///
     /// # Errors

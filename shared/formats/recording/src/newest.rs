@@ -21,7 +21,8 @@ pub(crate) fn newest(path: &Path) -> Result<(Head, Positions), RecordingError> {
         match step {
             Step::End => break,
             Step::Chunk(_) => has_chunk = true,
-            Step::Metadata(record) => {
+            Step::Channel(_) => {}
+            Step::Metadata(_, record) => {
                 if let Some(read) = Head::of_metadata(&record) {
                     head = read.ok();
                 } else if let Some(table) = Table::of_metadata(&record).filter(|_| has_chunk) {
@@ -45,7 +46,7 @@ pub(crate) fn head(path: &Path) -> Option<Head> {
     let file = gyre_storage::open(path).ok()?;
     let mut walk = Walk::new(path, &file).ok()?;
     // It is before all messages.
-    while let Step::Metadata(record) = walk.next().ok()?? {
+    while let Step::Metadata(_, record) = walk.next().ok()?? {
         if let Some(head) = Head::of_metadata(&record) {
             return head.ok();
         }

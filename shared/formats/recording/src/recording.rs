@@ -3,11 +3,12 @@
 use std::{
     collections::{BTreeMap, BTreeSet},
     fs::File,
+    mem,
     path::{Path, PathBuf},
 };
 
 use foxglove::{Decode, messages::RawImage};
-use gyre_bags::damaged::Span;
+use gyre_bags::damaged::{Damage, Span};
 use gyre_messages::{GivenAnew, Item, NumberedBy, topic};
 
 use crate::{
@@ -57,8 +58,9 @@ struct Part {
     missed: BTreeMap<String, u64>,
     /// The generations of a topic of which the recorder has seen no message.
     skipped: Vec<(String, GivenAnew)>,
-    /// True if its writer came to its end.
-    is_complete: bool,
+    damage: Damage,
+    /// The position behind the last record, if the file has no end.
+    cut_at: Option<u64>,
 }
 
 /// The place of a message.
@@ -196,8 +198,23 @@ impl Recording {
 
     /// Returns the files whose writers were killed.
     pub fn cut(&self) -> impl Iterator<Item = &Path> {
-        let cut = self.parts.iter().filter(|part| !part.is_complete);
+        let cut = self.parts.iter().filter(|part| part.cut_at.is_some());
         cut.map(|part| part.path.as_path())
+    }
+
+    /// Returns a sentence for each file that is damaged or has no end.
+    pub fn damages(&self) -> impl Iterator<Item = String> {
+        let parts = self.parts.iter();
+        parts.filter_map(|part| part.damage.of_file(&part.path, part.cut_at))
+    }
+
+    /// Returns the first of these sentences after which messages may be missing: the next recorder
+    /// of a run repeats the messages that one which was killed had not written.
+    pub fn damage(&self) -> Option<String> {
+        let last = self.parts.len() - 1;
+        let cut_at = |number, part: &Part| part.cut_at.filter(|_| number == last);
+        let mut parts = self.parts.iter().enumerate();
+        parts.find_map(|(number, part)| part.damage.of_file(&part.path, cut_at(number, part)))
     }
 
     /// Reads a message.
@@ -276,40 +293,57 @@ impl Part {
             channels: Channels::new(),
             missed: BTreeMap::new(),
             skipped: Vec::new(),
-            is_complete: false,
+            damage: Damage::default(),
+            cut_at: None,
         };
         let (mut head, mut places, mut chunk) = (None, Vec::new(), None);
+        let (mut is_first, mut is_complete) = (true, false);
         let mut walk = Walk::new(&part.path, &part.file)?;
         while let Some(step) = walk.next()? {
             match step {
-                Step::End => {
-                    part.is_complete = true;
-                    break;
+                // Behind it are the channels again, for one whose first chunk is damaged.
+                Step::End => is_complete = true,
+                Step::Channel(channel) => {
+                    part.channels.entry(channel.id).or_insert(channel.topic);
                 }
                 Step::Chunk(span) => {
                     // The first one has the channels.
-                    if part.channels.is_empty() {
-                        chunk::read(&part.path, &part.file, span, &mut part.channels)?;
+                    if mem::take(&mut is_first) {
+                        match chunk::read(&part.path, &part.file, span, &mut part.channels) {
+                            Err(RecordingError::Damaged { .. }) => walk.note(span),
+                            read => drop(read?),
+                        }
                     }
                     chunk = Some(span);
                 }
-                Step::Metadata(record) => {
+                Step::Metadata(span, record) => {
                     if let Some(read) = Head::of_metadata(&record) {
                         head = Some(read.map_err(|reason| part.foreign(reason))?);
                     } else if let Some(skipped) = generations::of_metadata(&record) {
                         part.skipped.push(skipped);
-                    } else if let (Some(table), Some(chunk)) =
-                        (Table::of_metadata(&record), chunk.take())
-                    {
+                    } else if let Some(table) = Table::of_metadata(&record) {
                         part.missed = table.missed;
+                        // Of a chunk that was not found its messages are known all the same.
+                        let chunk = chunk.take().unwrap_or(Span { bytes: 0, ..span });
                         let topics = table.entries.into_iter();
                         places.extend(topics.map(|(topic, entries)| (topic, entries, chunk)));
+                    } else if Table::is_of(&record) {
+                        walk.note(span);
                     }
                 }
             }
         }
-        let head: Head =
-            head.ok_or_else(|| part.foreign("it has no metadata `gyre.recording`".to_owned()))?;
+        let (damage, end) = walk.damage();
+        (part.damage, part.cut_at) = (damage, (!is_complete).then_some(end));
+        let reason = "it has no metadata `gyre.recording`".to_owned();
+        let head: Head = head.ok_or_else(|| match part.damage.places {
+            0 => part.foreign(reason),
+            _ => RecordingError::Damaged {
+                path: part.path.clone(),
+                offset: part.damage.first,
+                reason,
+            },
+        })?;
         part.number = head.part;
         Ok((head, part, places))
     }

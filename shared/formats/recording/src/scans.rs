@@ -25,6 +25,7 @@ pub(crate) struct Scans {
     first: SweepGeometry,
     period_ns: i64,
     notes: Vec<String>,
+    damage: Option<String>,
     /// Of the scan that was read last.
     samples: Vec<Sample>,
 }
@@ -58,6 +59,7 @@ impl Scans {
         let files: FileList = recording.paths().map(Path::to_owned).collect();
         Ok(Self {
             notes: notes(&recording, &entries),
+            damage: recording.damage(),
             samples: Vec::new(),
             recording,
             files,
@@ -125,10 +127,8 @@ impl Scans {
 
 /// Returns what is missing in a recording: whole sentences.
 fn notes(recording: &Recording, entries: &BTreeMap<usize, Entry>) -> Vec<String> {
-    let mut notes: Vec<String> = recording
-        .cut()
-        .map(|path| format!("{} has no end: its recorder was killed.", path.display()))
-        .collect();
+    let damages = recording.damages();
+    let mut notes: Vec<String> = damages.map(|it| format!("{it}.")).collect();
     notes.extend(recording.absent_parts().iter().map(|number| {
         format!("Part {number} of the recording is not there: what only it holds is missing.")
     }));
@@ -220,6 +220,10 @@ impl Dataset for Scans {
         &self.notes
     }
 
+    fn damage(&self) -> Option<&str> {
+        self.damage.as_deref()
+    }
+
     fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError> {
         let len = self.len();
         if index >= len {
@@ -235,9 +239,13 @@ impl Dataset for Scans {
             .map_err(|error| failed(&path, error))?;
         let damaged = || ReadError::Damaged {
             path: path.clone(),
-            reason: format!("scan {index} does not fit its header"),
+            reason: format!("scan {index} does not fit its header and its table"),
         };
         let (geometry, header) = geometry(&stored).ok_or_else(damaged)?;
+        let (scan, stamp_ns) = (header.item.scan, header.item.stamp_ns);
+        if (scan, stamp_ns) != (entry.scan, entry.stamp_ns) {
+            return Err(damaged());
+        }
         let samples = header.read_samples(&stored.payload);
         self.samples = samples.ok_or_else(damaged)?;
         let powers = header

@@ -89,9 +89,14 @@ impl Table {
         }
     }
 
+    /// Returns whether a record is a table, be it a damaged one.
+    pub fn is_of(record: &Metadata) -> bool {
+        record.name == NAME
+    }
+
     /// Reads a record; `None` if it is another one, or no table.
     pub fn of_metadata(record: &Metadata) -> Option<Self> {
-        if record.name != NAME {
+        if !Self::is_of(record) {
             return None;
         }
         let mut table = Self::default();

@@ -2,8 +2,8 @@
 
 use std::{fs::File, io, path::Path};
 
-use gyre_bags::damaged::Span;
-use mcap::records::{Metadata, Record, op};
+use gyre_bags::damaged::{Damage, Span};
+use mcap::records::{Channel, Metadata, Record, op};
 
 use crate::RecordingError;
 
@@ -12,8 +12,10 @@ const PREFIX: usize = 9;
 
 /// A record that readers of recordings look at.
 pub(crate) enum Step {
-    Metadata(Metadata),
+    Metadata(Span, Metadata),
     Chunk(Span),
+    /// A channel that the end of the file lists.
+    Channel(Channel),
     /// The end of the data, as a writer leaves it that was not killed.
     End,
 }
@@ -42,31 +44,38 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// Returns the next record; `None` where the file ends before its end.
+    /// Returns the next record that can be read; `None` where the file ends.
     pub fn next(&mut self) -> Result<Option<Step>, RecordingError> {
         while let Some((opcode, span)) = self.records.next().map_err(|e| failed(self.path, e))? {
             match opcode {
                 op::CHUNK => return Ok(Some(Step::Chunk(span))),
                 op::DATA_END | op::FOOTER => return Ok(Some(Step::End)),
-                op::METADATA => return self.metadata(span).map(Some),
+                op::METADATA | op::CHANNEL => {
+                    let record = gyre_bags::damaged::read(self.file, span);
+                    let record = record.map_err(|e| failed(self.path, e))?;
+                    let body = record.get(PREFIX..).unwrap_or_default();
+                    match gyre_bags::damaged::parse(opcode, body) {
+                        Ok(Record::Metadata(record)) => {
+                            return Ok(Some(Step::Metadata(span, record)));
+                        }
+                        Ok(Record::Channel(channel)) => return Ok(Some(Step::Channel(channel))),
+                        _ => self.records.note(span),
+                    }
+                }
                 _ => {}
             }
         }
         Ok(None)
     }
 
-    fn metadata(&self, span: Span) -> Result<Step, RecordingError> {
-        let record = gyre_bags::damaged::read(self.file, span).map_err(|e| failed(self.path, e))?;
-        match gyre_bags::damaged::parse(op::METADATA, record.get(PREFIX..).unwrap_or_default()) {
-            Ok(Record::Metadata(metadata)) => Ok(Step::Metadata(metadata)),
-            parsed => Err(RecordingError::Damaged {
-                path: self.path.to_owned(),
-                offset: span.offset,
-                reason: parsed
-                    .err()
-                    .map_or("it is no metadata".to_owned(), |e| e.to_string()),
-            }),
-        }
+    /// Returns the damaged places so far, and the position behind the last record.
+    pub fn damage(&self) -> (Damage, u64) {
+        (self.records.damage(), self.records.offset())
+    }
+
+    /// Counts a record as damaged.
+    pub fn note(&mut self, span: Span) {
+        self.records.note(span);
     }
 }
 

@@ -9,6 +9,7 @@ use std::{
 };
 
 use bytemuck::{Zeroable, bytes_of};
+use gyre_bags::damaged::Walk;
 use gyre_datasets::{DatasetOptions, ReadError};
 use gyre_messages::{GivenAnew, Item, MotionHeader, PoseHeader, RotationHeader, ScanHeader};
 use gyre_radar::OwnedScan;
@@ -16,7 +17,7 @@ use gyre_recording::{
     Head, Incoming, Ledger, LogLine, Positions, Recording, RecordingError, RecordingWriter, Split,
     SplitWriter, open, open_recording,
 };
-use mcap::records::{MessageHeader, Metadata, Record};
+use mcap::records::{MessageHeader, Metadata, Record, op};
 
 const SCANS: u64 = 6;
 const START_NS: i64 = 1_549_986_607_000_000_000;
@@ -392,6 +393,45 @@ fn a_file_that_is_cut_anywhere_is_read_up_to_its_last_table() {
 }
 
 #[test]
+fn whatever_is_damaged_of_a_chunk_its_scan_alone_cannot_be_read_and_the_place_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    write(&path, &head("a", 1), &[0, 1, 2, 3, 4, 5]);
+    let whole = fs::read(&path).unwrap();
+    let file = fs::File::open(&path).unwrap();
+    let mut walk = Walk::new(&file).unwrap().unwrap();
+    let mut chunks = Vec::new();
+    while let Some((opcode, span)) = walk.next().unwrap() {
+        chunks.extend((opcode == op::CHUNK).then_some(span.offset as usize));
+    }
+    // The first one has the channels alone, which the end of the file lists too.
+    for (chunk, read) in [(0, 6), (3, 5), (6, 5)] {
+        let at = chunks[chunk];
+        let flips = (0..72).map(|bit| {
+            let mut edited = whole.clone();
+            edited[at + bit / 8] ^= 1 << (bit % 8);
+            edited
+        });
+        let (before, after) = whole.split_at(at + 20);
+        for edited in flips.chain([[before, &[7], after].concat()]) {
+            fs::write(&path, edited).unwrap();
+            let mut dataset = open(&path, &DatasetOptions::default()).unwrap();
+            let damage = dataset.damage().unwrap().to_owned();
+            assert!(damage.contains("is damaged at byte"), "{damage}");
+            assert!(dataset.notes().join(" ").contains(&damage));
+            assert_eq!((dataset.first(), dataset.len()), (10, 16));
+            let mut own = OwnedScan::with_limits(dataset.limits());
+            let scans = dataset.scans().map(|scan| dataset.read(scan, own.slot()));
+            assert_eq!(scans.filter(Result::is_ok).count(), read, "{damage}");
+        }
+    }
+    fs::write(&path, &whole[..chunks[4] + 9]).unwrap();
+    let damage = open_recording(&path).unwrap().damage().unwrap();
+    let named = format!("has no end behind byte {}", chunks[4]);
+    assert!(damage.contains(&named), "{damage}");
+}
+
+#[test]
 fn damaged_bytes_are_an_error_and_no_panic() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.mcap");
@@ -454,11 +494,11 @@ fn a_chunk_of_which_a_few_bytes_are_gigabytes_is_refused() {
     let path = folder.path().join("a.mcap");
     let table = || [("scan".to_owned(), "0:0:1".to_owned())].into();
     write_chunk(&path, table(), 4);
-    Recording::open(std::slice::from_ref(&path)).unwrap();
+    let opened = || Recording::open(std::slice::from_ref(&path)).unwrap();
+    assert_eq!(opened().damage(), None);
     write_chunk(&path, table(), 300);
     assert!(fs::metadata(&path).unwrap().len() < 100_000);
-    let refused = Recording::open(std::slice::from_ref(&path));
-    let refused = refused.err().unwrap().to_string();
+    let refused = opened().read("scan", 0).unwrap_err().to_string();
     assert!(
         refused.contains("a.mcap is damaged at byte") && refused.contains("exceeds limit"),
         "{refused}"

@@ -13,24 +13,48 @@ use mcap::{
 /// # Errors
 /// The bytes end before the record does.
 pub fn parse(opcode: u8, body: &[u8]) -> Result<Record<'_>, McapError> {
-    let fields: &[Field] = match opcode {
-        op::HEADER => &[Field::Text, Field::Text],
-        op::SCHEMA => &[Field::Bytes(2), Field::Text, Field::Text],
-        op::CHANNEL => &[Field::Bytes(4), Field::Text, Field::Text, Field::Map],
-        op::MESSAGE => &[],
-        op::METADATA => &[Field::Text, Field::Map],
-        _ => {
-            return Ok(Record::Unknown {
-                opcode,
-                data: Cow::Borrowed(body),
-            });
-        }
+    let parsed = [
+        op::HEADER,
+        op::SCHEMA,
+        op::CHANNEL,
+        op::MESSAGE,
+        op::METADATA,
+    ];
+    let Some(fields) = fields(opcode).filter(|_| parsed.contains(&opcode)) else {
+        return Ok(Record::Unknown {
+            opcode,
+            data: Cow::Borrowed(body),
+        });
     };
     let mut rest = body;
     match fields.iter().try_for_each(|field| field.skip(&mut rest)) {
         Some(()) => mcap::parse_record(opcode, body),
         None => Err(McapError::UnexpectedEof),
     }
+}
+
+/// Returns the fields that a record consists of; those of a message come before its content. `None`
+/// for an opcode that MCAP does not have.
+pub(super) fn fields(opcode: u8) -> Option<&'static [Field]> {
+    use Field::{Bytes, Long, Map, Text};
+    Some(match opcode {
+        op::HEADER => &[Text, Text],
+        op::FOOTER => &[Bytes(20)],
+        op::SCHEMA => &[Bytes(2), Text, Text, Text],
+        op::CHANNEL => &[Bytes(4), Text, Text, Map],
+        op::MESSAGE => &[Bytes(22)],
+        op::CHUNK => &[Bytes(28), Text, Long],
+        op::MESSAGE_INDEX => &[Bytes(2), Text],
+        op::CHUNK_INDEX => &[Bytes(32), Text, Bytes(8), Text, Bytes(16)],
+        op::ATTACHMENT => &[Bytes(16), Text, Text, Long, Bytes(4)],
+        op::ATTACHMENT_INDEX => &[Bytes(40), Text, Text],
+        op::STATISTICS => &[Bytes(42), Text],
+        op::METADATA => &[Text, Map],
+        op::METADATA_INDEX => &[Bytes(16), Text],
+        op::SUMMARY_OFFSET => &[Bytes(17)],
+        op::DATA_END => &[Bytes(4)],
+        _ => return None,
+    })
 }
 
 /// Returns whether the records in all chunks that are not compressed end with their chunk. The
@@ -71,12 +95,14 @@ fn next<'a>(bytes: &mut &'a [u8]) -> Option<(u8, &'a [u8])> {
     Some((opcode, body))
 }
 
-/// A field whose length is in the record. The parser allocates that much before it reads.
+/// A field of a record. The parser allocates the length that the record states before it reads.
 #[derive(Clone, Copy)]
-enum Field {
+pub(super) enum Field {
     Bytes(usize),
-    /// The length in bytes, and the text.
+    /// The length in four bytes, and a text, or anything else.
     Text,
+    /// The same with a length in eight bytes.
+    Long,
     /// The length in bytes, and pairs of texts.
     Map,
 }
@@ -89,6 +115,10 @@ impl Field {
             Self::Text => {
                 let bytes = length(rest)?;
                 *rest = rest.get(bytes..)?;
+            }
+            Self::Long => {
+                let (bytes, after) = rest.split_first_chunk::<8>()?;
+                *rest = after.get(usize::try_from(u64::from_le_bytes(*bytes)).ok()?..)?;
             }
             Self::Map => {
                 let bytes = length(rest)?;

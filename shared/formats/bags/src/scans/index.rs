@@ -1,35 +1,44 @@
 //! Where the azimuths of each scan are.
 
-use std::mem;
+use std::{
+    collections::{BTreeSet, VecDeque},
+    hash::{DefaultHasher, Hash, Hasher},
+    mem,
+    ops::RangeInclusive,
+};
 
-use gyre_colossus::{Counters, FoundClock, RadarClock, SweepAssembler};
+use gyre_colossus::{Azimuth, Counters, FoundClock, RadarClock, SweepAssembler};
 use gyre_radar::{OwnedScan, ScanLimits};
 
 use crate::{
     BagError,
     azimuths::{Described, azimuths},
-    bag::Bag,
+    bag::{Bag, Key},
     reading::Message,
     topics::{Kind, Topics},
 };
 
+/// Turns among which one of the same time is looked for.
+const RECENT: usize = 8;
+
 /// Place of an azimuth in a bag.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Place {
-    pub span: u32,
-    /// Number of the message in its span, of those with scans.
-    pub message: u32,
+    /// Its message.
+    pub message: Key,
     /// Number of the azimuth in its message.
     pub row: u32,
 }
 
 /// A scan.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Entry {
     /// The azimuth before its first one, from which the assembler sees where it begins.
     pub start: Place,
     /// The azimuth that completes it.
     pub end: Place,
+    /// The spans of its messages.
+    pub spans: RangeInclusive<u32>,
     pub stamp_ns: i64,
     pub logged_ns: i64,
     /// A whole turn in a message that cannot be decoded.
@@ -43,9 +52,10 @@ pub(super) struct Index {
     /// The clock from a scan on.
     clocks: Vec<(usize, RadarClock)>,
     counters: Counters,
-    /// Messages that cannot be decoded, and spans that cannot be read.
+    /// Messages of turns that others have too.
+    pub repeated: BTreeSet<Key>,
+    /// Messages that cannot be decoded.
     damaged_messages: u64,
-    damaged_spans: u64,
     /// Why the first of these messages cannot be decoded.
     first_damage: Option<String>,
     /// Azimuths in those that can be.
@@ -61,13 +71,13 @@ impl Index {
         assembler: SweepAssembler,
     ) -> Result<Self, BagError> {
         let mut indexing = Indexing::new(topics.scans.kind, described, assembler);
-        for span in 0..bag.spans.len() {
-            match bag.read(span, |channel| channel.topic == topics.scans.name) {
-                Ok(messages) => indexing.add(span as u32, &messages),
-                Err(BagError::Damaged { .. }) => indexing.index.damaged_spans += 1,
-                Err(error) => return Err(error),
-            }
-        }
+        bag.read_in_order(
+            |channel| channel.topic == topics.scans.name,
+            |_, key, message| {
+                indexing.add(key, message);
+                true
+            },
+        )?;
         Ok(indexing.finish())
     }
 
@@ -115,8 +125,8 @@ impl Index {
         );
         let losses: [(u64, &str); 6] = [
             (
-                self.damaged_spans,
-                "damaged parts of the bag are skipped, with all that is in them.",
+                self.repeated.len() as u64,
+                "scans are left out: the bag has each of them twice, with one time.",
             ),
             (self.damaged_messages, &damaged),
             (
@@ -158,6 +168,10 @@ struct Indexing {
     previous: Option<Place>,
     /// The start of the next scan.
     start: Option<Place>,
+    /// The spans of its azimuths so far.
+    spans: RangeInclusive<u32>,
+    /// The newest turns.
+    recent: VecDeque<u64>,
     index: Index,
 }
 
@@ -173,13 +187,15 @@ impl Indexing {
             held: Vec::new(),
             previous: None,
             start: None,
+            spans: 0..=0,
+            recent: VecDeque::new(),
             index: Index {
                 entries: Vec::new(),
                 limits,
                 clocks: vec![(0, clock.clone())],
                 counters: Counters::default(),
+                repeated: BTreeSet::new(),
                 damaged_messages: 0,
-                damaged_spans: 0,
                 first_damage: None,
                 azimuths: 0,
             },
@@ -187,29 +203,49 @@ impl Indexing {
         }
     }
 
-    fn add(&mut self, span: u32, messages: &[Message]) {
-        for (number, message) in messages.iter().enumerate() {
-            let mut place = Place {
-                span,
-                message: number as u32,
-                row: 0,
-            };
-            let described = self.described;
-            let added = azimuths(self.kind, message, &described, |azimuth, received_ns| {
-                self.add_azimuth(place, azimuth, received_ns, message.log_ns);
-                place.row += 1;
-            });
-            if let Err(reason) = added {
-                self.index.first_damage.get_or_insert(reason);
-                self.add_damaged(place, message.log_ns);
+    fn add(&mut self, key: Key, message: &Message) {
+        let mut place = Place {
+            message: key,
+            row: 0,
+        };
+        let (described, mut is_repeated) = (self.described, None);
+        let added = azimuths(self.kind, message, &described, |azimuth, received_ns| {
+            if *is_repeated.get_or_insert_with(|| self.is_repeated(key, message, &azimuth)) {
+                return;
             }
+            self.add_azimuth(place, azimuth, received_ns, message.log_ns);
+            place.row += 1;
+        });
+        if let Err(reason) = added {
+            self.index.first_damage.get_or_insert(reason);
+            self.add_damaged(place, message.log_ns);
         }
+    }
+
+    /// Returns whether the turn that begins with this azimuth has the time of one before, or its
+    /// bytes if the radar has no clock.
+    fn is_repeated(&mut self, key: Key, message: &Message, first: &Azimuth<'_>) -> bool {
+        if matches!(self.kind, Kind::Azimuths(_)) {
+            return false;
+        }
+        let mut turn = DefaultHasher::new();
+        match (first.seconds, first.split_seconds) {
+            ([0, 0, 0, 0], [0, 0, 0, 0]) => message.data.hash(&mut turn),
+            time => (time, first.encoder).hash(&mut turn),
+        }
+        let turn = turn.finish();
+        if self.recent.contains(&turn) {
+            return self.index.repeated.insert(key);
+        }
+        self.recent.truncate(RECENT - 1);
+        self.recent.push_front(turn);
+        false
     }
 
     fn add_azimuth(
         &mut self,
         place: Place,
-        azimuth: gyre_colossus::Azimuth<'_>,
+        azimuth: Azimuth<'_>,
         received_ns: i64,
         logged_ns: i64,
     ) {
@@ -220,17 +256,23 @@ impl Indexing {
             let Some(here) = released.next().copied() else {
                 break;
             };
-            let start = *self.start.get_or_insert(here);
+            let start = *self.start.get_or_insert_with(|| {
+                self.spans = only(here);
+                here
+            });
+            self.spans = joined(&self.spans, here);
             let invalid = self.assembler.counters().invalid_azimuths;
             if let Some(sweep) = self.assembler.add(&azimuth, stamp_ns, self.scan.slot()) {
                 self.index.entries.push(Entry {
                     start,
                     end: here,
+                    spans: self.spans.clone(),
                     stamp_ns: sweep.geometry.stamp_ns,
                     logged_ns,
                     is_damaged: false,
                 });
-                self.start = Some(self.previous.unwrap_or(here));
+                let start = self.previous.unwrap_or(here);
+                (self.start, self.spans) = (Some(start), joined(&only(start), here));
             }
             // From one without a place in a turn nothing is seen of where the next one begins.
             if self.assembler.counters().invalid_azimuths == invalid {
@@ -263,6 +305,7 @@ impl Indexing {
             self.index.entries.push(Entry {
                 start: place,
                 end: place,
+                spans: only(place),
                 stamp_ns: logged_ns,
                 logged_ns,
                 is_damaged: true,
@@ -274,4 +317,15 @@ impl Indexing {
         self.index.counters = self.assembler.counters();
         self.index
     }
+}
+
+/// Returns the span of a place.
+fn only(place: Place) -> RangeInclusive<u32> {
+    place.message.span..=place.message.span
+}
+
+/// Returns the spans, with that of a place.
+fn joined(spans: &RangeInclusive<u32>, place: Place) -> RangeInclusive<u32> {
+    let span = place.message.span;
+    span.min(*spans.start())..=span.max(*spans.end())
 }

@@ -4,6 +4,7 @@ use super::index::Index;
 use crate::{
     azimuths::Described,
     bag::{Bag, CountsOrigin, Origin, RadarOrigin},
+    reading::BagFile,
     topics::Topics,
 };
 
@@ -18,13 +19,8 @@ pub(super) fn notes(
     let (scans, radar) = (&topics.scans.name, of_radar(described, origin));
     let mut notes = vec![format!("Scans are on {scans}{radar}.")];
     notes.extend(index.notes());
-    let cut = bag.files.iter().filter(|file| !file.is_complete);
-    notes.extend(cut.map(|file| {
-        format!(
-            "{} has no end: its recorder was killed, or it was not copied whole.",
-            file.path.display()
-        )
-    }));
+    let damage = bag.files.iter().filter_map(BagFile::damage);
+    notes.extend(damage.map(|sentence| format!("{sentence}.")));
     notes
 }
 

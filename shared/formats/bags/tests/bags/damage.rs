@@ -1,5 +1,8 @@
 //! Bags that lack a part of what they should have.
 
+use gyre_bags::damaged::{Span, Walk};
+use mcap::records::op;
+
 use super::*;
 
 #[test]
@@ -57,44 +60,55 @@ fn damaged_messages_are_scans_that_cannot_be_read() {
     );
 }
 
-#[test]
-fn a_damaged_chunk_is_left_out_with_a_note() {
-    let folder = Folder::new();
-    let path = folder.path("bag.mcap");
-    b_scans(8).write(&path, uncompressed().chunk_size(Some(2000)));
-    let mut bytes = fs::read(&path).unwrap();
-    let place = scan(4).bytes;
-    let at = bytes
-        .windows(place.len())
-        .position(|window| window == place)
-        .unwrap();
-    bytes[at + 100] ^= 1;
-    fs::write(&path, bytes).unwrap();
-    let mut dataset = opened(&path);
-    assert_eq!(dataset.len(), 7);
-    let notes = dataset.notes().join(" ");
-    assert!(notes.contains("1 damaged parts"), "{notes}");
-    assert_is(&read(dataset.as_mut(), 4).unwrap(), 5);
+/// Returns the place of the chunk with this number.
+fn chunk(path: &Path, number: usize) -> Span {
+    let file = fs::File::open(path).unwrap();
+    let mut walk = Walk::new(&file).unwrap().unwrap();
+    let mut records = std::iter::from_fn(|| walk.next().unwrap());
+    let mut chunks = records.by_ref().filter(|(opcode, _)| *opcode == op::CHUNK);
+    chunks.nth(number).unwrap().1
 }
 
 #[test]
-fn a_bag_that_was_cut_has_the_scans_before_that() {
+fn whatever_is_damaged_of_a_chunk_it_alone_is_left_out_and_named() {
     let folder = Folder::new();
     let path = folder.path("bag.mcap");
-    b_scans(8).write(&path, uncompressed().chunk_size(Some(2000)));
-    let bytes = fs::read(&path).unwrap();
-    let place = scan(6).bytes;
-    let at = bytes
-        .windows(place.len())
-        .position(|window| window == place)
-        .unwrap();
-    fs::write(&path, &bytes[..at]).unwrap();
-    let mut dataset = opened(&path);
-    assert_has_turns(dataset.as_mut(), 6);
-    assert!(
-        dataset
-            .notes()
-            .iter()
-            .any(|note| note.contains("has no end"))
-    );
+    for options in [uncompressed(), WriteOptions::new()] {
+        b_scans(8).write(&path, options.chunk_size(Some(2000)));
+        let whole = fs::read(&path).unwrap();
+        assert_eq!(opened(&path).damage(), None);
+        let Span { offset, bytes } = chunk(&path, 4);
+        let (at, end) = (offset as usize, (offset + bytes) as usize);
+        // Its opcode, the eight bytes of its length, and its content.
+        let flips = (0..72).chain([800 * 8]).map(|bit| {
+            let mut edited = whole.clone();
+            edited[at + bit / 8] ^= 1 << (bit % 8);
+            edited
+        });
+        let lengthened = [at + 1, at + 5, end - 9].map(|place| {
+            let (before, after) = whole.split_at(place);
+            [before, &[7], after].concat()
+        });
+        let shortened = [at, at + 3].map(|place| [&whole[..place], &whole[place + 1..]].concat());
+        for (number, edited) in flips.chain(lengthened).chain(shortened).enumerate() {
+            fs::write(&path, edited).unwrap();
+            let mut dataset = opened(&path);
+            let damage = dataset.damage().unwrap().to_owned();
+            assert!(
+                damage.contains(&format!("at byte {offset}")),
+                "{number}: {damage}"
+            );
+            assert!(dataset.notes().join(" ").contains(&damage), "{number}");
+            assert_eq!(dataset.len(), 7, "{number}");
+            assert_is(&read(dataset.as_mut(), 6).unwrap(), 7);
+        }
+        fs::write(&path, &whole[..at + 100]).unwrap();
+        let mut dataset = opened(&path);
+        let damage = dataset.damage().unwrap();
+        assert!(
+            damage.contains(&format!("no end behind byte {offset}")),
+            "{damage}"
+        );
+        assert_has_turns(dataset.as_mut(), 4);
+    }
 }

@@ -363,6 +363,12 @@ fn bags_that_cannot_be_used_say_why_in_one_sentence() {
     assert!(refused(&folder.bag(&few)).contains("no complete turn"));
     assert!(refused(&folder.bag(&Messages::default())).contains("has no topics"));
 
+    let mut compressed = b_scans(3);
+    for (.., data) in &mut compressed.0 {
+        data.splice(..4, [0x28, 0xb5, 0x2f, 0xfd]);
+    }
+    assert!(refused(&folder.bag(&compressed)).contains("compression_mode: none"));
+
     let path = folder.path("empty.mcap");
     fs::write(&path, []).unwrap();
     assert!(refused(&path).contains("signature of MCAP"));

@@ -59,3 +59,31 @@ fn files_of_the_same_time_are_refused() {
     }
     assert_has_turns(opened(&folder.path("other.mcap")).as_mut(), 8);
 }
+
+#[test]
+fn messages_are_read_in_the_order_of_their_times_and_turns_once() {
+    let exchange = |messages: &mut Messages| {
+        let pairs = messages.0.chunks_exact_mut(2).step_by(5);
+        pairs.for_each(|pair| pair.swap(0, 1));
+    };
+    let reverse = |messages: &mut Messages| messages.0[1..].reverse();
+    let repeat = |messages: &mut Messages| {
+        let all = std::mem::take(&mut messages.0).into_iter();
+        messages.0 = all.flat_map(|message| [message.clone(), message]).collect();
+    };
+    let edits: [&dyn Fn(&mut Messages); 3] = [&exchange, &reverse, &repeat];
+    for (number, edit) in edits.iter().enumerate() {
+        for mut messages in [b_scans(12), azimuths(12, |_, _, message| Some(message))] {
+            edit(&mut messages);
+            for options in [uncompressed().chunk_size(Some(4000)), uncompressed()] {
+                let folder = Folder::new();
+                let path = folder.path("bag.mcap");
+                messages.write(&path, options);
+                let mut dataset = opened(&path);
+                assert_has_turns(dataset.as_mut(), 12);
+                let notes = dataset.notes().join(" ");
+                assert_eq!(notes.contains("left out"), number == 2, "{notes}");
+            }
+        }
+    }
+}
