@@ -124,6 +124,26 @@ fn scans_of_poses(run: &Run) -> BTreeMap<u64, u64> {
 }
 
 #[test]
+fn a_recording_has_all_results_of_a_run_that_was_stopped() {
+    for _ in 0..3 {
+        let run = Run::small().data(recording::around_a_block());
+        // Scans are in flight all the time, so that poses follow the request to stop.
+        let run = run.set(WINDOW).set("stages.refinement.delay_ms=15");
+        let run = recorded(&run.set(TOPICS).rate("max"));
+        let mut running = run.start();
+        running.await_poses(20);
+        running.signal(Signal::INT);
+        running.end();
+        let (poses, recording) = (scans_of_poses(&run), open_recording(&file(&run)).unwrap());
+        for topic in ["scan", "masked", "rotation", "motion", "refined", "pose"] {
+            let recorded: Vec<u64> = recording.entries(topic).map(|entry| entry.seq).collect();
+            let lacks = poses.keys().filter(|seq| !recorded.contains(seq));
+            assert_eq!(lacks.count(), 0, "{topic}");
+        }
+    }
+}
+
+#[test]
 fn a_recording_is_of_the_results_after_masking_was_killed_twice_while_no_recorder_was_there() {
     // Without poses nothing but the recorder can know what the second masking gave anew.
     let run = played().set("record.topics=['masked','motion']");

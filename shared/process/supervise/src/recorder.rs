@@ -126,7 +126,7 @@ impl Recorder {
         }
     }
 
-    /// Lets the recorder write what it has received, before the stages end.
+    /// Lets the recorder write what it has received, after the stages have ended.
     pub fn stop(
         &mut self,
         run: &mut Run<'_>,

@@ -194,10 +194,12 @@ impl<'a> Supervisor<'a> {
     fn stop(&mut self, ending: Option<Ending>) -> Result<(), SuperviseError> {
         self.run.say(Event::Stopping);
         self.swaps.end_trial(&self.processes);
+        let stopped = self.processes.stop(&mut self.run, ending);
+        // After the stages, which finish what they have begun.
         if let Some(recorder) = &mut self.recorder {
             recorder.stop(&mut self.run, ending)?;
         }
-        self.processes.stop(&mut self.run, ending)?;
+        stopped?;
         self.logs.bound();
         // The failure that the run ends by is the first one.
         match ending {
