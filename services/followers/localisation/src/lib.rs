@@ -93,6 +93,10 @@ impl Follower for Fixes {
         })
     }
 
+    fn sync(&mut self) -> Result<(), StageError> {
+        Ok(())
+    }
+
     fn progress(&self) -> Progress {
         Progress {
             done: self.read as u64,

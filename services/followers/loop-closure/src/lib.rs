@@ -94,6 +94,11 @@ impl Follower for LoopClosing {
         Ok(step)
     }
 
+    fn sync(&mut self) -> Result<(), StageError> {
+        self.state.places.sync()?;
+        Ok(self.state.queries.sync()?)
+    }
+
     fn progress(&self) -> Progress {
         Progress {
             done: self.state.queries.len() as u64,

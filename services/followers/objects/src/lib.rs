@@ -164,6 +164,10 @@ impl Follower for Tracking {
         Ok(Step::Ended)
     }
 
+    fn sync(&mut self) -> Result<(), StageError> {
+        Ok(self.tracked.sync()?)
+    }
+
     fn progress(&self) -> Progress {
         Progress {
             done: self.read as u64,

@@ -238,6 +238,11 @@ impl Follower for Trajectory {
         })
     }
 
+    fn sync(&mut self) -> Result<(), StageError> {
+        let received = self.live_fixes.as_mut();
+        received.map_or(Ok(()), LiveFixes::finish)
+    }
+
     fn progress(&self) -> Progress {
         Progress {
             done: self.read[1] as u64,

@@ -28,6 +28,14 @@ impl LiveFixes {
         })
     }
 
+    /// Ends reception. What has arrived survives a power failure.
+    ///
+    /// # Errors
+    /// Reception has failed.
+    pub fn finish(&mut self) -> Result<(), StageError> {
+        self.receiver.finish()
+    }
+
     /// Returns all fixes that have arrived; `None` if there are no new ones. With `is_last` nothing
     /// is received after this.
     ///
@@ -35,7 +43,7 @@ impl LiveFixes {
     /// Reception has failed, or a log that cannot be read.
     pub fn take(&mut self, is_last: bool) -> Result<Option<Fixes>, StageError> {
         if is_last {
-            self.receiver.finish()?;
+            self.finish()?;
         }
         let Self {
             receiver,

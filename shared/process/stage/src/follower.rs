@@ -37,6 +37,13 @@ pub trait Follower {
     /// An error that ends the process.
     fn step(&mut self) -> Result<Step<<Self::Output as Message>::Header>, StageError>;
 
+    /// Makes what it has written survive a power failure. A failure is found by nobody after the
+    /// process.
+    ///
+    /// # Errors
+    /// A file that cannot be synchronised.
+    fn sync(&mut self) -> Result<(), StageError>;
+
     /// Returns the position in the logs.
     fn progress(&self) -> Progress;
 }
@@ -83,6 +90,7 @@ pub fn run<F: Follower>(launch: &Launch, follower: &mut F) -> Result<StageCounte
             .wait(&grown, Some(flow.output.listener()), limit)?;
         flow.counters.wakes += u64::from(!limit.is_zero());
         if woken.stop {
+            follower.sync()?;
             return Ok(flow.counters);
         }
         if woken.may_have_new_readers() {
@@ -127,6 +135,7 @@ impl<M: Message> Flow<M> {
         }
         let has_ended = matches!(step, Step::Ended);
         if has_ended {
+            follower.sync()?;
             self.publish_end()?;
         }
         self.report.write(follower.progress(), has_ended)?;
