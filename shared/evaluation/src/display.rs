@@ -47,7 +47,10 @@ impl fmt::Display for Evaluation {
         }
         match &self.rpe {
             Some(rpe) => write!(f, "RPE           {rpe}")?,
-            None => write!(f, "RPE           none: the ground truth has no heading")?,
+            None => {
+                let why = self.axes.without_heading().unwrap_or_default();
+                write!(f, "RPE           none: {why}")?;
+            }
         }
         if f.alternate() {
             self.fmt_lengths(f)
@@ -61,10 +64,9 @@ const TOO_SHORT: &str = "the path is not longer than 100 m";
 
 impl Evaluation {
     fn why_no_kitti(&self) -> String {
-        if self.axes.truth_lacks_heading {
-            "the ground truth has no heading; use ATE and seg".to_owned()
-        } else {
-            format!("{TOO_SHORT}; use RPE")
+        match self.axes.without_heading() {
+            Some(why) => format!("{why}; use ATE and seg"),
+            None => format!("{TOO_SHORT}; use RPE"),
         }
     }
 

@@ -24,12 +24,25 @@ pub struct Axes {
     /// The heading of the ground truth is constant although the estimate turns: it has positions
     /// only.
     pub truth_lacks_heading: bool,
+    /// The heading of the estimate is constant although the ground truth turns.
+    pub estimate_lacks_heading: bool,
 }
 
 impl Axes {
     /// Returns whether the poses of the ground truth are used as they are, with their heading.
     pub fn are_as_given(&self) -> bool {
-        !(self.y_negated || self.heading_negated || self.truth_lacks_heading)
+        !(self.y_negated || self.heading_negated || self.without_heading().is_some())
+    }
+
+    /// Returns a clause that names the trajectory without heading; `None` if both have one.
+    pub fn without_heading(&self) -> Option<&'static str> {
+        match (self.truth_lacks_heading, self.estimate_lacks_heading) {
+            (true, _) => Some("the ground truth has no heading"),
+            (_, true) => Some(
+                "the estimate has no heading (TUM has the scalar of a quaternion last: x y z w)",
+            ),
+            _ => None,
+        }
     }
 }
 
@@ -64,7 +77,7 @@ const MIN_MISFIT_M: f64 = 0.01;
 const MIN_MISFIT_RAD: f64 = 1e-3;
 /// A heading that varies by less than this is constant, rad (TUM files have nine decimals).
 const CONSTANT_RAD: f64 = 1e-6;
-/// The least turn of the estimate that shows that the ground truth has no heading, rad.
+/// The least turn of one trajectory that shows that the other has no heading, rad.
 const MIN_TURN_RAD: f64 = 0.1;
 /// The steps over which the turns of a path are measured, m: long compared with the noise of
 /// positions.
@@ -95,12 +108,14 @@ pub fn resolve_axes(matched: MatchedPoses) -> (MatchedPoses, Axes) {
         MIN_MISFIT_RAD,
     );
     let (y_negated, heading_negated) = decide(y, heading, mirrored_m < given_m + MIN_MISFIT_M);
+    let lacks =
+        |yaw: &[f64], other: &[f64]| range(yaw) < CONSTANT_RAD && range(other) > MIN_TURN_RAD;
     let axes = Axes {
         y_negated,
         heading_negated,
         heading_fault: (y_negated != heading_negated).then(|| heading_fault(&matched)),
-        truth_lacks_heading: range(&truth_yaw) < CONSTANT_RAD
-            && range(&estimate_yaw) > MIN_TURN_RAD,
+        truth_lacks_heading: lacks(&truth_yaw, &estimate_yaw),
+        estimate_lacks_heading: lacks(&estimate_yaw, &truth_yaw),
     };
     (
         matched.map_estimate(|p| negate(p, y_negated, heading_negated)),
@@ -222,10 +237,9 @@ impl fmt::Display for Axes {
             Some(HeadingFault::Truth) => " (the heading of the ground truth contradicts its path)",
             Some(HeadingFault::Unclear) => " (it is unclear whose heading is wrong)",
         })?;
-        if self.truth_lacks_heading {
-            f.write_str("; the ground truth has no heading")
-        } else {
-            Ok(())
+        match self.without_heading() {
+            Some(clause) => write!(f, "; {clause}"),
+            None => Ok(()),
         }
     }
 }
@@ -311,12 +325,18 @@ mod tests {
 
     #[test]
     fn a_ground_truth_without_heading_is_recognised() {
-        let positions = drive()
+        let positions: Vec<Pose> = drive()
             .iter()
             .map(|p| pose(p.translation.x, p.translation.y, 0.0))
             .collect();
-        let axes = resolve(with(drive(), true, true), positions);
+        let axes = resolve(with(drive(), true, true), positions.clone());
         assert!(axes.truth_lacks_heading && axes.y_negated && axes.heading_negated);
         assert_eq!(axes.heading_fault, None);
+        let axes = resolve(positions, drive());
+        assert!(axes.estimate_lacks_heading && !axes.truth_lacks_heading);
+        assert!(
+            axes.to_string().contains("the estimate has no heading"),
+            "{axes}"
+        );
     }
 }

@@ -49,15 +49,15 @@ pub struct Evaluation {
     /// The ground truth stays in one place although the estimate moves: it is empty, or of another
     /// drive.
     pub truth_stands: bool,
-    /// KITTI odometry errors; `None` for a path up to 100 m or a ground truth without heading.
+    /// KITTI odometry errors; `None` for a path up to 100 m or a trajectory without heading.
     pub kitti: Option<Kitti>,
     /// Absolute trajectory error.
     pub ate: Ate,
     /// Segment error; `None` for a path up to 100 m.
     pub seg: Option<Seg>,
-    /// End-point error; `None` for a ground truth without heading.
+    /// End-point error; `None` for a trajectory without heading.
     pub end: Option<EndError>,
-    /// Relative pose error; `None` for a ground truth without heading.
+    /// Relative pose error; `None` for a trajectory without heading.
     pub rpe: Option<Rpe>,
     /// The poses that were compared, the estimate in the handedness of the ground truth but not
     /// aligned; not serialised.
@@ -76,7 +76,7 @@ pub fn evaluate(
 ) -> Result<Evaluation, EvaluationError> {
     let (matched, coverage) = associate(estimate, truth, options.association)?;
     let (matched, axes) = resolve_axes(matched);
-    let has_heading = !axes.truth_lacks_heading;
+    let has_heading = axes.without_heading().is_none();
     let ate = ate(&matched);
     let (moved_m, travelled_m) = (extent_m(matched.truth()), extent_m(matched.estimate()));
     let offset_rad = heading_offset_rad(&matched, &ate.truth_from_estimate)

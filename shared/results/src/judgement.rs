@@ -174,10 +174,10 @@ pub fn judge_motions(
             "covariances are judged by time, and estimate or ground truth has no stamps".into(),
         );
     };
-    let axes = &evaluation.axes;
-    if axes.truth_lacks_heading || axes.y_negated || axes.heading_negated {
+    if !evaluation.axes.are_as_given() {
         return Err(
-            "covariances need a ground truth with heading and with axes as the estimate's".into(),
+            "covariances need an estimate and a ground truth with headings and the same axes"
+                .into(),
         );
     }
     Ok(MatchedMotions::new(motions, timed(truth), max_gap_ns)?)
