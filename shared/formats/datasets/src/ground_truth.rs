@@ -139,13 +139,39 @@ pub fn find_ground_truth(root: &Path) -> Option<PathBuf> {
 }
 
 fn parse(text: &str, format: TrajectoryFormat) -> Result<Trajectory, LineError> {
-    match format {
+    let trajectory = match format {
         TrajectoryFormat::OxfordCsv => oxford::parse(text),
         TrajectoryFormat::BoreasCsv => boreas::parse(text),
         TrajectoryFormat::MulranCsv => mulran::parse(text),
         TrajectoryFormat::Tum => tum::parse(text),
         TrajectoryFormat::Kitti => kitti::parse(text),
+    }?;
+    check_places(text, &trajectory)?;
+    Ok(trajectory)
+}
+
+/// Rejects one time for several places.
+fn check_places(text: &str, trajectory: &Trajectory) -> Result<(), LineError> {
+    let stamps = trajectory.stamp_ns.as_deref().unwrap_or_default();
+    let mut first = 0;
+    for (index, pose) in trajectory.poses.iter().enumerate().take(stamps.len()) {
+        if stamps[index] != stamps[first] {
+            first = index;
+        }
+        let from = trajectory.poses[first].translation.vector;
+        let apart_m = (pose.translation.vector - from).norm();
+        if apart_m > MAX_APART_M {
+            let header = lines(text).count().saturating_sub(stamps.len());
+            let line = lines(text).nth(header + index);
+            return Err(LineError {
+                line: line.map_or(0, |(line, _)| line),
+                reason: format!(
+                    "its place is {apart_m:.1} m from another one of the same time: the times are rounded, and need three decimals of a second or more"
+                ),
+            });
+        }
     }
+    Ok(())
 }
 
 fn detect(text: &str) -> Result<TrajectoryFormat, String> {
@@ -155,7 +181,9 @@ fn detect(text: &str) -> Result<TrajectoryFormat, String> {
     check_separators(first, commas, words)?;
     match (commas, words) {
         _ if first.contains("destination_timestamp") => Ok(TrajectoryFormat::OxfordCsv),
-        _ if first.contains("GPSTime") => Ok(TrajectoryFormat::BoreasCsv),
+        _ if boreas::TIMES.iter().any(|name| first.contains(name)) => {
+            Ok(TrajectoryFormat::BoreasCsv)
+        }
         (13, _) => Ok(TrajectoryFormat::MulranCsv),
         (1, 8) => Ok(TrajectoryFormat::Tum),
         (1, 12 | 13) => Ok(TrajectoryFormat::Kitti),
@@ -203,6 +231,9 @@ fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
         .map(|(i, l)| (i + 1, l.trim()))
         .filter(|(_, l)| !l.is_empty() && !l.starts_with('#'))
 }
+
+/// The largest distance between places of one time, m: poses may be repeated.
+const MAX_APART_M: f64 = 1.0;
 
 /// The largest number: no product or sum of such overflows.
 const LARGEST: f64 = 1e15;

@@ -1,15 +1,26 @@
-//! Boreas `radar_poses.csv`: poses of the radar in east-north-up; the radar frame is x forward, y
-//! right, z down (roll near pi).
+//! Boreas `radar_poses.csv`, or those of the lidar: poses of the sensor in east-north-up; its frame
+//! is x forward, y right, z down (roll near pi).
 
 use gyre_geometry::pose;
 
 use super::{LineError, check_increasing, columns, lines, number, stamp_field};
 use gyre_radar::trajectory::Trajectory;
 
+/// The names of the column of times, in order of precedence.
+pub(super) const TIMES: [&str; 2] = ["GPSTime", "ROSTime"];
+
 pub(super) fn parse(text: &str) -> Result<Trajectory, LineError> {
     let mut rows = lines(text);
     let header = rows.next().map(|(_, header)| header).unwrap_or_default();
-    let names = ["GPSTime", "easting", "northing", "roll", "pitch", "heading"];
+    let time = TIMES.into_iter().find(|name| header.contains(name));
+    let names = [
+        time.unwrap_or(TIMES[0]),
+        "easting",
+        "northing",
+        "roll",
+        "pitch",
+        "heading",
+    ];
     let [time, east, north, roll, pitch, heading] = columns(header, names)?;
     let (mut stamps, mut poses) = (Vec::new(), Vec::new());
     for (line, row) in rows {
