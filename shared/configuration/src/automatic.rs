@@ -114,12 +114,12 @@ fn of_recorded_run(data: &Path) -> Result<Automatic, AutomaticError> {
     // The recording itself says what its scans are.
     table.retain(|section, _| section != "dataset" && MethodConfig::SECTIONS.contains(&section));
     let gnss = table.get_mut("gnss").and_then(Value::as_table_mut);
-    let is_live = |gnss: &&mut Table| {
+    let is_beside = |gnss: &&mut Table| {
         let kind = gnss.get("kind").and_then(Value::as_str);
-        matches!(kind, Some("udp" | "ros2"))
+        matches!(kind, Some("udp" | "ros2" | "auto"))
     };
-    if let Some(gnss) = gnss.filter(is_live) {
-        // The fixes that arrived then lie beside it, if the run made the recording itself.
+    if let Some(gnss) = gnss.filter(is_beside) {
+        // The fixes of the run lie beside it, if the run made the recording itself.
         gnss.insert("kind".to_owned(), "auto".into());
         gnss.remove("topic");
     }

@@ -72,15 +72,42 @@ impl GnssLog {
     /// # Errors
     /// A file that cannot be read or has no positions, and one without a usable fix.
     pub fn read(path: &Path) -> Result<Self, GnssLogError> {
-        let raw = match path.is_dir() {
-            true => radiate::read(path)?,
-            false => table::read(path)?,
-        };
+        let raw = Self::raw(path)?;
         if let Some(reason) = raw.is_another_table() {
             let path = path.to_owned();
             return Err(GnssLogError::Unusable { path, reason });
         }
         Self::usable(raw, path)
+    }
+
+    fn raw(path: &Path) -> Result<Raw, GnssLogError> {
+        match path.is_dir() {
+            true => radiate::read(path),
+            false => table::read(path),
+        }
+    }
+
+    /// Returns a table of what a log contains, in one file that has all.
+    ///
+    /// # Errors
+    /// A log that cannot be read.
+    pub fn copy_of(path: &Path) -> Result<String, GnssLogError> {
+        let raw = Self::raw(path)?;
+        Ok(Self::table(&raw.rows, raw.is_plane))
+    }
+
+    /// Returns a table of fixes, m east and north in a plane of their own or degrees on the earth.
+    pub fn table(fixes: &[RawFix], is_plane: bool) -> String {
+        let at = match is_plane {
+            true => "east_m,north_m",
+            false => "latitude_deg,longitude_deg",
+        };
+        let row = |fix: &RawFix| {
+            let (ns, [a, b], sigma_m) = (fix.stamp_ns, fix.at, fix.sigma_m.max(0.0));
+            format!("{ns},{a},{b},{},{sigma_m}\n", fix.altitude_m)
+        };
+        let rows: String = fixes.iter().map(row).collect();
+        format!("stamp_ns,{at},altitude_m,sigma_m\n{rows}")
     }
 
     /// Reads what a live receiver has sent during a run, be it among lines that are no fixes. A run

@@ -31,6 +31,25 @@ pub fn gnss_log(
     }
 }
 
+/// Returns a table of the fixes that `gnss.kind = "auto"` takes with the scans at `data`, for a
+/// recording of the run.
+///
+/// # Errors
+/// As [`gnss_log`].
+pub fn copied_fixes(config: &GnssConfig, data: &Path) -> Result<String, GnssLogError> {
+    let in_bag = match is_bag(data) {
+        true => gyre_bags::fixes(data, config.topic.as_deref())?,
+        false => None,
+    };
+    match in_bag {
+        Some(found) => Ok(GnssLog::table(&found.fixes, false)),
+        None => {
+            let first = first_part_in(data).unwrap_or_else(|| data.to_owned());
+            GnssLog::copy_of(&GnssLog::find(&first)?)
+        }
+    }
+}
+
 /// Reads the fixes in the bag, else the log beside the scans.
 fn of_scans(topic: Option<&str>, data: &Path) -> Result<GnssLog, GnssLogError> {
     let none_in_bag = |_| GnssLogError::NoneInBag {
@@ -89,6 +108,9 @@ mod tests {
             ..GnssConfig::default()
         };
         assert_eq!(log(&config).unwrap().path, named);
+        let copy = copied_fixes(&auto(None), folder.path()).unwrap();
+        fs::write(&named, copy).unwrap();
+        assert_eq!(log(&config).unwrap().fixes, log(&auto(None)).unwrap().fixes);
         assert!(log(&GnssConfig::default()).is_none());
     }
 
