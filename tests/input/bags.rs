@@ -225,13 +225,17 @@ fn a_damaged_scan_is_skipped_and_counted() {
     let mut damaged = bytes.clone();
     damaged[chunks[chunks.len() / 2] + 1000] ^= 0xff;
     fs::write(&path, damaged).unwrap();
-    let again = Run::of_file(&run.out().join("config.toml")).data(&path);
-    again.complete();
-    let fewer = odometry::rows(&again.odometry()).len();
+    let again = |path: &Path, words: &[&str]| {
+        let again = Run::of_file(&run.out().join("config.toml")).data(path);
+        again.finish().failed_with(words);
+        odometry::rows(&again.odometry()).len()
+    };
+    let fewer = again(&path, &["is damaged at byte"]);
     assert!(fewer > 0 && fewer < recording::SCANS - 1, "{fewer}");
     // Cut within a chunk: what is before it is read.
     let cut = bag(&run, "cut.mcap");
     fs::write(&cut, &bytes[..chunks[chunks.len() / 2] + 1000]).unwrap();
+    again(&cut, &["has no end behind byte"]);
     let inspected = inspect(&cut, &[]);
     inspected.succeeded();
     assert!(

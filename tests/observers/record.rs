@@ -80,7 +80,7 @@ fn a_recorded_run_has_the_same_results_and_replays_to_them_from_every_topic() {
         let all: Vec<u64> = (0..SCANS as u64).collect();
         assert_eq!(seqs(&recording, topic), all, "{topic}");
     }
-    assert_eq!(recording.cut().count(), 0);
+    assert_eq!(recording.damages().count(), 0);
     assert_eq!(replay(&file(&run), &[]), undisturbed());
     for topic in ["masked", "rotation", "motion", "refined"] {
         let odometry = replay(&file(&run), &["--from", topic]);
@@ -103,7 +103,7 @@ fn a_killed_recorder_changes_no_byte_and_another_one_goes_on_in_the_next_part() 
     assert_eq!(parts(&file(&run)).len(), 2);
     let recording = open_recording(&file(&run)).unwrap();
     assert_eq!(
-        recording.cut().count(),
+        recording.damages().count(),
         1,
         "the part of the killed one has no end"
     );
@@ -157,7 +157,7 @@ fn a_recording_in_several_files_replays_to_the_same_bytes() {
     assert!((4..8).contains(&files.len()), "{files:?}");
     let recording = open_recording(&file(&run)).unwrap();
     assert_eq!(seqs(&recording, "scan").len(), SCANS);
-    assert_eq!(recording.cut().count(), 0, "each file has its end");
+    assert_eq!(recording.damages().count(), 0, "each file has its end");
     assert_eq!(replay(run.folder(), &[]), odometry, "named by its folder");
     assert_eq!(replay(&file(&run), &["--from", "masked"]), odometry);
 }
@@ -174,7 +174,10 @@ fn a_recorder_that_is_killed_in_a_later_file_loses_none_of_the_earlier_ones() {
     await_recorder(&mut running, Some(killed));
     running.finish().succeeded();
     let recording = open_recording(&file(&run)).unwrap();
-    assert!(recording.cut().count() <= 1, "only the file of the kill");
+    assert!(
+        recording.damages().count() <= 1,
+        "only the file of the kill"
+    );
     assert!(parts(&file(&run)).len() > before.len());
     assert_eq!(seqs(&recording, "scan").len(), SCANS);
     assert_eq!(replay(&file(&run), &[]), run.odometry());
@@ -435,6 +438,17 @@ fn inspect_reports_a_recording_as_a_dataset() {
     assert_eq!(report["format"], "mcap");
     assert_eq!(report["scans"], SCANS);
     assert_eq!(report["unreadable"].as_array().unwrap().len(), 0);
+    // A bit of the length of the last chunk with scans.
+    let mut bytes = fs::read(file(&run)).unwrap();
+    let signature = [0x28, 0xb5, 0x2f, 0xfd];
+    let mut places = (0..bytes.len() - 4).rev();
+    let content = places.find(|at| bytes[*at..*at + 4] == signature).unwrap();
+    // The head of a chunk before its content: opcode, lengths, times, sizes, `zstd`.
+    bytes[content - 53 + 3] ^= 4;
+    fs::write(file(&run), bytes).unwrap();
+    let again = Run::configured("").data(&file(&run));
+    let named = format!("is damaged at byte {}", content - 53);
+    again.finish().failed_with(&[&named]);
 }
 
 #[test]

@@ -154,6 +154,8 @@ fn results_take_bounded_memory() {
     let session = Session {
         scans: Some(poses as usize),
         resumed: 0,
+        damage: None,
+        needs_all: false,
         wall: Duration::from_secs(1),
         footprint: None,
         ending: Some(Ending::Complete),

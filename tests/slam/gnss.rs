@@ -21,10 +21,14 @@ use rustix::process::Signal;
 use serde_json::Value;
 
 use super::followers::undisturbed;
-use crate::common::{
-    Ended, Run, gyre,
-    recording::{SCANS_AROUND as SCANS, around_a_block},
-    send,
+use crate::{
+    common::{
+        Ended, Run, gyre,
+        recording::{SCANS_AROUND as SCANS, around_a_block},
+        send,
+    },
+    live::gnss::assert_replays,
+    observers::record::{WINDOW, recorded},
 };
 
 const TRAJECTORY: &str = FollowerId::Trajectory.name();
@@ -216,9 +220,11 @@ fn fixes_in_a_bag_lead_to_the_results_of_the_same_log_beside_it() {
     let without = of(&beside).finish();
     without.refused_with(&["has no messages of sensor_msgs/msg/NavSatFix, and no log"]);
     fs::write(beside.with_file_name("gnss.csv"), log(0.0)).unwrap();
-    let [of_log, of_bag] = [&beside, &within].map(|bag| of(bag));
+    let [of_log, of_bag] = [&beside, &within].map(|bag| recorded(&of(bag).set(WINDOW)));
     assert_eq!(of_bag.complete(), of_log.complete());
     assert_eq!(left(&of_bag), left(&of_log));
+    assert_replays(&of_log);
+    assert_replays(&of_bag);
     let gnss = &of_bag.summary()["gnss"];
     assert_eq!(gnss["topic"], "/fix", "{gnss}");
     assert_eq!(gnss["faults"]["zero"], 1, "{gnss}");

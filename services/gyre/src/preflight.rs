@@ -3,7 +3,7 @@
 use std::{io, net::UdpSocket, path::Path, time::Duration};
 
 use gyre_configuration::{Configuration, Played, gnss_log, open};
-use gyre_datasets::{DEFAULT_TURN_NS, Fingerprint, turn_ns};
+use gyre_datasets::{DEFAULT_TURN_NS, Fingerprint, Format, turn_ns};
 use gyre_live_radar::Settings;
 use gyre_maps::localise::searched_map;
 use gyre_masking::Masker;
@@ -100,6 +100,10 @@ pub struct Preflight {
     pub truth: Option<Vec<u8>>,
     /// The recording, if it is on the disk.
     pub recording: Option<Recording>,
+    /// See [`Session::damage`](gyre_results::Session).
+    pub damage: Option<String>,
+    /// See [`Session::needs_all`](gyre_results::Session).
+    pub needs_all: bool,
 }
 
 /// A recording on the disk.
@@ -152,6 +156,8 @@ pub fn check(configuration: &Configuration) -> Result<Preflight, Failure> {
     let footprint = Footprint::new(&window, &limits);
     Ok(Preflight {
         recording: scans.recording,
+        damage: scans.damage,
+        needs_all: scans.needs_all,
         scans: scans.count,
         window,
         limits,
@@ -161,6 +167,7 @@ pub fn check(configuration: &Configuration) -> Result<Preflight, Failure> {
 }
 
 /// The properties of the scans that the source knows before the run.
+#[derive(Default)]
 pub(crate) struct Scans {
     /// `None`: without end.
     pub count: Option<usize>,
@@ -169,6 +176,8 @@ pub(crate) struct Scans {
     pub bytes: usize,
     pub truth: Option<Vec<u8>>,
     pub recording: Option<Recording>,
+    damage: Option<String>,
+    needs_all: bool,
 }
 
 impl Scans {
@@ -201,6 +210,8 @@ impl Scans {
             count,
             period_ns: dataset.period_ns(),
             bytes: dataset.limits().bytes,
+            damage: dataset.damage().map(str::to_owned),
+            needs_all: matches!(dataset.format(), Format::Mcap | Format::Ros2Bag),
             truth,
             recording,
         })
@@ -225,9 +236,8 @@ impl Scans {
         Ok(Self {
             count: Some(stamps.len()),
             period_ns: turn_ns(stamps.into_iter()).unwrap_or(DEFAULT_TURN_NS),
-            bytes: 0,
-            truth: None,
-            recording: None,
+            damage: player.damage(),
+            ..Self::default()
         })
     }
 
@@ -237,8 +247,7 @@ impl Scans {
             count: None,
             period_ns: DEFAULT_TURN_NS,
             bytes: split::scan_bytes(&configuration.link)?,
-            truth: None,
-            recording: None,
+            ..Self::default()
         })
     }
 
@@ -274,8 +283,7 @@ impl Scans {
             count: configuration.source.scans,
             period_ns: radar.period_ns,
             bytes: radar.limits.bytes,
-            truth: None,
-            recording: None,
+            ..Self::default()
         })
     }
 }

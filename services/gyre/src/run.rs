@@ -5,7 +5,6 @@ mod resolve;
 use std::{
     env,
     ffi::OsString,
-    fs,
     os::unix::process::CommandExt,
     path::{Path, PathBuf},
     process::{Command, ExitCode},
@@ -16,15 +15,16 @@ use gyre_configuration::{Configuration, describe_masks, describe_objects, with_s
 use gyre_datasets::GnssLog;
 use gyre_messages::StageId;
 use gyre_operate::detach_if_asked;
-use gyre_recording::received_fixes;
+use gyre_recording::{copied_fixes, received_fixes};
 use gyre_results::{Form, Identity, Out, Programs, Results, SIMULATED_TRUTH, Session};
 use gyre_run::{Ending, Mode};
+use gyre_samples::GnssKind;
 use gyre_stage::{
     Manifest,
     run::{RootError, RunRoot, sweep},
     wake::{Signals, let_signals_end_the_process},
 };
-use gyre_storage::{self as storage, StorageError};
+use gyre_storage as storage;
 use gyre_supervise::{Plan, SuperviseError, supervise};
 use gyre_terminal::{Failure, INTERRUPTED, own, print};
 
@@ -223,6 +223,8 @@ fn play(
     let session = Session {
         scans: checked.scans,
         resumed,
+        damage: checked.damage.as_deref(),
+        needs_all: checked.needs_all,
         wall: started.elapsed(),
         footprint: Some(&checked.footprint),
         ending: report.as_ref().ok().map(|report| report.ending),
@@ -309,9 +311,12 @@ fn write_missing_results(
         begun.poses,
         out.path().display()
     ));
+    let played = gyre_configuration::open(configuration).ok();
     let session = Session {
         scans: begun.identity.scans,
         resumed: begun.poses as usize,
+        damage: played.as_ref().and_then(|it| it.dataset.damage()),
+        needs_all: false,
         wall: Duration::ZERO,
         footprint: None,
         ending: Some(Ending::Complete),
@@ -347,19 +352,25 @@ fn finish(
     Ok(written)
 }
 
-/// Puts the fixes that a live receiver has sent beside the recording of the run, for its replays.
-/// The run has its results without, as it has without the recording.
+/// Puts the fixes that the run has used beside its recording, for its replays. The run has its
+/// results without, as it has without the recording.
 fn keep_fixes(configuration: &Configuration, out: &Out) {
-    let (record, received) = (&configuration.record, received_fixes(out.path()));
-    if !record.is_on() || !configuration.gnss.is_live() || !received.exists() {
-        return;
-    }
-    let rows = fs::read(&received).map_err(StorageError::at("read", &received));
-    let kept = rows.and_then(|rows| storage::write(&GnssLog::of_recording(&record.file), rows));
+    let (record, gnss) = (&configuration.record, &configuration.gnss);
+    let received = received_fixes(out.path());
+    let rows: Result<_, Failure> = match gnss.kind {
+        _ if !record.is_on() => return,
+        GnssKind::Auto => copied_fixes(gnss, &configuration.source.data).map_err(Failure::from),
+        GnssKind::Udp | GnssKind::Ros2 if received.exists() => {
+            storage::read_text(&received, u64::from(u32::MAX)).map_err(Failure::from)
+        }
+        _ => return,
+    };
+    let to = GnssLog::of_recording(&record.file);
+    let kept = rows.and_then(|rows| Ok(storage::write(&to, rows)?));
     if let Err(error) = kept {
         print::note(format_args!(
-            "the fixes of GNSS are not beside the recording, but in {}: {error}",
-            received.display()
+            "the fixes of GNSS are not in {}: {error}",
+            to.display()
         ));
     }
 }

@@ -27,6 +27,11 @@ pub struct Session<'a> {
     pub scans: Option<usize>,
     /// Poses that were in the journal before.
     pub resumed: usize,
+    /// A sentence about what is damaged or missing in the recording.
+    pub damage: Option<&'a str>,
+    /// True if each scan that cannot be read is a problem: of recordings of runs and bags, whose
+    /// scans were read once.
+    pub needs_all: bool,
     /// Wall-clock time.
     pub wall: Duration,
     /// Shared memory; `None` if no process was started, because only results were missing.
@@ -83,7 +88,13 @@ impl Problem {
                 "only {poses} of the {scans} scans of {data} can be read, and a motion is between two: {log} says what is wrong with them"
             )));
         }
-        if counts.too_many_are_unreadable() {
+        if let Some(damage) = session.damage {
+            let missing = counts.missing;
+            return Some(Self(format!(
+                "{damage}; {unreadable} scans cannot be read and {missing} are missing by their times, and the results are of the others: `gyre inspect {data}` names all that is damaged"
+            )));
+        }
+        if counts.too_many_are_unreadable() || (session.needs_all && unreadable > 0) {
             return Some(Self(format!(
                 "{unreadable} of the {scans} scans of {data} cannot be read: the results are of the others, and {log} says what is wrong with each"
             )));

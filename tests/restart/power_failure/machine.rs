@@ -100,6 +100,8 @@ impl Machine {
         let session = Session {
             scans: Some(SCANS as usize),
             resumed: resumed as usize,
+            damage: None,
+            needs_all: false,
             wall: Duration::ZERO,
             footprint: None,
             ending: Some(Ending::Complete),

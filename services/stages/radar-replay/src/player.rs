@@ -73,6 +73,11 @@ impl Player {
         })
     }
 
+    /// See [`Recording::damage`].
+    pub fn damage(&self) -> Option<String> {
+        self.recording.damage()
+    }
+
     /// Returns the times of the messages, ns since 1970.
     pub fn stamps_ns(&self) -> impl Iterator<Item = i64> + '_ {
         let entries = self.recording.entries(self.topics[0]);

@@ -17,7 +17,7 @@ use crate::{
     topics::{Kind, Topics},
 };
 
-/// What a radar says of itself, or why that cannot be used.
+/// The description that a radar gives of itself, or why that cannot be used.
 type OwnDescription = Result<Described, String>;
 
 /// The files of a bag, and the spans of the messages in them.
@@ -43,7 +43,7 @@ pub(crate) struct Key {
     ns: i64,
     /// The number of its span.
     pub span: u32,
-    /// Its number in the span, among those that are wanted.
+    /// The number in the span, among those that are wanted.
     number: u32,
 }
 
@@ -91,8 +91,8 @@ impl Bag {
     /// Returns the messages of a span that are wanted.
     ///
     /// # Errors
-    /// A file that cannot be read, or whose messages are compressed. A damaged span has no messages,
-    /// and its file knows that.
+    /// A file that cannot be read, or whose messages are compressed. A damaged span has none, and
+    /// counts as damage of its file.
     pub fn read(
         &mut self,
         span: u32,

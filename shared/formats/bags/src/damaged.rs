@@ -10,4 +10,4 @@ mod walk;
 
 pub use parse::parse;
 pub use records::records;
-pub use walk::{Damage, Span, Walk, read};
+pub use walk::{Damage, Span, Walk, read, sentence};

@@ -1,13 +1,13 @@
 //! The messages of a span.
 
 use std::{
-    collections::{BTreeMap, BTreeSet},
+    collections::BTreeMap,
     fs::File,
     io,
     path::{Path, PathBuf},
 };
 
-use crate::damaged::{Damage, Span};
+use crate::damaged::{Damage, Span, sentence};
 use mcap::{McapError, records::Record};
 
 use crate::{
@@ -54,10 +54,8 @@ pub(crate) struct BagFile {
     pub channels: BTreeMap<u16, Channel>,
     /// The position behind the last record, if the file has no end.
     cut_at: Option<u64>,
-    /// The places between records that cannot be read.
-    gaps: Damage,
-    /// The positions of the spans that could not be read so far.
-    broken: BTreeSet<u64>,
+    /// The places between records that cannot be read, and the spans so far.
+    damage: Damage,
     /// True if it lists its channels at its end.
     pub has_summary: bool,
 }
@@ -73,25 +71,20 @@ impl BagFile {
             schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
             cut_at: (!found.is_complete).then_some(found.end),
-            gaps: found.damage,
-            broken: BTreeSet::new(),
+            damage: found.damage,
             has_summary: false,
         };
         for span in found.summary {
             bag.read(span, |_| false)?;
         }
         // One that is damaged may lack a channel.
-        bag.has_summary = !bag.channels.is_empty() && found.damage.places == 0;
+        bag.has_summary = !bag.channels.is_empty() && bag.damage.is_empty();
         Ok((bag, found.messages))
     }
 
     /// Returns a sentence about what is damaged or missing, as far as the file has been read.
     pub fn damage(&self) -> Option<String> {
-        let mut damage = self.gaps;
-        self.broken.iter().for_each(|offset| damage.add(*offset));
-        let first = self.broken.first().copied().unwrap_or(u64::MAX);
-        damage.first = damage.first.min(first);
-        damage.of_file(&self.path, self.cut_at)
+        sentence(&self.path, &self.damage, self.cut_at)
     }
 
     /// Returns the messages of a span that are of wanted channels, and learns the channels in it.
@@ -112,7 +105,7 @@ impl BagFile {
             Err(error) => return Err(BagError::io(&self.path, error)),
         };
         if let Err(error) = read {
-            self.broken.insert(span.offset);
+            self.damage.insert(span.offset);
             return Err(BagError::Damaged {
                 path: self.path.clone(),
                 offset: span.offset,

@@ -103,6 +103,6 @@ pub(crate) fn spans(path: &Path, file: &File) -> Result<Spans, BagError> {
         }
     }
     found.messages.extend(plain);
-    (found.end, found.damage) = (walk.offset(), walk.damage());
+    (found.end, found.damage) = (walk.offset, walk.damage);
     Ok(found)
 }

@@ -8,7 +8,7 @@ use std::{
 };
 
 use foxglove::{Decode, messages::RawImage};
-use gyre_bags::damaged::{Damage, Span};
+use gyre_bags::damaged::{Damage, Span, sentence};
 use gyre_messages::{GivenAnew, Item, NumberedBy, topic};
 
 use crate::{
@@ -196,16 +196,10 @@ impl Recording {
         absent.take(MAX_ABSENT).collect()
     }
 
-    /// Returns the files whose writers were killed.
-    pub fn cut(&self) -> impl Iterator<Item = &Path> {
-        let cut = self.parts.iter().filter(|part| part.cut_at.is_some());
-        cut.map(|part| part.path.as_path())
-    }
-
     /// Returns a sentence for each file that is damaged or has no end.
     pub fn damages(&self) -> impl Iterator<Item = String> {
         let parts = self.parts.iter();
-        parts.filter_map(|part| part.damage.of_file(&part.path, part.cut_at))
+        parts.filter_map(|part| sentence(&part.path, &part.damage, part.cut_at))
     }
 
     /// Returns the first of these sentences after which messages may be missing: the next recorder
@@ -214,7 +208,7 @@ impl Recording {
         let last = self.parts.len() - 1;
         let cut_at = |number, part: &Part| part.cut_at.filter(|_| number == last);
         let mut parts = self.parts.iter().enumerate();
-        parts.find_map(|(number, part)| part.damage.of_file(&part.path, cut_at(number, part)))
+        parts.find_map(|(number, part)| sentence(&part.path, &part.damage, cut_at(number, part)))
     }
 
     /// Reads a message.
@@ -293,7 +287,7 @@ impl Part {
             channels: Channels::new(),
             missed: BTreeMap::new(),
             skipped: Vec::new(),
-            damage: Damage::default(),
+            damage: Damage::new(),
             cut_at: None,
         };
         let (mut head, mut places, mut chunk) = (None, Vec::new(), None);
@@ -310,7 +304,9 @@ impl Part {
                     // The first one has the channels.
                     if mem::take(&mut is_first) {
                         match chunk::read(&part.path, &part.file, span, &mut part.channels) {
-                            Err(RecordingError::Damaged { .. }) => walk.note(span),
+                            Err(RecordingError::Damaged { offset, .. }) => {
+                                walk.records.damage.insert(offset);
+                            }
                             read => drop(read?),
                         }
                     }
@@ -328,19 +324,19 @@ impl Part {
                         let topics = table.entries.into_iter();
                         places.extend(topics.map(|(topic, entries)| (topic, entries, chunk)));
                     } else if Table::is_of(&record) {
-                        walk.note(span);
+                        walk.records.damage.insert(span.offset);
                     }
                 }
             }
         }
-        let (damage, end) = walk.damage();
-        (part.damage, part.cut_at) = (damage, (!is_complete).then_some(end));
+        part.cut_at = (!is_complete).then_some(walk.records.offset);
+        part.damage = walk.records.damage;
         let reason = "it has no metadata `gyre.recording`".to_owned();
-        let head: Head = head.ok_or_else(|| match part.damage.places {
-            0 => part.foreign(reason),
-            _ => RecordingError::Damaged {
+        let head: Head = head.ok_or_else(|| match part.damage.first() {
+            None => part.foreign(reason),
+            Some(offset) => RecordingError::Damaged {
                 path: part.path.clone(),
-                offset: part.damage.first,
+                offset: *offset,
                 reason,
             },
         })?;

@@ -2,7 +2,7 @@
 
 use std::{fs::File, io, path::Path};
 
-use gyre_bags::damaged::{Damage, Span};
+use gyre_bags::damaged::Span;
 use mcap::records::{Channel, Metadata, Record, op};
 
 use crate::RecordingError;
@@ -24,7 +24,7 @@ pub(crate) enum Step {
 pub(crate) struct Walk<'a> {
     path: &'a Path,
     file: &'a File,
-    records: gyre_bags::damaged::Walk<'a>,
+    pub records: gyre_bags::damaged::Walk<'a>,
 }
 
 impl<'a> Walk<'a> {
@@ -59,23 +59,15 @@ impl<'a> Walk<'a> {
                             return Ok(Some(Step::Metadata(span, record)));
                         }
                         Ok(Record::Channel(channel)) => return Ok(Some(Step::Channel(channel))),
-                        _ => self.records.note(span),
+                        _ => {
+                            self.records.damage.insert(span.offset);
+                        }
                     }
                 }
                 _ => {}
             }
         }
         Ok(None)
-    }
-
-    /// Returns the damaged places so far, and the position behind the last record.
-    pub fn damage(&self) -> (Damage, u64) {
-        (self.records.damage(), self.records.offset())
-    }
-
-    /// Counts a record as damaged.
-    pub fn note(&mut self, span: Span) {
-        self.records.note(span);
     }
 }
 

@@ -173,6 +173,8 @@ mod tests {
         let session = Session {
             scans: Some(466),
             resumed: 0,
+            damage: None,
+            needs_all: false,
             wall: Duration::from_millis(14_200),
             footprint: None,
             ending: Some(Ending::Complete),

@@ -1,6 +1,6 @@
 //! The places of records in a file, up to its end or to where its writer was killed.
 
-use std::{fs::File, io, os::unix::fs::FileExt, path::Path};
+use std::{collections::BTreeSet, fs::File, io, os::unix::fs::FileExt, path::Path};
 
 use mcap::{MAGIC, records::op};
 
@@ -13,6 +13,8 @@ const PREFIX: u64 = 9;
 const MAX_SPAN_BYTES: u64 = 256 << 20;
 /// The first opcode of records that are of one program.
 const OWN: u8 = 0x80;
+/// Damaged places behind which a file is not read.
+const MAX_PLACES: usize = 4096;
 /// Bytes that are searched at once for the record behind a damaged one.
 const WINDOW: usize = 1 << 16;
 /// Whole records in a row of which a damaged place is followed.
@@ -34,56 +36,39 @@ impl Span {
     }
 }
 
-/// The damaged places of a file.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Damage {
-    /// Their number.
-    pub places: u64,
-    /// The position of the first.
-    pub first: u64,
-}
+/// The positions of the damaged places of a file, at most [`MAX_PLACES`].
+pub type Damage = BTreeSet<u64>;
 
-impl Damage {
-    /// Counts a damaged place.
-    pub fn add(&mut self, offset: u64) {
-        if self.places == 0 {
-            self.first = offset;
-        }
-        self.places += 1;
-    }
-
-    /// Returns a sentence about a file, which has no end if the last record that can be read ends
-    /// at `cut_at`; `None` if nothing of the file is missing.
-    pub fn of_file(&self, path: &Path, cut_at: Option<u64>) -> Option<String> {
-        let path = path.display();
-        match (self.places, cut_at) {
-            (0, None) => None,
-            (0, Some(end)) => Some(format!(
-                "{path} has no end behind byte {end}: its recorder was killed, or it was not copied whole"
-            )),
-            (places, _) => {
-                let places = match places {
-                    1 => String::new(),
-                    _ => format!(", the first of {places} places"),
-                };
-                let first = self.first;
-                Some(format!(
-                    "{path} is damaged at byte {first}{places}: what was there is left out"
-                ))
-            }
-        }
-    }
+/// Returns a sentence about the damage of a file, which has no end if the last record that can be
+/// read ends at `cut_at`; `None` if nothing of the file is missing.
+pub fn sentence(path: &Path, damage: &Damage, cut_at: Option<u64>) -> Option<String> {
+    let path = path.display();
+    let Some(first) = damage.first() else {
+        return cut_at.map(|end| {
+            format!("{path} has no end behind byte {end}: its recorder was killed, or it was not copied whole")
+        });
+    };
+    let places = match damage.len() {
+        1 => String::new(),
+        places => format!(", the first of {places} places"),
+    };
+    Some(format!(
+        "{path} is damaged at byte {first}{places}: what was there is left out"
+    ))
 }
 
 /// Walks over a file from record to record, past those that are damaged. Of a record only the
 /// lengths of its fields are read: they must add up to its own.
 pub struct Walk<'a> {
     file: &'a File,
-    offset: u64,
+    /// The position behind the last record: in a file that has no end, the first byte that cannot
+    /// be read.
+    pub offset: u64,
+    /// The damaged places so far.
+    pub damage: Damage,
     bytes: u64,
     /// True if the file has chunks: then the records within a damaged one are not taken for others.
     has_chunks: bool,
-    damage: Damage,
 }
 
 impl<'a> Walk<'a> {
@@ -93,9 +78,8 @@ impl<'a> Walk<'a> {
     /// The file cannot be read.
     pub fn new(file: &'a File) -> io::Result<Option<Self>> {
         let bytes = file.metadata()?.len();
-        let signature = number(file, 0)?.map(u64::to_le_bytes);
-        let has_signature = signature.is_some_and(|signature| signature == MAGIC);
-        Ok(has_signature.then_some(Self {
+        let has_signature = number(file, 0)?.to_le_bytes() == MAGIC;
+        Ok(has_signature.then(|| Self {
             file,
             offset: MAGIC.len() as u64,
             bytes,
@@ -118,29 +102,15 @@ impl<'a> Walk<'a> {
                 self.offset = span.end();
                 return Ok(Some((opcode, span)));
             }
-            let Some(next) = self.next_whole()? else {
-                break;
-            };
-            self.damage.add(self.offset);
-            self.offset = next;
+            match self.next_whole()? {
+                Some(next) if self.damage.len() < MAX_PLACES => {
+                    self.damage.insert(self.offset);
+                    self.offset = next;
+                }
+                _ => break,
+            }
         }
         Ok(None)
-    }
-
-    /// Counts a record whose content is damaged.
-    pub fn note(&mut self, record: Span) {
-        self.damage.add(record.offset);
-    }
-
-    /// Returns the damaged places so far.
-    pub fn damage(&self) -> Damage {
-        self.damage
-    }
-
-    /// Returns the position behind the last record: in a file that has no end, the first byte that
-    /// cannot be read.
-    pub fn offset(&self) -> u64 {
-        self.offset
     }
 
     /// Returns the opcode of a record and the place that it states.
@@ -172,15 +142,11 @@ impl<'a> Walk<'a> {
     fn fill(&self, fields: &[Field], span: Span, has_content: bool) -> io::Result<bool> {
         let mut at = span.offset + PREFIX;
         for field in fields {
-            let bytes = match field {
-                Field::Bytes(bytes) => Some(*bytes as u64),
-                Field::Text | Field::Map => {
-                    let length = number(self.file, at)?.map(|length| length & u64::from(u32::MAX));
-                    length.map(|length| length + 4)
-                }
-                Field::Long => number(self.file, at)?.map(|length| length.saturating_add(8)),
-            };
-            at = bytes.map_or(u64::MAX, |bytes| at.saturating_add(bytes));
+            at = at.saturating_add(match field {
+                Field::Bytes(bytes) => *bytes as u64,
+                Field::Text | Field::Map => 4 + (number(self.file, at)? & u64::from(u32::MAX)),
+                Field::Long => number(self.file, at)?.saturating_add(8),
+            });
             if at > span.end() {
                 return Ok(false);
             }
@@ -232,11 +198,11 @@ impl<'a> Walk<'a> {
     }
 }
 
-/// Returns eight bytes as a number; those behind the end of the file are zero, all of them `None`.
-fn number(file: &File, offset: u64) -> io::Result<Option<u64>> {
+/// Returns eight bytes as a number, in which those behind the end of the file are zero.
+fn number(file: &File, offset: u64) -> io::Result<u64> {
     let mut bytes = [0; 8];
-    let read = file.read_at(&mut bytes, offset)?;
-    Ok((read > 0).then_some(u64::from_le_bytes(bytes)))
+    file.read_at(&mut bytes, offset)?;
+    Ok(u64::from_le_bytes(bytes))
 }
 
 /// Reads what a file has of a place. A walk over the same file goes on as before.
