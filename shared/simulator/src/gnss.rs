@@ -135,8 +135,8 @@ pub(crate) fn fixes(
             Some(RawFix {
                 stamp_ns: start_ns + ((time_s + config.late_s) * 1e9).round() as i64,
                 at: [place.latitude_deg, place.longitude_deg],
-                altitude_m: 0.0,
                 sigma_m: config.noise_m.hypot(config.bias_m),
+                ..RawFix::default()
             })
         };
         (0..count).filter_map(fix).collect()
@@ -267,7 +267,7 @@ mod tests {
         let plane = LocalPlane::new(
             RawFix {
                 at: config.gnss.origin_deg,
-                ..fix()
+                ..RawFix::default()
             }
             .geographic(),
             0.0,
@@ -279,15 +279,6 @@ mod tests {
         });
         let errors = errors.collect();
         (fixes, errors)
-    }
-
-    fn fix() -> RawFix {
-        RawFix {
-            stamp_ns: 0,
-            at: [0.0, 0.0],
-            altitude_m: 0.0,
-            sigma_m: 0.0,
-        }
     }
 
     fn exact() -> SimulatedGnssConfig {

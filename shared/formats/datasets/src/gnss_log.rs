@@ -2,21 +2,24 @@
 //!
 //! - [`GnssLog`]: where it lies beside the scans of a dataset, and how it is read;
 //! - `table`: tables as CSV; `radiate`: the files of RADIATE, one for each fix;
+//! - [`ReceivedFixes`]: what a live receiver has sent, read on;
 //! - `faults`: what is wrong with the fixes, and which of them are left out.
 
 mod error;
 mod faults;
 mod radiate;
+mod received;
 mod table;
 
 use std::path::{Path, PathBuf};
 
 pub use error::GnssLogError;
 pub use faults::GnssFaults;
+pub use received::ReceivedFixes;
 
 use gyre_samples::{BagFixes, GnssConfig, GnssFix, LocalPlane, RawFix};
 
-use crate::{gps_imu_twist::has_list, gyro_log::roots};
+use crate::{gps_imu_twist::has_list, gyro_log::roots, table::Unreadable};
 
 /// Logs relative to the root of a dataset, in order of precedence.
 const PLACES: [&str; 8] = [
@@ -73,7 +76,7 @@ impl GnssLog {
     /// A file that cannot be read or has no positions, and one without a usable fix.
     pub fn read(path: &Path) -> Result<Self, GnssLogError> {
         let raw = Self::raw(path)?;
-        if let Some(reason) = raw.is_another_table() {
+        if let Some(reason) = raw.unreadable.are_most(raw.count()) {
             let path = path.to_owned();
             return Err(GnssLogError::Unusable { path, reason });
         }
@@ -113,12 +116,14 @@ impl GnssLog {
     /// Reads what a live receiver has sent during a run, be it among lines that are no fixes. A run
     /// that has got nothing usable goes on without fixes, and with the reason.
     pub fn received(path: &Path) -> Self {
-        let read = table::read(path).map(|raw| Self::examined(raw, path));
-        let (log, error) = read.unwrap_or_else(|error| (Self::default(), Some(error)));
-        Self {
-            path: path.to_owned(),
-            unusable: error.map(|error| error.to_string()),
-            ..log
+        let mut received = ReceivedFixes::new(path);
+        match received.read_on() {
+            Ok(()) => received.log(),
+            Err(error) => Self {
+                path: path.to_owned(),
+                unusable: Some(error.to_string()),
+                ..Self::default()
+            },
         }
     }
 
@@ -209,14 +214,12 @@ impl GnssLog {
 }
 
 /// The fixes of a file as they stand there.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 struct Raw {
     rows: Vec<RawFix>,
     /// The coordinates are m east and north, and not degrees of latitude and longitude.
     is_plane: bool,
-    /// Rows that are none of the table, and the line of the first.
-    unreadable: usize,
-    first_unreadable: usize,
+    unreadable: Unreadable,
     /// Messages or rows in which the receiver had no fix.
     without_fix: usize,
 }
@@ -224,24 +227,6 @@ struct Raw {
 impl Raw {
     /// All entries, those that cannot be used too.
     fn count(&self) -> usize {
-        self.rows.len() + self.unreadable + self.without_fix
-    }
-
-    /// Returns what is wrong if most of the rows cannot be read.
-    fn is_another_table(&self) -> Option<String> {
-        let (unreadable, all) = (self.unreadable, self.count());
-        (2 * unreadable > all).then(|| {
-            format!(
-                "{unreadable} of its {all} rows cannot be read, the first in line {}: are its stamps, decimal points and columns those that its header names?",
-                self.first_unreadable
-            )
-        })
-    }
-
-    fn leave_out(&mut self, line: usize) {
-        if self.unreadable == 0 {
-            self.first_unreadable = line;
-        }
-        self.unreadable += 1;
+        self.rows.len() + self.without_fix + self.unreadable.count
     }
 }

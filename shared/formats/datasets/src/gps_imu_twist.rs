@@ -13,6 +13,9 @@ use crate::{OpenError, frame_stamps};
 /// The largest file: they have about 900 bytes.
 const MAX_BYTES: u64 = 1 << 16;
 
+/// The fault of a file that cannot be read.
+pub(crate) const UNREADABLE: &str = "the file of this number is missing, or has another form";
+
 /// A file of the folder.
 pub(crate) struct TwistFile {
     /// The number that it is named by.

@@ -1,17 +1,16 @@
 //! The log of a gyro as a file.
 //!
 //! - [`GyroLog`]: where it lies beside the scans of a dataset, and how it is read;
-//! - `table`: tables as CSV; `columns`: which of their columns are what;
+//! - `columns`: which columns of a table are what;
 //! - `twist`: the files of RADIATE, one for each sample;
 //! - [`SampleTrack`]: its samples in the vehicle's axes on the radar's clock;
 //! - `faults`: what is wrong with the samples, and which of them are left out; `jumps`: which of
 //!   them change faster than a vehicle can.
 
-pub(crate) mod columns;
+mod columns;
 mod error;
 pub(crate) mod faults;
 mod jumps;
-pub(crate) mod table;
 mod track;
 mod twist;
 
@@ -22,8 +21,12 @@ pub use faults::{LogFaults, LogGap};
 pub use track::SampleTrack;
 
 use gyre_samples::{Sample, SampleKind};
+use gyre_storage as storage;
 
-use crate::gps_imu_twist::has_list;
+use crate::{
+    gps_imu_twist::has_list,
+    table::{Columns, MAX_BYTES, Rows, Unreadable},
+};
 
 /// Logs relative to the root of a dataset, in order of precedence.
 const PLACES: [&str; 12] = [
@@ -75,7 +78,7 @@ impl GyroLog {
     pub fn read(path: &Path) -> Result<Self, LogError> {
         let raw = match path.is_dir() {
             true => twist::read(path)?,
-            false => table::read::<columns::Columns>(path)?,
+            false => read_table::<columns::Columns>(path)?,
         };
         let (samples, faults) = faults::examine(raw, path, &faults::RATES)?;
         Ok(Self {
@@ -134,13 +137,42 @@ pub(crate) fn roots(folder: &Path) -> impl Iterator<Item = &Path> {
     [Some(folder), above].into_iter().flatten()
 }
 
+/// The columns of a table in which each row is a sample.
+pub(crate) trait SampleColumns: Columns<Entry = Sample> {
+    /// The sensor.
+    const OF: SampleKind;
+
+    /// The unit of the values is named nowhere.
+    fn unit_is_assumed(&self) -> bool;
+}
+
+/// Reads a table of samples.
+pub(crate) fn read_table<C: SampleColumns>(path: &Path) -> Result<Raw, LogError> {
+    let text = storage::read_text(path, MAX_BYTES).map_err(|source| LogError::Io {
+        of: C::OF,
+        path: path.to_owned(),
+        source,
+    })?;
+    let rows = Rows::<C>::of(&text).map_err(|reason| LogError::Unknown {
+        of: C::OF,
+        path: path.to_owned(),
+        reason,
+    })?;
+    Ok(Raw {
+        unit_is_assumed: rows.columns.unit_is_assumed(),
+        samples: rows.entries,
+        unreadable: rows.unreadable,
+        unmeasured: rows.unmeasured,
+    })
+}
+
 /// The samples of a file as they stand there.
 #[derive(Debug, Default)]
 pub(crate) struct Raw {
     samples: Vec<Sample>,
-    /// Rows that are none of the table, and the line of the first.
-    unreadable: usize,
-    first_unreadable: usize,
+    unreadable: Unreadable,
+    /// Rows that state that nothing was measured.
+    unmeasured: usize,
     /// The unit of the values is named nowhere.
     pub(crate) unit_is_assumed: bool,
 }

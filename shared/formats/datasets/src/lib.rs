@@ -15,10 +15,12 @@ mod gnss_log;
 mod gps_imu_twist;
 pub mod ground_truth;
 mod gyro_log;
+mod header;
 pub mod inspect;
 mod plain_words;
 mod scan_samples;
 mod stretches;
+mod table;
 mod wheel_log;
 
 pub use dataset::{
@@ -29,7 +31,7 @@ pub use dataset::{
 };
 pub use fingerprint::Fingerprint;
 pub use first_scan::check_first_scan;
-pub use gnss_log::{GnssFaults, GnssLog, GnssLogError, LoggedFix};
+pub use gnss_log::{GnssFaults, GnssLog, GnssLogError, LoggedFix, ReceivedFixes};
 pub use ground_truth::{
     TrajectoryError, find_ground_truth, parse_trajectory, read_trajectory, write_kitti, write_tum,
 };

@@ -164,6 +164,10 @@ impl ScanSamples {
                 of,
                 path: path.to_owned(),
                 after_s: (span_ns[0] - first_ns) as f64 * 1e-9,
+                steps: match faults.clock_steps_s.is_empty() {
+                    true => String::new(),
+                    false => format!("{}. ", faults.clock_steps()),
+                },
             });
         }
         let named = |sentence| format!("{}: {sentence}", path.display());

@@ -14,14 +14,13 @@ use counts::CountColumns;
 use crate::{
     LogError, LogFaults, SampleTrack,
     gyro_log::{
-        Raw,
-        columns::{StampUnit, plain, stamp_unit},
+        Raw, SampleColumns,
         faults::{Plausible, examine},
-        roots,
-        table::{self, SampleColumns},
+        read_table, roots,
     },
+    header::{Header, Sign, Stamp},
+    table::Columns,
 };
-use gyre_storage::quoted;
 
 /// Logs relative to the root of a dataset, in order of precedence.
 const PLACES: [&str; 4] = ["wheels.csv", "wheel_speed.csv", "speed.csv", "odometer.csv"];
@@ -53,11 +52,11 @@ impl WheelLog {
     /// A file that cannot be read or has no speed, one whose stamps or speeds cannot be those of
     /// wheels, and ticks whose length is not given.
     pub fn read(path: &Path, m_per_tick: Option<f64>) -> Result<Self, LogError> {
-        let no_speed = match table::read::<SpeedColumns>(path) {
+        let no_speed = match read_table::<SpeedColumns>(path) {
             Ok(raw) => return Self::examined(raw, path),
             Err(error) => error,
         };
-        match table::read::<CountColumns>(path) {
+        match read_table::<CountColumns>(path) {
             Ok(raw) => Ok(Self::with(counts::speeds(raw, path, m_per_tick)?, path)),
             Err(_) => Err(no_speed),
         }
@@ -104,15 +103,7 @@ impl WheelLog {
 }
 
 /// Names of the speed.
-const NAMES: [&str; 7] = [
-    "speed",
-    "wheel_speed",
-    "vehicle_speed",
-    "velocity",
-    "v",
-    "vx",
-    "linear_x",
-];
+const NAMES: &str = "speed wheel_speed vehicle_speed velocity v vx linear_x";
 /// Units at the end of its name.
 const UNITS: [(&str, f64); 8] = [
     ("_mps", 1.0),
@@ -128,51 +119,66 @@ const UNITS: [(&str, f64); 8] = [
 /// The remedy, for messages.
 const REMEDY: &str = "the first row must name the columns, as in `stamp_ns,speed_m_s` (also stamp_us, stamp_s; speed_km_h; ticks, distance_m)";
 
+/// Columns with the direction of a speed that has no sign.
+const DIRECTION: Sign = Sign {
+    names: "direction driving_direction travel_direction",
+    plus: "1 +1 f d forward forwards",
+    minus: "-1 b r backward backwards reverse",
+};
+const REVERSE: Sign = Sign {
+    names: "reverse is_reverse reversing",
+    plus: "0 false",
+    minus: "1 true",
+};
+
 /// Where a table has what.
 struct SpeedColumns {
-    stamp: (usize, StampUnit),
+    stamp: Stamp,
     speed: usize,
     /// Factor that makes speeds m/s; `None`: it is named nowhere.
     unit: Option<f64>,
+    sign: Option<(usize, &'static Sign)>,
+}
+
+impl Columns for SpeedColumns {
+    type Entry = Sample;
+
+    fn by_names(header: &Header) -> Result<Self, String> {
+        let missing = |what| format!("its columns {} have no {what}: {REMEDY}", header.listed());
+        let (speed, unit) = header.first(speed_unit).ok_or_else(|| missing("speed"))?;
+        Ok(Self {
+            stamp: header.stamp().ok_or_else(|| missing("stamps"))?,
+            speed,
+            unit,
+            sign: header.sign(&[&DIRECTION, &REVERSE]),
+        })
+    }
+
+    fn entry(&self, row: &StringRecord) -> Option<Sample> {
+        let speed = row.get(self.speed)?.parse::<f64>().ok()? * self.unit.unwrap_or(1.0);
+        let speed = match self.sign {
+            Some((column, sign)) => sign.apply(speed, row.get(column)?)?,
+            None => speed,
+        };
+        Some(Sample::speed(self.stamp.ns(row)?, speed))
+    }
 }
 
 impl SampleColumns for SpeedColumns {
     const OF: SampleKind = SampleKind::Wheels;
 
-    fn of(first: &StringRecord) -> Result<Self, String> {
-        let names: Vec<String> = first.iter().map(plain).collect();
-        let columns = || names.iter().enumerate();
-        let stamp = columns().find_map(|(k, name)| Some((k, stamp_unit(name)?)));
-        let speed = columns().find_map(|(k, name)| Some((k, speed_unit(name)?)));
-        let listed = || quoted(&names.join(","));
-        let (speed, unit) =
-            speed.ok_or_else(|| format!("its columns {} have no speed: {REMEDY}", listed()))?;
-        Ok(Self {
-            stamp: stamp
-                .ok_or_else(|| format!("its columns {} have no stamps: {REMEDY}", listed()))?,
-            speed,
-            unit,
-        })
-    }
-
     fn unit_is_assumed(&self) -> bool {
         self.unit.is_none()
-    }
-
-    fn sample(&self, row: &StringRecord) -> Option<Sample> {
-        let (column, unit) = self.stamp;
-        let stamp_ns = unit.ns(row.get(column)?)?;
-        let speed: f64 = row.get(self.speed)?.parse().ok()?;
-        Some(Sample::speed(stamp_ns, speed * self.unit.unwrap_or(1.0)))
     }
 }
 
 /// The unit of a column of this name; `None` if it is no speed, `Some(None)` if it has no unit.
 fn speed_unit(name: &str) -> Option<Option<f64>> {
+    let is_speed = |name: &str| NAMES.split(' ').any(|it| it == name);
     let of_unit = |(unit, factor): &(&str, f64)| {
         let named = name.strip_suffix(unit)?;
-        NAMES.contains(&named).then_some(Some(*factor))
+        is_speed(named).then_some(Some(*factor))
     };
     let by_name = UNITS.iter().find_map(of_unit);
-    by_name.or_else(|| NAMES.contains(&name).then_some(None))
+    by_name.or_else(|| is_speed(name).then_some(None))
 }

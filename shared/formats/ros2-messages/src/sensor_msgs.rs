@@ -54,8 +54,8 @@ message!(
     [Header]
 );
 
-/// A sample of an inertial sensor. Covariances are 3 x 3, by rows; the first element is -1 where
-/// there is no such measurement.
+/// A sample of an inertial sensor. Covariances are 3 x 3, by rows; the first element is negative
+/// (-1) where there is no such measurement.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Imu {
     /// Time and frame.
@@ -82,29 +82,34 @@ message!(
     [Header, Quaternion, Vector3]
 );
 
-/// The first element of a covariance where nothing is measured.
-const NOT_MEASURED: f64 = -1.0;
-
 impl Imu {
     /// Returns the rates and accelerations as a sample, in the sensor's own axes and on its own
-    /// clock ([`Header::stamp_or`]); `None` if it measures no rates.
-    pub fn sample(&self, received_ns: i64) -> Option<Sample> {
-        let (turn, along) = (self.angular_velocity, self.linear_acceleration);
-        let sample = Sample {
+    /// clock ([`Header::stamp_or`]). Rates that it did not measure are not a number, accelerations
+    /// zero.
+    pub fn sample(&self, received_ns: i64) -> Sample {
+        let values = |of: Vector3, covariance: [f64; 9], unmeasured: f64| match covariance[0] < 0.0
+        {
+            true => [unmeasured; 3],
+            false => [of.x, of.y, of.z],
+        };
+        let covariance = self.angular_velocity_covariance;
+        let [x, y, z] = values(self.angular_velocity, covariance, f64::NAN);
+        let covariance = self.linear_acceleration_covariance;
+        let [along_x, along_y, along_z] = values(self.linear_acceleration, covariance, 0.0);
+        Sample {
             stamp_ns: self.header.stamp_or(received_ns),
             kind: SampleKind::Gyro as u32,
             reserved: 0,
-            values: [turn.x, turn.y, turn.z, along.x, along.y, along.z],
-        };
-        (self.angular_velocity_covariance[0] != NOT_MEASURED).then_some(sample)
+            values: [x, y, z, along_x, along_y, along_z],
+        }
     }
 }
 
 /// The kind of a fix of a GNSS receiver, and the systems that it is of.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct NavSatStatus {
-    /// 0 for a fix, 1 and 2 for one that is augmented by satellites or on the ground; below 0
-    /// without a fix.
+    /// 0 for a fix, 1 and 2 for one that is augmented by satellites or on the ground; -1 without a
+    /// fix; -2 where the driver does not state it, as by default from ROS 2 Jazzy on.
     pub status: i8,
     /// The systems, a bit each: GPS, GLONASS, BeiDou, Galileo.
     pub service: u16,
@@ -142,8 +147,9 @@ message!(
     [Header, NavSatStatus]
 );
 
-/// The least status of a fix.
+/// The least status of a fix, and that of a driver that does not state it.
 const FIX: i8 = 0;
+const STATUS_UNKNOWN: i8 = -2;
 /// The type of a covariance that is not known.
 const COVARIANCE_UNKNOWN: u8 = 0;
 
@@ -155,11 +161,13 @@ impl NavSatFix {
             COVARIANCE_UNKNOWN => 0.0,
             _ => RawFix::sigma_of([0, 4].map(|at| self.position_covariance[at])),
         };
-        (self.status.status >= FIX).then_some(RawFix {
+        let status_is_unknown = self.status.status == STATUS_UNKNOWN;
+        (self.status.status >= FIX || status_is_unknown).then_some(RawFix {
             stamp_ns: self.header.stamp_or(received_ns),
             at: [self.latitude, self.longitude],
             altitude_m: self.altitude,
             sigma_m,
+            status_is_unknown,
         })
     }
 

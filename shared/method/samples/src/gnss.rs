@@ -116,7 +116,7 @@ pub struct GnssFix {
 }
 
 /// A fix as it was logged, whatever it says.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RawFix {
     /// Time on the receiver's clock, ns since 1970.
     pub stamp_ns: i64,
@@ -126,6 +126,8 @@ pub struct RawFix {
     pub altitude_m: f64,
     /// Standard deviation along each of both axes, m; not above zero where the log has none.
     pub sigma_m: f64,
+    /// The receiver does not state whether it had a fix.
+    pub status_is_unknown: bool,
 }
 
 impl RawFix {
@@ -137,9 +139,13 @@ impl RawFix {
         }
     }
 
-    /// Returns the standard deviation along each of both axes with these variances along them, m².
-    pub fn sigma_of([east_m2, north_m2]: [f64; 2]) -> f64 {
-        (0.5 * (east_m2 + north_m2)).sqrt()
+    /// Returns the standard deviation along each of both axes with these variances along them, m²;
+    /// 0 if one is unknown, which is negative or not a number.
+    pub fn sigma_of(variances_m2: [f64; 2]) -> f64 {
+        match variances_m2.iter().all(|variance| *variance >= 0.0) {
+            true => (0.5 * (variances_m2[0] + variances_m2[1])).sqrt(),
+            false => 0.0,
+        }
     }
 }
 

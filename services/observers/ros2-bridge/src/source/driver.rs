@@ -287,22 +287,21 @@ impl Driver {
         self.node.type_of(&self.configuration_dds_name) == Some(form.dds_name())
     }
 
-    /// Takes the next sample of the gyro. Messages that cannot be read, or have no rates, are
-    /// passed over.
+    /// Takes the next sample of the gyro. That of a message that cannot be read, or has no rates,
+    /// is not a number, so that it is counted.
     pub fn gyro_sample(&self) -> Option<Sample> {
-        let gyro = self.gyro.as_ref()?;
-        let messages = (0..SAMPLES).map_while(|_| gyro.take().transpose());
-        messages
-            .flatten()
-            .find_map(|(imu, _)| imu.sample(clock::since_1970_ns()))
+        match self.gyro.as_ref()?.take() {
+            Ok(taken) => taken.map(|(imu, _)| imu.sample(clock::since_1970_ns())),
+            Err(_) => Some(Sample::yaw_rate(0, f64::NAN)),
+        }
     }
 
-    /// Takes the next speed of the wheels. Messages that cannot be read are passed over.
+    /// Takes the next speed of the wheels. That of a message that cannot be read is not a number.
     pub fn wheel_sample(&self) -> Option<Sample> {
-        let wheels = self.wheels.as_ref()?;
-        let mut messages = (0..SAMPLES).map_while(|_| wheels.take().transpose());
-        let odometry = messages.find_map(Result::ok)?.0;
-        Some(odometry.sample(clock::since_1970_ns()))
+        match self.wheels.as_ref()?.take() {
+            Ok(taken) => taken.map(|(odometry, _)| odometry.sample(clock::since_1970_ns())),
+            Err(_) => Some(Sample::speed(0, f64::NAN)),
+        }
     }
 
     /// Passes the fixes of GNSS on that have arrived.

@@ -77,7 +77,7 @@ type Change = (&'static str, fn(i64, &mut NavSatFix), usize);
 
 #[test]
 fn the_log_of_a_bag_is_that_of_a_table_with_the_same_fixes_and_faults() {
-    let changes: [Change; 6] = [
+    let changes: [Change; 3] = [
         ("", |_, _| {}, 0),
         (
             "not a number",
@@ -89,27 +89,6 @@ fn the_log_of_a_bag_is_that_of_a_table_with_the_same_fixes_and_faults() {
             3,
         ),
         (
-            "off the earth",
-            |number, fix| {
-                if number == 4 {
-                    fix.latitude = 517.0;
-                }
-                if number == 5 {
-                    fix.longitude = -1260.0;
-                }
-            },
-            2,
-        ),
-        (
-            "at 0, 0",
-            |number, fix| {
-                if number < 2 {
-                    (fix.latitude, fix.longitude) = (0.0, 0.0);
-                }
-            },
-            2,
-        ),
-        (
             "repeated",
             |number, fix| {
                 if number == 9 {
@@ -117,15 +96,6 @@ fn the_log_of_a_bag_is_that_of_a_table_with_the_same_fixes_and_faults() {
                 }
             },
             1,
-        ),
-        (
-            "out of order",
-            |number, fix| {
-                if number == 9 {
-                    fix.header = Header::new(START_NS + 7_500_000_000, "gnss");
-                }
-            },
-            0,
         ),
     ];
     for (name, change, lost) in changes {
@@ -145,26 +115,20 @@ fn the_log_of_a_bag_is_that_of_a_table_with_the_same_fixes_and_faults() {
 
 #[test]
 fn messages_without_a_fix_are_left_out_and_counted() {
-    // A receiver without a fix repeats its last place.
+    // A receiver without a fix repeats its last place. Some do not state whether they have one.
     let log = log(&with(&[FIX], |number, fix| {
         if (10..14).contains(&number) {
             fix.status.status = -1;
             fix.latitude = 51.75;
         }
+        if (20..25).contains(&number) {
+            fix.status.status = -2;
+        }
     }));
     assert_eq!(log.fixes.len() as i64, FIXES - 4);
     assert_eq!((log.faults.without_fix, log.faults.left_out()), (4, 4));
-    assert_eq!(log.faults.named(), [(4, "without a fix")]);
-}
-
-#[test]
-fn a_receiver_without_any_fix_is_refused_with_the_count() {
-    let folder = Folder::new();
-    let path = folder.bag(&with(&[FIX], |_, fix| fix.status.status = -1));
-    let fixes = fixes(&path, None).unwrap().unwrap();
-    let refused = GnssLog::of(fixes, &path).unwrap_err().to_string();
-    let words = "none of its 30 entries is a usable fix (30 without a fix)";
-    assert!(refused.contains(words), "{refused}");
+    let unknown = (5, "of unknown status, used");
+    assert_eq!(log.faults.named(), [(4, "without a fix"), unknown]);
 }
 
 #[test]

@@ -12,6 +12,11 @@ const MAX_SPEED_MPS: f64 = 70.0;
 const SLACK_M: f64 = 10.0;
 /// The stated accuracy, in standard deviations, by which a step may be longer.
 const SLACK_SIGMAS: f64 = 5.0;
+/// No receiver measures better than 1 cm with the phase of the carrier, nor is a fix compared with
+/// the radar's place better than that: within 1 ms a car drives a centimetre.
+const LEAST_SIGMA_M: f64 = 0.01;
+/// A fix that is less certain tells nothing, m.
+const MOST_SIGMA_M: f64 = 1e6;
 /// Stretches between jumps that are looked back over: behind so many the fixes are noise.
 const LOOK_BACK: usize = 200;
 
@@ -33,8 +38,15 @@ pub struct GnssFaults {
     pub zero: usize,
     /// Fixes with the stamp of another one.
     pub repeated: usize,
+    /// Fixes at the very place of the fix before, as of a receiver that is frozen: only the first
+    /// is where the vehicle was.
+    pub frozen: usize,
     /// Fixes with a stamp before that of an earlier one: sorted.
     pub out_of_order: usize,
+    /// Fixes whose status the receiver does not state: used.
+    pub of_unknown_status: usize,
+    /// Fixes that state to be better than a centimetre: used as if they stated that.
+    pub too_certain: usize,
     /// Fixes that jump away from the others faster than a vehicle.
     pub jumps: usize,
 }
@@ -52,6 +64,7 @@ impl GnssFaults {
             + self.off_the_earth
             + self.zero
             + self.repeated
+            + self.frozen
             + self.jumps
     }
 
@@ -77,7 +90,10 @@ impl GnssFaults {
             (self.off_the_earth, "off the earth"),
             (self.zero, "at 0, 0"),
             (self.repeated, "repeated"),
+            (self.frozen, "at the very place of the fix before"),
             (self.out_of_order, "out of order"),
+            (self.of_unknown_status, "of unknown status, used"),
+            (self.too_certain, "stated better than 1 cm, used as of 1 cm"),
             (self.jumps, "jump faster than a vehicle"),
         ];
         all.into_iter().filter(|(count, _)| *count > 0).collect()
@@ -90,8 +106,8 @@ type Examined = (Vec<LoggedFix>, Option<LocalPlane>, GnssFaults);
 /// Leaves out and sorts what the faults name, and counts it.
 pub(super) fn examine(raw: Raw) -> Examined {
     let mut faults = GnssFaults {
-        unreadable: raw.unreadable,
-        first_unreadable: raw.first_unreadable,
+        unreadable: raw.unreadable.count,
+        first_unreadable: raw.unreadable.first,
         without_fix: raw.without_fix,
         ..GnssFaults::default()
     };
@@ -104,6 +120,12 @@ pub(super) fn examine(raw: Raw) -> Examined {
         });
     }
     sort(&mut rows, &mut faults);
+    let before = rows.len();
+    rows.dedup_by(|later, earlier| later.at == earlier.at);
+    faults.frozen = before - rows.len();
+    let count = |is_so: &dyn Fn(&&RawFix) -> bool| rows.iter().filter(is_so).count();
+    faults.of_unknown_status = count(&|row| row.status_is_unknown);
+    faults.too_certain = count(&|row| 0.0 < row.sigma_m && row.sigma_m < LEAST_SIGMA_M);
     let plane_at = |row: &RawFix| LocalPlane::new(row.geographic(), finite_or_zero(row.altitude_m));
     let first = rows.first().filter(|_| !raw.is_plane);
     let fixes = in_plane(&rows, first.map(plane_at).as_ref());
@@ -142,7 +164,9 @@ fn in_plane(rows: &[RawFix], plane: Option<&LocalPlane>) -> Vec<LoggedFix> {
     let fix = |row: &RawFix| LoggedFix {
         stamp_ns: row.stamp_ns,
         east_north_m: plane.map_or(row.at, |plane| plane.east_north(row.geographic())),
-        sigma_m: Some(row.sigma_m).filter(|sigma| sigma.is_finite() && *sigma > 0.0),
+        sigma_m: Some(row.sigma_m)
+            .filter(|sigma| sigma.is_finite() && *sigma > 0.0)
+            .map(|sigma| sigma.clamp(LEAST_SIGMA_M, MOST_SIGMA_M)),
     };
     rows.iter().map(fix).collect()
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use gyre_samples::RawFix;
 
 use super::{GnssLogError, Raw};
-use crate::gps_imu_twist::{TwistFile, files, has_list, without_list};
+use crate::gps_imu_twist::{TwistFile, UNREADABLE, files, has_list, without_list};
 
 /// Lines of the place and of the first two rows of its covariance, from 0.
 const LINES: [usize; 3] = [0, 1, 2];
@@ -21,7 +21,7 @@ pub(super) fn read(folder: &Path) -> Result<Raw, GnssLogError> {
     for file in files(folder)? {
         match read_fix(&file) {
             Some(fix) => raw.rows.push(fix),
-            None => raw.leave_out(file.number),
+            None => raw.unreadable.add(1, file.number, || UNREADABLE.to_owned()),
         }
     }
     Ok(raw)
@@ -34,5 +34,6 @@ fn read_fix(file: &TwistFile) -> Option<RawFix> {
         at: [latitude, longitude],
         altitude_m,
         sigma_m: RawFix::sigma_of([east, north]),
+        ..RawFix::default()
     })
 }

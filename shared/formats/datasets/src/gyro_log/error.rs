@@ -70,7 +70,7 @@ pub enum LogError {
     },
     /// A log of another time than the scans.
     #[error(
-        "the log of the {section} {path} has no sample while the scans were measured: it begins {after_s:.1} s after the first of them. It is of another drive, or {section}.late_s is wrong",
+        "the log of the {section} {path} has no sample while the scans were measured: it begins {after_s:.1} s after the first of them. {steps}It is of another drive, or {section}.late_s is wrong",
         section = of.section()
     )]
     Elsewhere {
@@ -80,6 +80,8 @@ pub enum LogError {
         path: PathBuf,
         /// From the first scan to its first sample, s.
         after_s: f64,
+        /// The steps of its clock, if there are any: sentences with a space behind.
+        steps: String,
     },
     /// The list of the times of RADIATE's files.
     #[error(transparent)]

@@ -1,6 +1,7 @@
 //! Faults of the samples of a log, and which samples are left out.
 
 mod breaks;
+mod bursts;
 mod order;
 
 use std::path::Path;
@@ -18,6 +19,9 @@ pub(crate) const ABSURD_SHARE: f64 = 0.01;
 /// Longest time between two samples that is no gap, median periods, whatever stamps round to.
 const GAP_PERIODS: f64 = 3.0 + 1e-6;
 
+/// Counters of 32 bits overflow after so long, if they count ns, µs or ms, s.
+const OVERFLOWS_S: [f64; 3] = [4.294967296, 4294.967296, 4294967.296];
+
 /// Faults of a log. What is counted as left out is not in its samples.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct LogFaults {
@@ -25,10 +29,12 @@ pub struct LogFaults {
     pub unreadable: usize,
     /// Line (of a folder of files: number) of the first of them.
     pub first_unreadable: usize,
-    /// Samples with a value that is not finite: left out.
+    /// Samples that are stated to have no value, or have one that is not finite: left out.
     pub not_a_number: usize,
     /// Samples with a rate beyond 10 rad/s, or a speed beyond 100 m/s: left out.
     pub absurd: usize,
+    /// Samples that come in bursts of one stamp: spread over the time since the burst before.
+    pub spread: usize,
     /// Samples with the stamp of another one: left out.
     pub repeated: usize,
     /// Samples with a stamp before that of an earlier one: sorted.
@@ -37,6 +43,8 @@ pub struct LogFaults {
     pub measured_twice: usize,
     /// Places where the stamps step back by more than a second, or ahead by more than an hour, s.
     pub clock_steps_s: Vec<f64>,
+    /// The number of the sample, from 1, behind which the first of them is.
+    pub first_clock_step: usize,
     /// Samples whose stamps such steps make unusable: left out.
     pub by_clock_steps: usize,
     /// Times without samples, of more than three periods.
@@ -72,6 +80,24 @@ impl LogFaults {
         self.gaps.iter().map(|gap| gap.seconds).fold(0.0, f64::max)
     }
 
+    /// Returns how the clock steps, and where first: without a full stop.
+    pub fn clock_steps(&self) -> String {
+        let (count, first) = (self.clock_steps_s.len(), self.first_clock_step);
+        let steps = self.clock_steps_s.iter().take(5);
+        let steps: Vec<String> = steps.map(|step| format!("{step:+.6} s")).collect();
+        let wraps = |step: &f64| {
+            OVERFLOWS_S
+                .iter()
+                .any(|it| (step.abs() - it).abs() < 1e-3 * it)
+        };
+        let counter = match self.clock_steps_s.iter().any(wraps) {
+            true => ", as a counter of 32 bits that overflows: write stamps of 64 bits",
+            false => "",
+        };
+        let steps = steps.join(", ");
+        format!("The clock steps {count} times ({steps}), first behind sample {first}{counter}")
+    }
+
     /// Returns a sentence for each kind of fault of the log of a sensor.
     pub fn sentences(&self, of: SampleKind) -> Vec<String> {
         let [values, absurd, unit] = match of {
@@ -87,11 +113,6 @@ impl LogFaults {
             ],
         };
         let counted = |count: usize, sentence: String| (count > 0).then_some(sentence);
-        let steps = self
-            .clock_steps_s
-            .iter()
-            .map(|step| format!("{step:+.1} s"));
-        let steps = steps.take(5).collect::<Vec<_>>().join(", ");
         let longest = self.gaps.iter().copied();
         let longest = longest.max_by(|a, b| a.seconds.total_cmp(&b.seconds));
         [
@@ -101,11 +122,15 @@ impl LogFaults {
             ),
             counted(
                 self.not_a_number,
-                format!("{} samples have {values} that are not finite: left out.", self.not_a_number),
+                format!("{} samples have no {values}, or some that are not finite: left out.", self.not_a_number),
             ),
             counted(
                 self.absurd,
                 format!("{} samples have {absurd}: left out.", self.absurd),
+            ),
+            counted(
+                self.spread,
+                format!("{} samples come in bursts of one stamp: spread evenly back to the burst before.", self.spread),
             ),
             counted(
                 self.repeated,
@@ -122,8 +147,8 @@ impl LogFaults {
             counted(
                 self.clock_steps_s.len(),
                 format!(
-                    "The clock steps {} times ({steps}): {} samples that do not fit with the others are left out.",
-                    self.clock_steps_s.len(),
+                    "{}: {} samples that do not fit with the others are left out.",
+                    self.clock_steps(),
                     self.by_clock_steps
                 ),
             ),
@@ -183,18 +208,15 @@ pub(crate) fn examine(
         path: path.to_owned(),
         reason,
     };
-    let rows = raw.samples.len() + raw.unreadable;
+    let rows = raw.samples.len() + raw.unmeasured + raw.unreadable.count;
     let mut faults = LogFaults {
-        unreadable: raw.unreadable,
-        first_unreadable: raw.first_unreadable,
+        unreadable: raw.unreadable.count,
+        first_unreadable: raw.unreadable.first,
         unit_is_assumed: raw.unit_is_assumed,
         ..LogFaults::default()
     };
-    if 2 * raw.unreadable > rows {
-        return Err(unusable(format!(
-            "{} of its {rows} rows cannot be read, the first in line {}: are its stamps, decimal points and columns those that its header names?",
-            raw.unreadable, raw.first_unreadable
-        )));
+    if let Some(reason) = raw.unreadable.are_most(rows) {
+        return Err(unusable(reason));
     }
     let mut samples = raw.samples;
     let mut leave_out = |is_bad: &dyn Fn(f64) -> bool| {
@@ -208,6 +230,7 @@ pub(crate) fn examine(
         (before, before - samples.len())
     };
     (_, faults.not_a_number) = leave_out(&|value| !value.is_finite());
+    faults.not_a_number += raw.unmeasured;
     let (finite, absurd) = leave_out(&|value| value.abs() > plausible.most);
     faults.absurd = absurd;
     if absurd as f64 > ABSURD_SHARE * finite as f64 {
@@ -216,6 +239,7 @@ pub(crate) fn examine(
             "{absurd} of its {finite} samples {beyond}"
         )));
     }
+    bursts::spread(&mut samples, &mut faults);
     let samples = breaks::repair(samples, &mut faults).map_err(unusable)?;
     let samples = order::sort(&samples, &mut faults);
     if samples.is_empty() {

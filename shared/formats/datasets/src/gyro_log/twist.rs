@@ -2,8 +2,8 @@
 
 use std::{fs, path::Path};
 
-use super::{LogError, Raw, table::sample};
-use crate::gps_imu_twist::{TwistFile, files, has_list, without_list};
+use super::{LogError, Raw, columns::sample};
+use crate::gps_imu_twist::{TwistFile, UNREADABLE, files, has_list, without_list};
 use gyre_samples::{Sample, SampleKind};
 
 /// Lines of the angular rates and of the accelerations, from 0.
@@ -22,7 +22,7 @@ pub(super) fn read(folder: &Path) -> Result<Raw, LogError> {
     for file in files(folder)? {
         match read_sample(&file) {
             Some(sample) => raw.samples.push(sample),
-            None => raw.leave_out(file.number),
+            None => raw.unreadable.add(1, file.number, || UNREADABLE.to_owned()),
         }
     }
     let is_empty = raw.samples.is_empty();

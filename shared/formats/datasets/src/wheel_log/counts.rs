@@ -9,11 +9,11 @@ use super::SPEEDS;
 use crate::{
     LogError, LogFaults,
     gyro_log::{
-        Raw,
-        columns::{StampUnit, plain, stamp_unit},
+        Raw, SampleColumns,
         faults::{ABSURD_SHARE, Plausible, examine},
-        table::SampleColumns,
     },
+    header::{Header, Stamp},
+    table::Columns,
 };
 
 /// Shortest time over which a speed is that of two counts: over less, ticks are too coarse.
@@ -40,49 +40,46 @@ const COUNTS: Plausible = Plausible {
 
 /// Where a table has counts. A sample of it has the count in the place of the speed.
 pub(super) struct CountColumns {
-    stamp: (usize, StampUnit),
+    stamp: Stamp,
     /// One, or one of each wheel.
     counts: Vec<usize>,
     is_in_ticks: bool,
 }
 
-impl SampleColumns for CountColumns {
-    const OF: SampleKind = SampleKind::Wheels;
+impl Columns for CountColumns {
+    type Entry = Sample;
 
-    fn of(first: &StringRecord) -> Result<Self, String> {
-        let names: Vec<String> = first.iter().map(plain).collect();
-        let at = |name: &str| names.iter().position(|it| it == name);
-        let one = |all: &[&str]| all.iter().find_map(|name| Some(vec![at(name)?]));
+    fn by_names(header: &Header) -> Result<Self, String> {
+        let one = |all: &[&str]| all.iter().find_map(|name| Some(vec![header.find(name)?]));
         let both = || {
             let mut pairs = LEFT_AND_RIGHT.iter();
-            pairs.find_map(|[left, right]| Some(vec![at(left)?, at(right)?]))
+            pairs.find_map(|[left, right]| Some(vec![header.find(left)?, header.find(right)?]))
         };
         let metres = one(&METRES);
         let is_in_ticks = metres.is_none();
         let counts = metres.or_else(both).or_else(|| one(&TICKS));
-        let stamps = names.iter().enumerate();
-        let stamp = stamps
-            .clone()
-            .find_map(|(k, name)| Some((k, stamp_unit(name)?)));
         Ok(Self {
-            stamp: stamp.ok_or("it has no stamps")?,
+            stamp: header.stamp().ok_or("it has no stamps")?,
             counts: counts.ok_or("it counts nothing")?,
             is_in_ticks,
         })
     }
 
-    fn unit_is_assumed(&self) -> bool {
-        self.is_in_ticks
-    }
-
-    fn sample(&self, row: &StringRecord) -> Option<Sample> {
-        let (column, unit) = self.stamp;
-        let stamp_ns = unit.ns(row.get(column)?)?;
+    fn entry(&self, row: &StringRecord) -> Option<Sample> {
         let mut sum = 0.0;
         for column in &self.counts {
             sum += row.get(*column)?.parse::<f64>().ok()?;
         }
-        Some(Sample::speed(stamp_ns, sum / self.counts.len() as f64))
+        let count = sum / self.counts.len() as f64;
+        Some(Sample::speed(self.stamp.ns(row)?, count))
+    }
+}
+
+impl SampleColumns for CountColumns {
+    const OF: SampleKind = SampleKind::Wheels;
+
+    fn unit_is_assumed(&self) -> bool {
+        self.is_in_ticks
     }
 }
 

@@ -1,131 +1,60 @@
 //! Faults: each is counted under its name, and what it is of is left out.
 
-use gyre_datasets::{GnssFaults, GnssLog};
+use gyre_datasets::{GnssLog, ReceivedFixes};
 
 use super::{START_NS, read};
 
-/// A log at 10 m/s to the east, a fix a second, with changes to some rows.
-fn drive(change: impl Fn(usize, &mut [String; 3])) -> GnssLog {
+/// A log at 10 m/s to the east, a fix a second, of which `row` may return other rows.
+fn drive(row: impl Fn(usize, i64, f64) -> Option<String>) -> GnssLog {
     let mut text = "stamp_ns,latitude_deg,longitude_deg\n".to_owned();
     for k in 0..60 {
-        let stamp_ns = START_NS + k as i64 * 1_000_000_000;
-        let mut row = [
-            stamp_ns.to_string(),
-            "51.7".to_owned(),
-            format!("{:.8}", -1.2 + 1.447e-4 * k as f64),
-        ];
-        change(k, &mut row);
-        text += &(row.join(",") + "\n");
+        let (stamp_ns, longitude) = (stamp_ns(k), -1.2 + 1.447e-4 * k as f64);
+        let other = row(k, stamp_ns, longitude);
+        text += &other.unwrap_or_else(|| format!("{stamp_ns},51.7,{longitude:.8}"));
+        text += "\n";
     }
     read("gnss.csv", &text).unwrap()
 }
 
-#[test]
-fn a_log_without_faults_keeps_all() {
-    let log = drive(|_, _| {});
-    assert_eq!((log.fixes.len(), &log.faults), (60, &GnssFaults::default()));
-    let east_m = log.fixes[59].east_north_m[0];
-    assert!((east_m - 590.0).abs() < 1.0, "{east_m}");
+fn stamp_ns(k: usize) -> i64 {
+    START_NS + k as i64 * 1_000_000_000
 }
-
-/// A change of rows with its name, the count that must report it, and that count.
-type Fault = (
-    &'static str,
-    fn(usize, &mut [String; 3]),
-    fn(&GnssFaults) -> usize,
-    usize,
-);
 
 #[test]
 fn each_fault_is_counted_under_its_name_and_left_out() {
-    let faults: [Fault; 8] = [
-        (
-            "a row that is cut off",
-            |k, row| {
-                if k == 20 {
-                    row[2] = "-1.19,".to_owned();
-                }
-            },
-            |faults| faults.unreadable,
-            1,
-        ),
-        (
-            "a stamp alone",
-            |k, row| {
-                if k % 20 == 9 {
-                    (row[1], row[2]) = (String::new(), String::new());
-                }
-            },
-            |faults| faults.without_fix,
-            3,
-        ),
-        (
-            "not a number",
-            |k, row| {
-                if k % 20 == 5 {
-                    row[1] = "nan".to_owned();
-                }
-            },
-            |faults| faults.not_a_number,
-            3,
-        ),
-        (
-            "no fix",
-            |k, row| {
-                if k < 4 {
-                    (row[1], row[2]) = ("0".to_owned(), "0.0".to_owned());
-                }
-            },
-            |faults| faults.zero,
-            4,
-        ),
-        (
-            "off the earth",
-            |k, row| {
-                if k == 0 {
-                    row[1] = "517.0".to_owned();
-                }
-            },
-            |faults| faults.off_the_earth,
-            1,
-        ),
-        (
-            "repeated",
-            |k, row| {
-                if k == 30 {
-                    row[0] = (START_NS + 29_000_000_000).to_string();
-                }
-            },
-            |faults| faults.repeated,
-            1,
-        ),
-        (
-            "a stretch 1 km aside",
-            |k, row| {
-                if (10..22).contains(&k) {
-                    row[1] = "51.709".to_owned();
-                }
-            },
-            |faults| faults.jumps,
-            12,
-        ),
-        (
-            "the first is elsewhere",
-            |k, row| {
-                if k == 0 {
-                    row[1] = "40.0".to_owned();
-                }
-            },
-            |faults| faults.jumps,
-            1,
-        ),
-    ];
-    for (name, change, count, expected) in faults {
-        let log = drive(change);
-        assert_eq!(count(&log.faults), expected, "{name}: {:?}", log.faults);
-        assert_eq!(log.faults.left_out(), expected, "{name}: {:?}", log.faults);
-        assert_eq!(log.fixes.len(), 60 - expected, "{name}");
-        assert_eq!(log.faults.named().len(), 1, "{name}");
+    let log = drive(|_, _, _| None);
+    let east_m = log.fixes[59].east_north_m[0];
+    assert!((east_m - 590.0).abs() < 1.0, "{east_m}");
+    let frozen = "51.7,-1.19869770";
+    for (name, rows, place) in [
+        ("unreadable", 20..21, "51.7,-1.19,"),
+        ("without a fix", 9..12, ","),
+        ("not a number", 5..8, "nan,-1.2"),
+        ("at 0, 0", 0..4, "0,0.0"),
+        ("off the earth", 0..1, "517.0,-1.2"),
+        ("repeated", 30..31, "51.7,-1.19"),
+        // That of the 9th fix.
+        ("at the very place of the fix before", 10..36, frozen),
+        ("jump faster than a vehicle", 10..22, "51.709,"),
+        ("jump faster than a vehicle", 0..1, "40.0,"),
+    ] {
+        let log = drive(|k, ns, longitude| {
+            let stamp_ns = if name == "repeated" {
+                ns - 1_000_000_000
+            } else {
+                ns
+            };
+            let longitude = match name.starts_with("jump") {
+                true => longitude.to_string(),
+                false => String::new(),
+            };
+            rows.contains(&k)
+                .then(|| format!("{stamp_ns},{place}{longitude}"))
+        });
+        let count = rows.len();
+        assert_eq!(log.faults.named(), [(count, name)]);
+        assert_eq!(log.faults.left_out(), count, "{name}");
+        assert_eq!(log.fixes.len(), 60 - count, "{name}");
         // The plane touches at a fix that is used.
         let origin = log.plane.unwrap().origin();
         assert_eq!(origin.latitude_deg, 51.7, "{name}");
@@ -134,17 +63,14 @@ fn each_fault_is_counted_under_its_name_and_left_out() {
 
 #[test]
 fn fixes_that_come_out_of_order_are_sorted_and_counted() {
-    let log = drive(|k, row| {
-        let swapped = match k {
+    let log = drive(|k, _, _| {
+        let k = match k {
             40 => 41,
             41 => 40,
-            _ => k,
+            _ => return None,
         };
-        *row = [
-            (START_NS + swapped as i64 * 1_000_000_000).to_string(),
-            "51.7".to_owned(),
-            format!("{:.8}", -1.2 + 1.447e-4 * swapped as f64),
-        ];
+        let longitude = -1.2 + 1.447e-4 * k as f64;
+        Some(format!("{},51.7,{longitude:.8}", stamp_ns(k)))
     });
     assert_eq!((log.fixes.len(), log.faults.out_of_order), (60, 1));
     assert!(log.fixes.is_sorted_by_key(|fix| fix.stamp_ns));
@@ -172,16 +98,47 @@ fn what_a_live_receiver_has_sent_may_be_nothing_usable_and_then_says_why() {
             "{unusable}"
         );
     }
-    let text = format!("{header}{START_NS},51.7,-1.2,0\nunreadable\n17,51.7,-1.2,0.5\n");
+    let text = format!("{header}{START_NS},51.7,-1.2,0\nunreadable\n17,51.8,-1.2,0.5\n");
     let log = GnssLog::received(&super::written(&folder, "gnss.csv", &text));
     assert_eq!((log.unusable, log.faults.unreadable), (None, 1));
     assert_eq!(log.faults.out_of_order, 1);
     assert_eq!(log.fixes.len(), 2);
-    let noisy = format!("{text}unreadable\nunreadable\n");
+    let noisy = format!("{text}unreadable\nunreadable,1\n");
     let log = GnssLog::received(&super::written(&folder, "gnss.csv", &noisy));
     assert_eq!((log.fixes.len(), log.faults.unreadable), (2, 3));
     let missing = GnssLog::received(&folder.path().join("none.csv"));
     assert!(missing.unusable.unwrap().contains("none.csv"));
+}
+
+#[test]
+fn a_log_that_grows_is_read_on_to_what_it_is_as_a_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("gnss.csv");
+    let mut received = ReceivedFixes::new(&path);
+    let mut text = "stamp_ns,latitude_deg,longitude_deg,sigma_m\n".to_owned();
+    for rows in [100, 0, 1, 1, 2] {
+        for _ in 0..rows {
+            let k = text.lines().count() as i64;
+            let line = match k % 20 {
+                0 => "unreadable,3\n".to_owned(),
+                _ => format!(
+                    "{},51.7,{:.8},0.5\n",
+                    START_NS + k * 10_000_000,
+                    1e-8 * k as f64
+                ),
+            };
+            text += &line;
+        }
+        std::fs::write(&path, &text).unwrap();
+        received.read_on().unwrap();
+        let (log, whole) = (received.log(), GnssLog::read(&path));
+        assert_eq!(received.count(), log.fixes.len());
+        if rows > 0 {
+            let whole = whole.unwrap();
+            assert_eq!((log.fixes, log.faults), (whole.fixes, whole.faults));
+        }
+    }
+    assert!(received.log().faults.unreadable >= 3);
 }
 
 #[test]

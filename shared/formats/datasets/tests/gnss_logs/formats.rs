@@ -30,7 +30,15 @@ fn assert_two(log: &GnssLog, sigma_m: Option<f64>, what: &str) {
     }
     let origin = log.plane.unwrap().origin();
     assert_eq!([origin.latitude_deg, origin.longitude_deg], [55.9, -3.2]);
-    assert_eq!(log.faults.left_out(), 0);
+    let faults = &log.faults;
+    assert_eq!(faults.left_out(), faults.without_fix, "{what}");
+    let stated = usize::from(what.contains("status"));
+    let counted = [
+        faults.without_fix,
+        faults.of_unknown_status,
+        faults.too_certain,
+    ];
+    assert_eq!(counted, [stated; 3], "{what}");
 }
 
 #[test]
@@ -58,6 +66,25 @@ fn tables_are_read_by_their_headers_or_by_their_number_of_columns() {
                  {us},8,55.9,-3.2,110.0,3.0,4.0,9.0,5.0,6.0,-110.0,30U\n{next_us},8,55.9001,-3.2,110.0,3.0,4.0,9.0,5.0,6.0,-110.0,30U\n"
             ),
             Some(12.5f64.sqrt()),
+        ),
+        // Hemispheres, a stamp in two parts; an altitude and an accuracy that are not known.
+        (
+            "gnss.csv",
+            format!(
+                "header.stamp.sec,header.stamp.nanosec,lat,N/S,lon,E/W,alt,sigma_m\n\
+                 {0},551626000,55.9,N,3.2,W,,\n{1},551626000,55.9001,n,3.2,West,20.0,-1\n",
+                ns / 1_000_000_000,
+                next_ns / 1_000_000_000
+            ),
+            None,
+        ),
+        // As stated by a simulation, and as of no receiver.
+        (
+            "gnss.csv",
+            format!(
+                "stamp_ns,latitude_deg,longitude_deg,sigma_m,status.status\n{ns},55.9,-3.2,0.0000127,-2\n{next_ns},55.9001,-3.2,0.01,2\n1,0,0,0,-1\n"
+            ),
+            Some(0.01),
         ),
         (
             "sensor_data/gps.csv",
@@ -117,7 +144,7 @@ fn coordinates_in_a_plane_have_no_place_on_the_earth() {
 #[test]
 fn fixes_on_the_radars_clock_have_the_delay_taken_off_and_the_uncertainty_that_is_known() {
     let text = format!(
-        "stamp_ns,east_m,north_m,sigma_m\n{START_NS},3.0,4.0,0.5\n{},3.0,4.0,nan\n",
+        "stamp_ns,east_m,north_m,sigma_m\n{START_NS},3.0,4.0,0.5\n{},3.0,5.0,nan\n",
         START_NS + 1_000_000_000
     );
     let config = GnssConfig {
@@ -144,6 +171,19 @@ fn what_is_no_log_is_refused_with_what_to_do() {
         (
             "stamp_ns,latitude,longitude\na,b,c\n1,2\n5,1,1\n",
             "2 of its 3 rows cannot be read, the first in line 2",
+        ),
+        (
+            "stamp_ns,latitude,longitude\n5,50.0S,1.0E\n",
+            "\"50.0S\" has a letter: write degrees to the south and to the west with a minus",
+        ),
+        // A contradiction, and a word that is of no hemisphere.
+        (
+            "stamp_ns,lat,n_s,lon\n5,-50.0,N,1.0\n6,50.0,?,1.0\n",
+            "2 of its 2 rows",
+        ),
+        (
+            "stamp_ns,lat,lon,lat\n5,50.0,1.0,2.0\n",
+            "two of its columns are named \"lat\"",
         ),
     ] {
         let refused = read("gnss.csv", text).unwrap_err().to_string();

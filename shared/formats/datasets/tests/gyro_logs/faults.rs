@@ -175,7 +175,8 @@ fn a_clock_that_was_set_leaves_the_longer_part() {
         assert_eq!(log.samples[0].values[2], rows[kept.start].1);
         let sentences = faults.sentences(SampleKind::Gyro);
         assert!(
-            sentences[0].contains("The clock steps 1 times"),
+            sentences[0].contains("The clock steps 1 times")
+                && sentences[0].contains("first behind sample 100"),
             "{sentences:?}"
         );
     }
@@ -233,13 +234,53 @@ fn a_log_in_degrees_is_refused_or_its_unit_said_to_be_assumed() {
 }
 
 #[test]
-fn stamps_that_are_no_clock_are_refused() {
-    let rows: Vec<_> = (0..300)
-        .map(|k| (START_NS + (k % 2) * 10_000_000_000, 0.0))
-        .collect();
-    let refused = read("imu.csv", &text(&rows)).unwrap_err().to_string();
-    assert!(
-        refused.contains("is the column of stamps another one?"),
-        "{refused}"
+fn stamps_that_are_no_clock_are_refused_with_the_steps() {
+    for (step_ns, words) in [
+        (10_000_000_000, "Are the stamps in another column?"),
+        // A counter of ns in 32 bits.
+        (1 << 32, "(-4.294967 s"),
+    ] {
+        let rows: Vec<_> = (0..300)
+            .map(|k| (START_NS + (k % 2) * step_ns, 0.0))
+            .collect();
+        let refused = read("imu.csv", &text(&rows)).unwrap_err().to_string();
+        for words in [words, "first behind sample 2"] {
+            assert!(refused.contains(words), "{refused}");
+        }
+        let is_counter = refused.contains("a counter of 32 bits");
+        assert_eq!(is_counter, step_ns == 1 << 32, "{refused}");
+    }
+}
+
+#[test]
+fn samples_that_come_in_bursts_are_spread_back_to_the_burst_before() {
+    for (size, lost) in [(20, None), (2, None), (20, Some(100..140))] {
+        let mut rows = rows(300);
+        let measured = rows.clone();
+        for burst in rows.chunks_mut(size) {
+            let received_ns = burst.last().unwrap().0;
+            burst.iter_mut().for_each(|row| row.0 = received_ns);
+        }
+        let mut measured: Vec<_> = measured.iter().map(|row| row.0).collect();
+        if let Some(lost) = lost {
+            measured.drain(lost.clone());
+            rows.drain(lost);
+        }
+        let log = read("imu.csv", &text(&rows)).unwrap();
+        let found: Vec<i64> = log.samples.iter().map(|it| it.stamp_ns).collect();
+        assert_eq!(found, measured, "{size}");
+        assert_eq!((log.faults.spread, log.faults.left_out()), (rows.len(), 0));
+        let sentences = log.faults.sentences(SampleKind::Gyro);
+        assert!(
+            sentences[0].contains("in bursts of one stamp"),
+            "{sentences:?}"
+        );
+    }
+    // Rows that were written twice are no bursts.
+    let twice: Vec<_> = rows(300).iter().flat_map(|row| [*row, *row]).collect();
+    let log = read("imu.csv", &text(&twice)).unwrap();
+    assert_eq!(
+        (log.samples.len(), log.faults.repeated, log.faults.spread),
+        (300, 300, 0)
     );
 }

@@ -91,6 +91,44 @@ fn tables_of_ones_own_are_read_by_names_and_units() {
             ALL,
             START_NS,
         ),
+        // As ROS 2 and ROS 1 write the two parts of a stamp.
+        (
+            "header.stamp.sec,header.stamp.nanosec,gx,gy,gz",
+            "1760456485,551626000,1,2,3".to_owned(),
+            [1.0, 2.0, 3.0, 0.0, 0.0, 0.0],
+            START_NS,
+        ),
+        (
+            "gx (deg/s),gy (deg/s),gz (deg/s),nsecs,secs",
+            format!(
+                "{},{},{},551626000.0,1760456485.0",
+                deg,
+                2.0 * deg,
+                3.0 * deg
+            ),
+            [1.0, 2.0, 3.0, 0.0, 0.0, 0.0],
+            START_NS,
+        ),
+        (
+            "timestamp,usec,gyro_x,gyro_y,gyro_z",
+            "1760456485,551626,1,2,3".to_owned(),
+            [1.0, 2.0, 3.0, 0.0, 0.0, 0.0],
+            START_NS,
+        ),
+        // Two whole stamps.
+        (
+            "stamp_s,stamp_ns,gyro_x,gyro_y,gyro_z",
+            "1760456485,1760456485551626000,1,2,3".to_owned(),
+            [1.0, 2.0, 3.0, 0.0, 0.0, 0.0],
+            START_NS,
+        ),
+        // EuRoC.
+        (
+            "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]",
+            "1760456485551626000,1,2,3,4,5,6".to_owned(),
+            ALL,
+            START_NS,
+        ),
         (
             "x,stamp_us,omega_z,omega_x,omega_y",
             "0,1000,3,1,2".to_owned(),
@@ -102,7 +140,9 @@ fn tables_of_ones_own_are_read_by_names_and_units() {
         let log = read("own.csv", &format!("{header}\n{row}\n")).unwrap();
         assert_close(log.samples[0].values, expected, header);
         assert_eq!(log.samples[0].stamp_ns, stamp_ns, "{header}");
-        let names_unit = header.contains("dps") || header.contains("rad/s");
+        let names_unit = ["dps", "rad/s", "deg/s", "rad s"]
+            .iter()
+            .any(|it| header.contains(it));
         assert_eq!(log.faults.unit_is_assumed, !names_unit, "{header}");
     }
 }
@@ -208,13 +248,29 @@ fn what_is_no_log_of_a_gyro_is_refused_with_the_reason() {
         ("stamp_ns,gyro_x,gyro_y,gyro_z\n", "it has no samples"),
         (
             "stamp_ns;gyro_x;gyro_y;gyro_z\n1;0,1;0,2;0,3\n",
-            "decimal points",
+            "the first in line 2: \"0,1\" has a decimal comma: write decimal points",
+        ),
+        (
+            "stamp_ns,gyro_x,gyro_y,gyro_z\n1;0.1;0.2;0.3\n",
+            "it has 1 fields in place of 4: do all rows have the mark",
+        ),
+        (
+            "time,gyro_x,gyro_y,gyro_z\n2025-10-14T15:41:25.551Z,0,0,0\n",
+            "\"2025-10-14T15:41:25.551Z\" is a date or a time of day: write stamps as",
+        ),
+        (
+            &"x,".repeat(200_000),
+            "its first row has 200001 columns, and at most 1000",
         ),
     ] {
         let refused = read("imu.csv", text).unwrap_err().to_string();
         assert!(refused.contains(reason), "{refused}");
         assert!(refused.contains("imu.csv"), "{refused}");
     }
+    let stated =
+        "stamp_ns,gyro_x,gyro_y,gyro_z,angular_velocity_covariance_0\n1,0,0,0,-1\n3,0,0,0,0\n";
+    let log = read("imu.csv", stated).unwrap();
+    assert_eq!((log.samples.len(), log.faults.not_a_number), (1, 1));
     let missing = GyroLog::read(&PathBuf::from("/no/imu.csv")).unwrap_err();
     assert!(
         missing

@@ -34,8 +34,15 @@ fn columns_are_found_by_their_names_and_units() {
         ("stamp_ns,speed_km_h", 2.5, false),
         ("# stamp_ns, vehicle speed [km/h]", 2.5, false),
         ("stamp_ns;velocity", 9.0, true),
+        ("stamp_ns,speed_m_s,reverse", 9.0, false),
+        ("stamp_ns,speed_m_s,direction", 9.0, false),
     ] {
-        let text = rows(header, &["9.0", "-9.0"]);
+        let signed = match header {
+            it if it.contains("reverse") => ["9.0,0", "9.0,1"],
+            it if it.contains("direction") => ["9.0,forward", "9.0,backward"],
+            _ => ["9.0", "-9.0"],
+        };
+        let text = rows(header, &signed);
         let text = if header.contains(';') {
             text.replace(',', ";")
         } else {
@@ -57,8 +64,9 @@ fn what_is_no_log_of_wheels_is_refused_with_the_remedy() {
     for (text, words) in [
         (rows("stamp_ns,gyro_z_radps", &["0.1"]), "have no speed"),
         (rows("number,speed_m_s", &["1"]), "have no stamps"),
-        (rows("1,2", &["1"]), "have no speed"),
+        (rows("1,2", &["1"]), "columns have no names"),
         (String::new(), "it is empty"),
+        (rows("stamp_ns,speed,speed", &["1,1"]), "two of its columns"),
     ] {
         let refused = read(&text).unwrap_err().to_string();
         assert!(

@@ -18,9 +18,9 @@ const MAX_STRETCHES: usize = 5000;
 /// samples.
 pub(super) fn repair(samples: Vec<Sample>, faults: &mut LogFaults) -> Result<Vec<Sample>, String> {
     let steps = (1..samples.len()).map(|k| (k, step_ns(&samples, k)));
-    let of_clock = steps.clone().map(|(_, ns)| ns);
-    let of_clock = of_clock.filter(|ns| !(-STEP_NS..=AHEAD_NS).contains(ns));
-    faults.clock_steps_s = of_clock.map(|ns| ns as f64 * 1e-9).collect();
+    let of_clock = || (steps.clone()).filter(|(_, ns)| !(-STEP_NS..=AHEAD_NS).contains(ns));
+    faults.clock_steps_s = of_clock().map(|(_, ns)| ns as f64 * 1e-9).collect();
+    faults.first_clock_step = of_clock().next().map_or(0, |(k, _)| k);
     if faults.clock_steps_s.is_empty() {
         return Ok(samples);
     }
@@ -35,8 +35,8 @@ pub(super) fn repair(samples: Vec<Sample>, faults: &mut LogFaults) -> Result<Vec
     faults.by_clock_steps = samples.len() - kept.len();
     match faults.by_clock_steps > kept.len() {
         true => Err(format!(
-            "its stamps step back by more than a second, or ahead by more than an hour, {} times, so that most do not fit with each other: is the column of stamps another one?",
-            faults.clock_steps_s.len()
+            "most of its stamps do not fit with each other. {}. Are the stamps in another column?",
+            faults.clock_steps()
         )),
         false => Ok(kept),
     }

@@ -1,0 +1,77 @@
+//! The log of what a live receiver sends, which grows.
+
+use std::{
+    io::{self, Read, Seek, SeekFrom},
+    path::{Path, PathBuf},
+};
+
+use gyre_storage as storage;
+
+use super::{GnssLog, GnssLogError, Raw, table::FixColumns};
+use crate::table::Rows;
+
+/// The fixes that a live receiver has sent so far: each row of their log is read once.
+pub struct ReceivedFixes {
+    path: PathBuf,
+    /// The end of what was read.
+    end: u64,
+    rows: Option<Rows<FixColumns>>,
+}
+
+impl ReceivedFixes {
+    /// Begins with the log at this path.
+    pub fn new(path: &Path) -> Self {
+        Self {
+            path: path.to_owned(),
+            end: 0,
+            rows: None,
+        }
+    }
+
+    /// Reads the rows that were appended since.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or is no log of fixes.
+    pub fn read_on(&mut self) -> Result<(), GnssLogError> {
+        let path = || self.path.clone();
+        let bytes = self.appended();
+        let bytes = bytes.map_err(|source| GnssLogError::Io {
+            path: path(),
+            source,
+        })?;
+        let text = String::from_utf8_lossy(&bytes);
+        match &mut self.rows {
+            Some(rows) => rows.go_on(&text),
+            None => {
+                let rows = Rows::of(&text);
+                let path = path();
+                self.rows = Some(rows.map_err(|reason| GnssLogError::Unknown { path, reason })?);
+            }
+        }
+        self.end += bytes.len() as u64;
+        Ok(())
+    }
+
+    /// Returns the number of fixes so far.
+    pub fn count(&self) -> usize {
+        self.rows.as_ref().map_or(0, |rows| rows.entries.len())
+    }
+
+    /// Returns the log of all that was read.
+    pub fn log(&self) -> GnssLog {
+        let raw = self.rows.clone().map(Raw::from).unwrap_or_default();
+        let (log, error) = GnssLog::examined(raw, &self.path);
+        GnssLog {
+            unusable: error.map(|error| error.to_string()),
+            ..log
+        }
+    }
+
+    fn appended(&self) -> io::Result<Vec<u8>> {
+        let mut file = storage::open(&self.path)?;
+        file.seek(SeekFrom::Start(self.end))?;
+        let mut bytes = Vec::new();
+        file.read_to_end(&mut bytes)?;
+        Ok(bytes)
+    }
+}

@@ -1,0 +1,250 @@
+//! The first row of a table: which column has what, by its name.
+
+use std::collections::HashSet;
+
+use csv::StringRecord;
+use gyre_storage::quoted;
+
+use crate::{parse_seconds, stamp_to_ns};
+
+/// Tables of sensors have tens of columns.
+const MAX_COLUMNS: usize = 1000;
+/// Times are at most 146 years from 1970, so that no difference overflows.
+const MAX_NS: i64 = i64::MAX / 2;
+const SECOND_NS: i64 = 1_000_000_000;
+
+/// Names of the column of stamps that have no unit.
+const STAMPS: &str = "timestamp stamp time t gpstime header_stamp utime unix_time tv";
+/// Units at the end of a stamp's name.
+const STAMP_UNITS: [(&str, StampUnit); 7] = [
+    ("_ns", StampUnit::Ns(1)),
+    ("_us", StampUnit::Ns(1_000)),
+    ("_ms", StampUnit::Ns(1_000_000)),
+    ("_s", StampUnit::Seconds),
+    ("_sec", StampUnit::Seconds),
+    ("_secs", StampUnit::Seconds),
+    ("_seconds", StampUnit::Seconds),
+];
+/// Names of whole seconds, and, at the same place of another column's name, of the rest of them in
+/// this unit, ns.
+const SECONDS: [&str; 4] = ["seconds", "secs", "sec", "s"];
+const RESTS: [(&str, i64); 3] = [
+    ("nanosec nanosecs nanoseconds nsec nsecs ns", 1),
+    ("microseconds usec usecs us", 1_000),
+    ("ms", 1_000_000),
+];
+/// Columns that state that a row has no measurement, and the number for that.
+const UNMEASURED: [(&str, f64); 4] = [
+    ("valid is_valid", 0.0),
+    // ROS, of a gyro and of fixes.
+    (
+        "angular_velocity_covariance_0 angular_velocity_covariance0",
+        -1.0,
+    ),
+    ("status_status", -1.0),
+    // NMEA.
+    ("fix_quality", 0.0),
+];
+
+/// A column with the sign of another: its names, and its words for plus and minus, with spaces
+/// between.
+pub(crate) struct Sign {
+    pub names: &'static str,
+    pub plus: &'static str,
+    pub minus: &'static str,
+}
+
+impl Sign {
+    /// Returns a value with the sign of this word; `None` for another word, or a contradiction.
+    pub fn apply(&self, value: f64, word: &str) -> Option<f64> {
+        let is_of = |words: &str| words.split(' ').any(|it| it.eq_ignore_ascii_case(word));
+        match (is_of(self.minus), is_of(self.plus)) {
+            (true, _) => Some(-value.abs()),
+            (_, true) => Some(value).filter(|it| *it >= 0.0 || it.is_nan()),
+            _ => Some(value).filter(|it| *it == 0.0 || it.is_nan()),
+        }
+    }
+}
+
+/// The names of the columns of a table.
+pub(crate) struct Header(Vec<String>);
+
+impl Header {
+    /// Takes the first row of a table.
+    ///
+    /// # Errors
+    /// More columns than a table of a sensor has, or two of one name.
+    pub fn of(first: &StringRecord) -> Result<Self, String> {
+        let count = first.len();
+        if count > MAX_COLUMNS {
+            return Err(format!(
+                "its first row has {count} columns, and at most {MAX_COLUMNS} are read: remove those that are not needed"
+            ));
+        }
+        let names: Vec<String> = first.iter().map(plain).collect();
+        let mut seen = HashSet::new();
+        let mut filled = names.iter().filter(|name| !name.is_empty());
+        match filled.find(|name| !seen.insert(name.as_str())) {
+            Some(name) => Err(format!("two of its columns are named {}", quoted(name))),
+            None => Ok(Self(names)),
+        }
+    }
+
+    /// Returns the column that has the first of these names, with spaces between, that there is.
+    pub fn find(&self, names: &str) -> Option<usize> {
+        let mut names = names.split(' ');
+        names.find_map(|name| self.0.iter().position(|it| it == name))
+    }
+
+    /// Returns the column of the first of these signs that there is.
+    pub fn sign(&self, signs: &[&'static Sign]) -> Option<(usize, &'static Sign)> {
+        let mut signs = signs.iter();
+        signs.find_map(|sign| Some((self.find(sign.names)?, *sign)))
+    }
+
+    /// Returns the first column of which `meaning` knows the name, with what it means.
+    pub fn first<T>(&self, meaning: impl Fn(&str) -> Option<T>) -> Option<(usize, T)> {
+        let mut names = self.0.iter().enumerate();
+        names.find_map(|(column, name)| Some((column, meaning(name)?)))
+    }
+
+    /// Returns the names.
+    pub fn names(&self) -> &[String] {
+        &self.0
+    }
+
+    /// Returns the names for a message.
+    pub fn listed(&self) -> String {
+        quoted(&self.0.join(","))
+    }
+
+    /// Returns the columns that state that a row has no measurement, and the number for that.
+    pub fn unmeasured(&self) -> Vec<(usize, f64)> {
+        let columns = UNMEASURED.iter();
+        columns
+            .filter_map(|(name, number)| Some((self.find(name)?, *number)))
+            .collect()
+    }
+
+    /// Returns where the stamps are; `None` without such a column.
+    pub fn stamp(&self) -> Option<Stamp> {
+        let of_name = self.first(stamp_unit);
+        let bare = || self.first(|it| SECONDS[..3].contains(&it).then_some(StampUnit::Seconds));
+        let (column, unit) = of_name.or_else(bare)?;
+        let name = self.0[column].as_str();
+        let mut stems = SECONDS.iter().filter_map(|word| name.strip_suffix(word));
+        let stem = stems.next().unwrap_or_default().to_owned();
+        let rest = |stem: &str| {
+            let units = RESTS.iter();
+            let mut words = units.flat_map(|(words, ns)| words.split(' ').map(move |it| (it, *ns)));
+            // `ns` alone may be north and south.
+            words.find_map(|(word, ns)| {
+                let column = self.find(&format!("{stem}{word}"))?;
+                (!stem.is_empty() || word.len() > 2).then_some((column, ns))
+            })
+        };
+        let is_joined = matches!(unit, StampUnit::Seconds | StampUnit::BySize);
+        let found = || {
+            [stem, format!("{name}_"), String::new()]
+                .iter()
+                .find_map(|it| rest(it))
+        };
+        Some(Stamp {
+            column,
+            unit,
+            rest: is_joined
+                .then(found)
+                .flatten()
+                .filter(|(at, _)| *at != column),
+        })
+    }
+}
+
+/// Where a table has its stamps.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Stamp {
+    column: usize,
+    unit: StampUnit,
+    /// The column of the rest of whole seconds, and its unit, ns.
+    rest: Option<(usize, i64)>,
+}
+
+impl Stamp {
+    /// Stamps in the first column: in ns, or of the unit that their size says.
+    pub const fn first(is_by_size: bool) -> Self {
+        Self {
+            column: 0,
+            unit: match is_by_size {
+                true => StampUnit::BySize,
+                false => StampUnit::Ns(1),
+            },
+            rest: None,
+        }
+    }
+
+    /// Returns the time of a row, ns.
+    pub fn ns(&self, row: &StringRecord) -> Option<i64> {
+        let ns = self.unit.ns(row.get(self.column)?)?;
+        match self.rest {
+            Some((column, unit)) if ns % SECOND_NS == 0 => with_rest(ns, row.get(column)?, unit),
+            _ => Some(ns),
+        }
+    }
+}
+
+/// Adds the rest to whole seconds. A rest of a second or more is all of the stamp.
+fn with_rest(whole_ns: i64, rest: &str, unit_ns: i64) -> Option<i64> {
+    // Programs that know no integers write `500.0`.
+    let rest = rest.strip_suffix(".0").unwrap_or(rest);
+    let rest_ns = StampUnit::Ns(unit_ns).ns(rest).filter(|ns| *ns >= 0)?;
+    let is_all = rest_ns >= SECOND_NS;
+    Some(if is_all { rest_ns } else { whole_ns + rest_ns })
+}
+
+/// The unit of stamps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum StampUnit {
+    /// An integer number of so many ns.
+    Ns(i64),
+    /// Decimal seconds.
+    Seconds,
+    /// Decimal seconds, or an integer whose size says its unit.
+    BySize,
+}
+
+impl StampUnit {
+    /// Returns the time of a stamp, ns.
+    fn ns(self, text: &str) -> Option<i64> {
+        let ns = match self {
+            Self::Ns(unit) => text.parse::<i64>().ok()?.checked_mul(unit),
+            Self::Seconds => parse_seconds(text),
+            Self::BySize => match text.parse::<i64>() {
+                Ok(raw) => stamp_to_ns(raw),
+                Err(_) => parse_seconds(text),
+            },
+        };
+        ns.filter(|ns| (-MAX_NS..=MAX_NS).contains(ns))
+    }
+}
+
+/// Returns the unit of a column of stamps by its name; `None` for another column.
+fn stamp_unit(name: &str) -> Option<StampUnit> {
+    let is_stamp = |name: &str| STAMPS.split(' ').any(|it| it == name);
+    let with_unit = |(unit, meaning): &(&str, StampUnit)| {
+        let named = name.strip_suffix(unit)?;
+        is_stamp(named).then_some(*meaning)
+    };
+    let by_name = STAMP_UNITS.iter().find_map(with_unit);
+    by_name.or_else(|| is_stamp(name).then_some(StampUnit::BySize))
+}
+
+/// Returns a name of a column with what programs write in different ways made equal.
+fn plain(name: &str) -> String {
+    let name = name.trim().trim_start_matches(['%', '#']);
+    let name = name.strip_prefix("field.").unwrap_or(name).trim();
+    let name = name
+        .to_lowercase()
+        .replace([' ', '.', '/', '[', '('], "_")
+        .replace([']', ')'], "");
+    name.replace("__", "_").replace("^2", "2")
+}

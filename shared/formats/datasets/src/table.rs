@@ -1,0 +1,206 @@
+//! Tables as CSV: their rows, by the columns that the first row names.
+
+use csv::StringRecord;
+use gyre_storage::quoted;
+
+use crate::header::Header;
+
+/// The largest file: a day of samples at 200 Hz has 2 GB.
+pub(crate) const MAX_BYTES: u64 = 4 << 30;
+/// Marks between columns that are looked for in the first row.
+const MARKS: [u8; 3] = [b',', b';', b'\t'];
+/// The first field of a row in place of as many as the second says, which could not be read before.
+const UNREADABLE: &str = "unreadable";
+
+/// The columns of a table in which each row is an entry.
+pub(crate) trait Columns: Sized {
+    /// The entry that a row becomes.
+    type Entry;
+
+    /// Finds the columns by their names.
+    ///
+    /// # Errors
+    /// A column that is missing, and the remedy.
+    fn by_names(header: &Header) -> Result<Self, String>;
+
+    /// Finds the columns of a table without names, by their number.
+    ///
+    /// # Errors
+    /// An unknown number, and the remedy.
+    fn by_number(columns: usize) -> Result<Self, String> {
+        Err(format!(
+            "its {columns} columns have no names: the first row must name them"
+        ))
+    }
+
+    /// Reads a row; `None` if a field is missing or no number. `nan` is one.
+    fn entry(&self, row: &StringRecord) -> Option<Self::Entry>;
+
+    /// Returns whether a row states that nothing was measured.
+    fn is_unmeasured(&self, _row: &StringRecord) -> bool {
+        false
+    }
+}
+
+/// The rows of a table.
+#[derive(Clone)]
+pub(crate) struct Rows<C: Columns> {
+    pub columns: C,
+    pub entries: Vec<C::Entry>,
+    pub unreadable: Unreadable,
+    /// Rows that state that nothing was measured.
+    pub unmeasured: usize,
+    /// Columns that state so, with the number for that.
+    stating: Vec<(usize, f64)>,
+    /// The number of columns, and the mark between them.
+    count: usize,
+    mark: u8,
+    lines: usize,
+}
+
+impl<C: Columns> Rows<C> {
+    /// Reads a table from its beginning.
+    ///
+    /// # Errors
+    /// Columns that are missing, and the remedy.
+    pub fn of(text: &str) -> Result<Self, String> {
+        let first = text.lines().next().unwrap_or_default().as_bytes();
+        let mark = MARKS.into_iter().find(|mark| first.contains(mark));
+        let mark = mark.unwrap_or(b',');
+        let mut row = StringRecord::new();
+        let mut reader = reader(text, mark);
+        if !reader.read_record(&mut row).map_err(|e| e.to_string())? {
+            return Err("it is empty".to_owned());
+        }
+        let is_named = row.iter().any(|field| field.parse::<f64>().is_err());
+        let (columns, stating) = match is_named {
+            true => {
+                let header = Header::of(&row)?;
+                (C::by_names(&header)?, header.unmeasured())
+            }
+            false => (C::by_number(row.len())?, Vec::new()),
+        };
+        let mut rows = Self {
+            columns,
+            stating,
+            mark,
+            count: row.len(),
+            entries: Vec::new(),
+            unreadable: Unreadable::default(),
+            unmeasured: 0,
+            lines: 0,
+        };
+        // Without names the first row is an entry.
+        let mut from = 0;
+        if is_named {
+            rows.lines = (reader.position().line() - 1) as usize;
+            from = reader.position().byte() as usize;
+        }
+        rows.go_on(text.get(from..).unwrap_or_default());
+        Ok(rows)
+    }
+
+    /// Reads the rows that follow.
+    pub fn go_on(&mut self, text: &str) {
+        let mut reader = reader(text, self.mark);
+        let mut row = StringRecord::new();
+        // Of a text rows of any form can be read.
+        while reader.read_record(&mut row).unwrap_or_default() {
+            self.take(&row);
+        }
+        self.lines += (reader.position().line() - 1) as usize;
+    }
+
+    fn take(&mut self, row: &StringRecord) {
+        let states_so = |(column, number): &(usize, f64)| {
+            let text = row.get(*column).unwrap_or_default();
+            text.eq_ignore_ascii_case("false") || text.parse() == Ok(*number)
+        };
+        match self.columns.entry(row).filter(|_| row.len() == self.count) {
+            Some(_) if self.stating.iter().any(states_so) => self.unmeasured += 1,
+            Some(entry) => self.entries.push(entry),
+            None if row.len() == self.count && self.columns.is_unmeasured(row) => {
+                self.unmeasured += 1;
+            }
+            None => {
+                let line = self.lines + row.position().map_or(0, |at| at.line() as usize);
+                let times = row.get(1).filter(|_| row.get(0) == Some(UNREADABLE));
+                let times = times.and_then(|it| it.parse().ok()).unwrap_or(1);
+                self.unreadable.add(times, line, || why(row, self.count));
+            }
+        }
+    }
+}
+
+fn reader(text: &str, mark: u8) -> csv::Reader<&[u8]> {
+    csv::ReaderBuilder::new()
+        .has_headers(false)
+        .flexible(true)
+        .trim(csv::Trim::All)
+        .delimiter(mark)
+        .from_reader(text.as_bytes())
+}
+
+/// Rows that cannot be read.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Unreadable {
+    pub count: usize,
+    /// The line (of a folder of files: the number) of the first of them.
+    pub first: usize,
+    why: String,
+}
+
+impl Unreadable {
+    /// Counts a row so often.
+    pub fn add(&mut self, times: usize, line: usize, why: impl FnOnce() -> String) {
+        if self.count == 0 {
+            (self.first, self.why) = (line, why());
+        }
+        self.count = self.count.saturating_add(times);
+    }
+
+    /// Returns what is wrong if these are most of all rows.
+    pub fn are_most(&self, all: usize) -> Option<String> {
+        let Self { count, first, why } = self;
+        (*count > all / 2).then(|| {
+            format!("{count} of its {all} rows cannot be read, the first in line {first}: {why}")
+        })
+    }
+}
+
+/// Returns what is wrong with a row of a table with so many columns, and the remedy.
+fn why(row: &StringRecord, columns: usize) -> String {
+    let is_number = |text: &str| text.trim().parse::<f64>().is_ok();
+    let is_date = |text: &str| {
+        let has_digits = text.starts_with(|first: char| first.is_ascii_digit());
+        has_digits
+            && (text.contains(':') || text.matches(['-', '/']).count() == 2)
+            && !is_number(text)
+    };
+    let has_comma = |text: &str| text.contains(',') && is_number(&text.replacen(',', ".", 1));
+    let has_letter = |text: &str| {
+        let degrees = text.strip_suffix(['N', 'S', 'E', 'W', 'n', 's', 'e', 'w']);
+        degrees.is_some_and(is_number)
+    };
+    let remedies: [(&dyn Fn(&str) -> bool, &str); 3] = [
+        (
+            &is_date,
+            "is a date or a time of day: write stamps as seconds or nanoseconds since 1970",
+        ),
+        (&has_comma, "has a decimal comma: write decimal points"),
+        (
+            &has_letter,
+            "has a letter: write degrees to the south and to the west with a minus",
+        ),
+    ];
+    let mut found = remedies.iter().filter_map(|(is_so, remedy)| {
+        let field = row.iter().find(|field| is_so(field))?;
+        Some(format!("{} {remedy}", quoted(field)))
+    });
+    found.next().unwrap_or_else(|| match row.len() {
+        fields if fields != columns => format!(
+            "it has {fields} fields in place of {columns}: do all rows have the mark between columns that the first row has, and decimal points in place of commas?"
+        ),
+        _ => "are its stamps, decimal points and columns those that its header names?".to_owned(),
+    })
+}
