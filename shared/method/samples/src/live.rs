@@ -2,8 +2,11 @@
 
 use crate::{GyroConfig, MAX_SAMPLES, Sample, WheelsConfig, interval_of};
 
-/// A sample that is so much later than the last scan is of a clock that has jumped, ns.
+/// A sample that is so much later than the last scan, or before the first scan so far from the
+/// newest sample, is of a clock that has jumped, ns.
 const MAX_AHEAD_NS: i64 = 10_000_000_000;
+/// The most samples that wait: those of that time at 1600 Hz.
+const MAX_WAITING: usize = 16 * MAX_SAMPLES;
 
 /// The sensor that the samples are of, by whose settings they are taken over to the radar's clock.
 #[derive(Clone, Debug)]
@@ -57,18 +60,28 @@ impl LiveSamples {
             .samples
             .get(place)
             .is_some_and(|it| it.stamp_ns == sample.stamp_ns);
-        let is_of_now = self.handed_until_ns.is_none_or(|until_ns| {
-            let after = sample.stamp_ns.saturating_sub(until_ns);
-            (1..=MAX_AHEAD_NS).contains(&after)
-        });
+        let newest_ns = self.samples.last().map(|it| it.stamp_ns);
+        let after = |ns: i64| sample.stamp_ns.saturating_sub(ns);
+        let is_of_now = match (self.handed_until_ns, newest_ns) {
+            (Some(until_ns), _) => (1..=MAX_AHEAD_NS).contains(&after(until_ns)),
+            (None, Some(newest_ns)) => after(newest_ns).saturating_abs() <= MAX_AHEAD_NS,
+            (None, None) => true,
+        };
         if is_repeated || !is_of_now || !sample.is_valid() {
             self.left_out += 1;
             return;
         }
         self.samples.insert(place, sample);
-        // Before the first scan nothing takes them.
-        if self.samples.len() > 2 * MAX_SAMPLES {
-            self.samples.remove(0);
+        if self.handed_until_ns.is_none() {
+            // What is so old is of no scan.
+            let oldest_ns = newest_ns.map_or(i64::MIN, |ns| ns.saturating_sub(MAX_AHEAD_NS));
+            let old = self.samples.partition_point(|it| it.stamp_ns < oldest_ns);
+            self.samples.drain(..old);
+        }
+        // The next scan needs the earliest.
+        if self.samples.len() > MAX_WAITING {
+            self.samples.truncate(MAX_WAITING);
+            self.left_out += 1;
         }
     }
 
@@ -83,6 +96,9 @@ impl LiveSamples {
     /// ([`interval_of`]), and the number of samples that were left out since the scan before.
     pub fn of_scan(&mut self, span_ns: [i64; 2]) -> (&[Sample], usize) {
         let [after_ns, until_ns] = interval_of(span_ns);
+        let latest_ns = until_ns.saturating_add(MAX_AHEAD_NS);
+        let ahead = self.samples.partition_point(|it| it.stamp_ns <= latest_ns);
+        self.left_out += self.samples.drain(ahead..).count();
         self.samples.retain(|sample| sample.stamp_ns > after_ns);
         self.handed_until_ns = Some(until_ns);
         let end = self
@@ -144,6 +160,37 @@ mod tests {
         let (samples, left_out) = live.of_scan([100 * MS, 200 * MS]);
         assert_eq!((stamps(samples), left_out), (vec![115, 120], 5));
         assert_eq!(live.of_scan([500 * MS, 600 * MS]).1, 0);
+    }
+
+    #[test]
+    fn samples_of_another_year_displace_none_and_all_are_counted() {
+        const YEAR_NS: i64 = 365 * 86_400_000_000_000;
+        // The clock that comes first counts until there is a scan.
+        for (before, ahead, after, lost) in
+            [(100, 2500, 100, 0), (0, 2500, 100, 100), (0, 0, 12_000, 0)]
+        {
+            let mut live = of_gyro(GyroConfig::default());
+            let mut add = |from_ns: i64, count: i64| {
+                (1..=count).for_each(|k| live.add(&Sample::yaw_rate(from_ns + k * MS, 0.1)));
+            };
+            let end_ns = (before + after) * MS;
+            add(0, before);
+            add(YEAR_NS, ahead);
+            add(before * MS, after);
+            let (samples, left_out) = live.of_scan([end_ns - 100 * MS, end_ns]);
+            let expected = (before + after).min(200) - lost;
+            assert_eq!(
+                (samples.len() as i64, left_out as i64),
+                (expected, ahead + lost)
+            );
+        }
+        let mut flooded = of_gyro(GyroConfig::default());
+        (1..=20_000).for_each(|k| flooded.add(&Sample::yaw_rate(k, 0.1)));
+        let (samples, left_out) = flooded.of_scan([0, MS]);
+        assert_eq!(
+            (samples.len(), left_out),
+            (MAX_WAITING, 20_000 - MAX_WAITING)
+        );
     }
 
     #[test]
