@@ -1,18 +1,23 @@
 //! The fixes of a live receiver, as they come to a trajectory.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use gyre_recording::received_fixes;
+use gyre_recording::{ReceivedFixes, received_fixes};
 use gyre_samples::GnssConfig;
 use gyre_slam::Fixes;
 use gyre_stage::{GnssReceiver, StageError};
 
-/// Receives fixes, and reads the log of all that have arrived as that of a recording is read.
+/// Fixes are examined together, in a time that grows with their number. So while the run goes on
+/// they are examined when one in so many is new: after ten hours at 20 Hz that is every 18 s.
+const NEW_SHARE: usize = 2000;
+
+/// Receives fixes, and reads the log of all that have arrived on.
 pub struct LiveFixes {
     receiver: GnssReceiver,
     config: GnssConfig,
-    /// The folder of the results.
-    out: PathBuf,
+    received: ReceivedFixes,
+    /// The number of them that were examined.
+    examined: usize,
 }
 
 impl LiveFixes {
@@ -21,9 +26,11 @@ impl LiveFixes {
     /// # Errors
     /// An address at which nothing can be received, or a file that cannot be written.
     pub fn open(config: GnssConfig, out: &Path) -> Result<Self, StageError> {
+        let log = received_fixes(out);
         Ok(Self {
-            receiver: GnssReceiver::open(&config.listen, &received_fixes(out))?,
-            out: out.to_owned(),
+            receiver: GnssReceiver::open(&config.listen, &log)?,
+            received: ReceivedFixes::new(&log),
+            examined: 0,
             config,
         })
     }
@@ -36,8 +43,8 @@ impl LiveFixes {
         self.receiver.finish()
     }
 
-    /// Returns all fixes that have arrived; `None` if there are no new ones. With `is_last` nothing
-    /// is received after this.
+    /// Returns all fixes that have arrived; `None` if there are no new ones, or few beside all.
+    /// With `is_last` nothing is received after this.
     ///
     /// # Errors
     /// Reception has failed, or a log that cannot be read.
@@ -45,17 +52,20 @@ impl LiveFixes {
         if is_last {
             self.finish()?;
         }
-        let Self {
-            receiver,
-            config,
-            out,
-        } = self;
-        let read = || gyre_recording::gnss_log(config, Path::new(""), out);
-        let Some(log) = receiver.if_grown(read)? else {
-            return Ok(None);
+        let received = &mut self.received;
+        let read = self.receiver.if_grown(|| received.read_on())?;
+        read.unwrap_or(Ok(()))
+            .map_err(|error| StageError::Input(error.to_string()))?;
+        let new = self.received.count() - self.examined;
+        let least = if is_last {
+            1
+        } else {
+            self.examined / NEW_SHARE + 1
         };
-        let log = log.map_err(|error| StageError::Input(error.to_string()))?;
-        let fixes = log.map(|log| log.on_radar(config)).unwrap_or_default();
-        Ok(Some(Fixes::new(fixes, config)))
+        Ok((new >= least).then(|| {
+            self.examined += new;
+            let fixes = self.received.log().on_radar(&self.config);
+            Fixes::new(fixes, &self.config)
+        }))
     }
 }

@@ -47,6 +47,7 @@ mod writer;
 
 pub use error::RecordingError;
 pub use gnss::{copied_fixes, gnss_log, received_fixes};
+pub use gyre_datasets::ReceivedFixes;
 pub use head::Head;
 pub use ledger::{Begun, Ledger};
 pub use open::{is_recording, open, open_recording, open_resolved, reopen, stored_options};

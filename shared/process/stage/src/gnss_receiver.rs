@@ -10,7 +10,7 @@ use std::{
         atomic::{AtomicBool, Ordering},
     },
     thread::{self, JoinHandle},
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use gyre_storage::{File, GroupSync, StorageError};
@@ -24,6 +24,11 @@ use crate::{
 const HEADER: &str = "stamp_ns,latitude_deg,longitude_deg,sigma_m\n";
 /// The row of a line that is no fix: readers of the log count it.
 const UNREADABLE: &str = "unreadable\n";
+/// Rows that the log takes in this time: receivers send at most 20 a second.
+const MAX_ROWS: usize = 1000;
+const OF: Duration = Duration::from_secs(10);
+/// The largest log, bytes: that of days.
+const MAX_LOG: u64 = 1 << 30;
 /// Time between two looks whether reception is to end.
 const WAIT: Duration = Duration::from_millis(50);
 
@@ -69,6 +74,9 @@ impl GnssReceiver {
             socket,
             log,
             shared: shared.clone(),
+            since: Instant::now(),
+            rows: 0,
+            surplus: 0,
         };
         tracing::info!(address, "waiting for fixes of GNSS");
         Ok(Self {
@@ -158,6 +166,11 @@ struct Reception {
     socket: UdpSocket,
     log: Log,
     shared: Arc<Shared>,
+    /// Rows since that time, and lines for which the log had no room and which it does not count
+    /// yet.
+    since: Instant,
+    rows: usize,
+    surplus: usize,
 }
 
 impl Reception {
@@ -189,12 +202,33 @@ impl Reception {
         if let lost @ 1.. = dropped(&self.socket) {
             tracing::warn!(lost, "datagrams with fixes came faster than they are read");
         }
+        let surplus = self.surplus();
+        self.log.append(&surplus).map_err(unwritten)?;
         self.log.sync.finish().map_err(unwritten)
+    }
+
+    /// Returns the row that counts the surplus; nothing without one.
+    fn surplus(&mut self) -> String {
+        match std::mem::take(&mut self.surplus) {
+            0 => String::new(),
+            surplus => format!("unreadable,{surplus}\n"),
+        }
     }
 
     fn append(&mut self, datagram: &[u8]) -> Result<(), StageError> {
         let lines = lines(datagram).filter(|line| !line.trim().is_empty());
-        let rows: String = lines.map(row).collect();
+        let mut rows = String::new();
+        if self.since.elapsed() >= OF {
+            rows += &self.surplus();
+            (self.since, self.rows) = (Instant::now(), 0);
+        }
+        for line in lines {
+            self.rows += 1;
+            match self.rows <= MAX_ROWS && self.log.end < MAX_LOG {
+                true => rows += &row(line),
+                false => self.surplus += 1,
+            }
+        }
         let mut datagrams = self.shared.lock();
         self.log.append(&rows).map_err(unwritten)?;
         *datagrams += 1;
@@ -295,6 +329,12 @@ mod tests {
             receiver.if_grown(read).unwrap().as_deref(),
             Some(&*expected)
         );
+        let mut flooded = GnssReceiver::open(&address, &log).unwrap();
+        send(&address, &[b"7\n".repeat(20_000).as_slice()]);
+        flooded.finish().unwrap();
+        let text = read();
+        assert_eq!(text.lines().count(), 4 + MAX_ROWS + 1);
+        assert!(text.ends_with("unreadable,19000\n"));
         fs::write(&log, format!("{HEADER}1,2,3,0\n2,2,")).unwrap();
         let mut next = GnssReceiver::open(&address, &log).unwrap();
         send(&address, &[b"3,2,3"]);
