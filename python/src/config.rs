@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use gyre_configuration::{
     MethodConfig, automatic,
-    paths::{Named, find_own},
+    paths::{Named, resolve},
     strict,
 };
 use gyre_datasets::Format;
@@ -43,7 +43,7 @@ impl Config {
     }
 
     fn from_table(mut table: Table, note: Option<String>) -> PyResult<Self> {
-        find_own(&mut table);
+        resolve(&mut table).map_err(errors::config)?;
         let method = MethodConfig::take(&mut table).map_err(errors::config)?;
         if let Some(key) = table.keys().next() {
             let unknown = strict::unknown("the configuration", key, &MethodConfig::SECTIONS);

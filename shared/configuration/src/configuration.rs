@@ -3,6 +3,7 @@
 
 pub mod difference;
 mod validation;
+mod without_effect;
 
 use std::{
     collections::BTreeMap,
@@ -131,7 +132,7 @@ impl Configuration {
     }
 
     fn of_table(mut table: toml::Table) -> Result<Self, ConfigurationError> {
-        paths::find_own(&mut table);
+        paths::resolve(&mut table)?;
         let configuration = Self::from_table(table)?;
         configuration.validate()?;
         Ok(configuration)

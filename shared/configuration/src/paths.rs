@@ -74,10 +74,7 @@ impl Named {
             here,
             notes: Vec::new(),
         };
-        for key in KEYS {
-            places.key(&mut table, key)?;
-        }
-        places.commands(&mut table)?;
+        visit(&mut table, |path, key| places.replace(path, key))?;
         let notes = places.notes;
         Ok(Self { table, notes })
     }
@@ -90,17 +87,70 @@ impl Named {
     }
 }
 
-/// Replaces each relative path that names nothing in the current folder by that of the program's
-/// file that it names: paths of the command line.
-pub fn find_own(table: &mut Table) {
+/// Replaces each path that is one from the current folder by the whole one, so that the resolved
+/// configuration names the same from any folder; else by that of the program's file that it names:
+/// paths of the command line.
+///
+/// # Errors
+/// A path that is not UTF-8.
+pub fn resolve(table: &mut Table) -> Result<(), ConfigurationError> {
+    visit(table, |path, key| {
+        let written = Path::new(path.as_str());
+        if path.is_empty() || gyre_shipped::is_own(written) {
+            return Ok(());
+        }
+        let found = match written.exists() {
+            // The program of a virtual environment is known by the name of its link.
+            true if key.ends_with(".command") => std::path::absolute(written).ok(),
+            true if key != RECORDING => written.canonicalize().ok(),
+            _ if key == RECORDING => std::path::absolute(written).ok(),
+            _ => gyre_shipped::find(written),
+        };
+        found.map_or(Ok(()), |found| put(path, found))
+    })
+}
+
+fn put(path: &mut String, found: PathBuf) -> Result<(), ConfigurationError> {
+    let text = found.to_str().map(str::to_owned);
+    *path = text.ok_or(ConfigurationError::Name(found))?;
+    Ok(())
+}
+
+/// Visits the paths of all keys, and those in the commands of stages: that of the program, others
+/// that begin with a dot, and that of a function of Python.
+fn visit(
+    table: &mut Table,
+    mut each: impl FnMut(&mut String, &str) -> Result<(), ConfigurationError>,
+) -> Result<(), ConfigurationError> {
     for key in KEYS {
-        if let Some(Value::String(path)) = value_mut(table, key)
-            && !Path::new(path).exists()
-            && let Some(own) = gyre_shipped::find(Path::new(path))
-        {
-            *path = own.to_string_lossy().into_owned();
+        let paths = match value_mut(table, key) {
+            Some(Value::Array(paths)) => paths.as_mut_slice(),
+            Some(path) => std::slice::from_mut(path),
+            None => continue,
+        };
+        for path in paths {
+            if let Value::String(path) = path {
+                each(path, key)?;
+            }
         }
     }
+    let Some(Value::Table(stages)) = table.get_mut("stages") else {
+        return Ok(());
+    };
+    for (name, stage) in stages.iter_mut() {
+        let command = stage.get_mut("command").and_then(Value::as_array_mut);
+        for (index, word) in command.into_iter().flatten().enumerate() {
+            let Value::String(word) = word else { continue };
+            let has_dot = word.starts_with("./") || word.starts_with("../");
+            if has_dot || (index == 0 && word.contains('/')) {
+                each(word, &format!("stages.{name}.command"))?;
+            }
+        }
+        if let Some(Value::String(file)) = stage.get_mut("python") {
+            each(file, &format!("stages.{name}.python"))?;
+        }
+    }
+    Ok(())
 }
 
 /// Returns the path of the configuration of the program that is meant: where there is no such file.
@@ -145,40 +195,6 @@ struct Places<'a> {
 }
 
 impl Places<'_> {
-    /// Replaces the path or the paths of a key.
-    fn key(&mut self, table: &mut Table, key: &str) -> Result<(), ConfigurationError> {
-        match value_mut(table, key) {
-            Some(Value::String(path)) => self.replace(path, key),
-            Some(Value::Array(paths)) => paths.iter_mut().try_for_each(|path| match path {
-                Value::String(path) => self.replace(path, key),
-                _ => Ok(()),
-            }),
-            _ => Ok(()),
-        }
-    }
-
-    /// Replaces the paths in the commands of stages: that of the program, others that begin with a
-    /// dot, and that of a function of Python.
-    fn commands(&mut self, table: &mut Table) -> Result<(), ConfigurationError> {
-        let Some(Value::Table(stages)) = table.get_mut("stages") else {
-            return Ok(());
-        };
-        for (name, stage) in stages.iter_mut() {
-            let command = stage.get_mut("command").and_then(Value::as_array_mut);
-            for (index, word) in command.into_iter().flatten().enumerate() {
-                let Value::String(word) = word else { continue };
-                let has_dot = word.starts_with("./") || word.starts_with("../");
-                if has_dot || (index == 0 && word.contains('/')) {
-                    self.replace(word, &format!("stages.{name}.command"))?;
-                }
-            }
-            if let Some(Value::String(file)) = stage.get_mut("python") {
-                self.replace(file, &format!("stages.{name}.python"))?;
-            }
-        }
-        Ok(())
-    }
-
     fn replace(&mut self, path: &mut String, key: &str) -> Result<(), ConfigurationError> {
         let written = Path::new(path.as_str());
         if path.is_empty() || written.is_absolute() || gyre_shipped::is_own(written) {
@@ -214,8 +230,7 @@ impl Places<'_> {
             }
         };
         if let Some(found) = found {
-            let text = found.to_str().map(str::to_owned);
-            *path = text.ok_or(ConfigurationError::Name(found))?;
+            put(path, found)?;
         }
         let key = key.to_owned();
         self.notes
@@ -358,12 +373,25 @@ mod tests {
     }
 
     #[test]
-    fn a_path_of_the_command_line_is_one_here_or_of_the_program() {
+    fn each_path_of_the_command_line_is_one_here_or_of_the_program() {
+        let own: Vec<String> = KEYS.iter().map(|key| format!("{key}=src")).collect();
+        let mut table: Table = "[stages.masking]\npython = 'src'\n".parse().unwrap();
+        for setting in own {
+            strict::set(&mut table, &setting).unwrap();
+        }
+        resolve(&mut table).unwrap();
+        let here = Path::new("src").canonicalize().unwrap();
+        for key in KEYS.into_iter().chain(["stages.masking.python"]) {
+            let path = value(&table, key).unwrap().as_str().unwrap();
+            assert_eq!(Path::new(path), here, "{key}");
+        }
         let mut table: Table = MODEL.parse().unwrap();
-        strict::set(&mut table, "source.data=src").unwrap();
-        find_own(&mut table);
+        strict::set(&mut table, "gyro.file=nowhere.csv").unwrap();
+        strict::set(&mut table, "record.file=new.mcap").unwrap();
+        resolve(&mut table).unwrap();
         let named = |key: &str| value(&table, key).unwrap().as_str().unwrap();
         assert_eq!(named("masking.model"), "gyre:models/gyre-255.toml");
-        assert_eq!(named("source.data"), "src");
+        assert_eq!(named("gyro.file"), "nowhere.csv");
+        assert!(Path::new(named("record.file")).is_absolute());
     }
 }

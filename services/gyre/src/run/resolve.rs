@@ -47,11 +47,7 @@ pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
         let dataset = gyre_recording::open(&source.data, &configuration.dataset)?;
         source.first = source.first.max(dataset.first());
     }
-    if let Some(simulation) = &mut configuration.simulation {
-        let streets = simulation.town.streets.iter_mut();
-        for file in simulation.drive.file.iter_mut().chain(streets) {
-            *file = file.canonicalize().unwrap_or_else(|_| file.clone());
-        }
+    if let Some(simulation) = &configuration.simulation {
         // The constants of a simulated radar are known.
         configuration.dataset = configuration.dataset.or(&simulation.dataset_options());
         configuration.source.data = PathBuf::new();
@@ -60,28 +56,9 @@ pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
     if configuration.objects.is_on() {
         configuration.odometry.masking.resolve_library()?;
     }
-    let functions = configuration.stages.values_mut();
-    let functions = functions.filter_map(|stage| stage.python.as_mut());
-    // Absolute, so that the resolved configuration repeats the run from any folder. The reader
-    // reports what does not exist.
-    for path in [
-        Some(&mut configuration.source.data),
-        configuration.run.ground_truth.as_mut(),
-        Some(&mut configuration.slam.map),
-        configuration.gnss.file.as_mut(),
-        Some(&mut configuration.link.ca),
-        Some(&mut configuration.link.certificate),
-        Some(&mut configuration.link.key),
-    ]
-    .into_iter()
-    .flatten()
-    .chain(functions)
-    {
-        if let Ok(absolute) = path.canonicalize() {
-            *path = absolute;
-        }
-        path_value(path)?;
-    }
+    let idle = configuration.without_effect(&arguments.inputs.set)?;
+    idle.iter()
+        .for_each(|sentence| print::note(format_args!("gyre: {sentence}")));
     // The run's processes are told where it is.
     path_value(&absolute(&results_folder(arguments)?)?)?;
     Ok(configuration)

@@ -55,6 +55,11 @@ fn impossible_values_are_refused() {
         ("[points]\ncapacity = 0", "points.capacity is 0"),
         ("[refinement]\nkeyframes = 0", "refinement.keyframes"),
         ("[masking]\nlag = 0", "lag"),
+        ("[gyro]\nkind = 'log'", "[gyro]: kind is `log`, but no file"),
+        (
+            "[wheels]\nkind = 'log'\nfile = ''",
+            "[wheels]: kind is `log`",
+        ),
         ("[masking]\nthreads = 65", "threads is 65"),
         ("[masking]\nprovider = 'npu'", "npu"),
         ("[masking]\nthreshold = 300", "300"),
@@ -69,6 +74,37 @@ fn impossible_values_are_refused() {
     ] {
         let error = from(text).unwrap_err().to_string();
         assert!(error.contains(part), "{text}: {error}");
+    }
+}
+
+#[test]
+fn settings_without_effect_are_named() {
+    let named = |overrides: &[&str]| {
+        let overrides: Vec<String> = overrides.iter().map(|it| (*it).to_owned()).collect();
+        let configuration = Configuration::of_overrides(&overrides).unwrap();
+        configuration.without_effect(&overrides).unwrap()
+    };
+    let sentence = "gyro.file is set and has no effect, since gyro.kind is `none`: it needs `log`";
+    assert_eq!(named(&["gyro.file=a.csv"]), [sentence]);
+    for idle in [
+        &["gyro.kind=auto", "gyro.file=a.csv"][..],
+        &["wheels.late_s=1"],
+        &["gnss.listen=127.0.0.1:1"],
+        &["objects.lost_s=9"],
+        &["masking.kind=none", "masking.threshold=60"],
+    ] {
+        assert_eq!(named(idle).len(), 1, "{idle:?}");
+    }
+    for used in [
+        &["gyro.kind=log", "gyro.file=a.csv", "gyro.late_s=1"][..],
+        &[
+            "gyro.kind=none",
+            "run.window=3",
+            "simulation.drive.kind=town",
+        ],
+        &["masking.threshold=60", "simulation.gyro.rate_hz=100"],
+    ] {
+        assert_eq!(named(used), [""; 0], "{used:?}");
     }
 }
 

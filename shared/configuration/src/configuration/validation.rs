@@ -57,6 +57,7 @@ impl Configuration {
             let reason = "map is set, but the keyframes that are found in it are those of slam: set kind to `graph`";
             return Err(value("slam", reason));
         }
+        self.validate_logs()?;
         self.validate_gnss()?;
         self.validate_listen()?;
         if self.objects.is_on() && self.link.side.is_some() {
@@ -81,6 +82,24 @@ impl Configuration {
         Ok(())
     }
 
+    /// A log that is used is named.
+    fn validate_logs(&self) -> Result<(), ConfigurationError> {
+        let odometry = &self.odometry;
+        let (gyro, wheels, gnss) = (&odometry.gyro, &odometry.wheels, &self.gnss);
+        for (section, is_log, file) in [
+            ("gyro", gyro.kind == GyroKind::Log, &gyro.file),
+            ("wheels", wheels.kind == WheelsKind::Log, &wheels.file),
+            ("gnss", gnss.kind == GnssKind::Log, &gnss.file),
+        ] {
+            let is_named = file.as_ref().is_some_and(|it| !it.as_os_str().is_empty());
+            if is_log && !is_named {
+                let reason = "kind is `log`, but no file is named: set file, or kind to `auto`";
+                return Err(value(section, reason));
+            }
+        }
+        Ok(())
+    }
+
     /// Fixes are constraints of a graph. Those of a recording are in a log. Those beside a live
     /// radar arrive during the run, or are in a log that is complete when it begins.
     fn validate_gnss(&self) -> Result<(), ConfigurationError> {
@@ -88,9 +107,6 @@ impl Configuration {
             GnssKind::None => return Ok(()),
             _ if self.slam.kind != SlamKind::Graph => {
                 "kind is set, but fixes are constraints of the graph of slam: set slam.kind to `graph`"
-            }
-            GnssKind::Log if self.gnss.file.is_none() => {
-                "kind is `log`, but no file is named: set file, or kind to `auto`"
             }
             GnssKind::Auto if self.is_radar() => {
                 "kind is `auto`, but the log of a live radar does not lie beside its scans: receive fixes with kind = \"udp\" or \"ros2\", or name a log with kind = \"log\" and file"
