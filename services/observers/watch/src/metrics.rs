@@ -363,6 +363,17 @@ mod tests {
     }
 
     #[test]
+    fn alarms_are_of_metrics_that_exist_and_one_is_of_a_run_that_has_ended() {
+        let rules = include_str!("../../../../configs/prometheus/gyre.rules.yml");
+        assert!(rules.contains("expr: gyre_up == 0\n"));
+        let (_, text) = scrape(&view(), b"text/plain");
+        let words = rules.split(|c: char| !c.is_alphanumeric() && c != '_');
+        for name in words.filter(|word| word.starts_with("gyre_")) {
+            assert!(text.contains(name), "{name}");
+        }
+    }
+
+    #[test]
     fn what_a_radar_has_not_delivered_is_counted() {
         let received = Received {
             missing_azimuths: 3,
