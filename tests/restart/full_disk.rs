@@ -55,15 +55,22 @@ fn an_error_that_cannot_be_printed_is_told_by_the_exit_code() {
 }
 
 #[test]
-fn results_on_a_full_disk_end_the_run_with_the_reason() {
-    let run = Run::of_recording();
-    std::fs::create_dir(run.out()).unwrap();
-    let Some(command) = run.with_tmpfs(run.out(), "size=64k") else {
-        return;
-    };
-    let ended = run.start_as(command).finish();
-    ended.failed_with(&["No space left on device", &run.out().display().to_string()]);
-    assert!(!ended.stderr.contains("exit code 101"), "{}", ended.stderr);
+fn a_full_disk_ends_a_run_with_the_reason_and_a_live_one_when_all_poses_are_computed() {
+    let last = format!("to pose {} are not kept", recording::SCANS - 1);
+    for (mode, words) in [
+        ("lossless", &["No space left on device"][..]),
+        ("live", &["is full: poses continue", &last]),
+    ] {
+        let run = Run::of_recording().set(&format!("run.mode={mode}"));
+        let run = run.rate("2");
+        std::fs::create_dir(run.out()).unwrap();
+        let Some(command) = run.with_tmpfs(run.out(), "size=64k") else {
+            return;
+        };
+        let ended = run.start_as(command).finish();
+        ended.failed_with(words);
+        ended.failed_with(&[&run.out().display().to_string()]);
+    }
 }
 
 #[test]

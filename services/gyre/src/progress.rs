@@ -82,7 +82,7 @@ impl Progress {
             Event::GaveUp { follower, error } => {
                 self.say(&format!("{error}: odometry goes on without {follower}"));
             }
-            Event::Recorder { sentence } => self.say(sentence),
+            Event::Note { sentence } => self.say(sentence),
             Event::Stalled(stall) => self.say(&stall.to_string()),
             Event::Following { follower, progress } => {
                 self.radar = None;

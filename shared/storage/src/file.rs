@@ -5,6 +5,7 @@ use std::{
     io,
     os::unix::fs::{FileExt, MetadataExt},
     path::{Path, PathBuf},
+    sync::atomic::{AtomicBool, Ordering},
     thread,
     time::{Duration, Instant},
 };
@@ -20,6 +21,26 @@ use crate::{
 /// Time for which a lock is tried, and between two attempts.
 const LOCK_WAIT: Duration = Duration::from_secs(1);
 const LOCK_PAUSE: Duration = Duration::from_millis(5);
+
+/// True if a full disk is no error of this process, and from when it was full.
+static CONTINUES: AtomicBool = AtomicBool::new(false);
+static IS_FULL: AtomicBool = AtomicBool::new(false);
+
+/// Lets this process continue when the disk is full: nothing that it changes in place is kept from
+/// then on, because its files may not have gaps.
+pub fn continue_when_full() {
+    CONTINUES.store(true, Ordering::Relaxed);
+}
+
+/// Returns whether the disk was full since [`continue_when_full`].
+pub fn was_full() -> bool {
+    IS_FULL.load(Ordering::Relaxed)
+}
+
+fn is_full(error: &io::Error) -> bool {
+    use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
+    matches!(error.kind(), StorageFull | QuotaExceeded | FileTooLarge)
+}
 
 /// A file that is changed in place.
 #[derive(Debug)]
@@ -174,11 +195,18 @@ impl File {
     /// them.
     ///
     /// # Errors
-    /// The file cannot be written.
+    /// The file cannot be written, but see [`continue_when_full`].
     pub fn write_at(&self, bytes: &[u8], offset: u64) -> Result<(), StorageError> {
-        self.file
-            .write_all_at(bytes, offset)
-            .map_err(StorageError::at("write", &self.path))?;
+        if was_full() {
+            return Ok(());
+        }
+        match self.file.write_all_at(bytes, offset) {
+            Err(error) if is_full(&error) && CONTINUES.load(Ordering::Relaxed) => {
+                IS_FULL.store(true, Ordering::Relaxed);
+                return Ok(());
+            }
+            written => written.map_err(StorageError::at("write", &self.path))?,
+        }
         #[cfg(feature = "record")]
         record::push(&self.path, || Operation::Write {
             path: self.path.clone(),

@@ -3,7 +3,7 @@
 //! - [`write()`] and [`Draft`] replace a file as a whole: it is written aside, synchronised and
 //!   renamed.
 //! - [`File`] is changed in place; what has not been synchronised when the power fails may be there
-//!   in part.
+//!   in part. A process can [continue when the disk is full](continue_when_full).
 //! - [`GroupSync`] synchronises such a file in the background.
 //! - [`DurableFile`] is such a file of one process, synchronised so; its records are in [`Slots`],
 //!   each with a [`Checksum`].
@@ -37,7 +37,7 @@ use thiserror::Error;
 
 pub use draft::{Draft, is_draft, write};
 pub use durable::{Busy, Checksum, DurableFile, Slots};
-pub use file::File;
+pub use file::{File, continue_when_full, was_full};
 pub use folder::{create_folder, remove, rename, sync_folder};
 pub use group_sync::GroupSync;
 pub use limited::{SETTINGS, open, read_bytes, read_text};

@@ -193,6 +193,7 @@ mod tests {
             poses: 8,
             dropped,
             last_pose_s: Some(0.1),
+            notice: None,
             swap: None,
             processes: vec![
                 process("masking", Activity::Working),

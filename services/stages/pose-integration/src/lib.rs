@@ -2,7 +2,8 @@
 //! pose before it is published.
 //!
 //! With SLAM it also selects the keyframes, and logs each of them before its pose is journalled;
-//! with objects it logs each scan.
+//! with objects it logs each scan. In live mode poses continue when the disk is full, and are not
+//! kept from then on.
 
 use std::path::PathBuf;
 
@@ -18,12 +19,12 @@ use gyre_messages::{
 use gyre_objects::ObjectsConfig;
 use gyre_slam::SlamConfig;
 use gyre_stage::{
-    Launch, Sink, StageCounters, StageError, clock,
+    Launch, Manifest, Sink, StageCounters, StageError, clock,
     follower::{Growth, LogId},
     reader::Received,
     sink,
 };
-use gyre_storage::LogError;
+use gyre_storage::{LogError, continue_when_full, was_full};
 
 /// Runs the stage until SIGTERM.
 ///
@@ -34,6 +35,9 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
         return Ok(StageCounters::default());
     }
     let out = &launch.manifest.out;
+    if launch.manifest.live {
+        continue_when_full();
+    }
     let mut integration = Integration {
         journal: Journal::open(&journal::path(out)).map_err(unusable)?,
         last: None,
@@ -44,6 +48,8 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
         keyframes: None,
         scans: None,
         growth: Vec::new(),
+        manifest: launch.manifest.clone(),
+        first_lost: None,
     };
     if integration.slam.is_on() {
         let grown = Growth::of(launch, LogId::Keyframes)?;
@@ -58,6 +64,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
         false => sink::run::<Motion, _>(launch, &mut integration),
     }?;
     integration.sync()?;
+    integration.require_kept()?;
     Ok(counters)
 }
 
@@ -75,6 +82,9 @@ struct Integration {
     scans: Option<Scans>,
     /// Wakes the followers of the logs that the run has.
     growth: Vec<(LogId, Growth)>,
+    manifest: Manifest,
+    /// The first pose that is not kept.
+    first_lost: Option<u64>,
 }
 
 impl Sink for Integration {
@@ -122,7 +132,13 @@ impl Sink for Integration {
             self.wake_followers(LogId::Scans)?;
         }
         self.write(&pose)?;
+        if was_full() {
+            self.first_lost.get_or_insert(pose.item.seq);
+        }
         self.last = Some(pose);
+        if let Err(loss) = self.require_kept() {
+            sink::set_notice(&self.manifest, &loss.to_string())?;
+        }
         Ok(pose)
     }
 
@@ -142,6 +158,7 @@ impl Sink for Integration {
             },
             ..PoseHeader::default()
         })?;
+        self.require_kept()?;
         // Once the end is published, the run is complete.
         self.sync()
     }
@@ -158,6 +175,17 @@ impl Integration {
         let scans = self.scans.as_ref();
         scans.map_or(Ok(()), Scans::sync).map_err(unusable_scans)?;
         self.journal.sync().map_err(unusable)
+    }
+
+    /// Reports the poses that are not kept.
+    fn require_kept(&self) -> Result<(), StageError> {
+        let (Some(first), Some(last)) = (self.first_lost, self.last) else {
+            return Ok(());
+        };
+        let (out, last) = (self.out.display(), last.item.seq);
+        Err(StageError::Input(format!(
+            "the disk of {out} is full: poses continue, but those from pose {first} to pose {last} are not kept: they are in no result, and the run can be resumed only from those before"
+        )))
     }
 
     fn wake_followers(&self, log: LogId) -> Result<(), StageError> {

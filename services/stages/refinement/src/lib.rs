@@ -1,7 +1,10 @@
 //! The refinement stage: registers the searched motions against a map of the last keyframes.
 
 use gyre_geometry::SparsePoint;
-use gyre_journal::checkpoint::{self, Checkpoint, CheckpointError};
+use gyre_journal::{
+    checkpoint::{self, Checkpoint, CheckpointError},
+    continue_when_full,
+};
 use gyre_messages::{Item, Masked, Motion, Refined, StageId, flag};
 use gyre_radar::PointsConfig;
 use gyre_samples::{DopplerConfig, GyroConfig, WheelsConfig};
@@ -33,6 +36,9 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
         return Ok(StageCounters::default());
     }
     let manifest = &launch.manifest;
+    if manifest.live {
+        continue_when_full();
+    }
     let path = checkpoint::path(&manifest.out);
     let window = manifest.window.scans + manifest.window.look_back;
     let checkpoint = Checkpoint::open(&path, window, config.keyframes, refiner.keyframe_cells())

@@ -117,12 +117,15 @@ fn ills(status: &Status) -> Vec<String> {
         format!("{out}: no azimuths arrive from the radar, {again} reconnections so far")
     });
     let starting = (status.phase == Phase::Starting).then(|| format!("{out} is starting"));
-    starting.into_iter().chain(ill).chain(deaf).collect()
+    let notice = status.notice.iter().map(|it| format!("{out}: {it}"));
+    let all = starting.into_iter().chain(notice);
+    all.chain(ill).chain(deaf).collect()
 }
 
 /// Returns the state of a run in a line.
 pub fn summary(status: &Status) -> String {
     let mode = if status.live { "live" } else { "lossless" };
+    let notice = status.notice.iter().map(|it| format!("; {it}"));
     let pose = status.last_pose_s.map_or_else(String::new, |age| {
         format!(", the last {} ago", duration(age))
     });
@@ -132,7 +135,8 @@ pub fn summary(status: &Status) -> String {
         duration(status.uptime_s),
         status.pid,
         status.poses,
-        status.dropped
+        status.dropped,
+        notice.collect::<String>()
     )
 }
 

@@ -26,6 +26,7 @@ use gyre_storage::DurableFile;
 
 pub use check::{Content, check, cut};
 pub use error::JournalError;
+pub use gyre_storage::continue_when_full;
 use record::{MAGIC, RECORD, RECORDS, Record};
 pub use records::{Records, records, records_from};
 

@@ -94,6 +94,9 @@ pub struct Status {
     pub dropped: u64,
     /// Time since the newest pose was seen, s; `None` before the first one.
     pub last_pose_s: Option<f64>,
+    /// What is wrong with the whole run: it waits for its radar, or its disk is full.
+    #[serde(default)]
+    pub notice: Option<String>,
     /// The swap that is not done yet.
     pub swap: Option<PendingSwap>,
     /// The processes: the stages in the order of the stream, the followers, the recorder.

@@ -1,14 +1,20 @@
 //! The loop of the last stage, which journals each pose before it publishes it.
 
+use std::fs;
+
 use gyre_messages::{Header, Item, Masked, Message, MotionHeader, Pose, PoseHeader, StageId, flag};
 
 use crate::{
-    Launch, StageCounters, StageError, allocations, clock,
+    Launch, Manifest, StageCounters, StageError, allocations, clock,
     reader::{Reader, Received},
+    run,
     transport::Listener,
     wake,
     writer::Writer,
 };
+
+/// The file in the run's root with a sentence about the whole run.
+const NOTICE: &str = "notice";
 
 /// The owner of the trajectory.
 pub trait Sink {
@@ -87,6 +93,20 @@ pub fn run<M: Message<Header = MotionHeader>, S: Sink>(
             integration.counters.wakes_caught_late += 1;
         }
     }
+}
+
+/// Returns a stage's sentence about the whole run.
+pub fn notice(manifest: &Manifest) -> Option<String> {
+    let notice = fs::read_to_string(manifest.root.join(NOTICE)).ok()?;
+    (!notice.is_empty()).then_some(notice)
+}
+
+/// Writes it.
+///
+/// # Errors
+/// The file in the run's root cannot be written.
+pub fn set_notice(manifest: &Manifest, notice: &str) -> Result<(), StageError> {
+    run::write(manifest.root.join(NOTICE), notice)
 }
 
 /// Publishes the last poses again. The source resumes at the newest one, and masking needs the

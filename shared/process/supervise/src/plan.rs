@@ -111,8 +111,8 @@ pub enum Event<'a> {
         /// Why.
         error: &'a SuperviseError,
     },
-    /// The end of the recording.
-    Recorder {
+    /// The end of the recording, or a notice of a stage about the run.
+    Note {
         /// A sentence.
         sentence: &'a str,
     },

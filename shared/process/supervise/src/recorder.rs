@@ -207,6 +207,6 @@ impl Recorder {
 
 fn say(run: &mut Run<'_>, sentence: &str) {
     if !sentence.is_empty() {
-        run.say(Event::Recorder { sentence });
+        run.say(Event::Note { sentence });
     }
 }

@@ -5,7 +5,7 @@ use std::{env, process};
 use gyre_stage::{
     clock,
     control::{Activity, Answer, Phase, ProcessStatus, Request, Status, Swap},
-    schedule,
+    schedule, sink,
 };
 
 use crate::{
@@ -214,6 +214,7 @@ impl Supervisor<'_> {
             poses: self.poses.count(),
             dropped: self.poses.dropped(),
             last_pose_s: self.poses.age_s(),
+            notice: sink::notice(manifest),
             swap: self.swaps.pending(&self.processes, &self.run),
             processes,
         }

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use gyre_stage::{
-    StageCounters, counters, transport,
+    StageCounters, counters, sink, transport,
     wake::{self, Signals},
 };
 
@@ -61,6 +61,8 @@ pub(crate) struct Supervisor<'a> {
     logs: Logs,
     /// True when all stages have opened their topics once.
     is_ready: bool,
+    /// True when a notice about the run was said.
+    has_notice: bool,
     // Last: the processes end before their guardian, and the ports before their node.
     pub run: Run<'a>,
 }
@@ -84,6 +86,7 @@ impl<'a> Supervisor<'a> {
             observers: Sweep::new(),
             logs: Logs::of(plan),
             is_ready: false,
+            has_notice: false,
             run,
         })
     }
@@ -179,6 +182,13 @@ impl<'a> Supervisor<'a> {
     /// Keeps the logs short, and the processes alive that nothing depends on.
     fn keep_house(&mut self) -> Result<(), SuperviseError> {
         self.logs.bound_if_due();
+        if !self.has_notice
+            && let Some(sentence) = sink::notice(self.run.manifest())
+        {
+            self.has_notice = true;
+            let sentence = &sentence;
+            self.run.say(Event::Note { sentence });
+        }
         let standby = self.swaps.pid();
         let others = standby
             .into_iter()
