@@ -255,7 +255,7 @@ fn down_says_that_results_are_not_written_and_that_a_killed_run_is_not_running()
     let mut running = slow.start();
     running.await_poses(2);
     running.kill_supervisor();
-    ask(&run, &["down"]).refused_with(&["no run"]);
+    ask(&run, &["down"]).refused_with(&["no run", "and was killed"]);
     let other = Run::of_recording().rate(SLOW);
     let going = other.start();
     await_status(&other, "poses", |status| {
@@ -270,7 +270,9 @@ fn down_says_that_results_are_not_written_and_that_a_killed_run_is_not_running()
     );
     ask(&other, &["down"]).succeeded();
     going.finish();
+    ask(&other, &["ps"]).refused_with(&["the run was interrupted"]);
     assert_eq!(run.complete(), undisturbed());
+    ask(&run, &["swap", "masking"]).refused_with(&["the run is complete"]);
 }
 
 #[test]

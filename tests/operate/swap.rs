@@ -9,6 +9,7 @@ use std::{
 };
 
 use rustix::process::Signal;
+use serde_json::Value;
 
 use crate::{
     PROGRAM,
@@ -73,26 +74,40 @@ fn a_program_that_cannot_take_over_changes_nothing() {
 }
 
 #[test]
-fn a_program_that_fails_after_taking_over_gives_way_to_the_one_before() {
-    let (run, running) = started();
+fn a_program_that_fails_gives_way_to_the_one_before_and_the_swap_says_why() {
+    // Twenty seconds, since the machine may be busy.
+    let run = Run::of_recording().rate("0.3");
+    let mut running = run.start();
+    running.await_poses(2);
     let fails = script(&run, "fails.sh", FAILS);
-    swap(&run, "masking", &[], &[&fails]).refused_with(&[
-        "masking goes on as before",
-        "fails.sh` has failed",
-        "exit code 3",
-        "no such mask",
-    ]);
-    let back = status(&run).unwrap();
-    assert_eq!(process(&back, "masking")["is_swapped"], false);
-    assert_eq!(process(&back, "masking")["last_death"], "exit code 3");
-    let ended = running.finish();
-    assert!(
-        ended
-            .succeeded()
-            .stderr
-            .contains("goes back to the program before")
-    );
-    assert_eq!(run.odometry(), undisturbed());
+    let cold = script(&run, "cold.sh", "echo no such mask >&2\nexit 3");
+    for (options, program, words) in [
+        (
+            &[][..],
+            &*fails,
+            &["fails.sh` has failed", "exit code 3", "no such mask"][..],
+        ),
+        (
+            &["--cold"],
+            &cold,
+            &["cold.sh` has failed", "exit code 3", "no such mask"],
+        ),
+        (&["--cold"], "/nowhere/masking", &["cannot start masking"]),
+    ] {
+        let refused = swap(&run, "masking", options, &[program]);
+        refused
+            .refused_with(words)
+            .refused_with(&["masking goes on as before"]);
+        let status = status(&run).unwrap();
+        let back = process(&status, "masking");
+        assert_eq!(back["is_swapped"], false);
+        assert_eq!(back["last_death"], Value::Null, "it was of another program");
+    }
+    ask(&run, &["down"]).succeeded();
+    let ended = running.end();
+    assert!(ended.stderr.contains("goes back to the program before"));
+    let rest = Run::of_recording().into(run.out());
+    assert_eq!(rest.complete(), undisturbed());
 }
 
 /// An executable script.
@@ -105,17 +120,6 @@ fn script(run: &Run, name: &str, text: &str) -> String {
 
 /// A masking stage that stands by as the contract says, and then dies.
 const FAILS: &str = "touch $GYRE_RUN/masking.ready\ncat\necho no such mask >&2\nexit 3";
-
-#[test]
-fn a_cold_swap_to_a_program_that_cannot_be_started_changes_nothing() {
-    let (run, running) = started();
-    swap(&run, "masking", &["--cold"], &["/nowhere/masking"])
-        .refused_with(&["masking goes on as before", "/nowhere/masking"]);
-    let status = status(&run).unwrap();
-    assert_eq!(process(&status, "masking")["is_swapped"], false);
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed());
-}
 
 #[test]
 fn a_program_that_was_edited_is_taken_by_a_swap_alone_and_gives_way_when_it_fails() {
@@ -140,19 +144,6 @@ fn a_program_that_was_edited_is_taken_by_a_swap_alone_and_gives_way_when_it_fail
     assert_eq!(running.end().code(), Some(130));
     let rest = Run::of_recording().into(run.out());
     assert_eq!(rest.complete(), undisturbed());
-}
-
-#[test]
-fn a_program_that_fails_after_a_cold_swap_gives_way_and_the_swap_says_so() {
-    let (run, running) = started();
-    let fails = script(&run, "cold.sh", "echo no such mask >&2\nexit 3");
-    swap(&run, "masking", &["--cold"], &[&fails]).refused_with(&[
-        "cold.sh` has failed",
-        "exit code 3",
-        "no such mask",
-    ]);
-    running.finish().succeeded();
-    assert_eq!(run.odometry(), undisturbed());
 }
 
 #[test]
@@ -234,6 +225,7 @@ fn a_supervisor_that_hangs_is_not_waited_for_and_does_nothing_of_that_later() {
     restart.args(["restart", "masking"]).arg(run.out());
     let restarting = restart.stderr(Stdio::piped()).spawn().unwrap();
     let since = Instant::now();
+    ask(&run, &["ps"]).failed_with(&["does not answer"]);
     for client in swapping.into_iter().chain([restarting]) {
         let said = said(client);
         assert!(said.contains("does not answer"), "{said}");
@@ -247,7 +239,7 @@ fn a_supervisor_that_hangs_is_not_waited_for_and_does_nothing_of_that_later() {
     running.finish().succeeded();
     assert_eq!(run.odometry(), undisturbed());
     let summary = run.summary();
-    assert_eq!(summary["swaps"], serde_json::Value::Null);
+    assert_eq!(summary["swaps"], Value::Null);
     assert_eq!(summary["restarts"], serde_json::json!({}));
 }
 
@@ -261,7 +253,7 @@ fn a_program_that_never_stands_by_is_said_to_be_waited_for_and_how_long() {
     let note = "masking goes on as before: waiting for 8 s at most (run.start_timeout_s) for `";
     assert!(said.contains(note), "{said}");
     assert!(said.contains("it did not get ready"), "{said}");
-    assert_eq!(status(&run).unwrap()["swap"], serde_json::Value::Null);
+    assert_eq!(status(&run).unwrap()["swap"], Value::Null);
     ask(&run, &["down"]).succeeded();
     running.end();
 }

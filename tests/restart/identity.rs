@@ -7,7 +7,10 @@ use std::{
     process::Command,
 };
 
-use crate::common::{Run, copy_program, install, recording, undisturbed};
+use crate::{
+    common::{Run, copy_program, install, recording, undisturbed},
+    operate::commands::ask,
+};
 use rustix::process::Signal;
 use tempfile::TempDir;
 
@@ -130,9 +133,11 @@ fn a_stage_of_another_build_is_refused() {
         "stages.masking.command=['{}','stage','masking']",
         program.display()
     );
-    run.set(&command)
-        .finish()
-        .failed_with(&["another build of gyre"]);
+    let run = run.set(&command);
+    run.finish().failed_with(&["another build of gyre"]);
+    let logged = ask(&run, &["logs", "masking"]).stdout;
+    assert!(logged.contains("ERROR masking: this is another build"));
+    ask(&run, &["ps"]).refused_with(&["the run failed: masking: this is another build"]);
 }
 
 #[test]

@@ -21,6 +21,7 @@ use gyre_run::{Ending, Mode};
 use gyre_samples::GnssKind;
 use gyre_stage::{
     Manifest,
+    launch::{BEGUN, log_session},
     run::{RootError, RunRoot, sweep},
     wake::{Signals, let_signals_end_the_process},
 };
@@ -209,10 +210,17 @@ fn play(
     }
     let mut notifier = Notifier::of_environment();
     let started = Instant::now();
+    log_session(&plan.manifest, BEGUN);
     let report = supervise(&plan, signals, &mut |event| {
         progress.show(&event);
         notifier.report(&event);
     });
+    let end = match &report {
+        Ok(report) if report.ending == Ending::Complete => "the run is complete".to_owned(),
+        Ok(_) => "the run was interrupted".to_owned(),
+        Err(error) => format!("the run failed: {error}"),
+    };
+    log_session(&plan.manifest, &end);
     progress.finish();
     notifier.writing();
     if matches!(report, Err(SuperviseError::TransportStuck)) && !has_started_over_at(resumed) {

@@ -41,7 +41,11 @@ pub fn logs(arguments: &LogsArguments) -> Result<ExitCode, Failure> {
         lines[first..].iter().try_for_each(print::line)?;
     }
     let signals = Signals::install()?;
-    let run = Control::of(&out).ok().filter(|_| arguments.follow);
+    let run = Control::of(&out);
+    if let Err(ended) = &run {
+        print::note(format_args!("gyre: {ended}"));
+    }
+    let run = run.ok().filter(|_| arguments.follow);
     while let Some(run) = &run {
         // Before the logs: what is written last is still printed.
         let is_there = run.is_there();
@@ -62,8 +66,8 @@ fn open(out: &Path, process: Option<&str>) -> Result<Vec<Log>, Failure> {
         return Err(format!("no run has written to {out}: it has no log.jsonl").into());
     }
     let mut names = process_names();
-    // The supervisor, where it runs in the background.
-    names.extend(["recorder", "gyre"]);
+    // `gyre` is the supervisor's output, where it runs in the background.
+    names.extend(["recorder", "supervisor", "gyre"]);
     if let Some(process) = process
         && !names.contains(&process)
     {

@@ -3,6 +3,7 @@
 use std::{fmt, process::ExitCode};
 
 use gyre_stage::{
+    StageError,
     control::{Activity, Control, Phase, ProcessStatus, Status},
     source::Received,
     usage::Usage,
@@ -11,6 +12,8 @@ use gyre_terminal::{Failure, print};
 use serde::Serialize;
 
 use crate::arguments::PsArguments;
+
+const NO_RUN: &str = "no run is running";
 
 /// A run with what its processes use, in the order of the status.
 #[derive(Serialize)]
@@ -22,10 +25,10 @@ struct ListedRun {
 /// Lists the runs of this user.
 ///
 /// # Errors
-/// There is no such run; standard output cannot be written; or, with `--check`,
-/// not all is well.
+/// There is no such run, one does not answer, standard output cannot be written, or, with
+/// `--check`, not all is well.
 pub fn ps(arguments: &PsArguments) -> Result<ExitCode, Failure> {
-    let (mut rows, mut silent) = (Vec::new(), Vec::new());
+    let (mut rows, mut faults) = (Vec::new(), Vec::new());
     let runs = match arguments.run.named() {
         Some(out) => vec![Control::of(out)?],
         None => Control::of_all(),
@@ -33,33 +36,25 @@ pub fn ps(arguments: &PsArguments) -> Result<ExitCode, Failure> {
     for run in runs {
         match run.status() {
             Ok(status) => rows.push(ListedRun::of(status)),
-            // It has ended meanwhile, or it hangs.
-            Err(error) => silent.push(error.to_string()),
+            // It has ended meanwhile.
+            Err(StageError::NotRunning(_)) => {}
+            Err(error) => faults.push(error.to_string()),
         }
     }
-    if arguments.check {
-        let ills = rows.iter().flat_map(|row| ills(&row.status));
-        silent.extend(ills);
-        return match (rows.is_empty(), silent.is_empty()) {
-            (_, false) => Err(silent.join("; ").into()),
-            (true, true) => Err("no run is running".into()),
-            (false, true) => Ok(ExitCode::SUCCESS),
-        };
-    }
-    for error in silent {
-        print::note(format_args!("gyre: {error}"));
-    }
-    if arguments.json {
-        print::line(serde_json::to_string_pretty(&rows)?)?;
-    } else if rows.is_empty() {
-        print::line("no run is running")?;
-    }
-    if !arguments.json {
-        for row in &rows {
-            print::line(row)?;
+    let is_none = rows.is_empty() && faults.is_empty();
+    match arguments {
+        PsArguments { check: true, .. } if is_none => return Err(NO_RUN.into()),
+        PsArguments { check: true, .. } => {
+            faults.extend(rows.iter().flat_map(|row| ills(&row.status)));
         }
+        PsArguments { json: true, .. } => print::line(serde_json::to_string_pretty(&rows)?)?,
+        _ if is_none => print::line(NO_RUN)?,
+        _ => rows.iter().try_for_each(print::line)?,
     }
-    Ok(ExitCode::SUCCESS)
+    match faults.is_empty() {
+        true => Ok(ExitCode::SUCCESS),
+        false => Err(faults.join("; ").into()),
+    }
 }
 
 impl ListedRun {
@@ -130,7 +125,7 @@ pub fn summary(status: &Status) -> String {
         format!(", the last {} ago", duration(age))
     });
     format!(
-        "{} for {}, {mode}, supervised by {}: {} poses{pose}, {} dropped",
+        "{} for {}, {mode}, supervised by {}: {} poses{pose}, {} dropped{}",
         status.phase.name(),
         duration(status.uptime_s),
         status.pid,

@@ -5,7 +5,10 @@ use std::{fmt::Debug, path::PathBuf};
 use gyre_storage::LogError;
 use thiserror::Error;
 
-use crate::shared_memory::{self, SHARED_MEMORY};
+use crate::{
+    launch::last_session,
+    shared_memory::{self, SHARED_MEMORY},
+};
 
 /// An error that ends a stage. The exit code tells the supervisor whether a restart can help.
 #[derive(Debug, Error)]
@@ -27,7 +30,7 @@ pub enum StageError {
         reason: String,
     },
     /// No run writes to a folder.
-    #[error("no run is writing to {0}: `gyre run` starts one, and its --out names the folder")]
+    #[error("no run is writing to {0}{end}: `gyre run` starts one, and its --out names the folder", end = last_session(.0))]
     NotRunning(PathBuf),
     /// A run does not answer.
     #[error("the run that writes to {out} does not answer: {reason}")]

@@ -79,8 +79,9 @@ impl GnssReceiver {
             surplus: 0,
         };
         tracing::info!(address, "waiting for fixes of GNSS");
+        let stage = tracing::Span::current();
         Ok(Self {
-            thread: Some(thread::spawn(|| reception.run())),
+            thread: Some(thread::spawn(move || stage.in_scope(|| reception.run()))),
             shared,
             read: None,
         })

@@ -43,8 +43,10 @@ pub(crate) struct Child {
     /// The file in which the process says why it ended.
     last_words: PathBuf,
     log: Log,
-    /// The cause of the last death.
+    /// The cause of the last death of this program.
     last_death: Option<String>,
+    /// Why the last program that was given up for this one could not be started.
+    pub(crate) start_error: Option<String>,
     /// The plan before a swap, to go back to.
     before: Option<StagePlan>,
     /// True from a swap until the new program has worked on a pose.
@@ -71,6 +73,7 @@ impl Child {
             last_words: last_words(manifest, &plan.name, position),
             log,
             last_death: None,
+            start_error: None,
             before: None,
             is_on_trial: false,
         })
@@ -146,6 +149,7 @@ impl Child {
         self.plan = plan;
         self.is_on_trial = false;
         self.deaths.clear();
+        self.last_death = None;
         true
     }
 
@@ -189,10 +193,6 @@ impl Child {
     /// Returns the cause of its last death.
     pub(crate) fn last_death(&self) -> Option<&str> {
         self.last_death.as_deref()
-    }
-
-    pub(crate) fn note_death(&mut self, cause: String) {
-        self.last_death = Some(cause);
     }
 
     /// Returns whether it has lived for longer than the time in which its deaths are counted.

@@ -112,12 +112,13 @@ impl Supervisor<'_> {
         }
         self.processes[process].change(plan);
         self.restart_and_count(&stages)?;
-        let child = &self.processes[process];
+        let child = &mut self.processes[process];
         if child.is_on_trial() {
             self.has_swapped(process, client);
             return Ok(());
         }
-        let (name, reason) = (child.name(), child.last_death().unwrap_or_default());
+        let reason = child.start_error.take().unwrap_or_default();
+        let name = child.name();
         client.answer(&Answer::Refused(format!(
             "{name} goes on as before: {reason}"
         )));

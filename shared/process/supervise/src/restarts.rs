@@ -137,7 +137,7 @@ impl Supervisor<'_> {
                     if !self.go_back(process, &reason) {
                         return Err(error);
                     }
-                    self.processes[process].note_death(reason);
+                    self.processes[process].start_error = Some(reason);
                 }
                 respawned => return respawned,
             }
