@@ -3,7 +3,7 @@
 
 use std::{
     io::{BufRead, BufReader, Read},
-    net::UdpSocket,
+    net::{TcpListener, UdpSocket},
     path::Path,
     process::{self, Child, Stdio},
     sync::mpsc::{self, RecvTimeoutError},
@@ -13,7 +13,10 @@ use std::{
 
 use rustix::process::Signal;
 
-use crate::common::{Ended, Run, gyre, odometry, recording};
+use crate::{
+    common::{Ended, Run, gyre, odometry, recording},
+    operate::commands::ask,
+};
 
 /// Faster than the radar turns, and slow enough for a run to keep up.
 const RATE: &str = "1.5";
@@ -264,16 +267,30 @@ fn a_capture_of_a_radar_is_played_as_that_radar() {
 
 #[test]
 fn what_is_no_radar_is_named_in_a_sentence() {
-    let ended = |run: Run| Ended::of(run.command());
-    // Nothing listens at port 9 of this machine.
-    let run = Run::small().argument("--radar", "127.0.0.1:9");
-    ended(run).refused_with(&["no radar answers at 127.0.0.1:9"]);
-    let run = Run::small()
-        .set("source.kind=colossus")
-        .set("run.mode=live");
-    ended(run).refused_with(&["address is missing"]);
-    let run = Run::small()
-        .set("source.kind=colossus")
-        .set("source.address='127.0.0.1:9'");
-    ended(run).refused_with(&["set run.mode to `live`"]);
+    let address = "source.address='127.0.0.1:9'";
+    for (set, words) in [
+        ("run.mode=live", "address is missing"),
+        (address, "set run.mode to `live`"),
+    ] {
+        let run = Run::small().set("source.kind=colossus").set(set);
+        run.finish().refused_with(&[words]);
+    }
+}
+
+#[test]
+fn a_radar_that_is_not_there_yet_is_waited_for_and_a_signal_ends_the_wait() {
+    let free = TcpListener::bind("127.0.0.1:0").unwrap().local_addr();
+    let free = free.unwrap().to_string();
+    let run = run_at(&free).set("source.scans=8");
+    let waits = format!("waits for its radar: no radar answers at {free}");
+    let mut running = run.start();
+    running.await_words(&waits);
+    ask(&run, &["ps", "--check"]).refused_with(&[&waits]);
+    running.signal(Signal::TERM);
+    assert_eq!(running.finish().code(), Some(130));
+    let mut running = run.start();
+    running.await_words(&waits);
+    let _radar = Radar::to(&["--listen", &free], recording::small(), &[]);
+    running.finish().succeeded();
+    assert_eq!(run.summary()["published"], 8);
 }

@@ -51,7 +51,7 @@ fn examine(arguments: &ConformanceArguments) -> Result<Option<Report>, Failure> 
     let configuration = configuration(arguments, stage)?;
     let command = command(arguments, &configuration, stage)?;
     preflight::check_open_files()?;
-    let checked = preflight::check(&configuration)?;
+    let checked = preflight::check(&configuration, &mut preflight::ask)?;
     preflight::check_shared_memory(&checked.footprint)?;
     describe_masks(&configuration)?.iter().for_each(print::note);
     let folder = tempfile::Builder::new()

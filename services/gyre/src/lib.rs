@@ -25,6 +25,7 @@ pub mod simulate;
 pub mod split;
 pub mod stage;
 pub mod stress;
+mod waiting;
 pub mod watch;
 
 use std::{path::PathBuf, process::ExitCode};
@@ -105,7 +106,7 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
 /// large as those of Oxford.
 fn doctor(arguments: &DoctorArguments) -> Result<ExitCode, Failure> {
     let simulated = Configuration::of_overrides(&["simulation.scans=2".to_owned()])?;
-    let checked = preflight::check(&simulated)?;
+    let checked = preflight::check(&simulated, &mut preflight::ask)?;
     gyre_doctor::doctor(arguments, &checked.footprint, checked.window.observers)
 }
 

@@ -49,13 +49,7 @@ impl Notifier {
                 self.is_ready = true;
                 self.tell(&[NotifyState::Ready]);
             }
-            Event::Watched
-                if self.is_ready
-                    && self.every.is_some_and(|it| self.kept_alive.elapsed() >= it) =>
-            {
-                self.kept_alive = Instant::now();
-                self.tell(&[NotifyState::Watchdog]);
-            }
+            Event::Watched => self.keep_alive(),
             Event::Pose(pose) if self.status.elapsed() >= STATUS_EVERY => {
                 self.status = Instant::now();
                 self.tell(&[NotifyState::Status(&status(pose))]);
@@ -63,6 +57,22 @@ impl Notifier {
             Event::Stopping => self.tell(&[NotifyState::Stopping]),
             Event::Stalled(stall) => self.tell(&[NotifyState::Status(&stall.to_string())]),
             _ => {}
+        }
+    }
+
+    /// The run waits for its radar. For systemd it has started: what is after it at the boot does
+    /// not wait.
+    pub fn waiting(&mut self, reason: &str) {
+        self.is_ready = true;
+        self.tell(&[NotifyState::Ready, NotifyState::Status(reason)]);
+    }
+
+    /// Says that this process lives, as often as systemd wants it.
+    pub fn keep_alive(&mut self) {
+        let is_due = self.every.is_some_and(|it| self.kept_alive.elapsed() >= it);
+        if self.is_ready && is_due {
+            self.kept_alive = Instant::now();
+            self.tell(&[NotifyState::Watchdog]);
         }
     }
 

@@ -4,7 +4,7 @@ use std::{io, net::UdpSocket, path::Path, time::Duration};
 
 use gyre_configuration::{Configuration, Played, gnss_log, open};
 use gyre_datasets::{DEFAULT_TURN_NS, Fingerprint, Format, turn_ns};
-use gyre_live_radar::Settings;
+use gyre_live_radar::{Settings, Sizes};
 use gyre_maps::localise::searched_map;
 use gyre_masking::Masker;
 use gyre_messages::{Footprint, Limits, StageId, Window};
@@ -114,20 +114,15 @@ pub struct Recording {
     pub listing: Listing,
 }
 
-/// Checks the dataset and the mask.
+/// Asks a radar for the sizes of its scans.
+pub type Ask<'a> = dyn FnMut(&Configuration) -> Result<Sizes, Failure> + 'a;
+
+/// Checks the dataset and the mask; `ask` may wait for the radar, and comes last.
 ///
 /// # Errors
 /// A dataset or a mask that cannot be used.
-pub fn check(configuration: &Configuration) -> Result<Preflight, Failure> {
+pub fn check(configuration: &Configuration, ask: &mut Ask<'_>) -> Result<Preflight, Failure> {
     split::check(configuration)?;
-    let scans = match configuration.is_radar() {
-        true => Scans::of_radar(configuration)?,
-        false if configuration.is_side(Side::Base) => Scans::of_base(configuration)?,
-        false if configuration.source.from != PlayedFrom::Scan => {
-            Scans::of_messages(configuration)?
-        }
-        false => Scans::of_recording(configuration)?,
-    };
     let masker = Masker::new(
         &configuration.odometry.raster,
         &configuration.odometry.points,
@@ -140,6 +135,14 @@ pub fn check(configuration: &Configuration) -> Result<Preflight, Failure> {
     if configuration.slam.is_localised() {
         searched_map::open(&configuration.slam.map, configuration)?;
     }
+    let scans = match configuration.is_radar() {
+        true => Scans::of_radar(configuration, ask)?,
+        false if configuration.is_side(Side::Base) => Scans::of_base(configuration)?,
+        false if configuration.source.from != PlayedFrom::Scan => {
+            Scans::of_messages(configuration)?
+        }
+        false => Scans::of_recording(configuration)?,
+    };
     let period = Duration::from_nanos(scans.period_ns.max(0) as u64);
     let window = configuration.window(Some(period), masker.scans());
     let limits = Limits {
@@ -252,7 +255,7 @@ impl Scans {
     }
 
     /// Asks the radar.
-    fn of_radar(configuration: &Configuration) -> Result<Self, Failure> {
+    fn of_radar(configuration: &Configuration, ask: &mut Ask<'_>) -> Result<Self, Failure> {
         let is_in_ros2 = configuration.source.kind == SourceKind::Ros2;
         let can_come = match configuration.odometry.gyro.kind {
             GyroKind::None | GyroKind::Udp => true,
@@ -274,17 +277,25 @@ impl Scans {
             return Err(PreflightError::LiveDoppler.into());
         }
         configuration.dataset.check()?;
-        let (source, options) = (&configuration.source, &configuration.dataset);
-        let radar = match source.kind {
-            SourceKind::Ros2 => ros2::ask(source, options)?,
-            _ => gyre_live_radar::ask(&Settings::of(source, options)?)?,
-        };
+        let radar = ask(configuration)?;
         Ok(Self {
             count: configuration.source.scans,
             period_ns: radar.period_ns,
             bytes: radar.limits.bytes,
             ..Self::default()
         })
+    }
+}
+
+/// Asks the radar once.
+///
+/// # Errors
+/// No radar, or one that cannot be used.
+pub fn ask(configuration: &Configuration) -> Result<Sizes, Failure> {
+    let (source, options) = (&configuration.source, &configuration.dataset);
+    match source.kind {
+        SourceKind::Ros2 => ros2::ask(source, options),
+        _ => Ok(gyre_live_radar::ask(&Settings::of(source, options)?)?),
     }
 }
 

@@ -37,7 +37,7 @@ use crate::{
     preflight::{self, Preflight},
     program,
     progress::Progress,
-    simulate, split,
+    simulate, split, waiting,
 };
 
 pub use resolve::resolve;
@@ -133,6 +133,7 @@ fn make_ready(
     programs: &Programs,
     out: &Out,
     earlier: &Earlier,
+    ask: &mut preflight::Ask<'_>,
 ) -> Result<Ready, Failure> {
     let unfinished = earlier.unfinished();
     if let Some(simulation) = configuration.stored() {
@@ -143,7 +144,7 @@ fn make_ready(
     preflight::check_open_files()?;
     // The stages read the options of dataset.toml from here: it may change while they run.
     let resolved = with_stored_options(configuration)?;
-    let checked = preflight::check(&resolved)?;
+    let checked = preflight::check(&resolved, ask)?;
     let identity = Identity::of(
         configuration,
         programs,
@@ -180,12 +181,19 @@ fn play(
     earlier: &Earlier,
     form: Form,
 ) -> Result<ExitCode, Failure> {
-    let ready = make_ready(configuration, programs, &out, earlier)?;
+    let (mut notifier, mut signals) = (Notifier::of_environment(), None);
+    let mut ask = |it: &Configuration| waiting::for_radar(it, &out, (&mut notifier, &mut signals));
+    let ready = match make_ready(configuration, programs, &out, earlier, &mut ask) {
+        Err(error) if matches!(error.downcast_ref(), Some(RootError::Interrupted)) => {
+            return Ok(ExitCode::from(INTERRUPTED));
+        }
+        ready => ready?,
+    };
     let Ready {
         resolved, checked, ..
     } = &ready;
     let unfinished = earlier.unfinished();
-    let signals = Signals::install()?;
+    let signals = signals.map_or_else(Signals::install, Ok)?;
     let root = match RunRoot::acquire(out.path(), &signals) {
         Err(RootError::Interrupted) => return Ok(ExitCode::from(INTERRUPTED)),
         root => root?,
@@ -208,7 +216,6 @@ fn play(
     if resolved.is_radar() {
         progress.watch_radar(resolved.data(), plan.manifest.clone());
     }
-    let mut notifier = Notifier::of_environment();
     let started = Instant::now();
     log_session(&plan.manifest, BEGUN);
     let report = supervise(&plan, signals, &mut |event| {

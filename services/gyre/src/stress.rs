@@ -77,7 +77,7 @@ fn carry_out(arguments: &StressArguments) -> Result<Report, Failure> {
     // First, since a radar that is configured is no recording, and would be asked for its scans.
     let played = gyre_configuration::open(&configuration)?;
     let period = Duration::from_nanos(played.dataset.period_ns().max(1) as u64);
-    let checked = preflight::check(&configuration)?;
+    let checked = preflight::check(&configuration, &mut preflight::ask)?;
     let file = out.join("config.toml");
     fs::write(&file, configuration.to_toml()?)?;
     let stages = StageId::ALL.into_iter();

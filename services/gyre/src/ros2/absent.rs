@@ -28,6 +28,11 @@ pub fn ask(_: &SourceConfig, _: &DatasetOptions) -> Result<Sizes, Failure> {
     Err(ABSENT.into())
 }
 
+/// Returns that no driver comes.
+pub fn may_come(_: &Failure) -> bool {
+    false
+}
+
 /// Says that there is no ROS 2.
 ///
 /// # Errors

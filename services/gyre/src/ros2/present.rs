@@ -74,6 +74,12 @@ pub fn ask(source: &SourceConfig, options: &DatasetOptions) -> Result<Sizes, Fai
     source::ask(&settings).map_err(|error: AskError| error.into())
 }
 
+/// Returns whether a driver that was asked in vain may still come.
+pub fn may_come(error: &Failure) -> bool {
+    let absent = error.downcast_ref::<AskError>();
+    absent.is_some_and(|it| matches!(it, AskError::NoTopic { .. } | AskError::Silent { .. }))
+}
+
 /// Receives the scans of a source.
 ///
 /// # Errors

@@ -50,7 +50,7 @@ pub enum AskError {
         /// The destination of the datagrams.
         address: String,
     },
-    /// The datagrams are no azimuths.
+    /// What arrives are no azimuths.
     #[error("what arrives at {address} are no scans: {source}")]
     NoScans {
         /// The destination of the datagrams.
@@ -66,6 +66,21 @@ pub enum AskError {
         /// The reason.
         source: BadConfiguration,
     },
+}
+
+impl AskError {
+    /// Returns whether the radar may answer later: it or its network is not there yet.
+    pub fn may_pass(&self) -> bool {
+        match self {
+            Self::NoAnswer { source, .. } => {
+                let text = source.to_string();
+                let is_unknown_name = text.contains("lookup address") && !text.contains("emporary");
+                !is_unknown_name && source.kind() != ErrorKind::InvalidInput
+            }
+            Self::NoConfiguration { .. } | Self::NoDatagrams { .. } => true,
+            Self::NoScans { .. } | Self::Unusable { .. } => false,
+        }
+    }
 }
 
 /// The sizes of a radar's scans.
@@ -124,8 +139,30 @@ fn configuration(settings: &Settings) -> Result<Configuration, AskError> {
         }
     }
     Err(match (&settings.address, damage) {
-        (Address::Tcp(_), _) => AskError::NoConfiguration { address },
-        (Address::Udp { .. }, Some(source)) => AskError::NoScans { address, source },
+        (_, Some(source)) => AskError::NoScans { address, source },
+        (Address::Tcp(_), None) => AskError::NoConfiguration { address },
         (Address::Udp { .. }, None) => AskError::NoDatagrams { address },
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io;
+
+    use super::*;
+
+    #[test]
+    fn a_radar_that_is_not_there_yet_is_told_apart_from_a_wrong_name() {
+        let lookup = |why| io::Error::other(format!("failed to lookup address information: {why}"));
+        for (source, may_pass) in [
+            (ErrorKind::ConnectionRefused.into(), true),
+            (lookup("Temporary failure in name resolution"), true),
+            (lookup("Name or service not known"), false),
+            (ErrorKind::InvalidInput.into(), false),
+        ] {
+            let address = "radar:6317".to_owned();
+            let error = AskError::NoAnswer { address, source };
+            assert_eq!(error.may_pass(), may_pass, "{error}");
+        }
+    }
 }

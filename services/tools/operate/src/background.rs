@@ -66,8 +66,9 @@ pub fn up(out: &Path) -> Result<ExitCode, Failure> {
         if let Some(status) = status_of(out, run.id()) {
             let name = out.display();
             let count = status.processes.len();
+            let does = status.notice.unwrap_or(format!("runs: {count} processes"));
             print::line(format_args!(
-                "{name} runs: {count} processes, supervised by {}; gyre ps, top, logs -f, down",
+                "{name} {does}, supervised by {}; gyre ps, top, logs -f, down",
                 status.pid
             ))?;
             return Ok(ExitCode::SUCCESS);
@@ -98,10 +99,12 @@ fn start(output: &File) -> std::io::Result<Child> {
         .spawn()
 }
 
-/// Returns the status of the run that this process supervises, when all its stages are there.
+/// Returns the status of the run that this process supervises, when all its stages are there, or
+/// it waits for its radar.
 fn status_of(out: &Path, pid: u32) -> Option<Status> {
     let status = Control::of(out).ok()?.status().ok()?;
-    (status.pid == pid && status.phase != Phase::Starting).then_some(status)
+    let is_up = status.phase != Phase::Starting || status.notice.is_some();
+    (status.pid == pid && is_up).then_some(status)
 }
 
 fn interrupt(run: &Child) {
@@ -150,7 +153,7 @@ pub fn down(choice: &RunChoice) -> Result<ExitCode, Failure> {
         }
     }
     let (out, poses) = (status.out.display(), status.poses);
-    if version_of_results(&status.out) == before {
+    if !status.processes.is_empty() && version_of_results(&status.out) == before {
         return Err(format!(
             "{out} has ended, but its results are not written; the poses are kept, and the same command goes on from there. {LOG} in it says why"
         )

@@ -72,7 +72,7 @@ pub enum Answer {
 }
 
 /// The state of a run.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Status {
     /// The process of the supervisor.
     pub pid: u32,
@@ -120,10 +120,11 @@ pub struct PendingSwap {
 }
 
 /// Where a run is between its start and its end.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Phase {
     /// A stage has not opened its topics.
+    #[default]
     Starting,
     /// All stages are there.
     Running,
@@ -233,8 +234,13 @@ impl Control {
     #[must_use]
     pub fn of_all() -> Vec<Self> {
         let with_out = |root: PathBuf| {
-            let out = Manifest::read(&root).ok()?.out;
-            Self::at(root, out)
+            let mut run = Self::at(root.clone(), root)?;
+            let manifest = Manifest::read(&run.root).map(|manifest| manifest.out);
+            // A run that waits for its radar has none yet.
+            run.out = manifest
+                .or_else(|_| run.status().map(|status| status.out))
+                .unwrap_or(run.out);
+            Some(run)
         };
         let mut runs: Vec<Self> = run::roots().into_iter().filter_map(with_out).collect();
         runs.sort_by(|a, b| a.out.cmp(&b.out));

@@ -81,7 +81,8 @@ impl ObservedRun {
     pub fn writing_to(out: &Path) -> Result<Self, StageError> {
         let absolute = out.canonicalize().unwrap_or_else(|_| out.to_owned());
         let root = run::root_of(&absolute);
-        if !root.exists() {
+        // A run that waits for its radar has none yet.
+        if !Manifest::path(&root).exists() {
             return Err(StageError::NotRunning(out.to_owned()));
         }
         Self::at(&root)

@@ -49,4 +49,5 @@ pub use gyre_run::{Ending, Scheduling, Swapped};
 pub use log::last_line;
 pub use plan::{END_TIMEOUT, Event, Plan, StagePlan, Stall, SuperviseError};
 pub use program::Program;
+pub use requests::wait;
 pub use supervisor::supervise;

@@ -1,23 +1,57 @@
 //! Requests from other processes: what is asked at the control socket, and the answers.
 
-use std::{env, process};
+use std::{env, path::Path, process};
 
 use gyre_stage::{
-    clock,
+    StageError, clock,
     control::{Activity, Answer, Phase, ProcessStatus, Request, Status, Swap},
     schedule, sink,
+    wake::{MAX_WAIT, Signals},
 };
 
 use crate::{
     Event, StagePlan, SuperviseError,
     process_status::status_of,
-    socket::Client,
+    socket::{Client, ControlSocket},
     supervisor::Supervisor,
     swaps::{Standby, Step, plan_of},
 };
 
 /// Requests that are answered before the supervisor looks after its processes again.
 const MAX_REQUESTS: usize = 8;
+
+/// Waits until `look`, which updates the status, returns something, before there are processes.
+/// `None`: the run is to end.
+///
+/// # Errors
+/// The socket cannot be opened in the run's root, or the system refuses to wait.
+pub fn wait<T>(
+    root: &Path,
+    signals: &Signals,
+    mut status: Status,
+    mut look: impl FnMut(&mut Status) -> Option<T>,
+) -> Result<Option<T>, StageError> {
+    let socket = ControlSocket::open(root)?;
+    loop {
+        if let Some(found) = look(&mut status) {
+            return Ok(Some(found));
+        }
+        let requests = Some(socket.descriptor());
+        if signals.wait_or_readable(&[], &[], requests, MAX_WAIT)?.stop {
+            return Ok(None);
+        }
+        while let Some((request, client)) = socket.next() {
+            match request {
+                Request::Status => client.answer(&Answer::Status(status.clone())),
+                Request::Stop => {
+                    client.answer(&Answer::Done);
+                    return Ok(None);
+                }
+                _ => client.answer(&Answer::Refused("the run has no processes yet".to_owned())),
+            }
+        }
+    }
+}
 
 impl Supervisor<'_> {
     /// Answers the requests that have come; true if one of them is to stop.

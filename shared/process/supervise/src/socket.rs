@@ -7,11 +7,12 @@ use std::{
         fd::{AsFd, BorrowedFd},
         unix::net::{UnixListener, UnixStream},
     },
+    path::Path,
     time::{Duration, Instant},
 };
 
 use gyre_stage::{
-    Manifest, StageError,
+    StageError,
     control::{Answer, Request, SOCKET},
 };
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -26,8 +27,8 @@ const MAX: usize = 64 << 10;
 pub(crate) struct ControlSocket(UnixListener);
 
 impl ControlSocket {
-    pub fn open(manifest: &Manifest) -> Result<Self, StageError> {
-        let path = manifest.root.join(SOCKET);
+    pub fn open(root: &Path) -> Result<Self, StageError> {
+        let path = root.join(SOCKET);
         let listener = UnixListener::bind(&path).and_then(|listener| {
             listener.set_nonblocking(true)?;
             Ok(listener)

@@ -82,7 +82,7 @@ impl<'a> Supervisor<'a> {
             stalls: Stalls::of(plan),
             followers: Followers::of(plan),
             swaps: Swaps::default(),
-            socket: ControlSocket::open(&plan.manifest)?,
+            socket: ControlSocket::open(&plan.manifest.root)?,
             observers: Sweep::new(),
             logs: Logs::of(plan),
             is_ready: false,
