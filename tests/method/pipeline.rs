@@ -330,6 +330,8 @@ fn an_unfinished_run_of_another_configuration_is_refused() {
     let other = run.clone().set("masking.threshold=70");
     other.finish().refused_with(&[
         "unfinished run of another configuration",
+        "masking.threshold was",
+        "and is now 70",
         "--out",
         "--fresh",
     ]);

@@ -104,13 +104,30 @@ fn results_of_another_recording_or_program_are_kept() {
 }
 
 #[test]
-fn what_a_live_run_has_computed_is_never_computed_again_unasked() {
+fn a_live_run_that_cannot_continue_the_earlier_one_keeps_it_under_a_number() {
     let run = Run::of_recording().set("run.mode=live").rate("20");
     run.complete();
-    let odometry = run.odometry();
-    run.finish()
+    run.clone()
+        .set("run.earlier=refuse")
+        .finish()
         .refused_with(&["complete live run", "another --out", "--fresh"]);
-    assert_eq!(run.odometry(), odometry);
+    let other = run.clone().set("masking.threshold=70");
+    let journal = run.out().join("journal/poses.journal");
+    for (number, run) in [run.clone(), other.clone(), other].iter().enumerate() {
+        if number == 2 {
+            let mut bytes = fs::read(&journal).unwrap();
+            bytes[..16].copy_from_slice(b"gyre journal v9 ");
+            fs::write(&journal, bytes).unwrap();
+        }
+        let odometry = run.odometry();
+        let out = run.out().canonicalize().unwrap();
+        let kept = out.with_extension((number + 1).to_string());
+        let ended = run.finish();
+        let words = format!("is kept as {}", kept.display());
+        assert!(ended.succeeded().stderr.contains(&words), "{ended:?}");
+        let kept = fs::read_to_string(kept.join("odometry.csv")).unwrap();
+        assert_eq!(kept, odometry);
+    }
 }
 
 /// A run that begins in the folder of a complete one and computes nothing.
@@ -233,22 +250,6 @@ fn a_damaged_record_of_what_a_run_was_begun_with_is_named_and_not_discarded() {
         ]);
     }
     fs::write(&path, whole).unwrap();
-    assert_eq!(run.complete(), undisturbed());
-}
-
-#[test]
-fn another_configuration_is_refused_by_the_key_that_differs() {
-    let run = interrupted();
-    run.clone()
-        .set("masking.threshold=70")
-        .finish()
-        .refused_with(&[
-            "unfinished run of another configuration",
-            "masking.threshold was",
-            "and is now 70",
-            "--out",
-            "--fresh",
-        ]);
     assert_eq!(run.complete(), undisturbed());
 }
 

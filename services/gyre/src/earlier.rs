@@ -20,7 +20,7 @@ use gyre_messages::StageId;
 use gyre_recorder::Ledger;
 use gyre_recording::received_fixes;
 use gyre_results::{FILES, Holds, Identity, Out, Programs, SIMULATED_TRUTH, SUMMARY};
-use gyre_run::{BEGUN_WITH, COMPLETE, Mode, Side};
+use gyre_run::{BEGUN_WITH, COMPLETE, EarlierRun, Mode, Side};
 use gyre_scan_matching::Refiner;
 use gyre_slam::{Keyframe, Place, Query, RecordReader, records_path};
 use gyre_stage::Generation;
@@ -45,6 +45,8 @@ pub enum Earlier {
     Ended(Begun),
     /// The results of a complete run, which the same run may replace.
     Complete(Identity),
+    /// A run that this one cannot continue, and why.
+    Foreign(Failure),
 }
 
 /// A run that was begun.
@@ -63,8 +65,7 @@ impl Earlier {
     /// on from nothing.
     ///
     /// # Errors
-    /// Files that cannot be read, a damaged journal, a run of another configuration, or results
-    /// that only a `fresh` run may replace.
+    /// Files that cannot be read, or a damaged journal.
     pub fn of(
         out: &Out,
         configuration: &Configuration,
@@ -76,7 +77,8 @@ impl Earlier {
         let there = match journal::records(&path) {
             Err(JournalError::OtherVersion { .. }) if fresh => true,
             Err(error @ JournalError::OtherVersion { .. }) => {
-                return Err(format!("{error}, or begin anew with --fresh").into());
+                let reason = format!("{error}, or begin anew with --fresh");
+                return Ok(Self::Foreign(reason.into()));
             }
             records => records?.is_some(),
         };
@@ -85,20 +87,27 @@ impl Earlier {
             return Ok(Self::Nothing);
         }
         if is_complete(out.path()) {
-            return complete(out, configuration, programs);
+            let complete = complete(out, configuration, programs);
+            return Ok(complete.unwrap_or_else(Self::Foreign));
         }
         if !there {
-            require_no_results(out)?;
-            return Ok(without_poses(out, configuration, programs));
+            return Ok(match require_no_results(out) {
+                Ok(()) => without_poses(out, configuration, programs),
+                Err(reason) => Self::Foreign(reason),
+            });
         }
         let content = journal::check(&path).map_err(|error| kept(error, &path))?;
         let holds = Holds::Unfinished(content.poses);
         let is_empty = content.poses == 0 && !content.ended;
         let identity = match is_empty {
             true => return Ok(without_poses(out, configuration, programs)),
-            false => Identity::read(out, holds)?,
+            false => Identity::read(out, holds),
         };
-        identity.require(configuration, programs, out.path(), holds)?;
+        let require = |it: &Identity| it.require(configuration, programs, out.path(), holds);
+        let identity = match identity.and_then(|it| require(&it).map(|()| it)) {
+            Err(reason) => return Ok(Self::Foreign(reason)),
+            Ok(identity) => identity,
+        };
         let poses = match content.ended {
             true => content.poses,
             false => known_poses(out, configuration, &content)?,
@@ -135,14 +144,14 @@ impl Earlier {
         match self {
             Self::Unfinished(_) => true,
             Self::WithoutPoses(begun_with) => is_same(begun_with).is_ok(),
-            Self::Nothing | Self::Ended(_) | Self::Complete(_) => false,
+            Self::Nothing | Self::Ended(_) | Self::Complete(_) | Self::Foreign(_) => false,
         }
     }
 
     /// The identity of the run in the folder, which the new one must have too.
     pub fn identity(&self) -> Option<(&Identity, Holds)> {
         match self {
-            Self::Nothing | Self::WithoutPoses(_) => None,
+            Self::Nothing | Self::WithoutPoses(_) | Self::Foreign(_) => None,
             Self::Complete(identity) => Some((identity, Holds::Complete)),
             Self::Unfinished(begun) | Self::Ended(begun) => {
                 Some((&begun.identity, Holds::Unfinished(begun.poses)))
@@ -305,6 +314,42 @@ fn known_poses(
         }
         .into()),
     }
+}
+
+/// Returns whether a run that the new one cannot continue is closed.
+pub fn is_closed(configuration: &Configuration) -> bool {
+    // A recording that was simulated lies in the folder, and is played from there.
+    configuration.stored().is_none()
+        && match configuration.run.earlier {
+            EarlierRun::Auto => configuration.run.mode == Mode::Live,
+            EarlierRun::Refuse => false,
+            EarlierRun::Close => true,
+        }
+}
+
+/// Closes a run that the new one cannot continue: its folder keeps all that it holds under a name
+/// with a number. Returns the folder of the new run.
+///
+/// # Errors
+/// A folder that cannot be renamed, as one that is a file system of its own.
+pub fn close(out: Out, reason: &Failure) -> Result<Out, Failure> {
+    let path = out.path();
+    let mut names = (1..).map(|number: u32| {
+        let mut name = path.as_os_str().to_owned();
+        name.push(format!(".{number}"));
+        PathBuf::from(name)
+    });
+    let kept = names.find(|name| !name.exists()).unwrap_or_default();
+    let (old, new) = (kept.display(), path.display());
+    storage::rename(path, &kept)
+        .map_err(|error| format!("{reason}; it cannot be kept as {old} (run.earlier): {error}"))?;
+    storage::sync_folder(path.parent().unwrap_or(path))?;
+    let reason = reason.to_string();
+    let reason = reason.split(": choose another").next().unwrap_or_default();
+    print::note(format_args!(
+        "gyre: {reason}: that run is kept as {old}, and a new one begins in {new} (run.earlier)"
+    ));
+    Ok(Out::lock(path)?)
 }
 
 /// Says what to do about damaged keyframes.

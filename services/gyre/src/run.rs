@@ -82,6 +82,7 @@ pub(crate) fn compute(
     place_recording(&mut configuration, &out);
     let programs = program::now(&configuration)?;
     match Earlier::of(&out, &configuration, &programs, fresh)? {
+        Earlier::Foreign(reason) if !earlier::is_closed(&configuration) => Err(reason),
         Earlier::Ended(begun) => write_missing_results(&configuration, &out, &begun, form),
         earlier => play(&configuration, &programs, out, &earlier, form),
     }
@@ -177,7 +178,7 @@ fn make_ready(
 fn play(
     configuration: &Configuration,
     programs: &Programs,
-    out: Out,
+    mut out: Out,
     earlier: &Earlier,
     form: Form,
 ) -> Result<ExitCode, Failure> {
@@ -194,6 +195,9 @@ fn play(
     } = &ready;
     let unfinished = earlier.unfinished();
     let signals = signals.map_or_else(Signals::install, Ok)?;
+    if let Earlier::Foreign(reason) = earlier {
+        out = earlier::close(out, reason)?;
+    }
     let root = match RunRoot::acquire(out.path(), &signals) {
         Err(RootError::Interrupted) => return Ok(ExitCode::from(INTERRUPTED)),
         root => root?,

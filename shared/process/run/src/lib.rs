@@ -25,7 +25,7 @@ pub use budget::{Budget, Limits};
 pub use link::{LinkConfig, Side};
 pub use played_fault::{PlayedFault, PlayedFaultKind};
 pub use played_from::PlayedFrom;
-pub use processes::{Mode, RestartPolicy, RunConfig, StageConfig};
+pub use processes::{EarlierRun, Mode, RestartPolicy, RunConfig, StageConfig};
 pub use rate::Rate;
 pub use record::RecordConfig;
 pub use report::{Ending, Report, StageCounters, Swapped};

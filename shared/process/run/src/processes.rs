@@ -12,6 +12,10 @@ use crate::{Rate, Scheduling};
 pub struct RunConfig {
     /// `lossless`: every scan is processed, and the source waits. `live`: the newest scan wins.
     pub mode: Mode,
+    /// What becomes of a run in the folder of the results that this one cannot continue, as one of
+    /// another program or configuration. `close`: its folder gets a number in its name, and this
+    /// run begins. `refuse`: this run does not begin. `auto`: `close` in live mode, else `refuse`.
+    pub earlier: EarlierRun,
     /// Maximum number of scans between admission and their pose, 1 to 64. More than the free cores
     /// increases latency and not throughput.
     pub window: usize,
@@ -52,6 +56,21 @@ pub enum Mode {
     Lossless,
     /// The newest scan wins.
     Live,
+}
+
+/// What becomes of an earlier run: see [`RunConfig::earlier`].
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum EarlierRun {
+    /// As the mode is.
+    #[default]
+    Auto,
+    /// This run does not begin.
+    Refuse,
+    /// It is kept under another name.
+    Close,
 }
 
 /// A section `[stages.NAME]`.
@@ -154,6 +173,7 @@ impl Default for RunConfig {
     fn default() -> Self {
         Self {
             mode: Mode::Lossless,
+            earlier: EarlierRun::Auto,
             window: 4,
             rate: Rate::Max,
             observers: 8,
