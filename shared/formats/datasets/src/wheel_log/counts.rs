@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use csv::StringRecord;
+use gyre_radar::median;
 use gyre_samples::{Sample, SampleKind};
 
 use super::SPEEDS;
@@ -33,12 +34,12 @@ const METRES: [&str; 3] = ["distance_m", "odometer_m", "mileage_m"];
 /// Any count: what is plausible are the speeds.
 const COUNTS: Plausible = Plausible {
     of: SampleKind::Wheels,
-    values: 1,
+    values: 2,
     most: f64::MAX,
     beyond: "",
 };
 
-/// Where a table has counts. A sample of it has the count in the place of the speed.
+/// Where a table has counts. A sample of it has those of both wheels, or of one twice.
 pub(super) struct CountColumns {
     stamp: Stamp,
     /// One, or one of each wheel.
@@ -66,12 +67,12 @@ impl Columns for CountColumns {
     }
 
     fn entry(&self, row: &StringRecord) -> Option<Sample> {
-        let mut sum = 0.0;
-        for column in &self.counts {
-            sum += row.get(*column)?.parse::<f64>().ok()?;
+        let mut sample = Sample::speed(self.stamp.ns(row)?, 0.0);
+        let columns = self.counts.iter().cycle();
+        for (value, column) in sample.values[..2].iter_mut().zip(columns) {
+            *value = row.get(*column)?.parse().ok()?;
         }
-        let count = sum / self.counts.len() as f64;
-        Some(Sample::speed(self.stamp.ns(row)?, count))
+        Some(sample)
     }
 }
 
@@ -108,13 +109,15 @@ pub(super) fn speeds(
         })?,
         false => 1.0,
     };
-    let (counts, mut faults) = examine(raw, path, &COUNTS)?;
+    let (mut counts, mut faults) = examine(raw, path, &COUNTS)?;
+    (0..2).for_each(|wheel| count_on(&mut counts, wheel));
     let mut speeds = Vec::with_capacity(counts.len());
     let mut from = counts[0];
     for to in &counts {
         let span_ns = to.stamp_ns - from.stamp_ns;
         if span_ns >= SPAN_NS {
-            let way_m = (to.values[0] - from.values[0]) * m_per_count;
+            let by = |wheel: usize| to.values[wheel] - from.values[wheel];
+            let way_m = (by(0) + by(1)) / 2.0 * m_per_count;
             let speed_mps = way_m / (span_ns as f64 * 1e-9);
             speeds.push(Sample::speed(from.stamp_ns + span_ns / 2, speed_mps));
             from = *to;
@@ -128,9 +131,7 @@ pub(super) fn speeds(
     let absurd = before - speeds.len();
     if absurd as f64 > ABSURD_SHARE * before as f64 && absurd > 1 || speeds.is_empty() {
         let remedy = match is_in_ticks {
-            true => {
-                "is wheels.m_per_tick in metres, and does the counter not start anew at each turn?"
-            }
+            true => "is wheels.m_per_tick in metres?",
             false => "is the distance in metres?",
         };
         return Err(unusable(format!(
@@ -139,4 +140,37 @@ pub(super) fn speeds(
     }
     faults.absurd += absurd;
     Ok((speeds, faults))
+}
+
+/// Lets a counter that runs over count on. Its range is a power of two, or what it jumps by each
+/// time; one that jumps once by something else is started anew.
+fn count_on(counts: &mut [Sample], wheel: usize) {
+    let values = || counts.iter().map(|it| it.values[wheel]);
+    let range = values().fold(f64::MIN, f64::max) - values().fold(f64::MAX, f64::min);
+    let apart = |pair: &[Sample]| pair[1].values[wheel] - pair[0].values[wheel];
+    let steps: Vec<f64> = counts.windows(2).map(apart).collect();
+    let (jumps, others): (Vec<usize>, Vec<usize>) =
+        (0..steps.len()).partition(|k| steps[*k].abs() > 0.5 * range);
+    let largest = others.iter().map(|k| steps[*k].abs()).fold(0.0, f64::max);
+    // The counter would have gone on as before.
+    let before = |k: usize| k.checked_sub(1).map_or(0.0, |before| steps[before].abs());
+    let size = |k: &usize| steps[*k].abs() + before(*k).min(largest);
+    let Some(usual) = median(jumps.iter().map(size)) else {
+        return;
+    };
+    let is_usual = |size: f64| (size - usual).abs() <= largest;
+    let bits = usual.log2().round().exp2();
+    let repeats = jumps.len() > 1 && jumps.iter().all(|k| is_usual(size(k)));
+    let modulus = match is_usual(bits) && bits > range {
+        true => bits,
+        false if repeats && usual + largest > range => usual.max(range),
+        false => return,
+    };
+    let mut turns = 0.0;
+    for (count, step) in counts[1..].iter_mut().zip(steps) {
+        if step.abs() > 0.5 * range {
+            turns -= step.signum();
+        }
+        count.values[wheel] += turns * modulus;
+    }
 }

@@ -142,6 +142,31 @@ fn counts_become_speeds_whose_way_is_that_of_the_counts() {
 }
 
 #[test]
+fn a_counter_that_runs_over_counts_on() {
+    let speeds_of = |row: &dyn Fn(f64) -> String| {
+        let header = "stamp_ns,left_ticks,right_ticks";
+        let text = ticks(header, 0.01, |_, count| row(count));
+        speeds(&read_ticks(&text, Some(0.01)).unwrap())
+    };
+    let whole = speeds_of(&|count| format!("{count},{count}"));
+    // The range, the least value, and the count at the start of the log.
+    for (range, least, from) in [
+        (256.0, -128.0, 77.0),
+        (65_536.0, 0.0, 65_000.0),
+        (4_294_967_296.0, 0.0, 4_294_967_000.0),
+        (1000.0, 1.0, 5.0),
+    ] {
+        let over = |count: f64| (count + from).rem_euclid(range) + least;
+        let ahead = speeds_of(&|count| format!("{},{}", over(count + 33.0), over(count)));
+        let back = speeds_of(&|count| format!("{},{}", over(-count), over(33.0 - count)));
+        for (k, speed) in whole.iter().enumerate() {
+            let off = [ahead[k] - speed, back[k] + speed].map(f64::abs);
+            assert!(off.iter().all(|off| *off < 0.2), "{range}: {off:?} at {k}");
+        }
+    }
+}
+
+#[test]
 fn a_counter_that_starts_anew_costs_one_speed() {
     let row = |k: usize, count: f64| format!("{}", count + if k < 500 { 65_000.0 } else { 0.0 });
     let text = ticks("stamp_ns,ticks", 0.05, row);
