@@ -20,10 +20,11 @@ pub use error::LogError;
 pub use faults::{LogFaults, LogGap};
 pub use track::SampleTrack;
 
-use gyre_samples::{Sample, SampleKind};
+use gyre_samples::{Sample, SampleKind, UpAxis};
 use gyre_storage as storage;
 
 use crate::{
+    Format,
     gps_imu_twist::has_list,
     table::{Columns, MAX_BYTES, Rows, Unreadable},
 };
@@ -47,6 +48,10 @@ const PLACES: [&str; 12] = [
     "GPS_IMU_Twist",
     "imu/imu.csv",
 ];
+
+/// Accelerations that can be gravity's, m/s², and its share along the axis that points up.
+const GRAVITY_MPS2: std::ops::RangeInclusive<f64> = 9.3..=10.3;
+const UPRIGHT: f64 = 0.9;
 
 /// Folders of images, beside which the log lies too if one of them is given for the dataset.
 const IMAGES: [&str; 5] = [
@@ -111,6 +116,45 @@ impl GyroLog {
                 folder: folder.to_owned(),
             },
         })
+    }
+
+    /// Returns the axis that points up: the configured one, or else that along which the log
+    /// measures gravity, or that of its format beside scans of a dataset.
+    ///
+    /// # Errors
+    /// Both contradict each other.
+    pub fn up(&self, configured: Option<UpAxis>, dataset: Format) -> Result<UpAxis, LogError> {
+        // Of RADIATE's logs z points down, and gravity is taken out of their accelerations.
+        let is_radiates = dataset == Format::Radiate && self.path.ends_with("imu_as_logged.csv")
+            || self.path.ends_with("GPS_IMU_Twist");
+        let measured = self.up_by_gravity();
+        let known = measured.or(is_radiates.then_some(UpAxis::MinusZ));
+        let up = configured.or(known).unwrap_or_default();
+        match known.filter(|known| *known != up) {
+            None => Ok(up),
+            Some(known) => Err(LogError::Unusable {
+                of: SampleKind::Gyro,
+                path: self.path.clone(),
+                reason: format!(
+                    "gyro.up is {}, but by {} its axis {} points up: take gyro.up out of the configuration, or the accelerations out of the log if their sign is wrong",
+                    up.name(),
+                    measured.map_or("its format", |_| "gravity"),
+                    known.name()
+                ),
+            }),
+        }
+    }
+
+    /// Returns the axis along which the accelerations have gravity: what rests is accelerated
+    /// upwards.
+    pub(crate) fn up_by_gravity(&self) -> Option<UpAxis> {
+        use UpAxis::{MinusX, MinusY, MinusZ, X, Y, Z};
+        let sum = |k: usize| self.samples.iter().map(|it| it.values[k]).sum::<f64>();
+        let mean = [3, 4, 5].map(|k| sum(k) / self.samples.len().max(1) as f64);
+        let norm = mean.iter().map(|value| value * value).sum::<f64>().sqrt();
+        let mut axes = [X, MinusX, Y, MinusY, Z, MinusZ].into_iter();
+        axes.find(|up| up.in_vehicle(mean)[2] > UPRIGHT * norm)
+            .filter(|_| GRAVITY_MPS2.contains(&norm))
     }
 
     /// Takes the samples of a bag or of a simulation, which messages name by this path.

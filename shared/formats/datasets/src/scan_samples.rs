@@ -81,13 +81,17 @@ impl ScanSamples {
     /// Takes the samples of the log of a gyro.
     ///
     /// # Errors
-    /// It has none from the first scan to the last.
+    /// It has none from the first scan to the last, or another axis than the configuration.
     pub fn of_gyro(
         log: &GyroLog,
         config: &GyroConfig,
         dataset: &dyn Dataset,
     ) -> Result<Self, LogError> {
-        let track = SampleTrack::new(log, config);
+        let config = GyroConfig {
+            up: Some(log.up(config.up, dataset.format())?),
+            ..config.clone()
+        };
+        let track = SampleTrack::new(log, &config);
         Self::of_track(track, (SampleKind::Gyro, &log.path), &log.faults, dataset)
     }
 

@@ -9,6 +9,10 @@ use crate::{
     bounds::{Bounds, SampleConfigError},
 };
 
+/// Standard deviation by which a scale may differ from 1 in any case: an axis leans by up to 8
+/// degrees, by its mount, in bends and on slopes.
+const LEANING: f64 = 0.01;
+
 /// Configuration of the gyro: section `[gyro]`.
 ///
 /// The noise is that of a data sheet. The defaults are those of a gyro that cars have.
@@ -31,8 +35,10 @@ pub struct GyroConfig {
     pub max_wait_ms: f64,
     /// Time by which the stamps of the gyro are late against the radar's, s: it is taken off them.
     pub late_s: f64,
-    /// The axis of the gyro that points up: `z`, `-z`, `x`, `-x`, `y` or `-y`.
-    pub up: UpAxis,
+    /// The axis of the gyro that points up: `z`, `-z`, `x`, `-x`, `y` or `-y`. Default: the axis
+    /// along which the log measures gravity, or that of its format; else `z`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub up: Option<UpAxis>,
     /// True yaw rate over the measured one.
     pub scale: f64,
     /// Standard deviation of that scale.
@@ -133,7 +139,7 @@ impl Default for GyroConfig {
             listen: "127.0.0.1:6321".to_owned(),
             max_wait_ms: 20.0,
             late_s: 0.0,
-            up: UpAxis::Z,
+            up: None,
             scale: 1.0,
             scale_sigma: 0.01,
             bias_radps: 0.0,
@@ -162,13 +168,19 @@ impl GyroConfig {
     pub fn on_radar(&self, sample: &Sample) -> Sample {
         let late_ns = (self.late_s * 1e9).round() as i64;
         let [x, y, z, along_x, along_y, along_z] = sample.values;
-        let [roll, pitch, yaw] = self.up.in_vehicle([x, y, z]);
-        let [ahead, left, above] = self.up.in_vehicle([along_x, along_y, along_z]);
+        let up = self.up.unwrap_or_default();
+        let [roll, pitch, yaw] = up.in_vehicle([x, y, z]);
+        let [ahead, left, above] = up.in_vehicle([along_x, along_y, along_z]);
         Sample {
             stamp_ns: sample.stamp_ns.saturating_sub(late_ns),
             values: [roll, pitch, yaw * self.scale, ahead, left, above],
             ..*sample
         }
+    }
+
+    /// Returns whether a gyro with these settings can have a learnt scale.
+    pub fn allows_scale(&self, scale: f64) -> bool {
+        (scale - 1.0).abs() <= 4.0 * self.scale_sigma.max(LEANING)
     }
 
     /// Checks every value.

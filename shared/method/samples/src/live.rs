@@ -197,7 +197,7 @@ mod tests {
     fn samples_are_put_on_the_radars_clock_and_axes() {
         let mut live = of_gyro(GyroConfig {
             late_s: 0.1,
-            up: crate::UpAxis::MinusZ,
+            up: Some(crate::UpAxis::MinusZ),
             ..GyroConfig::default()
         });
         live.add(&Sample::yaw_rate(200 * MS, -0.5));

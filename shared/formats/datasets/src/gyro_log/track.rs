@@ -156,7 +156,7 @@ mod tests {
         .unwrap();
         let config = GyroConfig {
             late_s: 1.58,
-            up: UpAxis::MinusZ,
+            up: Some(UpAxis::MinusZ),
             scale: 1.01,
             bias_radps: 0.5,
             ..GyroConfig::default()

@@ -12,9 +12,6 @@ use crate::gyro_log::{GyroLog, LogError, LogFaults};
 const QUIET_S: f64 = 5.0;
 /// Share of the samples that such a time has at least.
 const QUIET_SHARE: f64 = 0.9;
-/// Accelerations that can be gravity's, m/s², and its share along the axis that points up.
-const GRAVITY_MPS2: std::ops::RangeInclusive<f64> = 9.3..=10.3;
-const UPRIGHT: f64 = 0.9;
 
 /// Summary of the log of a gyro.
 #[derive(Clone, Debug, Serialize)]
@@ -76,7 +73,7 @@ fn examine_file(file: &Path, timing: Option<&TimingReport>) -> GyroReport {
     GyroReport {
         times,
         quiet: quiet(samples, period_s),
-        up_by_gravity: up_by_gravity(samples),
+        up_by_gravity: log.up_by_gravity(),
         faults: log.faults.clone(),
         ..GyroReport::of(file, None)
     }
@@ -130,23 +127,4 @@ fn moments(samples: &[Sample]) -> ([f64; 3], [f64; 3]) {
         squares.sum::<f64>() / count
     });
     (mean, variance)
-}
-
-/// The axis along which the accelerations have gravity: what rests is accelerated upwards.
-fn up_by_gravity(samples: &[Sample]) -> Option<UpAxis> {
-    let count = samples.len().max(1) as f64;
-    let mean = [3, 4, 5].map(|k| samples.iter().map(|it| it.values[k]).sum::<f64>() / count);
-    let norm = mean.iter().map(|value| value * value).sum::<f64>().sqrt();
-    let axes = [
-        UpAxis::X,
-        UpAxis::MinusX,
-        UpAxis::Y,
-        UpAxis::MinusY,
-        UpAxis::Z,
-        UpAxis::MinusZ,
-    ];
-    let is_up = |up: &UpAxis| up.in_vehicle(mean)[2] > UPRIGHT * norm;
-    axes.into_iter()
-        .find(is_up)
-        .filter(|_| GRAVITY_MPS2.contains(&norm))
 }

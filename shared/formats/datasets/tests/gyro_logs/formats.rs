@@ -2,8 +2,8 @@
 
 use std::{env, path::PathBuf};
 
-use gyre_datasets::GyroLog;
-use gyre_samples::SampleKind;
+use gyre_datasets::{Format, GyroLog};
+use gyre_samples::{SampleKind, UpAxis};
 use tempfile::TempDir;
 
 use super::{START_NS, read, written};
@@ -174,6 +174,28 @@ fn samples_of_radiate_are_files() {
     );
     // The third has a time and no file.
     assert_eq!((log.faults.unreadable, log.faults.first_unreadable), (1, 3));
+}
+
+#[test]
+fn the_axis_that_points_up_is_configured_or_measured_or_that_of_the_format() {
+    use Format::{Oxford, Radiate};
+    use UpAxis::{MinusZ, X, Z};
+    let folder = TempDir::new().unwrap();
+    for (name, accelerations, dataset, configured, expected) in [
+        ("imu.csv", "0,0,0", Oxford, None, Some(Z)),
+        ("imu.csv", "9.7,0.3,-0.4", Oxford, None, Some(X)),
+        ("imu.csv", "0.1,0,-9.8", Oxford, Some(Z), None),
+        ("imu.csv", "0,0,9.8", Radiate, None, Some(Z)),
+        ("imu_as_logged.csv", "0.1,0,0", Oxford, None, Some(Z)),
+        ("imu_as_logged.csv", "0.1,0,0", Radiate, None, Some(MinusZ)),
+        ("imu_as_logged.csv", "0.1,0,0", Radiate, Some(Z), None),
+    ] {
+        let header = "stamp_ns,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z";
+        let text = format!("{header}\n{START_NS},0,0,0.1,{accelerations}\n");
+        let log = GyroLog::read(&written(&folder, name, &text)).unwrap();
+        let up = log.up(configured, dataset);
+        assert_eq!(up.ok(), expected, "{name} {accelerations} {configured:?}");
+    }
 }
 
 #[test]

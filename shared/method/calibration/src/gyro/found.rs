@@ -113,10 +113,11 @@ impl GyroCalibration {
             }
             true => format!(", configured {value:.4}: agrees with the configured value"),
         };
-        let axis = match configured.is_used() && configured.up != self.up {
+        let up = configured.up.unwrap_or(self.up);
+        let axis = match configured.is_used() && up != self.up {
             true => format!(
                 ", configured {}: CONTRADICTS the configured value",
-                configured.up.name()
+                up.name()
             ),
             false => String::new(),
         };

@@ -291,7 +291,7 @@ fn the_section_is_a_configuration_of_what_was_found() {
     let found = drive.calibrated().unwrap();
     let table: toml::Table = found.toml(None).parse().unwrap();
     let config: GyroConfig = table["gyro"].clone().try_into().unwrap();
-    assert_eq!(config.up, UpAxis::MinusZ);
+    assert_eq!(config.up, Some(UpAxis::MinusZ));
     assert!((config.late_s - 1.58).abs() < 0.02 && (config.scale - 1.01).abs() < 0.01);
     assert!((config.bias_radps - 2e-3).abs() < 1e-3);
     assert_eq!(
