@@ -25,7 +25,11 @@ fn refine_with(
     off_radps: impl Fn(usize) -> f64,
 ) -> Vec<Refined> {
     const REACH_RAD: f64 = 0.07;
-    let mut refiner = refiner().with_gyro(&GyroConfig::default());
+    // A turn that stays does not tell the scale from the bias.
+    let mut refiner = refiner().with_gyro(&GyroConfig {
+        bias_sigma_radps: 0.0,
+        ..GyroConfig::default()
+    });
     let refine = |k: usize| {
         let off_radps = off_radps(k);
         let rate_radps = drive.yaw_rate_radps + off_radps;
@@ -110,4 +114,16 @@ fn a_gyro_that_differs_by_what_a_match_can_err_is_doubted_and_weighed() {
     let refined = refine_with((&drive, &scans), wrong);
     assert!(judged(&refined, Verdict::Doubted).contains(&WRONG.start));
     assert_eq!(judged(&refined, Verdict::Refused), [0; 0]);
+}
+
+#[test]
+fn a_gyro_whose_learnt_scale_is_implausible_is_not_used_any_more() {
+    let (drive, scans) = bend();
+    for (by, is_refused) in [(0.03, false), (-0.5, true), (-0.13, true), (0.13, true)] {
+        let refined = refine_with((&drive, &scans), |_| by * drive.yaw_rate_radps);
+        let refused = judged(&refined, Verdict::Refused);
+        let from = refused.first().map_or(SCANS, |first| *first);
+        assert_eq!(refused, (from..SCANS).collect::<Vec<_>>(), "{by}");
+        assert_eq!(from < 20, is_refused, "{by}: {from}");
+    }
 }

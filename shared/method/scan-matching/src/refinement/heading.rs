@@ -42,7 +42,8 @@ pub struct Heading {
     pub bias_radps: f64,
     /// Steady error of registered headings, rad.
     pub lean_rad: f64,
-    /// True turn over the one that is measured, but for the bias.
+    /// True turn over the one that is measured, but for the bias. With one that the gyro cannot
+    /// have ([`GyroConfig::allows_scale`]) it is not used any more.
     pub scale: f64,
     /// Covariance of the errors of the heading against the map, the bias, the lean and the scale.
     pub covariance: Matrix4<f64>,
@@ -69,6 +70,8 @@ pub struct GyroBias {
     pub rate_radps: f64,
     /// Standard deviation, rad/s.
     pub sigma_radps: f64,
+    /// True turn over the measured one.
+    pub scale: f64,
     /// The verdict of the registered heading on the turn, or the last one.
     pub verdict: Verdict,
 }
@@ -137,6 +140,7 @@ impl Heading {
         GyroBias {
             rate_radps: self.bias_radps,
             sigma_radps: self.covariance[(BIAS, BIAS)].max(0.0).sqrt(),
+            scale: self.scale,
             verdict: self.verdict,
         }
     }

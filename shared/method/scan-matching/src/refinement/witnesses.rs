@@ -90,11 +90,14 @@ impl Refiner {
             },
             ..*scan
         };
-        let last = self.state.heading.map(|heading| heading.verdict);
-        if last == Some(Verdict::Refused) {
+        let refused = self.state.heading;
+        let refused = refused.filter(|heading| heading.verdict == Verdict::Refused);
+        if let Some(heading) = refused {
             let best = self.registration(&alone).best();
             // After predictions the heading is so uncertain that any turn agrees.
-            let is_known = self.state.unmatched == 0 && best.is_plausible;
+            let is_known = self.state.unmatched == 0
+                && best.is_plausible
+                && self.gyro.allows_scale(heading.scale);
             if !is_known || self.judge(&best, &turn) != Verdict::Agrees {
                 *scan = alone;
                 return best;
@@ -276,6 +279,11 @@ impl Refiner {
             return heading.adopt(&registered, &self.state.pose);
         };
         let drift_share = uncertainty::drift_share(self.map.len(), &self.config);
-        heading.weigh(&registered, &self.state.pose, &turn, drift_share)
+        let weighed = heading.weigh(&registered, &self.state.pose, &turn, drift_share);
+        if self.gyro.allows_scale(heading.scale) {
+            return weighed;
+        }
+        heading.verdict = Verdict::Refused;
+        heading.adopt(&registered, &self.state.pose)
     }
 }
