@@ -127,7 +127,7 @@ class RotationEstimate(Message):
 
 
 class RefinementRecord(Message):
-    NAME = "gyre_refinement_v5"
+    NAME = "gyre_refinement_v6"
     _fields_ = [
         ("outcome", c_uint32),
         ("initial_guess", c_uint32),
@@ -135,9 +135,12 @@ class RefinementRecord(Message):
         ("support", c_double),
         ("stationary", c_uint64),
         ("gyro", c_uint64),
+        ("gyro_turn_rad", c_double),
+        ("gyro_scale", c_double),
         ("gyro_bias_radps", c_double),
         ("gyro_bias_sigma_radps", c_double),
         ("wheels", c_uint64),
+        ("wheel_distance_m", c_double),
         ("wheel_scale", c_double),
         ("wheel_scale_sigma", c_double),
         ("doppler", c_uint64),
@@ -147,7 +150,7 @@ class RefinementRecord(Message):
 
 
 class MotionEstimate(Message):
-    NAME = "gyre_motion_estimate_v7"
+    NAME = "gyre_motion_estimate_v8"
     _fields_ = [
         ("x_m", c_double),
         ("y_m", c_double),
@@ -165,12 +168,12 @@ class MotionEstimate(Message):
 
 
 class MotionHeader(Message):
-    NAME = "gyre_motion_header_v10"
+    NAME = "gyre_motion_header_v11"
     _fields_ = [("item", Item), ("motion", MotionEstimate)]
 
 
 class PoseHeader(Message):
-    NAME = "gyre_pose_header_v10"
+    NAME = "gyre_pose_header_v11"
     _fields_ = [
         ("item", Item),
         ("motion", MotionEstimate),

@@ -98,21 +98,21 @@ fn layouts() -> [(&'static str, Layout); 12] {
             layout!(RotationEstimate: angle_rad, variance_rad2, score, runner_up_rad, runner_up_score),
         ),
         (
-            "gyre_refinement_v5",
-            layout!(RefinementRecord: outcome, initial_guess, overlap, support, stationary, gyro, gyro_bias_radps,
-                gyro_bias_sigma_radps, wheels, wheel_scale, wheel_scale_sigma, doppler, doppler_scale, doppler_scale_sigma),
+            "gyre_refinement_v6",
+            layout!(RefinementRecord: outcome, initial_guess, overlap, support, stationary, gyro, gyro_turn_rad, gyro_scale,
+                gyro_bias_radps, gyro_bias_sigma_radps, wheels, wheel_distance_m, wheel_scale, wheel_scale_sigma, doppler, doppler_scale, doppler_scale_sigma),
         ),
         (
-            "gyre_motion_estimate_v7",
+            "gyre_motion_estimate_v8",
             layout!(MotionEstimate: x_m, y_m, yaw_rad, covariance, drift_share, scale_sigma, interval_ns, score,
                 runner_up_score, rotation, searched, refinement),
         ),
         (
-            "gyre_motion_header_v10",
+            "gyre_motion_header_v11",
             layout!(MotionHeader: item, motion),
         ),
         (
-            "gyre_pose_header_v10",
+            "gyre_pose_header_v11",
             layout!(PoseHeader: item, motion, x_m, y_m, yaw_rad, covariance, accumulated_covariance, trajectory_version),
         ),
     ]

@@ -41,14 +41,9 @@ pub enum PreflightError {
     },
     /// A log beside a live radar, or a topic beside one that is not in ROS 2.
     #[error(
-        "gyro.kind is of a recording, but the radar is live: set it to `udp`, to `ros2` for a radar behind its driver in ROS 2, or to `none`"
+        "{0}.kind is of a recording, but the radar is live: set it to `udp`, to `ros2` for a radar behind its driver in ROS 2, or to `none`"
     )]
-    LiveGyro,
-    /// Wheels beside a live radar.
-    #[error(
-        "wheels.kind is of a recording, but the radar is live: set it to `udp`, to `ros2` for a radar behind its driver in ROS 2, or to `none`"
-    )]
-    LiveWheels,
+    LiveLog(&'static str),
     /// An address at which no fixes can be received.
     #[error("cannot receive the fixes of GNSS at {address} (gnss.listen): {source}")]
     LiveGnss {
@@ -263,7 +258,7 @@ impl Scans {
             GyroKind::Auto | GyroKind::Log => false,
         };
         if !can_come {
-            return Err(PreflightError::LiveGyro.into());
+            return Err(PreflightError::LiveLog("gyro").into());
         }
         let can_come = match configuration.odometry.wheels.kind {
             WheelsKind::None | WheelsKind::Udp => true,
@@ -271,7 +266,7 @@ impl Scans {
             WheelsKind::Auto | WheelsKind::Log => false,
         };
         if !can_come {
-            return Err(PreflightError::LiveWheels.into());
+            return Err(PreflightError::LiveLog("wheels").into());
         }
         if configuration.odometry.doppler.is_used() {
             return Err(PreflightError::LiveDoppler.into());

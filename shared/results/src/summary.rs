@@ -3,6 +3,7 @@
 mod counts;
 mod ending;
 mod gnss;
+mod sensors;
 mod slam;
 
 use std::{collections::BTreeMap, fmt, path::Path, time::Duration};
@@ -108,17 +109,7 @@ impl Problem {
                 Self::OF_MOTIONS
             )));
         }
-        if let Some(gyro) = counts.gyro_contradicts() {
-            return Some(Self(format!(
-                "the gyro contradicts the radar: {} of its {} turns were refused. `gyro.up`, `gyro.late_s` or the unit of its log is wrong; `gyre calibrate` finds them from a recording, and gyro.kind=none leaves it out",
-                gyro.refused, gyro.motions
-            )));
-        }
-        let wheels = counts.wheels_contradict()?;
-        Some(Self(format!(
-            "the wheels contradict the radar: {} of their {} distances are not those that it sees. `wheels.late_s`, `wheels.scale` or the unit of their log is wrong; wheels.kind=none leaves them out",
-            wheels.slips, wheels.motions
-        )))
+        None
     }
 }
 
@@ -235,12 +226,20 @@ impl Summary {
             slam,
             gnss,
         } = measured;
+        // The run of a radar has no other end than an interruption.
+        let has_ended = match session.ending {
+            Some(Ending::Interrupted) => configuration.is_radar(),
+            ending => ending.is_some(),
+        };
+        let of_sensors = || sensors::problem(configuration, &counts, gnss.as_ref());
+        let problem = Problem::of(&configuration.data(), out, session, &counts)
+            .or_else(|| of_sensors().filter(|_| has_ended).map(Problem));
         let (wall_s, report) = (session.wall.as_secs_f64(), session.report);
         Self {
             version: env!("CARGO_PKG_VERSION"),
             machine: Machine::this(),
             out: out.display().to_string(),
-            problem: Problem::of(&configuration.data(), out, session, &counts),
+            problem,
             data: configuration.data(),
             ending: session.ending,
             mode: configuration.run.mode,

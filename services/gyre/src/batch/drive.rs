@@ -221,8 +221,7 @@ fn outcome_of_preflight(error: &PreflightError) -> DriveOutcome {
         PreflightError::SharedMemory { .. }
         | PreflightError::OpenFiles { .. }
         | PreflightError::NoSharedMemory(_) => DriveOutcome::Machine,
-        PreflightError::LiveGyro
-        | PreflightError::LiveWheels
+        PreflightError::LiveLog(_)
         | PreflightError::LiveDoppler
         | PreflightError::LiveGnss { .. } => DriveOutcome::Configuration,
     }

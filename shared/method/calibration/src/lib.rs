@@ -19,10 +19,12 @@
 //! - [`Found`]: the constants beside the configured ones, with what each rests on; [`toml()`]: as a
 //!   section of a configuration; [`svg`]: a place seen twice, before and after;
 //! - [`calibrate_gyro`], [`calibrate_wheels`]: the clock and the axes of a gyro, the clock and the
-//!   scale of the wheels, by the same track;
+//!   scale of the wheels, by the same track; [`delay()`]: the clock of either, by the motions of a
+//!   run;
 //! - [`Study`]: a drive with all that, and what several drives of one radar say together.
 
 mod calibrate;
+mod delay;
 mod drift;
 mod drive;
 mod error;
@@ -41,6 +43,7 @@ mod study;
 mod wheels;
 
 pub use calibrate::{Calibration, FactEstimate, calibrate};
+pub use delay::{Compared, delay};
 pub use drive::{Drive, Sweep, Track};
 pub use error::CalibrationError;
 pub use facts::{FACTS, Fact, FactMatrix, FactVector};

@@ -4,7 +4,7 @@ use gyre_messages::PoseHeader;
 use gyre_storage::{Checksum, Slots};
 
 /// The start of a journal, with the version of its records.
-pub(crate) const MAGIC: [u8; 16] = *b"gyre journal v11";
+pub(crate) const MAGIC: [u8; 16] = *b"gyre journal v12";
 /// The prefix of the start of a journal of any version.
 pub(crate) const ANY_VERSION: &[u8] = b"gyre journal v";
 const POSE: usize = size_of::<PoseHeader>();

@@ -36,7 +36,7 @@ impl Message for Motion {
         header.motion.check(limits)
     }
 }
-header!(MotionHeader, "gyre_motion_header_v10");
+header!(MotionHeader, "gyre_motion_header_v11");
 
 /// The pose of this scan's frame in the previous scan's frame, with its covariance.
 #[repr(C)]

@@ -33,7 +33,7 @@ impl Message for Pose {
         header.check(limits)
     }
 }
-header!(PoseHeader, "gyre_pose_header_v10");
+header!(PoseHeader, "gyre_pose_header_v11");
 
 /// A pose in the frame of the first scan, with the motion that led to it.
 #[repr(C)]

@@ -82,12 +82,18 @@ pub struct RefinementRecord {
     pub stationary: u64,
     /// The part of the gyro: see [`gyro`].
     pub gyro: u64,
+    /// Turn since the previous scan that the gyro measured, rad; zero without one.
+    pub gyro_turn_rad: f64,
+    /// True turn over that of the gyro, after the scan; zero without one.
+    pub gyro_scale: f64,
     /// Bias of the gyro after the scan, rad/s; zero without one.
     pub gyro_bias_radps: f64,
     /// Standard deviation of that bias, rad/s.
     pub gyro_bias_sigma_radps: f64,
     /// The part of the wheels: see [`wheels`].
     pub wheels: u64,
+    /// Distance since the previous scan that the wheels measured, m; zero without wheels.
+    pub wheel_distance_m: f64,
     /// True distance over that of the wheels, after the scan; zero without wheels.
     pub wheel_scale: f64,
     /// Standard deviation of that scale.
@@ -133,8 +139,11 @@ impl RefinementRecord {
         finite([
             ("overlap", self.overlap),
             ("support", self.support),
+            ("gyro_turn_rad", self.gyro_turn_rad),
+            ("gyro_scale", self.gyro_scale),
             ("gyro_bias_radps", self.gyro_bias_radps),
             ("gyro_bias_sigma_radps", self.gyro_bias_sigma_radps),
+            ("wheel_distance_m", self.wheel_distance_m),
             ("wheel_scale", self.wheel_scale),
             ("wheel_scale_sigma", self.wheel_scale_sigma),
             ("doppler_scale", self.doppler_scale),
@@ -166,6 +175,7 @@ impl From<&gyre_scan_matching::Refined> for RefinementRecord {
                 Some(Verdict::Doubted) => gyro::DOUBTED,
                 Some(Verdict::Refused) => gyro::REFUSED,
             },
+            gyro_scale: refined.gyro.map_or(0.0, |of| of.scale),
             gyro_bias_radps: refined.gyro.map_or(0.0, |bias| bias.rate_radps),
             gyro_bias_sigma_radps: refined.gyro.map_or(0.0, |bias| bias.sigma_radps),
             wheels: match refined.wheels {
@@ -182,6 +192,8 @@ impl From<&gyre_scan_matching::Refined> for RefinementRecord {
             },
             doppler_scale: refined.doppler.map_or(0.0, |of| of.scale),
             doppler_scale_sigma: refined.doppler.map_or(0.0, |of| of.sigma),
+            // What was measured is not known here.
+            ..Self::default()
         }
     }
 }

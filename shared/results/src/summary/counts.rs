@@ -5,16 +5,12 @@ use gyre_messages::{
 };
 use serde::Serialize;
 
+use super::sensors::{Clock, too_many};
+
 /// Largest share of unreadable scans of a run that succeeds. With more, motions span more than one
 /// scan too often for the trajectory to be the recording's.
 const MAX_UNREADABLE_SHARE: f64 = 0.2;
 
-/// Largest share of turns of a gyro that is refused, and of distances of wheels that slip, in a run
-/// that succeeds: beyond, the log is another one than its settings say. Fewer than the number say
-/// nothing.
-const MAX_REFUSED_SHARE: f64 = 0.1;
-const MAX_SLIPPING_SHARE: f64 = 0.5;
-const MIN_CONTRADICTIONS: u64 = 10;
 /// Largest share of motions without a firm match in a run that succeeds.
 const MAX_UNSURE_SHARE: f64 = 0.2;
 
@@ -97,6 +93,12 @@ pub struct GyroCounts {
     pub bias_radps: f64,
     /// Standard deviation of that bias, rad/s.
     pub bias_sigma_radps: f64,
+    /// True turn over that of the gyro, after the last of them.
+    pub scale: f64,
+    /// Time by which its stamps are later than its settings say, and the standard deviation, s;
+    /// `None`: the turns do not determine it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub delay_s: Option<[f64; 2]>,
 }
 
 impl GyroCounts {
@@ -108,6 +110,7 @@ impl GyroCounts {
             self.refused += u64::from(refinement.gyro == gyro::REFUSED);
             self.bias_radps = refinement.gyro_bias_radps;
             self.bias_sigma_radps = refinement.gyro_bias_sigma_radps;
+            self.scale = refinement.gyro_scale;
         }
     }
 }
@@ -126,6 +129,9 @@ pub struct WheelCounts {
     pub scale: f64,
     /// Standard deviation of that scale.
     pub scale_sigma: f64,
+    /// As that of a gyro.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub delay_s: Option<[f64; 2]>,
 }
 
 impl WheelCounts {
@@ -227,29 +233,11 @@ impl Counts {
         motions.filter(|it| too_many(it.unsure, it.refined + it.doubtful, MAX_UNSURE_SHARE))
     }
 
-    /// Returns the counts of a gyro that contradicts the radar so often that its settings must be
-    /// wrong.
-    pub fn gyro_contradicts(&self) -> Option<&GyroCounts> {
-        let gyro = self.gyro.as_ref();
-        gyro.filter(|it| too_many(it.refused, it.motions, MAX_REFUSED_SHARE))
-    }
-
-    /// Returns the counts of wheels that contradict the radar so often that their settings must be
-    /// wrong.
-    pub fn wheels_contradict(&self) -> Option<&WheelCounts> {
-        let wheels = self.wheels.as_ref();
-        wheels.filter(|it| too_many(it.slips, it.motions, MAX_SLIPPING_SHARE))
-    }
-
     /// Returns whether the result is hardly one of the recording.
     pub fn too_many_are_unreadable(&self) -> bool {
         let read = self.published + self.unreadable;
         self.unreadable as f64 > MAX_UNREADABLE_SHARE * read as f64
     }
-}
-
-fn too_many(contradictions: u64, motions: u64, max_share: f64) -> bool {
-    contradictions >= MIN_CONTRADICTIONS && contradictions as f64 > max_share * motions as f64
 }
 
 /// Counts the poses of a journal.
@@ -265,6 +253,8 @@ pub struct Counter {
     gyro: GyroCounts,
     wheels: WheelCounts,
     doppler: DopplerCounts,
+    gyro_clock: Clock,
+    wheel_clock: Clock,
 }
 
 impl Counter {
@@ -280,6 +270,12 @@ impl Counter {
         self.gyro.add(&pose.motion);
         self.wheels.add(&pose.motion);
         self.doppler.add(&pose.motion);
+        let (motion, of) = (&pose.motion, &pose.motion.refinement);
+        // A registered turn would depend on that of the gyro.
+        let turn = (of.gyro != gyro::NONE).then_some(of.gyro_turn_rad);
+        self.gyro_clock.add(pose, motion.searched[2], turn);
+        let distance = (of.wheels != wheels::NONE).then_some(of.wheel_distance_m);
+        self.wheel_clock.add(pose, motion.x_m, distance);
     }
 
     /// Returns the path, which is so long.
@@ -302,6 +298,9 @@ impl Counter {
         };
         let published = next(|item| item.published).unwrap_or(0);
         let seen = next(|item| item.scan).map_or(0, |next| next.saturating_sub(first as u64));
+        let (mut gyro, mut wheels) = (self.gyro, self.wheels);
+        gyro.delay_s = self.gyro_clock.delay_s(true);
+        wheels.delay_s = self.wheel_clock.delay_s(false);
         Counts {
             published,
             processed: self.processed,
@@ -311,8 +310,8 @@ impl Counter {
             breaks: self.starts.saturating_sub(1),
             lost: (self.lost.scans > 0).then_some(self.lost),
             motions: refines.then_some(self.motions),
-            gyro: (self.gyro.motions > 0).then_some(self.gyro),
-            wheels: (self.wheels.motions > 0).then_some(self.wheels),
+            gyro: (gyro.motions > 0).then_some(gyro),
+            wheels: (wheels.motions > 0).then_some(wheels),
             doppler: (self.doppler.motions > 0).then_some(self.doppler),
         }
     }

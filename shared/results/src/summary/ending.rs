@@ -119,8 +119,8 @@ impl Summary {
                 "motions predicted, since nothing matched",
             ),
             (
-                c.gyro.map_or(0, |gyro| gyro.refused),
-                "turns of the gyro refused",
+                c.gyro.map_or(0, |gyro| gyro.doubted + gyro.refused),
+                "turns of the gyro doubted or refused",
             ),
             (
                 c.wheels.map_or(0, |wheels| wheels.slips),
@@ -169,7 +169,8 @@ mod tests {
     };
 
     fn summary(rate: &str, counts: Counts, p99_us: f64) -> Summary {
-        let configuration = Configuration::of_overrides(&[format!("run.rate='{rate}'")]).unwrap();
+        let overrides = [format!("run.rate='{rate}'"), "gyro.kind='auto'".to_owned()];
+        let configuration = Configuration::of_overrides(&overrides).unwrap();
         let session = Session {
             scans: Some(466),
             resumed: 0,
@@ -250,11 +251,13 @@ look at     gyre report out/radiate --open; all figures:
     }
 
     #[test]
-    fn motions_without_a_match_and_sensors_that_contradict_the_radar_are_a_problem() {
-        let problem = |refused, slips, unsure| {
+    fn motions_without_a_match_and_sensors_that_are_wrong_or_unused_are_a_problem() {
+        let problem = |unsure, doubted, slips, scale, delay_s| {
             let gyro = GyroCounts {
                 motions: 400,
-                refused,
+                doubted,
+                scale,
+                delay_s: Some([delay_s, 0.03]),
                 ..GyroCounts::default()
             };
             let wheels = WheelCounts {
@@ -270,19 +273,22 @@ look at     gyre report out/radiate --open; all figures:
             let counts = Counts {
                 processed: 466,
                 motions: Some(motions),
-                gyro: Some(gyro),
+                gyro: (scale > 0.0).then_some(gyro),
                 wheels: Some(wheels),
                 ..Counts::default()
             };
             let summary = summary("max", counts, 1e6);
             let problem = summary.problem().map(ToString::to_string);
             assert_eq!(summary.in_brief().contains("\nproblem "), problem.is_some());
-            problem
+            problem.unwrap_or_default()
         };
-        assert!(problem(0, 0, 94).unwrap().contains(Problem::OF_MOTIONS));
-        assert_eq!(problem(40, 200, 93), None);
-        assert!(problem(41, 0, 0).unwrap().contains("41 of its 400 turns"));
-        assert!(problem(0, 201, 0).unwrap().contains("201 of their 400"));
+        assert_eq!(problem(93, 40, 200, 1.04, -0.11), "");
+        assert!(problem(94, 0, 0, 1.0, 0.0).contains(Problem::OF_MOTIONS));
+        assert!(problem(0, 41, 0, 1.0, 0.0).contains("41 of its 400 turns"));
+        assert!(problem(0, 0, 201, 1.0, 0.0).contains("201 of their 400"));
+        assert!(problem(0, 0, 0, 1.05, 0.0).contains("`gyro.scale` or"));
+        assert!(problem(0, 0, 0, 1.0, -0.3).contains("set gyro.late_s=-0.30"));
+        assert!(problem(0, 0, 0, 0.0, 0.0).contains("gyro.kind is set, but none of the 465"));
     }
 
     #[test]

@@ -23,6 +23,8 @@ const MIN_SHARE: f64 = 0.6;
 const INDEPENDENT: f64 = 2.0;
 /// Logarithm of the likelihood by which the best offset must exceed any other.
 const MIN_EVIDENCE: f64 = 5.0;
+/// Delays that are looked for in a run, s: those of buffers and of hosts that stall.
+const MAX_DELAY_S: f64 = 10.0;
 
 /// The axis and the offset that fit best.
 #[derive(Clone, Copy, Debug, Default)]
@@ -112,6 +114,26 @@ pub(crate) fn peak(turns: &[Turn], angles: &Angles) -> Result<Peak, NoPeak> {
         true => Err(NoPeak::Ambiguous { best, rival }),
         false => Ok(best),
     }
+}
+
+/// Finds the smallest delay about the axis z that fits about as well as the best one; `None` if
+/// that fits hardly better than none at all.
+pub(crate) fn nearest(turns: &[Turn], angles: &Angles) -> Option<Peak> {
+    let steps = (MAX_DELAY_S / STEP_S) as i32;
+    let delays = (-steps..=steps).map(|k| f64::from(k) * STEP_S);
+    let peaks = delays.map(|late_s| correlations(turns, angles, late_s)[2]);
+    let peaks: Vec<Peak> = peaks.filter(|peak| peak.turns >= MIN_TURNS).collect();
+    let strength = |peak: &Peak| peak.correlation.abs();
+    let best = *peaks
+        .iter()
+        .max_by(|a, b| strength(a).total_cmp(&strength(b)))?;
+    let independent = independent(turns);
+    let fits = |peak: &Peak| best.evidence(peak, independent) < MIN_EVIDENCE;
+    let fitting = peaks
+        .into_iter()
+        .filter(|it| it.correlation > 0.0 && fits(it));
+    let nearest = fitting.min_by(|a, b| a.late_s.abs().total_cmp(&b.late_s.abs()));
+    nearest.filter(|_| !fits(&Peak::default()))
 }
 
 /// The number of turns that are independent of each other, each as far as it turns: a straight road

@@ -1,0 +1,109 @@
+//! The use of gyro, wheels and GNSS in a run, and errors of their settings.
+
+use std::collections::VecDeque;
+
+use gyre_calibration::{Compared, delay};
+use gyre_configuration::Configuration;
+use gyre_messages::{PoseHeader, flag, initial_guess, outcome};
+
+use super::{Counts, GnssSummary};
+
+/// Largest share of turns of a gyro that is doubted or refused, and of distances of wheels that
+/// slip, in a run that succeeds: beyond, the log is another one than its settings say. Fewer than
+/// the number say nothing.
+const MAX_DOUBTED_SHARE: f64 = 0.1;
+const MAX_SLIPPING_SHARE: f64 = 0.5;
+const MIN_CONTRADICTIONS: u64 = 10;
+/// A delay of more than so many standard deviations is one.
+const DELAY_SIGMAS: f64 = 4.0;
+/// The last motions, of which the delay is measured: those of an hour.
+const MOTIONS_OF_DELAY: usize = 1 << 14;
+
+/// The motions by the radar alone and by a sensor, of which the delay is measured.
+#[derive(Debug, Default)]
+pub struct Clock(VecDeque<Compared>);
+
+impl Clock {
+    /// Adds the motion to a pose.
+    pub fn add(&mut self, pose: &PoseHeader, by_radar: f64, by_sensor: Option<f64>) {
+        if self.0.len() == MOTIONS_OF_DELAY {
+            self.0.pop_front();
+        }
+        let of = &pose.motion.refinement;
+        let is_seen = of.outcome == outcome::REFINED
+            && of.initial_guess != initial_guess::ALONG_WALLS
+            && !pose.item.is(flag::BREAK);
+        self.0.push_back(Compared {
+            stamp_ns: pose.item.stamp_ns,
+            interval_ns: pose.motion.interval_ns,
+            radar: is_seen.then_some(by_radar),
+            other: by_sensor,
+        });
+    }
+
+    /// Returns the delay and its standard deviation, s; `None` where it is not determined.
+    pub fn delay_s(mut self, has_bias: bool) -> Option<[f64; 2]> {
+        let delay = delay(self.0.make_contiguous(), has_bias)?;
+        Some([delay.value, delay.sigma])
+    }
+}
+
+/// Returns why a run has not used its sensors, or why their settings must be wrong.
+pub fn problem(
+    configuration: &Configuration,
+    counts: &Counts,
+    gnss: Option<&GnssSummary>,
+) -> Option<String> {
+    let config = &configuration.odometry;
+    // Without a refinement it is not known what gyro and wheels were used for.
+    let motions = counts.motions.map_or(0, |it| it.refined + it.doubtful);
+    let unused = [
+        ("gyro", config.gyro.is_used() && counts.gyro.is_none()),
+        ("wheels", config.wheels.is_used() && counts.wheels.is_none()),
+    ];
+    if let Some((section, _)) = unused.iter().find(|it| it.1 && motions > 0) {
+        return Some(format!(
+            "{section}.kind is set, but none of the {motions} motions has a measurement of it: no samples arrived, or they are farther apart than {section}.max_gap_s. `gyre inspect` shows the log of a recording, and {section}.kind=none leaves it out"
+        ));
+    }
+    let by_gyro = counts.gyro.and_then(|it| {
+        let is_wrong = too_many(it.doubted + it.refused, it.motions, MAX_DOUBTED_SHARE) || !config.gyro.allows_scale(it.scale);
+        let cause = cause("gyro", config.gyro.late_s, it.delay_s, is_wrong)?;
+        let (doubts, turns) = (it.doubted + it.refused, it.motions);
+        Some(format!(
+            "the gyro contradicts the radar: {doubts} of its {turns} turns were doubted or refused; {cause}, and gyro.kind=none leaves it out"
+        ))
+    });
+    let by_wheels = || {
+        let it = counts.wheels?;
+        let is_wrong = too_many(it.slips, it.motions, MAX_SLIPPING_SHARE);
+        let cause = cause("wheels", config.wheels.late_s, it.delay_s, is_wrong)?;
+        let (slips, distances) = (it.slips, it.motions);
+        Some(format!(
+            "the wheels contradict the radar: {slips} of their {distances} distances are not those that it sees; {cause}, and wheels.kind=none leaves them out"
+        ))
+    };
+    let unused_fixes = gnss.and_then(GnssSummary::refusal);
+    let by_gnss = || Some(format!("the fixes of GNSS are not used: {}", unused_fixes?));
+    by_gyro.or_else(by_wheels).or_else(by_gnss)
+}
+
+/// Returns which key of a section is wrong: by a delay, if that is certain.
+fn cause(section: &str, late_s: f64, delay_s: Option<[f64; 2]>, is_wrong: bool) -> Option<String> {
+    match delay_s {
+        Some([delay_s, sigma_s]) if delay_s.abs() > DELAY_SIGMAS * sigma_s => Some(format!(
+            "the stamps are late by {delay_s:.2} \u{b1} {sigma_s:.2} s: set {section}.late_s={:.2}, which `gyre calibrate` finds too",
+            late_s + delay_s
+        )),
+        _ => is_wrong.then(|| {
+            format!(
+                "`gyro.up`, `{section}.late_s`, `{section}.scale` or the unit of the log is wrong: `gyre calibrate` finds them from a recording"
+            )
+        }),
+    }
+}
+
+/// Returns whether contradictions are more than chance, and more than this share of all motions.
+pub fn too_many(contradictions: u64, motions: u64, max_share: f64) -> bool {
+    contradictions >= MIN_CONTRADICTIONS && contradictions as f64 > max_share * motions as f64
+}
