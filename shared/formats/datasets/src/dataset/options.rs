@@ -85,7 +85,7 @@ impl DatasetOptions {
     /// The first of them.
     pub fn check(&self) -> Result<(), OpenError> {
         let check = |key, value: Option<f32>, bounds: RangeInclusive<f32>, reason| match value {
-            Some(v) if !bounds.contains(&v) => Err(self.invalid(key, value, reason)),
+            Some(v) if !bounds.contains(&v) => Err(Self::invalid(None, key, value, reason)),
             _ => Ok(()),
         };
         check(
@@ -140,12 +140,9 @@ impl DatasetOptions {
 
     /// Rejects the option of bags, for images.
     pub(crate) fn check_without_topics(&self, format: Format) -> Result<(), OpenError> {
-        let options = Self {
-            format: Some(format),
-            ..*self
-        };
         match self.topic {
-            Some(_) => Err(options.invalid(
+            Some(_) => Err(Self::invalid(
+                Some(format),
                 "topic",
                 self.topic,
                 "images have no topics; leave the key out",
@@ -156,19 +153,17 @@ impl DatasetOptions {
 
     /// Rejects options that require an encoder, for images without encoder counts.
     pub(crate) fn check_without_encoder(&self, format: Format) -> Result<(), OpenError> {
-        let options = Self {
-            format: Some(format),
-            ..*self
-        };
         if self.encoder_counts.is_some() {
-            return Err(options.invalid(
+            return Err(Self::invalid(
+                Some(format),
                 "encoder_counts",
                 self.encoder_counts,
                 "its images have no encoder counts",
             ));
         }
         if self.azimuth_source == Some(AzimuthSource::Encoder) {
-            return Err(options.invalid(
+            return Err(Self::invalid(
+                Some(format),
                 "azimuth_source",
                 Some("encoder"),
                 "its images have no encoder counts",
@@ -178,7 +173,7 @@ impl DatasetOptions {
     }
 
     fn invalid(
-        &self,
+        format: Option<Format>,
         key: &'static str,
         value: Option<impl fmt::Display>,
         reason: &'static str,
@@ -186,7 +181,7 @@ impl DatasetOptions {
         OpenError::BadOption {
             key,
             value: value.map(|v| v.to_string()).unwrap_or_default(),
-            format: self.format,
+            format,
             reason,
         }
     }
