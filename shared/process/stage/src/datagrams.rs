@@ -21,16 +21,13 @@ pub(crate) fn listen(what: &str, section: &str, address: &str) -> Result<UdpSock
     })
 }
 
-/// What is read in a turn, bytes: the samples of a scan, or as many datagrams of a line each, which
-/// count as [`LEAST_BYTES`], as a socket holds by default.
+/// Bytes of a turn: the samples of a scan, or as many datagrams of a line each, which count as
+/// [`LEAST_BYTES`], as a socket holds by default.
 pub(crate) const TURN_BYTES: usize = 1 << 16;
 const LEAST_BYTES: usize = 128;
 
 /// Receives a datagram that has arrived, and returns its size; `None` where there is none, and
 /// where nothing is `left` of the turn, so that a sender without a pause holds nothing up.
-///
-/// # Errors
-/// The socket fails.
 pub(crate) fn receive(
     socket: &UdpSocket,
     datagram: &mut [u8],

@@ -37,7 +37,7 @@ pub(super) struct LiveSensors {
 struct Live {
     samples: LiveSamples,
     socket: Option<UdpSocket>,
-    /// Parses a line of a datagram.
+    /// Parses a line of a datagram; `None` for one that is no sample.
     parse: fn(&str) -> Option<Sample>,
     /// Lines of datagrams that are no samples.
     unreadable: usize,
@@ -169,8 +169,8 @@ impl Live {
         };
         let mut left = TURN_BYTES;
         while let Some(bytes) = receive(socket, datagram, &mut left)? {
-            for sample in samples_in(&datagram[..bytes], self.parse) {
-                match sample {
+            for line in lines(&datagram[..bytes]) {
+                match (self.parse)(line) {
                     Some(sample) => self.samples.add(&sample),
                     None => self.unreadable += 1,
                 }
@@ -178,14 +178,6 @@ impl Live {
         }
         Ok(())
     }
-}
-
-/// Returns the samples of a datagram, line by line; `None` for one that is no sample.
-fn samples_in(
-    datagram: &[u8],
-    parse: fn(&str) -> Option<Sample>,
-) -> impl Iterator<Item = Option<Sample>> {
-    lines(datagram).map(parse)
 }
 
 /// Parses a sample of a gyro: a stamp, ns, and the rates about x, y and z, rad/s; then, if they are
@@ -216,7 +208,7 @@ mod tests {
     #[test]
     fn a_datagram_has_a_sample_in_each_line() {
         let text = b"1700000000000000001, 0.1,-0.2,0.3\n1700000000000000002,0,0,1e-3,0.5,0,9.8\n";
-        let found: Vec<_> = samples_in(text, rates).collect();
+        let found: Vec<_> = lines(text).map(rates).collect();
         let expected = |stamp_ns, values| {
             Some(Sample {
                 stamp_ns,
@@ -246,18 +238,20 @@ mod tests {
             b"1700000000000000001,0,x,0",
             b"\xff\xfe",
         ] {
-            let found: Vec<_> = samples_in(text, rates).collect();
+            let found: Vec<_> = lines(text).map(rates).collect();
             assert_eq!(found, [None], "{text:?}");
         }
         for text in [&b"hello"[..], b"17", b"17,x", b"1.5,3", b"17,3,4", b"\xff"] {
-            let found: Vec<_> = samples_in(text, speed).collect();
+            let found: Vec<_> = lines(text).map(speed).collect();
             assert_eq!(found, [None], "{text:?}");
         }
     }
 
     #[test]
     fn a_line_of_the_wheels_has_a_stamp_and_a_speed() {
-        let found: Vec<_> = samples_in(b"1700000000000000001, 8.25\n17,-1\n", speed).collect();
+        let found: Vec<_> = lines(b"1700000000000000001, 8.25\n17,-1\n")
+            .map(speed)
+            .collect();
         let first = Sample::speed(1_700_000_000_000_000_001, 8.25);
         assert_eq!(found, [Some(first), Some(Sample::speed(17, -1.0))]);
     }
