@@ -219,10 +219,7 @@ impl Recorded {
 
     /// Finds the constants, prints them, and draws the drive.
     fn study(self, picture: &Path) -> Result<Study, Failure> {
-        print::note(format_args!(
-            "comparing the scans of {}, ~1 s each",
-            self.name
-        ));
+        print::note(format_args!("comparing {}, 1 s a scan", self.name));
         let study = Study::new(self.drive, &self.configured)?;
         print::line(format_args!("{}: {}", self.name, study.found))?;
         storage::write(picture, svg(&study.drive, &study.calibration))?;

@@ -451,6 +451,7 @@ mod tests {
                 outcome,
                 initial_guess,
                 stationary: u64::from(outcome == outcome::WEAK),
+                wheels: u64::from(initial_guess == initial_guess::SEARCH) * wheels::USED,
                 ..RefinementRecord::default()
             };
             PoseHeader {
@@ -469,13 +470,15 @@ mod tests {
             (outcome::REFINED, initial_guess::ALONG_WALLS),
             (outcome::WEAK, initial_guess::SEARCH),
             (outcome::PREDICTED, initial_guess::NONE),
+            (outcome::PREDICTED, initial_guess::SEARCH),
         ];
         let counts = counted(&poses.map(pose)).counts(None, 0, true);
         let expected = MotionCounts {
             refined: 4,
             weak: 1,
-            predicted: 1,
-            doubtful: 2,
+            predicted: 2,
+            doubtful: 3,
+            unsure: 2,
             second_hypothesis: 2,
             stationary: 1,
             along_walls: 1,
