@@ -25,7 +25,7 @@ use gyre_terminal::{Failure, print};
 use crate::{
     judgement::{Judgement, judge, judge_motions, note_time_offset},
     out::Out,
-    summary::{GnssSummary, Measured, Session, SlamSummary, Summary},
+    summary::{Measured, Session, SlamSummary, Summary},
 };
 use estimate::Estimate;
 use files::Files;

@@ -226,11 +226,8 @@ impl Summary {
             slam,
             gnss,
         } = measured;
-        // The run of a radar has no other end than an interruption.
-        let has_ended = match session.ending {
-            Some(Ending::Interrupted) => configuration.is_radar(),
-            ending => ending.is_some(),
-        };
+        let has_ended = session.ending == Some(Ending::Complete)
+            || session.ending.is_some() && configuration.is_radar();
         let of_sensors = || sensors::problem(configuration, &counts, gnss.as_ref());
         let problem = Problem::of(&configuration.data(), out, session, &counts)
             .or_else(|| of_sensors().filter(|_| has_ended).map(Problem));

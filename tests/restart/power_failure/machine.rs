@@ -91,6 +91,7 @@ impl Machine {
     pub fn run(&self, folder: &Path) -> Result<(), Failure> {
         let out = Out::lock(folder)?;
         let resumed = match Earlier::of(&out, &self.configuration, &self.programs, false)? {
+            Earlier::Foreign(reason) => return Err(reason),
             Earlier::Ended(begun) => begun.poses,
             Earlier::Unfinished(begun) => self.go_on(&out, Some(begun))?,
             Earlier::Nothing | Earlier::WithoutPoses(_) | Earlier::Complete(_) => {

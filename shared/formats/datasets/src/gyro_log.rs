@@ -118,8 +118,7 @@ impl GyroLog {
         })
     }
 
-    /// Returns the axis that points up: the configured one, or else that along which the log
-    /// measures gravity, or that of its format beside scans of a dataset.
+    /// Returns the axis that points up: the configured one, or that by gravity or the format.
     ///
     /// # Errors
     /// Both contradict each other.

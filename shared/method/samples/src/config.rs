@@ -9,8 +9,7 @@ use crate::{
     bounds::{Bounds, SampleConfigError},
 };
 
-/// Standard deviation by which a scale may differ from 1 in any case: an axis leans by up to 8
-/// degrees, by its mount, in bends and on slopes.
+/// Least standard deviation of a scale: an axis leans by up to 8 degrees, in bends and on slopes.
 const LEANING: f64 = 0.01;
 
 /// Configuration of the gyro: section `[gyro]`.

@@ -192,7 +192,6 @@ impl From<&gyre_scan_matching::Refined> for RefinementRecord {
             },
             doppler_scale: refined.doppler.map_or(0.0, |of| of.scale),
             doppler_scale_sigma: refined.doppler.map_or(0.0, |of| of.sigma),
-            // What was measured is not known here.
             ..Self::default()
         }
     }

@@ -95,9 +95,7 @@ pub struct GyroCounts {
     pub bias_sigma_radps: f64,
     /// True turn over that of the gyro, after the last of them.
     pub scale: f64,
-    /// Time by which its stamps are later than its settings say, and the standard deviation, s;
-    /// `None`: the turns do not determine it.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    /// Time by which its stamps are late, and its standard deviation, s; `None`: it is unknown.
     pub delay_s: Option<[f64; 2]>,
 }
 
@@ -130,7 +128,6 @@ pub struct WheelCounts {
     /// Standard deviation of that scale.
     pub scale_sigma: f64,
     /// As that of a gyro.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub delay_s: Option<[f64; 2]>,
 }
 

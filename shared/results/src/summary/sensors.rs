@@ -8,9 +8,8 @@ use gyre_messages::{PoseHeader, flag, initial_guess, outcome};
 
 use super::{Counts, GnssSummary};
 
-/// Largest share of turns of a gyro that is doubted or refused, and of distances of wheels that
-/// slip, in a run that succeeds: beyond, the log is another one than its settings say. Fewer than
-/// the number say nothing.
+/// Largest shares of turns that are doubted or refused, and of distances of slipping wheels, in a
+/// run that succeeds. Fewer contradictions than the number say nothing.
 const MAX_DOUBTED_SHARE: f64 = 0.1;
 const MAX_SLIPPING_SHARE: f64 = 0.5;
 const MIN_CONTRADICTIONS: u64 = 10;
@@ -56,7 +55,8 @@ pub fn problem(
 ) -> Option<String> {
     let config = &configuration.odometry;
     // Without a refinement it is not known what gyro and wheels were used for.
-    let motions = counts.motions.map_or(0, |it| it.refined + it.doubtful);
+    let motions = counts.processed.saturating_sub(1 + counts.breaks);
+    let motions = counts.motions.map_or(0, |_| motions);
     let unused = [
         ("gyro", config.gyro.is_used() && counts.gyro.is_none()),
         ("wheels", config.wheels.is_used() && counts.wheels.is_none()),
@@ -69,18 +69,19 @@ pub fn problem(
     let by_gyro = counts.gyro.and_then(|it| {
         let is_wrong = too_many(it.doubted + it.refused, it.motions, MAX_DOUBTED_SHARE) || !config.gyro.allows_scale(it.scale);
         let cause = cause("gyro", config.gyro.late_s, it.delay_s, is_wrong)?;
-        let (doubts, turns) = (it.doubted + it.refused, it.motions);
+        let doubts = it.doubted + it.refused;
         Some(format!(
-            "the gyro contradicts the radar: {doubts} of its {turns} turns were doubted or refused; {cause}, and gyro.kind=none leaves it out"
+            "the gyro contradicts the radar: {doubts} of its {} turns were doubted or refused; {cause}, and gyro.kind=none leaves it out",
+            it.motions
         ))
     });
     let by_wheels = || {
         let it = counts.wheels?;
         let is_wrong = too_many(it.slips, it.motions, MAX_SLIPPING_SHARE);
         let cause = cause("wheels", config.wheels.late_s, it.delay_s, is_wrong)?;
-        let (slips, distances) = (it.slips, it.motions);
         Some(format!(
-            "the wheels contradict the radar: {slips} of their {distances} distances are not those that it sees; {cause}, and wheels.kind=none leaves them out"
+            "the wheels contradict the radar: {} of their {} distances are not those that it sees; {cause}, and wheels.kind=none leaves them out",
+            it.slips, it.motions
         ))
     };
     let unused_fixes = gnss.and_then(GnssSummary::refusal);

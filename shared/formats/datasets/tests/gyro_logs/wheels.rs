@@ -153,7 +153,6 @@ fn a_counter_that_runs_over_counts_on() {
     for (range, least, from) in [
         (256.0, -128.0, 77.0),
         (65_536.0, 0.0, 65_000.0),
-        (4_294_967_296.0, 0.0, 4_294_967_000.0),
         (1000.0, 1.0, 5.0),
     ] {
         let over = |count: f64| (count + from).rem_euclid(range) + least;

@@ -283,6 +283,11 @@ impl Refiner {
         if self.gyro.allows_scale(heading.scale) {
             return weighed;
         }
+        if heading.verdict == Verdict::Doubted {
+            // One match that errs says no more of the scale.
+            heading.scale = 1.0;
+            return weighed;
+        }
         heading.verdict = Verdict::Refused;
         heading.adopt(&registered, &self.state.pose)
     }
