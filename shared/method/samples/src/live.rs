@@ -177,8 +177,10 @@ mod tests {
             add(0, before);
             add(YEAR_NS, ahead);
             add(before * MS, after);
-            let (samples, left_out) = live.of_scan([end_ns - 100 * MS, end_ns]);
-            let expected = (before + after).min(200) - lost;
+            let sweep = [end_ns - 100 * MS, end_ns];
+            let (samples, left_out) = live.of_scan(sweep);
+            let of_scan = (end_ns - interval_of(sweep)[0]) / MS;
+            let expected = (before + after).min(of_scan) - lost;
             assert_eq!(
                 (samples.len() as i64, left_out as i64),
                 (expected, ahead + lost)
