@@ -45,7 +45,7 @@ class Hop(Message):
 class Item(Message):
     """The scan that a message is about; every header begins with it."""
 
-    NAME = "gyre_item_v5"
+    NAME = "gyre_item_v6"
     _fields_ = [
         ("seq", c_uint64),
         ("scan", c_uint64),
@@ -56,14 +56,13 @@ class Item(Message):
         ("due_ns", c_int64),
         ("generation", c_uint32),
         ("flags", c_uint32),
-        ("lost", c_uint16 * 2 * 7),
-        ("lost_count", c_uint32),
+        ("lost", c_uint16 * 3 * 8),
         ("hops", Hop * STAGES),
     ]
 
 
 class ScanHeader(Message):
-    NAME = "gyre_scan_header_v6"
+    NAME = "gyre_scan_header_v7"
     _fields_ = [
         ("item", Item),
         ("azimuths", c_uint32),
@@ -98,7 +97,7 @@ class DopplerVelocity(Message):
 
 
 class MaskedHeader(Message):
-    NAME = "gyre_masked_header_v8"
+    NAME = "gyre_masked_header_v9"
     _fields_ = [
         ("item", Item),
         ("n", c_uint32),

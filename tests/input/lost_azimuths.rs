@@ -74,7 +74,7 @@ fn lost_azimuths_are_counted_and_put_back_in_an_export() {
     let lost: usize = stale_before.iter().sum();
     let repaired = stale_before.iter().filter(|stale| **stale > 0).count();
     assert!(lost > repaired && repaired > 5, "{stale_before:?}");
-    let counts = json!({"scans": repaired, "azimuths": lost});
+    let counts = json!({"scans": repaired, "azimuths": lost, "unplaced": 0});
     assert_eq!(run.summary()["lost"], counts);
 
     let out = run.folder().join("repaired");

@@ -67,17 +67,17 @@ fn layouts() -> [(&'static str, Layout); 12] {
             layout!(Hop: received_ns, started_ns, finished_ns, published_ns),
         ),
         (
-            "gyre_item_v5",
+            "gyre_item_v6",
             layout!(Item: seq, scan, previous_scan, published, numbered_from, stamp_ns, due_ns, generation,
-                flags, lost, lost_count, hops),
+                flags, lost, hops),
         ),
         (
-            "gyre_scan_header_v6",
+            "gyre_scan_header_v7",
             layout!(ScanHeader: item, azimuths, bins, stride, first_byte, range_resolution_m, range_offset_m, clockwise,
                 doppler_s, samples, samples_left_out, azimuth_stamp_ns, azimuth_rad, azimuth_flags),
         ),
         (
-            "gyre_masked_header_v8",
+            "gyre_masked_header_v9",
             layout!(MaskedHeader: item, n, rasters, cell_m, mask, twist, compensated, points, azimuth_variance_rad2, gyro, has_gyro,
                 wheels, has_wheels, doppler, has_doppler),
         ),

@@ -294,8 +294,11 @@ impl fmt::Display for Summary {
             c.published, c.dropped, c.unreadable, c.missing, c.breaks
         )?;
         if let Some(lost) = &c.lost {
-            let LostCounts { scans, azimuths } = lost;
-            writeln!(f, "lost azimuths {azimuths} in {scans} scans")?;
+            let (azimuths, scans, unplaced) = (lost.azimuths, lost.scans, lost.unplaced);
+            writeln!(
+                f,
+                "lost azimuths {azimuths} in {scans} scans  unplaced {unplaced}"
+            )?;
         }
         if let Some(m) = &c.motions {
             writeln!(

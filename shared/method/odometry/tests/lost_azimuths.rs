@@ -64,7 +64,7 @@ fn all_are_counted_and_lie_where_they_are_said_to_be() {
                 Twist::from_motion(&motion(&drive, index - 2), interval_s)
             });
             let found = finder.find(&scan.view(), twist);
-            for (row, [first, last]) in lost.iter().zip(found.rows()) {
+            for (row, [first, last, _]) in lost.iter().zip(found.gaps()) {
                 places += 1;
                 // The interval has the mean and the variance of the place, not all of it.
                 let (first, last) = (usize::from(*first), usize::from(*last));

@@ -16,7 +16,10 @@ mod repair;
 #[cfg(test)]
 mod tests;
 
-use std::f32::consts::{PI, TAU};
+use std::{
+    f32::consts::{PI, TAU},
+    mem::swap,
+};
 
 use gyre_geometry::Twist;
 
@@ -25,13 +28,17 @@ use crate::{
     scan::{MAX_AZIMUTHS, PolarScan, flag},
 };
 use alignment::Alignment;
-use echoes::{Echoes, Layout};
+use echoes::Echoes;
 use prediction::{Motion, Prediction};
 
 pub use repair::repair;
 
-/// The largest number of lost azimuths in a turn. A turn that lost more is used as it is.
-pub const MAX_LOST: usize = 7;
+/// The largest number of lost azimuths that are placed: two bursts of a tenth of RADIATE's turn.
+pub const MAX_LOST: usize = 80;
+/// The largest number of gaps in a turn: places where azimuths were lost together.
+pub const MAX_GAPS: usize = 8;
+/// The largest number of lost azimuths that are placed one by one. More are lost in bursts.
+const MAX_SINGLE: usize = 7;
 
 /// The least azimuths of a turn in which places are found.
 const MIN_AZIMUTHS: usize = 64;
@@ -40,61 +47,80 @@ const MIN_AZIMUTHS: usize = 64;
 /// accelerates by 1.2 m/s² for half a second.
 const FASTER_MPS: [f64; 3] = [0.0, -0.6, 0.6];
 
-/// Where azimuths of a turn were lost, in order: each before one of the rows between two, which are
-/// equally likely.
+/// Where azimuths of a turn were lost: gaps in order, each before one of the rows between two,
+/// which are equally likely.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LostAzimuths {
-    count: usize,
-    between: [[u16; 2]; MAX_LOST],
+    gaps: [[u16; 3]; MAX_GAPS],
 }
 
 impl LostAzimuths {
-    /// Creates it from the first and the last row before which each azimuth may have been lost. Of
-    /// more than [`MAX_LOST`] the first are taken.
-    pub fn between(rows: impl IntoIterator<Item = [u16; 2]>) -> Self {
+    /// Creates it from gaps: the first and the last row before which azimuths may have been lost,
+    /// and their number. A number of 0 ends the gaps; of more than [`MAX_GAPS`] the first are taken.
+    pub fn of_gaps(gaps: impl IntoIterator<Item = [u16; 3]>) -> Self {
         let mut lost = Self::default();
-        for (rows, between) in rows.into_iter().zip(&mut lost.between) {
-            *between = rows;
-            lost.count += 1;
-        }
+        let gaps = gaps.into_iter().take_while(|[.., azimuths]| *azimuths > 0);
+        lost.gaps
+            .iter_mut()
+            .zip(gaps)
+            .for_each(|(to, gap)| *to = gap);
         lost
     }
 
-    /// Says that each may have been lost anywhere in a turn of `azimuths`.
+    /// Creates gaps of one azimuth each.
+    pub fn between(rows: impl IntoIterator<Item = [u16; 2]>) -> Self {
+        Self::of_gaps(rows.into_iter().map(|[first, last]| [first, last, 1]))
+    }
+
+    /// Returns azimuths that may have been lost anywhere in a turn of `azimuths`: few of them one
+    /// by one, more of them together.
     pub fn anywhere(count: usize, azimuths: usize) -> Self {
-        let measured = azimuths.saturating_sub(count) as u16;
-        Self::between((0..count).map(|_| [0, measured]))
+        let last = azimuths.saturating_sub(count) as u16;
+        match count {
+            0..=MAX_SINGLE => Self::between((0..count).map(|_| [0, last])),
+            _ => Self::of_gaps([[0, last, count as u16]]),
+        }
     }
 
     /// Returns the number of lost azimuths.
     pub fn count(&self) -> usize {
-        self.count
+        self.gaps.iter().map(|gap| usize::from(gap[2])).sum()
     }
 
-    /// Returns, in order, the first and the last row before which each may have been lost.
-    pub fn rows(&self) -> &[[u16; 2]] {
-        &self.between[..self.count]
+    /// Returns, in order, the first and the last row before which azimuths may have been lost, and
+    /// their number.
+    pub fn gaps(&self) -> &[[u16; 3]] {
+        let count = self.gaps.iter().take_while(|gap| gap[2] > 0).count();
+        &self.gaps[..count]
+    }
+
+    /// Returns the number of azimuths in gaps of several whose place is unknown: it may be before
+    /// more rows than the gap has azimuths.
+    pub fn unplaced(&self) -> usize {
+        let is_unknown = |gap: &&[u16; 3]| gap[2] > 1 && gap[1] - gap[0] > gap[2];
+        let unknown = self.gaps().iter().filter(is_unknown);
+        unknown.map(|gap| usize::from(gap[2])).sum()
     }
 
     /// Returns the variance of the mean of the rows' azimuths by what is not known of the places,
     /// rad², in a turn of `azimuths`.
     pub fn variance_of_mean_rad2(&self, azimuths: usize) -> f32 {
-        let measured = azimuths.saturating_sub(self.count).max(1) as f32;
-        // The mean falls back by a step for each row behind the place: its variance is that of one
+        let measured = azimuths.saturating_sub(self.count()).max(1) as f32;
+        // The mean falls back by the gap for each row behind the place: its variance is that of one
         // of n places, (n² - 1) / 12.
-        let of_places = self.rows().iter().map(|[first, last]| {
+        let of_gaps = self.gaps().iter().map(|[first, last, azimuths]| {
             let places = f32::from(last - first) + 1.0;
-            (places * places - 1.0) / 12.0
+            f32::from(*azimuths).powi(2) * (places * places - 1.0) / 12.0
         });
         let step_rad = TAU / azimuths.max(1) as f32;
-        of_places.sum::<f32>() * (step_rad / measured).powi(2)
+        of_gaps.sum::<f32>() * (step_rad / measured).powi(2)
     }
 
     /// Returns the azimuth at which a row is expected to have been measured, in steps of the turn.
     fn azimuth_of(&self, row: f32) -> f32 {
-        let lost = self.rows().iter().map(|rows| {
-            let [first, last] = rows.map(f32::from);
-            ((row - first + 1.0) / (last - first + 1.0)).clamp(0.0, 1.0)
+        let lost = self.gaps().iter().map(|gap| {
+            let [first, last, azimuths] = gap.map(f32::from);
+            azimuths * ((row - first + 1.0) / (last - first + 1.0)).clamp(0.0, 1.0)
         });
         row + lost.sum::<f32>()
     }
@@ -107,15 +133,17 @@ pub struct LostAzimuthFinder {
     rows: Echoes,
     /// The scan before.
     previous: Option<Previous>,
+    /// Its echoes, each at its azimuth: only where the next scan has lost some.
+    placed: Echoes,
     prediction: Prediction,
     alignment: Alignment,
 }
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 struct Previous {
     stamp_ns: i64,
-    /// Each at its azimuth.
-    echoes: Echoes,
+    rows: Echoes,
+    lost: LostAzimuths,
 }
 
 impl LostAzimuthFinder {
@@ -131,10 +159,12 @@ impl LostAzimuthFinder {
             (_, _, 0) => LostAzimuths::default(),
             (Some(previous), Some(twist), _)
                 if continues(previous.stamp_ns, scan.geometry.stamp_ns)
-                    && previous.echoes.layout == Layout::of(scan)
+                    && previous.rows.layout == self.rows.layout
                     && scan.geometry.azimuths >= MIN_AZIMUTHS
-                    && previous.echoes.layout.cells > 1 =>
+                    && self.rows.layout.cells > 1
+                    && count <= MAX_LOST =>
             {
+                self.placed.place(&previous.rows, &previous.lost);
                 self.alignment.begin();
                 for faster_mps in FASTER_MPS {
                     let twist = Twist {
@@ -142,7 +172,7 @@ impl LostAzimuthFinder {
                         ..twist
                     };
                     let motion = Motion::new(previous.stamp_ns, scan, &twist);
-                    self.prediction.make(&previous.echoes, &motion);
+                    self.prediction.make(&self.placed, &motion);
                     self.alignment.add(&self.prediction, &self.rows, count);
                 }
                 self.alignment.found(scan.geometry.azimuths - count, count)
@@ -174,12 +204,10 @@ impl LostAzimuthFinder {
     }
 
     fn remember(&mut self, scan: &PolarScan<'_>, lost: &LostAzimuths) {
-        let previous = self.previous.get_or_insert_with(|| Previous {
-            stamp_ns: 0,
-            echoes: Echoes::default(),
-        });
+        let previous = self.previous.get_or_insert_default();
         previous.stamp_ns = scan.geometry.stamp_ns;
-        previous.echoes.place(&self.rows, lost);
+        previous.lost = *lost;
+        swap(&mut previous.rows, &mut self.rows);
     }
 
     /// Forgets the scan before.
@@ -216,10 +244,10 @@ impl PlacedRows {
             let after = (before + 1).min(azimuths - 1);
             let (start, end) = (scan.azimuth_rad[before], scan.azimuth_rad[after]);
             // Angles may wrap around anywhere.
-            let step = (end - start + PI).rem_euclid(TAU) - PI;
+            let step = || (end - start + PI).rem_euclid(TAU) - PI;
             self.azimuth_rad.push(match share == 0.0 {
                 true => start,
-                false => (start + share * step).rem_euclid(TAU),
+                false => (start + share * step()).rem_euclid(TAU),
             });
             let (start, end) = (scan.stamp_ns[before], scan.stamp_ns[after]);
             let passed_ns = share as f64 * (end - start) as f64;
@@ -238,6 +266,6 @@ impl PlacedRows {
 pub fn stale_rows(scan: &PolarScan<'_>) -> usize {
     let rows = scan.flags.iter().rev();
     let stale = rows.take_while(|flags| **flags & flag::STALE != 0).count();
-    // No radar has so few azimuths that most of them may be lost.
-    stale.min(MAX_LOST).min(scan.geometry.azimuths / 2)
+    // Half a turn at least is taken as measured.
+    stale.min(scan.geometry.azimuths / 2)
 }

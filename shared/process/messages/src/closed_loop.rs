@@ -32,7 +32,7 @@ impl Message for Loop {
         header.check(limits)
     }
 }
-header!(LoopHeader, "gyre_loop_header_v3");
+header!(LoopHeader, "gyre_loop_header_v4");
 
 /// The pose of the later keyframe in the frame of the earlier one.
 #[repr(C)]

@@ -34,7 +34,7 @@ impl Message for Correction {
         header.check()
     }
 }
-header!(CorrectionHeader, "gyre_correction_header_v3");
+header!(CorrectionHeader, "gyre_correction_header_v4");
 
 /// The pose of the odometry frame in the map frame.
 #[repr(C)]

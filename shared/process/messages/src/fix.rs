@@ -45,7 +45,7 @@ impl Message for Fix {
         header.check()
     }
 }
-header!(FixHeader, "gyre_fix_header_v3");
+header!(FixHeader, "gyre_fix_header_v4");
 
 /// The pose of a keyframe in the map's frame; all zero if it is lost.
 #[repr(C)]

@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use gyre_radar::{LostAzimuths, MAX_AZIMUTHS, lost::MAX_LOST};
+use gyre_radar::{LostAzimuths, MAX_AZIMUTHS, lost::MAX_GAPS};
 
 use crate::check::{Violation, require};
 
@@ -131,11 +131,10 @@ pub struct Item {
     pub generation: u32,
     /// Bits of [`flag`].
     pub flags: u32,
-    /// The first and the last row before which each azimuth that was lost may have been, as masking
-    /// has found them. With the pose they are kept for a masking that is restarted.
-    pub lost: [[u16; 2]; MAX_LOST],
-    /// Number of azimuths that were lost.
-    pub lost_count: u32,
+    /// Gaps where azimuths were lost, as masking has found them: the first and the last row before
+    /// which a gap may be, and its number of azimuths, 0 behind the last gap. With the pose they are
+    /// kept for a masking that is restarted.
+    pub lost: [[u16; 3]; MAX_GAPS],
     /// The time stamps of each stage.
     pub hops: Hops,
 }
@@ -143,16 +142,13 @@ pub struct Item {
 impl Item {
     /// Returns where azimuths were lost.
     pub fn lost_azimuths(&self) -> LostAzimuths {
-        LostAzimuths::between(self.lost.into_iter().take(self.lost_count as usize))
+        LostAzimuths::of_gaps(self.lost)
     }
 
     /// Notes where azimuths were lost.
     pub fn set_lost_azimuths(&mut self, lost: &LostAzimuths) {
-        (self.lost, self.lost_count) = Default::default();
-        for (kept, rows) in self.lost.iter_mut().zip(lost.rows()) {
-            *kept = *rows;
-            self.lost_count += 1;
-        }
+        self.lost = Default::default();
+        self.lost[..lost.gaps().len()].copy_from_slice(lost.gaps());
     }
 
     /// Checks the numbers.
@@ -173,18 +169,12 @@ impl Item {
             previous,
             format_args!("at most {}, its scan", self.scan),
         )?;
-        require(
-            self.lost_count as usize <= MAX_LOST,
-            "lost_count",
-            self.lost_count,
-            format_args!("at most {MAX_LOST}"),
-        )?;
-        for [first, last] in self.lost {
+        for [first, last, azimuths] in self.lost {
             require(
-                first <= last && usize::from(last) < MAX_AZIMUTHS,
+                first <= last && usize::from(last) + usize::from(azimuths) <= MAX_AZIMUTHS,
                 "lost",
-                format_args!("{first} to {last}"),
-                format_args!("two rows below {MAX_AZIMUTHS} in order"),
+                format_args!("{azimuths} before {first} to {last}"),
+                format_args!("two rows in order, within {MAX_AZIMUTHS} with the azimuths"),
             )?;
         }
         // The scan of the newest pose is sent again with its number.
@@ -245,6 +235,6 @@ mod tests {
     #[test]
     fn sizes_are_part_of_the_wire_format() {
         assert_eq!(size_of::<Hop>(), 32);
-        assert_eq!(size_of::<Item>(), 96 + 7 * 32);
+        assert_eq!(size_of::<Item>(), 112 + 7 * 32);
     }
 }

@@ -56,7 +56,7 @@ impl Message for Masked {
             + (limits.points * size_of::<SparsePoint>()).div_ceil(ByteBlock::LEN)
     }
 }
-header!(MaskedHeader, "gyre_masked_header_v8");
+header!(MaskedHeader, "gyre_masked_header_v9");
 
 /// Values of [`MaskedHeader::mask`].
 pub mod mask_kind {

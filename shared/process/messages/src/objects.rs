@@ -38,7 +38,7 @@ impl Message for Objects {
         header.check()
     }
 }
-header!(ObjectsHeader, "gyre_objects_header_v2");
+header!(ObjectsHeader, "gyre_objects_header_v3");
 
 /// The objects, in the frame of the odometry: that of the first scan.
 #[repr(C)]

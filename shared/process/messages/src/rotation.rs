@@ -33,7 +33,7 @@ impl Message for Rotation {
         header.rotation.check()
     }
 }
-header!(RotationHeader, "gyre_rotation_header_v5");
+header!(RotationHeader, "gyre_rotation_header_v6");
 
 /// An angle with its variance.
 #[repr(C)]

@@ -63,7 +63,7 @@ impl Message for Scan {
         }
     }
 }
-header!(ScanHeader, "gyre_scan_header_v6");
+header!(ScanHeader, "gyre_scan_header_v7");
 
 /// The geometry of a scan, and the measured angle and time of each azimuth.
 #[repr(C)]

@@ -68,13 +68,16 @@ pub struct LostCounts {
     pub scans: u64,
     /// Azimuths that were lost in all.
     pub azimuths: u64,
+    /// Those of bursts whose places are unknown.
+    pub unplaced: u64,
 }
 
 impl LostCounts {
     fn add(&mut self, item: &Item) {
-        let azimuths = item.lost_azimuths().count() as u64;
-        self.scans += u64::from(azimuths > 0);
-        self.azimuths += azimuths;
+        let lost = item.lost_azimuths();
+        self.scans += u64::from(lost.count() > 0);
+        self.azimuths += lost.count() as u64;
+        self.unplaced += lost.unplaced() as u64;
     }
 }
 
@@ -426,16 +429,18 @@ mod tests {
 
     #[test]
     fn lost_azimuths_count_where_there_are_any() {
-        let pose = |lost: &[[u16; 2]]| {
+        let pose = |lost: &[[u16; 3]]| {
             let mut pose = PoseHeader::default();
-            let lost = LostAzimuths::between(lost.iter().copied());
+            let lost = LostAzimuths::of_gaps(lost.iter().copied());
             pose.item.set_lost_azimuths(&lost);
             pose
         };
-        let poses = [pose(&[]), pose(&[[3, 9]]), pose(&[[1, 1], [7, 8]])];
+        let bursts = [[1, 1, 1], [7, 8, 12], [70, 99, 9]];
+        let poses = [pose(&[]), pose(&[[3, 99, 1]]), pose(&bursts)];
         let lost = LostCounts {
             scans: 2,
-            azimuths: 3,
+            azimuths: 23,
+            unplaced: 9,
         };
         assert_eq!(counted(&poses).counts(None, 0, false).lost, Some(lost));
         assert_eq!(counted(&poses[..1]).counts(None, 0, false).lost, None);

@@ -113,6 +113,7 @@ impl Summary {
             (c.missing, "scans missing in the recording"),
             (c.breaks, "breaks, after which the path starts anew"),
             (lost.azimuths, "azimuths lost, which are put back"),
+            (lost.unplaced, "of them at unknown places"),
             (motions.weak, "motions weak"),
             (
                 motions.predicted,

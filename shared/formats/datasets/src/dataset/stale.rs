@@ -1,8 +1,6 @@
 //! Stale rows: the last rows of an image, if they still hold what the image before had there. A
 //! host that loses azimuths of a turn fills so many rows less.
 
-use gyre_radar::lost::MAX_LOST;
-
 /// Least correlation of a stale row with the same row of the image before. It is 0.93 to 0.97 with
 /// stale ones, which were compressed anew, and mostly below 0.75 with measured ones.
 const STALE: f64 = 0.85;
@@ -10,12 +8,12 @@ const STALE: f64 = 0.85;
 /// in each turn.
 const NEAR: f64 = 0.05;
 
-/// The last rows of the image that was read last.
+/// The image that was read last.
 #[derive(Debug, Default)]
 pub(crate) struct StaleRows {
     /// Number of that image.
     of: Option<usize>,
-    /// The last rows, one more than [`MAX_LOST`]; empty if it cannot be read.
+    /// Its rows; empty if it cannot be read.
     rows: Vec<u8>,
     is_compressed: bool,
 }
@@ -36,16 +34,15 @@ impl StaleRows {
         self.of == Some(index)
     }
 
-    /// Keeps the last rows of an image of so many bins a row.
-    pub fn remember(&mut self, index: usize, image: &[u8], bins: usize) {
+    /// Keeps an image.
+    pub fn remember(&mut self, index: usize, image: &[u8]) {
         self.of = Some(index);
-        let first = image.len().saturating_sub((MAX_LOST + 1) * bins);
         self.rows.clear();
-        self.rows.extend_from_slice(&image[first..]);
+        self.rows.extend_from_slice(image);
     }
 
-    /// Returns the number of stale rows at the end of an image of the same shape; 0 if there are
-    /// more than [`MAX_LOST`], as where an image was written twice.
+    /// Returns the number of stale rows at the end of an image of the same shape; 0 if all are, as
+    /// where an image was written twice.
     pub fn count(&self, image: &[u8], bins: usize) -> usize {
         let near = (bins as f64 * NEAR) as usize;
         let rows = image.chunks_exact(bins).rev();
@@ -55,7 +52,7 @@ impl StaleRows {
                 && correlation(&row[near..], &before[near..]) > STALE
         };
         let stale = rows.zip(before).take_while(is_stale).count();
-        if stale > MAX_LOST { 0 } else { stale }
+        if stale * bins < image.len() { stale } else { 0 }
     }
 }
 
@@ -93,7 +90,7 @@ mod tests {
     #[test]
     fn rows_at_the_end_that_are_those_of_the_image_before_are_stale() {
         let before = image(1);
-        for lost in [0, 1, 3, MAX_LOST] {
+        for lost in [0, 1, 3, 9, 19] {
             let mut now = image(2);
             let first = now.len() - lost * BINS;
             for (power, stale) in now.iter_mut().zip(&before).skip(first) {
@@ -102,17 +99,17 @@ mod tests {
             }
             let mut rows = StaleRows::default().of_compressed();
             assert_eq!(rows.count(&now, BINS), 0, "no image before");
-            rows.remember(4, &before, BINS);
+            rows.remember(4, &before);
             assert!(rows.has(4) && !rows.has(5));
             assert_eq!(rows.count(&now, BINS), lost);
             let mut exact = StaleRows::default();
-            exact.remember(4, &before, BINS);
+            exact.remember(4, &before);
             assert_eq!(exact.count(&now, BINS), 0, "measured anew");
             now[first..].copy_from_slice(&before[first..]);
             assert_eq!(exact.count(&now, BINS), lost);
         }
         let mut rows = StaleRows::default();
-        rows.remember(0, &before, BINS);
+        rows.remember(0, &before);
         assert_eq!(rows.count(&before, BINS), 0, "written twice");
     }
 
@@ -120,7 +117,7 @@ mod tests {
     fn uniform_rows_are_not_stale() {
         let dark = vec![0; 20 * BINS];
         let mut rows = StaleRows::default();
-        rows.remember(0, &dark, BINS);
+        rows.remember(0, &dark);
         assert_eq!(rows.count(&dark, BINS), 0);
     }
 }

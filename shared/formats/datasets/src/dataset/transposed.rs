@@ -138,11 +138,10 @@ impl TransposedScans {
         Ok(())
     }
 
-    /// Keeps the last rows of an image, or that it cannot be read.
+    /// Keeps an image, or that it cannot be read.
     fn remember(&mut self, index: usize, image: Option<&[u8]>) {
-        let bins = self.bins();
         if let Some(stale) = &mut self.stale {
-            stale.remember(index, image.unwrap_or_default(), bins);
+            stale.remember(index, image.unwrap_or_default());
         }
     }
 

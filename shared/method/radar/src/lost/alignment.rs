@@ -6,7 +6,7 @@ mod passes;
 
 use gyre_simd::simd;
 
-use super::{LostAzimuths, MAX_LOST, echoes::Echoes, prediction::Prediction};
+use super::{LostAzimuths, MAX_GAPS, MAX_LOST, MAX_SINGLE, echoes::Echoes, prediction::Prediction};
 use passes::{pass_backward, pass_forward};
 
 /// Azimuths by which the whole scan may be turned against a prediction, to either side.
@@ -23,52 +23,54 @@ const LEAST_NOISE: f32 = 1e-3;
 const OUTLIER: f32 = 1e-3;
 /// Logarithm of a likelihood, relative to the highest of a row, that is none.
 const LEAST_LOGARITHM: f32 = -20.0;
-/// Numbers of lost azimuths before a row, from none to all.
-const NUMBERS: usize = MAX_LOST + 1;
-/// The most azimuths with which a row is compared, a multiple of what a processor takes at once.
-const WIDTH: usize = azimuths(MAX_LOST).next_multiple_of(8);
+/// Numbers of lost azimuths before a row, from none to all, if they are placed one by one.
+const FEW: usize = MAX_SINGLE + 1;
+/// Distance below which azimuths were lost together if many were, rows.
+const TOGETHER: f64 = 2.0;
+/// Measurements for which a row counts if many azimuths were lost, as bursts show in many rows.
+const OF_BURST: f32 = 4.0;
+/// Logarithm of a likelihood, relative to another, beside which nothing is left of it.
+const NEGLIGIBLE: f64 = -30.0;
 /// Turns of the scan, a value for each: those of [`TURN`], and some that fill a multiple of what a
 /// processor takes at once.
 type Turns<T> = [T; TURNS.next_multiple_of(8)];
 const TURNS: usize = 2 * TURN * STEPS + 1;
-/// Steps with which a row is compared at most, as many as the turns of the largest number reach,
-/// and some that make it a power of two.
-const MOST_STEPS: usize = (STEPS * MAX_LOST + TURNS.next_multiple_of(8)).next_power_of_two();
 
 /// Aligns the rows of scans with predictions.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Alignment {
     /// Sum of products of each row with each predicted azimuth around it.
-    products: Vec<[f32; WIDTH]>,
+    products: Vec<f32>,
     /// Likelihood of each row at each step around it, relative to the highest.
-    likelihoods: Vec<[f32; MOST_STEPS]>,
+    likelihoods: Vec<f32>,
     /// Probability of each number, given the rows up to this one: row x number.
     forward: Vec<Turns<f32>>,
+    /// Mean and mean square of each place.
+    moments: Vec<[Turns<f64>; 2]>,
     places: Places,
     /// Energy of what remains of a row, of the first prediction.
     noise: f32,
 }
 
 /// The places of lost azimuths, as the number of rows before each.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 struct Places {
     /// Logarithm of the likelihood of all that is averaged here.
     likelihood: f64,
-    mean: [f64; MAX_LOST],
-    mean_square: [f64; MAX_LOST],
+    /// Mean and mean square of each.
+    moments: Vec<[f64; 2]>,
 }
 
 impl Places {
     /// Averages with others, each by how likely it is.
-    fn add(&mut self, other: &Self) {
-        let most = self.likelihood.max(other.likelihood);
-        let [of_self, of_other] = [self.likelihood, other.likelihood].map(|of| (of - most).exp());
+    fn add(&mut self, likelihood: f64, others: impl Iterator<Item = [f64; 2]>) {
+        let most = self.likelihood.max(likelihood);
+        let [of_self, of_other] = [self.likelihood, likelihood].map(|of| (of - most).exp());
         let sum = of_self + of_other;
-        let average =
-            |mean: &mut f64, other: f64| *mean = (of_self * *mean + of_other * other) / sum;
-        for place in 0..MAX_LOST {
-            average(&mut self.mean[place], other.mean[place]);
-            average(&mut self.mean_square[place], other.mean_square[place]);
+        for (moments, others) in self.moments.iter_mut().zip(others) {
+            for (mean, other) in moments.iter_mut().zip(others) {
+                *mean = (of_self * *mean + of_other * other) / sum;
+            }
         }
         self.likelihood = most + sum.ln();
     }
@@ -83,51 +85,102 @@ impl Alignment {
 
     /// Adds what a prediction says of where `count` azimuths of the scan were lost.
     pub fn add(&mut self, prediction: &Prediction, scan: &Echoes, count: usize) {
-        let rows = scan.layout.azimuths - count;
-        self.products.clear();
-        self.products.resize(rows, [0.0; WIDTH]);
-        multiply(prediction, scan, &mut self.products);
-        let (gain, common) = self.gain(prediction, count);
-        if self.noise == 0.0 {
-            let measured = scan.energy();
-            let noise = measured - gain * common;
-            self.noise = noise.max(LEAST_NOISE * measured).max(1.0) / rows as f32;
-        }
-        self.likelihoods.resize(rows, [0.0; MOST_STEPS]);
-        let weights = Weights {
-            gain,
-            scale: gain / self.noise,
-            steps: STEPS * (azimuths(count) + 1 - AMID.len()),
-        };
-        let likelihood = weigh(&self.products, prediction, &weights, &mut self.likelihoods);
-        let turns = pass_forward(&self.likelihoods, count, &mut self.forward);
-        let all = pass_backward(&self.likelihoods, &self.forward, count);
-        for (places, turn) in all.iter().zip(turns).take(TURNS) {
-            let likelihood = likelihood + turn;
-            self.places.add(&Places {
-                likelihood,
-                ..*places
-            });
+        self.places.moments.resize(count, [0.0; 2]);
+        match count {
+            1 => self.add_numbers::<24, 32, 16, 2>(prediction, scan, count),
+            2 => self.add_numbers::<24, 32, 16, 3>(prediction, scan, count),
+            3 => self.add_numbers::<24, 32, 16, 4>(prediction, scan, count),
+            ..FEW => self.add_numbers::<24, 32, 16, FEW>(prediction, scan, count),
+            _ => self.add_numbers::<96, 176, 88, { MAX_LOST + 1 }>(prediction, scan, count),
         }
     }
 
-    /// Returns where `count` azimuths were lost before one of so many rows, or behind the last.
-    pub fn found(&self, rows: usize, count: usize) -> LostAzimuths {
-        let places = &self.places;
-        LostAzimuths::between((0..count).map(|place| {
-            let mean = places.mean[place];
-            let variance = (places.mean_square[place] - mean * mean).max(0.0);
+    /// Compares rows with `WIDTH` azimuths: `MOST_STEPS` steps, of which `HALF` lie amid two azimuths.
+    fn add_numbers<
+        const WIDTH: usize,
+        const MOST_STEPS: usize,
+        const HALF: usize,
+        const NUMBERS: usize,
+    >(
+        &mut self,
+        prediction: &Prediction,
+        scan: &Echoes,
+        count: usize,
+    ) {
+        let rows = scan.layout.azimuths - count;
+        self.products.clear();
+        self.products.resize(rows * WIDTH, 0.0);
+        let (products, _) = self.products.as_chunks_mut::<WIDTH>();
+        let measured = multiply(prediction, scan, products);
+        let (gain, common) = Self::gain(products, prediction, count);
+        if self.noise == 0.0 {
+            let noise = measured - gain * common;
+            self.noise = noise.max(LEAST_NOISE * measured).max(1.0) / rows as f32;
+        }
+        let measurements = if NUMBERS > FEW { OF_BURST } else { 1.0 };
+        let weights = Weights {
+            gain,
+            scale: measurements * gain / self.noise,
+            steps: STEPS * (azimuths(count) + 1 - AMID.len()),
+        };
+        self.likelihoods.resize(rows * MOST_STEPS, 0.0);
+        let (steps, _) = self.likelihoods.as_chunks_mut::<MOST_STEPS>();
+        let likelihood = weigh::<WIDTH, MOST_STEPS, HALF>(products, prediction, &weights, steps);
+        let turns = pass_forward::<MOST_STEPS, NUMBERS>(steps, count, &mut self.forward);
+        let is_negligible = |of: &f64| likelihood + of < self.places.likelihood + NEGLIGIBLE;
+        if turns[..TURNS].iter().all(is_negligible) {
+            return;
+        }
+        self.moments.resize(count, Default::default());
+        pass_backward::<MOST_STEPS, NUMBERS>(steps, &self.forward, &mut self.moments);
+        for (turn, of_turn) in turns.into_iter().enumerate().take(TURNS) {
+            let moments = self.moments.iter().map(|it| it.map(|it| it[turn]));
+            self.places.add(likelihood + of_turn, moments);
+        }
+    }
+
+    /// Returns where `count` azimuths were lost before one of so many rows, or behind the last:
+    /// few of them one by one, more of them in gaps.
+    pub fn found(&mut self, rows: usize, count: usize) -> LostAzimuths {
+        let moments = &mut self.places.moments;
+        let mut azimuths = [1; MAX_LOST];
+        let mut gaps = count;
+        while count >= FEW {
+            let apart = |gap: &usize| moments[gap + 1][0] - moments[*gap][0];
+            let next = (0..gaps - 1).min_by(|a, b| apart(a).total_cmp(&apart(b)));
+            let Some(gap) = next.filter(|gap| gaps > MAX_GAPS || apart(gap) < TOGETHER) else {
+                break;
+            };
+            let [of_gap, of_next] = [azimuths[gap], azimuths[gap + 1]].map(f64::from);
+            for moment in 0..2 {
+                let sum = of_gap * moments[gap][moment] + of_next * moments[gap + 1][moment];
+                moments[gap][moment] = sum / (of_gap + of_next);
+            }
+            azimuths[gap] += azimuths[gap + 1];
+            moments[gap + 1..gaps].rotate_left(1);
+            azimuths[gap + 1..gaps].rotate_left(1);
+            gaps -= 1;
+        }
+        let gaps = moments.iter().zip(azimuths).take(gaps);
+        LostAzimuths::of_gaps(gaps.map(|([mean, mean_square], azimuths)| {
+            let variance = (mean_square - mean * mean).max(0.0);
             // Rows of equal probability with this mean and variance.
             let beside = 0.5 * ((12.0 * variance + 1.0).sqrt() - 1.0);
-            [mean - beside, mean + beside].map(|row| row.round().clamp(0.0, rows as f64) as u16)
+            let [first, last] = [mean - beside, mean + beside]
+                .map(|row| row.round().clamp(0.0, rows as f64) as u16);
+            [first, last, azimuths]
         }))
     }
 
     /// Returns by how much the rows are stronger than predicted, each where it agrees best, and the
     /// sum of its products there.
-    fn gain(&self, prediction: &Prediction, count: usize) -> (f32, f32) {
+    fn gain<const WIDTH: usize>(
+        products: &[[f32; WIDTH]],
+        prediction: &Prediction,
+        count: usize,
+    ) -> (f32, f32) {
         let (mut common, mut energy) = (0.0, f32::MIN_POSITIVE);
-        for (row, products) in self.products.iter().enumerate() {
+        for (row, products) in products.iter().enumerate() {
             let (mut best, mut highest) = (BESIDE + TURN, products[BESIDE + TURN]);
             for (k, product) in (best..).zip(&products[BESIDE + TURN..][..=count]) {
                 // Which it is cannot be foreseen: no branch.
@@ -142,13 +195,20 @@ impl Alignment {
     }
 }
 
-/// Adds the products of each row's echoes with the predicted azimuths around it.
+/// Adds the products of each row's echoes with the predicted azimuths around it, and returns the
+/// sum of the squares of the echoes.
 #[simd]
-fn multiply(prediction: &Prediction, scan: &Echoes, products: &mut [[f32; WIDTH]]) {
+fn multiply<const WIDTH: usize>(
+    prediction: &Prediction,
+    scan: &Echoes,
+    products: &mut [[f32; WIDTH]],
+) -> f32 {
+    let mut energy = 0.0;
     for row in scan.rows() {
         let index = row.at as usize;
         let mut sums = [0.0; WIDTH];
         for (cell, power) in row.cells.iter().zip(row.powers) {
+            energy += power * power;
             let predicted = prediction.from::<WIDTH>(*cell, azimuth(index, 0));
             for (sum, predicted) in sums.iter_mut().zip(predicted) {
                 *sum += power * predicted;
@@ -156,6 +216,7 @@ fn multiply(prediction: &Prediction, scan: &Echoes, products: &mut [[f32; WIDTH]
         }
         products[index] = sums;
     }
+    energy
 }
 
 /// The numbers that make likelihoods from products. A row is the prediction times a gain, and
@@ -171,7 +232,7 @@ struct Weights {
 
 /// Determines the likelihoods, and returns the sum of the logarithms of the highest.
 #[simd]
-fn weigh(
+fn weigh<const WIDTH: usize, const MOST_STEPS: usize, const HALF: usize>(
     products: &[[f32; WIDTH]],
     prediction: &Prediction,
     weights: &Weights,
@@ -183,7 +244,7 @@ fn weigh(
         let scores: [f32; WIDTH] = std::array::from_fn(|k| {
             weights.scale * (products[k] - 0.5 * weights.gain * energies[k])
         });
-        let amid: [f32; MOST_STEPS / STEPS] = std::array::from_fn(|k| amid(&scores, k));
+        let amid: [f32; HALF] = std::array::from_fn(|k| amid(&scores, k));
         let mut steps: [f32; MOST_STEPS] = std::array::from_fn(|step| match step % STEPS {
             0 => scores[step / STEPS + BESIDE],
             _ => amid[step / STEPS],
@@ -211,22 +272,24 @@ fn weigh(
 
 /// Returns the highest score, without a chain of comparisons.
 #[inline(always)]
-fn highest_of(steps: &[f32; MOST_STEPS]) -> f32 {
-    let mut best = *steps;
-    let mut half = MOST_STEPS / 2;
-    while half > 0 {
+fn highest_of<const STEPS: usize>(steps: &[f32; STEPS]) -> f32 {
+    let higher = |a: f32, b: f32| if b > a { b } else { a };
+    let mut best = [f32::NEG_INFINITY; 16];
+    for steps in steps.as_chunks::<16>().0 {
+        best = std::array::from_fn(|k| higher(best[k], steps[k]));
+    }
+    for half in [8, 4, 2, 1] {
         let (low, high) = best.split_at_mut(half);
         for (low, high) in low.iter_mut().zip(high) {
-            *low = if *high > *low { *high } else { *low };
+            *low = higher(*low, *high);
         }
-        half /= 2;
     }
     best[0]
 }
 
 /// Returns the value amid the second and the third of four scores from the `k`-th on.
 #[inline(always)]
-fn amid(scores: &[f32; WIDTH], k: usize) -> f32 {
+fn amid<const WIDTH: usize>(scores: &[f32; WIDTH], k: usize) -> f32 {
     AMID[0] * scores[k]
         + AMID[1] * scores[k + 1]
         + AMID[2] * scores[k + 2]

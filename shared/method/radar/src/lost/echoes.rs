@@ -147,11 +147,6 @@ impl Echoes {
         })
     }
 
-    /// Returns the sum of the squares of all powers.
-    pub fn energy(&self) -> f32 {
-        self.powers.iter().map(|power| power * power).sum()
-    }
-
     fn begin(&mut self, layout: Layout) {
         self.layout = layout;
         self.rows.clear();

@@ -14,8 +14,9 @@ use crate::{
 
 /// Range at which the time between two looks in one direction is determined, m.
 const TYPICAL_M: f32 = 30.0;
-/// Azimuths beyond the turn, to either side, that a prediction has.
-const BEYOND: usize = 32;
+/// Azimuths before the turn and beyond it that a prediction has.
+const BEFORE: usize = 8;
+const BEYOND: usize = 88;
 /// Echoes that are located at once.
 const BLOCK: usize = 16;
 
@@ -94,7 +95,7 @@ impl Moved {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Prediction {
     layout: Layout,
-    /// Cell x azimuth, those within [`BEYOND`] of the turn's ends on both sides.
+    /// Cell x azimuth, with those [`BEFORE`] the turn and [`BEYOND`] it.
     powers: Vec<f32>,
     /// Sum of the squares of an azimuth's powers.
     energies: Vec<f32>,
@@ -120,16 +121,16 @@ impl Prediction {
         self.energies.clear();
         self.energies.resize(width, 0.0);
         for powers in self.powers.chunks_exact_mut(width) {
-            powers[BEYOND] += powers[BEYOND + azimuths];
-            powers.copy_within(BEYOND..2 * BEYOND, BEYOND + azimuths);
-            powers.copy_within(azimuths..azimuths + BEYOND, 0);
+            powers[BEFORE] += powers[BEFORE + azimuths];
+            powers.copy_within(BEFORE..BEFORE + BEYOND, BEFORE + azimuths);
+            powers.copy_within(azimuths..azimuths + BEFORE, 0);
         }
         add_squares(&self.powers, &mut self.energies);
     }
 
     /// Azimuths of the turn and beyond it.
     fn width(&self) -> usize {
-        self.layout.azimuths + 2 * BEYOND
+        BEFORE + self.layout.azimuths + BEYOND
     }
 
     /// Returns the powers of a cell at an azimuth and at those behind it.
@@ -146,10 +147,10 @@ impl Prediction {
     }
 }
 
-/// Returns the values at an azimuth and behind it, of those from [`BEYOND`] before the turn on.
+/// Returns the values at an azimuth and behind it, of those from [`BEFORE`] the turn on.
 #[inline(always)]
 fn around<const WIDTH: usize>(values: &[f32], azimuth: isize) -> &[f32; WIDTH] {
-    let from = (azimuth + BEYOND as isize) as usize;
+    let from = (azimuth + BEFORE as isize) as usize;
     let chunk = values[from..].first_chunk();
     chunk.expect("the turn and what is beyond it hold all that a row is compared with")
 }
@@ -250,7 +251,7 @@ fn locate(
         let low = integer_below(azimuth).min(frame.azimuths as i32);
         let near = integer_below(cell);
         let (share, depth) = (azimuth - low as f32, cell - near as f32);
-        places.first[k] = near as u32 * frame.width + BEYOND as u32 + low as u32;
+        places.first[k] = near as u32 * frame.width + BEFORE as u32 + low as u32;
         let (near, far) = (power * (1.0 - depth), power * depth);
         (places.near[0][k], places.near[1][k]) = (near * (1.0 - share), near * share);
         (places.far[0][k], places.far[1][k]) = (far * (1.0 - share), far * share);

@@ -99,12 +99,70 @@ fn lost_azimuths_are_found_where_they_were_lost() {
         finder.set_previous(&before.view(), &known);
         let found = finder.find(&now.view(), Some(twist));
         assert_eq!(found.count(), lost.len());
-        let middles = found.rows().iter().map(|[first, last]| (first + last) / 2);
+        let middles = found
+            .gaps()
+            .iter()
+            .map(|[first, last, _]| (first + last) / 2);
         distances.extend(middles.zip(&lost).map(|(a, b)| a.abs_diff(*b)));
     }
     let near = distances.iter().filter(|distance| **distance <= 4).count();
     println!("{near} of {} within 4 rows", distances.len());
     assert!(near * 100 >= distances.len() * 95, "{distances:?}");
+}
+
+#[test]
+fn bursts_are_found_wherever_they_are_and_counted_where_they_are_not() {
+    let [twist, predicted] = [0.1, 0.14].map(|yaw_rate_radps| Twist {
+        vx_mps: 8.0,
+        vy_mps: 0.1,
+        yaw_rate_radps,
+    });
+    let before = scan(&world(3), &twist, 0.0);
+    let whole = scan(&world(3), &twist, TURN_S);
+    // The first azimuth of each burst and their number.
+    let bursts: [&[[usize; 2]]; 9] = [
+        &[[0, 9]],
+        &[[0, 40]],
+        &[[120, 9]],
+        &[[250, 40]],
+        &[[391, 9]],
+        &[[360, 40]],
+        &[[0, 12], [290, 9]],
+        &[[40, 20], [180, 11], [370, 30]],
+        &[[0, MAX_LOST + 1]],
+    ];
+    for bursts in bursts {
+        let lost = bursts
+            .iter()
+            .flat_map(|[first, count]| *first..first + count);
+        let lost = Vec::from_iter(lost);
+        let mut now = whole.clone();
+        lose(&mut now, &before, &lost);
+        let mut finder = LostAzimuthFinder::default();
+        finder.set_previous(&before.view(), &LostAzimuths::default());
+        let unknown = finder.clone().find(&now.view(), None);
+        assert_eq!(
+            (unknown.count(), unknown.unplaced()),
+            (lost.len(), lost.len())
+        );
+        // The rows behind are turned by all of them or by none: evenly distributed.
+        let sigma_steps = unknown.variance_of_mean_rad2(AZIMUTHS).sqrt() / TAU as f32 * 400.0;
+        let share = sigma_steps / lost.len() as f32;
+        assert!((share - 12.0_f32.sqrt().recip()).abs() < 0.01, "{share}");
+        let found = finder.find(&now.view(), Some(predicted));
+        if lost.len() > MAX_LOST {
+            assert_eq!(found, unknown);
+            continue;
+        }
+        assert_eq!((found.gaps().len(), found.unplaced()), (bursts.len(), 0));
+        let mut earlier = 0;
+        for ([first, last, count], burst) in found.gaps().iter().zip(bursts) {
+            let azimuth = usize::from((first + last) / 2) + earlier;
+            let is_found = azimuth.abs_diff(burst[0]) <= 1 && usize::from(*count) == burst[1];
+            assert!(is_found, "{bursts:?}: {found:?}");
+            earlier += burst[1];
+        }
+    }
 }
 
 #[test]
@@ -114,7 +172,10 @@ fn rows_are_placed_at_the_azimuths_where_they_were_measured() {
     let whole = scan(&world, &twist, TURN_S);
     let mut now = whole.clone();
     let lost = certain(&lose(&mut now, &before, &[0, 7, 8, 399]));
-    assert_eq!(lost.rows(), [[0; 2], [6; 2], [6; 2], [396; 2]]);
+    assert_eq!(
+        lost.gaps(),
+        [[0, 0, 1], [6, 6, 1], [6, 6, 1], [396, 396, 1]]
+    );
     let (view, mut rows) = (now.view(), PlacedRows::default());
     let placed = rows.place(&view, &lost);
     assert_eq!(placed.geometry.azimuths, 396);
@@ -165,7 +226,11 @@ fn scans_of_any_shape_and_offset_are_looked_at() {
             (now.geometry.azimuths, now.geometry.bins) = (azimuths, bins);
             now.geometry.range_offset_m = offset_m;
             let found = finder.find(&now.view(), Some(twist));
-            assert_eq!(found.rows(), [[0, azimuths as u16 - 2]; 2], "{bins} bins");
+            assert_eq!(
+                found.gaps(),
+                [[0, azimuths as u16 - 2, 1]; 2],
+                "{bins} bins"
+            );
         }
     }
 }
@@ -177,7 +242,7 @@ fn without_a_scan_before_they_may_be_anywhere_and_measured_azimuths_are_never_mo
     let mut now = scan(&world, &twist, TURN_S);
     lose(&mut now, &before, &[50, 51]);
     let mut finder = LostAzimuthFinder::default();
-    assert_eq!(finder.find(&now.view(), None).rows(), [[0, 398]; 2]);
+    assert_eq!(finder.find(&now.view(), None).gaps(), [[0, 398, 1]; 2]);
     for flags in &mut now.flags {
         *flags = flag::MEASURED;
     }

@@ -124,16 +124,16 @@ impl PolarImage {
 
     fn lay_out(&mut self, geometry: &SweepGeometry) {
         let layout = Layout::new(geometry, self.window_m);
-        if layout == self.layout {
-            return;
-        }
         let stride = layout.stride();
-        self.samples.clear();
+        self.layout.azimuths = layout.azimuths;
+        if layout != self.layout {
+            self.samples.clear();
+            self.pieces.clear();
+            self.pieces.resize(stride + 2 * layout.window.reach(), 0);
+            self.above_floor.resize(layout.bins, 0);
+            self.measured.resize(stride, 0);
+        }
         self.samples.resize((layout.azimuths + 1) * stride, 0);
-        self.pieces.clear();
-        self.pieces.resize(stride + 2 * layout.window.reach(), 0);
-        self.above_floor.resize(layout.bins, 0);
-        self.measured.resize(stride, 0);
         self.layout = layout;
     }
 

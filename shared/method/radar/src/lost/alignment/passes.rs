@@ -2,31 +2,23 @@
 
 use gyre_simd::simd;
 
-use super::{MOST_STEPS, NUMBERS, Places, STEPS, Turns};
+use super::{FEW, STEPS, Turns};
+
+/// Probability of a gap before a row, whatever its width, where many azimuths were lost. So small
+/// that a motion that differs a little from the predicted one is not taken for more gaps.
+const GAP: f32 = 1e-12;
+/// Rows after which probabilities are normalised if few azimuths were lost.
+const SCALED: usize = 4;
 
 /// Passes along the rows, and returns the logarithm of their likelihood for each turn. Writes the
 /// probability of each number of lost azimuths before a row, given the rows up to it: row x number.
 #[simd]
-pub(super) fn pass_forward(
+pub(super) fn pass_forward<const MOST_STEPS: usize, const NUMBERS: usize>(
     likelihoods: &[[f32; MOST_STEPS]],
     count: usize,
     forward: &mut Vec<Turns<f32>>,
 ) -> Turns<f64> {
-    // A count that the compiler knows keeps all numbers in registers.
-    match count {
-        1 => forward_of(likelihoods, 1, forward),
-        2 => forward_of(likelihoods, 2, forward),
-        3 => forward_of(likelihoods, 3, forward),
-        _ => forward_of(likelihoods, count, forward),
-    }
-}
-
-#[inline(always)]
-fn forward_of(
-    likelihoods: &[[f32; MOST_STEPS]],
-    count: usize,
-    forward: &mut Vec<Turns<f32>>,
-) -> Turns<f64> {
+    let count = known::<NUMBERS>(count);
     let mut likelihood = Turns::default();
     let mut product = [1.0; _];
     let mut before = [Turns::default(); NUMBERS];
@@ -34,17 +26,20 @@ fn forward_of(
     forward.resize(likelihoods.len() * (count + 1), Turns::default());
     let of_rows = forward.chunks_exact_mut(count + 1);
     for (row, (steps, forward)) in likelihoods.iter().zip(of_rows).enumerate() {
-        let mut reached = Turns::<f32>::default();
+        let mut fewer = Turns::<f32>::default();
         for (number, before) in before[..=count].iter_mut().enumerate() {
             let of_turns = of_number(steps, number);
-            for ((reached, before), likelihood) in reached.iter_mut().zip(before).zip(of_turns) {
-                *reached += *before;
-                *before = *reached * likelihood;
+            for ((fewer, before), likelihood) in fewer.iter_mut().zip(before).zip(of_turns) {
+                let reached = gap::<NUMBERS>() * *fewer + *before;
+                *fewer += *before;
+                *before = reached * likelihood;
             }
         }
-        let sums = normalise(&mut before[..=count]);
-        for (product, sum) in product.iter_mut().zip(sums) {
-            *product *= f64::from(sum);
+        if NUMBERS > FEW || row % SCALED == 0 {
+            let sums = normalise(&mut before[..=count]);
+            for (product, sum) in product.iter_mut().zip(sums) {
+                *product *= f64::from(sum);
+            }
         }
         // Logarithms are slow, and a row's likelihood is at least that of an outlier.
         if row % 64 == 63 {
@@ -52,38 +47,26 @@ fn forward_of(
         }
         forward.copy_from_slice(&before[..=count]);
     }
+    for (turn, product) in product.iter_mut().enumerate() {
+        let fewer: f32 = before[..count].iter().map(|before| before[turn]).sum();
+        *product *= f64::from(gap::<NUMBERS>() * fewer + before[count][turn]);
+    }
     add_logarithms(&mut likelihood, &mut product);
     likelihood
 }
 
-/// Passes back along the rows, and returns the places for each turn.
+/// Passes back along the rows, and writes mean and mean square of each place for each turn.
 #[simd]
-pub(super) fn pass_backward(
+pub(super) fn pass_backward<const MOST_STEPS: usize, const NUMBERS: usize>(
     likelihoods: &[[f32; MOST_STEPS]],
     forward: &[Turns<f32>],
-    count: usize,
-) -> Turns<Places> {
-    match count {
-        1 => backward_of(likelihoods, forward, 1),
-        2 => backward_of(likelihoods, forward, 2),
-        3 => backward_of(likelihoods, forward, 3),
-        _ => backward_of(likelihoods, forward, count),
-    }
-}
-
-#[inline(always)]
-fn backward_of(
-    likelihoods: &[[f32; MOST_STEPS]],
-    forward: &[Turns<f32>],
-    count: usize,
-) -> Turns<Places> {
-    let mut places = Turns::<Places>::default();
-    let (mut means, mut squares) = (
-        [Turns::<f64>::default(); NUMBERS],
-        [Turns::<f64>::default(); NUMBERS],
-    );
+    moments: &mut [[Turns<f64>; 2]],
+) {
+    let count = known::<NUMBERS>(moments.len());
+    moments[..count].fill(Default::default());
     // What is lost behind the last row shows in none.
-    let mut behind = [[1.0; _]; NUMBERS];
+    let mut behind = [[gap::<NUMBERS>(); _]; NUMBERS];
+    behind[count] = [1.0; _];
     let forward = forward.chunks_exact(count + 1);
     for (row, (forward, steps)) in forward.zip(likelihoods).enumerate().rev() {
         let mut now = [Turns::default(); NUMBERS];
@@ -93,8 +76,7 @@ fn backward_of(
         normalise(&mut now[..=count]);
         // A place lies behind this row as long as fewer azimuths were lost.
         let mut fewer = Turns::<f64>::default();
-        for (place, probability) in now[..count].iter().enumerate() {
-            let (mean, square) = (&mut means[place], &mut squares[place]);
+        for (probability, [mean, square]) in now.iter().zip(&mut moments[..count]) {
             for turn in 0..fewer.len() {
                 fewer[turn] += f64::from(probability[turn]);
                 mean[turn] += fewer[turn];
@@ -105,24 +87,32 @@ fn backward_of(
         for (number, behind) in behind[..=count].iter_mut().enumerate().rev() {
             let of_turns = of_number(steps, number);
             for ((further, behind), likelihood) in further.iter_mut().zip(behind).zip(of_turns) {
-                *further += *behind * likelihood;
-                *behind = *further;
+                let here = *behind * likelihood;
+                *behind = gap::<NUMBERS>() * *further + here;
+                *further += here;
             }
         }
-        normalise(&mut behind[..=count]);
-    }
-    for (turn, places) in places.iter_mut().enumerate() {
-        for place in 0..count {
-            places.mean[place] = means[place][turn];
-            places.mean_square[place] = squares[place][turn];
+        if NUMBERS > FEW || row % SCALED == 0 {
+            normalise(&mut behind[..=count]);
         }
     }
-    places
+}
+
+/// Returns the count, which the compiler knows if it is small: all numbers are in registers then.
+#[inline(always)]
+const fn known<const NUMBERS: usize>(count: usize) -> usize {
+    if NUMBERS < FEW { NUMBERS - 1 } else { count }
+}
+
+/// Returns the probability of a gap relative to none: where few azimuths were lost, no place is
+/// likelier than another.
+const fn gap<const NUMBERS: usize>() -> f32 {
+    if NUMBERS > FEW { GAP } else { 1.0 }
 }
 
 /// Returns the likelihoods of a row if a number of azimuths was lost before it.
 #[inline(always)]
-fn of_number(steps: &[f32; MOST_STEPS], number: usize) -> &Turns<f32> {
+fn of_number<const MOST_STEPS: usize>(steps: &[f32; MOST_STEPS], number: usize) -> &Turns<f32> {
     let chunk = steps[STEPS * number..].first_chunk();
     chunk.expect("there are steps for the turns of the largest number")
 }
