@@ -255,7 +255,7 @@ fn a_batch_that_is_killed_gives_the_table_of_one_that_is_not() {
     assert_eq!(codes, [Some(1), Some(1), Some(1)]);
     let ended = shared.clone().with(&["--collect"]).finish();
     assert_eq!(ended.code(), Some(1));
-    assert_eq!(ended.stderr.lines().count(), 4, "{}", ended.stderr);
+    assert_eq!(ended.stderr.lines().count(), 5, "{}", ended.stderr);
     assert_eq!(shared.table(), calm.table());
 }
 
