@@ -75,7 +75,10 @@ fn no_command_replaces_what_is_not_its_own() {
         let write = |file| fs::write(file, "mine").unwrap();
         theirs.iter().for_each(write);
         expect(true, command, &at("file"));
-        expect(true, command, &at("folder"));
+        // The pictures of masks have no lock.
+        if !command.starts_with("masks") {
+            expect(true, command, &at("folder"));
+        }
         let is_kept = |file| fs::read(file).unwrap() == b"mine";
         assert!(theirs.iter().all(is_kept), "{command}");
         // A FIFO and, as root, a device like /dev/null: a page is written to them.

@@ -32,7 +32,7 @@ impl Content {
     pub const RUN: Self = Self("gyre run", LOCK, "config.toml log.jsonl odometry.csv poses.csv objects.csv trajectory.tum trajectory.svg errors.svg bands.svg map.png latency.json summary.json ground_truth.tum");
     pub const MAP: Self = Self("gyre map", LOCK, "map.toml map.png map.tif map.pgm map.yaml keyframes.log changes.csv changes.png");
     pub const FIXES: Self = Self("gyre localise", LOCK, "fixes.csv fixes.tum fixes.png");
-    pub const MASKS: Self = Self("gyre masks", LOCK, "masks.png");
+    pub const MASKS: Self = Self("gyre masks", "masks.png", "masks.png");
     pub const CALIBRATION: Self = Self("gyre calibrate", LOCK, "calibration.toml calibration.svg calibration-2.svg");
     pub const PLOTS: Self = Self("gyre evaluate", LOCK, "trajectory.svg errors.svg bands.svg");
     pub const STRESS: Self = Self("gyre stress", LOCK, "config.toml report.json report.md report.svg");
@@ -51,7 +51,7 @@ impl Content {
         let refused = |reason| Err(OutError::Refused(reason));
         if fs::metadata(folder).is_ok_and(|there| !there.is_dir()) {
             return refused(format!(
-                "{path} is a file, and `{command}` fills a folder: name another place"
+                "cannot write to {path}: it is a file, and `{command}` fills a folder"
             ));
         }
         let is_run = folder.join("journal").is_dir();

@@ -9,12 +9,12 @@ mod inspection;
 mod inspector;
 pub mod picture;
 
-use std::{num::NonZeroUsize, ops::Range, path::PathBuf, process::ExitCode};
+use std::{fs, num::NonZeroUsize, ops::Range, path::PathBuf, process::ExitCode};
 
 use clap::Args;
 use gyre_configuration::describe_masks_in_process;
 use gyre_inputs::Inputs;
-use gyre_results::{Content, Out};
+use gyre_results::Content;
 use gyre_terminal::{Failure, print};
 
 use drawing::Canvas;
@@ -62,7 +62,9 @@ pub fn masks(arguments: &MasksArguments) -> Result<ExitCode, Failure> {
         .iter()
         .for_each(print::note);
     let out = &arguments.out;
-    let _locked = Out::lock_for(out, Content::MASKS)?;
+    Content::MASKS.require_place(out)?;
+    fs::create_dir_all(out)
+        .map_err(|error| format!("cannot write to {}: {error}", out.display()))?;
     if !arguments.json {
         print::line(inspection::HEADER)?;
     }
