@@ -182,7 +182,8 @@ fn why(row: &StringRecord, columns: usize) -> String {
         let degrees = text.strip_suffix(['N', 'S', 'E', 'W', 'n', 's', 'e', 'w']);
         degrees.is_some_and(is_number)
     };
-    let remedies: [(&dyn Fn(&str) -> bool, &str); 3] = [
+    type IsSo<'a> = &'a dyn Fn(&str) -> bool;
+    let remedies: [(IsSo<'_>, &str); 3] = [
         (
             &is_date,
             "is a date or a time of day: write stamps as seconds or nanoseconds since 1970",

@@ -61,7 +61,7 @@ pub struct Swap {
 #[serde(rename_all = "kebab-case")]
 pub enum Answer {
     /// To [`Request::Status`].
-    Status(Status),
+    Status(Box<Status>),
     /// It is done, or has begun.
     Done,
     /// It was not done, and why.
@@ -263,7 +263,7 @@ impl Control {
 
     fn status_or(&self, otherwise: &str) -> Result<Status, StageError> {
         match self.ask(&Request::Status, otherwise)? {
-            Answer::Status(status) => Ok(status),
+            Answer::Status(status) => Ok(*status),
             answer => Err(self.silent(format!("its answer is {answer:?}"))),
         }
     }

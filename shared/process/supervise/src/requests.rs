@@ -42,7 +42,7 @@ pub fn wait<T>(
         }
         while let Some((request, client)) = socket.next() {
             match request {
-                Request::Status => client.answer(&Answer::Status(status.clone())),
+                Request::Status => client.answer(&Answer::Status(Box::new(status.clone()))),
                 Request::Stop => {
                     client.answer(&Answer::Done);
                     return Ok(None);
@@ -62,7 +62,7 @@ impl Supervisor<'_> {
                 break;
             };
             match request {
-                Request::Status => client.answer(&Answer::Status(self.status())),
+                Request::Status => client.answer(&Answer::Status(Box::new(self.status()))),
                 Request::Stop => {
                     stop = true;
                     client.answer(&Answer::Done);

@@ -145,16 +145,17 @@ impl Alignment {
         let moments = &mut self.places.moments;
         let mut azimuths = [1; MAX_LOST];
         let mut gaps = count;
-        while count >= FEW {
+        loop {
             let apart = |gap: &usize| moments[gap + 1][0] - moments[*gap][0];
-            let next = (0..gaps - 1).min_by(|a, b| apart(a).total_cmp(&apart(b)));
-            let Some(gap) = next.filter(|gap| gaps > MAX_GAPS || apart(gap) < TOGETHER) else {
+            let next = (0..gaps.saturating_sub(1)).min_by(|a, b| apart(a).total_cmp(&apart(b)));
+            let is_joined = |gap: &usize| gaps > MAX_GAPS || apart(gap) < TOGETHER;
+            let Some(gap) = next.filter(|gap| count >= FEW && is_joined(gap)) else {
                 break;
             };
             let [of_gap, of_next] = [azimuths[gap], azimuths[gap + 1]].map(f64::from);
-            for moment in 0..2 {
-                let sum = of_gap * moments[gap][moment] + of_next * moments[gap + 1][moment];
-                moments[gap][moment] = sum / (of_gap + of_next);
+            let next = moments[gap + 1];
+            for (moment, next) in moments[gap].iter_mut().zip(next) {
+                *moment = (of_gap * *moment + of_next * next) / (of_gap + of_next);
             }
             azimuths[gap] += azimuths[gap + 1];
             moments[gap + 1..gaps].rotate_left(1);
