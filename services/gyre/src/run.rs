@@ -21,8 +21,8 @@ use gyre_run::{Ending, Mode};
 use gyre_samples::GnssKind;
 use gyre_stage::{
     Manifest,
-    launch::{BEGUN, log_session},
     run::{RootError, RunRoot, sweep},
+    sessions::{BEGUN, log_session},
     wake::{Signals, let_signals_end_the_process},
 };
 use gyre_storage as storage;

@@ -101,12 +101,14 @@ impl Problem {
             )));
         }
         if let Some(it) = counts.too_many_are_unsure() {
+            let (all, hardly_measured) = (it.refined + it.doubtful, Self::OF_MOTIONS);
+            let cause = match counts.dropped {
+                0 => "The mask keeps too little, or a constant in [dataset] is wrong: `gyre masks` and `gyre inspect` show which".to_owned(),
+                dropped => format!("{dropped} scans were dropped, and motions over dropped scans are long: `gyre stress` finds the rate that this machine keeps up with"),
+            };
+            let (weak, predicted) = (it.weak, it.predicted);
             return Some(Self(format!(
-                "{} weak and {} predicted motions of {}: {}. The mask keeps too little, or a constant in [dataset] is wrong: `gyre masks` and `gyre inspect` show which",
-                it.weak,
-                it.predicted,
-                it.refined + it.doubtful,
-                Self::OF_MOTIONS
+                "{weak} weak and {predicted} predicted motions of {all}: {hardly_measured}. {cause}"
             )));
         }
         None

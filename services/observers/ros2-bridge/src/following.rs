@@ -53,7 +53,7 @@ pub fn each_run(
         let state = shared.begin(run.manifest());
         match follow(&run, &state) {
             Ok(()) => await_end(shared, &run),
-            Err(StageError::NotRunning(_)) => {}
+            Err(StageError::NotRunning { .. }) => {}
             Err(error) => {
                 state.lock().notice = Some(error.to_string());
                 thread::sleep(POLL_INTERVAL);

@@ -89,7 +89,7 @@ fn follow_run(followed: &Followed, run: &ObservedRun) {
                 view.set_state(RunState::Finishing);
                 await_end(view, run);
             }
-            Err(StageError::NotRunning(_)) => {}
+            Err(StageError::NotRunning { .. }) => {}
             Err(error) => {
                 view.set_notice(Some(format!("Poses are not shown: {error}.")));
                 thread::sleep(POLL_INTERVAL);
@@ -174,7 +174,7 @@ fn follow_pictures<M: Message>(
             layers.iter().for_each(|layer| view.clear_pictures(*layer));
         }
         match seen {
-            Ok(()) | Err(StageError::NotRunning(_)) => {}
+            Ok(()) | Err(StageError::NotRunning { .. }) => {}
             Err(error) => view.set_notice(Some(format!("Not all is shown: {error}."))),
         }
     }

@@ -50,7 +50,7 @@ pub enum AskError {
         /// The destination of the datagrams.
         address: String,
     },
-    /// What arrives are no azimuths.
+    /// The datagrams contain no azimuths.
     #[error("what arrives at {address} are no scans: {source}")]
     NoScans {
         /// The destination of the datagrams.

@@ -37,7 +37,7 @@ pub fn ps(arguments: &PsArguments) -> Result<ExitCode, Failure> {
         match run.status() {
             Ok(status) => rows.push(ListedRun::of(status)),
             // It has ended meanwhile.
-            Err(StageError::NotRunning(_)) => {}
+            Err(StageError::NotRunning { .. }) => {}
             Err(error) => faults.push(error.to_string()),
         }
     }

@@ -56,7 +56,8 @@ pub struct LostAzimuths {
 
 impl LostAzimuths {
     /// Creates it from gaps: the first and the last row before which azimuths may have been lost,
-    /// and their number. A number of 0 ends the gaps; of more than [`MAX_GAPS`] the first are taken.
+    /// and their number. A number of 0 ends the gaps; of more than [`MAX_GAPS`] the first are
+    /// taken.
     pub fn of_gaps(gaps: impl IntoIterator<Item = [u16; 3]>) -> Self {
         let mut lost = Self::default();
         let gaps = gaps.into_iter().take_while(|[.., azimuths]| *azimuths > 0);
@@ -133,7 +134,7 @@ pub struct LostAzimuthFinder {
     rows: Echoes,
     /// The scan before.
     previous: Option<Previous>,
-    /// Its echoes, each at its azimuth: only where the next scan has lost some.
+    /// The echoes of that scan, each at its azimuth: only where the next scan has lost some.
     placed: Echoes,
     prediction: Prediction,
     alignment: Alignment,

@@ -132,8 +132,8 @@ pub struct Item {
     /// Bits of [`flag`].
     pub flags: u32,
     /// Gaps where azimuths were lost, as masking has found them: the first and the last row before
-    /// which a gap may be, and its number of azimuths, 0 behind the last gap. With the pose they are
-    /// kept for a masking that is restarted.
+    /// which a gap may be, and its number of azimuths, 0 behind the last gap. The pose keeps them
+    /// for a masking that is restarted.
     pub lost: [[u16; 3]; MAX_GAPS],
     /// The time stamps of each stage.
     pub hops: Hops,

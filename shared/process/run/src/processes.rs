@@ -12,7 +12,7 @@ use crate::{Rate, Scheduling};
 pub struct RunConfig {
     /// `lossless`: every scan is processed, and the source waits. `live`: the newest scan wins.
     pub mode: Mode,
-    /// What becomes of a run in the folder of the results that this one cannot continue, as one of
+    /// The treatment of a run in the folder of the results that this one cannot continue, as one of
     /// another program or configuration. `close`: its folder gets a number in its name, and this
     /// run begins. `refuse`: this run does not begin. `auto`: `close` in live mode, else `refuse`.
     pub earlier: EarlierRun,
@@ -58,7 +58,7 @@ pub enum Mode {
     Live,
 }
 
-/// What becomes of an earlier run: see [`RunConfig::earlier`].
+/// The treatment of an earlier run: see [`RunConfig::earlier`].
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema,
 )]

@@ -14,7 +14,7 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Manifest, StageError, run, source::Received};
+use crate::{Manifest, StageError, run, sessions::not_running, source::Received};
 use exchange::Sent;
 
 /// The name of the socket in the run's root.
@@ -94,7 +94,7 @@ pub struct Status {
     pub dropped: u64,
     /// Time since the newest pose was seen, s; `None` before the first one.
     pub last_pose_s: Option<f64>,
-    /// What is wrong with the whole run: it waits for its radar, or its disk is full.
+    /// The trouble of the whole run: it waits for its radar, or its disk is full.
     #[serde(default)]
     pub notice: Option<String>,
     /// The swap that is not done yet.
@@ -219,8 +219,7 @@ impl Control {
     /// There is no such run.
     pub fn of(out: &Path) -> Result<Self, StageError> {
         let absolute = out.canonicalize().unwrap_or_else(|_| out.to_owned());
-        Self::at(run::root_of(&absolute), out.to_owned())
-            .ok_or_else(|| StageError::NotRunning(out.to_owned()))
+        Self::at(run::root_of(&absolute), out.to_owned()).ok_or_else(|| not_running(out.to_owned()))
     }
 
     /// Returns the control of the run with this root; `None` if it is dead, or has no socket yet.
@@ -365,7 +364,7 @@ impl Control {
             io::ErrorKind::NotFound
             | io::ErrorKind::ConnectionRefused
             | io::ErrorKind::ConnectionReset
-            | io::ErrorKind::UnexpectedEof => StageError::NotRunning(self.out.clone()),
+            | io::ErrorKind::UnexpectedEof => not_running(self.out.clone()),
             _ => self.silent(error.to_string()),
         }
     }

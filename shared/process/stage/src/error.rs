@@ -5,10 +5,7 @@ use std::{fmt::Debug, path::PathBuf};
 use gyre_storage::LogError;
 use thiserror::Error;
 
-use crate::{
-    launch::last_session,
-    shared_memory::{self, SHARED_MEMORY},
-};
+use crate::shared_memory::{self, SHARED_MEMORY};
 
 /// An error that ends a stage. The exit code tells the supervisor whether a restart can help.
 #[derive(Debug, Error)]
@@ -30,8 +27,13 @@ pub enum StageError {
         reason: String,
     },
     /// No run writes to a folder.
-    #[error("no run is writing to {0}{end}: `gyre run` starts one, and its --out names the folder", end = last_session(.0))]
-    NotRunning(PathBuf),
+    #[error("no run is writing to {out}{end}: `gyre run` starts one, and its --out names the folder", out = out.display())]
+    NotRunning {
+        /// The folder of the results.
+        out: PathBuf,
+        /// When and why the last run there ended, in parentheses.
+        end: String,
+    },
     /// A run does not answer.
     #[error("the run that writes to {out} does not answer: {reason}")]
     Silent {

@@ -5,7 +5,7 @@ use std::{
     fs::{self, OpenOptions},
     io::Write,
     os::{fd::AsFd, unix::fs::OpenOptionsExt},
-    path::{Path, PathBuf},
+    path::PathBuf,
     process::ExitCode,
     sync::Mutex,
     time::Duration,
@@ -19,14 +19,7 @@ use rustix::{
 };
 use serde::de::DeserializeOwned;
 use tracing::span::EnteredSpan;
-use tracing_subscriber::{
-    filter::Targets,
-    fmt::{
-        format::Writer,
-        time::{FormatTime, SystemTime},
-    },
-    prelude::*,
-};
+use tracing_subscriber::{filter::Targets, prelude::*};
 
 use crate::{
     Manifest, StageCounters, StageError, counters,
@@ -288,39 +281,4 @@ pub fn start_log(manifest: &Manifest, name: &str) -> Result<EnteredSpan, StageEr
     // A second call in one process (tests) keeps the first log.
     let _ = tracing_subscriber::registry().with(lines).try_init();
     Ok(tracing::error_span!("process", stage = name).entered())
-}
-
-/// The log of the begins and the ends of a run, with their times.
-const SESSIONS: &str = "log/supervisor.txt";
-/// The line of a begin.
-pub const BEGUN: &str = "the run begins";
-
-/// Logs that the run begins, or why it ends. Without a place for that the run is the same.
-pub fn log_session(manifest: &Manifest, event: &str) {
-    let mut line = String::new();
-    // Writing to a string does not fail.
-    let _ = SystemTime.format_time(&mut Writer::new(&mut line));
-    line += &format!(" {event}\n");
-    let mut options = OpenOptions::new();
-    let options = options.append(true).create(true).mode(0o600);
-    let file = options.open(manifest.out.join(SESSIONS));
-    let _ = file.and_then(|mut file| file.write_all(line.as_bytes()));
-}
-
-/// Returns in parentheses when and why the last run that wrote to `out` ended; nothing if there was
-/// none.
-pub(crate) fn last_session(out: &Path) -> String {
-    if let Ok(out) = out.canonicalize()
-        && run::is_alive(&run::root_of(&out))
-    {
-        return " (one is about to begin, or writes its results)".to_owned();
-    }
-    let text = gyre_storage::read_text(&out.join(SESSIONS), gyre_storage::SETTINGS);
-    match text.unwrap_or_default().lines().last() {
-        None => String::new(),
-        Some(last) => match last.strip_suffix(BEGUN) {
-            Some(time) => format!(" (the last one began at {time}and was killed)"),
-            None => format!(" ({last})"),
-        },
-    }
 }

@@ -54,6 +54,7 @@ mod reservation;
 pub mod run;
 pub mod schedule;
 pub mod services;
+pub mod sessions;
 mod shared_memory;
 pub mod sink;
 pub mod source;

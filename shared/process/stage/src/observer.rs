@@ -25,6 +25,7 @@ use crate::{
     heartbeat::HeartbeatWriter,
     reader::{self, Received},
     run, services,
+    sessions::not_running,
     transport::{self, Node, Service, Subscriber},
     wake::{self, Signals},
 };
@@ -83,7 +84,7 @@ impl ObservedRun {
         let root = run::root_of(&absolute);
         // A run that waits for its radar has none yet.
         if !Manifest::path(&root).exists() {
-            return Err(StageError::NotRunning(out.to_owned()));
+            return Err(not_running(out.to_owned()));
         }
         Self::at(&root)
     }
@@ -104,7 +105,7 @@ impl ObservedRun {
             node,
         };
         match run.has_ended() {
-            true => Err(StageError::NotRunning(run.manifest.out)),
+            true => Err(not_running(run.manifest.out)),
             false => Ok(run),
         }
     }
@@ -170,7 +171,7 @@ impl ObservedRun {
             let failed = match self.try_attach(topic) {
                 Ok(ports) => return Ok(ports),
                 Err(_) if self.has_ended() => {
-                    return Err(StageError::NotRunning(self.manifest.out.clone()));
+                    return Err(not_running(self.manifest.out.clone()));
                 }
                 Err(error) => error,
             };

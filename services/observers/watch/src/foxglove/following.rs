@@ -96,7 +96,7 @@ impl<M: Message> FollowedTopic<M> {
                 continue;
             }
             match ObservedRun::writing_to(&self.followed.out).and_then(|run| self.follow(&run)) {
-                Ok(()) | Err(StageError::NotRunning(_)) => {}
+                Ok(()) | Err(StageError::NotRunning { .. }) => {}
                 Err(error) => {
                     let notice = format!("{} is not shown: {error}.", M::TOPIC);
                     self.hub.notice.send_replace(notice);

@@ -13,7 +13,7 @@ const NEAR: f64 = 0.05;
 pub(crate) struct StaleRows {
     /// Number of that image.
     of: Option<usize>,
-    /// Its rows; empty if it cannot be read.
+    /// The rows of that image; empty if it cannot be read.
     rows: Vec<u8>,
     is_compressed: bool,
 }

@@ -95,7 +95,8 @@ impl Alignment {
         }
     }
 
-    /// Compares rows with `WIDTH` azimuths: `MOST_STEPS` steps, of which `HALF` lie amid two azimuths.
+    /// Compares rows with `WIDTH` azimuths: `MOST_STEPS` steps, of which `HALF` lie amid two
+    /// azimuths.
     fn add_numbers<
         const WIDTH: usize,
         const MOST_STEPS: usize,

@@ -146,5 +146,5 @@ fn an_observer_of_an_earlier_run_does_not_disturb_a_later_one_with_the_same_resu
 fn without_a_run_there_is_nothing_to_observe() {
     let out = tempfile::tempdir().unwrap();
     let refused = ObservedRun::writing_to(out.path()).map(drop);
-    assert!(matches!(refused, Err(StageError::NotRunning(_))));
+    assert!(matches!(refused, Err(StageError::NotRunning { .. })));
 }
