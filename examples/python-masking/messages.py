@@ -204,17 +204,17 @@ POINT_FLOATS = 5  # x_m, y_m, time_s, weight, doppler_s
 
 SIZES = {
     Hop: 32,
-    Item: 320,
-    ScanHeader: 13672,
+    Item: 336,
+    ScanHeader: 13688,
     GyroTurn: 32,
     WheelDistance: 32,
     DopplerVelocity: 48,
-    MaskedHeader: 496,
+    MaskedHeader: 512,
     RotationEstimate: 40,
     RefinementRecord: 128,
     MotionEstimate: 304,
-    MotionHeader: 624,
-    PoseHeader: 752,
+    MotionHeader: 640,
+    PoseHeader: 768,
     ByteBlock: 64,
     FloatBlock: 64,
 }

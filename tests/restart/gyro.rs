@@ -83,7 +83,8 @@ fn whatever_is_killed_the_result_is_the_undisturbed_one() {
     alone.complete();
     assert_ne!(alone.odometry(), undisturbed);
     let by_gyro = with_gyro();
-    by_gyro.complete();
+    // Without wheels the distance is unknown where the radar is blind.
+    by_gyro.finish().failed_with(&["hardly measured"]);
     assert_ne!(by_gyro.odometry(), undisturbed);
     assert!(by_gyro.summary().get("wheels").is_none());
     assert_same_after_kills(with_both, &undisturbed);

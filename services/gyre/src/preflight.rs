@@ -3,7 +3,7 @@
 use std::{io, net::UdpSocket, path::Path, time::Duration};
 
 use gyre_configuration::{Configuration, Played, gnss_log, open};
-use gyre_datasets::{DEFAULT_TURN_NS, Fingerprint, Format, turn_ns};
+use gyre_datasets::{DEFAULT_TURN_NS, Dataset, Fingerprint, Format, turn_ns};
 use gyre_live_radar::{Settings, Sizes};
 use gyre_maps::localise::searched_map;
 use gyre_masking::Masker;
@@ -209,7 +209,7 @@ impl Scans {
             period_ns: dataset.period_ns(),
             bytes: dataset.limits().bytes,
             damage: dataset.damage().map(str::to_owned),
-            needs_all: matches!(dataset.format(), Format::Mcap | Format::Ros2Bag),
+            needs_all: needs_all(dataset.as_ref()),
             truth,
             recording,
         })
@@ -292,6 +292,12 @@ pub fn ask(configuration: &Configuration) -> Result<Sizes, Failure> {
         SourceKind::Ros2 => ros2::ask(source, options),
         _ => Ok(gyre_live_radar::ask(&Settings::of(source, options)?)?),
     }
+}
+
+/// Returns whether each scan that cannot be read is a problem: see
+/// [`Session::needs_all`](gyre_results::Session).
+pub(crate) fn needs_all(dataset: &dyn Dataset) -> bool {
+    matches!(dataset.format(), Format::Mcap | Format::Ros2Bag)
 }
 
 /// Checks that the fixes of GNSS can be used, or received.

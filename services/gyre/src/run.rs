@@ -335,7 +335,9 @@ fn write_missing_results(
         scans: begun.identity.scans,
         resumed: begun.poses as usize,
         damage: played.as_ref().and_then(|it| it.dataset.damage()),
-        needs_all: false,
+        needs_all: played
+            .as_ref()
+            .is_some_and(|it| preflight::needs_all(it.dataset.as_ref())),
         wall: Duration::ZERO,
         footprint: None,
         ending: Some(Ending::Complete),
@@ -418,10 +420,12 @@ fn conclude(session: &Session<'_>, written: &Results, form: Form) -> Result<Exit
     }
     if let Some(problem) = problem {
         // The five lines have it.
-        if is_printed && form == Form::Brief {
+        if !(is_printed && form == Form::Brief) {
+            print::note(format_args!("gyre: {problem}"));
+        }
+        if session.ending != Some(Ending::Interrupted) {
             return Ok(ExitCode::FAILURE);
         }
-        return Err(problem.clone().into());
     }
     Ok(match session.ending == Some(Ending::Complete) {
         true => ExitCode::SUCCESS,

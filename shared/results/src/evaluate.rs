@@ -59,7 +59,10 @@ pub fn evaluate(arguments: &EvaluateArguments) -> Result<ExitCode, Failure> {
         false => print::line(format_args!("{judgement:#}"))?,
     }
     if let Some(directory) = &arguments.plots {
-        let is_of_estimate = files.estimate.parent() == Some(directory);
+        let folder = crate::absolute(&files.estimate).ok();
+        let folder = folder.as_deref().and_then(Path::parent);
+        let is_of_estimate =
+            folder.is_some_and(|it| crate::absolute(directory).is_ok_and(|at| at == it));
         let locked = (!is_of_estimate).then(|| Out::lock_for(directory, Content::PLOTS));
         let _locked = locked.transpose()?;
         for (name, plot) in judgement.plots()? {

@@ -29,7 +29,7 @@ pub struct Content(&'static str, &'static str, &'static str);
 #[rustfmt::skip]
 #[allow(missing_docs, reason = "each names its command")]
 impl Content {
-    pub const RUN: Self = Self("gyre run", LOCK, "config.toml log.jsonl odometry.csv poses.csv objects.csv trajectory.tum trajectory.svg errors.svg bands.svg map.png latency.json summary.json ground_truth.tum");
+    pub const RUN: Self = Self("gyre run", LOCK, "config.toml log.jsonl odometry.csv poses.csv objects.csv trajectory.tum trajectory.svg errors.svg bands.svg trajectory_slam.tum loops.csv graph.g2o bands_slam.svg map.png latency.json summary.json ground_truth.tum");
     pub const MAP: Self = Self("gyre map", LOCK, "map.toml map.png map.tif map.pgm map.yaml keyframes.log changes.csv changes.png");
     pub const FIXES: Self = Self("gyre localise", LOCK, "fixes.csv fixes.tum fixes.png");
     pub const MASKS: Self = Self("gyre masks", "masks.png", "masks.png");

@@ -116,6 +116,9 @@ pub fn write(
         files.add("objects.csv", objects::csv(out.path())?)?;
     }
     let gnss = slam.as_mut().map(Slam::gnss).transpose()?.flatten();
+    if let Some((refusal, false)) = gnss.as_ref().and_then(|it| it.refusal()) {
+        print::note(format_args!("the fixes of GNSS are not used: {refusal}"));
+    }
     let judgement = truth.and_then(|truth| judged(&truth, &read.estimate));
     for (name, plot) in plots(&read.sketch, judgement.as_ref())? {
         files.add(name, plot)?;

@@ -191,6 +191,16 @@ impl File {
         }
     }
 
+    fn unless_full(&self, done: io::Result<()>, action: &'static str) -> Result<(), StorageError> {
+        match done {
+            Err(error) if is_full(&error) && CONTINUES.load(Ordering::Relaxed) => {
+                IS_FULL.store(true, Ordering::Relaxed);
+                Ok(())
+            }
+            done => done.map_err(StorageError::at(action, &self.path)),
+        }
+    }
+
     /// Writes `bytes` at `offset`. A process that is killed meanwhile has written a first part of
     /// them.
     ///
@@ -200,12 +210,9 @@ impl File {
         if was_full() {
             return Ok(());
         }
-        match self.file.write_all_at(bytes, offset) {
-            Err(error) if is_full(&error) && CONTINUES.load(Ordering::Relaxed) => {
-                IS_FULL.store(true, Ordering::Relaxed);
-                return Ok(());
-            }
-            written => written.map_err(StorageError::at("write", &self.path))?,
+        self.unless_full(self.file.write_all_at(bytes, offset), "write")?;
+        if was_full() {
+            return Ok(());
         }
         #[cfg(feature = "record")]
         record::push(&self.path, || Operation::Write {
@@ -251,9 +258,7 @@ impl File {
     pub fn sync(&self) -> Result<(), StorageError> {
         #[cfg(feature = "record")]
         let id = record::sync_begins(&self.path);
-        self.file
-            .sync_data()
-            .map_err(StorageError::at("synchronise", &self.path))?;
+        self.unless_full(self.file.sync_data(), "synchronise")?;
         #[cfg(feature = "record")]
         record::push(&self.path, || Operation::SyncEnds {
             path: self.path.clone(),

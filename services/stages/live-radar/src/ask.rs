@@ -122,6 +122,7 @@ fn configuration(settings: &Settings) -> Result<Configuration, AskError> {
     let mut radar = RadarSocket::open(&settings.address, &requests).map_err(no_answer)?;
     let (mut messages, mut damage) = (settings.parser(), None);
     let started = Instant::now();
+    let mut understood = false;
     while started.elapsed() < MAX_WAIT {
         match radar.read(messages.space()) {
             Ok((count, _)) => messages.filled(count),
@@ -133,12 +134,12 @@ fn configuration(settings: &Settings) -> Result<Configuration, AskError> {
         while let Some(event) = messages.next() {
             match event {
                 Event::Message(Message::Configuration(configuration)) => return Ok(configuration),
-                Event::Message(_) => {}
+                Event::Message(_) => understood = true,
                 Event::Damaged { reason, .. } => damage = Some(reason),
             }
         }
     }
-    Err(match (&settings.address, damage) {
+    Err(match (&settings.address, damage.filter(|_| !understood)) {
         (_, Some(source)) => AskError::NoScans { address, source },
         (Address::Tcp(_), None) => AskError::NoConfiguration { address },
         (Address::Udp { .. }, None) => AskError::NoDatagrams { address },

@@ -67,7 +67,7 @@ impl List {
         };
         let absolute = path.canonicalize().map_err(unread)?;
         let (lines, folder) = match absolute.is_dir() {
-            // The sub-folders of a drive are none.
+            // Sub-folders of a drive are not drives.
             true if is_dataset(&absolute) => (Vec::new(), absolute),
             true => (entries(path)?, absolute),
             false => {

@@ -32,8 +32,9 @@ pub(crate) struct Bag {
 struct Placed {
     file: usize,
     span: Span,
-    /// When its first message was received, ns.
+    /// The times between which its messages are placed, ns.
     from_ns: i64,
+    until_ns: i64,
 }
 
 /// The place of a message in the order of time, and then of the files.
@@ -67,16 +68,14 @@ impl Bag {
         let ns = |time: u64| i64::try_from(time).unwrap_or(i64::MAX);
         all.sort_by_key(|(_, span)| span.times_ns.map(|(first, _)| first));
         let placed = |(number, (file, timed)): (usize, &(usize, TimedSpan))| {
-            // What comes later than the window reaches is placed at its end.
-            let before = number.checked_sub(WINDOW).and_then(|it| all[it].1.times_ns);
-            let reached_ns = before.map_or(0, |(_, last)| ns(last));
+            // A message that is later than the window reaches is placed at its end.
+            let beyond = all.get(number + WINDOW).and_then(|it| it.1.times_ns);
+            let from_ns = timed.times_ns.map_or(0, |(first, _)| ns(first));
             Placed {
                 file: *file,
                 span: timed.span,
-                from_ns: timed
-                    .times_ns
-                    .map_or(0, |(first, _)| ns(first))
-                    .max(reached_ns),
+                from_ns,
+                until_ns: beyond.map_or(i64::MAX, |(first, _)| ns(first).max(from_ns)),
             }
         };
         bag.spans = all.iter().enumerate().map(placed).collect();
@@ -106,7 +105,7 @@ impl Bag {
             read => read?,
         };
         let key = |(number, message): (u32, Message)| {
-            let ns = message.log_ns.max(placed.from_ns);
+            let ns = message.log_ns.clamp(placed.from_ns, placed.until_ns);
             (Key { ns, span, number }, message)
         };
         Ok((0..).zip(messages).map(key).collect())

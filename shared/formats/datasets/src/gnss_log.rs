@@ -227,6 +227,6 @@ struct Raw {
 impl Raw {
     /// All entries, those that cannot be used too.
     fn count(&self) -> usize {
-        self.rows.len() + self.without_fix + self.unreadable.count
+        (self.rows.len() + self.without_fix).saturating_add(self.unreadable.count)
     }
 }

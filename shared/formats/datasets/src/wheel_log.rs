@@ -131,6 +131,8 @@ const REVERSE: Sign = Sign {
     minus: "1 true",
 };
 
+const SIGNS: [&Sign; 2] = [&DIRECTION, &REVERSE];
+
 /// Where a table has what.
 struct SpeedColumns {
     stamp: Stamp,
@@ -144,13 +146,20 @@ impl Columns for SpeedColumns {
     type Entry = Sample;
 
     fn by_names(header: &Header) -> Result<Self, String> {
-        let missing = |what| format!("its columns {} have no {what}: {REMEDY}", header.listed());
+        let sign = header.sign(&SIGNS);
+        let missing = |what| match sign {
+            Some(_) => format!(
+                "its columns {} have a direction, which is applied to speeds alone: let the counts run backwards, and remove the direction",
+                header.listed()
+            ),
+            None => format!("its columns {} have no {what}: {REMEDY}", header.listed()),
+        };
         let (speed, unit) = header.first(speed_unit).ok_or_else(|| missing("speed"))?;
         Ok(Self {
             stamp: header.stamp().ok_or_else(|| missing("stamps"))?,
             speed,
             unit,
-            sign: header.sign(&[&DIRECTION, &REVERSE]),
+            sign,
         })
     }
 

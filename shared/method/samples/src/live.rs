@@ -78,9 +78,13 @@ impl LiveSamples {
             let old = self.samples.partition_point(|it| it.stamp_ns < oldest_ns);
             self.samples.drain(..old);
         }
-        // The next scan needs the earliest.
+        // The next scan needs the earliest, and the first one the latest.
         if self.samples.len() > MAX_WAITING {
-            self.samples.truncate(MAX_WAITING);
+            let surplus = match self.handed_until_ns {
+                Some(_) => MAX_WAITING,
+                None => 0,
+            };
+            self.samples.remove(surplus);
             self.left_out += 1;
         }
     }

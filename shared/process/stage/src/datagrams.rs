@@ -1,6 +1,10 @@
 //! Datagrams of live sensors: lines of text.
 
-use std::{io::ErrorKind, net::UdpSocket, os::fd::AsRawFd};
+use std::{
+    io::ErrorKind::{Interrupted, WouldBlock},
+    net::UdpSocket,
+    os::fd::AsRawFd,
+};
 
 use crate::StageError;
 
@@ -39,7 +43,7 @@ pub(crate) fn receive(
             *left = left.saturating_sub(bytes.max(LEAST_BYTES));
             Ok(Some(bytes))
         }
-        Some(Err(error)) if error.kind() == ErrorKind::WouldBlock => Ok(None),
+        Some(Err(error)) if matches!(error.kind(), WouldBlock | Interrupted) => Ok(None),
         Some(Err(error)) => Err(StageError::transport("receive datagrams", error)),
     }
 }

@@ -25,7 +25,7 @@ const HEADER: &str = "stamp_ns,latitude_deg,longitude_deg,sigma_m\n";
 /// The row of a line that is no fix: readers of the log count it.
 const UNREADABLE: &str = "unreadable\n";
 /// Rows that the log takes in this time: receivers send at most 20 a second.
-const MAX_ROWS: usize = 1000;
+const MAX_ROWS: usize = 5000;
 const OF: Duration = Duration::from_secs(10);
 /// The largest log, bytes: that of days.
 const MAX_LOG: u64 = 1 << 30;
@@ -335,7 +335,7 @@ mod tests {
         flooded.finish().unwrap();
         let text = read();
         assert_eq!(text.lines().count(), 4 + MAX_ROWS + 1);
-        assert!(text.ends_with("unreadable,19000\n"));
+        assert!(text.ends_with("unreadable,15000\n"));
         fs::write(&log, format!("{HEADER}1,2,3,0\n2,2,")).unwrap();
         let mut next = GnssReceiver::open(&address, &log).unwrap();
         send(&address, &[b"3,2,3"]);

@@ -193,7 +193,7 @@ pub struct MotionCounts {
     pub predicted: u64,
     /// Weak or predicted.
     pub doubtful: u64,
-    /// Those of them whose distance neither wheels nor Doppler measured.
+    /// Weak ones, and predicted ones whose distance neither wheels nor Doppler measured.
     pub unsure: u64,
     /// Refined ones whose initial guess was not the prediction.
     pub second_hypothesis: u64,

@@ -6,7 +6,7 @@ use gyre_datasets::{GnssFaults, GnssLog};
 use gyre_estimation::EstimationError;
 use gyre_geometry::{UncertainMotion, xy_yaw};
 use gyre_mapping::Origin;
-use gyre_slam::TrajectoryEstimator;
+use gyre_slam::{FixRefusal, TrajectoryEstimator};
 use serde::Serialize;
 
 /// Fixes with a smaller weight count as refused: they pull less than a quarter as hard.
@@ -132,9 +132,11 @@ impl GnssSummary {
         })
     }
 
-    /// Returns why no fix is used.
-    pub fn refusal(&self) -> Option<&str> {
-        self.refusal.as_deref()
+    /// Returns why no fix is used, and whether that is a problem: of a vehicle that hardly moved it
+    /// is not.
+    pub fn refusal(&self) -> Option<(&str, bool)> {
+        let refusal = self.refusal.as_deref()?;
+        Some((refusal, refusal != FixRefusal::Undetermined.to_string()))
     }
 }
 

@@ -67,9 +67,10 @@ pub fn problem(
         ));
     }
     let by_gyro = counts.gyro.and_then(|it| {
-        let is_wrong = too_many(it.doubted + it.refused, it.motions, MAX_DOUBTED_SHARE) || !config.gyro.allows_scale(it.scale);
-        let cause = cause("gyro", config.gyro.late_s, it.delay_s, is_wrong)?;
         let doubts = it.doubted + it.refused;
+        let is_wrong = too_many(doubts, it.motions, MAX_DOUBTED_SHARE)
+            || !config.gyro.allows_scale(it.scale);
+        let cause = cause("gyro", config.gyro.late_s, it.delay_s, is_wrong)?;
         Some(format!(
             "the gyro contradicts the radar: {doubts} of its {} turns were doubted or refused; {cause}, and gyro.kind=none leaves it out",
             it.motions
@@ -84,13 +85,16 @@ pub fn problem(
             it.slips, it.motions
         ))
     };
-    let unused_fixes = gnss.and_then(GnssSummary::refusal);
-    let by_gnss = || Some(format!("the fixes of GNSS are not used: {}", unused_fixes?));
+    let by_gnss = || {
+        let (reason, _) = gnss?.refusal().filter(|it| it.1)?;
+        Some(format!("the fixes of GNSS are not used: {reason}"))
+    };
     by_gyro.or_else(by_wheels).or_else(by_gnss)
 }
 
 /// Returns which key of a section is wrong: by a delay, if that is certain.
 fn cause(section: &str, late_s: f64, delay_s: Option<[f64; 2]>, is_wrong: bool) -> Option<String> {
+    let up = if section == "gyro" { "`gyro.up`, " } else { "" };
     match delay_s {
         Some([delay_s, sigma_s]) if delay_s.abs() > DELAY_SIGMAS * sigma_s => Some(format!(
             "the stamps are late by {delay_s:.2} \u{b1} {sigma_s:.2} s: set {section}.late_s={:.2}, which `gyre calibrate` finds too",
@@ -98,7 +102,7 @@ fn cause(section: &str, late_s: f64, delay_s: Option<[f64; 2]>, is_wrong: bool) 
         )),
         _ => is_wrong.then(|| {
             format!(
-                "`gyro.up`, `{section}.late_s`, `{section}.scale` or the unit of the log is wrong: `gyre calibrate` finds them from a recording"
+                "{up}`{section}.late_s`, `{section}.scale` or the unit of the log is wrong: `gyre calibrate` finds them from a recording"
             )
         }),
     }

@@ -38,8 +38,8 @@ pub struct GnssFaults {
     pub zero: usize,
     /// Fixes with the stamp of another one.
     pub repeated: usize,
-    /// Fixes at the very place of the fix before, as of a receiver that is frozen: only the first
-    /// is where the vehicle was.
+    /// Fixes at the very place of the fix before, as of a frozen receiver or a standing vehicle:
+    /// only the first is used.
     pub frozen: usize,
     /// Fixes with a stamp before that of an earlier one: sorted.
     pub out_of_order: usize,

@@ -25,12 +25,12 @@ const NORTH: &str = "north_m northing_m northing north";
 const ALTITUDE: &str = "altitude_m altitude alt";
 /// The hemispheres of latitudes and longitudes without a sign.
 const NORTH_OR_SOUTH: Sign = Sign {
-    names: "n_s ns lat_dir latitude_dir lat_ns lat_hemisphere latitude_hemisphere hemisphere",
+    names: "n_s ns n_s_indicator ns_indicator lat_ref latitude_ref lat_dir latitude_dir lat_ns lat_hemisphere latitude_hemisphere hemisphere",
     plus: "n north",
     minus: "s south",
 };
 const EAST_OR_WEST: Sign = Sign {
-    names: "e_w ew lon_dir longitude_dir lon_ew lon_hemisphere longitude_hemisphere",
+    names: "e_w ew e_w_indicator ew_indicator lon_ref longitude_ref lon_dir longitude_dir lon_ew lon_hemisphere longitude_hemisphere",
     plus: "e east",
     minus: "w west",
 };
@@ -181,7 +181,7 @@ impl Columns for FixColumns {
         };
         // What a receiver does not know is blank.
         let known = |column: usize| match row.get(column)? {
-            "" => Some(0.0),
+            "" => Some(f64::NAN),
             text => text.parse::<f64>().ok(),
         };
         Some(RawFix {

@@ -51,6 +51,9 @@ impl Columns for CountColumns {
     type Entry = Sample;
 
     fn by_names(header: &Header) -> Result<Self, String> {
+        if header.sign(&super::SIGNS).is_some() {
+            return Err("its direction is not applied to counts".to_owned());
+        }
         let one = |all: &[&str]| all.iter().find_map(|name| Some(vec![header.find(name)?]));
         let both = || {
             let mut pairs = LEFT_AND_RIGHT.iter();
@@ -145,8 +148,11 @@ pub(super) fn speeds(
 /// Lets a counter that runs over count on. Its range is a power of two, or what it jumps by each
 /// time; one that jumps once by something else is started anew.
 fn count_on(counts: &mut [Sample], wheel: usize) {
-    let values = || counts.iter().map(|it| it.values[wheel]);
-    let range = values().fold(f64::MIN, f64::max) - values().fold(f64::MAX, f64::min);
+    let mut values: Vec<f64> = counts.iter().map(|it| it.values[wheel]).collect();
+    values.sort_unstable_by(f64::total_cmp);
+    // Without a hundredth at each end: single rows are corrupt.
+    let margin = values.len() / 100;
+    let range = values[values.len() - 1 - margin] - values[margin];
     let apart = |pair: &[Sample]| pair[1].values[wheel] - pair[0].values[wheel];
     let steps: Vec<f64> = counts.windows(2).map(apart).collect();
     let (jumps, others): (Vec<usize>, Vec<usize>) =
