@@ -279,16 +279,16 @@ impl Refiner {
             return heading.adopt(&registered, &self.state.pose);
         };
         let drift_share = uncertainty::drift_share(self.map.len(), &self.config);
+        let scale_before = heading.scale;
         let weighed = heading.weigh(&registered, &self.state.pose, &turn, drift_share);
         if self.gyro.allows_scale(heading.scale) {
             return weighed;
         }
-        if heading.verdict == Verdict::Doubted {
-            // One match that errs says no more of the scale.
-            heading.scale = 1.0;
-            return weighed;
+        match heading.verdict {
+            // Either the match or the gyro errs by much, which says nothing of the scale.
+            Verdict::Doubted => heading.scale = scale_before,
+            _ => heading.verdict = Verdict::Refused,
         }
-        heading.verdict = Verdict::Refused;
         heading.adopt(&registered, &self.state.pose)
     }
 }
