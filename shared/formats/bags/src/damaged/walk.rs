@@ -130,11 +130,11 @@ impl<'a> Walk<'a> {
         match fields(opcode) {
             Some(of_it) => self.fill(of_it, span, opcode == op::MESSAGE),
             None if opcode < OWN => Ok(false),
-            // A program's own record, and not a chunk of whose opcode a bit is flipped.
-            None => {
-                let of_chunk = fields(op::CHUNK).unwrap_or_default();
-                Ok(!self.fill(of_chunk, span, false)?)
-            }
+            // A program's own record, and not another one of whose opcode a bit is flipped.
+            None => match fields(opcode ^ OWN) {
+                Some(of_other) => Ok(!self.fill(of_other, span, false)?),
+                None => Ok(true),
+            },
         }
     }
 
@@ -258,6 +258,15 @@ mod tests {
                 assert!(walk.next().unwrap().is_none());
             }
         }
+    }
+
+    #[test]
+    fn a_record_with_a_flipped_bit_in_its_opcode_is_damage() {
+        let flipped = record(op::METADATA | OWN, &[0; 8]);
+        let file = file(&[MAGIC, &flipped, &record(op::DATA_END, &[0; 4])].concat());
+        let mut walk = Walk::new(&file).unwrap().unwrap();
+        assert_eq!(walk.next().unwrap().unwrap().0, op::DATA_END);
+        assert!(walk.damage.contains(&8));
     }
 
     #[test]
