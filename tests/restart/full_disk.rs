@@ -56,7 +56,7 @@ fn an_error_that_cannot_be_printed_is_told_by_the_exit_code() {
 
 #[test]
 fn a_full_disk_ends_a_run_with_the_reason_and_a_live_one_when_all_poses_are_computed() {
-    let last = format!("to pose {} are not kept", recording::SCANS - 1);
+    let last = format!("the last pose is {}", recording::SCANS - 1);
     for (mode, words) in [
         ("lossless", &["No space left on device"][..]),
         ("live", &["is full: poses continue", &last]),

@@ -419,7 +419,7 @@ fn conclude(session: &Session<'_>, written: &Results, form: Form) -> Result<Exit
         print::line(written.summary.text(form)?)?;
     }
     if let Some(problem) = problem {
-        // The five lines have it.
+        // The brief summary contains the problem.
         if !(is_printed && form == Form::Brief) {
             print::note(format_args!("gyre: {problem}"));
         }

@@ -52,7 +52,7 @@ pub fn for_radar(
     let root = RunRoot::acquire(out.path(), signals)?;
     let (sender, answers) = channel();
     let asked = configuration.clone();
-    // An attempt can take seconds, in which the run must answer and end.
+    // An attempt can take seconds. Meanwhile the run must answer requests and signals.
     thread::spawn(move || {
         loop {
             thread::sleep(PAUSE);

@@ -14,6 +14,8 @@ use gyre_storage::{
 };
 use thiserror::Error;
 
+use crate::results::FILES;
+
 /// The lock of the folder, with the name of the command that fills it. It lies beside the results
 /// and not in shared memory, which two runs need not have in common: containers have their own.
 const LOCK: &str = ".lock";
@@ -29,7 +31,7 @@ pub struct Content(&'static str, &'static str, &'static str);
 #[rustfmt::skip]
 #[allow(missing_docs, reason = "each names its command")]
 impl Content {
-    pub const RUN: Self = Self("gyre run", LOCK, "config.toml log.jsonl odometry.csv poses.csv objects.csv trajectory.tum trajectory.svg errors.svg bands.svg trajectory_slam.tum loops.csv graph.g2o bands_slam.svg map.png latency.json summary.json ground_truth.tum");
+    pub const RUN: Self = Self("gyre run", LOCK, "config.toml log.jsonl");
     pub const MAP: Self = Self("gyre map", LOCK, "map.toml map.png map.tif map.pgm map.yaml keyframes.log changes.csv changes.png");
     pub const FIXES: Self = Self("gyre localise", LOCK, "fixes.csv fixes.tum fixes.png");
     pub const MASKS: Self = Self("gyre masks", "masks.png", "masks.png");
@@ -42,7 +44,7 @@ impl Content {
 }
 
 impl Content {
-    /// Checks that this content replaces nothing in a folder but what its command wrote.
+    /// Checks that this content replaces only files of its own command in a folder.
     ///
     /// # Errors
     /// A file in the place of the folder, or content of another command or of somebody else.
@@ -64,7 +66,11 @@ impl Content {
             }
             None => {}
         }
-        let mut files = files.split(' ').map(|name| folder.join(name));
+        let results = FILES.into_iter().filter(|_| *command == Self::RUN.0);
+        let mut files = files
+            .split(' ')
+            .chain(results)
+            .map(|name| folder.join(name));
         match files.find(|file| file.exists() && !folder.join(mark).exists()) {
             None => Ok(()),
             Some(file) => refused(format!(
@@ -107,7 +113,7 @@ pub fn write_page(to: &Path, page: &str, mark: &str) -> Result<(), OutError> {
             to.display()
         )));
     }
-    // What a link leads to is replaced, and not the link.
+    // The target of a link is replaced, and not the link.
     let file = to.canonicalize().unwrap_or(to.to_owned());
     storage::write(&file, page).map_err(|error| unwritable(error.source))
 }
@@ -115,7 +121,7 @@ pub fn write_page(to: &Path, page: &str, mark: &str) -> Result<(), OutError> {
 /// Checks that the results in the folder of a run are those of its configuration.
 ///
 /// # Errors
-/// A run that has taken the place of another one has not ended.
+/// A run that replaces an earlier one has not ended.
 pub fn require_results(run: &Path) -> Result<(), OutError> {
     let reason = "has not ended, and the results in it are of the run before: start the same command again, and it continues";
     match run.join(REPLACED).exists() {

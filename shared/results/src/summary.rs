@@ -28,7 +28,7 @@ pub struct Session<'a> {
     pub scans: Option<usize>,
     /// Poses that were in the journal before.
     pub resumed: usize,
-    /// A sentence about what is damaged or missing in the recording.
+    /// A sentence about damaged or missing parts of the recording.
     pub damage: Option<&'a str>,
     /// True if each scan that cannot be read is a problem: of recordings of runs and bags, whose
     /// scans were read once.

@@ -7,8 +7,8 @@ use gyre_samples::GnssConfig;
 use gyre_slam::Fixes;
 use gyre_stage::{GnssReceiver, StageError};
 
-/// Fixes are examined together, in a time that grows with their number. So while the run goes on
-/// they are examined when one in so many is new: after ten hours at 20 Hz that is every 18 s.
+/// The time to examine all fixes grows with their number. So during the run they are examined when
+/// one in so many is new: after ten hours at 20 Hz that is every 18 s.
 const NEW_SHARE: usize = 2000;
 
 /// Receives fixes, and reads the log of all that have arrived on.

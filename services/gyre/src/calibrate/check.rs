@@ -25,7 +25,7 @@ pub(super) fn ates_m(arguments: &CalibrateArguments, found: &Found) -> Option<[f
         configuration.odometry.points.min_range_m = min_range_m as f32;
         configuration.odometry.raster.min_range_m = min_range_m as f32;
     }
-    // Constants with which the drive cannot be registered are worse than any.
+    // If the drive cannot be registered with the constants, they are worse.
     let after = ate_m(&configuration, arguments.scans, &truth);
     Some([before, after.unwrap_or(f64::INFINITY)])
 }

@@ -211,7 +211,7 @@ const NAMES: usize = 16;
 
 /// Returns the command line of `gyre`, with groups and examples in its help.
 pub fn command() -> Command {
-    // A number below zero is no option: the option before it says what it needs.
+    // A negative number is a value: the parser of the option before it reports its own error.
     let of_option = |arg: Arg| {
         let has_value = arg.get_action().takes_values() && !arg.is_positional();
         arg.allow_negative_numbers(has_value)

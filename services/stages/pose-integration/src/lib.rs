@@ -5,8 +5,6 @@
 //! with objects it logs each scan. In live mode poses continue when the disk is full, and are not
 //! kept from then on.
 
-use std::path::PathBuf;
-
 use gyre_geometry::SparsePoint;
 use gyre_journal::{
     self as journal, Journal, JournalError,
@@ -41,15 +39,15 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let mut integration = Integration {
         journal: Journal::open(&journal::path(out)).map_err(unusable)?,
         last: None,
-        out: out.clone(),
         slam: launch.section("slam")?,
         objects: launch.section("objects")?,
         points: launch.manifest.limits.points,
         keyframes: None,
         scans: None,
         growth: Vec::new(),
+        // A stage that died on the full disk has left it.
+        loss: sink::notice(&launch.manifest),
         manifest: launch.manifest.clone(),
-        first_lost: None,
     };
     if integration.slam.is_on() {
         let grown = Growth::of(launch, LogId::Keyframes)?;
@@ -71,7 +69,6 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
 struct Integration {
     journal: Journal,
     last: Option<PoseHeader>,
-    out: PathBuf,
     slam: SlamConfig,
     objects: ObjectsConfig,
     /// The most points of a scan.
@@ -83,8 +80,8 @@ struct Integration {
     /// Wakes the followers of the logs that the run has.
     growth: Vec<(LogId, Growth)>,
     manifest: Manifest,
-    /// The first pose that is not kept.
-    first_lost: Option<u64>,
+    /// The sentence about the poses that are not kept.
+    loss: Option<String>,
 }
 
 impl Sink for Integration {
@@ -101,14 +98,14 @@ impl Sink for Integration {
         poses.drain(..poses.len().saturating_sub(count));
         let known = self.last.map_or(0, |last| last.item.seq.saturating_add(1));
         if self.slam.is_on() {
-            let keyframes = Keyframes::open(&self.out, &self.slam.places, known, ended);
+            let keyframes = Keyframes::open(&self.manifest.out, &self.slam.places, known, ended);
             let keyframes = self
                 .keyframes
                 .insert(keyframes.map_err(unusable_keyframes)?);
             keyframes.reserve(self.points);
         }
         if self.objects.is_on() {
-            let scans = Scans::open(&self.out, known, ended).map_err(unusable_scans)?;
+            let scans = Scans::open(&self.manifest.out, known, ended).map_err(unusable_scans)?;
             self.scans.insert(scans).reserve(self.points);
         }
         Ok((poses, ended))
@@ -132,13 +129,15 @@ impl Sink for Integration {
             self.wake_followers(LogId::Scans)?;
         }
         self.write(&pose)?;
-        if was_full() {
-            self.first_lost.get_or_insert(pose.item.seq);
+        if was_full() && self.loss.is_none() {
+            let (out, seq) = (self.manifest.out.display(), pose.item.seq);
+            let loss = format!(
+                "the disk of {out} is full: poses continue, but those from pose {seq} on are not kept: they are in no result, and the run can be resumed only from those before"
+            );
+            sink::set_notice(&self.manifest, &loss)?;
+            self.loss = Some(loss);
         }
         self.last = Some(pose);
-        if let Err(loss) = self.require_kept() {
-            sink::set_notice(&self.manifest, &loss.to_string())?;
-        }
         Ok(pose)
     }
 
@@ -179,13 +178,11 @@ impl Integration {
 
     /// Reports the poses that are not kept.
     fn require_kept(&self) -> Result<(), StageError> {
-        let (Some(first), Some(last)) = (self.first_lost, self.last) else {
+        let (Some(loss), Some(last)) = (&self.loss, self.last) else {
             return Ok(());
         };
-        let (out, last) = (self.out.display(), last.item.seq);
-        Err(StageError::Input(format!(
-            "the disk of {out} is full: poses continue, but those from pose {first} to pose {last} are not kept: they are in no result, and the run can be resumed only from those before"
-        )))
+        let seq = last.item.seq;
+        Err(StageError::Input(format!("{loss}; the last pose is {seq}")))
     }
 
     fn wake_followers(&self, log: LogId) -> Result<(), StageError> {

@@ -48,7 +48,7 @@ pub(crate) struct Key {
     number: u32,
 }
 
-/// A message is put into order among those of so many spans. Chunks have about 1 MB.
+/// Messages are sorted within a window of so many spans. Chunks have about 1 MB.
 const WINDOW: usize = 64;
 
 impl Bag {

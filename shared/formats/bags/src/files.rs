@@ -177,7 +177,7 @@ fn listed(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// The error of a bag of which each message, or each file, is compressed.
+/// The error of a bag whose messages or files are compressed.
 pub(crate) fn compressed(path: &Path) -> BagError {
     BagError::unreadable(
         path,

@@ -82,7 +82,7 @@ impl BagFile {
         Ok((bag, found.messages))
     }
 
-    /// Returns a sentence about what is damaged or missing, as far as the file has been read.
+    /// Returns a sentence about damaged or missing parts, as far as the file has been read.
     pub fn damage(&self) -> Option<String> {
         sentence(&self.path, &self.damage, self.cut_at)
     }

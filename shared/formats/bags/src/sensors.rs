@@ -21,7 +21,7 @@ pub(crate) struct Sensor<T: 'static> {
 /// The measurements on a topic.
 pub(crate) struct Measured<T> {
     pub topic: String,
-    /// In the order in which the bag received them.
+    /// In the order of their log times.
     pub measurements: Vec<T>,
 }
 

@@ -2,7 +2,7 @@
 //!
 //! - [`GnssLog`]: where it lies beside the scans of a dataset, and how it is read;
 //! - `table`: tables as CSV; `radiate`: the files of RADIATE, one for each fix;
-//! - [`ReceivedFixes`]: what a live receiver has sent, read on;
+//! - [`ReceivedFixes`]: the growing log of a live receiver;
 //! - `faults`: what is wrong with the fixes, and which of them are left out.
 
 mod error;
@@ -90,7 +90,7 @@ impl GnssLog {
         }
     }
 
-    /// Returns a table of what a log contains, in one file that has all.
+    /// Returns all fixes of a log as one table.
     ///
     /// # Errors
     /// A log that cannot be read.

@@ -102,7 +102,7 @@ impl Header {
         signs.find_map(|sign| Some((self.find(sign.names)?, *sign)))
     }
 
-    /// Returns the first column of which `meaning` knows the name, with what it means.
+    /// Returns the first column whose name `meaning` knows, with its meaning.
     pub fn first<T>(&self, meaning: impl Fn(&str) -> Option<T>) -> Option<(usize, T)> {
         let mut names = self.0.iter().enumerate();
         names.find_map(|(column, name)| Some((column, meaning(name)?)))
@@ -170,7 +170,7 @@ pub(crate) struct Stamp {
 }
 
 impl Stamp {
-    /// Stamps in the first column: in ns, or of the unit that their size says.
+    /// Stamps in the first column: in ns, or in the unit that their size implies.
     pub const fn first(is_by_size: bool) -> Self {
         Self {
             column: 0,
@@ -208,7 +208,7 @@ enum StampUnit {
     Ns(i64),
     /// Decimal seconds.
     Seconds,
-    /// Decimal seconds, or an integer whose size says its unit.
+    /// Decimal seconds, or an integer whose size implies its unit.
     BySize,
 }
 

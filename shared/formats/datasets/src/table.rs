@@ -159,7 +159,7 @@ impl Unreadable {
         self.count = self.count.saturating_add(times);
     }
 
-    /// Returns what is wrong if these are most of all rows.
+    /// Returns a sentence if most of all rows are unreadable.
     pub fn are_most(&self, all: usize) -> Option<String> {
         let Self { count, first, why } = self;
         (*count > all / 2).then(|| {
@@ -168,7 +168,7 @@ impl Unreadable {
     }
 }
 
-/// Returns what is wrong with a row of a table with so many columns, and the remedy.
+/// Returns the fault of a row of a table with so many columns, and the remedy.
 fn why(row: &StringRecord, columns: usize) -> String {
     let is_number = |text: &str| text.trim().parse::<f64>().is_ok();
     let is_date = |text: &str| {

@@ -147,7 +147,7 @@ message!(
     [Header, NavSatStatus]
 );
 
-/// The least status of a fix, and that of a driver that does not state it.
+/// The lowest status of a fix, and the status of a driver that does not state it.
 const FIX: i8 = 0;
 const STATUS_UNKNOWN: i8 = -2;
 /// The type of a covariance that is not known.

@@ -267,6 +267,6 @@ impl PlacedRows {
 pub fn stale_rows(scan: &PolarScan<'_>) -> usize {
     let rows = scan.flags.iter().rev();
     let stale = rows.take_while(|flags| **flags & flag::STALE != 0).count();
-    // Half a turn at least is taken as measured.
+    // At least half a turn was measured.
     stale.min(scan.geometry.azimuths / 2)
 }

@@ -5,7 +5,7 @@ use crate::{GyroConfig, MAX_SAMPLES, Sample, WheelsConfig, interval_of};
 /// A sample that is so much later than the last scan, or before the first scan so far from the
 /// newest sample, is of a clock that has jumped, ns.
 const MAX_AHEAD_NS: i64 = 10_000_000_000;
-/// The most samples that wait: those of that time at 1600 Hz.
+/// Maximum number of samples that wait: ten seconds at 1600 Hz.
 const MAX_WAITING: usize = 16 * MAX_SAMPLES;
 
 /// The sensor that the samples are of, by whose settings they are taken over to the radar's clock.
@@ -73,7 +73,7 @@ impl LiveSamples {
         }
         self.samples.insert(place, sample);
         if self.handed_until_ns.is_none() {
-            // What is so old is of no scan.
+            // No scan needs such old samples.
             let oldest_ns = newest_ns.map_or(i64::MIN, |ns| ns.saturating_sub(MAX_AHEAD_NS));
             let old = self.samples.partition_point(|it| it.stamp_ns < oldest_ns);
             self.samples.drain(..old);

@@ -84,7 +84,7 @@ pub struct RefinementRecord {
     pub gyro: u64,
     /// Turn since the previous scan that the gyro measured, rad; zero without one.
     pub gyro_turn_rad: f64,
-    /// True turn over that of the gyro, after the scan; zero without one.
+    /// Scale of the gyro (true turn over measured turn) after the scan; zero without a gyro.
     pub gyro_scale: f64,
     /// Bias of the gyro after the scan, rad/s; zero without one.
     pub gyro_bias_radps: f64,

@@ -30,7 +30,7 @@ pub(crate) fn listen(what: &str, section: &str, address: &str) -> Result<UdpSock
 pub(crate) const TURN_BYTES: usize = 1 << 16;
 const LEAST_BYTES: usize = 128;
 
-/// Receives a datagram that has arrived, and returns its size; `None` where there is none, and
+/// Receives a datagram that has arrived, and returns its size; `None` if no datagram waits, and
 /// where nothing is `left` of the turn, so that a sender without a pause holds nothing up.
 pub(crate) fn receive(
     socket: &UdpSocket,

@@ -27,7 +27,7 @@ const UNREADABLE: &str = "unreadable\n";
 /// Rows that the log takes in this time: receivers send at most 20 a second.
 const MAX_ROWS: usize = 5000;
 const OF: Duration = Duration::from_secs(10);
-/// The largest log, bytes: that of days.
+/// Maximum size of the log, bytes: several days of fixes.
 const MAX_LOG: u64 = 1 << 30;
 /// Time between two looks whether reception is to end.
 const WAIT: Duration = Duration::from_millis(50);
@@ -194,7 +194,7 @@ impl Reception {
                 },
             }
         }
-        // At the end what is there is taken: a receiver goes on sending.
+        // At the end only the waiting datagrams are read, because a receiver continues to send.
         self.socket.set_nonblocking(true).map_err(failed)?;
         let mut left = TURN_BYTES;
         while let Some(bytes) = receive(&self.socket, &mut datagram, &mut left)? {

@@ -126,7 +126,7 @@ impl Recorder {
         }
     }
 
-    /// Lets the recorder write what it has received, after the stages have ended.
+    /// Lets the recorder write all received messages, after the stages have ended.
     pub fn stop(
         &mut self,
         run: &mut Run<'_>,

@@ -61,7 +61,7 @@ pub(crate) struct Supervisor<'a> {
     logs: Logs,
     /// True when all stages have opened their topics once.
     is_ready: bool,
-    /// True when a notice about the run was said.
+    /// True when a notice about the run was reported.
     has_notice: bool,
     // Last: the processes end before their guardian, and the ports before their node.
     pub run: Run<'a>,
@@ -205,7 +205,7 @@ impl<'a> Supervisor<'a> {
         self.run.say(Event::Stopping);
         self.swaps.end_trial(&self.processes);
         let stopped = self.processes.stop(&mut self.run, ending);
-        // After the stages, which finish what they have begun.
+        // After the stages, because they finish their current scans.
         if let Some(recorder) = &mut self.recorder {
             recorder.stop(&mut self.run, ending)?;
         }

@@ -68,7 +68,7 @@ pub struct LostCounts {
     pub scans: u64,
     /// Azimuths that were lost in all.
     pub azimuths: u64,
-    /// Those of bursts whose places are unknown.
+    /// Azimuths in bursts at unknown places.
     pub unplaced: u64,
 }
 
@@ -96,9 +96,9 @@ pub struct GyroCounts {
     pub bias_radps: f64,
     /// Standard deviation of that bias, rad/s.
     pub bias_sigma_radps: f64,
-    /// True turn over that of the gyro, after the last of them.
+    /// Scale (true turn over measured turn) after the last of these motions.
     pub scale: f64,
-    /// Time by which its stamps are late, and its standard deviation, s; `None`: it is unknown.
+    /// Delay of its stamps and its standard deviation, s; `None`: it is unknown.
     pub delay_s: Option<[f64; 2]>,
 }
 
@@ -130,7 +130,7 @@ pub struct WheelCounts {
     pub scale: f64,
     /// Standard deviation of that scale.
     pub scale_sigma: f64,
-    /// As that of a gyro.
+    /// Delay of the stamps and its standard deviation, s; `None`: it is unknown.
     pub delay_s: Option<[f64; 2]>,
 }
 
@@ -227,7 +227,7 @@ impl MotionCounts {
 }
 
 impl Counts {
-    /// Returns the counts of motions of which too many have no firm match.
+    /// Returns the counts of motions if too many have no firm match.
     pub fn too_many_are_unsure(&self) -> Option<&MotionCounts> {
         let motions = self.motions.as_ref();
         motions.filter(|it| too_many(it.unsure, it.refined + it.doubtful, MAX_UNSURE_SHARE))
@@ -271,7 +271,7 @@ impl Counter {
         self.wheels.add(&pose.motion);
         self.doppler.add(&pose.motion);
         let (motion, of) = (&pose.motion, &pose.motion.refinement);
-        // A registered turn would depend on that of the gyro.
+        // A registered turn depends on the gyro.
         let turn = (of.gyro != gyro::NONE).then_some(of.gyro_turn_rad);
         self.gyro_clock.add(pose, motion.searched[2], turn);
         let distance = (of.wheels != wheels::NONE).then_some(of.wheel_distance_m);

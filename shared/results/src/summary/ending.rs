@@ -1,4 +1,4 @@
-//! The five lines with which a run ends on a terminal.
+//! The summary that a run prints at its end on a terminal.
 
 use std::{env, path::Path};
 
@@ -12,8 +12,8 @@ const NAMES: usize = 12;
 
 /// The way a run has gone, of which all results tell parts.
 impl Summary {
-    /// Returns five lines: the path, its accuracy, the latency, what is unusual, and where to look;
-    /// with SLAM one of the loops, and one of a problem.
+    /// Returns a line each for the path, its accuracy, the latency, unusual events and the files;
+    /// with SLAM one for the loops, and one for a problem.
     pub fn in_brief(&self) -> String {
         let problem = self.problem.as_ref().map(ToString::to_string);
         let lines = [

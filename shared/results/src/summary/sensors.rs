@@ -9,22 +9,25 @@ use gyre_messages::{PoseHeader, flag, initial_guess, outcome};
 use super::{Counts, GnssSummary};
 
 /// Largest shares of turns that are doubted or refused, and of distances of slipping wheels, in a
-/// run that succeeds. Fewer contradictions than the number say nothing.
+/// run that succeeds. Fewer contradictions are chance.
 const MAX_DOUBTED_SHARE: f64 = 0.1;
 const MAX_SLIPPING_SHARE: f64 = 0.5;
 const MIN_CONTRADICTIONS: u64 = 10;
 /// A delay of more than so many standard deviations is one.
 const DELAY_SIGMAS: f64 = 4.0;
-/// The last motions, of which the delay is measured: those of an hour.
+/// The delay is measured over so many motions: an hour.
 const MOTIONS_OF_DELAY: usize = 1 << 14;
 
-/// The motions by the radar alone and by a sensor, of which the delay is measured.
+/// The motions by the radar alone and by a sensor, to measure the delay between them.
 #[derive(Debug, Default)]
 pub struct Clock(VecDeque<Compared>);
 
 impl Clock {
     /// Adds the motion to a pose.
     pub fn add(&mut self, pose: &PoseHeader, by_radar: f64, by_sensor: Option<f64>) {
+        if self.0.is_empty() && by_sensor.is_none() {
+            return;
+        }
         if self.0.len() == MOTIONS_OF_DELAY {
             self.0.pop_front();
         }

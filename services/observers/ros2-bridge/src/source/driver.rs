@@ -296,7 +296,7 @@ impl Driver {
         }
     }
 
-    /// Takes the next speed of the wheels. That of a message that cannot be read is not a number.
+    /// Takes the next speed of the wheels; NaN for a message that cannot be read.
     pub fn wheel_sample(&self) -> Option<Sample> {
         match self.wheels.as_ref()?.take() {
             Ok(taken) => taken.map(|(odometry, _)| odometry.sample(clock::since_1970_ns())),

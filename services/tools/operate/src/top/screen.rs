@@ -117,7 +117,7 @@ pub fn text(snapshot: &Snapshot, width: u16) -> String {
     lines.join("\n")
 }
 
-/// Returns what is above the table, in lines that fit this width.
+/// Returns the lines above the table, wrapped to this width.
 fn head_lines(snapshot: &Snapshot, width: u16) -> Vec<String> {
     let status = &snapshot.status;
     let in_flight = snapshot

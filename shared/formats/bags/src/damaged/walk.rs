@@ -17,7 +17,7 @@ const OWN: u8 = 0x80;
 const MAX_PLACES: usize = 4096;
 /// Bytes that are searched at once for the record behind a damaged one.
 const WINDOW: usize = 1 << 16;
-/// Whole records in a row of which a damaged place is followed.
+/// Whole records in a row that must follow a damaged place.
 const CHAIN: usize = 3;
 
 /// The place of records in a file.
@@ -130,7 +130,7 @@ impl<'a> Walk<'a> {
         match fields(opcode) {
             Some(of_it) => self.fill(of_it, span, opcode == op::MESSAGE),
             None if opcode < OWN => Ok(false),
-            // A program's own record, and not another one of whose opcode a bit is flipped.
+            // A program's own record, unless it fits a standard opcode with a flipped bit.
             None => match fields(opcode ^ OWN) {
                 Some(of_other) => Ok(!self.fill(of_other, span, false)?),
                 None => Ok(true),
@@ -198,7 +198,7 @@ impl<'a> Walk<'a> {
     }
 }
 
-/// Returns eight bytes as a number, in which those behind the end of the file are zero.
+/// Returns eight bytes as a number; bytes behind the end of the file are zero.
 fn number(file: &File, offset: u64) -> io::Result<u64> {
     let mut bytes = [0; 8];
     file.read_at(&mut bytes, offset)?;

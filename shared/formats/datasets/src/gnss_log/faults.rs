@@ -15,7 +15,7 @@ const SLACK_SIGMAS: f64 = 5.0;
 /// No receiver measures better than 1 cm with the phase of the carrier, nor is a fix compared with
 /// the radar's place better than that: within 1 ms a car drives a centimetre.
 const LEAST_SIGMA_M: f64 = 0.01;
-/// A fix that is less certain tells nothing, m.
+/// A fix with a larger standard deviation contains no information, m.
 const MOST_SIGMA_M: f64 = 1e6;
 /// Stretches between jumps that are looked back over: behind so many the fixes are noise.
 const LOOK_BACK: usize = 200;

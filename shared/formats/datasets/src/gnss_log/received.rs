@@ -1,4 +1,4 @@
-//! The log of what a live receiver sends, which grows.
+//! The growing log of a live receiver.
 
 use std::{
     io::{self, Read, Seek, SeekFrom},
@@ -13,7 +13,7 @@ use crate::table::Rows;
 /// The fixes that a live receiver has sent so far: each row of their log is read once.
 pub struct ReceivedFixes {
     path: PathBuf,
-    /// The end of what was read.
+    /// The end of the part that was read.
     end: u64,
     rows: Option<Rows<FixColumns>>,
 }

@@ -179,7 +179,7 @@ impl Columns for FixColumns {
                 None => Some(value),
             }
         };
-        // What a receiver does not know is blank.
+        // A field is blank if the receiver does not know the value.
         let known = |column: usize| match row.get(column)? {
             "" => Some(f64::NAN),
             text => text.parse::<f64>().ok(),

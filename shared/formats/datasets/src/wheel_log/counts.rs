@@ -39,7 +39,7 @@ const COUNTS: Plausible = Plausible {
     beyond: "",
 };
 
-/// Where a table has counts. A sample of it has those of both wheels, or of one twice.
+/// The columns of counts. A sample contains the counts of both wheels, or of one wheel twice.
 pub(super) struct CountColumns {
     stamp: Stamp,
     /// One, or one of each wheel.
@@ -145,8 +145,8 @@ pub(super) fn speeds(
     Ok((speeds, faults))
 }
 
-/// Lets a counter that runs over count on. Its range is a power of two, or what it jumps by each
-/// time; one that jumps once by something else is started anew.
+/// Unwraps a counter that overflows. The range of the counter is a power of two, or the size of
+/// its jumps if all jumps are equal; a single other jump is a restart of the counter.
 fn count_on(counts: &mut [Sample], wheel: usize) {
     let mut values: Vec<f64> = counts.iter().map(|it| it.values[wheel]).collect();
     values.sort_unstable_by(f64::total_cmp);

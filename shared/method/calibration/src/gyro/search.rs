@@ -23,7 +23,7 @@ const MIN_SHARE: f64 = 0.6;
 const INDEPENDENT: f64 = 2.0;
 /// Logarithm of the likelihood by which the best offset must exceed any other.
 const MIN_EVIDENCE: f64 = 5.0;
-/// Delays that are looked for in a run, s: those of buffers and of hosts that stall.
+/// Range of the delays that are searched in a run, s: buffers and stalling hosts cause them.
 const MAX_DELAY_S: f64 = 10.0;
 
 /// The axis and the offset that fit best.

@@ -285,7 +285,7 @@ impl Refiner {
             return weighed;
         }
         match heading.verdict {
-            // Either the match or the gyro errs by much, which says nothing of the scale.
+            // Either the match or the gyro has a gross error, so the scale is not updated.
             Verdict::Doubted => heading.scale = scale_before,
             _ => heading.verdict = Verdict::Refused,
         }

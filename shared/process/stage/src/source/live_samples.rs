@@ -89,7 +89,7 @@ impl LiveSensors {
         sockets.map(AsFd::as_fd)
     }
 
-    /// Takes what has arrived, a turn of it at most.
+    /// Takes the samples that have arrived, at most one turn of them.
     ///
     /// # Errors
     /// A socket fails.
