@@ -7,7 +7,7 @@ use gyre_storage as storage;
 use gyre_terminal::Failure;
 use serde::Deserialize;
 
-use crate::results::SUMMARY;
+use crate::out::SUMMARY;
 
 /// The part of a summary that says where the run is.
 #[derive(Deserialize)]

@@ -22,8 +22,11 @@ mod summary;
 
 pub use georeference::georeference;
 pub use identity::{Holds, Identity, Programs};
-pub use out::{Content, Out, OutError, REPLACED, absolute, require_results, write_page};
-pub use results::{FILES, Results, SIMULATED_TRUTH, SUMMARY, map_options, truth_of, write};
+pub use out::{
+    Content, FILES, Out, OutError, REPLACED, SIMULATED_TRUTH, SUMMARY, absolute, require_results,
+    write_page,
+};
+pub use results::{Results, map_options, truth_of, write};
 pub use summary::{
     Counter, Counts, Course, Form, GnssSummary, LostCounts, Measured, MotionCounts, Problem,
     Session, SlamSummary, Summary,

@@ -14,7 +14,29 @@ use gyre_storage::{
 };
 use thiserror::Error;
 
-use crate::results::FILES;
+/// The figures of a run. It is put in place after all other results.
+pub const SUMMARY: &str = "summary.json";
+
+/// The ground truth of a simulation that is played without being stored.
+pub const SIMULATED_TRUTH: &str = "ground_truth.tum";
+/// All results.
+pub const FILES: [&str; 15] = [
+    "odometry.csv",
+    "poses.csv",
+    "objects.csv",
+    "trajectory.tum",
+    "trajectory.svg",
+    "errors.svg",
+    "bands.svg",
+    "trajectory_slam.tum",
+    "loops.csv",
+    "graph.g2o",
+    "bands_slam.svg",
+    "map.png",
+    "latency.json",
+    SUMMARY,
+    SIMULATED_TRUTH,
+];
 
 /// The lock of the folder, with the name of the command that fills it. It lies beside the results
 /// and not in shared memory, which two runs need not have in common: containers have their own.

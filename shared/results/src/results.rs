@@ -24,7 +24,7 @@ use gyre_terminal::{Failure, print};
 
 use crate::{
     judgement::{Judgement, judge, judge_motions, note_time_offset},
-    out::Out,
+    out::{Out, SIMULATED_TRUTH, SUMMARY},
     summary::{Measured, Session, SlamSummary, Summary},
 };
 use estimate::Estimate;
@@ -34,30 +34,6 @@ use sketch::Sketch;
 use slam::Slam;
 
 pub use map::map_options;
-
-/// The figures of a run. It is put in place after all other results.
-pub const SUMMARY: &str = "summary.json";
-
-/// The ground truth of a simulation that is played without being stored.
-pub const SIMULATED_TRUTH: &str = "ground_truth.tum";
-/// All results.
-pub const FILES: [&str; 15] = [
-    "odometry.csv",
-    "poses.csv",
-    "objects.csv",
-    "trajectory.tum",
-    "trajectory.svg",
-    "errors.svg",
-    "bands.svg",
-    "trajectory_slam.tum",
-    "loops.csv",
-    "graph.g2o",
-    "bands_slam.svg",
-    "map.png",
-    "latency.json",
-    SUMMARY,
-    SIMULATED_TRUTH,
-];
 
 /// The files that were written.
 #[derive(Debug)]

@@ -5,8 +5,7 @@ use std::path::Path;
 use gyre_storage::{self as storage, Draft};
 use gyre_terminal::Failure;
 
-use super::{FILES, SIMULATED_TRUTH};
-use crate::out::Out;
+use crate::out::{FILES, Out, SIMULATED_TRUTH};
 
 /// Results that take their places together.
 #[derive(Debug)]
