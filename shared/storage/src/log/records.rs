@@ -245,7 +245,9 @@ impl Records {
         let mut bytes = vec![0; CHUNK];
         let mut offset = self.end();
         while offset + HEADER as u64 <= length {
-            let found = self.read_some(&mut bytes, offset)?;
+            // Records that were appended since the length was taken are no part of this look.
+            let within = (length - offset).min(CHUNK as u64) as usize;
+            let found = self.read_some(&mut bytes[..within], offset)?;
             let last_start = found.saturating_sub(HEADER);
             for start in (0..=last_start).step_by(ALIGNMENT) {
                 let header = Header::decode(&bytes[start..found]);
