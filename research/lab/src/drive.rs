@@ -4,7 +4,7 @@ use std::{convert::Infallible, path::Path};
 
 use gyre_configuration::Configuration;
 use gyre_datasets::{find_ground_truth, read_trajectory};
-use gyre_estimation::places::{MAX_NEIGHBOURS, PlaceOptions, neighbours};
+use gyre_estimation::places::{MAX_NEIGHBOURS, SUBMAP_REACH_M, neighbours};
 use gyre_geometry::Pose;
 use gyre_radar::Trajectory;
 use gyre_scan_matching::{RefinementConfig, Submap};
@@ -29,8 +29,6 @@ pub struct Drive {
     pub capacity: usize,
     /// The submap of a query and that of a candidate.
     pub submaps: [Submap; 2],
-    /// The settings by which the run selected keyframes and recognised places.
-    pub places: PlaceOptions,
 }
 
 impl Drive {
@@ -66,7 +64,6 @@ impl Drive {
             refinement: configuration.odometry.refinement,
             capacity,
             submaps: [0, 1].map(|_| Submap::with_capacity(capacity * (2 * MAX_NEIGHBOURS + 1))),
-            places: configuration.slam.places,
         })
     }
 
@@ -83,7 +80,7 @@ impl Drive {
         let middle = &self.keyframes[keyframe];
         let submap = &mut self.submaps[submap];
         submap.start(&middle.points, &middle.twist);
-        for k in neighbours(&self.path_m, keyframe, self.places.submap_reach_m)
+        for k in neighbours(&self.path_m, keyframe, SUBMAP_REACH_M)
             .filter(|k| *k != keyframe)
         {
             let other = &self.keyframes[k];

@@ -63,7 +63,7 @@ pub fn places(arguments: &PlacesArguments) -> Result<ExitCode, Failure> {
     let start = Instant::now();
     let (mut index, descriptors) = describe(&mut drive)?;
     let mut counts = Counts::new(start.elapsed());
-    let mut verifier = LoopVerifier::new(&drive.places, &drive.refinement, drive.capacity)?;
+    let mut verifier = LoopVerifier::new(&drive.refinement, drive.capacity)?;
     let mut rows = String::from(HEADER);
     for (query, descriptor) in descriptors.iter().enumerate() {
         let eligible = index.places_until(drive.path_m[query] - arguments.gap_m);

@@ -43,8 +43,8 @@ class Recipe:
 
 # Options of Gyre's search that `ScanMatch` lacks, with the only values that it supports.
 FIXED = {
-    "rotation": {"magnitude": "linear", "phase_only": False},
-    "translation": {"phase_only": False, "half_turn": False},
+    "rotation": {"phase_only": False},
+    "translation": {"phase_only": False},
 }
 
 

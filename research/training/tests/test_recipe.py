@@ -51,7 +51,7 @@ def test_the_search_has_the_settings_of_the_configuration():
 
 @pytest.mark.parametrize(
     "section, key, value",
-    [("rotation", "magnitude", "log"), ("rotation", "phase_only", True), ("translation", "half_turn", True), ("translation", "peak", "parabola")],
+    [("rotation", "phase_only", True), ("translation", "peak", "parabola")],
 )
 def test_an_unsupported_search_is_refused(section, key, value):
     with pytest.raises(SystemExit, match=key):

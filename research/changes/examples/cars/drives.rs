@@ -106,7 +106,7 @@ fn registered(drive: &SimulatedDrive) -> Outcome<Vec<Keyframe>> {
     let options = drive.dataset_options();
     let mut dataset = gyre_datasets::open_source(Box::new(drive.renderer()), &options)?;
     let mut odometry = Odometry::new(&OdometryConfig::default())?;
-    let mut builder = KeyframeBuilder::new(&Default::default());
+    let mut builder = KeyframeBuilder::default();
     let mut scan = OwnedScan::with_limits(dataset.limits());
     let mut keyframes = Vec::new();
     for index in 0..dataset.len() {
