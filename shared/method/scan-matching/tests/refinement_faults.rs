@@ -3,7 +3,7 @@
 
 use crate::common::{Numbers, scenes::*};
 use gyre_geometry::{ComposedMotion, Pose, SparsePoint};
-use gyre_scan_matching::{Outcome, Refined, RefinementConfig, Refiner};
+use gyre_scan_matching::{Outcome, Refined, Refiner};
 
 /// A gentle bend and its 60 scans.
 fn bend() -> (Drive, Vec<Vec<SparsePoint>>) {
