@@ -168,11 +168,11 @@ impl Slam {
             ));
         }
         let capacity = config.odometry.points.capacity;
-        let closer = LoopCloser::new(
-            LoopOptions::default(),
-            &config.odometry.refinement,
-            capacity,
-        );
+        let options = LoopOptions {
+            submap_reach_m: config.slam.submap_reach_m,
+            ..LoopOptions::default()
+        };
+        let closer = LoopCloser::new(options, &config.odometry.refinement, capacity);
         let state = State {
             builder: KeyframeBuilder::default(),
             closer: closer.map_err(errors::config)?,

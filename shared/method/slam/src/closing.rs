@@ -33,6 +33,8 @@ pub trait KeyframeSource {
 /// Options of [`LoopCloser`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoopOptions {
+    /// Length of the path to each side of a keyframe whose keyframes make its submap, m.
+    pub submap_reach_m: f64,
     /// Length of the path between a keyframe and the earlier ones that it is compared with, at
     /// least, m.
     pub gap_m: f64,
@@ -49,6 +51,7 @@ pub struct LoopOptions {
 impl Default for LoopOptions {
     fn default() -> Self {
         Self {
+            submap_reach_m: SUBMAP_REACH_M,
             gap_m: 100.0,
             candidates: 3,
             apart_m: 15.0,
@@ -241,7 +244,7 @@ impl LoopCloser {
     }
 
     fn neighbours(&self, middle: usize) -> std::ops::Range<usize> {
-        neighbours(&self.path_m, middle, SUBMAP_REACH_M)
+        neighbours(&self.path_m, middle, self.options.submap_reach_m)
     }
 
     /// The places that look most like that of a keyframe.

@@ -2,12 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
+use gyre_estimation::places::SUBMAP_REACH_M;
 use serde::{Deserialize, Serialize};
 
 use crate::EstimatorKind;
 
 /// Configuration of SLAM: section `[slam]`.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SlamConfig {
     /// `none`: odometry alone. `filter` and `graph`: the keyframes of the drive are kept in
@@ -18,6 +19,24 @@ pub struct SlamConfig {
     /// published on the topic `fix`.
     #[serde(skip_serializing_if = "is_empty")]
     pub map: PathBuf,
+    /// Length of the path to each side of a keyframe whose keyframes make its submap, m: more if
+    /// scans are far apart.
+    pub submap_reach_m: f64,
+}
+
+/// `slam.submap_reach_m` is out of its bounds.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("submap_reach_m = {0}: expected 0 to 50 m")]
+pub struct SlamConfigError(f64);
+
+impl Default for SlamConfig {
+    fn default() -> Self {
+        Self {
+            kind: SlamKind::default(),
+            map: PathBuf::new(),
+            submap_reach_m: SUBMAP_REACH_M,
+        }
+    }
 }
 
 /// The correction of the trajectory by loops.
@@ -59,5 +78,16 @@ impl SlamConfig {
     /// Returns whether keyframes are kept and loops closed.
     pub fn is_on(&self) -> bool {
         self.kind != SlamKind::None
+    }
+
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// The reach of submaps is out of its bounds.
+    pub fn validate(&self) -> Result<(), SlamConfigError> {
+        match (0.0..=50.0).contains(&self.submap_reach_m) {
+            true => Ok(()),
+            false => Err(SlamConfigError(self.submap_reach_m)),
+        }
     }
 }

@@ -28,7 +28,7 @@ mod variance;
 mod verdict;
 
 pub use closing::{ClosingError, KeyframeSource, LoopCloser, LoopOptions};
-pub use config::{SlamConfig, SlamKind};
+pub use config::{SlamConfig, SlamConfigError, SlamKind};
 pub use correction::Correction;
 pub use fixes::{FixCounts, FixRefusal, Fixes};
 pub use keyframe::Keyframe;
