@@ -39,7 +39,8 @@ impl Outcome {
     fn of(data: &Path, corrupted: usize) -> Self {
         let configuration = Path::new(crate::PROJECT).join("configs/radiate.toml");
         let run = Run::of_file(&configuration).data(data).rate("max");
-        run.complete();
+        // The program ends with code 1 if many motions are weak. The results are there.
+        run.finish();
         let summary = run.summary();
         let figure = |place| summary.pointer(place).and_then(Value::as_f64).unwrap();
         let (ate_m, seg_percent) = (
