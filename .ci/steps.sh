@@ -1,4 +1,4 @@
-# What `.ci/run` and `.ci/nightly` share. They source it.
+# What the scripts of `.ci` share. They source it.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 export GYRE_DATA="${GYRE_DATA:-$PWD/../shared/data}"
@@ -71,20 +71,16 @@ check_dependencies() {
     state_of Cargo.lock deny.toml > .ci/dependencies.passed
 }
 
-install_training() {
-    python3 -m venv "$target/training"
-    install "$target/training/bin/python" -r training/requirements.txt -e training
-}
-
-# The tests of the training, and a note of what has passed them.
-test_training() {
-    GYRE_LAB="$target/debug/gyre-lab" "$target/training/bin/python" -m pytest -q training
-    rm -rf "$target/training"
-    state_of training models > .ci/training.passed
+# The package as pip would install it, from the build of the tests.
+place_package() {
+    local packages
+    packages="$("$GYRE_PYTHON" -c 'import sysconfig; print(sysconfig.get_path("platlib"))')"
+    cp -r python/package/gyre "$packages/"
+    cp "$target/debug/lib_gyre.so" "$packages/gyre/_gyre.abi3.so"
 }
 
 test_package() {
-    GYRE_PROGRAM="$target/debug/gyre" "$GYRE_PYTHON" -m pytest -q -n 2 --dist loadfile python lab
+    GYRE_PROGRAM="$target/debug/gyre" "$GYRE_PYTHON" -m pytest -q -n 2 --dist loadfile python
 }
 
 demo() {

@@ -52,6 +52,8 @@ TAU = 2.0 * math.pi
 # The sensor's place depends on the time of a measurement, and that on the bearing from there: after two steps the error is
 # centimetres for a cell 12 m away at 30 m/s.
 FIXED_POINT_STEPS = 2
+# Power above the floor at which the weight of a point reaches 1.
+WEIGHT_CAP = 60.0
 # A larger motion within half a sweep comes from a wrong match: no compensation is better.
 MAX_TURN_RAD, MAX_TRAVEL_M = 2.0, 1e4
 
@@ -191,7 +193,7 @@ class PointExtractor:
         row, cell = np.nonzero(self._strongest(peaks))
         range_m = (skipped + cell + 0.5) * per_cell * sweep.resolution_m + sweep.offset_m
         angle = sweep.azimuth_rad[row]
-        weight = np.minimum(peaks[row, cell] / (self.config["weight_cap"] * per_cell), 1.0)
+        weight = np.minimum(peaks[row, cell] / (WEIGHT_CAP * per_cell), 1.0)
         columns = (
             range_m * np.cos(angle),
             range_m * sweep.side * np.sin(angle),

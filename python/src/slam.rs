@@ -167,14 +167,14 @@ impl Slam {
                 "slam.map: keyframes are found in a map by `gyre run` alone; leave the key out",
             ));
         }
-        let (places, capacity) = (config.slam.places.clone(), config.odometry.points.capacity);
-        let options = LoopOptions {
-            places,
-            ..LoopOptions::default()
-        };
-        let closer = LoopCloser::new(options, &config.odometry.refinement, capacity);
+        let capacity = config.odometry.points.capacity;
+        let closer = LoopCloser::new(
+            LoopOptions::default(),
+            &config.odometry.refinement,
+            capacity,
+        );
         let state = State {
-            builder: KeyframeBuilder::new(&config.slam.places),
+            builder: KeyframeBuilder::default(),
             closer: closer.map_err(errors::config)?,
             estimator: TrajectoryEstimator::new(TrajectoryOptions {
                 kind,

@@ -32,9 +32,9 @@ def test_all_configurations_of_the_repository_are_read() -> None:
 
 
 def test_overrides_replace_keys() -> None:
-    config = gyre.Config.read(CONFIGS / "radiate.toml", {"masking.kind": "none", "slam.places.submap_reach_m": 9})
+    config = gyre.Config.read(CONFIGS / "radiate.toml", {"masking.kind": "none", "refinement.keyframes": 9})
     assert config.to_dict()["masking"]["kind"] == "none"
-    assert config.to_dict()["slam"]["places"]["submap_reach_m"] == 9
+    assert config.to_dict()["refinement"]["keyframes"] == 9
 
 
 def test_settings_that_are_found_say_what_they_are(recording: Path) -> None:

@@ -87,6 +87,7 @@ fn sentence_of(stderr: &str) -> &str {
         .and_then(|line| {
             line.strip_prefix("gyre: ")
                 .or(line.strip_prefix("gyre-lab: "))
+                .or(line.strip_prefix("gyre-changes: "))
         })
         .unwrap_or_default()
 }

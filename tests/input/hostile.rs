@@ -192,10 +192,7 @@ fn a_model_and_a_card_without_end_are_refused() {
 
 #[test]
 fn a_journal_and_logs_of_impossible_lengths_are_refused_and_a_mended_run_goes_on() {
-    let run = Run::of_recording()
-        .rate("6")
-        .set("slam.kind=graph")
-        .set("slam.places.keyframe_distance_m=5");
+    let run = Run::of_recording().rate("6").set("slam.kind=graph");
     let mut running = run.start();
     running.await_poses(recording::SCANS / 2);
     running.kill_supervisor();

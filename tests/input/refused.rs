@@ -221,8 +221,8 @@ fn an_impossible_value_is_reported_with_what_is_possible() {
             ["refinement.min_overlap = 1.5", "0 to 1"],
         ),
         (
-            "[refinement]\njitter_m = nan",
-            ["refinement.jitter_m = NaN", "positive"],
+            "[refinement]\nvariance_scale = nan",
+            ["refinement.variance_scale = NaN", "positive"],
         ),
         ("[dataset]\nformat = 'oxfort'", ["oxfort", "oxford"]),
         ("[simulation]\nscans = 0", ["simulation", "scans"]),

@@ -189,7 +189,7 @@ fn the_window_does_not_change_the_result() {
 fn the_resolved_configuration_repeats_the_run() {
     let run = Run::of_recording()
         .set("masking.threshold=70")
-        .set("rotation.magnitude=log");
+        .set("rotation.window=hann");
     let odometry = run.complete();
     assert_ne!(odometry, undisturbed());
     assert_eq!(

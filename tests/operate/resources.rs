@@ -12,10 +12,7 @@ use rustix::process::Signal;
 fn after_its_first_messages_a_stage_allocates_nothing_for_a_scan() {
     // So slow that the followers have come before the sixth scan: the transport allocates when a
     // listener comes.
-    let with_slam = Run::of_recording()
-        .rate("6")
-        .set("slam.kind=graph")
-        .set("slam.places.keyframe_distance_m=5");
+    let with_slam = Run::of_recording().rate("6").set("slam.kind=graph");
     for run in [Run::of_recording(), with_slam] {
         run.complete();
         // The source's are the PNG decoder's own.

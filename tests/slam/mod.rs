@@ -6,4 +6,3 @@ pub mod gnss;
 mod keyframes;
 mod localise;
 mod loops;
-mod map_changes;

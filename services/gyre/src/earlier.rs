@@ -271,7 +271,7 @@ fn known_poses(
 ) -> Result<u64, Failure> {
     let slam = &configuration.slam;
     let complete = match slam.is_on() {
-        true => complete_poses(out.path(), &slam.places, content.poses).map_err(damaged)?,
+        true => complete_poses(out.path(), content.poses).map_err(damaged)?,
         false => content.poses,
     };
     let complete = match configuration.objects.is_on() {

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use gyre_configuration::Configuration;
 use gyre_messages::{FollowerId, StageId};
-use gyre_run::{LinkConfig, Mode, RecordConfig, Scheduling, Side, StageConfig};
+use gyre_run::{LinkConfig, Mode, RecordConfig, RestartPolicy, Scheduling, Side, StageConfig};
 use gyre_supervise::{END_TIMEOUT, Program, StagePlan};
 use gyre_terminal::Failure;
 
@@ -93,7 +93,7 @@ pub fn recorder(record: &RecordConfig, gyre: &Path, out: &Path) -> Option<StageP
         programs: Vec::new(),
         directory: None,
         scheduling: Scheduling::default(),
-        restart: record.restart,
+        restart: RestartPolicy::default(),
         outlives_restarts: true,
         restarts_all: false,
         end_timeout: END_TIMEOUT,

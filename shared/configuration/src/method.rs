@@ -103,7 +103,6 @@ impl MethodConfig {
         within("gyro", odometry.gyro.validate())?;
         within("wheels", odometry.wheels.validate())?;
         within("doppler", odometry.doppler.validate())?;
-        within("slam.places", self.slam.validate())?;
         within("gnss", self.gnss.validate())?;
         within("objects", self.objects.validate())
     }

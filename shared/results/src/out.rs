@@ -54,7 +54,7 @@ pub struct Content(&'static str, &'static str, &'static str);
 #[allow(missing_docs, reason = "each names its command")]
 impl Content {
     pub const RUN: Self = Self("gyre run", LOCK, "config.toml log.jsonl");
-    pub const MAP: Self = Self("gyre map", LOCK, "map.toml map.png map.tif map.pgm map.yaml keyframes.log changes.csv changes.png");
+    pub const MAP: Self = Self("gyre map", LOCK, "map.toml map.png map.tif map.pgm map.yaml keyframes.log");
     pub const FIXES: Self = Self("gyre localise", LOCK, "fixes.csv fixes.tum fixes.png");
     pub const MASKS: Self = Self("gyre masks", "masks.png", "masks.png");
     pub const CALIBRATION: Self = Self("gyre calibrate", LOCK, "calibration.toml calibration.svg calibration-2.svg");

@@ -45,7 +45,6 @@ const FILES: &[(&str, &[u8])] = files![
     "configs/simulated-oxford.toml"
     "configs/stop-and-go.toml"
     "configs/stop-and-go.tum"
-    "models/changes.onnx"
     "models/gyre-255.onnx"
     "models/gyre-255.toml"
     "models/light-255.onnx"

@@ -49,7 +49,6 @@ impl Machine {
         let overrides = [
             "points.max_range_m=10.0",
             "refinement.keyframes=3",
-            "refinement.keyframe_distance_m=1.5",
             "refinement.cell_m=1.0",
             "refinement.reach_m=30.0",
             match slam {
@@ -169,9 +168,7 @@ impl Stages {
         let last = poses.pop();
         let slam = &configuration.slam;
         let poses = last.map_or(0, |last| last.item.seq + 1);
-        let keyframes = slam
-            .is_on()
-            .then(|| Keyframes::open(out, &slam.places, poses, ended));
+        let keyframes = slam.is_on().then(|| Keyframes::open(out, poses, ended));
         Ok(Self {
             refiner,
             checkpoint,

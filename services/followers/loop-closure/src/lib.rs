@@ -9,14 +9,14 @@ mod logged;
 
 use std::{collections::VecDeque, path::PathBuf};
 
-use gyre_estimation::places::{MAX_NEIGHBOURS, neighbours};
+use gyre_estimation::places::{MAX_NEIGHBOURS, SUBMAP_REACH_M, neighbours};
 use gyre_geometry::{covariance, xy_yaw};
 use gyre_messages::{Item, Loop, LoopHeader};
 use gyre_radar::points::PointsConfig;
 use gyre_scan_matching::RefinementConfig;
 use gyre_slam::{
     ClosingError, Keyframe, KeyframeSource, LoopCandidate, LoopCloser, LoopOptions, Place, Query,
-    RecordLog, RecordReader, SlamConfig,
+    RecordLog, RecordReader,
 };
 use gyre_stage::{
     Follower, Launch, StageCounters, StageError,
@@ -35,7 +35,6 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     }
     let settings = Settings {
         out: launch.manifest.out.clone(),
-        slam: launch.section("slam")?,
         refinement: launch.section("refinement")?,
         points: launch.section("points")?,
     };
@@ -61,19 +60,18 @@ struct LoopClosing {
 struct Settings {
     /// The folder of the results.
     out: PathBuf,
-    slam: SlamConfig,
     refinement: RefinementConfig,
     points: PointsConfig,
 }
 
 impl Settings {
     fn closer(&self) -> Result<LoopCloser, StageError> {
-        let options = LoopOptions {
-            places: self.slam.places.clone(),
-            ..LoopOptions::default()
-        };
-        LoopCloser::new(options, &self.refinement, self.points.capacity)
-            .map_err(|error| StageError::Configuration(error.to_string()))
+        LoopCloser::new(
+            LoopOptions::default(),
+            &self.refinement,
+            self.points.capacity,
+        )
+        .map_err(|error| StageError::Configuration(error.to_string()))
     }
 }
 
@@ -113,7 +111,6 @@ struct State {
     places: RecordLog<Place>,
     queries: RecordLog<Query>,
     closer: LoopCloser,
-    submap_reach_m: f64,
     /// Number of loops so far.
     loops: u64,
     /// Loops that are to be published.
@@ -133,7 +130,6 @@ impl State {
             closer: settings.closer()?,
             loops: 0,
             pending: VecDeque::new(),
-            submap_reach_m: settings.slam.places.submap_reach_m,
             has_finished: false,
             has_appended: false,
         })
@@ -191,9 +187,9 @@ impl State {
         let path_m: Vec<f64> = (first..keyframes)
             .map(path_m)
             .collect::<Result<_, StageError>>()?;
-        let reach_m = self.submap_reach_m;
-        let is_incomplete =
-            |place: &usize| first + neighbours(&path_m, place - first, reach_m).end >= keyframes;
+        let is_incomplete = |place: &usize| {
+            first + neighbours(&path_m, place - first, SUBMAP_REACH_M).end >= keyframes
+        };
         Ok((first..places).find(is_incomplete).unwrap_or(places))
     }
 

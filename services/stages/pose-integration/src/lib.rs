@@ -98,7 +98,7 @@ impl Sink for Integration {
         poses.drain(..poses.len().saturating_sub(count));
         let known = self.last.map_or(0, |last| last.item.seq.saturating_add(1));
         if self.slam.is_on() {
-            let keyframes = Keyframes::open(&self.manifest.out, &self.slam.places, known, ended);
+            let keyframes = Keyframes::open(&self.manifest.out, known, ended);
             let keyframes = self
                 .keyframes
                 .insert(keyframes.map_err(unusable_keyframes)?);

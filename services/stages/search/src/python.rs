@@ -60,7 +60,6 @@ pub fn translation(launch: &Launch, file: &Path) -> Result<translation::Search, 
             ],
             score: 1.0,
             runner_up: None,
-            half_turn: false,
         }))
     }))
 }

@@ -1,11 +1,10 @@
-//! `gyre map`: draws the map of a run, or what has changed from one to another.
+//! `gyre map`: draws the map of a run.
 
 mod arguments;
-mod changes;
 mod extend;
-mod keyframes;
+pub mod keyframes;
 mod loops;
-mod placing;
+pub mod placing;
 
 use std::{
     collections::BTreeMap,
@@ -34,14 +33,11 @@ const ODOMETRY: &str = "trajectory.tum";
 const LOOPS: &str = "loops.csv";
 
 /// Draws the keyframes of a run along its trajectory, and writes the map in the forms that were
-/// asked for; or compares it with a later run.
+/// asked for.
 ///
 /// # Errors
 /// A run without keyframes or without a trajectory, a folder that cannot be written.
 pub fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
-    if let Some(later) = &arguments.later {
-        return changes::compare(arguments, later);
-    }
     let mut drawing = match &arguments.extend {
         Some(map) => extend::extend(arguments, map)?,
         None => draw_run(arguments)?,
@@ -118,7 +114,7 @@ fn origin(arguments: &MapArguments) -> Result<Option<Origin>, Failure> {
 }
 
 /// Returns the trajectory of a run: the corrected one, if it has one.
-fn trajectory_of(run: &Path) -> PathBuf {
+pub fn trajectory_of(run: &Path) -> PathBuf {
     let corrected = run.join(CORRECTED);
     match corrected.is_file() {
         true => corrected,
@@ -134,11 +130,19 @@ pub fn exists(path: &Path) -> Result<bool, StorageError> {
     path.try_exists().map_err(StorageError::at("read", path))
 }
 
-fn configuration(run: &Path) -> Result<Configuration, Failure> {
+/// Reads the configuration of a run.
+///
+/// # Errors
+/// A configuration that is missing or invalid.
+pub fn configuration(run: &Path) -> Result<Configuration, Failure> {
     Ok(Configuration::read(&run.join("config.toml"), &[])?)
 }
 
-fn open(run: &Path) -> Result<RecordReader<Keyframe>, Failure> {
+/// Opens the keyframes of a run.
+///
+/// # Errors
+/// A run without keyframes.
+pub fn open(run: &Path) -> Result<RecordReader<Keyframe>, Failure> {
     require_results(run)?;
     let path = records_path::<Keyframe>(run);
     match exists(&path)? {
@@ -248,7 +252,6 @@ mod tests {
     fn arguments(folder: &Path) -> MapArguments {
         MapArguments {
             run: folder.join("run"),
-            later: None,
             out: folder.join("map"),
             format: vec![
                 MapFormat::Folder,
@@ -261,7 +264,6 @@ mod tests {
             extend: None,
             cell_m: 0.5,
             origin: None,
-            json: false,
         }
     }
 

@@ -337,9 +337,7 @@ fn checks(limits: &Limits, figures: &Figures) -> Vec<Check> {
     let degraded = figures.motions.degraded_percent();
     let at_most = [
         ("p50_ms", percentile(latency.p50_ms), limits.p50_ms),
-        ("p90_ms", percentile(latency.p90_ms), limits.p90_ms),
         ("p99_ms", percentile(latency.p99_ms), limits.p99_ms),
-        ("p99_9_ms", percentile(latency.p99_9_ms), limits.p99_9_ms),
         ("max_ms", latency.max_ms, limits.max_ms),
         (
             "drops",

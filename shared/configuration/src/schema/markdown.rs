@@ -1,5 +1,6 @@
 //! The reference of the configuration, made from its schema.
 
+use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use schemars::Schema;
@@ -28,17 +29,78 @@ Editors that know [Taplo](https://taplo.tamasfe.dev) complete and check keys wit
 
 This page is made by `gyre schema --markdown` from the structures in the code.";
 
+/// The keys that users set, with which the page begins. All others are advanced.
+const USUAL: &[&str] = &[
+    "run.mode",
+    "run.rate",
+    "run.window",
+    "run.ground_truth",
+    "source.kind",
+    "source.address",
+    "source.topic",
+    "source.first",
+    "source.scans",
+    "dataset.format",
+    "dataset.range_resolution_m",
+    "dataset.range_offset_m",
+    "dataset.doppler_s",
+    "simulation.scans",
+    "simulation.seed",
+    "simulation.realism",
+    "raster.n",
+    "raster.cell_m",
+    "points.min_range_m",
+    "points.max_range_m",
+    "masking.kind",
+    "masking.threshold",
+    "masking.model",
+    "masking.backend",
+    "gyro.kind",
+    "gyro.file",
+    "gyro.up",
+    "gyro.late_s",
+    "gyro.scale",
+    "wheels.kind",
+    "wheels.file",
+    "wheels.late_s",
+    "wheels.scale",
+    "doppler.kind",
+    "slam.kind",
+    "slam.map",
+    "gnss.kind",
+    "gnss.file",
+    "gnss.lever_m",
+    "objects.kind",
+    "record.topics",
+    "stages.NAME.command",
+    "stages.NAME.python",
+];
+
+const HEADER: &str = "\n\n| key | type | default | meaning |\n|---|---|---|---|";
+
+/// The sections, and the rows of usual keys, which stand before the sections.
+#[derive(Default)]
+struct Page {
+    sections: String,
+    usual: BTreeMap<String, String>,
+}
+
 /// The whole page.
 pub fn reference(schema: &Schema) -> String {
-    let mut page = INTRODUCTION.to_owned();
+    let mut page = Page::default();
     for (name, section) in properties(schema.as_value()) {
         write_section(&mut page, name, section);
     }
-    page
+    let usual = USUAL.iter().filter_map(|key| page.usual.get(*key));
+    let usual: String = usual.map(String::as_str).collect();
+    format!(
+        "{INTRODUCTION}\n\n## Usual keys{HEADER}{usual}\n\nAll keys below are advanced.{}",
+        page.sections
+    )
 }
 
 /// A section with a table of its keys, then the sections in it.
-fn write_section(page: &mut String, name: &str, schema: &Value) {
+fn write_section(page: &mut Page, name: &str, schema: &Value) {
     if schema["type"] == "array" {
         return write_object(page, &format!("[[{name}]]"), name, schema, &schema["items"]);
     }
@@ -56,29 +118,37 @@ fn write_section(page: &mut String, name: &str, schema: &Value) {
     }
 }
 
-fn write_object(page: &mut String, title: &str, name: &str, described: &Value, object: &Value) {
+fn write_object(page: &mut Page, title: &str, name: &str, described: &Value, object: &Value) {
     let _ = write!(
-        page,
+        page.sections,
         "\n\n## `{title}`\n\n{}",
         text(&described["description"])
     );
     let (sections, keys): (Vec<_>, Vec<_>) =
         properties(object).partition(|(_, key)| is_section(key));
-    if !keys.is_empty() {
-        page.push_str("\n\n| key | type | default | meaning |\n|---|---|---|---|");
-    }
+    let mut rows = String::new();
     for (key, schema) in keys {
-        let default = schema.get("default").map_or(String::new(), toml_code);
-        let meaning = text(&schema["description"]).replace('|', "\\|");
-        let _ = write!(
-            page,
-            "\n| `{key}` | {} | {default} | {meaning} |",
-            kind(schema)
-        );
+        let path = format!("{name}.{key}");
+        if USUAL.contains(&path.as_str()) {
+            let row = row(&path, schema);
+            page.usual.insert(path, row);
+        } else {
+            rows += &row(key, schema);
+        }
+    }
+    if !rows.is_empty() {
+        page.sections.extend([HEADER, &rows]);
     }
     for (key, schema) in sections {
         write_section(page, &format!("{name}.{key}"), schema);
     }
+}
+
+/// The row of a key.
+fn row(key: &str, schema: &Value) -> String {
+    let default = schema.get("default").map_or(String::new(), toml_code);
+    let meaning = text(&schema["description"]).replace('|', "\\|");
+    format!("\n| `{key}` | {} | {default} | {meaning} |", kind(schema))
 }
 
 fn is_section(schema: &Value) -> bool {
@@ -131,4 +201,18 @@ fn toml_code(value: &Value) -> String {
 
 fn text(value: &Value) -> &str {
     value.as_str().unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_usual_key_is_a_key() {
+        let page = super::super::reference();
+        let unknown = USUAL
+            .iter()
+            .filter(|key| !page.contains(&format!("\n| `{key}` |")));
+        assert_eq!(unknown.count(), 0);
+    }
 }

@@ -37,7 +37,7 @@ pub fn find(
     change: &FactVector,
 ) -> Result<Vec<Revisit>, CalibrationError> {
     let options = LoopOptions::default();
-    let keyframes = Keyframes(keyframes(drive, track, change, &options));
+    let keyframes = Keyframes(keyframes(drive, track, change));
     let config = drive.config();
     let mut closer = LoopCloser::new(options, &config.refinement, config.points.capacity)?;
     for keyframe in &keyframes.0 {
@@ -59,13 +59,8 @@ pub fn find(
     Ok(found)
 }
 
-fn keyframes(
-    drive: &Drive,
-    track: &Track,
-    change: &FactVector,
-    options: &LoopOptions,
-) -> Vec<Keyframe> {
-    let mut builder = KeyframeBuilder::new(&options.places);
+fn keyframes(drive: &Drive, track: &Track, change: &FactVector) -> Vec<Keyframe> {
+    let mut builder = KeyframeBuilder::default();
     let mut pose = UncertainMotion::identity();
     let mut keyframes = Vec::new();
     for (scan, sweep) in drive.sweeps.iter().enumerate() {

@@ -7,7 +7,7 @@ mod scenes;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-use gyre_estimation::places::{Describer, Descriptor, LoopVerifier, PlaceIndex, PlaceOptions};
+use gyre_estimation::places::{Describer, Descriptor, LoopVerifier, PlaceIndex};
 use gyre_geometry::pose;
 use gyre_scan_matching::RefinementConfig;
 
@@ -45,8 +45,7 @@ fn describing_querying_and_verifying_allocate_nothing() {
             .insert(k as u64, 20.0 * k as f64, &descriptor)
             .unwrap();
     }
-    let mut verifier =
-        LoopVerifier::new(&PlaceOptions::default(), &RefinementConfig::default(), 8192).unwrap();
+    let mut verifier = LoopVerifier::new(&RefinementConfig::default(), 8192).unwrap();
     let before = ALLOCATIONS.with(Cell::get);
     describer.describe(&submaps[7], &mut descriptor);
     let found = index.query(&descriptor, 40, 15.0)[0];

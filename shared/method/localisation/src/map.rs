@@ -4,7 +4,7 @@ use std::path::Path;
 
 use gyre_estimation::places::{
     Candidate, Describer, Descriptor, MAX_NEIGHBOURS, OrderError, PlaceFileError, PlaceIndex,
-    PlaceOptions, neighbours,
+    SUBMAP_REACH_M, neighbours,
 };
 use gyre_geometry::Pose;
 use gyre_scan_matching::Submap;
@@ -149,7 +149,7 @@ impl Map {
     pub(crate) fn draw(&self, middle: usize, submap: &mut Submap) {
         let keyframe = &self.keyframes[middle];
         submap.start(&keyframe.points, &keyframe.twist);
-        let reach_m = PlaceOptions::default().submap_reach_m;
+        let reach_m = SUBMAP_REACH_M;
         for k in neighbours(&self.path_m, middle, reach_m).filter(|k| *k != middle) {
             let other = &self.keyframes[k];
             let pose = self.pose(middle).inv_mul(&other.pose.motion);

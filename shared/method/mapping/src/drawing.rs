@@ -92,7 +92,6 @@ impl Drawing {
                 &[]
             },
             loops: &loops,
-            changes: &[],
         };
         map_png(&mut self.evidence, &overlay)
     }

@@ -6,7 +6,6 @@
 //!   tiles;
 //! - [`write_map`], [`Map`]: a map as a folder;
 //! - [`map_png`]: a map as one picture with the trajectory in it; [`legible`]: cells for it;
-//! - [`Survey`], [`changes`]: what has appeared and gone between two drives;
 //! - [`write_pgm`], [`write_geotiff`], [`write_web_tiles`]: a map in the forms of other programs.
 //!
 //! # Method
@@ -28,7 +27,6 @@
 //! Those of [`gyre_geometry`]. The map frame is that of the poses. Rows of pictures run from the
 //! highest y to the lowest, columns from the lowest x to the highest.
 
-mod changes;
 mod drawing;
 mod evidence;
 mod export;
@@ -44,7 +42,6 @@ mod strips;
 mod tile;
 mod view;
 
-pub use changes::{Change, ChangeKind, Changes, Survey, changes};
 pub use drawing::Drawing;
 pub use evidence::Evidence;
 pub use export::{Grid, grid, write_geotiff, write_pgm, write_web_tiles};
@@ -55,3 +52,4 @@ pub use options::{MapOptions, OptionError};
 pub use picture::{Overlay, legible, map_png};
 pub use source::{MapError, TileSource};
 pub use tile::{Cell, TILE_CELLS, TileExtent, TileImage, TileIndex};
+pub use view::View;

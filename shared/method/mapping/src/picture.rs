@@ -6,7 +6,7 @@ mod ground;
 use gyre_geometry::Pose;
 use nalgebra::{Point2, Vector2};
 
-use crate::{Change, ChangeKind, MapError, MapOptions, TileExtent, TileSource, pixels};
+use crate::{MapError, MapOptions, TileExtent, TileSource, pixels};
 use canvas::{Canvas, Colour, Pen, View};
 use ground::Ground;
 
@@ -15,8 +15,6 @@ const ODOMETRY: Colour = [150, 158, 172];
 const LOOPS: Colour = [236, 40, 132];
 const START: Colour = [120, 230, 130];
 const TEXT: Colour = [220, 224, 232];
-const APPEARED: Colour = [70, 240, 120];
-const GONE: Colour = [255, 76, 76];
 
 /// Loops have a pale rim wider than the trajectory, under which many lie: they join places of one
 /// lane.
@@ -40,17 +38,6 @@ pub struct Overlay<'a> {
     pub odometry: &'a [Pose],
     /// Both ends of each loop.
     pub loops: &'a [[Point2<f64>; 2]],
-    /// The things that have appeared and gone, drawn as rectangles.
-    pub changes: &'a [Change],
-}
-
-impl Overlay<'_> {
-    /// Returns the changes of a kind.
-    fn changes(&self, kind: ChangeKind) -> impl Iterator<Item = &Change> {
-        self.changes
-            .iter()
-            .filter(move |change| change.kind == kind)
-    }
 }
 
 /// Returns options with the smallest cells, doubled from the default ones, of which a picture of
@@ -100,13 +87,6 @@ fn draw_paths(canvas: &mut Canvas, view: &View, overlay: &Overlay<'_>) {
     canvas.lines([path(overlay.odometry)], Pen::opaque(ODOMETRY, 1.0));
     let pieces = overlay.trajectory.iter().map(|piece| path(piece));
     canvas.lines(pieces, Pen::opaque(TRAJECTORY, 1.7));
-    for (kind, colour) in [(ChangeKind::Gone, GONE), (ChangeKind::Appeared, APPEARED)] {
-        let outline = |change: &Change| {
-            let [a, b, c, d] = change.corners().map(|corner| view.pixel(&corner));
-            [a, b, c, d, a]
-        };
-        canvas.lines(overlay.changes(kind).map(outline), Pen::opaque(colour, 2.0));
-    }
     if let Some(first) = overlay.trajectory.iter().find_map(|piece| piece.first()) {
         let start = view.pixel(&Point2::from(first.translation.vector));
         // The picture's y axis points down.
@@ -118,16 +98,11 @@ fn draw_paths(canvas: &mut Canvas, view: &View, overlay: &Overlay<'_>) {
 fn draw_footer(canvas: &mut Canvas, overlay: &Overlay<'_>) {
     let mut at = canvas.scale_bar(TEXT);
     let loops = format!("{} loops", overlay.loops.len());
-    let [appeared, gone] = [ChangeKind::Appeared, ChangeKind::Gone]
-        .map(|kind| format!("{} {kind}", overlay.changes(kind).count()));
-    let has_changes = !overlay.changes.is_empty();
     let entries = [
         (!overlay.trajectory.is_empty(), TRAJECTORY, "trajectory"),
         (!overlay.odometry.is_empty(), ODOMETRY, "odometry"),
         (!overlay.loops.is_empty(), LOOPS, loops.as_str()),
         (!overlay.trajectory.is_empty(), START, "start"),
-        (has_changes, APPEARED, appeared.as_str()),
-        (has_changes, GONE, gone.as_str()),
     ];
     for (_, colour, label) in entries.into_iter().filter(|(is_drawn, ..)| *is_drawn) {
         at = canvas.entry(at, colour, label, TEXT);

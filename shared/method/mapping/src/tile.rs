@@ -28,13 +28,13 @@ impl fmt::Display for TileIndex {
 
 impl TileIndex {
     /// Returns the corner of lowest x and y, in cells of the map frame.
-    pub(crate) fn corner(self) -> [i64; 2] {
+    pub fn corner(self) -> [i64; 2] {
         [self.x, self.y].map(|index| i64::from(index) * TILE_CELLS as i64)
     }
 
     /// Returns the tiles of the square that reaches `reach_m` to each side of `centre`, in rising
     /// order.
-    pub(crate) fn around(
+    pub fn around(
         centre: &Point2<f64>,
         reach_m: f64,
         cell_m: f64,

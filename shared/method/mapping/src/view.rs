@@ -34,14 +34,15 @@ pub struct View {
 
 /// A part of a return.
 #[derive(Clone, Copy)]
-pub struct Sample {
+pub(crate) struct Sample {
     /// The place in the frame of the keyframe, m.
-    pub place: Point2<f64>,
+    pub(crate) place: Point2<f64>,
     /// The amount that it adds to its place.
-    pub amount: f64,
+    pub(crate) amount: f64,
 }
 
 impl View {
+    /// Starts without a keyframe.
     pub fn new(options: &MapOptions) -> Self {
         Self {
             options: options.clone(),
@@ -93,7 +94,7 @@ impl View {
     }
 
     /// Calls `take` with the parts of all returns.
-    pub fn returns(&self, mut take: impl FnMut(Sample)) {
+    pub(crate) fn returns(&self, mut take: impl FnMut(Sample)) {
         let share = FULL_CELL_M / self.options.cell_m;
         for [x_m, y_m, weight] in self.points.points() {
             let place = Vector2::new(f64::from(x_m), f64::from(y_m));

@@ -52,9 +52,22 @@ impl PlanesNetwork {
     pub fn load(
         name: &'static str,
         runtime: Option<&Path>,
-        [shown, given]: [[usize; 3]; 2],
+        shapes: [[usize; 3]; 2],
     ) -> Result<Self, PlanesError> {
         let bytes = gyre_shipped::bytes(Path::new(name)).unwrap_or_default();
+        Self::of(name, bytes, runtime, shapes)
+    }
+
+    /// Loads a network from the bytes of its file.
+    ///
+    /// # Errors
+    /// A library or a network that cannot be used.
+    pub fn of(
+        name: &'static str,
+        bytes: &'static [u8],
+        runtime: Option<&Path>,
+        [shown, given]: [[usize; 3]; 2],
+    ) -> Result<Self, PlanesError> {
         let engine = match runtime {
             Some(path) => {
                 let environment = runtime::open(path)?;

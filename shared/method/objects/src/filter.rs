@@ -9,12 +9,22 @@
 
 use nalgebra::{Matrix2, Matrix2x4, Matrix4, Point2, Vector2, Vector4};
 
-use crate::ObjectsConfig;
-
 /// Turn rates of the models over the largest one.
 const TURNS: [f64; 5] = [-1.0, -0.5, 0.0, 0.5, 1.0];
 /// Their shares of the time: vehicles drive straight for most of it.
 const SHARES: [f64; 5] = [0.075, 0.075, 0.7, 0.075, 0.075];
+
+/// Largest turn rate, rad/s: a car turns off at 7 m/s on a radius of 10 m.
+const TURN_RATE_RADPS: f64 = 0.7;
+/// Mean time for which a turn rate lasts, s: a driver steers into a corner, and out of it, in about
+/// that.
+const TURN_LASTS_S: f64 = 0.5;
+/// Standard deviation of an object's acceleration along its way, m/s²: vehicles brake and
+/// accelerate with 1 to 3.
+const ACCELERATION_MPS2: f64 = 1.5;
+/// Standard deviation of its acceleration across its way beyond that of a turn, m/s²: a lane is
+/// changed with about 1.
+const LATERAL_ACCELERATION_MPS2: f64 = 1.0;
 
 /// Distance by which an object that stood may be seen behind its place, m: less than its length.
 const BEHIND_M: f64 = 4.0;
@@ -148,10 +158,10 @@ impl Filter {
 
     /// Predicts the state some seconds later. `heading` is a unit vector, along and across which
     /// the acceleration is uncertain.
-    pub fn predict(&mut self, dt_s: f64, heading: &Vector2<f64>, config: &ObjectsConfig) {
+    pub fn predict(&mut self, dt_s: f64, heading: &Vector2<f64>) {
         let before = self.models;
-        let kept = (-dt_s / config.turn_lasts_s).exp();
-        let noise = acceleration_noise(dt_s, heading, config);
+        let kept = (-dt_s / TURN_LASTS_S).exp();
+        let noise = acceleration_noise(dt_s, heading);
         for (index, model) in self.models.iter_mut().enumerate() {
             // A model stays what it is, or any of them begins.
             let from = |other: usize| {
@@ -160,7 +170,7 @@ impl Filter {
             };
             model.probability = (0..before.len()).map(from).sum();
             model.estimate = mixture((0..before.len()).map(|o| (from(o), &before[o].estimate)));
-            let turn_rate_radps = TURNS[index] * config.turn_rate_radps;
+            let turn_rate_radps = TURNS[index] * TURN_RATE_RADPS;
             model.estimate.predict(dt_s, turn_rate_radps, &noise);
         }
         self.combine();
@@ -220,13 +230,13 @@ impl Filter {
     /// Returns the squared Mahalanobis distance of the place at which another one began to drive
     /// from that of this one, which stood: it came so fast with the usual acceleration. It is
     /// infinite for one that has yet to come to that place.
-    pub fn apart_from_start(&self, started: &Self, config: &ObjectsConfig) -> f64 {
+    pub fn apart_from_start(&self, started: &Self) -> f64 {
         let velocity = started.velocity();
         let ahead = started.position() - self.position();
         if ahead.dot(&velocity) < -BEHIND_M * velocity.norm() {
             return f64::INFINITY;
         }
-        let way_s = velocity.norm() / (2.0 * config.acceleration_mps2);
+        let way_s = velocity.norm() / (2.0 * ACCELERATION_MPS2);
         let way = velocity * way_s;
         let difference = ahead - way;
         // The way is as uncertain as the acceleration: by half of it.
@@ -328,9 +338,8 @@ fn mixture<'a>(parts: impl Iterator<Item = (f64, &'a Estimate)> + Clone) -> Esti
 }
 
 /// The covariance of an acceleration that is constant for some seconds.
-fn acceleration_noise(dt_s: f64, heading: &Vector2<f64>, config: &ObjectsConfig) -> Matrix4<f64> {
-    let [along, across] =
-        [config.acceleration_mps2, config.lateral_acceleration_mps2].map(|sigma| sigma * sigma);
+fn acceleration_noise(dt_s: f64, heading: &Vector2<f64>) -> Matrix4<f64> {
+    let [along, across] = [ACCELERATION_MPS2, LATERAL_ACCELERATION_MPS2].map(|sigma| sigma * sigma);
     let side = Vector2::new(-heading.y, heading.x);
     let power = heading * heading.transpose() * along + side * side.transpose() * across;
     let mut noise = Matrix4::zeros();

@@ -12,6 +12,42 @@ const SLIP_MPS: f64 = 0.1;
 /// Standard deviation of a velocity before it is measured, m/s: that of any vehicle.
 const UNKNOWN_MPS: f64 = 30.0;
 
+/// Factor of the standard deviation that the network gives of a velocity: five of six scans that it
+/// sees are those that it saw before, and so is most of the error.
+const VELOCITY_SIGMAS: f64 = 2.0;
+/// Standard deviation of the heading that the network gives, rad.
+const HEADING_SIGMA_RAD: f64 = 0.2;
+/// Squared Mahalanobis distance, by place and velocity, between a detection and a prediction, up to
+/// which the two can be one object: more than its own noise, so that an object that brakes hard or
+/// turns off is within it.
+const GATE: f64 = 50.0;
+/// The largest score, so that an object that has gone ends soon.
+pub(crate) const MAX_SCORE: f64 = 4.0;
+/// The score from which on an object that a scan shows is reported.
+const KEEP_SCORE: f64 = 0.0;
+/// The score below which a track ends.
+const END_SCORE: f64 = -2.0;
+/// Loss of the score by a scan that does not show the object.
+const MISSED_LOSS: f64 = 1.0;
+/// Scans that show a track before it is an object.
+const BIRTH_HITS: u32 = 2;
+/// Time that a track is continued without being seen, s: a car that passes hides another for about
+/// one.
+const COAST_S: f64 = 1.0;
+/// Time for which an object that is not seen keeps its identity, s: then it may be anywhere.
+const LOST_S: f64 = 8.0;
+/// The same of one that had stopped, s: a red light.
+const STOPPED_S: f64 = 60.0;
+/// Speed below which an object that is lost has stopped, m/s.
+const STOPPING_MPS: f64 = 2.0;
+/// Speed up to which an object counts as standing, m/s: the odometry's own error, and what wind
+/// moves.
+const STANDING_MPS: f64 = 0.8;
+/// Speed above which its direction is the heading, m/s: below, noise turns it.
+const HEADING_MPS: f64 = 1.0;
+/// Standard deviations by which the speed must exceed that of standing for an object to be moving.
+const MOVING_SIGMAS: f64 = 1.0;
+
 /// A vehicle that may be there: its filter, score and identity.
 #[derive(Clone, Debug)]
 pub(crate) struct Track {
@@ -41,7 +77,7 @@ impl Track {
     /// Begins a track.
     pub fn new(detection: &Detection, config: &ObjectsConfig) -> Self {
         let mut filter = Filter::new(&sighting(detection), UNKNOWN_MPS);
-        measure_velocity(&mut filter, detection, config);
+        measure_velocity(&mut filter, detection);
         Self {
             filter,
             heading: detection.heading,
@@ -60,10 +96,10 @@ impl Track {
     }
 
     /// Predicts it some seconds later.
-    pub fn predict(&mut self, dt_s: f64, config: &ObjectsConfig) {
+    pub fn predict(&mut self, dt_s: f64) {
         if !self.stopped {
-            self.filter.predict(dt_s, &self.heading, config);
-            self.turn(config);
+            self.filter.predict(dt_s, &self.heading);
+            self.turn();
         }
         self.age = self.age.saturating_add(1);
         self.known_s += dt_s;
@@ -72,62 +108,62 @@ impl Track {
     }
 
     /// Returns what it costs that a scan shows it there; `None` outside of its gate.
-    pub fn cost(&self, detection: &Detection, config: &ObjectsConfig) -> Option<f64> {
+    pub fn cost(&self, detection: &Detection) -> Option<f64> {
         let place = self.filter.innovation(&sighting(detection));
-        let variance = (detection.sigma_mps * config.velocity_sigmas).powi(2);
+        let variance = (detection.sigma_mps * VELOCITY_SIGMAS).powi(2);
         let covariance = self.filter.velocity_covariance() + Matrix2::identity() * variance;
         let faster = detection.velocity - self.filter.velocity();
         let chi_square = (faster.transpose() * covariance.try_inverse()? * faster)[0];
         let spread = covariance.determinant().max(f64::MIN_POSITIVE).ln();
         let cost = place.cost() + chi_square + spread;
-        (place.chi_square() + chi_square <= config.gate).then_some(cost)
+        (place.chi_square() + chi_square <= GATE).then_some(cost)
     }
 
     /// Updates it by what a scan shows.
     pub fn update(&mut self, detection: &Detection, config: &ObjectsConfig) {
         self.filter.update(&sighting(detection));
-        measure_velocity(&mut self.filter, detection, config);
+        measure_velocity(&mut self.filter, detection);
         let speed_mps = self.filter.velocity().norm();
-        let sigma_mps = SLIP_MPS + config.heading_sigma_rad * speed_mps;
+        let sigma_mps = SLIP_MPS + HEADING_SIGMA_RAD * speed_mps;
         self.filter.align(&detection.heading, sigma_mps);
         // What hardly moves shows its axis, but not which end is ahead. What moves is turned into
         // its direction.
         self.heading = detection.heading * detection.heading.dot(&self.heading).signum();
-        self.turn(config);
+        self.turn();
         self.weight += detection.likely;
         let share = detection.likely / self.weight;
         for (size_m, seen_m) in self.size_m.iter_mut().zip(detection.size_m) {
             *size_m += share * (seen_m - *size_m);
         }
-        self.score = (self.score + evidence(detection, config)).min(config.max_score);
+        self.score = (self.score + evidence(detection, config)).min(MAX_SCORE);
         self.hits = self.hits.saturating_add(1);
         self.unseen_s = 0.0;
-        self.judge_sight(config);
+        self.judge_sight();
     }
 
     /// Notes that a scan does not show it.
-    pub fn miss(&mut self, config: &ObjectsConfig) {
-        self.score -= config.missed_loss;
-        self.judge_sight(config);
+    pub fn miss(&mut self) {
+        self.score -= MISSED_LOSS;
+        self.judge_sight();
     }
 
     /// Decides whether it is lost.
-    fn judge_sight(&mut self, config: &ObjectsConfig) {
-        if self.unseen_s > config.coast_s || self.score < config.end_score {
-            self.lose(config);
+    fn judge_sight(&mut self) {
+        if self.unseen_s > COAST_S || self.score < END_SCORE {
+            self.lose();
         }
     }
 
     /// Makes it lost: what may be seen again, or has given way to a track of the same vehicle.
-    pub fn lose(&mut self, config: &ObjectsConfig) {
+    pub fn lose(&mut self) {
         self.lost = true;
-        self.stopped = self.filter.velocity().norm() < config.stopping_mps;
+        self.stopped = self.filter.velocity().norm() < STOPPING_MPS;
     }
 
     /// Turns the heading into the direction of the motion.
-    fn turn(&mut self, config: &ObjectsConfig) {
+    fn turn(&mut self) {
         let velocity = self.filter.velocity();
-        if velocity.norm() > config.heading_mps {
+        if velocity.norm() > HEADING_MPS {
             self.heading = velocity.normalize();
         }
     }
@@ -141,10 +177,10 @@ impl Track {
     }
 
     /// Returns whether it has come to its end. An object keeps its identity for longer.
-    pub fn is_over(&self, config: &ObjectsConfig) -> bool {
+    pub fn is_over(&self) -> bool {
         let kept_s = match self.stopped {
-            true => config.stopped_s,
-            false => config.lost_s,
+            true => STOPPED_S,
+            false => LOST_S,
         };
         self.lost && (!self.is_object() || self.unseen_s > kept_s)
     }
@@ -152,25 +188,25 @@ impl Track {
     /// Returns how far from where a lost object would be now a track is that has become an object,
     /// or from where one that stopped would have begun to drive; `None` if it is another one, as
     /// what was seen before this one was lost.
-    pub fn distance(&self, found: &Self, config: &ObjectsConfig) -> Option<f64> {
+    pub fn distance(&self, found: &Self) -> Option<f64> {
         let is_along = !self.stopped || self.heading.dot(&found.heading) > 0.0;
         let may_be = self.is_object() && self.lost && found.known_s < self.unseen_s && is_along;
         let chi_square = match self.stopped {
-            true => self.filter.apart_from_start(&found.filter, config),
+            true => self.filter.apart_from_start(&found.filter),
             false => self.filter.apart(&found.filter),
         };
-        (may_be && chi_square <= config.gate).then_some(chi_square)
+        (may_be && chi_square <= GATE).then_some(chi_square)
     }
 
     /// Decides whether it moves: whether its speed is above that of what stands by more than its
     /// uncertainty explains. Returns whether it becomes an object by that.
     pub fn judge(&mut self, config: &ObjectsConfig) -> bool {
         let (speed_mps, sigma_mps) = self.filter.speed();
-        self.moving = speed_mps - config.standing_mps > config.moving_sigmas * sigma_mps;
+        self.moving = speed_mps - STANDING_MPS > MOVING_SIGMAS * sigma_mps;
         self.moving
             && !self.is_object()
             && !self.lost
-            && self.hits >= config.birth_hits
+            && self.hits >= BIRTH_HITS
             && self.score >= config.confirm_score
     }
 
@@ -192,9 +228,9 @@ impl Track {
 
     /// Returns whether another track is of the same vehicle: no two are at one place, but the
     /// outlines of two that meet may overlap, as their places are not exact.
-    pub fn is_same(&self, other: &Self, config: &ObjectsConfig) -> bool {
+    pub fn is_same(&self, other: &Self) -> bool {
         let [one, two] = [self, other].map(|track| track.filter.velocity());
-        let is_slow = one.norm().min(two.norm()) < config.heading_mps;
+        let is_slow = one.norm().min(two.norm()) < HEADING_MPS;
         (is_slow || one.dot(&two) > 0.0) && self.outline().overlaps(&other.outline())
     }
 
@@ -213,7 +249,7 @@ impl Track {
     /// Returns the object, if it is one that is seen, or has been seen well until a moment ago: one
     /// that may have gone elsewhere keeps its identity in case that it is seen again.
     pub fn object(&self, config: &ObjectsConfig) -> Option<Object> {
-        let is_seen = self.unseen_s == 0.0 && self.score >= config.keep_score;
+        let is_seen = self.unseen_s == 0.0 && self.score >= KEEP_SCORE;
         let is_there = is_seen || self.score >= config.confirm_score;
         let id = self.id.filter(|_| is_there && !self.lost)?;
         let [length_m, width_m] = self.size_m;
@@ -242,8 +278,8 @@ fn sighting(detection: &Detection) -> Sighting {
 }
 
 /// Updates a filter by the velocity of a detection.
-fn measure_velocity(filter: &mut Filter, detection: &Detection, config: &ObjectsConfig) {
-    let sigma_mps = detection.sigma_mps * config.velocity_sigmas;
+fn measure_velocity(filter: &mut Filter, detection: &Detection) {
+    let sigma_mps = detection.sigma_mps * VELOCITY_SIGMAS;
     for axis in [Vector2::x(), Vector2::y()] {
         filter.measure(&axis, detection.velocity.dot(&axis), sigma_mps);
     }
@@ -280,7 +316,7 @@ mod tests {
     fn seen(times: u32, config: &ObjectsConfig) -> Track {
         let mut track = Track::new(&detection([20.0, 3.0], [-10.0, 0.0]), config);
         for scan in 1..times {
-            track.predict(0.25, config);
+            track.predict(0.25);
             let x = 20.0 - 2.5 * f64::from(scan);
             track.update(&detection([x, 3.0], [-10.0, 0.0]), config);
         }
@@ -305,14 +341,10 @@ mod tests {
     fn what_drives_the_other_way_at_the_same_place_is_not_its_own() {
         let config = ObjectsConfig::default();
         let mut track = seen(4, &config);
-        track.predict(0.25, &config);
-        assert!(
-            track
-                .cost(&detection([10.0, 3.0], [-9.0, 0.0]), &config)
-                .is_some()
-        );
+        track.predict(0.25);
+        assert!(track.cost(&detection([10.0, 3.0], [-9.0, 0.0])).is_some());
         let other = detection([12.0, 3.0], [10.0, 0.0]);
-        assert_eq!(track.cost(&other, &config), None);
+        assert_eq!(track.cost(&other), None);
     }
 
     #[test]
@@ -321,12 +353,12 @@ mod tests {
         let track = |x: f64, y: f64| Track::new(&detection([x, y], [-10.0, 0.0]), &config);
         let oncoming = |mps: f64| Track::new(&detection([22.0, 3.5], [mps, 0.1]), &config);
         let first = track(20.0, 3.0);
-        assert!(first.is_same(&track(24.0, 3.5), &config));
-        assert!(!first.is_same(&track(25.0, 3.0), &config));
-        assert!(!first.is_same(&track(20.0, 5.5), &config));
-        assert!(!first.is_same(&oncoming(8.0), &config));
+        assert!(first.is_same(&track(24.0, 3.5)));
+        assert!(!first.is_same(&track(25.0, 3.0)));
+        assert!(!first.is_same(&track(20.0, 5.5)));
+        assert!(!first.is_same(&oncoming(8.0)));
         // The direction of what hardly moves is noise.
-        assert!(first.is_same(&oncoming(0.2), &config));
+        assert!(first.is_same(&oncoming(0.2)));
     }
 
     #[test]
@@ -334,12 +366,12 @@ mod tests {
         let config = ObjectsConfig::default();
         let mut track = seen(4, &config);
         for _ in 0..12 {
-            track.predict(0.25, &config);
+            track.predict(0.25);
             let mut standing = detection([12.0, 3.0], [-0.1, 0.0]);
             standing.heading = Vector2::new(1.0, 0.05).normalize();
             track.update(&standing, &config);
         }
-        assert!(track.filter.velocity().norm() < config.heading_mps);
+        assert!(track.filter.velocity().norm() < HEADING_MPS);
         assert!(track.heading.x < -0.99 && track.heading.y < 0.0);
     }
 
@@ -349,36 +381,36 @@ mod tests {
         let mut lost = seen(4, &config);
         lost.confirm(1);
         for _ in 0..8 {
-            lost.predict(0.25, &config);
-            lost.miss(&config);
+            lost.predict(0.25);
+            lost.miss();
         }
-        assert!(lost.is_lost() && !lost.is_over(&config));
+        assert!(lost.is_lost() && !lost.is_over());
         assert_eq!(lost.object(&config), None);
         let begun = |known_s: f64, x: f64| Track {
             known_s,
             ..Track::new(&detection([x, 3.0], [-10.0, 0.0]), &config)
         };
         // It is 20 m on, at 13.5 - 20 m.
-        assert!(lost.distance(&begun(0.5, -7.5), &config).is_some());
-        assert_eq!(lost.distance(&begun(0.5, 60.0), &config), None);
-        assert_eq!(lost.distance(&begun(3.0, -7.5), &config), None);
+        assert!(lost.distance(&begun(0.5, -7.5)).is_some());
+        assert_eq!(lost.distance(&begun(0.5, 60.0)), None);
+        assert_eq!(lost.distance(&begun(3.0, -7.5)), None);
         let mut found = begun(0.5, -7.5);
         found.take_over(&mut lost);
         assert!(found.id == Some(1) && found.age == 12);
-        assert!(lost.is_over(&config) && !found.is_over(&config));
+        assert!(lost.is_over() && !found.is_over());
     }
 
     #[test]
     fn what_gave_way_keeps_its_identity_if_it_has_one() {
         let config = ObjectsConfig::default();
         let mut track = seen(4, &config);
-        track.lose(&config);
-        assert!(track.is_over(&config));
+        track.lose();
+        assert!(track.is_over());
         track.confirm(1);
-        assert!(!track.is_over(&config) && track.object(&config).is_none());
-        track.predict(0.5, &config);
+        assert!(!track.is_over() && track.object(&config).is_none());
+        track.predict(0.5);
         let begun = Track::new(&detection([8.5, 3.0], [-10.0, 0.0]), &config);
-        assert!(track.distance(&begun, &config).is_some());
+        assert!(track.distance(&begun).is_some());
     }
 
     #[test]
@@ -388,20 +420,20 @@ mod tests {
         let mut stopped = Track::new(&slow(0), &config);
         stopped.confirm(1);
         for scan in 1..12 {
-            stopped.predict(0.25, &config);
+            stopped.predict(0.25);
             stopped.update(&slow(scan), &config);
         }
         for _ in 0..60 {
-            stopped.predict(0.25, &config);
-            stopped.miss(&config);
+            stopped.predict(0.25);
+            stopped.miss();
         }
-        assert!(stopped.is_lost() && !stopped.is_over(&config));
+        assert!(stopped.is_lost() && !stopped.is_over());
         let place = stopped.position();
         let begun = |ahead_m: f64, velocity: [f64; 2]| {
             let at = [place.x - ahead_m, place.y];
             let mut begun = Track::new(&detection(at, velocity), &config);
             begun.known_s = 0.5;
-            stopped.distance(&begun, &config).is_some()
+            stopped.distance(&begun).is_some()
         };
         // 4 m/s are reached after 5 m.
         assert!(begun(5.0, [-4.0, 0.0]) && begun(2.0, [-4.0, 0.0]) && begun(0.5, [-1.5, 0.0]));
@@ -411,18 +443,16 @@ mod tests {
 
     #[test]
     fn a_lost_object_that_gave_its_identity_away_becomes_none_again_whatever_its_score_is() {
-        let config = ObjectsConfig {
-            missed_loss: 0.0,
-            ..ObjectsConfig::default()
-        };
+        let config = ObjectsConfig::default();
         let mut lost = seen(4, &config);
         lost.confirm(1);
         for _ in 0..5 {
-            lost.predict(0.25, &config);
-            lost.miss(&config);
+            lost.predict(0.25);
+            lost.miss();
         }
-        assert!(lost.is_lost() && lost.score > config.confirm_score);
+        lost.score = MAX_SCORE;
+        assert!(lost.is_lost());
         Track::new(&detection([0.0, 3.0], [-10.0, 0.0]), &config).take_over(&mut lost);
-        assert!(!lost.judge(&config) && lost.is_over(&config));
+        assert!(!lost.judge(&config) && lost.is_over());
     }
 }

@@ -9,6 +9,13 @@ use crate::detector::{Detection, Detector};
 use crate::track::Track;
 use crate::{Object, ObjectsConfig, ObjectsError, PlacedScan};
 
+/// Likelihood, by the network, from which on a place counts as one of a vehicle that moves: what is
+/// less likely keeps no track alive.
+const LEAST_LIKELY: f64 = 0.1;
+/// Time between two scans beyond which all tracks end, s: by then a car at walking pace is
+/// elsewhere.
+const MAX_GAP_S: f64 = 2.0;
+
 /// Tracks moving objects from scan to scan.
 pub struct ObjectTracker {
     config: ObjectsConfig,
@@ -40,7 +47,7 @@ impl ObjectTracker {
     /// Takes the points of the next scan, as measured. Returns the objects at its time: those that
     /// move, and those that did and stand now.
     ///
-    /// A scan that is not later than the one before, or later by more than `max_gap_s`, ends all
+    /// A scan that is not later than the one before, or later by more than 2 s, ends all
     /// tracks.
     ///
     /// # Errors
@@ -51,8 +58,7 @@ impl ObjectTracker {
         points: &[SparsePoint],
     ) -> Result<&[Object], ObjectsError> {
         self.predict(scan.stamp_ns);
-        let least = self.config.least_likely;
-        let found = self.detector.detect(scan, points, least)?;
+        let found = self.detector.detect(scan, points, LEAST_LIKELY)?;
         let rest = self.assign(found);
         self.begin(&rest);
         self.judge();
@@ -74,13 +80,8 @@ impl ObjectTracker {
     fn predict(&mut self, stamp_ns: i64) {
         if let Some(before_ns) = self.stamp_ns {
             let dt_s = stamp_ns.saturating_sub(before_ns) as f64 * 1e-9;
-            match dt_s > 0.0 && dt_s <= self.config.max_gap_s {
-                true => {
-                    let config = &self.config;
-                    self.tracks
-                        .iter_mut()
-                        .for_each(|track| track.predict(dt_s, config));
-                }
+            match dt_s > 0.0 && dt_s <= MAX_GAP_S {
+                true => self.tracks.iter_mut().for_each(|track| track.predict(dt_s)),
                 false => self.restart(),
             }
         }
@@ -102,7 +103,7 @@ impl ObjectTracker {
             .iter()
             .map(|track| {
                 let track = &self.tracks[*track];
-                let costs = found.iter().map(|it| track.cost(it, config));
+                let costs = found.iter().map(|it| track.cost(it));
                 costs.collect()
             })
             .collect();
@@ -114,7 +115,7 @@ impl ObjectTracker {
                     is_left[detection] = false;
                     track.update(&found[detection], config);
                 }
-                None => track.miss(config),
+                None => track.miss(),
             }
         }
         let left = found.into_iter().zip(is_left);
@@ -131,17 +132,16 @@ impl ObjectTracker {
     /// Ends tracks, also those of one vehicle but the first, and decides which move. What was an
     /// object keeps its identity: two vehicles that are close may have been taken for one.
     fn judge(&mut self) {
-        let config = &self.config;
         // Objects first, then the older ones.
         self.tracks.sort_by_key(|track| !track.is_object());
         for index in 0..self.tracks.len() {
             let (first, rest) = self.tracks.split_at_mut(index);
-            let is_known = |first: &Track| !first.is_lost() && first.is_same(&rest[0], config);
+            let is_known = |first: &Track| !first.is_lost() && first.is_same(&rest[0]);
             if !rest[0].is_lost() && first.iter().any(is_known) {
-                rest[0].lose(config);
+                rest[0].lose();
             }
         }
-        self.tracks.retain(|track| !track.is_over(config));
+        self.tracks.retain(|track| !track.is_over());
         for index in 0..self.tracks.len() {
             if self.tracks[index].judge(&self.config) {
                 self.confirm(index);
@@ -153,7 +153,7 @@ impl ObjectTracker {
     fn confirm(&mut self, index: usize) {
         let mut found = self.tracks.remove(index);
         let lost = self.tracks.iter().enumerate();
-        let lost = lost.filter_map(|(at, it)| Some((at, it.distance(&found, &self.config)?)));
+        let lost = lost.filter_map(|(at, it)| Some((at, it.distance(&found)?)));
         match lost.min_by(|a, b| a.1.total_cmp(&b.1)) {
             Some((lost, _)) => found.take_over(&mut self.tracks[lost]),
             None => {

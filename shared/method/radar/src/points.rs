@@ -21,6 +21,8 @@ use peaks::{Beam, Peak};
 use range_cells::RangeCells;
 use serde::{Deserialize, Serialize};
 
+/// Power above the floor at which the weight of a point reaches 1.
+pub const WEIGHT_CAP: f32 = 60.0;
 /// The largest [`PointsConfig::capacity`].
 pub const MAX_POINTS: usize = 65_536;
 
@@ -38,8 +40,6 @@ pub struct PointsConfig {
     /// Maximum range, m. Farther away the beam is metres wide, and bearings are inaccurate.
     /// Default 80.
     pub max_range_m: f32,
-    /// Power above the floor at which the weight of a point reaches 1. Default 60.
-    pub weight_cap: f32,
     /// Maximum number of points per scan; the weakest are dropped. 0 disables the extraction.
     /// Default 8192.
     pub capacity: usize,
@@ -52,7 +52,6 @@ impl Default for PointsConfig {
             range_cell_m: 0.17,
             min_range_m: 5.0,
             max_range_m: 80.0,
-            weight_cap: 60.0,
             capacity: 8192,
         }
     }
@@ -93,8 +92,6 @@ impl PointsConfig {
         let fits = self.max_range_m > self.min_range_m && self.max_range_m <= 1e4;
         let bounds = "more than min_range_m, at most 10000";
         setting(fits, "max_range_m", self.max_range_m, bounds)?;
-        let fits = (1.0..=255.0).contains(&self.weight_cap);
-        setting(fits, "weight_cap", self.weight_cap, "1 to 255")?;
         let fits = self.capacity <= MAX_POINTS;
         setting(fits, "capacity", self.capacity as f32, "at most 65536")
     }
@@ -127,7 +124,7 @@ impl PointExtractor {
 
     /// Writes the points of `scan` with a power above `floor` to the start of `out`, ordered by
     /// azimuth, then by range. A point's weight is its power above the floor over
-    /// [`PointsConfig::weight_cap`], at most 1. Returns the number of points, at most
+    /// [`WEIGHT_CAP`], at most 1. Returns the number of points, at most
     /// [`PointsConfig::capacity`] and `out.len()`. Azimuths that were not measured give no points
     /// and suppress none.
     ///
@@ -147,7 +144,7 @@ impl PointExtractor {
         self.cells.update(scan, floor, &self.config);
         let peaks = self.beam.peaks(scan, &self.cells);
         let weakest = weakest_that_fits(peaks, room, &mut self.counts);
-        let cap = self.config.weight_cap * self.cells.bins_per_cell() as f32;
+        let cap = WEIGHT_CAP * self.cells.bins_per_cell() as f32;
         let mut count = 0;
         for peaks in peaks.chunk_by(|a, b| a.azimuth == b.azimuth) {
             let view = View::of(scan, usize::from(peaks[0].azimuth));

@@ -58,9 +58,7 @@ impl Bounds {
         self.within(key, value, [0.0, 1.0], "0 to 1")
     }
 
-    /// Checks the standard deviation of the times of samples, and their longest gap.
-    pub fn times(&self, [sigma_s, max_gap_s]: [f64; 2]) -> Result<(), SampleConfigError> {
-        self.within("time_sigma_s", sigma_s, [0.0, 1.0], "seconds, 0 to 1")?;
+    pub fn max_gap_s(&self, max_gap_s: f64) -> Result<(), SampleConfigError> {
         let expected = "seconds, 0.001 to 10";
         self.within("max_gap_s", max_gap_s, [1e-3, 10.0], expected)
     }

@@ -199,6 +199,12 @@ impl GyroConfig {
             "bias_walk_radps_per_sqrt_s",
             self.bias_walk_radps_per_sqrt_s,
         )?;
-        bounds.times([self.time_sigma_s, self.max_gap_s])
+        bounds.within(
+            "time_sigma_s",
+            self.time_sigma_s,
+            [0.0, 1.0],
+            "seconds, 0 to 1",
+        )?;
+        bounds.max_gap_s(self.max_gap_s)
     }
 }

@@ -44,11 +44,6 @@ pub struct DopplerConfig {
     /// Standard deviation of the true velocity over the measured one: how well
     /// `dataset.doppler_s` is known. The drive itself tells it better.
     pub scale_sigma: f64,
-    /// Random walk of that scale, /√s.
-    pub scale_walk_per_sqrt_s: f64,
-    /// Standard deviation of an error of the velocity that lasts, beside the noise that each scan
-    /// says, m/s.
-    pub noise_mps: f64,
 }
 
 /// Use of the velocity by Doppler.
@@ -70,13 +65,15 @@ impl Default for DopplerConfig {
         Self {
             kind: DopplerKind::None,
             scale_sigma: 0.03,
-            scale_walk_per_sqrt_s: 1e-5,
-            noise_mps: 0.02,
         }
     }
 }
 
 impl DopplerConfig {
+    /// Standard deviation of an error of the velocity that lasts, beside the noise of each scan,
+    /// m/s.
+    pub const NOISE_MPS: f64 = 0.02;
+
     /// Returns whether the velocity is measured and used.
     pub fn is_used(&self) -> bool {
         self.kind != DopplerKind::None
@@ -88,7 +85,6 @@ impl DopplerConfig {
         WheelsConfig {
             radar_ahead_m: 0.0,
             scale_sigma: self.scale_sigma,
-            scale_walk_per_sqrt_s: self.scale_walk_per_sqrt_s,
             ..WheelsConfig::default()
         }
     }
@@ -106,7 +102,7 @@ impl DopplerConfig {
         let [dx, dy] = [0, 1].map(|axis| later.velocity_mps[axis] - earlier.velocity_mps[axis]);
         let by_change = (dx * dx + dy * dy) / (4.0 * PI).powi(2);
         let variance =
-            |of_scans: f64| (of_scans + by_change + self.noise_mps.powi(2)) * interval_s.powi(2);
+            |of_scans: f64| (of_scans + by_change + Self::NOISE_MPS.powi(2)) * interval_s.powi(2);
         DopplerWay {
             ahead: WheelDistance {
                 distance_m: ahead * interval_s,
@@ -129,9 +125,7 @@ impl DopplerConfig {
             self.scale_sigma,
             [0.0, 1.0],
             "a share, 0 to 1",
-        )?;
-        bounds.noise("scale_walk_per_sqrt_s", self.scale_walk_per_sqrt_s)?;
-        bounds.noise("noise_mps", self.noise_mps)
+        )
     }
 }
 
@@ -156,7 +150,7 @@ mod tests {
         fn ways_add_up_and_so_do_their_variances(
             start in -30.0..30.0f64, change in -1.0..1.0f64, sigma in 0.01..0.3f64, scans in 2usize..20,
         ) {
-            let config = DopplerConfig { noise_mps: 0.0, ..DopplerConfig::default() };
+            let config = DopplerConfig::default();
             let at = |k: usize| velocity([start + change * k as f64, 0.1], sigma);
             let ways: Vec<_> = (1..scans).map(|k| config.way([&at(k - 1), &at(k)], 0.25)).collect();
             let time_s = 0.25 * (scans - 1) as f64;
@@ -181,8 +175,5 @@ mod tests {
         };
         assert_eq!(wrong(|_| ()), None);
         assert_eq!(wrong(|it| it.scale_sigma = f64::NAN), Some("scale_sigma"));
-        assert_eq!(wrong(|it| it.noise_mps = -1.0), Some("noise_mps"));
-        let walk = wrong(|it| it.scale_walk_per_sqrt_s = 2.0);
-        assert_eq!(walk, Some("scale_walk_per_sqrt_s"));
     }
 }

@@ -40,14 +40,8 @@ pub struct WheelsConfig {
     pub scale: f64,
     /// Standard deviation of that scale: tyres wear and warm, and a tachometer may show too much.
     pub scale_sigma: f64,
-    /// Random walk of the scale, /√s.
-    pub scale_walk_per_sqrt_s: f64,
     /// Noise of the distance and of the place across the path, m/√m.
     pub noise_m_per_sqrt_m: f64,
-    /// Standard deviation of a speed by the step to which it is rounded, m/s.
-    pub noise_mps: f64,
-    /// Standard deviation of the time of a sample against the radar's clock, s.
-    pub time_sigma_s: f64,
     /// Longest time between two samples over which the speed is interpolated, s.
     pub max_gap_s: f64,
 }
@@ -84,10 +78,7 @@ impl Default for WheelsConfig {
             m_per_tick: None,
             scale: 1.0,
             scale_sigma: 0.02,
-            scale_walk_per_sqrt_s: 1e-5,
             noise_m_per_sqrt_m: 0.01,
-            noise_mps: 0.02,
-            time_sigma_s: 0.01,
             max_gap_s: 0.25,
         }
     }
@@ -127,9 +118,7 @@ impl WheelsConfig {
             bounds.within("m_per_tick", m_per_tick, [1e-6, 10.0], expected)?;
         }
         bounds.scale([self.scale, self.scale_sigma])?;
-        bounds.noise("scale_walk_per_sqrt_s", self.scale_walk_per_sqrt_s)?;
         bounds.noise("noise_m_per_sqrt_m", self.noise_m_per_sqrt_m)?;
-        bounds.noise("noise_mps", self.noise_mps)?;
-        bounds.times([self.time_sigma_s, self.max_gap_s])
+        bounds.max_gap_s(self.max_gap_s)
     }
 }

@@ -14,11 +14,11 @@ use gyre_scan_matching::{RefinementConfig, Refiner};
 const SCANS: usize = 400;
 
 fn main() {
-    let drive = Drive::steady(10.0, 2.0, SCANS);
+    let drive = Drive::steady(4.0, 2.0, SCANS);
     let scene = town([[-700.0, 700.0], [-100.0, 1300.0]], 1);
     let scans = scans(&scene, &drive, &Sensor::default());
     let points = scans.iter().map(Vec::len).sum::<usize>() / SCANS;
-    println!("refinement: {SCANS} scans of {points} points, 2.5 m apart, ms");
+    println!("refinement: {SCANS} scans of {points} points, 1 m apart, ms");
     println!(
         "{:>9} {:>9} {:>20} {:>13}",
         "keyframes", "aligned", "and made a keyframe", "the keyframe"
@@ -26,7 +26,6 @@ fn main() {
     for keyframes in [1, 5, 10, 20] {
         let config = RefinementConfig {
             keyframes,
-            keyframe_distance_m: 4.0,
             ..RefinementConfig::default()
         };
         let mut refiner = Refiner::new(&config, CAPACITY).unwrap();

@@ -36,10 +36,7 @@ pub enum RotationForm {
 }
 
 /// The scale of spectral magnitudes.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema,
-)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Magnitude {
     /// The magnitude itself.
     #[default]
@@ -109,7 +106,8 @@ pub struct RotationConfig {
     /// Comparison of the polar spectra: `eq7` (Weston et al., Eq. 7) or `line14` (their Algorithm
     /// 1, line 14).
     pub form: RotationForm,
-    /// Scale of the spectral magnitudes: `linear` or `log`.
+    /// Scale of the spectral magnitudes: the descriptors of places take logarithms.
+    #[serde(skip)]
     pub magnitude: Magnitude,
     /// Phase correlation: keeps only the phase of the transform of the polar spectra (Checchin et
     /// al., Eq. 6).
@@ -131,10 +129,6 @@ pub struct RotationConfig {
     pub reach_deg: f64,
     /// Interpolation of the peak between samples.
     pub peak: Peak,
-    /// Factor of the variance: factor x (1 - score) / curvature of the peak. The curvature gives
-    /// the shape alone; the factor, about the inverse of the number of independent samples, is
-    /// calibrated on real scans with known motions.
-    pub variance_scale: f64,
 }
 
 impl Default for RotationConfig {
@@ -150,7 +144,6 @@ impl Default for RotationConfig {
             radii: None,
             reach_deg: 20.0,
             peak: Peak::default(),
-            variance_scale: 0.12,
         }
     }
 }
@@ -168,12 +161,6 @@ pub struct TranslationConfig {
     pub overlap: Overlap,
     /// Interpolation of the peak between cells.
     pub peak: Peak,
-    /// Also tries the angle half a turn away and keeps the better match: magnitude spectra cannot
-    /// distinguish the two.
-    pub half_turn: bool,
-    /// Factor of the covariance: factor x (1 - score) x inverse curvature of the peak, calibrated
-    /// like that of the angle.
-    pub variance_scale: f64,
 }
 
 impl Default for TranslationConfig {
@@ -183,8 +170,6 @@ impl Default for TranslationConfig {
             phase_only: false,
             overlap: Overlap::default(),
             peak: Peak::default(),
-            half_turn: false,
-            variance_scale: 0.015,
         }
     }
 }
@@ -234,7 +219,6 @@ impl RotationConfig {
         section.within("radii", radii, 2..=1 << 13, "2 to 8192")?;
         let fits = self.reach_deg > 0.0 && self.reach_deg <= 90.0;
         section.require(fits, "reach_deg", &self.reach_deg, "above 0, at most 90")?;
-        section.positive("variance_scale", self.variance_scale)?;
         section.positive("peak.soft_argmax.temperature", self.peak.temperature())
     }
 }
@@ -265,7 +249,6 @@ impl TranslationConfig {
         let section = Section("translation");
         let fits = positive(self.reach_m);
         section.require(fits, "reach_m", &self.reach_m, "metres, above 0")?;
-        section.positive("variance_scale", self.variance_scale)?;
         section.positive("peak.soft_argmax.temperature", self.peak.temperature())
     }
 }

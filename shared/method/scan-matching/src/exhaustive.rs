@@ -33,6 +33,9 @@ pub use config::ExhaustiveConfig;
 /// too. The delay of such a lookup is a for long waves only, so the final shift is found without
 /// the offset.
 const OFFSET: f64 = 0.211_324_865_405_187_1;
+/// Factor of the covariance: factor x (1 - score) x inverse curvature of the peak in all three
+/// unknowns.
+const VARIANCE_SCALE: f64 = 0.015;
 
 /// The motion between two scans, and its angle alone.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -300,13 +303,7 @@ impl ExhaustiveSearch {
         let place = translation(found.angle_rad, found.shift, self.cell_m);
         let guess = guess(self.config.reach_m);
         let hessian = &found.over_shifts.hessian;
-        let spread = shift_covariance(
-            self.config.variance_scale,
-            score,
-            hessian,
-            self.cell_m,
-            guess,
-        );
+        let spread = shift_covariance(VARIANCE_SCALE, score, hessian, self.cell_m, guess);
         let motion = MotionMatch {
             x_m: place.x,
             y_m: place.y,
@@ -319,7 +316,6 @@ impl ExhaustiveSearch {
             ),
             score,
             runner_up: self.runner_up(found, second),
-            half_turn: false,
         };
         JointMatch { rotation, motion }
     }
@@ -327,8 +323,8 @@ impl ExhaustiveSearch {
     /// (1 - score) over the curvature of the best scores along the angle, scaled as the shift's:
     /// the angle's variance whatever the shift is.
     fn angle_variance(&self, score: f64, curvature: f64) -> f64 {
-        let variance = -self.config.variance_scale * (1.0 - score).max(1e-6) / curvature
-            * self.angles.step.powi(2);
+        let variance =
+            -VARIANCE_SCALE * (1.0 - score).max(1e-6) / curvature * self.angles.step.powi(2);
         if variance > 0.0 {
             variance.min(self.angles.guess())
         } else {
@@ -409,7 +405,6 @@ impl ExhaustiveSearch {
                 covariance: Matrix3::from_diagonal(&[guess, guess, variance_rad2].into()),
                 score: 0.0,
                 runner_up: None,
-                half_turn: false,
             },
         }
     }

@@ -68,6 +68,13 @@ use uncertainty::Uncertainty;
 
 /// After this many doubtful scans in a row a plausible match is accepted.
 const MAX_DOUBTFUL: u32 = 2;
+/// Number of consecutive scans without a match after which a new map is started.
+const MAX_UNMATCHED: u32 = 5;
+/// Weight of the scan's points, as a share of its running mean, below which a match is `weak`.
+const MIN_SUPPORT: f64 = 0.6;
+/// Distance and angle from the searched motion above which a match is `weak`, m and degrees.
+const SEARCH_AGREES_M: f64 = 2.0;
+const SEARCH_AGREES_DEG: f64 = 6.0;
 
 /// The reliability of a refined motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -421,7 +428,7 @@ impl Refiner {
     /// Returns whether the scan overlaps the map well and has enough points.
     fn fits_firmly(&self, best: &Candidate) -> bool {
         best.overlap >= self.config.firm_overlap * self.state.mean_overlap
-            && best.support >= self.config.min_support
+            && best.support >= MIN_SUPPORT
     }
 
     /// Returns whether the motion is about that of the search, but for a direction in which neither
@@ -432,15 +439,14 @@ impl Refiner {
         best: &Candidate,
         undetermined: Option<UnitVector2<f64>>,
     ) -> bool {
-        let config = &self.config;
         let mut apart = scan.searched.inv_mul(&best.alignment.pose);
         if let Some(along) = undetermined {
             let along = scan.searched.rotation.inverse() * along.into_inner();
             let shift = &mut apart.translation.vector;
             *shift -= along * along.dot(shift);
         }
-        apart.translation.vector.norm() <= config.search_agrees_m
-            && apart.rotation.angle().abs() <= config.search_agrees_deg.to_radians()
+        apart.translation.vector.norm() <= SEARCH_AGREES_M
+            && apart.rotation.angle().abs() <= SEARCH_AGREES_DEG.to_radians()
     }
 
     /// Returns the motion to the estimated pose; none while the vehicle stands. Where the radar
@@ -473,11 +479,11 @@ impl Refiner {
         self.state.update(*pose, outcome, fit, &scan.step, config);
         self.state.ahead_m += accepted.ahead_m;
         let ahead_m = self.state.ahead_m;
-        if accepted.leaves_map || self.state.unmatched >= config.max_unmatched {
+        if accepted.leaves_map || self.state.unmatched >= MAX_UNMATCHED {
             // A new map starts with this scan at the next call, and so on until two scans match.
             self.map.clear();
             self.state.leave_map();
-        } else if outcome == Outcome::Refined && self.map.needs_keyframe(pose, ahead_m, config) {
+        } else if outcome == Outcome::Refined && self.map.needs_keyframe(pose, ahead_m) {
             self.insert_keyframe(scan.id, scan.points, pose, &twist);
             if let Some(heading) = &mut self.state.heading {
                 heading.follow(self.map.len());

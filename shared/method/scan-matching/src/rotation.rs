@@ -22,6 +22,11 @@ const NEAR_GYRO_RAD: f64 = 4.0 * PI / 180.0;
 /// Half width of the neighbourhood in which a second maximum counts as the same peak, rad.
 const SAME_PEAK_RAD: f64 = 2.0 * PI / 180.0;
 
+/// Factor of the variance: factor x (1 - score) / curvature of the peak. The curvature gives the
+/// shape alone; the factor, about the inverse of the number of independent samples, is calibrated
+/// on real scans with known motions.
+const VARIANCE_SCALE: f64 = 0.12;
+
 /// The second-best angle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RotationRunnerUp {
@@ -288,7 +293,7 @@ impl RotationSearch {
     /// (1 - score) over the peak's curvature, scaled; at most that of a uniform distribution over
     /// the reach.
     fn variance(&self, score: f64, curvature: f64) -> f64 {
-        let variance = self.config.variance_scale * (1.0 - score).max(1e-6) / -curvature;
+        let variance = VARIANCE_SCALE * (1.0 - score).max(1e-6) / -curvature;
         let guess = self.config.reach_deg.to_radians().powi(2) / 3.0;
         if variance > 0.0 && variance < guess {
             variance

@@ -43,8 +43,6 @@ pub struct MotionMatch {
     pub score: f64,
     /// The highest other local maximum within reach.
     pub runner_up: Option<MotionRunnerUp>,
-    /// The angle half a turn from the given one matched better.
-    pub half_turn: bool,
 }
 
 impl MotionMatch {
@@ -53,6 +51,10 @@ impl MotionMatch {
         pose(self.x_m, self.y_m, self.yaw_rad)
     }
 }
+
+/// Factor of the covariance: factor x (1 - score) x inverse curvature of the peak, calibrated like
+/// that of the angle.
+const VARIANCE_SCALE: f64 = 0.015;
 
 /// Finds the shift between two scans whose angle is known (Weston et al., Algorithm 1, lines 16 to
 /// 21).
@@ -141,19 +143,7 @@ impl TranslationSearch {
         kernels::finite_copy(later, &mut self.later);
         self.later_energy.measure(&self.later);
         let (angle_rad, variance_rad2) = (rotation.angle_rad, rotation.variance_rad2);
-        let straight = self.at_angle(earlier, seen, angle_rad, variance_rad2);
-        if !self.config.half_turn {
-            return Ok(straight);
-        }
-        let reversed = self.at_angle(earlier, seen, opposite(angle_rad), variance_rad2);
-        Ok(if reversed.score > straight.score {
-            MotionMatch {
-                half_turn: true,
-                ..reversed
-            }
-        } else {
-            straight
-        })
+        Ok(self.at_angle(earlier, seen, angle_rad, variance_rad2))
     }
 
     /// The motion if the angle is `angle_rad`.
@@ -249,13 +239,7 @@ impl TranslationSearch {
         let translation = turn * shift * -self.cell_m;
         let score = peak.value.min(1.0);
         let guess = guess(self.config.reach_m);
-        let spread = shift_covariance(
-            self.config.variance_scale,
-            score,
-            &peak.hessian,
-            self.cell_m,
-            guess,
-        );
+        let spread = shift_covariance(VARIANCE_SCALE, score, &peak.hessian, self.cell_m, guess);
         MotionMatch {
             x_m: translation.x,
             y_m: translation.y,
@@ -270,7 +254,6 @@ impl TranslationSearch {
                     score,
                 }
             }),
-            half_turn: false,
         }
     }
 
@@ -291,17 +274,6 @@ impl TranslationSearch {
             covariance: Matrix3::from_diagonal(&[guess, guess, variance_rad2].into()),
             score: 0.0,
             runner_up: None,
-            half_turn: false,
         }
-    }
-}
-
-/// The angle half a turn away, in (-pi, pi].
-fn opposite(angle_rad: f64) -> f64 {
-    use std::f64::consts::PI;
-    if angle_rad > 0.0 {
-        angle_rad - PI
-    } else {
-        angle_rad + PI
     }
 }

@@ -48,7 +48,6 @@ fn searches_allocate_nothing_after_construction() {
         .unwrap();
         let config = TranslationConfig {
             phase_only,
-            half_turn: true,
             ..TranslationConfig::default()
         };
         let mut translation = TranslationSearch::new(n, cell_m, &config).unwrap();

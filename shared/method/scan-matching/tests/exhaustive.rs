@@ -92,7 +92,6 @@ proptest! {
             reach_m: 3.0,
             overlap: Overlap::None,
             peak: Peak::Parabola,
-            ..Default::default()
         };
         let mut exhaustive = ExhaustiveSearch::new(n, 1.0, &config).unwrap();
         let view = |raster| ArrayView2::from_shape((n, n), raster).unwrap();

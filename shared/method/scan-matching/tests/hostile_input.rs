@@ -43,7 +43,6 @@ fn no_value_of_a_cell_makes_a_result_that_is_not_finite() {
                     rotation,
                     TranslationConfig {
                         phase_only,
-                        half_turn: true,
                         ..TranslationConfig::default()
                     },
                 );

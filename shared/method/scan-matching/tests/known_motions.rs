@@ -126,35 +126,6 @@ fn odd_and_even_rasters_of_any_size() {
     }
 }
 
-#[test]
-fn half_a_turn_is_resolved_on_request() {
-    let config = TranslationConfig {
-        half_turn: true,
-        ..TranslationConfig::default()
-    };
-    for (yaw, reversed) in [(184.0, true), (172.0, true), (5.0, false)] {
-        let motion = Motion::degrees(1.5, 2.0, yaw);
-        let found = recovered(
-            255,
-            0.4,
-            &(RotationConfig::default(), config.clone()),
-            motion,
-            21,
-        );
-        let dyaw = (found.yaw_rad - motion.yaw).rem_euclid(std::f64::consts::TAU);
-        let dyaw = dyaw.min(std::f64::consts::TAU - dyaw);
-        assert_eq!(found.half_turn, reversed, "{yaw}");
-        assert!(
-            found.yaw_rad.abs() <= std::f64::consts::PI && dyaw.to_degrees() < 0.3,
-            "{yaw}: {found:?}"
-        );
-        assert!(
-            (found.x_m - 1.5).abs() < 0.1 && (found.y_m - 2.0).abs() < 0.1,
-            "{yaw}: {found:?}"
-        );
-    }
-}
-
 /// A field that fills the raster: what shrinks with the shift is the overlap alone.
 #[test]
 fn energy_normalisation_removes_the_bias_toward_zero_shift() {

@@ -3,7 +3,7 @@
 
 use crate::common::{Numbers, scenes::*};
 use gyre_geometry::{ComposedMotion, Pose, SparsePoint};
-use gyre_scan_matching::{Outcome, Refined, RefinementConfig, Refiner};
+use gyre_scan_matching::{Outcome, Refined, Refiner};
 
 /// A gentle bend and its 60 scans.
 fn bend() -> (Drive, Vec<Vec<SparsePoint>>) {
@@ -135,12 +135,12 @@ fn the_covariance_of_a_pose_recovers_after_a_prediction() {
 fn after_enough_scans_of_noise_a_new_map_starts() {
     const FIRST: usize = 29;
     const RECOVERED: usize = 10;
-    let max_unmatched = RefinementConfig::default().max_unmatched as usize;
+    const MAX_UNMATCHED: usize = 5;
     let (drive, good) = bend();
     for seed in 0..4 {
         let mut scans = good.clone();
-        (0..max_unmatched).for_each(|k| scans[FIRST + 1 + k] = noise(100 * seed + k as u64));
-        let (mut refiner, last) = (refiner(), FIRST + max_unmatched - 1);
+        (0..MAX_UNMATCHED).for_each(|k| scans[FIRST + 1 + k] = noise(100 * seed + k as u64));
+        let (mut refiner, last) = (refiner(), FIRST + MAX_UNMATCHED - 1);
         let mut refined = refine_on(&mut refiner, &drive, &scans, 0..last);
         assert!(refiner.keyframes().count() > 0);
         refined.extend(refine_on(&mut refiner, &drive, &scans, last..last + 1));

@@ -5,7 +5,7 @@ mod cache;
 
 use gyre_estimation::places::{
     Candidate, Describer, Descriptor, LoopVerifier, MAX_NEIGHBOURS, OrderError, PlaceIndex,
-    PlaceOptions, neighbours,
+    SUBMAP_REACH_M, neighbours,
 };
 use gyre_estimation::{
     CHI_SQUARE_99_9, Constraint, EstimationError, GraphOptions, Outcome, PoseGraph,
@@ -33,8 +33,6 @@ pub trait KeyframeSource {
 /// Options of [`LoopCloser`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoopOptions {
-    /// Submaps, descriptors and their verification.
-    pub places: PlaceOptions,
     /// Length of the path between a keyframe and the earlier ones that it is compared with, at
     /// least, m.
     pub gap_m: f64,
@@ -51,7 +49,6 @@ pub struct LoopOptions {
 impl Default for LoopOptions {
     fn default() -> Self {
         Self {
-            places: PlaceOptions::default(),
             gap_m: 100.0,
             candidates: 3,
             apart_m: 15.0,
@@ -115,7 +112,7 @@ impl LoopCloser {
         };
         Ok(Self {
             describer: Describer::new(),
-            verifier: LoopVerifier::new(&options.places, refinement, capacity)?,
+            verifier: LoopVerifier::new(refinement, capacity)?,
             index: PlaceIndex::default(),
             odometry: PoseGraph::new(Pose::identity(), graph),
             path_m: Vec::new(),
@@ -244,7 +241,7 @@ impl LoopCloser {
     }
 
     fn neighbours(&self, middle: usize) -> std::ops::Range<usize> {
-        neighbours(&self.path_m, middle, self.options.places.submap_reach_m)
+        neighbours(&self.path_m, middle, SUBMAP_REACH_M)
     }
 
     /// The places that look most like that of a keyframe.

@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use gyre_estimation::places::{PlaceOptionError, PlaceOptions};
 use serde::{Deserialize, Serialize};
 
 use crate::EstimatorKind;
@@ -19,8 +18,6 @@ pub struct SlamConfig {
     /// published on the topic `fix`.
     #[serde(skip_serializing_if = "is_empty")]
     pub map: PathBuf,
-    /// Keyframes, and the recognition and verification of places.
-    pub places: PlaceOptions,
 }
 
 /// The correction of the trajectory by loops.
@@ -62,13 +59,5 @@ impl SlamConfig {
     /// Returns whether keyframes are kept and loops closed.
     pub fn is_on(&self) -> bool {
         self.kind != SlamKind::None
-    }
-
-    /// Checks every value.
-    ///
-    /// # Errors
-    /// The first option that is out of its bounds.
-    pub fn validate(&self) -> Result<(), PlaceOptionError> {
-        self.places.validate()
     }
 }

@@ -2,7 +2,7 @@
 
 use std::mem;
 
-use gyre_estimation::places::{KeyframeSelector, PlaceOptions};
+use gyre_estimation::places::KeyframeSelector;
 use gyre_geometry::{OdometryMotion, Twist, UncertainMotion};
 
 use crate::Keyframe;
@@ -34,7 +34,8 @@ impl ScanPose {
     }
 }
 
-/// Selects the keyframes of a drive, and composes the motions between them.
+/// Selects the keyframes of a drive, and composes the motions between them. The first scan becomes
+/// a keyframe.
 #[derive(Debug, Clone)]
 pub struct KeyframeBuilder {
     selector: KeyframeSelector,
@@ -42,15 +43,16 @@ pub struct KeyframeBuilder {
     motion: UncertainMotion,
 }
 
-impl KeyframeBuilder {
-    /// Creates a builder whose first scan becomes a keyframe.
-    pub fn new(options: &PlaceOptions) -> Self {
+impl Default for KeyframeBuilder {
+    fn default() -> Self {
         Self {
-            selector: KeyframeSelector::new(options),
+            selector: KeyframeSelector::default(),
             motion: UncertainMotion::identity(),
         }
     }
+}
 
+impl KeyframeBuilder {
     /// Continues after a keyframe, `path_m` along the path, whose pose is given as
     /// [`next`](Self::next) takes it.
     pub fn resume(&mut self, keyframe: &UncertainMotion, path_m: f64) {
@@ -113,7 +115,7 @@ mod tests {
 
     #[test]
     fn a_keyframe_has_the_motion_since_the_one_before_and_the_velocity_into_its_scan() {
-        let mut builder = KeyframeBuilder::new(&PlaceOptions::default());
+        let mut builder = KeyframeBuilder::default();
         let keyframes: Vec<Keyframe> = scans(7).iter().filter_map(|it| builder.next(it)).collect();
         let seqs: Vec<u64> = keyframes.iter().map(|keyframe| keyframe.seq).collect();
         assert_eq!(seqs, [0, 2, 4, 6]);
@@ -131,9 +133,9 @@ mod tests {
     #[test]
     fn a_builder_that_continues_after_a_keyframe_makes_the_same_ones() {
         let scans = scans(9);
-        let mut builder = KeyframeBuilder::new(&PlaceOptions::default());
+        let mut builder = KeyframeBuilder::default();
         let all: Vec<Keyframe> = scans.iter().filter_map(|it| builder.next(it)).collect();
-        let mut resumed = KeyframeBuilder::new(&PlaceOptions::default());
+        let mut resumed = KeyframeBuilder::default();
         resumed.resume(&scans[4].pose, all[2].path_m);
         let rest: Vec<Keyframe> = scans[5..]
             .iter()

@@ -5,7 +5,6 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use gyre_estimation::places::PlaceOptions;
 use gyre_geometry::SparsePoint;
 use gyre_messages::PoseHeader;
 use gyre_slam::{Keyframe, KeyframeBuilder, RecordLog, RecordReader, ScanPose, records_path};
@@ -49,19 +48,14 @@ impl Keyframes {
     ///
     /// # Errors
     /// A file that cannot be used, or a pose without its keyframe.
-    pub fn open(
-        out: &Path,
-        options: &PlaceOptions,
-        poses: u64,
-        ended: bool,
-    ) -> Result<Self, KeyframesError> {
+    pub fn open(out: &Path, poses: u64, ended: bool) -> Result<Self, KeyframesError> {
         let mut log = RecordLog::open(out)?;
         let found = find(log.len(), poses, |index| log.read(index))?;
         // The end of the keyframes is before that of the journal.
         if !ended {
             log.cut(found.keyframes)?;
         }
-        match recover(out, options, &found, poses)? {
+        match recover(out, &found, poses)? {
             (builder, None) => Ok(Self {
                 log,
                 builder,
@@ -125,14 +119,10 @@ impl Keyframes {
 ///
 /// # Errors
 /// A file that cannot be read or is damaged.
-pub fn complete_poses(
-    out: &Path,
-    options: &PlaceOptions,
-    poses: u64,
-) -> Result<u64, KeyframesError> {
+pub fn complete_poses(out: &Path, poses: u64) -> Result<u64, KeyframesError> {
     let mut reader = RecordReader::open(out)?;
     let found = find(reader.len(), poses, |index| reader.read(index))?;
-    let (_, missing) = recover(out, options, &found, poses)?;
+    let (_, missing) = recover(out, &found, poses)?;
     Ok(missing.unwrap_or(poses))
 }
 
@@ -168,11 +158,10 @@ fn find(
 /// its keyframe, if there is one.
 fn recover(
     out: &Path,
-    options: &PlaceOptions,
     found: &Found,
     poses: u64,
 ) -> Result<(KeyframeBuilder, Option<u64>), KeyframesError> {
-    let mut builder = KeyframeBuilder::new(options);
+    let mut builder = KeyframeBuilder::default();
     let last = found.last.as_ref().map_or(0, |keyframe| keyframe.seq);
     let records = crate::records_from(&crate::path(out), last)?;
     // Behind them may be what a power failure has left of others, or the end of the stream.

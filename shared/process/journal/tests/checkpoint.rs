@@ -20,7 +20,6 @@ fn config() -> RefinementConfig {
         cell_m: 1.0,
         reach_m: 40.0,
         keyframes: 4,
-        keyframe_distance_m: 1.5,
         ..RefinementConfig::default()
     }
 }

@@ -43,12 +43,8 @@ limits! {
     /// Median of the time from sensor to pose, ms. A scan that was dropped counts until the pose of
     /// the next one that was not.
     p50_ms,
-    /// 90th percentile of it, ms.
-    p90_ms,
     /// 99th percentile of it, ms. Of fewer than a hundred scans that is the maximum.
     p99_ms,
-    /// 99.9th percentile of it, ms. Of fewer than a thousand scans that is the maximum.
-    p99_9_ms,
     /// Maximum of it, ms.
     max_ms,
     /// Scans that were due and have no pose.

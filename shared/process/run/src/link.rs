@@ -48,6 +48,7 @@ pub struct LinkConfig {
     /// True if a robot sends masked scans beside a later cut: the keyframes of SLAM need them. Set
     /// by `slam.kind`.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
+    #[schemars(skip)]
     pub keyframes: bool,
 }
 

@@ -93,6 +93,7 @@ pub struct StageConfig {
     /// Delay for each scan, ms, to test behaviour under load. Source and `pose-integration` have
     /// none.
     #[serde(skip_serializing_if = "crate::unset::is_zero")]
+    #[schemars(skip)]
     pub delay_ms: u64,
 }
 

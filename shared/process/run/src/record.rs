@@ -4,8 +4,6 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use crate::RestartPolicy;
-
 /// The section `[record]`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -27,8 +25,6 @@ pub struct RecordConfig {
     /// `max_bagfile_duration`); 0: any.
     #[serde(skip_serializing_if = "is_none")]
     pub split_s: f64,
-    /// Limits of the recorder's restarts.
-    pub restart: RestartPolicy,
 }
 
 fn is_none(seconds: &f64) -> bool {

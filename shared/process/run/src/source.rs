@@ -81,6 +81,7 @@ pub struct SourceConfig {
     /// rate stays. They follow each other as fast as they are decoded. Only with a `run.rate` other
     /// than `max`.
     #[serde(skip_serializing_if = "is_one")]
+    #[schemars(skip)]
     pub burst: NonZeroUsize,
     /// Faults that are put into what is played of a recording: `gyre stress`. As in
     /// `[{ kind = "gyro-out", from_s = 4.0, for_s = 3.0 }]`.

@@ -10,11 +10,7 @@ use gyre_mapping::Origin;
 pub struct MapArguments {
     /// The folder of the run's results, its --out, with journal/keyframes.log.
     pub run: PathBuf,
-    /// A later run through the same place: report what has appeared and what has gone since RUN,
-    /// which may be the folder of a map too, in changes.csv and changes.png.
-    #[arg(conflicts_with_all = ["format", "trajectory", "extend", "cell_m", "origin"])]
-    pub later: Option<PathBuf>,
-    /// The folder of the map, or of the changes.
+    /// The folder of the map.
     #[arg(long)]
     pub out: PathBuf,
     /// The forms that are written: the map's own folder, map.png, map.tif, map.pgm with map.yaml
@@ -36,9 +32,6 @@ pub struct MapArguments {
     /// 84), clockwise from true north. Default: what the run has found by GNSS.
     #[arg(long, value_name = "LAT,LON,HEADING", value_parser = origin, allow_hyphen_values = true)]
     pub origin: Option<Origin>,
-    /// Print the changes as JSON instead of sentences.
-    #[arg(long, requires = "later")]
-    pub json: bool,
 }
 
 /// The forms of a map.

@@ -4,30 +4,23 @@ use std::ops::Range;
 
 use gyre_geometry::Pose;
 
-use super::PlaceOptions;
-
 /// Largest number of keyframes of a submap to each side of the middle one. A vehicle that turns on
 /// the spot makes many keyframes.
 pub const MAX_NEIGHBOURS: usize = 8;
+/// Length of the path to each side of a keyframe whose keyframes make its submap, m.
+pub const SUBMAP_REACH_M: f64 = 10.0;
+/// Distance and rotation from the last keyframe at which a scan becomes a keyframe, m and degrees.
+const DISTANCE_M: f64 = 2.0;
+const ANGLE_DEG: f64 = 15.0;
 
-/// Selects the scans that become keyframes, and measures the path along them.
-#[derive(Debug, Clone, PartialEq)]
+/// Selects the scans that become keyframes, and measures the path along them. The first scan becomes
+/// one.
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct KeyframeSelector {
-    distance_m: f64,
-    angle_rad: f64,
     last: Option<(Pose, f64)>,
 }
 
 impl KeyframeSelector {
-    /// Creates a selector whose first scan becomes a keyframe.
-    pub fn new(options: &PlaceOptions) -> Self {
-        Self {
-            distance_m: options.keyframe_distance_m,
-            angle_rad: options.keyframe_angle_deg.to_radians(),
-            last: None,
-        }
-    }
-
     /// Continues after a keyframe at `pose`, `path_m` along the path.
     pub fn resume(&mut self, pose: Pose, path_m: f64) {
         self.last = Some((pose, path_m));
@@ -42,7 +35,7 @@ impl KeyframeSelector {
                 let motion = last.inv_mul(pose);
                 let distance_m = motion.translation.vector.norm();
                 let angle_rad = motion.rotation.angle().abs();
-                if distance_m < self.distance_m && angle_rad < self.angle_rad {
+                if distance_m < DISTANCE_M && angle_rad < ANGLE_DEG.to_radians() {
                     return None;
                 }
                 path_m + distance_m
@@ -75,7 +68,7 @@ mod tests {
 
     #[test]
     fn two_metres_or_fifteen_degrees_make_a_keyframe() {
-        let mut selector = KeyframeSelector::new(&PlaceOptions::default());
+        let mut selector = KeyframeSelector::default();
         let poses = [
             (0.0, 0.0),
             (1.9, 0.0),
@@ -98,7 +91,7 @@ mod tests {
 
     #[test]
     fn a_resumed_selector_continues_the_path() {
-        let mut selector = KeyframeSelector::new(&PlaceOptions::default());
+        let mut selector = KeyframeSelector::default();
         selector.resume(pose(10.0, 0.0, 0.0), 50.0);
         assert_eq!(selector.next(&pose(11.0, 0.0, 0.0)), None);
         assert_eq!(selector.next(&pose(13.0, 0.0, 0.0)), Some(53.0));

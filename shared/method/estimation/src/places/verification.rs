@@ -9,10 +9,17 @@ use gyre_scan_matching::{
 };
 use ndarray::Array2;
 
-use super::{CELL_M, Candidate, PLANNED, PlaceOptions, RASTER_CELLS};
+use super::{CELL_M, Candidate, PLANNED, RASTER_CELLS};
 
 /// Cells within this range of both sensors are correlated: farther away few points are extracted.
 const MASK_M: f64 = 80.0;
+/// Largest translation between two places that are verified, along each axis, m.
+const REACH_M: f64 = 25.0;
+/// Smallest correlation of a loop that is accepted.
+const MIN_CORRELATION: f64 = 0.65;
+/// Smallest difference of the correlations of an accepted loop and of any other motion between the
+/// two places.
+const MIN_MARGIN: f64 = 0.1;
 /// A match on whole cells at an angle of the descriptors' grid is this much below the final one at
 /// most.
 const COARSE_LOSS: f64 = 0.15;
@@ -22,9 +29,9 @@ const COARSE_LOSS: f64 = 0.15;
 pub enum VerificationOutcome {
     /// The two submaps show the same place.
     Accepted,
-    /// The correlation is below [`PlaceOptions::min_correlation`].
+    /// The correlation is below 0.65.
     LowCorrelation,
-    /// Another motion correlates nearly as well: less than [`PlaceOptions::min_margin`] below.
+    /// Another motion correlates nearly as well: less than 0.1 below.
     Ambiguous,
     /// The points of the two keyframes do not determine the motion.
     Undetermined,
@@ -59,8 +66,6 @@ pub struct LoopVerifier {
     translation: TranslationSearch,
     aligner: KeyframeAligner,
     correlation: MaskedCorrelation,
-    min_correlation: f64,
-    min_margin: f64,
     later: Array2<f32>,
     earlier: Array2<f32>,
 }
@@ -70,15 +75,10 @@ impl LoopVerifier {
     /// odometry: its cells and reach, and the scales of its covariance.
     ///
     /// # Errors
-    /// The first value of `refinement` that is out of its bounds, or a reach of more than the
-    /// rasters allow.
-    pub fn new(
-        options: &PlaceOptions,
-        refinement: &RefinementConfig,
-        capacity: usize,
-    ) -> Result<Self, ConfigError> {
+    /// The first value of `refinement` that is out of its bounds.
+    pub fn new(refinement: &RefinementConfig, capacity: usize) -> Result<Self, ConfigError> {
         let translation = TranslationConfig {
-            reach_m: options.reach_m,
+            reach_m: REACH_M,
             ..TranslationConfig::default()
         };
         let raster = || Array2::zeros((RASTER_CELLS, RASTER_CELLS));
@@ -86,8 +86,6 @@ impl LoopVerifier {
             translation: TranslationSearch::new(RASTER_CELLS, CELL_M, &translation)?,
             aligner: KeyframeAligner::new(refinement, capacity)?,
             correlation: MaskedCorrelation::new(RASTER_CELLS, CELL_M, MASK_M)?,
-            min_correlation: options.min_correlation,
-            min_margin: options.min_margin,
             later: raster(),
             earlier: raster(),
         })
@@ -120,7 +118,7 @@ impl LoopVerifier {
             runner_up: second.max(other.score),
             half_turn,
         };
-        if best.score < self.min_correlation - COARSE_LOSS {
+        if best.score < MIN_CORRELATION - COARSE_LOSS {
             return found;
         }
         match self.aligner.align(later, earlier, &searched) {
@@ -154,9 +152,9 @@ impl LoopVerifier {
     }
 
     fn judge(&self, found: &Verification) -> VerificationOutcome {
-        if found.correlation < self.min_correlation {
+        if found.correlation < MIN_CORRELATION {
             VerificationOutcome::LowCorrelation
-        } else if found.searched - found.runner_up < self.min_margin {
+        } else if found.searched - found.runner_up < MIN_MARGIN {
             VerificationOutcome::Ambiguous
         } else {
             VerificationOutcome::Accepted

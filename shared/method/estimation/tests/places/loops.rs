@@ -2,9 +2,7 @@
 
 use std::f64::consts::PI;
 
-use gyre_estimation::places::{
-    Candidate, LoopVerifier, PlaceOptions, Verification, VerificationOutcome,
-};
+use gyre_estimation::places::{Candidate, LoopVerifier, Verification, VerificationOutcome};
 use gyre_geometry::{Pose, pose, wrap_angle};
 use gyre_scan_matching::{RefinementConfig, Submap};
 use proptest::prelude::*;
@@ -12,7 +10,7 @@ use proptest::prelude::*;
 use super::scenes;
 
 fn verifier() -> LoopVerifier {
-    LoopVerifier::new(&PlaceOptions::default(), &RefinementConfig::default(), 8192).unwrap()
+    LoopVerifier::new(&RefinementConfig::default(), 8192).unwrap()
 }
 
 fn verify(later: &Submap, earlier: &Submap, yaw_rad: f64) -> Verification {

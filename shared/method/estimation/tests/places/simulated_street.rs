@@ -6,7 +6,7 @@ use std::fs;
 
 use gyre_estimation::places::{
     Describer, Descriptor, KeyframeSelector, LoopVerifier, MAX_NEIGHBOURS, PlaceIndex,
-    PlaceOptions, VerificationOutcome, neighbours,
+    SUBMAP_REACH_M, VerificationOutcome, neighbours,
 };
 use gyre_geometry::{Pose, SparsePoint, Twist, pose, xy_yaw};
 use gyre_radar::{OwnedScan, PointExtractor, PointsConfig};
@@ -86,7 +86,7 @@ fn simulate() -> Vec<Keyframe> {
             points: points[..count].to_vec(),
         }
     };
-    let mut selector = KeyframeSelector::new(&PlaceOptions::default());
+    let mut selector = KeyframeSelector::default();
     let selected = (0..poses.len()).filter(|k| selector.next(&poses[*k]).is_some());
     selected.map(keyframe).collect()
 }
@@ -95,7 +95,7 @@ fn submap(keyframes: &[Keyframe], path_m: &[f64], middle: usize) -> Submap {
     let mut submap = Submap::with_capacity(8192 * (2 * MAX_NEIGHBOURS + 1));
     let here = &keyframes[middle];
     submap.start(&here.points, &here.twist);
-    for k in neighbours(path_m, middle, PlaceOptions::default().submap_reach_m) {
+    for k in neighbours(path_m, middle, SUBMAP_REACH_M) {
         if k != middle {
             let there = &keyframes[k];
             submap.add(&there.points, &there.twist, &here.pose.inv_mul(&there.pose));
@@ -121,8 +121,7 @@ fn a_street_driven_back_is_recognised_and_the_loops_are_right() {
         .map(|k| submap(&keyframes, &path_m, k))
         .collect();
     let (mut describer, mut index) = (Describer::new(), PlaceIndex::default());
-    let mut verifier =
-        LoopVerifier::new(&PlaceOptions::default(), &RefinementConfig::default(), 8192).unwrap();
+    let mut verifier = LoopVerifier::new(&RefinementConfig::default(), 8192).unwrap();
     let (mut returned, mut closed) = (0, 0);
     for (k, submap) in submaps.iter().enumerate() {
         let mut descriptor = Descriptor::default();

@@ -73,38 +73,6 @@ fn a_picture_has_the_trajectory_and_its_loops_in_it() {
 }
 
 #[test]
-fn a_picture_has_what_has_appeared_and_gone_in_it() {
-    let change = |kind, x_m: f64| Change {
-        kind,
-        x_m,
-        y_m: 5.0,
-        yaw_rad: 0.3,
-        length_m: 4.0,
-        width_m: 2.0,
-        confidence: 0.9,
-    };
-    let changes = [
-        change(ChangeKind::Appeared, -5.0),
-        change(ChangeKind::Gone, 5.0),
-    ];
-    let is_green = |[red, green, blue]: [u8; 3]| green > 200 && red < 120 && blue < 160;
-    let is_red = |[red, green, blue]: [u8; 3]| red > 220 && green < 110 && blue < 110;
-    let drive = drive(20, &wall());
-    let counts = |changes: &[Change]| {
-        let overlay = Overlay {
-            changes,
-            ..Overlay::default()
-        };
-        let picture = Picture::of(&mut drawn(&drive), &overlay);
-        [picture.count(is_green), picture.count(is_red)]
-    };
-    assert_eq!(counts(&[]), [0, 0]);
-    // 60 pixels of 0.2 m around each, and the legend.
-    let [green, red] = counts(&changes);
-    assert!(green > 60 && red > 60, "{green} {red}");
-}
-
-#[test]
 fn the_cells_of_a_legible_picture_grow_with_the_drive() {
     let cell_m = |length_m: f64| {
         let ends = [pose(0.0, 0.0, 0.0), pose(0.0, length_m, 0.0)];

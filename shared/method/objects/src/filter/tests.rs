@@ -29,8 +29,8 @@ struct Vehicle {
 }
 
 impl Vehicle {
-    fn step(&mut self, config: &ObjectsConfig, rng: &mut ChaCha8Rng) {
-        if rng.random::<f64>() > (-DT_S / config.turn_lasts_s).exp() {
+    fn step(&mut self, rng: &mut ChaCha8Rng) {
+        if rng.random::<f64>() > (-DT_S / TURN_LASTS_S).exp() {
             let mut left = rng.random::<f64>();
             self.model = (0..SHARES.len() - 1)
                 .find(|model| {
@@ -42,9 +42,9 @@ impl Vehicle {
         let heading = self.velocity.normalize();
         let side = Vector2::new(-heading.y, heading.x);
         let pushed = normal(rng);
-        let acceleration = heading * (config.acceleration_mps2 * pushed.x)
-            + side * (config.lateral_acceleration_mps2 * pushed.y);
-        self.turn(TURNS[self.model] * config.turn_rate_radps);
+        let acceleration = heading * (ACCELERATION_MPS2 * pushed.x)
+            + side * (LATERAL_ACCELERATION_MPS2 * pushed.y);
+        self.turn(TURNS[self.model] * TURN_RATE_RADPS);
         self.position += acceleration * (0.5 * DT_S * DT_S);
         self.velocity += acceleration * DT_S;
     }
@@ -65,7 +65,7 @@ impl Vehicle {
 /// Tracks a vehicle for some scans, and returns the filter.
 fn tracked(
     vehicle: &mut Vehicle,
-    (scans, config): (usize, &ObjectsConfig),
+    scans: usize,
     rng: &mut ChaCha8Rng,
     mut step: impl FnMut(&mut Vehicle, &mut ChaCha8Rng),
 ) -> Filter {
@@ -77,7 +77,7 @@ fn tracked(
         step(vehicle, rng);
         let velocity = filter.velocity();
         let heading = velocity.try_normalize(1e-9).unwrap_or_else(Vector2::x);
-        filter.predict(DT_S, &heading, config);
+        filter.predict(DT_S, &heading);
         filter.update(&measured(vehicle, rng));
     }
     filter
@@ -86,7 +86,6 @@ fn tracked(
 #[test]
 fn the_covariance_is_that_of_the_errors_over_vehicles_that_drive_as_the_models() {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
-    let config = ObjectsConfig::default();
     let (mut nees, mut squares_m2, runs) = (0.0, 0.0, 600);
     for _ in 0..runs {
         let velocity = normal(&mut rng) * SPEED_SIGMA_MPS;
@@ -95,8 +94,8 @@ fn the_covariance_is_that_of_the_errors_over_vehicles_that_drive_as_the_models()
             velocity,
             model: 2,
         };
-        let filter = tracked(&mut vehicle, (16, &config), &mut rng, |vehicle, rng| {
-            vehicle.step(&config, rng);
+        let filter = tracked(&mut vehicle, 16, &mut rng, |vehicle, rng| {
+            vehicle.step(rng);
         });
         let error = filter.velocity() - vehicle.velocity;
         let inverse = filter.velocity_covariance().try_inverse();
@@ -113,10 +112,6 @@ fn the_covariance_is_that_of_the_errors_over_vehicles_that_drive_as_the_models()
 #[test]
 fn the_turn_rate_of_a_vehicle_that_goes_on_turning_is_found_and_a_straight_one_has_none() {
     let mut rng = ChaCha8Rng::seed_from_u64(2);
-    let config = ObjectsConfig {
-        turn_lasts_s: 4.0,
-        ..ObjectsConfig::default()
-    };
     for wanted_radps in [-0.6, -0.35, 0.0, 0.35, 0.6] {
         let (mut found_radps, mut error_mps, runs) = (0.0, 0.0, 40);
         for _ in 0..runs {
@@ -125,10 +120,10 @@ fn the_turn_rate_of_a_vehicle_that_goes_on_turning_is_found_and_a_straight_one_h
                 velocity: Vector2::new(-6.0, 5.0),
                 model: 2,
             };
-            let filter = tracked(&mut vehicle, (14, &config), &mut rng, |vehicle, _| {
+            let filter = tracked(&mut vehicle, 14, &mut rng, |vehicle, _| {
                 vehicle.turn(wanted_radps);
             });
-            found_radps += filter.turn() * config.turn_rate_radps / f64::from(runs);
+            found_radps += filter.turn() * TURN_RATE_RADPS / f64::from(runs);
             error_mps += (filter.velocity() - vehicle.velocity).norm() / f64::from(runs);
         }
         assert!(
@@ -147,8 +142,7 @@ fn a_heading_turns_the_velocity_towards_it_and_makes_it_certain_across_it_alone(
         velocity: Vector2::new(6.0, 0.0),
         model: 2,
     };
-    let config = ObjectsConfig::default();
-    let mut filter = tracked(&mut vehicle, (6, &config), &mut rng, |vehicle, _| {
+    let mut filter = tracked(&mut vehicle, 6, &mut rng, |vehicle, _| {
         vehicle.turn(0.0);
     });
     let before = filter;
@@ -190,12 +184,7 @@ fn a_standing_vehicle_has_no_speed() {
         velocity: Vector2::zeros(),
         model: 2,
     };
-    let filter = tracked(
-        &mut vehicle,
-        (20, &ObjectsConfig::default()),
-        &mut rng,
-        |_, _| {},
-    );
+    let filter = tracked(&mut vehicle, 20, &mut rng, |_, _| {});
     let (speed_mps, sigma_mps) = filter.speed();
     assert!(
         speed_mps < 3.0 * sigma_mps && sigma_mps < 1.0,

@@ -1,6 +1,6 @@
 #![allow(clippy::unwrap_used)]
 
-use super::{PointExtractor, PointsConfig};
+use super::{PointExtractor, PointsConfig, WEIGHT_CAP};
 use crate::raster::tests::scene::Sensor;
 use crate::scan::{OwnedScan, ScanError, Sense, flag};
 use gyre_geometry::{SparsePoint, Twist};
@@ -72,7 +72,7 @@ fn direct(config: &PointsConfig, scan: &OwnedScan, floor: u8) -> Vec<SparsePoint
             } else {
                 sin
             };
-            let weight = (here as f32 / depth as f32 / config.weight_cap).min(1.0);
+            let weight = (here as f32 / depth as f32 / WEIGHT_CAP).min(1.0);
             let time_s = (view.stamp_ns[azimuth] - geometry.stamp_ns) as f32 * 1e-9;
             points.push(SparsePoint {
                 x_m: range_m * cos,
@@ -147,9 +147,11 @@ proptest! {
     #[test]
     fn the_strongest_points_are_kept(seed: u32, capacity in 0usize..400) {
         let scan = noise(40, 200, 0.17, seed);
-        let all = PointsConfig { weight_cap: 255.0, ..PointsConfig::default() };
+        // No weight above this floor reaches 1.
+        const FLOOR: u8 = 195;
+        let all = PointsConfig::default();
         let config = PointsConfig { capacity, ..all.clone() };
-        let (all, few) = (extract(&all, &scan, 100), extract(&config, &scan, 100));
+        let (all, few) = (extract(&all, &scan, FLOOR), extract(&config, &scan, FLOOR));
         prop_assert!(few.len() <= capacity);
         let weakest = few.iter().map(|point| point.weight).fold(1.0, f32::min);
         let is_kept = |point: &&SparsePoint| !few.is_empty() && point.weight >= weakest;
@@ -344,13 +346,6 @@ fn settings_out_of_bounds_are_rejected_by_name() {
             "max_range_m",
             PointsConfig {
                 max_range_m: 5.0,
-                ..default()
-            },
-        ),
-        (
-            "weight_cap",
-            PointsConfig {
-                weight_cap: 0.0,
                 ..default()
             },
         ),

@@ -11,10 +11,13 @@ use crate::config::{ConfigError, Overlap, Peak, Section, positive};
 #[serde(default, deny_unknown_fields)]
 pub struct ExhaustiveConfig {
     /// Largest angle searched to either side, degrees; 180 is the whole circle.
+    #[serde(skip)]
     pub reach_deg: f64,
     /// Step between angles, degrees. The cost grows with its inverse.
+    #[serde(skip)]
     pub step_deg: f64,
     /// Largest shift searched along each axis, m.
+    #[serde(skip)]
     pub reach_m: f64,
     /// Normalisation for the shrinking overlap. `none` and `area` compare the angles by their plain
     /// correlations, as in MbyM: rotation blurs, so unrotated rasters have the advantage. `energy`
@@ -22,9 +25,6 @@ pub struct ExhaustiveConfig {
     pub overlap: Overlap,
     /// Interpolation of the peak between angles and between cells: `gaussian` or `parabola`.
     pub peak: Peak,
-    /// Factor of the covariance: factor x (1 - score) x inverse curvature of the peak in all three
-    /// unknowns.
-    pub variance_scale: f64,
 }
 
 impl Default for ExhaustiveConfig {
@@ -35,7 +35,6 @@ impl Default for ExhaustiveConfig {
             reach_m: 12.0,
             overlap: Overlap::default(),
             peak: Peak::default(),
-            variance_scale: 0.015,
         }
     }
 }
@@ -63,8 +62,7 @@ impl ExhaustiveConfig {
         let fits = positive(self.reach_m);
         section.require(fits, "reach_m", &self.reach_m, "metres, above 0")?;
         let fits = !matches!(self.peak, Peak::SoftArgmax { .. });
-        section.require(fits, "peak", &"soft_argmax", "gaussian or parabola")?;
-        section.positive("variance_scale", self.variance_scale)
+        section.require(fits, "peak", &"soft_argmax", "gaussian or parabola")
     }
 
     /// Returns the number of angles tried.

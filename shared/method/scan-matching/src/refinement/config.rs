@@ -4,6 +4,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::config::{ConfigError, Section};
 
+/// Tolerance of the limit of acceleration for the noise of matches, m.
+pub(super) const JITTER_M: f64 = 0.8;
+/// Tolerance of the limit of yaw acceleration for the noise of matches, degrees.
+pub(super) const JITTER_DEG: f64 = 3.0;
+/// Cell size of the coarse map, on which registration starts, over that of the fine map.
+pub(super) const COARSE: f64 = 3.0;
+
 /// Configuration of [`Refiner`](crate::Refiner): section `[refinement]`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -13,39 +20,21 @@ pub struct RefinementConfig {
     pub kind: RefinementKind,
     /// Number of keyframes in the map, 1 to 64. 1 registers against the last keyframe alone.
     pub keyframes: usize,
-    /// Distance from the last keyframe at which a scan becomes a keyframe, m.
-    pub keyframe_distance_m: f64,
-    /// Rotation from the last keyframe at which a scan becomes a keyframe, degrees.
-    pub keyframe_angle_deg: f64,
     /// Size of a cell of the map, m. The map is blurred by a Gaussian with a standard deviation of
     /// one cell.
     pub cell_m: f64,
     /// Extent of the map to each side of its newest keyframe, m: a little more than
     /// `points.max_range_m`.
     pub reach_m: f64,
-    /// Cell size of the coarse map, on which registration starts, over that of the fine map.
-    pub coarse: f64,
     /// Maximum acceleration of the vehicle, m/s². A match that exceeds it is rejected.
     pub acceleration_mps2: f64,
     /// Maximum yaw acceleration of the vehicle, degrees/s². A match that exceeds it is rejected.
     pub yaw_acceleration_degps2: f64,
-    /// Tolerance of the acceleration limit for the noise of matches, m.
-    pub jitter_m: f64,
-    /// Tolerance of the yaw acceleration limit for the noise of matches, degrees.
-    pub jitter_deg: f64,
     /// Minimum overlap with the map, as a share of its running mean. A match below it is rejected.
     pub min_overlap: f64,
     /// Overlap with the map, as a share of its running mean, below which a match is `weak`: it is
     /// used, but its scan stays out of the map.
     pub firm_overlap: f64,
-    /// Weight of the scan's points, as a share of its running mean, below which a match is `weak`.
-    pub min_support: f64,
-    /// Distance from the searched motion above which a match is `weak`, m.
-    pub search_agrees_m: f64,
-    /// Angle from the searched motion above which a match is `weak`, degrees.
-    pub search_agrees_deg: f64,
-    /// Number of consecutive scans without a match after which a new map is started.
-    pub max_unmatched: u32,
     /// Factor of the covariance: factor x mean weight of the points x mean squared residual x
     /// inverse information matrix.
     pub variance_scale: f64,
@@ -81,21 +70,12 @@ impl Default for RefinementConfig {
         Self {
             kind: RefinementKind::default(),
             keyframes: 10,
-            keyframe_distance_m: 1.5,
-            keyframe_angle_deg: 3.0,
             cell_m: 0.3,
             reach_m: 85.0,
-            coarse: 3.0,
             acceleration_mps2: 6.0,
             yaw_acceleration_degps2: 90.0,
-            jitter_m: 0.8,
-            jitter_deg: 3.0,
             min_overlap: 0.5,
             firm_overlap: 0.7,
-            search_agrees_m: 2.0,
-            search_agrees_deg: 6.0,
-            min_support: 0.6,
-            max_unmatched: 5,
             variance_scale: 0.7,
             yaw_sigma_deg: 0.19,
             drift_scale: 2.0,
@@ -116,19 +96,11 @@ impl RefinementConfig {
         section.within("cell_m", self.cell_m, 0.05..=10.0, "metres, 0.05 to 10")?;
         let fits = (8.0..=1000.0).contains(&(self.reach_m / self.cell_m));
         section.require(fits, "reach_m", &self.reach_m, "8 to 1000 cells of cell_m")?;
-        section.within("coarse", self.coarse, 1.0..=8.0, "1 to 8")?;
         let share = |key, value| section.within(key, value, 0.0..=1.0, "a share, 0 to 1");
         share("min_overlap", self.min_overlap)?;
         share("firm_overlap", self.firm_overlap)?;
-        share("min_support", self.min_support)?;
-        section.positive("keyframe_distance_m", self.keyframe_distance_m)?;
-        section.positive("keyframe_angle_deg", self.keyframe_angle_deg)?;
         section.positive("acceleration_mps2", self.acceleration_mps2)?;
         section.positive("yaw_acceleration_degps2", self.yaw_acceleration_degps2)?;
-        section.positive("search_agrees_m", self.search_agrees_m)?;
-        section.positive("search_agrees_deg", self.search_agrees_deg)?;
-        section.positive("jitter_m", self.jitter_m)?;
-        section.positive("jitter_deg", self.jitter_deg)?;
         section.positive("variance_scale", self.variance_scale)?;
         section.positive("drift_scale", self.drift_scale)?;
         section.within("yaw_sigma_deg", self.yaw_sigma_deg, 0.0..=90.0, "0 to 90")?;

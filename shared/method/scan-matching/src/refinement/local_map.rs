@@ -8,9 +8,14 @@ use ndarray::{ArrayView2, ArrayViewMut2};
 
 use super::{
     RefinementConfig,
+    config::COARSE,
     map_level::{Image, ImageView, MapLevel, MapView},
     points::DeskewedPoints,
 };
+
+/// Distance and rotation from the last keyframe at which a scan becomes a keyframe, m and degrees.
+const KEYFRAME_DISTANCE_M: f64 = 1.5;
+const KEYFRAME_ANGLE_DEG: f64 = 3.0;
 
 /// A scan that is part of the local map.
 #[derive(Debug, Clone)]
@@ -53,7 +58,7 @@ pub(super) struct LocalMap {
 impl LocalMap {
     pub fn new(config: &RefinementConfig) -> Self {
         let level = |cell_m| MapLevel::new(cell_m, config.reach_m);
-        let (fine, coarse) = (level(config.cell_m), level(config.cell_m * config.coarse));
+        let (fine, coarse) = (level(config.cell_m), level(config.cell_m * COARSE));
         let keyframe = Keyframe {
             id: 0,
             pose: Pose::identity(),
@@ -152,18 +157,13 @@ impl LocalMap {
 
     /// Returns whether `pose` is far enough from the last keyframe for another one, also by the
     /// search.
-    pub fn needs_keyframe(
-        &self,
-        pose: &Pose,
-        ahead_m: Vector2<f64>,
-        config: &RefinementConfig,
-    ) -> bool {
+    pub fn needs_keyframe(&self, pose: &Pose, ahead_m: Vector2<f64>) -> bool {
         self.used.back().is_none_or(|last| {
             let moved = last.pose.inv_mul(pose);
             let moved_m = pose.translation.vector - last.pose.translation.vector;
             let by_search_m = moved_m + ahead_m - last.ahead_m;
-            moved_m.norm().max(by_search_m.norm()) >= config.keyframe_distance_m
-                || moved.rotation.angle().abs() >= config.keyframe_angle_deg.to_radians()
+            moved_m.norm().max(by_search_m.norm()) >= KEYFRAME_DISTANCE_M
+                || moved.rotation.angle().abs() >= KEYFRAME_ANGLE_DEG.to_radians()
         })
     }
 }

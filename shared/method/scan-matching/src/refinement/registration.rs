@@ -7,6 +7,7 @@ use nalgebra::UnitVector2;
 use super::{
     InitialGuess, RefinementConfig, TrackerState,
     alignment::{Alignment, align, align_across},
+    config::COARSE,
     initial_guess::{initial_guesses, yaw_offsets},
     local_map::LocalMap,
     points::DeskewedPoints,
@@ -134,7 +135,7 @@ impl Registration<'_> {
 
     fn in_same_basin(&self, a: &Pose, b: &Pose) -> bool {
         let apart = a.inv_mul(b);
-        let cell_m = self.config.cell_m * self.config.coarse;
+        let cell_m = self.config.cell_m * COARSE;
         apart.translation.vector.norm() <= SAME_BASIN_COARSE_CELLS * cell_m
             && apart.rotation.angle().abs() <= SAME_BASIN_RAD
     }

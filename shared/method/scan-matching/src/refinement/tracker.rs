@@ -5,7 +5,9 @@ use gyre_geometry::{Pose, Twist};
 use nalgebra::{UnitComplex, Vector2};
 
 use super::{
-    Heading, Outcome, RefinementConfig, Standstill, WheelState, heading::PredictedTurn,
+    Heading, Outcome, RefinementConfig, Standstill, WheelState,
+    config::{JITTER_DEG, JITTER_M},
+    heading::PredictedTurn,
     wheels::PredictedDistance,
 };
 
@@ -132,8 +134,8 @@ impl Anchor {
         let twist = self.twist_to(pose, interval_s);
         let moved = (twist.linear_mps() - self.twist.linear_mps()) * time_s;
         let turned = (twist.yaw_rate_radps - self.twist.yaw_rate_radps) * time_s;
-        let shift = config.jitter_m * jitter_share + config.acceleration_mps2 * time_s.powi(2);
-        let jitter = config.jitter_deg * jitter_share;
+        let shift = JITTER_M * jitter_share + config.acceleration_mps2 * time_s.powi(2);
+        let jitter = JITTER_DEG * jitter_share;
         let (turned, turn) = match heading {
             Some(heading) => (heading.rotation_to(&pose.rotation).angle(), jitter),
             None => (

@@ -4,8 +4,14 @@ use gyre_geometry::Pose;
 use nalgebra::{Matrix3, Vector2, Vector3};
 
 use super::{
-    Outcome, RefinementConfig, TrackerState, alignment::Alignment, heading::grown,
-    local_map::LocalMap, points::DeskewedPoints, registration::Scan, standstill::Report,
+    Outcome, RefinementConfig, TrackerState,
+    alignment::Alignment,
+    config::{JITTER_DEG, JITTER_M},
+    heading::grown,
+    local_map::LocalMap,
+    points::DeskewedPoints,
+    registration::Scan,
+    standstill::Report,
     tracker::Step,
 };
 
@@ -170,9 +176,9 @@ fn of_prediction(
     let variance = |jitter: f64, acceleration: f64| {
         grown * (jitter + acceleration * interval_s.powi(2)).powi(2) / 3.0
     };
-    let shift = variance(config.jitter_m, config.acceleration_mps2);
+    let shift = variance(JITTER_M, config.acceleration_mps2);
     let turn = variance(
-        config.jitter_deg.to_radians(),
+        JITTER_DEG.to_radians(),
         config.yaw_acceleration_degps2.to_radians(),
     );
     if let Some(distance) = &step.distance {

@@ -14,6 +14,8 @@ use gyre_geometry::{Pose, Twist, UncertainMotion, pose};
 use gyre_samples::{WheelDistance, WheelsConfig};
 use nalgebra::{Matrix2, Matrix3, RowVector3, Vector2, Vector3};
 
+/// Random walk of the scale, /√s: tyres that warm change it by 0.06 % in an hour.
+const SCALE_WALK_PER_SQRT_S: f64 = 1e-5;
 /// Standard deviation by which a scale may differ from 1 in any case: the settings may be of other
 /// tyres.
 const TYRES: f64 = 0.02;
@@ -148,8 +150,8 @@ impl WheelState {
     }
 
     /// Lets time pass: the scale changes.
-    pub(super) fn wait(&mut self, time_s: f64, config: &WheelsConfig) {
-        self.covariance[(1, 1)] += config.scale_walk_per_sqrt_s.powi(2) * time_s;
+    pub(super) fn wait(&mut self, time_s: f64) {
+        self.covariance[(1, 1)] += SCALE_WALK_PER_SQRT_S.powi(2) * time_s;
         self.untold_s += time_s;
     }
 

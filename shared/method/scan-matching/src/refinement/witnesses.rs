@@ -2,10 +2,11 @@
 //! it.
 
 use gyre_geometry::UncertainMotion;
-use gyre_samples::{DopplerWay, WheelDistance, WheelsConfig};
+use gyre_samples::{DopplerConfig, DopplerWay, WheelDistance, WheelsConfig};
 
 use super::{
     Heading, Refiner, WheelState,
+    config::JITTER_DEG,
     heading::{PredictedTurn, Verdict, grown},
     registration::{Candidate, Scan},
     tracker::Step,
@@ -48,14 +49,14 @@ impl Refiner {
             self.state.doppler.get_or_insert(WheelState::new(config));
         }
         let state = self.state.doppler.as_mut()?;
-        state.wait(interval_s, config);
+        state.wait(interval_s);
         let way = self.way?;
         let predicted = state.predict(&way.ahead, config)?;
         // The error that lasts is that of all motions since a match has told the place: the
         // variance of one motion alone is that of the way.
         let before_s = (state.untold_s - interval_s).max(0.0);
         let lasting = grown(interval_s, before_s) - interval_s.powi(2);
-        let lasting_m2 = self.doppler.noise_mps.powi(2) * lasting;
+        let lasting_m2 = DopplerConfig::NOISE_MPS.powi(2) * lasting;
         Some(PredictedDistance {
             by: DistanceBy::Doppler,
             left_m: state.scale * way.left_m,
@@ -73,7 +74,7 @@ impl Refiner {
                 .get_or_insert(WheelState::new(&self.wheels));
         }
         let wheels = self.state.wheels.as_mut()?;
-        wheels.wait(interval_s, &self.wheels);
+        wheels.wait(interval_s);
         wheels.predict(&measured?, &self.wheels)
     }
 
@@ -155,7 +156,7 @@ impl Refiner {
     fn judge(&self, best: &Candidate, turn: &PredictedTurn) -> Verdict {
         let registered = self.registered(&best.alignment);
         let both = registered.zip(self.state.heading);
-        let jitter_rad = self.config.jitter_deg.to_radians();
+        let jitter_rad = JITTER_DEG.to_radians();
         both.map_or(Verdict::Agrees, |(registered, heading)| {
             heading.judge(&registered, &self.state.pose, turn, jitter_rad)
         })

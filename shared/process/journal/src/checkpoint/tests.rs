@@ -12,11 +12,10 @@ const WINDOW: usize = 2;
 const SCANS: u64 = 60;
 const INTERVAL_S: f64 = 0.25;
 
-/// A small map with a keyframe for each scan: slots are reused after about ten scans.
+/// A small map with a keyframe for each second scan: slots are reused after about twenty scans.
 fn config() -> RefinementConfig {
     RefinementConfig {
         keyframes: 2,
-        keyframe_distance_m: 0.5,
         cell_m: 1.0,
         reach_m: 30.0,
         ..Default::default()

@@ -43,9 +43,9 @@ impl Drive {
 
     /// Drives so far, while the wheels show another distance by `slip_m`.
     fn drive(&mut self, step_m: f64, slip_m: f64) -> WheelDistance {
-        let walk = self.config.scale_walk_per_sqrt_s * INTERVAL_S.sqrt();
+        let walk = SCALE_WALK_PER_SQRT_S * INTERVAL_S.sqrt();
         self.true_scale += self.normal(walk);
-        self.wheels.wait(INTERVAL_S, &self.config);
+        self.wheels.wait(INTERVAL_S);
         self.true_m += step_m;
         let variance_m2 = 1e-4 * step_m.abs() + 2.5e-5;
         let noise_m = self.normal(variance_m2.sqrt());
