@@ -9,14 +9,14 @@ mod logged;
 
 use std::{collections::VecDeque, path::PathBuf};
 
-use gyre_estimation::places::{MAX_NEIGHBOURS, SUBMAP_REACH_M, neighbours};
+use gyre_estimation::places::{MAX_NEIGHBOURS, neighbours};
 use gyre_geometry::{covariance, xy_yaw};
 use gyre_messages::{Item, Loop, LoopHeader};
 use gyre_radar::points::PointsConfig;
 use gyre_scan_matching::RefinementConfig;
 use gyre_slam::{
     ClosingError, Keyframe, KeyframeSource, LoopCandidate, LoopCloser, LoopOptions, Place, Query,
-    RecordLog, RecordReader,
+    RecordLog, RecordReader, SlamConfig,
 };
 use gyre_stage::{
     Follower, Launch, StageCounters, StageError,
@@ -35,6 +35,7 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     }
     let settings = Settings {
         out: launch.manifest.out.clone(),
+        slam: launch.section("slam")?,
         refinement: launch.section("refinement")?,
         points: launch.section("points")?,
     };
@@ -60,6 +61,7 @@ struct LoopClosing {
 struct Settings {
     /// The folder of the results.
     out: PathBuf,
+    slam: SlamConfig,
     refinement: RefinementConfig,
     points: PointsConfig,
 }
@@ -67,7 +69,10 @@ struct Settings {
 impl Settings {
     fn closer(&self) -> Result<LoopCloser, StageError> {
         LoopCloser::new(
-            LoopOptions::default(),
+            LoopOptions {
+                submap_reach_m: self.slam.submap_reach_m,
+                ..LoopOptions::default()
+            },
             &self.refinement,
             self.points.capacity,
         )
@@ -111,6 +116,7 @@ struct State {
     places: RecordLog<Place>,
     queries: RecordLog<Query>,
     closer: LoopCloser,
+    submap_reach_m: f64,
     /// Number of loops so far.
     loops: u64,
     /// Loops that are to be published.
@@ -128,6 +134,7 @@ impl State {
             places: RecordLog::open(&settings.out)?,
             queries: RecordLog::open(&settings.out)?,
             closer: settings.closer()?,
+            submap_reach_m: settings.slam.submap_reach_m,
             loops: 0,
             pending: VecDeque::new(),
             has_finished: false,
@@ -188,7 +195,7 @@ impl State {
             .map(path_m)
             .collect::<Result<_, StageError>>()?;
         let is_incomplete = |place: &usize| {
-            first + neighbours(&path_m, place - first, SUBMAP_REACH_M).end >= keyframes
+            first + neighbours(&path_m, place - first, self.submap_reach_m).end >= keyframes
         };
         Ok((first..places).find(is_incomplete).unwrap_or(places))
     }

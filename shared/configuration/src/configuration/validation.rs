@@ -53,6 +53,12 @@ impl Configuration {
                 return Err(value(&section, reason));
             }
         }
+        if !(0.0..=50.0).contains(&self.slam.submap_reach_m) {
+            return Err(value(
+                "slam",
+                "submap_reach_m is out of its bounds: expected 0 to 50 m",
+            ));
+        }
         if !self.slam.is_on() && !self.slam.map.as_os_str().is_empty() {
             let reason = "map is set, but the keyframes that are found in it are those of slam: set kind to `graph`";
             return Err(value("slam", reason));

@@ -36,6 +36,8 @@ pub struct LoopOptions {
     /// Length of the path between a keyframe and the earlier ones that it is compared with, at
     /// least, m.
     pub gap_m: f64,
+    /// Length of the path to each side of a keyframe whose keyframes make its submap, m.
+    pub submap_reach_m: f64,
     /// Number of candidates that are verified.
     pub candidates: usize,
     /// Distance along the path between two of them, at least, m.
@@ -50,6 +52,7 @@ impl Default for LoopOptions {
     fn default() -> Self {
         Self {
             gap_m: 100.0,
+            submap_reach_m: SUBMAP_REACH_M,
             candidates: 3,
             apart_m: 15.0,
             covariance_scale: 1.0,
@@ -241,7 +244,7 @@ impl LoopCloser {
     }
 
     fn neighbours(&self, middle: usize) -> std::ops::Range<usize> {
-        neighbours(&self.path_m, middle, SUBMAP_REACH_M)
+        neighbours(&self.path_m, middle, self.options.submap_reach_m)
     }
 
     /// The places that look most like that of a keyframe.

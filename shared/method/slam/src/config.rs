@@ -4,10 +4,12 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use gyre_estimation::places::SUBMAP_REACH_M;
+
 use crate::EstimatorKind;
 
 /// Configuration of SLAM: section `[slam]`.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SlamConfig {
     /// `none`: odometry alone. `filter` and `graph`: the keyframes of the drive are kept in
@@ -18,6 +20,19 @@ pub struct SlamConfig {
     /// published on the topic `fix`.
     #[serde(skip_serializing_if = "is_empty")]
     pub map: PathBuf,
+    /// Length of the path to each side of a keyframe whose keyframes make the submap of a loop, m,
+    /// 0 to 50. A radar that turns slowly needs a longer path: three scans to each side.
+    pub submap_reach_m: f64,
+}
+
+impl Default for SlamConfig {
+    fn default() -> Self {
+        Self {
+            kind: SlamKind::default(),
+            map: PathBuf::new(),
+            submap_reach_m: SUBMAP_REACH_M,
+        }
+    }
 }
 
 /// The correction of the trajectory by loops.
