@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use gyre_bags::is_bag;
-use gyre_datasets::{GnssLog, GnssLogError};
+use gyre_datasets::{GnssLog, LogError};
 use gyre_samples::{GnssConfig, GnssKind};
 
 use crate::parts::first_part_in;
@@ -22,7 +22,7 @@ pub fn gnss_log(
     config: &GnssConfig,
     data: &Path,
     out: &Path,
-) -> Result<Option<GnssLog>, GnssLogError> {
+) -> Result<Option<GnssLog>, LogError> {
     match config.kind {
         GnssKind::None => Ok(None),
         GnssKind::Auto => of_scans(config.topic.as_deref(), data).map(Some),
@@ -36,7 +36,7 @@ pub fn gnss_log(
 ///
 /// # Errors
 /// As [`gnss_log`].
-pub fn copied_fixes(config: &GnssConfig, data: &Path) -> Result<String, GnssLogError> {
+pub fn copied_fixes(config: &GnssConfig, data: &Path) -> Result<String, LogError> {
     let in_bag = match is_bag(data) {
         true => gyre_bags::fixes(data, config.topic.as_deref())?,
         false => None,
@@ -51,8 +51,8 @@ pub fn copied_fixes(config: &GnssConfig, data: &Path) -> Result<String, GnssLogE
 }
 
 /// Reads the fixes in the bag, else the log beside the scans.
-fn of_scans(topic: Option<&str>, data: &Path) -> Result<GnssLog, GnssLogError> {
-    let none_in_bag = |_| GnssLogError::NoneInBag {
+fn of_scans(topic: Option<&str>, data: &Path) -> Result<GnssLog, LogError> {
+    let none_in_bag = |_| LogError::NoneInBag {
         bag: data.to_owned(),
     };
     match (is_bag(data), topic) {
@@ -69,7 +69,7 @@ fn of_scans(topic: Option<&str>, data: &Path) -> Result<GnssLog, GnssLogError> {
                 false => GnssLog::read(&path),
             }
         }
-        (false, Some(topic)) => Err(GnssLogError::NoBag {
+        (false, Some(topic)) => Err(LogError::NoBag {
             topic: topic.to_owned(),
             data: data.to_owned(),
         }),

@@ -13,8 +13,8 @@ use super::image_size::ImageSize;
 use super::images::Images;
 use super::navtech_notes::{note_encoder, observations};
 use super::navtech_png::{self, METADATA_BYTES};
-use super::navtech_profile::{Profile, ScanTime};
 use super::options::{AzimuthSource, DatasetOptions};
+use super::profiles::{Profile, ScanTime};
 use super::row_order::{self, RowOrder};
 use super::stamp;
 use gyre_radar::MAX_INTERVAL_NS;
@@ -26,6 +26,7 @@ use std::ops::RangeInclusive;
 #[derive(Debug)]
 pub(crate) struct NavtechScans {
     images: Images,
+    format: Format,
     profile: Profile,
     period_ns: i64,
     /// The longest plausible sweep.
@@ -43,12 +44,11 @@ const MAX_SWEEP_NS: i64 = 5 * stamp::SECOND_NS;
 const MAX_SWEEP_PERIODS: i64 = 2;
 
 impl NavtechScans {
-    /// `profile` returns the defaults of the format, which may depend on the first image; `options`
-    /// take precedence.
+    /// `profile` has the defaults of the format; `options` take precedence.
     pub(crate) fn open(
         found: Found,
         options: &DatasetOptions,
-        profile: impl FnOnce(Option<&FirstImage>) -> Profile,
+        profile: Profile,
     ) -> Result<Self, OpenError> {
         let Found {
             format,
@@ -72,7 +72,8 @@ impl NavtechScans {
             notes.extend(sentences);
         }
         let mut scans = Self {
-            profile: profile(first_image.as_ref()).with(options),
+            profile: profile.with(format, first_image.as_ref(), options),
+            format,
             period_ns: stamp::DEFAULT_TURN_NS,
             max_sweep_ns: MAX_SWEEP_NS,
             named_by_time: first_image
@@ -94,7 +95,9 @@ impl NavtechScans {
                 Some(_) => scans.notes.extend(note_encoder(image, &scans.profile)),
                 None => scans.find_encoder(image, turn_ns),
             }
-            scans.notes.extend(observations(image, &scans.profile));
+            scans
+                .notes
+                .extend(observations(image, scans.format, &scans.profile));
         }
         Ok(scans)
     }
@@ -226,7 +229,7 @@ fn check_shape(images: &Images, format: Format) -> Result<(), OpenError> {
 
 impl Dataset for NavtechScans {
     fn format(&self) -> Format {
-        self.profile.format
+        self.format
     }
 
     fn len(&self) -> usize {

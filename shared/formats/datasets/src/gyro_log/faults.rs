@@ -9,7 +9,7 @@ use std::path::Path;
 use gyre_radar::median;
 use serde::Serialize;
 
-use super::{LogError, Raw};
+use crate::{LogError, table::Raw};
 use gyre_samples::{Sample, SampleKind};
 
 /// Rates beyond this one are no vehicle's, rad/s.
@@ -199,26 +199,26 @@ pub(super) const RATES: Plausible = Plausible {
 
 /// Leaves out and sorts what the faults name, and counts it.
 pub(crate) fn examine(
-    raw: Raw,
+    raw: Raw<Sample>,
+    unit_is_assumed: bool,
     path: &Path,
     plausible: &Plausible,
 ) -> Result<(Vec<Sample>, LogFaults), LogError> {
     let unusable = |reason: String| LogError::Unusable {
-        of: plausible.of,
+        of: plausible.of.section(),
         path: path.to_owned(),
         reason,
     };
-    let rows = raw.samples.len() + raw.unmeasured + raw.unreadable.count;
     let mut faults = LogFaults {
         unreadable: raw.unreadable.count,
         first_unreadable: raw.unreadable.first,
-        unit_is_assumed: raw.unit_is_assumed,
+        unit_is_assumed,
         ..LogFaults::default()
     };
-    if let Some(reason) = raw.unreadable.are_most(rows) {
+    if let Some(reason) = raw.unreadable.are_most(raw.count()) {
         return Err(unusable(reason));
     }
-    let mut samples = raw.samples;
+    let mut samples = raw.entries;
     let mut leave_out = |is_bad: &dyn Fn(f64) -> bool| {
         let before = samples.len();
         let is_bad = |sample: &Sample| {
