@@ -87,23 +87,6 @@ fn an_ambiguous_format_is_reported_with_its_alternative() {
 }
 
 #[test]
-fn oord_has_uniform_azimuths() {
-    let root = folder();
-    let sweep = Sweep {
-        step: 0,
-        ..Sweep::default()
-    };
-    sweep.write(
-        &root
-            .path()
-            .join(format!("Navtech_CTS350-X_Radar/{START_US}.png")),
-    );
-    let scan = first_scan(root.path()).unwrap();
-    assert!((scan.azimuth_rad[10] - 0.25 * TAU).abs() < 1e-6);
-    assert_eq!(scan.geometry.range_resolution_m, 0.0438);
-}
-
-#[test]
 fn mulran_is_transposed_and_named_by_the_end_of_the_sweep() {
     let root = folder();
     let end = |k: i64| (START_US + k * PERIOD_US) * 1000;

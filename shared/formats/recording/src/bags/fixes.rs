@@ -6,7 +6,7 @@ use gyre_datasets::OpenError;
 use gyre_ros2_messages::{decode, sensor_msgs::NavSatFix};
 use gyre_samples::{BagFixes, RawFix};
 
-use crate::{BagError, bag::Bag, files::files, reading::Message, sensors::Sensor};
+use crate::bags::{Message, RecordingError, bag::Bag, files::files, sensors::Sensor};
 
 /// A message has a fix, or says that there is none.
 const RECEIVER: Sensor<Option<RawFix>> = Sensor {
@@ -23,7 +23,6 @@ const RECEIVER: Sensor<Option<RawFix>> = Sensor {
 /// cannot be read.
 pub fn fixes(path: &Path, topic: Option<&str>) -> Result<Option<BagFixes>, OpenError> {
     let mut bag = Bag::open(path, &files(path)?)?;
-    bag.learn_channels();
     Ok(read(&mut bag, path, topic)?)
 }
 
@@ -32,7 +31,7 @@ pub(crate) fn read(
     bag: &mut Bag,
     path: &Path,
     wished: Option<&str>,
-) -> Result<Option<BagFixes>, BagError> {
+) -> Result<Option<BagFixes>, RecordingError> {
     let Some(found) = RECEIVER.read(bag, path, wished)? else {
         return Ok(None);
     };

@@ -17,14 +17,12 @@ use gyre_datasets::{
 use gyre_radar::{ScanLimits, ScanSlot, SweepGeometry};
 use gyre_samples::{BagFixes, Sample, SampleKind};
 
-use crate::{
-    BagError,
+use crate::bags::{
+    Message, RecordingError,
     azimuths::{Described, azimuths},
     bag::{Bag, Key},
-    files::files,
-    fixes,
-    reading::{BagFile, Message},
-    samples,
+    files::{Files, files},
+    fixes, samples,
     topics::Topics,
 };
 use index::{Entry, Index};
@@ -50,13 +48,16 @@ pub fn reopen(
 ) -> Result<Box<dyn Dataset>, OpenError> {
     options.check()?;
     let paths = (0..files.len()).filter_map(|index| files.get(index));
-    let paths: Vec<PathBuf> = paths.map(Path::to_owned).collect();
-    open_files(path, &paths, options)
+    let files = Files {
+        paths: paths.map(Path::to_owned).collect(),
+        are_in_order: true,
+    };
+    open_files(path, &files, options)
 }
 
 fn open_files(
     path: &Path,
-    paths: &[PathBuf],
+    files: &Files,
     options: &DatasetOptions,
 ) -> Result<Box<dyn Dataset>, OpenError> {
     if options.azimuth_source == Some(AzimuthSource::Uniform) {
@@ -67,7 +68,7 @@ fn open_files(
             reason: "its azimuths are those of the encoder; leave the key out",
         });
     }
-    Ok(Box::new(Scans::open(path, paths, options)?))
+    Ok(Box::new(Scans::open(path, files, options)?))
 }
 
 /// The scans of a bag.
@@ -87,27 +88,27 @@ struct Scans {
 }
 
 impl Scans {
-    fn open(path: &Path, paths: &[PathBuf], options: &DatasetOptions) -> Result<Self, BagError> {
-        let mut bag = Bag::open(path, paths)?;
-        bag.learn_channels();
+    fn open(path: &Path, files: &Files, options: &DatasetOptions) -> Result<Self, RecordingError> {
+        let mut bag = Bag::open(path, files)?;
         let wished = options.topic.as_ref().map(|topic| topic.as_str());
         let topics = Topics::choose(path, &bag.channels(), wished)?;
         let (described, origin) = bag.describe(&topics, options)?;
         let constants = Constants::from(options);
         let assembler = SweepAssembler::new(&described.radar, constants);
-        let assembler = assembler
-            .map_err(|error| BagError::unreadable(path, format!("cannot be read: {error}")))?;
+        let assembler = assembler.map_err(|error| {
+            RecordingError::unreadable(path, format!("cannot be read: {error}"))
+        })?;
         let index = Index::of(&mut bag, &topics, &described, assembler)?;
         if let Some(reason) = index.why_none_can_be_read(&topics.scans.name) {
-            return Err(BagError::unreadable(path, reason));
+            return Err(RecordingError::unreadable(path, reason));
         }
         let stamps = index.entries.iter().map(|entry| entry.stamp_ns);
-        let mut damage = bag.files.iter().filter_map(BagFile::damage);
+        let mut damage = bag.files.iter().filter_map(|file| file.damage(true));
         Ok(Self {
             damage: damage.next(),
             period_ns: turn_ns(stamps).unwrap_or(DEFAULT_TURN_NS),
             notes: notes(&bag, &topics, &described, &origin, &index),
-            files: paths.iter().cloned().collect(),
+            files: bag.files.iter().map(|file| file.path.clone()).collect(),
             path: path.to_owned(),
             bag,
             topics,
@@ -123,7 +124,7 @@ impl Scans {
     }
 
     /// Reads the messages of scans of some spans, unless they are there.
-    fn keep(&mut self, spans: &RangeInclusive<u32>) -> Result<(), BagError> {
+    fn keep(&mut self, spans: &RangeInclusive<u32>) -> Result<(), RecordingError> {
         let topic = &self.topics.scans.name;
         let (there, messages) = (self.kept.0.take(), &mut self.kept.1);
         messages.retain(|key, _| spans.contains(&key.span));
@@ -136,7 +137,7 @@ impl Scans {
     }
 
     /// Returns why the message of a scan cannot be decoded.
-    fn why_damaged(&mut self, entry: &Entry) -> Result<String, BagError> {
+    fn why_damaged(&mut self, entry: &Entry) -> Result<String, RecordingError> {
         self.keep(&entry.spans)?;
         let message = self.kept.1.get(&entry.start.message);
         let decoded = message
@@ -151,7 +152,7 @@ impl Scans {
         index: usize,
         entry: &Entry,
         mut slot: ScanSlot<'_>,
-    ) -> Result<Option<SweepGeometry>, BagError> {
+    ) -> Result<Option<SweepGeometry>, RecordingError> {
         let Some(mut assembler) = self.assembler() else {
             return Ok(None);
         };
@@ -278,7 +279,7 @@ impl Dataset for Scans {
         check_capacity(&self.limits(), &slot)?;
         let path = self.file(index).to_owned();
         let failed = |error| match error {
-            BagError::Io { path, source } => ReadError::Io { path, source },
+            RecordingError::Io { path, source } => ReadError::Io { path, source },
             error => ReadError::Damaged {
                 path: path.clone(),
                 reason: error.to_string(),

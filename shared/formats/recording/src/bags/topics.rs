@@ -4,7 +4,7 @@ use std::{collections::BTreeSet, path::Path};
 
 use gyre_storage::quoted;
 
-use crate::{BagError, reading::Channel};
+use crate::bags::{Channel, RecordingError};
 
 /// The content of a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -86,7 +86,7 @@ impl Topics {
         path: &Path,
         channels: &[&Channel],
         wished: Option<&str>,
-    ) -> Result<Self, BagError> {
+    ) -> Result<Self, RecordingError> {
         let topics: BTreeSet<Topic> = channels.iter().filter_map(|c| Topic::of(c)).collect();
         let candidates = candidates(&topics, wished);
         let scans = match (&candidates[..], wished) {
@@ -104,7 +104,7 @@ impl Topics {
                 "has the messages of {} as {encoding}, expected `cdr`",
                 scans.name
             );
-            return Err(BagError::unreadable(path, reason));
+            return Err(RecordingError::unreadable(path, reason));
         }
         let near = |topic: &&Topic| common_prefix(&topic.name, &scans.name);
         let configurations = topics.iter().filter(|topic| !topic.has_scans());
@@ -153,7 +153,7 @@ fn names<'a>(names: impl Iterator<Item = &'a str>) -> String {
     listed.join(", ") + if more { ", ..." } else { "" }
 }
 
-fn no_scans(path: &Path, channels: &[&Channel]) -> BagError {
+fn no_scans(path: &Path, channels: &[&Channel]) -> RecordingError {
     let reason = match channels.is_empty() {
         true => "has no topics: it is empty, or damaged from its beginning".to_owned(),
         false => format!(
@@ -161,25 +161,25 @@ fn no_scans(path: &Path, channels: &[&Channel]) -> BagError {
             names(channels.iter().map(|channel| channel.topic.as_str()))
         ),
     };
-    BagError::unreadable(path, reason)
+    RecordingError::unreadable(path, reason)
 }
 
-fn no_such_topic(path: &Path, topics: &BTreeSet<Topic>, wished: &str) -> BagError {
+fn no_such_topic(path: &Path, topics: &BTreeSet<Topic>, wished: &str) -> RecordingError {
     let all = topics.iter().filter(|topic| topic.has_scans());
     let reason = format!(
         "has no scans on the topic {wished} (dataset.topic), but on: {}",
         names(all.map(|topic| topic.name.as_str()))
     );
-    BagError::unreadable(path, reason)
+    RecordingError::unreadable(path, reason)
 }
 
-fn ambiguous(path: &Path, several: &[&Topic]) -> BagError {
+fn ambiguous(path: &Path, several: &[&Topic]) -> RecordingError {
     let reason = format!(
         "has scans on several topics, {}: choose one with dataset.topic, as in --set dataset.topic={}",
         names(several.iter().map(|topic| topic.name.as_str())),
         several[0].name
     );
-    BagError::unreadable(path, reason)
+    RecordingError::unreadable(path, reason)
 }
 
 #[cfg(test)]

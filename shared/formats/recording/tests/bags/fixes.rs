@@ -1,7 +1,7 @@
 //! The fixes of GNSS receivers in bags.
 
-use gyre_bags::fixes;
 use gyre_datasets::{GnssLog, InspectedLogs, inspect_dataset};
+use gyre_recording::bags::fixes;
 use gyre_ros2_messages::{
     builtin_interfaces::Time,
     sensor_msgs::{Imu, NavSatFix, NavSatStatus},

@@ -10,10 +10,9 @@ use gyre_ros2_messages::{
     sensor_msgs::Image,
 };
 
-use crate::{
-    BagError,
+use crate::bags::{
+    Message, RecordingError,
     azimuths::{Described, of},
-    reading::Message,
     topics::{Form, Kind},
 };
 
@@ -99,8 +98,8 @@ impl Survey {
         path: &Path,
         range_resolution_m: Option<f32>,
         encoder_size: u16,
-    ) -> Result<Described, BagError> {
-        let refuse = |reason: &str| Err(BagError::unreadable(path, reason));
+    ) -> Result<Described, RecordingError> {
+        let refuse = |reason: &str| Err(RecordingError::unreadable(path, reason));
         let Some(range_resolution_m) = range_resolution_m else {
             return refuse(
                 "has no configuration of its radar (RadarConfigurationMsg): give the depth of a range bin with dataset.range_resolution_m \

@@ -9,8 +9,8 @@ use gyre_ros2_messages::{
     std_msgs::Header,
 };
 
-use crate::{
-    reading::Message,
+use crate::bags::{
+    Message,
     topics::{Form, Kind},
 };
 

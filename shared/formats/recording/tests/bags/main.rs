@@ -14,10 +14,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use gyre_bags::{BagWriter, Kept, is_bag, open};
 use gyre_colossus::Configuration;
 use gyre_datasets::{Dataset, DatasetOptions, Format, OpenError, ReadError, middle_ns};
 use gyre_radar::{OwnedScan, ScanLimits, Sense, SweepGeometry, scan::flag};
+use gyre_recording::bags::{BagWriter, Kept, is_bag, open};
 use gyre_ros2_messages::{
     Ros2Message, encode,
     messages::RadarFftDataMessage,

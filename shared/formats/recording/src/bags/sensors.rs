@@ -3,7 +3,7 @@
 
 use std::{collections::BTreeMap, path::Path};
 
-use crate::{BagError, bag::Bag, reading::Message};
+use crate::bags::{Message, RecordingError, bag::Bag};
 
 /// Makes a measurement of a message.
 pub(crate) type Decode<T> = fn(&Message) -> Result<T, String>;
@@ -37,7 +37,7 @@ impl<T> Sensor<T> {
         bag: &mut Bag,
         path: &Path,
         wished: Option<&str>,
-    ) -> Result<Option<Measured<T>>, BagError> {
+    ) -> Result<Option<Measured<T>>, RecordingError> {
         let Some((topic, decode)) = self.choose(bag, path, wished)? else {
             return Ok(None);
         };
@@ -58,7 +58,7 @@ impl<T> Sensor<T> {
         if let Some(reason) = refused {
             let of = self.measurements;
             let reason = format!("has messages on {topic} that are no {of}: {reason}");
-            return Err(BagError::unreadable(path, reason));
+            return Err(RecordingError::unreadable(path, reason));
         }
         Ok(Some(Measured {
             topic,
@@ -90,7 +90,7 @@ impl<T> Sensor<T> {
         bag: &Bag,
         path: &Path,
         wished: Option<&str>,
-    ) -> Result<Option<(String, Decode<T>)>, BagError> {
+    ) -> Result<Option<(String, Decode<T>)>, RecordingError> {
         let mut topics = self.topics(bag);
         let (section, of) = (self.section, self.measurements);
         let reason = match wished {
@@ -104,7 +104,7 @@ impl<T> Sensor<T> {
             }
             None => return Ok(topics.pop_first()),
         };
-        Err(BagError::unreadable(path, reason))
+        Err(RecordingError::unreadable(path, reason))
     }
 
     /// Returns the reason why a topic of this name cannot be read.

@@ -2,20 +2,16 @@
 //! `ros2 bag play` takes.
 //!
 //! A bag is a file of the MCAP profile `ros2`, or a folder of such files with a `metadata.yaml`.
-//! Reading order: `files` (what is a bag), `order` (of its files), [`damaged`] (MCAP records from
-//! damaged files), `spans` (where messages are), `topics` (which of them are a radar's), `azimuths`
-//! (messages as azimuths), `bag` (its files as one), `scans` (azimuths as scans), `sensors` (others
-//! than the radar), `samples` (of gyro and wheels), [`fixes()`] (of GNSS), [`BagWriter`].
+//! Reading order: `files` (what is a bag), `spans` (where messages are), `topics` (which of them
+//! are a radar's), `azimuths` (messages as azimuths), `bag` (its files as one), `scans` (azimuths
+//! as scans), `sensors` (others than the radar), `samples` (of gyro and wheels), [`fixes()`] (of
+//! GNSS), [`BagWriter`].
 
 mod azimuths;
 mod bag;
-pub mod damaged;
-mod error;
 mod files;
 mod fixes;
-mod order;
 mod radar;
-mod reading;
 mod samples;
 mod scans;
 mod sensors;
@@ -23,7 +19,11 @@ mod spans;
 mod topics;
 mod writer;
 
-pub use error::BagError;
+use crate::{
+    RecordingError,
+    file::{Channel, McapFile, Message},
+};
+
 pub use files::is_bag;
 pub use fixes::fixes;
 pub use scans::{open, reopen};

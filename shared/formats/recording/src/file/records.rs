@@ -20,7 +20,7 @@ const MAX_KEPT_BYTES: usize = 256 << 20;
 /// # Errors
 /// The bytes are damaged, or have more than a scan and its rasters take. Records at the end that
 /// are not whole are none.
-pub fn records(
+pub(super) fn records(
     mut bytes: &[u8],
     mut keep: impl FnMut(Record<'_>) -> usize,
 ) -> Result<(), McapError> {

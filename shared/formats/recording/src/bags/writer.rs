@@ -14,8 +14,8 @@ use gyre_ros2_messages::{Ros2Message, encode};
 use gyre_storage::lock::{Attempt, try_lock, try_lock_existing};
 use mcap::{Compression, McapError, WriteOptions, Writer, records::MessageHeader};
 
-use crate::{
-    BagError,
+use crate::bags::{
+    RecordingError,
     files::{METADATA, PROFILE},
 };
 use metadata::Described;
@@ -65,7 +65,7 @@ impl BagWriter {
     ///
     /// # Errors
     /// It exists, or cannot be written.
-    pub fn create(path: &Path) -> Result<Self, BagError> {
+    pub fn create(path: &Path) -> Result<Self, RecordingError> {
         require_new(path)?;
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let aside = path.with_file_name(format!(".{name}.tmp"));
@@ -114,7 +114,11 @@ impl BagWriter {
     ///
     /// # Errors
     /// A file that cannot be written.
-    pub fn topic<T: Ros2Message>(&mut self, name: &str, kept: Kept) -> Result<Topic<T>, BagError> {
+    pub fn topic<T: Ros2Message>(
+        &mut self,
+        name: &str,
+        kept: Kept,
+    ) -> Result<Topic<T>, RecordingError> {
         let definition = T::DEFINITION;
         let described = Described {
             name: name.to_owned(),
@@ -151,7 +155,7 @@ impl BagWriter {
         topic: &Topic<T>,
         log_ns: i64,
         message: &T,
-    ) -> Result<(), BagError> {
+    ) -> Result<(), RecordingError> {
         let data = encode(message)?;
         let written = &mut self.topics[topic.index];
         let time = u64::try_from(log_ns).unwrap_or_default();
@@ -179,7 +183,7 @@ impl BagWriter {
     ///
     /// # Errors
     /// A file that cannot be written.
-    pub fn finish(mut self) -> Result<(), BagError> {
+    pub fn finish(mut self) -> Result<(), RecordingError> {
         let path = self.path.clone();
         let failed = |error: &dyn std::fmt::Display| unwritable(&path, error.to_string());
         self.mcap.finish().map_err(|error| failed(&error))?;
@@ -233,7 +237,7 @@ fn create_aside(aside: &Path, file: &Path) -> io::Result<Option<File>> {
     })
 }
 
-fn require_new(path: &Path) -> Result<(), BagError> {
+fn require_new(path: &Path) -> Result<(), RecordingError> {
     match path.exists() {
         true => Err(unwritable(
             path,
@@ -248,8 +252,8 @@ fn remove(aside: &Path) {
     let _ = fs::remove_dir_all(aside).or_else(|_| fs::remove_file(aside));
 }
 
-fn unwritable(path: &Path, reason: String) -> BagError {
-    BagError::Unwritable {
+fn unwritable(path: &Path, reason: String) -> RecordingError {
+    RecordingError::Unwritable {
         path: path.to_owned(),
         reason,
     }

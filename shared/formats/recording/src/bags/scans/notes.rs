@@ -1,10 +1,9 @@
 //! Sentences on a bag.
 
 use super::index::Index;
-use crate::{
+use crate::bags::{
     azimuths::Described,
     bag::{Bag, CountsOrigin, Origin, RadarOrigin},
-    reading::BagFile,
     topics::Topics,
 };
 
@@ -19,7 +18,7 @@ pub(super) fn notes(
     let (scans, radar) = (&topics.scans.name, of_radar(described, origin));
     let mut notes = vec![format!("Scans are on {scans}{radar}.")];
     notes.extend(index.notes());
-    let damage = bag.files.iter().filter_map(BagFile::damage);
+    let damage = bag.files.iter().filter_map(|file| file.damage(true));
     notes.extend(damage.map(|sentence| format!("{sentence}.")));
     notes
 }

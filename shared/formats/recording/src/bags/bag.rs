@@ -8,13 +8,15 @@ use std::{
 use gyre_datasets::DatasetOptions;
 
 use crate::{
-    BagError,
-    azimuths::{Described, described},
-    damaged::Span,
-    radar::{ENCODER_COUNTS, Survey},
-    reading::{BagFile, Channel, Message},
-    spans::TimedSpan,
-    topics::{Kind, Topics},
+    bags::{
+        Channel, McapFile, Message, RecordingError,
+        azimuths::{Described, described},
+        files::{Files, compressed},
+        radar::{ENCODER_COUNTS, Survey},
+        spans::{TimedSpan, spans},
+        topics::{Kind, Topics},
+    },
+    file::{Span, Times, joined},
 };
 
 /// The description that a radar gives of itself, or why that cannot be used.
@@ -23,7 +25,7 @@ type OwnDescription = Result<Described, String>;
 /// The files of a bag, and the spans of the messages in them.
 pub(crate) struct Bag {
     path: PathBuf,
-    pub files: Vec<BagFile>,
+    pub files: Vec<McapFile>,
     /// In the order of their first messages.
     spans: Vec<Placed>,
 }
@@ -50,18 +52,38 @@ pub(crate) struct Key {
 
 /// Messages are sorted within a window of so many spans. Chunks have about 1 MB.
 const WINDOW: usize = 64;
+/// Files of one recorder overlap by no more than this, ns: messages are a little out of order where
+/// one file ends.
+const OVERLAP_NS: u64 = 1_000_000_000;
+/// The start of what zstd has compressed. No message in CDR begins so.
+const ZSTD: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
+
+/// A file with the spans of its messages and the times of all.
+type Timed = (McapFile, Vec<TimedSpan>, Times);
 
 impl Bag {
-    /// Opens the files, which are in order.
-    pub fn open(path: &Path, paths: &[PathBuf]) -> Result<Self, BagError> {
+    /// Opens the files, and learns all channels. Without a description they are in the order of
+    /// their first messages: names do not give it, since tools number parts in several ways, and a
+    /// folder may have several bags.
+    ///
+    /// # Errors
+    /// A file cannot be read, or files are of the same time.
+    pub fn open(path: &Path, files: &Files) -> Result<Self, RecordingError> {
+        let timed = files.paths.iter().map(|path| timed(path));
+        let mut timed = timed.collect::<Result<Vec<Timed>, _>>()?;
+        if !files.are_in_order {
+            timed.sort_by_key(|(.., times_ns)| *times_ns);
+            for pair in timed.windows(2) {
+                require_order(path, &pair[0], &pair[1])?;
+            }
+        }
         let mut bag = Self {
             path: path.to_owned(),
             files: Vec::new(),
             spans: Vec::new(),
         };
         let mut all = Vec::new();
-        for (number, path) in paths.iter().enumerate() {
-            let (file, spans) = BagFile::open(path)?;
+        for (number, (file, spans, _)) in timed.into_iter().enumerate() {
             bag.files.push(file);
             all.extend(spans.into_iter().map(|span| (number, span)));
         }
@@ -83,7 +105,7 @@ impl Bag {
     }
 
     /// Returns the file of a span.
-    pub fn file_of(&self, span: u32) -> Option<&BagFile> {
+    pub fn file_of(&self, span: u32) -> Option<&McapFile> {
         self.files.get(self.spans.get(span as usize)?.file)
     }
 
@@ -96,14 +118,20 @@ impl Bag {
         &mut self,
         span: u32,
         wanted: impl Fn(&Channel) -> bool,
-    ) -> Result<Vec<(Key, Message)>, BagError> {
+    ) -> Result<Vec<(Key, Message)>, RecordingError> {
         let Some(placed) = self.spans.get(span as usize) else {
             return Ok(Vec::new());
         };
         let messages = match self.files[placed.file].read(placed.span, wanted) {
-            Err(BagError::Damaged { .. }) => Vec::new(),
+            Err(RecordingError::Damaged { .. }) => Vec::new(),
             read => read?,
         };
+        if messages
+            .iter()
+            .any(|message| message.data.starts_with(&ZSTD))
+        {
+            return Err(compressed(&self.files[placed.file].path));
+        }
         let key = |(number, message): (u32, Message)| {
             let ns = message.log_ns.clamp(placed.from_ns, placed.until_ns);
             (Key { ns, span, number }, message)
@@ -120,7 +148,7 @@ impl Bag {
         &mut self,
         wanted: impl Fn(&Channel) -> bool,
         mut each: impl FnMut(&Self, Key, &Message) -> bool,
-    ) -> Result<(), BagError> {
+    ) -> Result<(), RecordingError> {
         let mut waiting = BTreeMap::new();
         for span in 0..=self.spans.len() as u32 {
             let ns = self
@@ -148,24 +176,13 @@ impl Bag {
         files.flat_map(|file| file.channels.values()).collect()
     }
 
-    /// Learns all channels. A file without a list of them is read as a whole.
-    pub fn learn_channels(&mut self) {
-        for placed in &self.spans {
-            let file = &mut self.files[placed.file];
-            if !file.has_summary {
-                // What is damaged has no channels.
-                let _ = file.read(placed.span, |_| false);
-            }
-        }
-    }
-
     /// Describes the radar: by its first configuration, otherwise by what its azimuths and the
     /// options show. Also returns what is to be said of that.
     pub fn describe(
         &mut self,
         topics: &Topics,
         options: &DatasetOptions,
-    ) -> Result<(Described, Origin), BagError> {
+    ) -> Result<(Described, Origin), RecordingError> {
         let (survey, own) = self.survey(topics)?;
         let usual = match &own {
             Some(Ok(own)) => own.radar.encoder_size,
@@ -188,7 +205,7 @@ impl Bag {
                 "has a configuration of its radar that cannot be used ({reason}): give the depth of a range bin with \
                  dataset.range_resolution_m"
             );
-            return Err(BagError::unreadable(&self.path, reason));
+            return Err(RecordingError::unreadable(&self.path, reason));
         }
         let described = survey.describe(&self.path, options.range_resolution_m, size)?;
         let radar = RadarOrigin::Scans { refused };
@@ -197,7 +214,10 @@ impl Bag {
 
     /// Looks at the first messages with scans, and for the first configuration that can be used, or
     /// why the first one cannot.
-    fn survey(&mut self, topics: &Topics) -> Result<(Survey, Option<OwnDescription>), BagError> {
+    fn survey(
+        &mut self,
+        topics: &Topics,
+    ) -> Result<(Survey, Option<OwnDescription>), RecordingError> {
         let (mut survey, mut own) = (Survey::new(topics.scans.kind), None);
         self.read_in_order(
             |channel| topics.has(channel),
@@ -236,6 +256,43 @@ impl Bag {
             _ => None,
         }
     }
+}
+
+/// Opens a file, finds its spans, and learns its channels: a file without a list of them, or with
+/// damage, which may hide one, is read as a whole.
+fn timed(path: &Path) -> Result<Timed, RecordingError> {
+    let mut file = McapFile::open(path)?;
+    let found = spans(&mut file)?;
+    for span in found.summary {
+        file.read(span, |_| false)?;
+    }
+    if file.channels.is_empty() || !file.damage.is_empty() {
+        for span in &found.messages {
+            // What is damaged has no channels.
+            let _ = file.read(span.span, |_| false);
+        }
+    }
+    let times = found.messages.iter().map(|span| span.times_ns);
+    let times = times.fold(None, joined);
+    Ok((file, found.messages, times))
+}
+
+fn require_order(folder: &Path, earlier: &Timed, later: &Timed) -> Result<(), RecordingError> {
+    let (Some((_, end)), Some((begin, _))) = (earlier.2, later.2) else {
+        return Ok(());
+    };
+    if begin.saturating_add(OVERLAP_NS) >= end {
+        return Ok(());
+    }
+    let name = |(file, ..): &Timed| file.path.file_name().unwrap_or_default().to_owned();
+    let overlap_s = (end - begin) as f64 * 1e-9;
+    let reason = format!(
+        "has files of the same time: {} begins {overlap_s:.1} s before {} ends, so that they are of several bags; give each a folder of \
+         its own, or name one file",
+        name(later).display(),
+        name(earlier).display()
+    );
+    Err(RecordingError::unreadable(folder, reason))
 }
 
 /// The sources of the description of a radar.

@@ -8,7 +8,7 @@ use gyre_ros2_messages::{
 };
 use gyre_samples::{Sample, SampleKind};
 
-use crate::{BagError, bag::Bag, reading::Message, sensors::Sensor};
+use crate::bags::{Message, RecordingError, bag::Bag, sensors::Sensor};
 
 const GYRO: Sensor<Sample> = Sensor {
     section: SampleKind::Gyro.section(),
@@ -39,7 +39,7 @@ pub(crate) fn read(
     path: &Path,
     of: SampleKind,
     wished: Option<&str>,
-) -> Result<Option<Vec<Sample>>, BagError> {
+) -> Result<Option<Vec<Sample>>, RecordingError> {
     let found = match of {
         SampleKind::Gyro => GYRO.read(bag, path, wished)?,
         SampleKind::Wheels => {
@@ -52,7 +52,7 @@ pub(crate) fn read(
     Ok(found.map(|found| found.measurements))
 }
 
-fn require_no_speeds(bag: &Bag, path: &Path) -> Result<(), BagError> {
+fn require_no_speeds(bag: &Bag, path: &Path) -> Result<(), RecordingError> {
     let listed = WHEELS.listed(bag);
     if listed.is_empty() {
         return Ok(());
@@ -60,7 +60,7 @@ fn require_no_speeds(bag: &Bag, path: &Path) -> Result<(), BagError> {
     let reason = format!(
         "has speeds on {listed}: name the topic that is of wheels with wheels.topic, since odometry may be of anything, as the radar's own in a bag that Gyre has exported"
     );
-    Err(BagError::unreadable(path, reason))
+    Err(RecordingError::unreadable(path, reason))
 }
 
 fn gyro(message: &Message) -> Result<Sample, String> {

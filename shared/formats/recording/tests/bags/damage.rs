@@ -1,6 +1,6 @@
 //! Bags that lack a part of what they should have.
 
-use gyre_bags::damaged::{Span, Walk};
+use gyre_recording::file::{McapFile, Span};
 use mcap::records::op;
 
 use super::*;
@@ -62,9 +62,8 @@ fn damaged_messages_are_scans_that_cannot_be_read() {
 
 /// Returns the place of the chunk with this number.
 fn chunk(path: &Path, number: usize) -> Span {
-    let file = fs::File::open(path).unwrap();
-    let mut walk = Walk::new(&file).unwrap().unwrap();
-    let mut records = std::iter::from_fn(|| walk.next().unwrap());
+    let mut file = McapFile::open(path).unwrap();
+    let mut records = std::iter::from_fn(|| file.next_record().unwrap());
     let mut chunks = records.by_ref().filter(|(opcode, _)| *opcode == op::CHUNK);
     chunks.nth(number).unwrap().1
 }

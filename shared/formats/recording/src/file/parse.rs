@@ -12,7 +12,7 @@ use mcap::{
 ///
 /// # Errors
 /// The bytes end before the record does.
-pub fn parse(opcode: u8, body: &[u8]) -> Result<Record<'_>, McapError> {
+pub(crate) fn parse(opcode: u8, body: &[u8]) -> Result<Record<'_>, McapError> {
     let parsed = [
         op::HEADER,
         op::SCHEMA,
@@ -59,7 +59,7 @@ pub(super) fn fields(opcode: u8) -> Option<&'static [Field]> {
 
 /// Returns whether the records in all chunks that are not compressed end with their chunk. The
 /// reader subtracts their lengths from the chunk's, and would overflow.
-pub(crate) fn chunks_hold_their_records(mut bytes: &[u8]) -> bool {
+pub(super) fn chunks_hold_their_records(mut bytes: &[u8]) -> bool {
     while let Some((opcode, body)) = next(&mut bytes) {
         let fits = match opcode {
             op::CHUNK => chunk_holds_its_records(body),
@@ -194,7 +194,7 @@ mod tests {
         longer[1] += 1;
         let bytes = [chunk(&inner), chunk(&longer)].concat();
         assert!(!chunks_hold_their_records(&bytes));
-        let read = crate::damaged::records(&bytes, |_| 0);
+        let read = super::super::records::records(&bytes, |_| 0);
         assert!(matches!(read, Err(McapError::UnexpectedEoc)));
     }
 

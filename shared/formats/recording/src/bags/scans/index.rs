@@ -10,11 +10,10 @@ use std::{
 use gyre_colossus::{Azimuth, Counters, FoundClock, RadarClock, SweepAssembler};
 use gyre_radar::{OwnedScan, ScanLimits};
 
-use crate::{
-    BagError,
+use crate::bags::{
+    Message, RecordingError,
     azimuths::{Described, azimuths},
     bag::{Bag, Key},
-    reading::Message,
     topics::{Kind, Topics},
 };
 
@@ -69,7 +68,7 @@ impl Index {
         topics: &Topics,
         described: &Described,
         assembler: SweepAssembler,
-    ) -> Result<Self, BagError> {
+    ) -> Result<Self, RecordingError> {
         let mut indexing = Indexing::new(topics.scans.kind, described, assembler);
         bag.read_in_order(
             |channel| channel.topic == topics.scans.name,

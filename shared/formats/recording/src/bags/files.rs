@@ -13,7 +13,7 @@ use mcap::{
 };
 use serde::Deserialize;
 
-use crate::{BagError, order::by_time};
+use crate::{RecordingError, file::parse};
 
 /// The description of a bag in its folder.
 pub(crate) const METADATA: &str = "metadata.yaml";
@@ -62,7 +62,7 @@ fn profile(path: &Path) -> Option<String> {
     let record = head.strip_prefix(MAGIC)?.strip_prefix(&[op::HEADER])?;
     let (length, body) = record.split_first_chunk::<8>()?;
     let length = usize::try_from(u64::from_le_bytes(*length)).ok()?;
-    match crate::damaged::parse(op::HEADER, body.get(..length)?) {
+    match parse(op::HEADER, body.get(..length)?) {
         Ok(Record::Header(header)) => Some(header.profile),
         _ => None,
     }
@@ -82,42 +82,51 @@ struct Information {
     compression_mode: String,
 }
 
-/// Returns the files of a bag in order: of its description, or without one of their times.
+/// The files of a bag.
+pub(crate) struct Files {
+    pub paths: Vec<PathBuf>,
+    /// As a description lists them, or as they were found before.
+    pub are_in_order: bool,
+}
+
+/// Returns the files of a bag.
 ///
 /// # Errors
-/// A bag that is not of MCAP files, or that is compressed as a whole; files of several bags.
-pub(crate) fn files(path: &Path) -> Result<Vec<PathBuf>, BagError> {
-    let files = match path.is_dir() {
-        true if has_metadata(path) => described(path)?,
+/// A bag that is not of MCAP files, or that is compressed as a whole.
+pub(crate) fn files(path: &Path) -> Result<Files, RecordingError> {
+    let is_described = path.is_dir() && has_metadata(path);
+    let paths = match path.is_dir() {
+        true if is_described => described(path)?,
         true => listed(path),
         false => vec![path.to_owned()],
     };
-    if let Some(file) = files.iter().find(|file| extension(file) == "zstd") {
+    if let Some(file) = paths.iter().find(|file| extension(file) == "zstd") {
         return Err(compressed(file));
     }
-    if let Some(file) = files.iter().find(|file| extension(file) == "db3") {
+    if let Some(file) = paths.iter().find(|file| extension(file) == "db3") {
         return Err(database(file));
     }
-    match files.len() {
-        0 => Err(BagError::unreadable(
+    match paths.is_empty() {
+        true => Err(RecordingError::unreadable(
             path,
             "lists no files: there is nothing to read",
         )),
-        1 => Ok(files),
-        _ if has_metadata(path) => Ok(files),
-        _ => by_time(path, files),
+        false => Ok(Files {
+            are_in_order: is_described || paths.len() == 1,
+            paths,
+        }),
     }
 }
 
 /// Returns the files that the description of a bag names.
-fn described(folder: &Path) -> Result<Vec<PathBuf>, BagError> {
+fn described(folder: &Path) -> Result<Vec<PathBuf>, RecordingError> {
     let path = folder.join(METADATA);
     let text = gyre_storage::read_text(&path, MAX_METADATA_BYTES)
-        .map_err(|error| BagError::io(&path, error))?;
+        .map_err(|error| RecordingError::io(&path, error))?;
     let metadata: Metadata = serde_saphyr::from_str(&text).map_err(|error| {
         let reason = error.to_string();
         let reason = reason.lines().next().unwrap_or_default();
-        BagError::unreadable(
+        RecordingError::unreadable(
             folder,
             format!(
                 "has a {METADATA} that cannot be read ({reason}): `ros2 bag reindex` writes it anew"
@@ -130,7 +139,7 @@ fn described(folder: &Path) -> Result<Vec<PathBuf>, BagError> {
     }
     if information.storage_identifier != "mcap" {
         let storage = quoted(&information.storage_identifier);
-        return Err(BagError::unreadable(
+        return Err(RecordingError::unreadable(
             folder,
             format!(
                 "is stored as {storage}: `ros2 bag convert` with `storage_id: mcap` makes one that is read"
@@ -148,7 +157,7 @@ fn described(folder: &Path) -> Result<Vec<PathBuf>, BagError> {
 }
 
 /// Returns a file that the description of a bag names, which is in its folder.
-fn within(folder: &Path, file: &Path) -> Result<PathBuf, BagError> {
+fn within(folder: &Path, file: &Path) -> Result<PathBuf, RecordingError> {
     let is_within = |file: &Path| {
         file.components()
             .all(|part| matches!(part, Component::Normal(_) | Component::CurDir))
@@ -161,7 +170,7 @@ fn within(folder: &Path, file: &Path) -> Result<PathBuf, BagError> {
         .flatten()
         .map(|file| folder.join(file));
     existing.find(|file| file.is_file()).ok_or_else(|| {
-        BagError::unreadable(
+        RecordingError::unreadable(
             folder,
             format!("lacks its file {}: copy the whole folder", file.display()),
         )
@@ -178,16 +187,16 @@ fn listed(folder: &Path) -> Vec<PathBuf> {
 }
 
 /// The error of a bag whose messages or files are compressed.
-pub(crate) fn compressed(path: &Path) -> BagError {
-    BagError::unreadable(
+pub(crate) fn compressed(path: &Path) -> RecordingError {
+    RecordingError::unreadable(
         path,
         "is compressed as a whole or by messages: `ros2 bag convert` with `compression_mode: none` makes one that is read (MCAP's own \
          compression of chunks is)",
     )
 }
 
-fn database(path: &Path) -> BagError {
-    BagError::unreadable(
+fn database(path: &Path) -> RecordingError {
+    RecordingError::unreadable(
         path,
         "is stored as an SQLite database: `ros2 bag convert` with `storage_id: mcap` makes one that is read",
     )
