@@ -4,8 +4,8 @@
 use std::{ops::Range, path::Path};
 
 use gyre_datasets::{
-    Dataset, Fingerprint, GnssLog, GyroLog, LogError, OpenError, ScanSamples,
-    WheelLog, check_first_scan,
+    Dataset, Fingerprint, GnssLog, GyroLog, LogError, OpenError, ScanSamples, WheelLog,
+    check_first_scan,
 };
 use gyre_radar::NoDoppler;
 use gyre_run::PlayedFrom;

@@ -162,6 +162,30 @@ pub trait Dataset: Send {
     }
 }
 
+/// Checks that a slot is as large as the limits of a dataset.
+///
+/// # Errors
+/// The first slice that is too small.
+pub fn check_capacity(limits: ScanLimits, slot: &ScanSlot<'_>) -> Result<(), ReadError> {
+    let slices = [
+        ("bytes", limits.bytes, slot.bytes.len()),
+        ("azimuths", limits.azimuths, slot.azimuth_rad.len()),
+        ("stamps", limits.azimuths, slot.stamp_ns.len()),
+        ("flags", limits.azimuths, slot.flags.len()),
+    ];
+    match slices
+        .into_iter()
+        .find(|(_, needed, actual)| actual < needed)
+    {
+        None => Ok(()),
+        Some((what, needed, actual)) => Err(ReadError::SlotTooSmall {
+            what,
+            needed,
+            actual,
+        }),
+    }
+}
+
 /// Opens the dataset at `root`: the folder that holds the radar's folder, or the folder of images
 /// itself.
 ///

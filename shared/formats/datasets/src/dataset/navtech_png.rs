@@ -246,7 +246,11 @@ mod tests {
 
     #[test]
     fn a_sweep_may_wrap_once_and_not_overlap_itself() {
-        for counts in [&[13, 27, 5599][..], &[5000, 5599, 0, 4999], &[5000, 5600, 14]] {
+        for counts in [
+            &[13, 27, 5599][..],
+            &[5000, 5599, 0, 4999],
+            &[5000, 5600, 14],
+        ] {
             assert!(ordered(counts).is_ok(), "{counts:?}");
         }
         for (counts, at) in [
@@ -262,7 +266,10 @@ mod tests {
             );
         }
         let refused = ordered(&[10, 5601]);
-        assert!(matches!(refused, Err(ReadError::EncoderCount { row: 1, .. })));
+        assert!(matches!(
+            refused,
+            Err(ReadError::EncoderCount { row: 1, .. })
+        ));
     }
 
     #[test]

@@ -1,7 +1,6 @@
 //! Reader of images with Navtech metadata columns, parameterised by a profile per format: Oxford,
 //! OORD, Boreas, MulRan (Oxford format) and FoMo.
 
-use super::Dataset;
 use super::detect::Found;
 use super::eccentricity;
 use super::encoder::{EncoderTurn, FIRST_TURNS, encoder_counts};
@@ -17,6 +16,7 @@ use super::options::{AzimuthSource, DatasetOptions};
 use super::profiles::{Profile, ScanTime};
 use super::row_order::{self, RowOrder};
 use super::stamp;
+use super::{Dataset, check_capacity};
 use gyre_radar::MAX_INTERVAL_NS;
 use gyre_radar::scan::{MAX_AZIMUTHS, ScanLimits, ScanSlot, Sense, SweepGeometry};
 use std::ops::RangeInclusive;
@@ -152,13 +152,6 @@ impl NavtechScans {
         self.profile.azimuth_source == AzimuthSource::Encoder
     }
 
-    fn check_slot(&self, slot: &ScanSlot<'_>) -> Result<(), ReadError> {
-        let rows = self.images.max_rows;
-        check_capacity("azimuths", rows, slot.azimuth_rad.len())?;
-        check_capacity("stamps", rows, slot.stamp_ns.len())?;
-        check_capacity("flags", rows, slot.flags.len())
-    }
-
     fn scan_time_ns(&self, stamp_ns: &[i64]) -> i64 {
         let n = stamp_ns.len();
         match self.profile.scan_time {
@@ -193,21 +186,6 @@ impl NavtechScans {
         next.filter(|ns| (ns - self.period_ns).abs() < self.period_ns / 5)
             .unwrap_or(self.period_ns)
     }
-}
-
-pub(crate) fn check_capacity(
-    what: &'static str,
-    needed: usize,
-    actual: usize,
-) -> Result<(), ReadError> {
-    if actual < needed {
-        return Err(ReadError::SlotTooSmall {
-            what,
-            needed,
-            actual,
-        });
-    }
-    Ok(())
 }
 
 fn check_shape(images: &Images, format: Format) -> Result<(), OpenError> {
@@ -289,7 +267,7 @@ impl Dataset for NavtechScans {
     }
 
     fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError> {
-        self.check_slot(&slot)?;
+        check_capacity(self.limits(), &slot)?;
         let size = self
             .images
             .decode_rows(index, self.accepted_rows(), slot.bytes)?;

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use gyre_datasets::{AzimuthSource, DatasetOptions, Format, OpenError, open};
 
-use super::{first_scan, first_scan_with, folder, opened, options, rejected};
+use super::{first_scan_with, folder, opened, options, rejected};
 use crate::common::{PERIOD_US, START_US, Sweep, read, write_png, write_radiate};
 
 /// Writes three scans to `folder`, named by the stamp of row `named`; a microsecond has `unit`

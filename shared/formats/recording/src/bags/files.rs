@@ -83,6 +83,7 @@ struct Information {
 }
 
 /// The files of a bag.
+#[derive(Debug)]
 pub(crate) struct Files {
     pub paths: Vec<PathBuf>,
     /// As a description lists them, or as they were found before.
@@ -228,7 +229,7 @@ mod tests {
         let text = metadata("mcap", "    - b_9.mcap\n    - old/b_10.mcap\n", "");
         let bag = folder(&text, &["b_10.mcap", "b_9.mcap", "c.mcap"]);
         assert!(is_bag(bag.path()));
-        let names: Vec<_> = files(bag.path()).unwrap();
+        let names = files(bag.path()).unwrap().paths;
         assert_eq!(
             names,
             ["b_9.mcap", "b_10.mcap"].map(|name| bag.path().join(name))

@@ -12,7 +12,7 @@ use std::{
 use gyre_colossus::{Constants, SweepAssembler};
 use gyre_datasets::{
     AzimuthSource, DEFAULT_TURN_NS, Dataset, DatasetOptions, FileList, Format, ImageSize,
-    OpenError, ReadError, turn_ns,
+    OpenError, ReadError, check_capacity, turn_ns,
 };
 use gyre_radar::{ScanLimits, ScanSlot, SweepGeometry};
 use gyre_samples::{BagFixes, Sample, SampleKind};
@@ -276,7 +276,7 @@ impl Dataset for Scans {
         let len = self.len();
         let entry = self.index.entries.get(index).cloned();
         let entry = entry.ok_or(ReadError::NoSuchScan { index, len })?;
-        check_capacity(&self.limits(), &slot)?;
+        check_capacity(self.limits(), &slot)?;
         let path = self.file(index).to_owned();
         let failed = |error| match error {
             RecordingError::Io { path, source } => ReadError::Io { path, source },
@@ -299,22 +299,4 @@ impl Dataset for Scans {
             reason: format!("scan {index} is not as it was when the bag was opened"),
         })
     }
-}
-
-fn check_capacity(limits: &ScanLimits, slot: &ScanSlot<'_>) -> Result<(), ReadError> {
-    for (what, needed, actual) in [
-        ("bytes", limits.bytes, slot.bytes.len()),
-        ("azimuths", limits.azimuths, slot.azimuth_rad.len()),
-        ("stamps", limits.azimuths, slot.stamp_ns.len()),
-        ("flags", limits.azimuths, slot.flags.len()),
-    ] {
-        if actual < needed {
-            return Err(ReadError::SlotTooSmall {
-                what,
-                needed,
-                actual,
-            });
-        }
-    }
-    Ok(())
 }
