@@ -1,8 +1,7 @@
-//! The figures of a run or a trajectory: one list, of which the table of the terminal, its five
-//! lines and the page of `gyre report` take names, units and decimals.
+//! The figures of a run or a trajectory in one list. The table of the terminal, its five lines and
+//! the page of `gyre report` take names, units and decimals from the list.
 //!
-//! A figure is found by its place in `summary.json`, so that a run of last year is shown as one that
-//! has just ended.
+//! A place in `summary.json` identifies a figure, so that old and new runs look alike.
 
 use serde_json::Value;
 
@@ -22,9 +21,9 @@ pub struct Figure {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     Plain,
-    /// An error, of which the smallest is the best.
+    /// An error: the smallest is the best.
     Error,
-    /// A count of what is unusual, if it is not zero.
+    /// A count of unusual events.
     Unusual,
 }
 
@@ -191,7 +190,7 @@ impl Figure {
     }
 }
 
-/// Returns what is unusual in a run: counts with their names; `nothing` if there is none.
+/// Returns the counts of the unusual events of a run, with their names, or `nothing`.
 pub fn all_unusual(summary: &Value) -> String {
     let figures = GROUPS.iter().flat_map(|(_, figures)| *figures);
     let unusual = figures.filter(|it| it.kind == Kind::Unusual);

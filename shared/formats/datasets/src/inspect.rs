@@ -62,7 +62,7 @@ pub fn inspect(
     Ok(inspect_dataset(root, dataset, options, &logs, trajectory))
 }
 
-/// Settings by which the logs beside the scans are read.
+/// Settings for the readers of the logs beside the scans.
 #[derive(Clone, Debug, Default)]
 pub struct InspectedLogs {
     /// The topic of GNSS in a bag, else the only one.

@@ -1,5 +1,5 @@
-//! What the logs of gyro, wheels and GNSS share: where they lie beside the scans, how they are
-//! read, and why they cannot be used.
+//! The common part of the logs of gyro, wheels and GNSS: their places beside the scans, their
+//! readers, and their errors.
 
 use std::{
     io,
@@ -24,8 +24,8 @@ const IMAGES: [&str; 5] = [
     "polar_oxford_form",
 ];
 
-/// A log that cannot be used. `of` is the section of the sensor in configurations; each message
-/// says what is wrong, where, and what to do.
+/// A log that cannot be used. `of` is the section of the sensor in configurations. Each message
+/// names the fault, its place and a remedy.
 #[derive(Debug, Error)]
 #[allow(missing_docs, reason = "the messages explain the variants and fields")]
 pub enum LogError {
@@ -60,7 +60,8 @@ pub enum LogError {
         path: PathBuf,
         reason: String,
     },
-    /// `steps` are those of its clock, if there are any: sentences with a space behind.
+    /// `steps` describes the steps of the clock, if there are any, in sentences that end with a
+    /// space.
     #[error(
         "the log of the {of} {path} has no sample while the scans were measured: it begins {after_s:.1} s after the first of them. {steps}It is of another drive, or {of}.late_s is wrong"
     )]
@@ -92,8 +93,8 @@ fn one(section: &str) -> &str {
     }
 }
 
-/// Returns the first of these places in which a log lies beside the scans of a dataset folder,
-/// which may also be the folder of the images.
+/// Returns the first of these places with a log beside the scans of a dataset folder. The folder of
+/// the images may be given instead.
 ///
 /// # Errors
 /// A log is missing.
@@ -106,8 +107,8 @@ pub(crate) fn find(folder: &Path, of: &'static str, places: &[&str]) -> Result<P
     })
 }
 
-/// Returns the folders in which the logs of a dataset are looked for: its own, and the one above
-/// that of the images.
+/// Returns the folders that may contain the logs of a dataset: its own, and the parent of a folder
+/// of images.
 pub(crate) fn roots(folder: &Path) -> impl Iterator<Item = &Path> {
     let name = folder.file_name().and_then(|name| name.to_str());
     let is_of_images = name.is_some_and(|name| IMAGES.contains(&name));

@@ -2,9 +2,9 @@
 //! `ros2 bag play` takes.
 //!
 //! A bag is a file of the MCAP profile `ros2`, or a folder of such files with a `metadata.yaml`.
-//! Reading order: `files` (what is a bag), `spans` (where messages are), `topics` (which of them
-//! are a radar's), `azimuths` (messages as azimuths), `bag` (its files as one), `scans` (azimuths
-//! as scans), `sensors` (others than the radar), `samples` (of gyro and wheels), [`fixes()`] (of
+//! Reading order: `files` (the files of a bag), `spans` (the places of messages), `topics` (the
+//! topics of a radar), `azimuths` (messages as azimuths), `bag` (all files as one), `scans`
+//! (azimuths as scans), `sensors` (other sensors), `samples` (of gyro and wheels), [`fixes()`] (of
 //! GNSS), [`BagWriter`].
 
 mod azimuths;

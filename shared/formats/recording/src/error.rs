@@ -63,7 +63,7 @@ impl RecordingError {
         }
     }
 
-    /// An error of the library. It hides what the system says.
+    /// An error of the library, which wraps the error of the system.
     pub(crate) fn of(path: &Path, error: McapError) -> Self {
         let path = path.to_owned();
         match error {

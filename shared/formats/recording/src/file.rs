@@ -28,7 +28,7 @@ use parse::{Field, fields};
 
 /// Bytes of opcode and length before each record.
 const PREFIX: u64 = 9;
-/// The largest place that is read, bytes. Chunks of ROS 2 have 768 kB, those of Gyre 4 MB and a
+/// The largest place that is read, bytes. A chunk of ROS 2 has 768 kB, a chunk of Gyre 4 MB and a
 /// scan.
 const MAX_SPAN_BYTES: u64 = 256 << 20;
 /// The first opcode of records that are of one program.
@@ -39,8 +39,8 @@ const MAX_PLACES: usize = 4096;
 const WINDOW: usize = 1 << 16;
 /// Whole records in a row that must follow a damaged place.
 const CHAIN: usize = 3;
-/// The largest number of channels and of schemas of a file, the longest name of a topic, and what
-/// is kept of a schema, bytes.
+/// The largest number of channels and of schemas of a file, the longest name of a topic, and the
+/// bytes of a schema that are kept.
 const MAX_CHANNELS: usize = 4096;
 const MAX_NAME_BYTES: usize = 1024;
 const MAX_SCHEMA_BYTES: usize = 4096;
@@ -113,7 +113,7 @@ pub struct McapFile {
     /// The positions of the damaged places so far, at most [`MAX_PLACES`].
     pub(crate) damage: BTreeSet<u64>,
     schemas: BTreeMap<u16, (String, String)>,
-    /// The channels in what has been read.
+    /// The channels so far.
     pub(crate) channels: BTreeMap<u16, Channel>,
 }
 
@@ -305,7 +305,7 @@ impl McapFile {
         ))
     }
 
-    /// Reads what the file has of a place.
+    /// Reads the bytes of a place, up to the end of the file.
     fn content(&self, span: Span) -> io::Result<Vec<u8>> {
         let left = self.file.metadata()?.len().saturating_sub(span.offset);
         let mut bytes = vec![0; left.min(span.bytes) as usize];

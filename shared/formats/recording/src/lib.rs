@@ -21,9 +21,9 @@
 //! has no summary because its writer was killed.
 //!
 //! Reading order: `head` and `table` (the metadata), `writer`, `split` and `ledger` (several
-//! files), [`mod@file`] (the records of a file that may be damaged or cut), `recording`, `generations`, `scans` (a
-//! [`Dataset`](gyre_datasets::Dataset)), [`open()`] and [`gnss_log`] (what a source plays, of
-//! whatever form).
+//! files), [`mod@file`] (the records of a file that may be damaged or cut), `recording`,
+//! `generations`, `scans` (a [`Dataset`](gyre_datasets::Dataset)), [`open()`] and [`gnss_log`] (the
+//! opening of sources in any form).
 
 pub mod bags;
 mod disk;

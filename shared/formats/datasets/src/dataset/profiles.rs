@@ -1,5 +1,5 @@
-//! The formats of folders of images: their folders, and the parameters in which those with Navtech
-//! metadata columns differ.
+//! The formats of folders of images: their folders, and the parameters of formats with Navtech
+//! metadata columns.
 //!
 //! - Oxford Radar RobotCar: `radar/<us>.png`, 400 azimuths x (11 + 3768), named by the start of the
 //!   sweep; azimuths clockwise from ahead. OORD uses the same format; its encoder columns are
@@ -57,7 +57,7 @@ pub(crate) struct Profile {
     pub(crate) byte_ten: ByteTen,
     pub(crate) named_by: NamedBy,
     pub(crate) stamp_meaning: &'static str,
-    /// Range bins by which an image is recognised; `None` if only the folder shows the format.
+    /// The range bins of an image; `None` if only the folder shows the format.
     pub(crate) bins: Option<usize>,
     /// True if its chirps alternate.
     pub(crate) chirps: bool,
@@ -66,8 +66,8 @@ pub(crate) struct Profile {
 /// A format: its folders relative to the root, and the parameters of its metadata columns.
 type Known = (Format, &'static [&'static str], Option<Profile>);
 
-/// The development kit of Oxford gives 0.0432 m for a bin, with which paths are 1.4 % shorter than
-/// the ground truth.
+/// The development kit of Oxford gives 0.0432 m for a bin: then paths are 1.4 % shorter than the
+/// ground truth.
 const OXFORD: Profile = Profile {
     range_resolution_m: 0.0438,
     range_offset_m: 0.0,
@@ -102,7 +102,7 @@ const BOREAS_BEFORE: (f32, i64) = (0.0596, 1_632_182_400 * SECOND_NS);
 /// Depth of a range bin of MulRan, m: 200 m over 3360 bins.
 pub(crate) const MULRAN_RESOLUTION_M: f32 = 200.0 / 3360.0;
 
-/// The formats in the order in which their folders are looked for.
+/// The formats, in the order of the search for their folders.
 pub(crate) const KNOWN: [Known; 8] = [
     (Format::Radiate, &["Navtech_Polar"], None),
     (
@@ -166,7 +166,7 @@ impl Profile {
         KNOWN.iter().find(|known| known.0 == format)?.2
     }
 
-    /// Applies what the first image shows of the radar, and then the options.
+    /// Applies the exception of Boreas by the date of the first image, and then the options.
     pub(crate) fn with(
         mut self,
         format: Format,

@@ -15,7 +15,7 @@ use gyre_radar::{ClockOffset, MAX_OFFSET_S, clock_offset};
 /// milliseconds.
 const MARGIN_NS: i64 = 20_000_000;
 
-/// A shorter path is that of a trajectory that stands, m.
+/// A trajectory with a shorter path stands, m.
 const STANDING_M: f64 = 0.1;
 
 /// Examines the ground truth at the usual path and all TUM files in the root, by name.

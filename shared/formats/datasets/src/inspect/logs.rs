@@ -1,4 +1,4 @@
-//! The logs of gyro, wheels and GNSS: what they hold, how often, when, and their faults.
+//! The logs of gyro, wheels and GNSS: their content, rates, spans and faults.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use super::{InspectedLogs, Report, timing::Timing};
 use crate::{Dataset, GnssLog, GyroLog, LogError, WheelLog};
 
-/// Time in which the gyro is looked at where it turns least, s.
+/// The duration of the quietest time of the gyro, s.
 const QUIET_S: f64 = 5.0;
 /// Share of the samples that such a time has at least.
 const QUIET_SHARE: f64 = 0.9;
@@ -216,7 +216,7 @@ struct Times {
     span_ns: Option<[i64; 2]>,
     /// Samples that are missing between them, share of all.
     missing: f64,
-    /// First and last stamp against those of the scans, s.
+    /// First and last stamp relative to the first and last scan, s.
     after_scans_s: Option<[f64; 2]>,
 }
 
@@ -255,7 +255,7 @@ impl Times {
         }
     }
 
-    /// Adds what a log has, how often, and when.
+    /// Adds the lines about the content, the rate and the span of a log.
     fn lines(&self, report: &mut Report, section: &str, what: &str, samples: &str) {
         let (count, rate_hz, missing) = (self.samples, self.rate_hz(), self.missing * 100.0);
         report.line(
@@ -273,7 +273,7 @@ impl Times {
         }
     }
 
-    /// Returns the name of a log, with a note if its stamps do not cover those of the scans.
+    /// Returns the name of a log, with a note if its stamps do not cover the scans.
     fn lies(&self, file: &Path) -> String {
         let name = file.file_name().unwrap_or_default().display();
         format!("{name}{}, lies", self.of_clocks())
@@ -316,8 +316,8 @@ struct Quiet {
     sigma_degps: [f64; 3],
 }
 
-/// Returns the time of [`QUIET_S`] in which the rates vary least: the bias and the noise, if the
-/// vehicle stood.
+/// Returns the time of [`QUIET_S`] with the smallest variance of the rates: the bias and the noise,
+/// if the vehicle stood.
 fn quiet(samples: &[Sample], period_s: f64) -> Option<Quiet> {
     let least = (QUIET_SHARE * QUIET_S / period_s.max(1e-9)) as usize;
     let windows = (0..samples.len()).step_by((least / 5).max(1)).map(|from| {

@@ -21,7 +21,7 @@ const QUIET_BINS: usize = 3;
 #[derive(Default)]
 pub(super) struct Survey {
     scans: usize,
-    /// Scans in which the directions of the chirps are known.
+    /// Scans with known directions of the chirps.
     with_chirps: usize,
     rows: u64,
     /// Minimum and maximum number of rows in a scan.
