@@ -61,16 +61,12 @@ impl Subject {
                 .ok()
         });
         let duration_s = |(first_ns, last_ns): (i64, i64)| (last_ns - first_ns) as f64 * 1e-9;
-        let mut figures = run.as_ref().map_or_else(
-            || {
-                json!({
-                    "path_m": trajectory.path_length_m(),
-                    "duration_s": trajectory.span_ns().map(duration_s),
-                    "processed": trajectory.poses.len(),
-                })
-            },
-            |run| run.summary.clone(),
-        );
+        let summary = run.as_ref().map(|run| run.summary.clone());
+        let summary = summary.filter(Value::is_object);
+        let mut figures = summary.unwrap_or_else(|| json!({}));
+        figures["path_m"] = json!(trajectory.path_length_m());
+        figures["duration_s"] = json!(trajectory.span_ns().map(duration_s));
+        figures["processed"] = json!(trajectory.poses.len());
         figures["evaluation"] = serde_json::to_value(&evaluation)?;
         Ok(Self {
             name: path.display().to_string(),
