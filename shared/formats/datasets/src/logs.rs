@@ -42,7 +42,7 @@ pub enum LogError {
         "{of}.kind is that of a live sensor, but the scans are of a recording: set it to `auto`, `log` or `none`"
     )]
     Live { of: &'static str },
-    #[error("cannot read the log of the {of} {path}: {source}")]
+    #[error("cannot read the log of the {} {path}: {source}", name(of))]
     Io {
         of: &'static str,
         path: PathBuf,
@@ -54,7 +54,7 @@ pub enum LogError {
         path: PathBuf,
         reason: String,
     },
-    #[error("the log of the {of} {path} cannot be used: {reason}")]
+    #[error("the log of the {} {path} cannot be used: {reason}", name(of))]
     Unusable {
         of: &'static str,
         path: PathBuf,
@@ -90,6 +90,13 @@ fn one(section: &str) -> &str {
         "gyro" => "a gyro",
         "wheels" => "the wheels",
         _ => "a GNSS receiver",
+    }
+}
+
+fn name(section: &str) -> &str {
+    match section {
+        "gnss" => "GNSS receiver",
+        other => other,
     }
 }
 
