@@ -59,7 +59,7 @@ pub fn open(error: OpenError) -> PyErr {
 /// A log of a gyro or of wheels.
 pub fn log(error: LogError) -> PyErr {
     match error {
-        LogError::None { .. } | LogError::Live(_) => config(error),
+        LogError::None { .. } | LogError::Live { .. } => config(error),
         error => read(error),
     }
 }

@@ -4,8 +4,8 @@
 use std::{ops::Range, path::Path};
 
 use gyre_datasets::{
-    Dataset, Fingerprint, GnssLog, GnssLogError, GyroLog, LogError, OpenError, ScanSamples,
-    WheelLog, check_first_scan,
+    Dataset, Fingerprint, GnssLog, GyroLog, LogError, OpenError, ScanSamples, WheelLog,
+    check_first_scan,
 };
 use gyre_radar::NoDoppler;
 use gyre_run::PlayedFrom;
@@ -38,12 +38,9 @@ pub enum SourceError {
     /// The first scan to play is behind the last one.
     #[error("source.first is {0}, but {1} has {n} scans, from {start} to {last}: give a smaller one", n = .2.len(), start = .2.start, last = .2.end - 1)]
     BeyondEnd(usize, String, Range<usize>),
-    /// The log of the gyro or of the wheels cannot be used.
+    /// The log of the gyro, of the wheels or of the GNSS receiver cannot be used.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// The log of the GNSS receiver cannot be used.
-    #[error(transparent)]
-    Gnss(#[from] GnssLogError),
     /// Scans that lie in no folder, as those of a simulation.
     #[error(
         "gnss.kind is `auto`, but these scans lie in no folder, so that no log lies beside them: name one with gnss.kind = \"log\" and gnss.file, or set gnss.kind = \"none\""

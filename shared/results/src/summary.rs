@@ -16,7 +16,7 @@ use gyre_run::{Ending, Mode, Rate, Report, StageCounters, Swapped};
 use serde::Serialize;
 use thiserror::Error;
 
-use crate::{judgement::Judgement, machine::Machine};
+use crate::{figures, judgement::Judgement, machine::Machine};
 
 pub use counts::{Counter, Counts, Course, LostCounts, MotionCounts};
 pub use gnss::GnssSummary;
@@ -203,6 +203,12 @@ impl Summary {
         }
     }
 
+    /// Returns the figures as `summary.json` has them.
+    fn figures(&self) -> serde_json::Value {
+        // A figure that JSON cannot hold is null there.
+        serde_json::to_value(self).unwrap_or_default()
+    }
+
     /// The counts of scans.
     pub fn counts(&self) -> &Counts {
         &self.counts
@@ -290,99 +296,21 @@ impl fmt::Display for Summary {
             "\n{ending}: {}{of} scans in {:.1} s, {:.1} scans/s",
             c.processed, self.wall_s, self.scans_per_s
         )?;
-        writeln!(
-            f,
-            "published {}  dropped {}  unreadable {}  missing {}  breaks {}",
-            c.published, c.dropped, c.unreadable, c.missing, c.breaks
-        )?;
-        if let Some(lost) = &c.lost {
-            let (azimuths, scans, unplaced) = (lost.azimuths, lost.scans, lost.unplaced);
-            writeln!(
-                f,
-                "lost azimuths {azimuths} in {scans} scans  unplaced {unplaced}"
-            )?;
-        }
-        if let Some(m) = &c.motions {
-            writeln!(
-                f,
-                "motions refined {} ({} by a second hypothesis)\n\
-                 weak {}  predicted {}  stationary {}",
-                m.refined, m.second_hypothesis, m.weak, m.predicted, m.stationary
-            )?;
-            if m.along_walls > 0 {
-                let along = m.along_walls;
-                writeln!(
-                    f,
-                    "along walls without structure {along}: the radar does not see how far"
-                )?;
+        let figures = self.figures();
+        for (title, rows) in figures::GROUPS
+            .iter()
+            .filter(|it| it.0 != figures::ACCURACY)
+        {
+            writeln!(f, "\n{title}")?;
+            for row in *rows {
+                if let Some(text) = row.text(&figures) {
+                    writeln!(f, "  {:41}{text}", row.name)?;
+                }
             }
-        }
-        if let Some(gyro) = &c.gyro {
-            writeln!(
-                f,
-                "turns by the gyro {} of {}  doubted {}  refused {}  bias {:.2e} +- {:.0e} rad/s",
-                gyro.motions,
-                c.processed.saturating_sub(1 + c.breaks),
-                gyro.doubted,
-                gyro.refused,
-                gyro.bias_radps,
-                gyro.bias_sigma_radps
-            )?;
-        }
-        if let Some(wheels) = &c.wheels {
-            writeln!(
-                f,
-                "distances by the wheels {} of {}  slips {}  predicted {}  scale {:.4} +- {:.4}",
-                wheels.motions,
-                c.processed.saturating_sub(1 + c.breaks),
-                wheels.slips,
-                wheels.predicted,
-                wheels.scale,
-                wheels.scale_sigma
-            )?;
-        }
-        if let Some(doppler) = &c.doppler {
-            writeln!(
-                f,
-                "velocities by Doppler {} of {}  refused {}  predicted {}  scale {:.4} +- {:.4}",
-                doppler.motions,
-                c.processed.saturating_sub(1 + c.breaks),
-                doppler.refused,
-                doppler.predicted,
-                doppler.scale,
-                doppler.scale_sigma
-            )?;
-        }
-        if let Some(mask) = &self.mask {
-            writeln!(f, "masks of {} by {}", mask.model, mask.backend.name())?;
-        }
-        if !self.restarts.is_empty() {
-            let restarts: Vec<_> = self
-                .restarts
-                .iter()
-                .map(|(stage, times)| format!("{stage} {times}"))
-                .collect();
-            let recovery: Vec<_> = self
-                .recovery_ms
-                .iter()
-                .map(|ms| format!("{ms:.0}"))
-                .collect();
-            writeln!(
-                f,
-                "restarts {}  recovered after {} ms",
-                restarts.join(", "),
-                recovery.join(", ")
-            )?;
         }
         self.latency_table(f)?;
         if let Some(evaluation) = &self.evaluation {
             writeln!(f, "\n{evaluation}")?;
-        }
-        if let Some(slam) = &self.slam {
-            writeln!(f, "\n{slam}")?;
-        }
-        if let Some(gnss) = &self.gnss {
-            writeln!(f, "{gnss}")?;
         }
         let corrected = match self.slam {
             Some(_) => ", trajectory_slam.tum, loops.csv, graph.g2o, map.png",

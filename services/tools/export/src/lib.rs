@@ -9,8 +9,8 @@ mod source;
 
 use std::{path::Path, process::ExitCode};
 
-use gyre_bags::{BagWriter, Kept, Topic};
 use gyre_messages::ListedObject;
+use gyre_recording::bags::{BagWriter, Kept, Topic};
 use gyre_ros2_messages::{
     Mounting,
     frames::{self, Frames, Interval},

@@ -1,11 +1,11 @@
 //! The scans of a source as messages of Navtech's driver.
 
-use gyre_bags::{BagWriter, Kept, Topic};
 use gyre_colossus::Configuration as Radar;
 use gyre_datasets::{ReadError, correct_eccentricity, middle_ns};
 use gyre_radar::{
     OwnedScan, PlacedRows, PolarScan, Sense, SweepGeometry, lost::stale_rows, scan::flag,
 };
+use gyre_recording::bags::{BagWriter, Kept, Topic};
 use gyre_ros2_messages::{
     navtech_msgs::{RadarBScanMsg, RadarConfigurationMsg, RadarFftDataMsg},
     radar::{Encoder, ScanMessages},

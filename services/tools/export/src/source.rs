@@ -6,7 +6,6 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use gyre_bags::{BagWriter, Kept};
 use gyre_configuration::Configuration;
 use gyre_datasets::{Dataset, DatasetOptions, ground_truth::read_trajectory};
 use gyre_geometry::Pose;
@@ -22,6 +21,7 @@ use gyre_messages::{
 };
 use gyre_radar::{LostAzimuths, Trajectory};
 use gyre_recording::Recording;
+use gyre_recording::bags::{BagWriter, Kept};
 use gyre_ros2_messages::{
     Mounting,
     frames::{Frames, occupancy_grid},

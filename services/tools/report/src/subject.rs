@@ -11,7 +11,7 @@ use gyre_geometry::Pose;
 use gyre_radar::Trajectory;
 use gyre_results::{SUMMARY, judgement::judge, require_results};
 use gyre_terminal::{Failure, print};
-use serde_json::Value;
+use serde_json::{Value, json};
 
 /// A run or a trajectory.
 pub struct Subject {
@@ -21,6 +21,9 @@ pub struct Subject {
     pub evaluation: Option<Evaluation>,
     /// The trajectory.
     pub trajectory: Trajectory,
+    /// The figures, as `summary.json` has them; the errors are those against the common ground
+    /// truth.
+    pub figures: Value,
     /// The results that only a run of Gyre has.
     pub run: Option<Run>,
 }
@@ -57,10 +60,19 @@ impl Subject {
                 })
                 .ok()
         });
+        let duration_s = |(first_ns, last_ns): (i64, i64)| (last_ns - first_ns) as f64 * 1e-9;
+        let summary = run.as_ref().map(|run| run.summary.clone());
+        let summary = summary.filter(Value::is_object);
+        let mut figures = summary.unwrap_or_else(|| json!({}));
+        figures["path_m"] = json!(trajectory.path_length_m());
+        figures["duration_s"] = json!(trajectory.span_ns().map(duration_s));
+        figures["processed"] = json!(trajectory.poses.len());
+        figures["evaluation"] = serde_json::to_value(&evaluation)?;
         Ok(Self {
             name: path.display().to_string(),
             evaluation,
             trajectory,
+            figures,
             run,
         })
     }
@@ -75,12 +87,6 @@ impl Subject {
             }
             None => self.trajectory.poses.clone(),
         }
-    }
-
-    /// Returns the time from the first to the last pose, s.
-    pub fn duration_s(&self) -> Option<f64> {
-        let (first_ns, last_ns) = self.trajectory.span_ns()?;
-        Some((last_ns - first_ns) as f64 * 1e-9)
     }
 }
 
@@ -101,19 +107,9 @@ impl Run {
         })
     }
 
-    /// Returns a value of the summary by its path, as in `/motions/weak`.
-    pub fn value(&self, path: &str) -> Option<&Value> {
-        self.summary.pointer(path).filter(|value| !value.is_null())
-    }
-
-    /// Returns a number of the summary.
+    /// Returns a number of the summary by its path, as in `/motions/weak`.
     pub fn number(&self, path: &str) -> Option<f64> {
-        self.value(path)?.as_f64()
-    }
-
-    /// Returns a word of the summary.
-    pub fn word(&self, path: &str) -> Option<&str> {
-        self.value(path)?.as_str()
+        self.summary.pointer(path)?.as_f64()
     }
 
     /// Returns the content of a picture among the results, `None` without one.

@@ -1,6 +1,5 @@
 //! Readers of radar recordings: one trait, one file per format.
 
-mod boreas;
 mod dataset_toml;
 mod detect;
 mod eccentricity;
@@ -8,7 +7,6 @@ mod encoder;
 mod error;
 mod file_list;
 mod first_image;
-mod fomo;
 mod foreign;
 mod format;
 mod image_list;
@@ -18,11 +16,10 @@ mod images;
 mod mulran;
 mod navtech_notes;
 mod navtech_png;
-mod navtech_profile;
 mod navtech_scans;
 mod options;
-mod oxford;
 mod png_image;
+mod profiles;
 mod radiate;
 mod row_order;
 mod sensor_clock;
@@ -165,6 +162,30 @@ pub trait Dataset: Send {
     }
 }
 
+/// Checks that a slot is as large as the limits of a dataset.
+///
+/// # Errors
+/// The first slice that is too small.
+pub fn check_capacity(limits: ScanLimits, slot: &ScanSlot<'_>) -> Result<(), ReadError> {
+    let slices = [
+        ("bytes", limits.bytes, slot.bytes.len()),
+        ("azimuths", limits.azimuths, slot.azimuth_rad.len()),
+        ("stamps", limits.azimuths, slot.stamp_ns.len()),
+        ("flags", limits.azimuths, slot.flags.len()),
+    ];
+    match slices
+        .into_iter()
+        .find(|(_, needed, actual)| actual < needed)
+    {
+        None => Ok(()),
+        Some((what, needed, actual)) => Err(ReadError::SlotTooSmall {
+            what,
+            needed,
+            actual,
+        }),
+    }
+}
+
 /// Opens the dataset at `root`: the folder that holds the radar's folder, or the folder of images
 /// itself.
 ///
@@ -229,25 +250,16 @@ fn open_found(
 ) -> Result<Box<dyn Dataset>, OpenError> {
     options.check_without_topics(found.format)?;
     Ok(match found.format {
-        Format::Oxford => Box::new(oxford::open(found, options)?),
-        Format::Oord => Box::new(oxford::open_oord(found, options)?),
-        Format::Boreas => Box::new(boreas::open(found, options)?),
-        Format::BoreasRt => Box::new(boreas::open_road_trip(found, options)?),
         Format::Mulran => Box::new(mulran::open(found, options)?),
-        Format::MulranOxfordForm => Box::new(mulran::open_oxford_form(found, options)?),
         Format::Radiate => Box::new(radiate::open(found, options)?),
-        Format::Fomo => Box::new(fomo::open(found, options)?),
-        format @ (Format::Mcap | Format::Ros2Bag) => {
-            let path = found.folder.display();
-            return Err(OpenError::Recording(format!(
-                "{path} is a folder of images, and the format `{format}` is that of a recording as MCAP"
-            )));
-        }
-        Format::Other => {
-            let path = found.folder.display();
-            return Err(OpenError::Recording(format!(
-                "{path} is in a format that only the program which wrote it reads"
-            )));
-        }
+        format => match profiles::Profile::of(format) {
+            Some(profile) => Box::new(navtech_scans::NavtechScans::open(found, options, profile)?),
+            None => {
+                let path = found.folder.display();
+                return Err(OpenError::Recording(format!(
+                    "{path} is a folder of images, and the format `{format}` is not of images"
+                )));
+            }
+        },
     })
 }

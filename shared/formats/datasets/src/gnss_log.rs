@@ -1,25 +1,25 @@
 //! The log of a GNSS receiver as a file, or in a bag.
 //!
 //! - [`GnssLog`]: where it lies beside the scans of a dataset, and how it is read;
-//! - `table`: tables as CSV; `radiate`: the files of RADIATE, one for each fix;
+//! - `table`: tables as CSV;
 //! - [`ReceivedFixes`]: the growing log of a live receiver;
 //! - `faults`: what is wrong with the fixes, and which of them are left out.
 
-mod error;
 mod faults;
-mod radiate;
 mod received;
 mod table;
 
 use std::path::{Path, PathBuf};
 
-pub use error::GnssLogError;
 pub use faults::GnssFaults;
 pub use received::ReceivedFixes;
 
 use gyre_samples::{BagFixes, GnssConfig, GnssFix, LocalPlane, RawFix};
 
-use crate::{gps_imu_twist::has_list, gyro_log::roots, table::Unreadable};
+use crate::{LogError, gps_imu_twist, logs, table::Raw};
+
+/// The section of the receiver in configurations.
+const OF: &str = "gnss";
 
 /// Logs relative to the root of a dataset, in order of precedence.
 const PLACES: [&str; 8] = [
@@ -74,18 +74,34 @@ impl GnssLog {
     ///
     /// # Errors
     /// A file that cannot be read or has no positions, and one without a usable fix.
-    pub fn read(path: &Path) -> Result<Self, GnssLogError> {
-        let raw = Self::raw(path)?;
+    pub fn read(path: &Path) -> Result<Self, LogError> {
+        let (raw, is_plane) = Self::raw(path)?;
         if let Some(reason) = raw.unreadable.are_most(raw.count()) {
             let path = path.to_owned();
-            return Err(GnssLogError::Unusable { path, reason });
+            return Err(LogError::Unusable {
+                of: OF,
+                path,
+                reason,
+            });
         }
-        Self::usable(raw, path)
+        Self::usable(raw, is_plane, path)
     }
 
-    fn raw(path: &Path) -> Result<Raw, GnssLogError> {
+    /// Returns the fixes of a log as they stand there, and whether they are m east and north, and
+    /// not degrees of latitude and longitude.
+    fn raw(path: &Path) -> Result<(Raw<RawFix>, bool), LogError> {
         match path.is_dir() {
-            true => radiate::read(path),
+            true => {
+                // The lines of the place and of the first two rows of its covariance.
+                let fix = |stamp_ns, [at, first, second]: [[f64; 3]; 3]| RawFix {
+                    stamp_ns,
+                    at: [at[0], at[1]],
+                    altitude_m: at[2],
+                    sigma_m: RawFix::sigma_of([first[0], second[1]]),
+                    ..RawFix::default()
+                };
+                Ok((gps_imu_twist::read(path, OF, [0, 1, 2], fix)?, false))
+            }
             false => table::read(path),
         }
     }
@@ -94,9 +110,9 @@ impl GnssLog {
     ///
     /// # Errors
     /// A log that cannot be read.
-    pub fn copy_of(path: &Path) -> Result<String, GnssLogError> {
-        let raw = Self::raw(path)?;
-        Ok(Self::table(&raw.rows, raw.is_plane))
+    pub fn copy_of(path: &Path) -> Result<String, LogError> {
+        let (raw, is_plane) = Self::raw(path)?;
+        Ok(Self::table(&raw.entries, is_plane))
     }
 
     /// Returns a table of fixes, m east and north in a plane of their own or degrees on the earth.
@@ -137,15 +153,14 @@ impl GnssLog {
     ///
     /// # Errors
     /// No usable fix.
-    pub fn of(fixes: BagFixes, bag: &Path) -> Result<Self, GnssLogError> {
+    pub fn of(fixes: BagFixes, bag: &Path) -> Result<Self, LogError> {
         let raw = Raw {
-            rows: fixes.fixes,
-            without_fix: fixes.without_fix,
-            ..Raw::default()
+            unmeasured: fixes.without_fix,
+            ..Raw::of(fixes.fixes)
         };
         Ok(Self {
             topic: Some(fixes.topic),
-            ..Self::usable(raw, bag)?
+            ..Self::usable(raw, false, bag)?
         })
     }
 
@@ -154,7 +169,7 @@ impl GnssLog {
     ///
     /// # Errors
     /// No log.
-    pub fn find(folder: &Path) -> Result<PathBuf, GnssLogError> {
+    pub fn find(folder: &Path) -> Result<PathBuf, LogError> {
         let own = Self::of_recording(folder);
         // The first file itself may have been moved away.
         if !folder.is_dir() && own.is_file() {
@@ -165,12 +180,7 @@ impl GnssLog {
             true => folder.parent().unwrap_or(folder),
             false => folder,
         };
-        roots(folder)
-            .flat_map(|root| PLACES.iter().map(|place| root.join(place)))
-            .find(|path| path.is_file() || (path.is_dir() && has_list(path)))
-            .ok_or_else(|| GnssLogError::None {
-                folder: folder.to_owned(),
-            })
+        logs::find(folder, OF, &PLACES)
     }
 
     /// Returns the fixes on the radar's clock, with the configured uncertainty where the log has
@@ -186,18 +196,19 @@ impl GnssLog {
         fixes.collect()
     }
 
-    fn usable(raw: Raw, path: &Path) -> Result<Self, GnssLogError> {
-        match Self::examined(raw, path) {
+    fn usable(raw: Raw<RawFix>, is_plane: bool, path: &Path) -> Result<Self, LogError> {
+        match Self::examined(raw, is_plane, path) {
             (log, None) => Ok(log),
             (_, Some(error)) => Err(error),
         }
     }
 
     /// Examines the fixes. Returns the log, and what is wrong where none can be used.
-    fn examined(raw: Raw, path: &Path) -> (Self, Option<GnssLogError>) {
+    fn examined(raw: Raw<RawFix>, is_plane: bool, path: &Path) -> (Self, Option<LogError>) {
         let all = raw.count();
-        let (fixes, plane, faults) = faults::examine(raw);
-        let error = fixes.is_empty().then(|| GnssLogError::Unusable {
+        let (fixes, plane, faults) = faults::examine(raw, is_plane);
+        let error = fixes.is_empty().then(|| LogError::Unusable {
+            of: OF,
             path: path.to_owned(),
             reason: faults.without_usable(all),
         });
@@ -210,23 +221,5 @@ impl GnssLog {
             unusable: None,
         };
         (log, error)
-    }
-}
-
-/// The fixes of a file as they stand there.
-#[derive(Clone, Debug, Default)]
-struct Raw {
-    rows: Vec<RawFix>,
-    /// The coordinates are m east and north, and not degrees of latitude and longitude.
-    is_plane: bool,
-    unreadable: Unreadable,
-    /// Messages or rows in which the receiver had no fix.
-    without_fix: usize,
-}
-
-impl Raw {
-    /// All entries, those that cannot be used too.
-    fn count(&self) -> usize {
-        (self.rows.len() + self.without_fix).saturating_add(self.unreadable.count)
     }
 }

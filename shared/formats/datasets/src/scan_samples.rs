@@ -7,9 +7,9 @@ use gyre_samples::{
 };
 
 use crate::{
-    WheelLog,
+    LogError, WheelLog,
     dataset::{Dataset, Format},
-    gyro_log::{GyroLog, LogError, LogFaults, SampleTrack},
+    gyro_log::{GyroLog, LogFaults, SampleTrack},
 };
 
 /// The samples of other sensors that come with the scans of a dataset: by their stamps alone.
@@ -52,7 +52,11 @@ impl ScanSamples {
                     None => GyroLog::read(&GyroLog::find(folder)?)?,
                 })
             }
-            GyroKind::Udp | GyroKind::Ros2 => return Err(LogError::Live(SampleKind::Gyro)),
+            GyroKind::Udp | GyroKind::Ros2 => {
+                return Err(LogError::Live {
+                    of: SampleKind::Gyro.section(),
+                });
+            }
             GyroKind::Log => Some(GyroLog::read(&gyro.file.clone().unwrap_or_default())?),
         };
         let speeds = match wheels.kind {
@@ -64,7 +68,11 @@ impl ScanSamples {
                     None => WheelLog::read(&WheelLog::find(folder)?, wheels.m_per_tick)?,
                 })
             }
-            WheelsKind::Udp | WheelsKind::Ros2 => return Err(LogError::Live(SampleKind::Wheels)),
+            WheelsKind::Udp | WheelsKind::Ros2 => {
+                return Err(LogError::Live {
+                    of: SampleKind::Wheels.section(),
+                });
+            }
             WheelsKind::Log => {
                 let file = wheels.file.clone().unwrap_or_default();
                 Some(WheelLog::read(&file, wheels.m_per_tick)?)
@@ -165,7 +173,7 @@ impl ScanSamples {
             && track.between(first_ns, last_ns).is_empty()
         {
             return Err(LogError::Elsewhere {
-                of,
+                of: of.section(),
                 path: path.to_owned(),
                 after_s: (span_ns[0] - first_ns) as f64 * 1e-9,
                 steps: match faults.clock_steps_s.is_empty() {

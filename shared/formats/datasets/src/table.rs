@@ -46,10 +46,7 @@ pub(crate) trait Columns: Sized {
 #[derive(Clone)]
 pub(crate) struct Rows<C: Columns> {
     pub columns: C,
-    pub entries: Vec<C::Entry>,
-    pub unreadable: Unreadable,
-    /// Rows that state that nothing was measured.
-    pub unmeasured: usize,
+    pub raw: Raw<C::Entry>,
     /// Columns that state so, with the number for that.
     stating: Vec<(usize, f64)>,
     /// The number of columns, and the mark between them.
@@ -85,9 +82,7 @@ impl<C: Columns> Rows<C> {
             stating,
             mark,
             count: row.len(),
-            entries: Vec::new(),
-            unreadable: Unreadable::default(),
-            unmeasured: 0,
+            raw: Raw::of(Vec::new()),
             lines: 0,
         };
         // Without names the first row is an entry.
@@ -117,16 +112,18 @@ impl<C: Columns> Rows<C> {
             text.eq_ignore_ascii_case("false") || text.parse() == Ok(*number)
         };
         match self.columns.entry(row).filter(|_| row.len() == self.count) {
-            Some(_) if self.stating.iter().any(states_so) => self.unmeasured += 1,
-            Some(entry) => self.entries.push(entry),
+            Some(_) if self.stating.iter().any(states_so) => self.raw.unmeasured += 1,
+            Some(entry) => self.raw.entries.push(entry),
             None if row.len() == self.count && self.columns.is_unmeasured(row) => {
-                self.unmeasured += 1;
+                self.raw.unmeasured += 1;
             }
             None => {
                 let line = self.lines + row.position().map_or(0, |at| at.line() as usize);
                 let times = row.get(1).filter(|_| row.get(0) == Some(UNREADABLE));
                 let times = times.and_then(|it| it.parse().ok()).unwrap_or(1);
-                self.unreadable.add(times, line, || why(row, self.count));
+                self.raw
+                    .unreadable
+                    .add(times, line, || why(row, self.count));
             }
         }
     }
@@ -139,6 +136,31 @@ fn reader(text: &str, mark: u8) -> csv::Reader<&[u8]> {
         .trim(csv::Trim::All)
         .delimiter(mark)
         .from_reader(text.as_bytes())
+}
+
+/// The entries of a log as they stand there.
+#[derive(Clone, Debug)]
+pub(crate) struct Raw<T> {
+    pub entries: Vec<T>,
+    pub unreadable: Unreadable,
+    /// Rows or messages that state that nothing was measured.
+    pub unmeasured: usize,
+}
+
+impl<T> Raw<T> {
+    /// Entries that are of no file.
+    pub fn of(entries: Vec<T>) -> Self {
+        Self {
+            entries,
+            unreadable: Unreadable::default(),
+            unmeasured: 0,
+        }
+    }
+
+    /// All entries, those that cannot be used too.
+    pub fn count(&self) -> usize {
+        (self.entries.len() + self.unmeasured).saturating_add(self.unreadable.count)
+    }
 }
 
 /// Rows that cannot be read.

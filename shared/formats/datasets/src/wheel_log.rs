@@ -13,14 +13,13 @@ use counts::CountColumns;
 
 use crate::{
     LogError, LogFaults, SampleTrack,
-    gyro_log::{
-        Raw, SampleColumns,
-        faults::{Plausible, examine},
-        read_table, roots,
-    },
+    gyro_log::faults::{Plausible, examine},
     header::{Header, Sign, Stamp},
-    table::Columns,
+    logs,
+    table::{Columns, Raw},
 };
+
+const OF: &str = SampleKind::Wheels.section();
 
 /// Logs relative to the root of a dataset, in order of precedence.
 const PLACES: [&str; 4] = ["wheels.csv", "wheel_speed.csv", "speed.csv", "odometer.csv"];
@@ -52,12 +51,12 @@ impl WheelLog {
     /// A file that cannot be read or has no speed, one whose stamps or speeds cannot be those of
     /// wheels, and ticks whose length is not given.
     pub fn read(path: &Path, m_per_tick: Option<f64>) -> Result<Self, LogError> {
-        let no_speed = match read_table::<SpeedColumns>(path) {
-            Ok(raw) => return Self::examined(raw, path),
+        let no_speed = match logs::rows::<SpeedColumns>(path, OF) {
+            Ok(rows) => return Self::examined(rows.raw, rows.columns.unit.is_none(), path),
             Err(error) => error,
         };
-        match read_table::<CountColumns>(path) {
-            Ok(raw) => Ok(Self::with(counts::speeds(raw, path, m_per_tick)?, path)),
+        match logs::rows::<CountColumns>(path, OF) {
+            Ok(rows) => Ok(Self::with(counts::speeds(rows, path, m_per_tick)?, path)),
             Err(_) => Err(no_speed),
         }
     }
@@ -68,12 +67,7 @@ impl WheelLog {
     /// # Errors
     /// There is none.
     pub fn find(folder: &Path) -> Result<PathBuf, LogError> {
-        let paths = roots(folder).flat_map(|root| PLACES.iter().map(|place| root.join(place)));
-        let found = paths.into_iter().find(|path| path.is_file());
-        found.ok_or_else(|| LogError::None {
-            of: SampleKind::Wheels,
-            folder: folder.to_owned(),
-        })
+        logs::find(folder, OF, &PLACES)
     }
 
     /// Takes the samples of a bag or of a simulation, which messages name by this path.
@@ -81,7 +75,7 @@ impl WheelLog {
     /// # Errors
     /// Stamps or speeds that cannot be those of wheels.
     pub fn of(samples: Vec<Sample>, path: &Path) -> Result<Self, LogError> {
-        Self::examined(Raw::of(samples), path)
+        Self::examined(Raw::of(samples), false, path)
     }
 
     /// Takes its samples over to the radar's clock: [`WheelsConfig::on_radar`].
@@ -89,8 +83,11 @@ impl WheelLog {
         SampleTrack::of(self.samples.iter().map(|sample| config.on_radar(sample)))
     }
 
-    fn examined(raw: Raw, path: &Path) -> Result<Self, LogError> {
-        Ok(Self::with(examine(raw, path, &SPEEDS)?, path))
+    fn examined(raw: Raw<Sample>, unit_is_assumed: bool, path: &Path) -> Result<Self, LogError> {
+        Ok(Self::with(
+            examine(raw, unit_is_assumed, path, &SPEEDS)?,
+            path,
+        ))
     }
 
     fn with((samples, faults): (Vec<Sample>, LogFaults), path: &Path) -> Self {
@@ -170,14 +167,6 @@ impl Columns for SpeedColumns {
             None => speed,
         };
         Some(Sample::speed(self.stamp.ns(row)?, speed))
-    }
-}
-
-impl SampleColumns for SpeedColumns {
-    const OF: SampleKind = SampleKind::Wheels;
-
-    fn unit_is_assumed(&self) -> bool {
-        self.unit.is_none()
     }
 }
 

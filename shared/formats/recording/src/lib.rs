@@ -1,4 +1,5 @@
-//! Recordings of runs as MCAP files, for viewers and for exact replay.
+//! Recordings of runs as MCAP files, for viewers and for exact replay; and [`bags`] of ROS 2, which
+//! are MCAP files too.
 //!
 //! Each message of a run is in the file twice over, without its bulk being stored twice:
 //!
@@ -20,14 +21,15 @@
 //! has no summary because its writer was killed.
 //!
 //! Reading order: `head` and `table` (the metadata), `writer`, `split` and `ledger` (several
-//! files), `walk` (the records of a file), `recording`, `generations`, `scans` (a
-//! [`Dataset`](gyre_datasets::Dataset)), [`open()`] and [`gnss_log`] (what a source plays, of
-//! whatever form).
+//! files), [`mod@file`] (the records of a file that may be damaged or cut), `recording`,
+//! `generations`, `scans` (a [`Dataset`](gyre_datasets::Dataset)), [`open()`] and [`gnss_log`] (the
+//! opening of sources in any form).
 
-mod chunk;
+pub mod bags;
 mod disk;
 mod early_lines;
 mod error;
+pub mod file;
 mod generations;
 mod gnss;
 mod head;
@@ -42,7 +44,6 @@ mod scans;
 mod split;
 mod table;
 pub mod view;
-mod walk;
 mod writer;
 
 pub use error::RecordingError;

@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use gyre_bags::is_bag;
 use gyre_datasets::{Dataset, DatasetOptions, FileList, Format, OpenError, foreign};
 
 use crate::{
     Recording, RecordingError,
+    bags::{self, is_bag},
     parts::{first_part_in, parts},
     scans::Scans,
 };
@@ -29,7 +29,7 @@ pub fn is_recording(path: &Path) -> bool {
 /// As there; a recording that cannot be read.
 pub fn open(root: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
     if is_bag(root) {
-        return gyre_bags::open(root, options);
+        return bags::open(root, options);
     }
     match is_recording(root) {
         true => open_parts(&parts(root), root, options),
@@ -60,7 +60,7 @@ pub fn reopen(
 ) -> Result<Box<dyn Dataset>, OpenError> {
     match format {
         Format::Mcap => {}
-        Format::Ros2Bag => return gyre_bags::reopen(root, options, &files),
+        Format::Ros2Bag => return bags::reopen(root, options, &files),
         _ => return gyre_datasets::reopen(root, options, format, files),
     }
     let paths: Vec<PathBuf> = (0..files.len())

@@ -6,6 +6,7 @@ use gyre_run::{Ending, Rate};
 use gyre_terminal::{WIDTH, wrap};
 
 use super::Summary;
+use crate::figures::all_unusual;
 
 /// Columns of the names of the lines.
 const NAMES: usize = 12;
@@ -16,13 +17,14 @@ impl Summary {
     /// with SLAM one for the loops, and one for a problem.
     pub fn in_brief(&self) -> String {
         let problem = self.problem.as_ref().map(ToString::to_string);
+        let unusual = all_unusual(&self.figures());
         let lines = [
             (self.ending_word(), Some(self.path())),
             ("problem", problem),
             ("accuracy", Some(self.accuracy())),
             ("loops", self.loops()),
             ("latency", Some(self.pace())),
-            ("unusual", Some(self.unusual())),
+            ("unusual", Some(unusual)),
             ("look at", Some(self.places())),
         ];
         let lines = lines.into_iter().filter_map(|(name, text)| {
@@ -34,9 +36,14 @@ impl Summary {
     }
 
     fn loops(&self) -> Option<String> {
-        let text = self.slam.as_ref()?.to_string();
-        let first = text.lines().next()?.trim_start_matches("slam");
-        Some(first.trim().to_owned() + "; trajectory_slam.tum, map.png")
+        let slam = self.slam.as_ref()?;
+        let ate = slam.ate_m.map_or(String::new(), |ate_m| {
+            format!("; ATE after correction {ate_m:.3} m rmse")
+        });
+        Some(format!(
+            "{} loops between {} keyframes, {} rejected{ate}; trajectory_slam.tum, map.png",
+            slam.loops_used, slam.keyframes, slam.loops_rejected
+        ))
     }
 
     fn ending_word(&self) -> &'static str {
@@ -100,43 +107,6 @@ impl Summary {
         format!(
             "{p50_ms:.0} ms (median), {p99_ms:.0} ms (99 %): {verdict} the {period_ms:.0} ms of a scan"
         )
-    }
-
-    fn unusual(&self) -> String {
-        let c = &self.counts;
-        let motions = c.motions.unwrap_or_default();
-        let lost = c.lost.unwrap_or_default();
-        let restarts = self.restarts.values().sum::<usize>() as u64;
-        let counts = [
-            (c.dropped, "scans dropped"),
-            (c.unreadable, "scans unreadable"),
-            (c.missing, "scans missing in the recording"),
-            (c.breaks, "breaks, after which the path starts anew"),
-            (lost.azimuths, "azimuths lost, which are put back"),
-            (lost.unplaced, "of them at unknown places"),
-            (motions.weak, "motions weak"),
-            (
-                motions.predicted,
-                "motions predicted, since nothing matched",
-            ),
-            (
-                c.gyro.map_or(0, |gyro| gyro.doubted + gyro.refused),
-                "turns of the gyro doubted or refused",
-            ),
-            (
-                c.wheels.map_or(0, |wheels| wheels.slips),
-                "distances of slipping wheels",
-            ),
-            (restarts, "restarts of processes"),
-        ];
-        let counts = counts.iter().filter(|(count, _)| *count > 0);
-        let counts: Vec<String> = counts
-            .map(|(count, what)| format!("{count} {what}"))
-            .collect();
-        match counts.is_empty() {
-            true => "nothing".to_owned(),
-            false => counts.join(", "),
-        }
     }
 
     fn places(&self) -> String {

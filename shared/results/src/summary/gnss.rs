@@ -1,7 +1,5 @@
 //! The part of the summary about GNSS.
 
-use std::fmt;
-
 use gyre_datasets::{GnssFaults, GnssLog};
 use gyre_estimation::EstimationError;
 use gyre_geometry::{UncertainMotion, xy_yaw};
@@ -137,30 +135,5 @@ impl GnssSummary {
     pub fn refusal(&self) -> Option<(&str, bool)> {
         let refusal = self.refusal.as_deref()?;
         Some((refusal, refusal != FixRefusal::Undetermined.to_string()))
-    }
-}
-
-impl fmt::Display for GnssSummary {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { used, refused, .. } = self;
-        write!(f, "gnss          {used} fixes used, {refused} refused")?;
-        if let Some(rms_m) = self.residual_rms_m {
-            write!(f, "; they lie {rms_m:.2} m rms from the trajectory")?;
-        }
-        for (count, what) in self.faults.named() {
-            write!(f, "\n              {count} entries of the log {what}")?;
-        }
-        if let (Some(origin), Some(east_north)) = (&self.origin, &self.east_north) {
-            let across_m = east_north.east_sigma_m.max(east_north.north_sigma_m);
-            write!(
-                f,
-                "\n              begins at {:.6}, {:.6}, heading {:.2} deg; +- {across_m:.2} m, {:.2} deg",
-                origin.latitude_deg,
-                origin.longitude_deg,
-                origin.heading_deg,
-                east_north.yaw_sigma_deg
-            )?;
-        }
-        Ok(())
     }
 }

@@ -146,17 +146,6 @@ mod tests {
     }
 
     #[test]
-    fn the_size_makes_the_step_over_the_seam_as_the_others() {
-        for size in [2_800, 5_595, 5_600, 16_000] {
-            for first in [0, 5, size / 3] {
-                let counts = turn(400, size, first);
-                let expected = u16::try_from(size).ok();
-                assert_eq!(found(&[&counts]), expected, "{size} from {first}");
-            }
-        }
-    }
-
-    #[test]
     fn azimuths_that_are_missing_at_the_seam_make_no_smaller_encoder() {
         let whole = turn(400, 5_600, 7);
         for missing in 0..20 {

@@ -3,8 +3,11 @@
 use gyre_samples::{LocalPlane, RawFix};
 use serde::Serialize;
 
-use super::{LoggedFix, Raw};
-use crate::stretches::{between, longest_chain};
+use super::LoggedFix;
+use crate::{
+    stretches::{between, longest_chain},
+    table::Raw,
+};
 
 /// No vehicle that carries a spinning radar is faster, m/s.
 const MAX_SPEED_MPS: f64 = 70.0;
@@ -104,16 +107,16 @@ impl GnssFaults {
 type Examined = (Vec<LoggedFix>, Option<LocalPlane>, GnssFaults);
 
 /// Leaves out and sorts what the faults name, and counts it.
-pub(super) fn examine(raw: Raw) -> Examined {
+pub(super) fn examine(raw: Raw<RawFix>, is_plane: bool) -> Examined {
     let mut faults = GnssFaults {
         unreadable: raw.unreadable.count,
         first_unreadable: raw.unreadable.first,
-        without_fix: raw.without_fix,
+        without_fix: raw.unmeasured,
         ..GnssFaults::default()
     };
-    let mut rows = raw.rows;
+    let mut rows = raw.entries;
     faults.not_a_number = leave_out(&mut rows, |row| row.at.iter().any(|it| !it.is_finite()));
-    if !raw.is_plane {
+    if !is_plane {
         faults.zero = leave_out(&mut rows, |row| row.at == [0.0, 0.0]);
         faults.off_the_earth = leave_out(&mut rows, |row| {
             row.at[0].abs() > 89.9 || row.at[1].abs() > 360.0
@@ -127,12 +130,12 @@ pub(super) fn examine(raw: Raw) -> Examined {
     faults.of_unknown_status = count(&|row| row.status_is_unknown);
     faults.too_certain = count(&|row| 0.0 < row.sigma_m && row.sigma_m < LEAST_SIGMA_M);
     let plane_at = |row: &RawFix| LocalPlane::new(row.geographic(), finite_or_zero(row.altitude_m));
-    let first = rows.first().filter(|_| !raw.is_plane);
+    let first = rows.first().filter(|_| !is_plane);
     let fixes = in_plane(&rows, first.map(plane_at).as_ref());
     let kept = without_jumps(&fixes);
     faults.jumps = rows.len() - kept.len();
     let rows: Vec<RawFix> = kept.into_iter().map(|k| rows[k]).collect();
-    let plane = rows.first().filter(|_| !raw.is_plane).map(plane_at);
+    let plane = rows.first().filter(|_| !is_plane).map(plane_at);
     (in_plane(&rows, plane.as_ref()), plane, faults)
 }
 

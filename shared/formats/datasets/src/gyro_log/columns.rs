@@ -5,20 +5,19 @@ use std::f64::consts::PI;
 use csv::StringRecord;
 use gyre_samples::{Sample, SampleKind};
 
-use super::SampleColumns;
 use crate::{
     header::{Header, Stamp},
-    table,
+    table::Columns,
 };
 
 /// Where a table has what.
-pub(super) struct Columns {
+pub(super) struct GyroColumns {
     stamp: Stamp,
     rates: [usize; 3],
     /// Factor that makes the rates rad/s.
     rate_unit: f64,
     /// The unit of the rates is named nowhere.
-    unit_is_assumed: bool,
+    pub unit_is_assumed: bool,
     accelerations: Option<([usize; 3], f64)>,
 }
 
@@ -72,7 +71,7 @@ const MULRAN_WITHOUT_RATES: usize = 8;
 /// The remedy, for messages.
 const REMEDY: &str = "the first row must name the columns, as in `stamp_ns,gyro_x_radps,gyro_y_radps,gyro_z_radps` (also stamp_us, stamp_s; _degps)";
 
-impl table::Columns for Columns {
+impl Columns for GyroColumns {
     type Entry = Sample;
 
     fn by_number(columns: usize) -> Result<Self, String> {
@@ -138,14 +137,6 @@ impl table::Columns for Columns {
         let rates = read(self.rates, self.rate_unit)?;
         let accelerations = self.accelerations.and_then(|(at, factor)| read(at, factor));
         Some(sample(stamp_ns, rates, accelerations.unwrap_or_default()))
-    }
-}
-
-impl SampleColumns for Columns {
-    const OF: SampleKind = SampleKind::Gyro;
-
-    fn unit_is_assumed(&self) -> bool {
-        self.unit_is_assumed
     }
 }
 

@@ -9,7 +9,7 @@ use std::path::Path;
 use gyre_radar::median;
 use serde::Serialize;
 
-use super::{LogError, Raw};
+use crate::{LogError, table::Raw};
 use gyre_samples::{Sample, SampleKind};
 
 /// Rates beyond this one are no vehicle's, rad/s.
@@ -100,7 +100,7 @@ impl LogFaults {
 
     /// Returns a sentence for each kind of fault of the log of a sensor.
     pub fn sentences(&self, of: SampleKind) -> Vec<String> {
-        let [values, absurd, unit] = match of {
+        let [values, absurd, unit_of] = match of {
             SampleKind::Gyro => [
                 "rates",
                 "rates beyond 10 rad/s, at which no vehicle turns",
@@ -112,67 +112,57 @@ impl LogFaults {
                 "of the speed: m/s is assumed; `gyre calibrate` tells km/h by its scale",
             ],
         };
-        let counted = |count: usize, sentence: String| (count > 0).then_some(sentence);
+        let counted = [
+            (
+                self.unreadable,
+                format!("rows are not of its table, the first in line {}: left out.", self.first_unreadable),
+            ),
+            (
+                self.not_a_number,
+                format!("samples have no {values}, or some that are not finite: left out."),
+            ),
+            (self.absurd, format!("samples have {absurd}: left out.")),
+            (
+                self.spread,
+                "samples come in bursts of one stamp: spread evenly back to the burst before.".to_owned(),
+            ),
+            (
+                self.repeated,
+                "samples have the stamp of another one: left out.".to_owned(),
+            ),
+            (
+                self.out_of_order,
+                "samples come later than their stamps say: sorted.".to_owned(),
+            ),
+            (
+                self.measured_twice,
+                "samples are of times over which the clock was set back, and which have two measurements: left out.".to_owned(),
+            ),
+        ];
+        let counted = counted.into_iter().filter(|(count, _)| *count > 0);
+        let counted = counted.map(|(count, sentence)| format!("{count} {sentence}"));
+        let steps = (!self.clock_steps_s.is_empty()).then(|| {
+            let (steps, count) = (self.clock_steps(), self.by_clock_steps);
+            format!("{steps}: {count} samples that do not fit with the others are left out.")
+        });
         let longest = self.gaps.iter().copied();
         let longest = longest.max_by(|a, b| a.seconds.total_cmp(&b.seconds));
-        [
-            counted(
-                self.unreadable,
-                format!("{} rows are not of its table, the first in line {}: left out.", self.unreadable, self.first_unreadable),
-            ),
-            counted(
-                self.not_a_number,
-                format!("{} samples have no {values}, or some that are not finite: left out.", self.not_a_number),
-            ),
-            counted(
-                self.absurd,
-                format!("{} samples have {absurd}: left out.", self.absurd),
-            ),
-            counted(
-                self.spread,
-                format!("{} samples come in bursts of one stamp: spread evenly back to the burst before.", self.spread),
-            ),
-            counted(
-                self.repeated,
-                format!("{} samples have the stamp of another one: left out.", self.repeated),
-            ),
-            counted(
-                self.out_of_order,
-                format!("{} samples come later than their stamps say: sorted.", self.out_of_order),
-            ),
-            counted(
-                self.measured_twice,
-                format!("{} samples are of times over which the clock was set back, and which have two measurements: left out.", self.measured_twice),
-            ),
-            counted(
-                self.clock_steps_s.len(),
-                format!(
-                    "{}: {} samples that do not fit with the others are left out.",
-                    self.clock_steps(),
-                    self.by_clock_steps
-                ),
-            ),
-            longest.map(|gap| {
-                format!(
-                    "Samples are missing in {} places, for up to {:.2} s ({:.1} s after the first).",
-                    self.gaps.len(),
-                    gap.seconds,
-                    gap.after_s
-                )
-            }),
-            counted(
-                self.bridged,
-                format!(
-                    "{} samples are missing one or two at a time: interpolated where `max_gap_s` allows it.",
-                    self.bridged
-                ),
-            ),
-            self.unit_is_assumed
-                .then(|| format!("The header names no unit {unit}.")),
-        ]
-        .into_iter()
-        .flatten()
-        .collect()
+        let gaps = longest.map(|gap| {
+            let (places, seconds, after_s) = (self.gaps.len(), gap.seconds, gap.after_s);
+            format!(
+                "Samples are missing in {places} places, for up to {seconds:.2} s ({after_s:.1} s after the first)."
+            )
+        });
+        let bridged = (self.bridged > 0).then(|| {
+            let count = self.bridged;
+            format!(
+                "{count} samples are missing one or two at a time: interpolated where `max_gap_s` allows it."
+            )
+        });
+        let unit = self.unit_is_assumed;
+        let unit = unit.then(|| format!("The header names no unit {unit_of}."));
+        let others = [steps, gaps, bridged, unit].into_iter().flatten();
+        counted.chain(others).collect()
     }
 }
 
@@ -199,26 +189,26 @@ pub(super) const RATES: Plausible = Plausible {
 
 /// Leaves out and sorts what the faults name, and counts it.
 pub(crate) fn examine(
-    raw: Raw,
+    raw: Raw<Sample>,
+    unit_is_assumed: bool,
     path: &Path,
     plausible: &Plausible,
 ) -> Result<(Vec<Sample>, LogFaults), LogError> {
     let unusable = |reason: String| LogError::Unusable {
-        of: plausible.of,
+        of: plausible.of.section(),
         path: path.to_owned(),
         reason,
     };
-    let rows = raw.samples.len() + raw.unmeasured + raw.unreadable.count;
     let mut faults = LogFaults {
         unreadable: raw.unreadable.count,
         first_unreadable: raw.unreadable.first,
-        unit_is_assumed: raw.unit_is_assumed,
+        unit_is_assumed,
         ..LogFaults::default()
     };
-    if let Some(reason) = raw.unreadable.are_most(rows) {
+    if let Some(reason) = raw.unreadable.are_most(raw.count()) {
         return Err(unusable(reason));
     }
-    let mut samples = raw.samples;
+    let mut samples = raw.entries;
     let mut leave_out = |is_bad: &dyn Fn(f64) -> bool| {
         let before = samples.len();
         let is_bad = |sample: &Sample| {

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use gyre_datasets::{AzimuthSource, DatasetOptions, Format, OpenError, open};
 
-use super::{first_scan, first_scan_with, folder, opened, options, rejected};
+use super::{first_scan_with, folder, opened, options, rejected};
 use crate::common::{PERIOD_US, START_US, Sweep, read, write_png, write_radiate};
 
 /// Writes three scans to `folder`, named by the stamp of row `named`; a microsecond has `unit`
@@ -84,23 +84,6 @@ fn an_ambiguous_format_is_reported_with_its_alternative() {
         note.contains("read as oxford") && note.contains("`format = \"fomo\"`"),
         "{note}"
     );
-}
-
-#[test]
-fn oord_has_uniform_azimuths() {
-    let root = folder();
-    let sweep = Sweep {
-        step: 0,
-        ..Sweep::default()
-    };
-    sweep.write(
-        &root
-            .path()
-            .join(format!("Navtech_CTS350-X_Radar/{START_US}.png")),
-    );
-    let scan = first_scan(root.path()).unwrap();
-    assert!((scan.azimuth_rad[10] - 0.25 * TAU).abs() < 1e-6);
-    assert_eq!(scan.geometry.range_resolution_m, 0.0438);
 }
 
 #[test]
