@@ -1,5 +1,5 @@
-//! The process of a drive: a run that knows whether it has been computed, and by whose exit code
-//! failures are told apart.
+//! The process of a drive: a run that knows whether it has been computed, and that reports its
+//! outcome.
 
 use std::{
     path::Path,
@@ -8,7 +8,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_batch::DriveOutcome;
+use gyre_batch::{End, Outcome};
 use gyre_configuration::{
     AutomaticError, Configuration, ConfigurationError, SourceError, paths::shipped,
 };
@@ -48,27 +48,22 @@ enum DriveError {
     Configuration(Failure),
 }
 
-/// Computes a drive, unless it has been computed with the same configuration from the same scans.
-/// The exit code tells the outcome.
+/// Computes a drive, unless it has been computed with the same configuration from the same scans,
+/// and prints its end.
 ///
 /// # Errors
-/// The system does not let the process end with the batch.
+/// The system does not let the process end with the batch; standard output cannot be written.
 pub fn drive(arguments: &BatchDriveArguments) -> Result<ExitCode, Failure> {
     if !end_with(arguments.parent, Signal::TERM)? {
-        return Ok(DriveOutcome::Interrupted.exit_code(false).into());
+        return Ok(ExitCode::FAILURE);
     }
-    let (outcome, earlier) = match computed(&arguments.run) {
-        Ok(ended) => ended,
-        Err(error) => {
-            print::note(format_args!("gyre: {error}"));
-            (outcome_of(&error), false)
-        }
-    };
-    Ok(outcome.exit_code(earlier).into())
+    let end = computed(&arguments.run);
+    let end = end.unwrap_or_else(|error| End::of(outcome_of(&error), error.to_string()));
+    print::line(serde_json::to_string(&end)?)?;
+    Ok(ExitCode::SUCCESS)
 }
 
-/// Returns how the drive has ended, and whether it had before.
-fn computed(arguments: &RunArguments) -> Result<(DriveOutcome, bool), Failure> {
+fn computed(arguments: &RunArguments) -> Result<End, Failure> {
     // What was to be there when the batch began may have gone.
     let given = &arguments.inputs;
     let path = given.data.as_ref().or(given.what.first());
@@ -85,13 +80,13 @@ fn computed(arguments: &RunArguments) -> Result<(DriveOutcome, bool), Failure> {
     earlier::settle(&out)?;
     run::place_recording(&mut configuration, &out);
     if is_finished(&out, &configuration) {
-        return finished(&out).map(|outcome| (outcome, true));
+        return finished(&out);
     }
     let discards = !continues(&out, &configuration)?;
     let code = run::compute(configuration, out, discards, Form::Table)?;
     Ok(match code == ExitCode::from(INTERRUPTED) {
-        true => (DriveOutcome::Interrupted, false),
-        false => (DriveOutcome::Complete, false),
+        true => End::interrupted(),
+        false => End::of(Outcome::Complete, ""),
     })
 }
 
@@ -118,16 +113,15 @@ fn is_finished(out: &Out, configuration: &Configuration) -> bool {
             .unwrap_or(false)
 }
 
-/// Returns how a finished drive has ended, and says again what is wrong with it.
-fn finished(out: &Out) -> Result<DriveOutcome, Failure> {
+/// Returns the end of a finished drive.
+fn finished(out: &Out) -> Result<End, Failure> {
     let text = gyre_storage::read_text(&out.join(SUMMARY), gyre_storage::SETTINGS)?;
     let summary: serde_json::Value = serde_json::from_str(&text)?;
-    Ok(match summary["problem"].as_str() {
-        None => DriveOutcome::Complete,
-        Some(problem) => {
-            print::note(format_args!("gyre: {problem}"));
-            outcome_of_problem(problem)
-        }
+    let problem = summary["problem"].as_str();
+    Ok(End {
+        outcome: problem.map_or(Outcome::Complete, outcome_of_problem),
+        earlier: true,
+        sentence: problem.unwrap_or_default().to_owned(),
     })
 }
 
@@ -158,27 +152,27 @@ fn of_settings(error: Failure) -> Failure {
     }
 }
 
-fn outcome_of(failure: &Failure) -> DriveOutcome {
-    if let Some(outcome) = DriveOutcome::of_full(&failure.to_string()) {
+fn outcome_of(failure: &Failure) -> Outcome {
+    if let Some(outcome) = Outcome::of_full(&failure.to_string()) {
         return outcome;
     }
     if let Some(error) = failure.downcast_ref::<DriveError>() {
         return match error {
-            DriveError::Missing(_) => DriveOutcome::Missing,
-            DriveError::Endless(_) | DriveError::Configuration(_) => DriveOutcome::Configuration,
+            DriveError::Missing(_) => Outcome::Missing,
+            DriveError::Endless(_) | DriveError::Configuration(_) => Outcome::Configuration,
         };
     }
     if let Some(error) = failure.downcast_ref::<AutomaticError>() {
         return match error {
             AutomaticError::Open(error) => outcome_of_open(error),
-            AutomaticError::Read(_) | AutomaticError::Empty => DriveOutcome::NotADataset,
-            _ => DriveOutcome::Configuration,
+            AutomaticError::Read(_) | AutomaticError::Empty => Outcome::NotADataset,
+            _ => Outcome::Configuration,
         };
     }
     if let Some(error) = failure.downcast_ref::<SourceError>() {
         return match error {
             SourceError::Open(error) => outcome_of_open(error),
-            _ => DriveOutcome::Configuration,
+            _ => Outcome::Configuration,
         };
     }
     if let Some(error) = failure.downcast_ref::<PreflightError>() {
@@ -189,41 +183,37 @@ fn outcome_of(failure: &Failure) -> DriveOutcome {
         || failure.is::<SimulatorError>();
     match failure.downcast_ref::<OpenError>() {
         Some(error) => outcome_of_open(error),
-        None if is_configuration => DriveOutcome::Configuration,
+        None if is_configuration => Outcome::Configuration,
         None if failure.is::<Problem>() => outcome_of_problem(&failure.to_string()),
-        None if matches!(failure.downcast_ref(), Some(OutError::Held { .. })) => {
-            DriveOutcome::InUse
-        }
-        None => DriveOutcome::Failed,
+        None if matches!(failure.downcast_ref(), Some(OutError::Held { .. })) => Outcome::InUse,
+        None => Outcome::Failed,
     }
 }
 
-fn outcome_of_problem(sentence: &str) -> DriveOutcome {
+fn outcome_of_problem(sentence: &str) -> Outcome {
     match sentence.contains(Problem::OF_MOTIONS) {
-        true => DriveOutcome::Unsure,
-        false => DriveOutcome::Corrupt,
+        true => Outcome::Unsure,
+        false => Outcome::Corrupt,
     }
 }
 
-fn outcome_of_open(error: &OpenError) -> DriveOutcome {
+fn outcome_of_open(error: &OpenError) -> Outcome {
     match error {
-        OpenError::Missing { .. } => DriveOutcome::Missing,
-        OpenError::BadOption { .. } | OpenError::DatasetToml { .. } => DriveOutcome::Configuration,
-        _ => DriveOutcome::NotADataset,
+        OpenError::Missing { .. } => Outcome::Missing,
+        OpenError::BadOption { .. } | OpenError::DatasetToml { .. } => Outcome::Configuration,
+        _ => Outcome::NotADataset,
     }
 }
 
-fn outcome_of_preflight(error: &PreflightError) -> DriveOutcome {
+fn outcome_of_preflight(error: &PreflightError) -> Outcome {
     match error {
-        PreflightError::TooFew { .. } | PreflightError::NoRecording { .. } => {
-            DriveOutcome::NotADataset
-        }
+        PreflightError::TooFew { .. } | PreflightError::NoRecording { .. } => Outcome::NotADataset,
         PreflightError::SharedMemory { .. }
         | PreflightError::OpenFiles { .. }
-        | PreflightError::NoSharedMemory(_) => DriveOutcome::Machine,
+        | PreflightError::NoSharedMemory(_) => Outcome::Machine,
         PreflightError::LiveLog(_)
         | PreflightError::LiveDoppler
-        | PreflightError::LiveGnss { .. } => DriveOutcome::Configuration,
+        | PreflightError::LiveGnss { .. } => Outcome::Configuration,
     }
 }
 
@@ -234,32 +224,26 @@ mod tests {
     #[test]
     fn failures_of_one_kind_have_one_outcome() {
         let path = || "a".into();
-        let cases: [(Failure, DriveOutcome); 8] = [
-            (
-                DriveError::Missing("a".into()).into(),
-                DriveOutcome::Missing,
-            ),
-            (
-                OpenError::Missing { path: path() }.into(),
-                DriveOutcome::Missing,
-            ),
+        let cases: [(Failure, Outcome); 8] = [
+            (DriveError::Missing("a".into()).into(), Outcome::Missing),
+            (OpenError::Missing { path: path() }.into(), Outcome::Missing),
             (
                 OpenError::NoImages { path: path() }.into(),
-                DriveOutcome::NotADataset,
+                Outcome::NotADataset,
             ),
             (
                 AutomaticError::Open(OpenError::NoImages { path: path() }).into(),
-                DriveOutcome::NotADataset,
+                Outcome::NotADataset,
             ),
             (
                 PreflightError::OpenFiles { limit: 1 }.into(),
-                DriveOutcome::Machine,
+                Outcome::Machine,
             ),
-            (of_settings("a card".into()), DriveOutcome::Configuration),
-            ("masking died".into(), DriveOutcome::Failed),
+            (of_settings("a card".into()), Outcome::Configuration),
+            ("masking died".into(), Outcome::Failed),
             (
                 "cannot write b: No space left on device (os error 28)".into(),
-                DriveOutcome::DiskFull,
+                Outcome::DiskFull,
             ),
         ];
         for (failure, outcome) in cases {

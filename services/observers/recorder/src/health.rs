@@ -8,10 +8,8 @@ use std::{
     time::Duration,
 };
 
-use gyre_stage::{
-    control::{Control, Status},
-    usage::Usage,
-};
+use gyre_stage::control::{Control, Status};
+use gyre_supervise::Usage;
 use serde::Serialize;
 
 /// Time between two questions.

@@ -6,8 +6,8 @@ use gyre_stage::{
     StageError,
     control::{Activity, Control, Phase, ProcessStatus, Status},
     source::Received,
-    usage::Usage,
 };
+use gyre_supervise::Usage;
 use gyre_terminal::{Failure, print};
 use serde::Serialize;
 

@@ -19,9 +19,11 @@ mod end;
 mod followers;
 mod guardian;
 mod log;
+pub mod memory;
 mod observers;
 mod plan;
 mod poses;
+mod process_stat;
 mod process_status;
 mod processes;
 mod program;
@@ -40,6 +42,7 @@ mod supervisor;
 mod swaps;
 #[cfg(test)]
 mod tests;
+mod usage;
 mod wake_limit;
 mod watchdog;
 
@@ -48,6 +51,8 @@ pub use guardian::guard;
 pub use gyre_run::{Ending, Scheduling, Swapped};
 pub use log::last_line;
 pub use plan::{END_TIMEOUT, Event, Plan, StagePlan, Stall, SuperviseError};
+pub use process_stat::ProcessStat;
 pub use program::Program;
 pub use requests::wait;
 pub use supervisor::supervise;
+pub use usage::Usage;

@@ -4,7 +4,7 @@ use std::{fs, path::Path, time::Duration};
 
 use serde::{Deserialize, Serialize};
 
-use crate::processes::ProcessStat;
+use crate::ProcessStat;
 
 /// The resources that a process has used since its start, and the memory that it has now.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
