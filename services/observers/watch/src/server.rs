@@ -26,7 +26,7 @@ use tokio::{runtime, sync::watch, time};
 
 use crate::{
     access::{Access, Token, Verdict},
-    connections::{self, Limits, Peer},
+    connections::{self, Limits},
     foxglove::{self, Hub},
     metrics,
     observing::{self, Followed},
@@ -87,14 +87,8 @@ struct Shared {
 }
 
 impl Shared {
-    /// Judges a request. The connection of one that may read keeps its place.
     fn judge(&self, request: &Request) -> Verdict {
-        let verdict = self.access.judge(request.uri(), request.headers());
-        let may_read = matches!(verdict, Verdict::Granted | Verdict::GrantedByAddress);
-        if let Some(peer) = request.extensions().get::<Peer>().filter(|_| may_read) {
-            peer.keep_place();
-        }
-        verdict
+        self.access.judge(request.uri(), request.headers())
     }
 }
 

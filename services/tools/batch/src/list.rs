@@ -191,7 +191,7 @@ fn table(text: &str) -> Lines {
 
 impl Line {
     fn drive(self) -> Result<Drive, String> {
-        let Self { drive: path, .. } = &self;
+        let path = &self.drive;
         if path.is_empty() {
             return Err("the column `drive` is empty: it is the path of the recording".to_owned());
         }
@@ -204,10 +204,11 @@ impl Line {
             let set = &self.set;
             format!("the column `set` is `{set}`, in which a quote is not closed")
         })?;
+        let drive = Drive::of(path, self.name.as_deref())?;
         Ok(Drive {
             configuration: self.configuration,
             set,
-            ..Drive::of(path, self.name.as_deref())?
+            ..drive
         })
     }
 }
