@@ -109,8 +109,8 @@ impl Ended {
     fn add(&mut self, batch: &Batch<'_>, drive: &Drive, end: End) -> Result<String, Failure> {
         let Batch { settings, out, .. } = batch;
         let row = Row::read(out, drive, settings)?;
-        let (row, earlier, note) = match end.outcome.leaves_results() && row.outcome.has_results() {
-            // The results are there, though they could not be checked again.
+        let (row, earlier, note) = match row.outcome.has_results() && !end.outcome.has_results() {
+            // The results are still there, though they could not be checked again.
             true => (
                 row,
                 true,
@@ -196,7 +196,7 @@ impl<'a> Child<'a> {
                 format!("its supervisor was killed by signal {signal}: the same command continues"),
             ),
             (None, Err(_)) if last.is_empty() => End::of(Outcome::Failed, "it printed nothing"),
-            (None, Err(_)) => End::of(Outcome::of_full(last).unwrap_or(Outcome::Failed), last),
+            (None, Err(_)) => End::of(Outcome::Failed, last),
         }
     }
 
@@ -310,10 +310,10 @@ mod tests {
 
     #[test]
     fn an_end_is_the_last_line_or_the_cause_of_the_death() {
-        let reported = End::of(Outcome::Missing, "no /batch/drives/a");
+        let reported = End::of(Outcome::Corrupt, "no /batch/drives/a");
         let json = serde_json::to_string(&reported).unwrap();
         let end = end_of(&format!("echo words; echo '{json}'"));
-        assert_eq!(end, End::of(Outcome::Missing, "no drives/a"));
+        assert_eq!(end, End::of(Outcome::Corrupt, "no drives/a"));
         let end = end_of("echo some words; exit 101");
         assert_eq!(end, End::of(Outcome::Failed, "some words"));
         assert_eq!(

@@ -269,7 +269,7 @@ impl<'a> Session<'a> {
 
     /// Returns the inputs that the process has not subscribed to.
     pub(crate) fn not_read(&self) -> Vec<&'static str> {
-        let feeds = self.harness.feeds;
+        let feeds = &self.harness.feeds;
         let is_unread = |topic: &&str| feeds.get(topic).is_some_and(|it| it.subscribers() == 0);
         let inputs = self.harness.topics.leading(Direction::Forward);
         inputs.filter(is_unread).collect()

@@ -163,7 +163,7 @@ fn gives_history(session: &mut Session<'_>) -> Result<(), ProgramError> {
         while late.receive().is_ok_and(|message| message.is_some()) {
             received += 1;
         }
-        let rig = session.harness.rig;
+        let rig = &session.harness.rig;
         if rig.sleep(&[late.as_ref()], POLL_PERIOD)? {
             return Err(ProgramError::Interrupted);
         }
