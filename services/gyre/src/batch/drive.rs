@@ -93,7 +93,7 @@ fn locked(path: &Path) -> Result<Out, OutError> {
 /// Returns whether a run was begun with this configuration from these scans.
 fn is_same(begun: &Identity, configuration: &Configuration) -> Result<bool, Failure> {
     let replaced = program::replaced(configuration)?;
-    Ok(begun.has_inputs_of(configuration, &replaced)?)
+    begun.has_inputs_of(configuration, &replaced)
 }
 
 /// Returns whether the folder has the results of all these scans with this configuration, by
