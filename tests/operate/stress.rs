@@ -4,7 +4,7 @@ use std::{
     fs,
     io::{BufRead, BufReader},
     path::{Path, PathBuf},
-    process::{Child, Command, Output, Stdio},
+    process::{Child, Output, Stdio},
     thread,
     time::{Duration, Instant},
 };
@@ -15,7 +15,7 @@ use rustix::process::Signal;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::common::{assert_nothing_left, gyre, leftovers, recording, send};
+use crate::common::{assert_nothing_left, gyre, recording, send};
 
 /// Time between two scans of the recording, s.
 const PERIOD_S: f64 = 0.25;

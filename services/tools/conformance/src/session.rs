@@ -142,7 +142,7 @@ impl<'a> Session<'a> {
     pub(crate) fn spawn(&mut self, command: &[String]) -> Result<(), ProgramError> {
         self.last = None;
         self.notified.clear();
-        Ok(self.harness.start(command, &Scheduling::default())?)
+        self.harness.start(command, &Scheduling::default())
     }
 
     /// Waits until the process has answered an item; the limit is that for one item.

@@ -104,7 +104,7 @@ impl ShadowProgram {
         if self.candidate.stage == StageId::Refinement {
             self.copy_state(&out)?;
         }
-        Ok(self.candidate.rig(out, signals, true)?)
+        self.candidate.rig(out, signals, true)
     }
 
     /// Appends the output of a life of the program to the file for it.
