@@ -15,7 +15,7 @@ use std::{
 use axum::{
     Router,
     extract::{Request, State, WebSocketUpgrade, ws::rejection::WebSocketUpgradeRejection},
-    http::{HeaderMap, HeaderValue, StatusCode, header},
+    http::{StatusCode, header},
     middleware::{self, Next},
     response::{IntoResponse, Redirect, Response},
     routing::get,
@@ -328,10 +328,9 @@ fn bounded(upgrade: WebSocketUpgrade, bytes: usize) -> WebSocketUpgrade {
     upgrade.max_message_size(bytes).max_frame_size(bytes)
 }
 
-async fn scrape(State(shared): State<Shared>, headers: HeaderMap) -> Response {
-    let accepted = headers.get(header::ACCEPT).map(HeaderValue::as_bytes);
-    let (kind, text) = metrics::scrape(&shared.view, accepted.unwrap_or_default());
-    ([(header::CONTENT_TYPE, kind)], text).into_response()
+async fn scrape(State(shared): State<Shared>) -> Response {
+    let text = metrics::scrape(&shared.view);
+    ([(header::CONTENT_TYPE, metrics::OPEN_METRICS)], text).into_response()
 }
 
 impl ReaderSlot {
