@@ -36,14 +36,8 @@ pub fn drive(arguments: &BatchDriveArguments) -> Result<ExitCode, Failure> {
     if !end_with(arguments.parent, Signal::TERM)? {
         return Ok(ExitCode::FAILURE);
     }
-    let end = computed(&arguments.run).unwrap_or_else(|error| {
-        let sentence = error.to_string();
-        let outcome = match error.is::<Problem>() {
-            true => of_problem(&sentence),
-            false => Outcome::Failed,
-        };
-        End::of(outcome, sentence)
-    });
+    let end = computed(&arguments.run);
+    let end = end.unwrap_or_else(|error| End::of(Outcome::Failed, error.to_string()));
     print::line(serde_json::to_string(&end)?)?;
     Ok(ExitCode::SUCCESS)
 }
@@ -69,14 +63,14 @@ fn computed(arguments: &RunArguments) -> Result<End, Failure> {
     earlier::settle(&out)?;
     run::place_recording(&mut configuration, &out);
     if is_finished(&out, &configuration) {
-        return finished(&out);
+        return finished(out.path(), true);
     }
     let discards = !continues(&out, &configuration)?;
-    let code = run::compute(configuration, out, discards, Form::Table)?;
-    Ok(match code == ExitCode::from(INTERRUPTED) {
-        true => End::interrupted(),
-        false => End::of(Outcome::Complete, ""),
-    })
+    let results = out.path().to_owned();
+    match run::compute(configuration, out, discards, Form::Table)? {
+        code if code == ExitCode::from(INTERRUPTED) => Ok(End::interrupted()),
+        _ => finished(&results, false),
+    }
 }
 
 /// Locks the folder of the results, when the run that ends there has ended.
@@ -107,14 +101,19 @@ fn is_finished(out: &Out, configuration: &Configuration) -> bool {
             .unwrap_or(false)
 }
 
-/// Returns the end of a finished drive.
-fn finished(out: &Out) -> Result<End, Failure> {
-    let text = gyre_storage::read_text(&out.join(SUMMARY), gyre_storage::SETTINGS)?;
+/// Returns the end of a finished drive; `earlier`: it had ended so before.
+fn finished(results: &Path, earlier: bool) -> Result<End, Failure> {
+    let text = gyre_storage::read_text(&results.join(SUMMARY), gyre_storage::SETTINGS)?;
     let summary: serde_json::Value = serde_json::from_str(&text)?;
     let problem = summary["problem"].as_str();
+    let outcome = match problem {
+        None => Outcome::Complete,
+        Some(problem) if problem.contains(Problem::OF_MOTIONS) => Outcome::Unsure,
+        Some(_) => Outcome::Corrupt,
+    };
     Ok(End {
-        outcome: problem.map_or(Outcome::Complete, of_problem),
-        earlier: true,
+        outcome,
+        earlier,
         sentence: problem.unwrap_or_default().to_owned(),
     })
 }
@@ -129,11 +128,4 @@ fn continues(out: &Out, configuration: &Configuration) -> Result<bool, Failure> 
         (_, Some((begun, _))) => is_same(begun, configuration).unwrap_or(true),
         (_, None) => true,
     })
-}
-
-fn of_problem(sentence: &str) -> Outcome {
-    match sentence.contains(Problem::OF_MOTIONS) {
-        true => Outcome::Unsure,
-        false => Outcome::Corrupt,
-    }
 }
