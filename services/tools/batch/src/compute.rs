@@ -47,14 +47,14 @@ pub struct Batch<'a> {
 pub struct Ended {
     /// The number of drives by outcome.
     pub counts: BTreeMap<Outcome, usize>,
-    /// Those of them that had been computed before.
+    /// The number of drives that had been computed before.
     pub earlier: usize,
     /// True if the batch was interrupted before its end.
     pub interrupted: bool,
 }
 
-/// Computes all drives, and writes the row of each when it has ended. `say` gets a line for each. A
-/// request to stop ends the runs too, whose results so far are kept.
+/// Computes all drives, and writes the row of each when it has ended. `say` receives a line for each
+/// drive. A request to stop ends the runs too, whose results so far are kept.
 ///
 /// # Errors
 /// A process that cannot be started, or a row that cannot be written. The runs are ended then.
@@ -135,7 +135,7 @@ struct Child<'a> {
     drive: &'a Drive,
     process: process::Child,
     output: File,
-    /// The place in the file of its output at which this process begins.
+    /// Bytes of the output before the output of this process.
     begin: u64,
 }
 
@@ -217,7 +217,7 @@ impl Drop for Child<'_> {
     }
 }
 
-/// The words of a drive's command: those of `gyre run`, after the process that it ends with.
+/// The words of a drive's command: the parent process, then the words of `gyre run`.
 fn words(batch: &Batch<'_>, drive: &Drive) -> Vec<OsString> {
     let option = |name: &str, path: &Path| {
         let mut word = OsString::from(name);
@@ -301,7 +301,7 @@ mod tests {
         fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
         let list = list(folder.path(), "a\n");
         let batch = batch(&list, folder.path(), program.to_str().unwrap());
-        // The sentence of an earlier attempt is not that of this one.
+        // An earlier attempt has left its output.
         fs::write(folder.path().join("output/a.txt"), "earlier\n").unwrap();
         let mut child = Child::start(&batch, &list.drives[0]).unwrap();
         let status = child.process.wait().unwrap();

@@ -45,7 +45,7 @@ pub(crate) const FIGURES: [Column; 26] = [
     ("loops_rejected", "/slam/loops_rejected"),
     ("slam_ate_rmse_m", "/slam/ate_m"),
 ];
-/// The columns of `times.csv`: they depend on the computer, and on what was killed.
+/// The columns of `times.csv`: they depend on the computer and on kills.
 pub(crate) const TIMES: [Column; 9] = [
     ("processor", "/machine/processor"),
     ("cores", "/machine/cores"),

@@ -27,7 +27,7 @@ pub struct Drive {
     /// Path of a recording's folder, of a recorded run (`.mcap`) or of a configuration (`.toml`),
     /// as the list has it.
     pub path: String,
-    /// Path of the configuration, as the list has it; `None`: that of the batch.
+    /// Path of the configuration, as the list has it; `None`: the configuration of the batch.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub configuration: Option<String>,
     /// Overrides of the configuration, `section.key=value`.
@@ -40,7 +40,7 @@ pub struct Drive {
 pub struct List {
     /// The drives.
     pub drives: Vec<Drive>,
-    /// The absolute path of the folder to which paths are relative.
+    /// The absolute path of the folder: paths are relative to it.
     folder: PathBuf,
 }
 
@@ -127,7 +127,7 @@ fn entries(folder: &Path) -> io::Result<Lines> {
 
 fn is_drive(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().as_encoded_bytes();
-    // macOS puts files of its own beside those of an archive.
+    // macOS adds files of its own to an archive.
     !name.starts_with(b".") && name != b"__MACOSX" && (path.is_dir() || is_recorded(path))
 }
 

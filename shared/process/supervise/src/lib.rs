@@ -7,7 +7,8 @@
 //!
 //! Reading order: `supervisor`, the loop; its parts, each with a file of that name: `processes`,
 //! `poses`, `stall`, `recovery`, `followers`, `swaps`, `recorder`; `restarts` and `requests`, where
-//! it is done what they decide; `start` and `child`, a process; `clean`.
+//! it is done what they decide; `start` and `child`, a process; `clean`. [`ProcessStat`], [`Usage`]
+//! and [`memory`] read `/proc`.
 
 // `pre_exec` and raw file descriptors need `unsafe`; each use states why it is sound.
 #![allow(unsafe_code)]
@@ -55,4 +56,4 @@ pub use process_stat::ProcessStat;
 pub use program::Program;
 pub use requests::wait;
 pub use supervisor::supervise;
-pub use usage::Usage;
+pub use usage::{Usage, UsedRun};
