@@ -3,7 +3,7 @@
 use std::{path::Path, process::ExitCode};
 
 use gyre_configuration::{Configuration, describe_masks, with_stored_options};
-use gyre_conformance::{Candidate, ConformanceError, Demands, InputScans, Report, Test, check};
+use gyre_conformance::{Candidate, Demands, InputScans, ProgramError, Report, Test, check};
 use gyre_inputs::Inputs;
 use gyre_messages::StageId;
 use gyre_odometry::SearchKind;
@@ -82,12 +82,12 @@ fn examine(arguments: &ConformanceArguments) -> Result<Option<Report>, Failure> 
         demands,
     };
     match run_test(&test, scans, arguments.json) {
-        Err(ConformanceError::Interrupted) => Ok(None),
+        Err(ProgramError::Interrupted) => Ok(None),
         report => Ok(Some(report?)),
     }
 }
 
-fn run_test(test: &Test, scans: InputScans, quietly: bool) -> Result<Report, ConformanceError> {
+fn run_test(test: &Test, scans: InputScans, quietly: bool) -> Result<Report, ProgramError> {
     let signals = Signals::install()?;
     check(test, scans, &signals, &mut |what| {
         if !quietly {

@@ -236,12 +236,6 @@ fn has_all_objects(out: &Out) -> Result<bool, Failure> {
         })
 }
 
-/// Returns whether the journal in a folder is of a version of Gyre that had another form of it.
-pub fn is_of_another_version(out: &Path) -> bool {
-    let records = journal::records(&journal::path(out));
-    matches!(records, Err(JournalError::OtherVersion { .. }))
-}
-
 /// Keeps a second name of a damaged journal, which `--fresh` does not remove.
 fn kept(error: JournalError, path: &Path) -> Failure {
     if !matches!(error, JournalError::Damaged { .. }) {

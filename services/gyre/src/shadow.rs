@@ -3,11 +3,11 @@
 
 use std::process::ExitCode;
 
+use gyre_conformance::shadow::{self, Options, STAGES};
 use gyre_messages::{FollowerId, Footprint, StageId, Window};
 use gyre_operate::chosen;
 use gyre_results::{Content, Out};
 use gyre_run::{Scheduling, StageConfig};
-use gyre_shadow::{Options, STAGES};
 use gyre_stage::{control::Control, observer::ObservedRun};
 use gyre_terminal::{Failure, own, print, seconds, words};
 
@@ -33,7 +33,7 @@ pub fn shadow(arguments: &ShadowArguments) -> Result<ExitCode, Failure> {
         ..manifest.window
     };
     preflight::check_shared_memory(&Footprint::new(&window, &manifest.limits))?;
-    let report = gyre_shadow::shadow(&run, &options, &mut |line| {
+    let report = shadow::shadow(&run, &options, &mut |line| {
         print::note(format_args!("gyre shadow: {line}"));
     })?;
     match arguments.json {

@@ -3,7 +3,7 @@
 use std::{fs, process::ExitCode, time::Duration};
 
 use gyre_configuration::Configuration;
-use gyre_messages::{Masked, Message, Motion, Scan, StageId, topics};
+use gyre_messages::StageId;
 use gyre_results::{
     Content, Out,
     machine::{Machine, today},
@@ -11,15 +11,13 @@ use gyre_results::{
 use gyre_run::Scenario;
 use gyre_scan_matching::RefinementKind;
 use gyre_stress::{
-    MessageKind, Options, Others, Provenance, Report, TestedPipeline, report::Verdict,
-    witness_fault,
+    Options, Others, Provenance, Report, TestedPipeline, report::Verdict, witness_fault,
 };
 use gyre_terminal::{Failure, own, print};
 
 use crate::{
     cli::{RunArguments, StressArguments},
-    preflight::{self, Preflight},
-    program,
+    preflight, program,
     run::resolve,
     simulate,
 };
@@ -61,7 +59,7 @@ pub fn stress(arguments: &StressArguments) -> Result<ExitCode, Failure> {
 /// # Errors
 /// A failure of it.
 pub fn help(arguments: &[String]) -> Result<ExitCode, Failure> {
-    gyre_stress::help(&own(), arguments)?;
+    gyre_stress::helper::help(&own(), arguments)?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -97,7 +95,6 @@ fn carry_out(arguments: &StressArguments) -> Result<Report, Failure> {
         },
         stages: stages.filter(|stage| configuration.has(*stage)).collect(),
         budget: configuration.budget.clone(),
-        kinds: kinds(&checked),
         shared_bytes: checked.footprint.total() as u64,
     };
     let options = Options {
@@ -122,7 +119,7 @@ fn carry_out(arguments: &StressArguments) -> Result<Report, Failure> {
     report.write(out.path())?;
     printed?;
     print::line(format_args!(
-        "report in {}: report.md, report.json, report.svg",
+        "report in {}: report.json, and NAME.csv of each scenario",
         out.path().display()
     ))?;
     Ok(report)
@@ -155,22 +152,6 @@ fn possible(tested: &TestedPipeline) -> Vec<Scenario> {
         }
     })
     .collect()
-}
-
-/// The messages whose hand-over is compared with copies: the largest ones, and one without a
-/// payload.
-fn kinds(checked: &Preflight) -> Vec<MessageKind> {
-    let kind = |name| {
-        let mut topics = topics(&checked.window);
-        let topic = topics.find(|topic| topic.name == name);
-        MessageKind {
-            topic: name,
-            bytes: topic.map_or(0, |topic| topic.max_sample_bytes(&checked.limits)),
-        }
-    };
-    [Scan::TOPIC, Masked::TOPIC, Motion::TOPIC]
-        .map(kind)
-        .to_vec()
 }
 
 fn require_stages(tested: &TestedPipeline, stages: &[StageId]) -> Result<(), Failure> {

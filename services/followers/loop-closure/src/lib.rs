@@ -5,25 +5,21 @@
 //! the verdicts on all candidates in `journal/loops.log`, from which a restarted process continues.
 //! Both follow from the keyframes, whenever those come.
 
-mod logged;
-
 use std::{collections::VecDeque, path::PathBuf};
 
 use gyre_estimation::places::{MAX_NEIGHBOURS, neighbours};
-use gyre_geometry::{covariance, xy_yaw};
-use gyre_messages::{Item, Loop, LoopHeader};
+use gyre_journal::loops::loop_header;
+use gyre_messages::{Loop, LoopHeader};
 use gyre_radar::points::PointsConfig;
 use gyre_scan_matching::RefinementConfig;
 use gyre_slam::{
-    ClosingError, Keyframe, KeyframeSource, LoopCandidate, LoopCloser, LoopOptions, Place, Query,
-    RecordLog, RecordReader, SlamConfig,
+    ClosingError, Keyframe, KeyframeSource, LoopCloser, LoopOptions, Place, Query, RecordLog,
+    RecordReader, SlamConfig,
 };
 use gyre_stage::{
     Follower, Launch, StageCounters, StageError,
     follower::{self, Growth, LogId, Progress, Step},
 };
-
-pub use logged::LoggedLoops;
 
 /// Runs the follower to the end of the keyframes, or until SIGTERM.
 ///
@@ -253,37 +249,11 @@ impl State {
         for (candidate, _) in query.loops() {
             let ends = [query.keyframe, candidate.place];
             let [later, earlier] = ends.map(|index| self.keyframes.read(index));
-            let header = header(self.loops, &later?, &earlier?, candidate);
+            let header = loop_header(self.loops, &later?, &earlier?, candidate);
             self.loops += 1;
             self.pending.push_back(header);
         }
         Ok(())
-    }
-}
-
-fn header(
-    loops: u64,
-    later: &Keyframe,
-    earlier: &Keyframe,
-    candidate: &LoopCandidate,
-) -> LoopHeader {
-    let [x_m, y_m, yaw_rad] = xy_yaw(&candidate.motion.motion);
-    LoopHeader {
-        item: Item {
-            seq: loops,
-            scan: later.scan,
-            previous_scan: earlier.scan,
-            stamp_ns: later.stamp_ns,
-            ..Item::default()
-        },
-        later_seq: later.seq,
-        earlier_seq: earlier.seq,
-        x_m,
-        y_m,
-        yaw_rad,
-        covariance: covariance::pack(&candidate.motion.covariance),
-        correlation: candidate.correlation,
-        loops: loops + 1,
     }
 }
 

@@ -8,10 +8,9 @@ use std::{
 };
 
 use bytemuck::Pod;
-use gyre_journal as journal;
-use gyre_loop_closure::LoggedLoops;
+use gyre_journal::{self as journal, loops::LoggedLoops};
 use gyre_messages::{Hop, LoopHeader, MotionHeader, PoseHeader, StageId, flag};
-use gyre_stage::source::RecordedMessage;
+use gyre_stage::{StageError, source::RecordedMessage};
 
 use crate::LinkError;
 
@@ -209,7 +208,7 @@ impl Log for LoggedLoops {
     type Header = LoopHeader;
 
     fn read(&mut self, seq: u64) -> Result<Option<LoopHeader>, LinkError> {
-        let loops = self.refresh()?;
+        let loops = self.refresh().map_err(StageError::from)?;
         Ok(loops.get(seq as usize).copied())
     }
 }

@@ -14,7 +14,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_loop_closure::LoggedLoops;
+use gyre_journal::loops::LoggedLoops;
 use gyre_messages::{
     Limits, Loop, Masked, Message as _, Motion, Pose, Refined, Scan, Sender, Window, topic,
 };
@@ -270,7 +270,7 @@ impl Logs {
         let loops = manifest
             .window
             .slam
-            .then(|| LoggedLoops::open(&manifest.out));
+            .then(|| LoggedLoops::open(&manifest.out).map_err(StageError::from));
         Ok(Self {
             poses: Arc::new(PoseBuffer::of(PoseLog::of(&manifest.out))),
             loops: loops

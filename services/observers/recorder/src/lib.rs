@@ -6,12 +6,11 @@
 //! [`gyre_stage::observer`].
 //!
 //! Reading order: `options`, `recorder` (the loop), `begin`, `tap` (the observers), `queue`,
-//! `writing` (the other thread), `log_tail`, `health`.
+//! `writing` (the other thread), `health`.
 
 mod begin;
 mod error;
 mod health;
-mod log_tail;
 mod options;
 mod queue;
 mod recorder;
@@ -21,6 +20,5 @@ mod writing;
 pub use begin::{require_new, require_own};
 pub use error::RecorderError;
 pub use gyre_recording::{Ledger, Split};
-pub use log_tail::LogTail;
 pub use options::Options;
 pub use recorder::{Recorded, record};

@@ -9,7 +9,7 @@ use std::{
 };
 
 use gyre_messages::{Message, Pose, Refined, Sender as PublishedBy, topic};
-use gyre_recording::SplitWriter;
+use gyre_recording::{LogTail, SplitWriter};
 use gyre_stage::{
     Manifest, StageError, clock, launch,
     observer::{ObservedRun, wait_for_any},
@@ -21,7 +21,6 @@ use crate::{
     RecorderError,
     begin::{Begun, begin},
     health::health,
-    log_tail::LogTail,
     options::{HEALTH, LOG, Options},
     queue::{Entry, LIMIT_BYTES, Sender, queue},
     tap::{Counts, Tap},

@@ -15,7 +15,7 @@ use std::{
 use axum::{
     Router,
     extract::{Request, State, WebSocketUpgrade, ws::rejection::WebSocketUpgradeRejection},
-    http::{HeaderMap, HeaderValue, StatusCode, header},
+    http::{StatusCode, header},
     middleware::{self, Next},
     response::{IntoResponse, Redirect, Response},
     routing::get,
@@ -26,7 +26,7 @@ use tokio::{runtime, sync::watch, time};
 
 use crate::{
     access::{Access, Token, Verdict},
-    connections::{self, Limits, Peer},
+    connections::{self, Limits},
     foxglove::{self, Hub},
     metrics,
     observing::{self, Followed},
@@ -87,14 +87,8 @@ struct Shared {
 }
 
 impl Shared {
-    /// Judges a request. The connection of one that may read keeps its place.
     fn judge(&self, request: &Request) -> Verdict {
-        let verdict = self.access.judge(request.uri(), request.headers());
-        let may_read = matches!(verdict, Verdict::Granted | Verdict::GrantedByAddress);
-        if let Some(peer) = request.extensions().get::<Peer>().filter(|_| may_read) {
-            peer.keep_place();
-        }
-        verdict
+        self.access.judge(request.uri(), request.headers())
     }
 }
 
@@ -334,10 +328,9 @@ fn bounded(upgrade: WebSocketUpgrade, bytes: usize) -> WebSocketUpgrade {
     upgrade.max_message_size(bytes).max_frame_size(bytes)
 }
 
-async fn scrape(State(shared): State<Shared>, headers: HeaderMap) -> Response {
-    let accepted = headers.get(header::ACCEPT).map(HeaderValue::as_bytes);
-    let (kind, text) = metrics::scrape(&shared.view, accepted.unwrap_or_default());
-    ([(header::CONTENT_TYPE, kind)], text).into_response()
+async fn scrape(State(shared): State<Shared>) -> Response {
+    let text = metrics::scrape(&shared.view);
+    ([(header::CONTENT_TYPE, metrics::OPEN_METRICS)], text).into_response()
 }
 
 impl ReaderSlot {

@@ -11,16 +11,17 @@ mod timing;
 
 use std::{collections::BTreeMap, time::Duration};
 
-use gyre_harness::{Recorded, item::work_ns, result::result_bytes};
 use gyre_messages::{Item, StageId, flag};
+use gyre_supervise::rig::Recorded;
 
 use crate::{
-    ConformanceError,
-    context::Context,
-    deviation::deviation,
+    ProgramError,
+    item::work_ns,
     report::{Judged, Report, Work},
+    result::{Differences, result_bytes},
     rule::{Findings, Rule},
     session::Session,
+    test::Context,
 };
 
 /// The test of one program.
@@ -51,7 +52,7 @@ impl<'a> Examination<'a> {
 
     /// Runs all scenarios. If the program does not get through the first, the others could say
     /// nothing.
-    pub(crate) fn run(mut self) -> Result<Report, ConformanceError> {
+    pub(crate) fn run(mut self) -> Result<Report, ProgramError> {
         self.note_inapplicable_rules();
         (self.observe)("a start without topics");
         self.start_without_topics()?;
@@ -107,7 +108,7 @@ impl<'a> Examination<'a> {
     }
 
     /// Measures Gyre's own stage on the same inputs, unless it is the program.
-    fn own_work(&mut self) -> Result<Option<Work>, ConformanceError> {
+    fn own_work(&mut self) -> Result<Option<Work>, ProgramError> {
         let (stage, candidate) = (self.stage(), &self.context.test.candidate);
         let own = candidate.own_command(stage);
         if candidate.command == own {
@@ -120,7 +121,7 @@ impl<'a> Examination<'a> {
         let waited = session.reach(self.context.reference.end())?;
         match waited.is_done() {
             true => Ok(Work::of(work_on(stage, &session.outputs))),
-            false => Err(ConformanceError::Own {
+            false => Err(ProgramError::Own {
                 stage: stage.name(),
                 reason: waited.to_string(),
             }),
@@ -131,7 +132,7 @@ impl<'a> Examination<'a> {
         mut self,
         answers: Option<Work>,
         own_work: Option<Work>,
-    ) -> Result<Report, ConformanceError> {
+    ) -> Result<Report, ProgramError> {
         let Context {
             test, reference, ..
         } = self.context;
@@ -178,7 +179,7 @@ impl<'a> Examination<'a> {
         });
     }
 
-    fn compare_with_own(&mut self, topic: &str, own: &[Recorded]) -> Result<(), ConformanceError> {
+    fn compare_with_own(&mut self, topic: &str, own: &[Recorded]) -> Result<(), ProgramError> {
         for own in own {
             let seq = own.item().seq;
             let same = self.first_results.get(&seq) == Some(&result_bytes(topic, own)?);
@@ -195,4 +196,25 @@ fn work_on(stage: StageId, outputs: &[Recorded]) -> impl Iterator<Item = i64> {
     let items = outputs.iter().map(Recorded::item);
     let worked_on = items.filter(|it: &Item| !it.is(flag::END) && !it.is(flag::BASE));
     worked_on.map(move |it| work_ns(stage, &it))
+}
+
+/// Returns the distance of results from those of Gyre's own stage, in a sentence. Items that one of
+/// them lacks are left out.
+fn deviation(topic: &str, own: &[Recorded], other: &[Recorded]) -> Result<String, ProgramError> {
+    let (mut items, mut equal, mut differences) = (0, 0, Differences::default());
+    for own in own.iter().filter(|own| !own.item().is(flag::END)) {
+        let seq = own.item().seq;
+        let is_same = |it: &&Recorded| it.item().seq == seq && !it.item().is(flag::BASE);
+        let Some(other) = other.iter().find(is_same) else {
+            continue;
+        };
+        items += 1;
+        match result_bytes(topic, own)? == result_bytes(topic, other)? {
+            true => equal += 1,
+            false => drop(differences.add(topic, own, other)?),
+        }
+    }
+    let same = format!("{equal} of {items} items are the same bytes");
+    let rows = differences.spreads().rows();
+    Ok([vec![same], rows].concat().join("\n                 "))
 }

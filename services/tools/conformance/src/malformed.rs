@@ -1,16 +1,15 @@
 //! Inputs that break the contract, and that each reader has to refuse.
 
-use gyre_harness::{Recorded, result::floats};
 use gyre_messages::{Masked, Message, Motion, Pose, Rotation, Scan};
 use gyre_stage::StageError;
+use gyre_supervise::rig::Recorded;
+
+use crate::result::floats;
 
 /// A message that no stage may send, after the name of its fault.
 pub(crate) type Malformed = (&'static str, Recorded);
 
 /// Returns messages of a topic that differ from a valid one by one field that breaks its rule.
-///
-/// # Errors
-/// A message of another topic.
 pub(crate) fn malformed(topic: &str, valid: &Recorded) -> Result<Vec<Malformed>, StageError> {
     let item = valid.item();
     let mut unknown = item;

@@ -6,19 +6,22 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_harness::{
-    Feed, Process, Recorded, Rig, Scheduling, StageTopics, Tap, start_of_trajectory,
-};
 use gyre_messages::{
     Hop, Item, Message, Motion, MotionHeader, Pose, PoseHeader, Refined, Scan, ScanHeader, StageId,
     compose, flag,
 };
 use gyre_radar::continues;
 use gyre_stage::{clock, wake::Signals};
+use gyre_supervise::{
+    Scheduling,
+    rig::{Feed, Process, Recorded, Rig, Tap},
+};
 
 use crate::{
-    ConformanceError,
+    ProgramError,
+    harness::start_of_trajectory,
     test::{InputScans, Test},
+    topics::StageTopics,
 };
 
 /// Time between two polls of what does not wake the tester.
@@ -45,19 +48,16 @@ impl Reference {
     }
 
     /// Reads the scans and lets Gyre's own stages process them.
-    ///
-    /// # Errors
-    /// No scan can be read, or one of the stages fails.
     pub(crate) fn compute(
         test: &Test,
         scans: &mut InputScans,
         signals: &Signals,
-    ) -> Result<Self, ConformanceError> {
+    ) -> Result<Self, ProgramError> {
         let scans = read(scans)?;
         if scans.len() < 3 {
-            return Err(ConformanceError::TooFew(scans.len().saturating_sub(1)));
+            return Err(ProgramError::TooFew(scans.len().saturating_sub(1)));
         }
-        let rig = test.rig("own", signals)?;
+        let rig = test.rig("own", signals, true)?;
         OwnPipeline::begin(test, &rig, scans)?.run()
     }
 
@@ -67,7 +67,7 @@ impl Reference {
 }
 
 /// Reads the scans, as the source does; the end of the stream follows.
-fn read(scans: &mut InputScans) -> Result<Vec<Recorded>, ConformanceError> {
+fn read(scans: &mut InputScans) -> Result<Vec<Recorded>, ProgramError> {
     let mut read: Vec<Recorded> = Vec::new();
     let mut bytes = vec![0; scans.dataset.limits().bytes];
     let mut before: Option<Item> = None;
@@ -121,11 +121,7 @@ struct OwnPipeline<'a> {
 }
 
 impl<'a> OwnPipeline<'a> {
-    fn begin(
-        test: &Test,
-        rig: &'a Rig<'a>,
-        scans: Vec<Recorded>,
-    ) -> Result<Self, ConformanceError> {
+    fn begin(test: &Test, rig: &'a Rig<'a>, scans: Vec<Recorded>) -> Result<Self, ProgramError> {
         let manifest = rig.manifest();
         let mut stages = test.stages.clone();
         stages.retain(|it| !matches!(it, StageId::RadarReplay | StageId::PoseIntegration));
@@ -160,7 +156,7 @@ impl<'a> OwnPipeline<'a> {
         })
     }
 
-    fn run(mut self) -> Result<Reference, ConformanceError> {
+    fn run(mut self) -> Result<Reference, ProgramError> {
         let mut progress = Instant::now();
         while !self.has_ended() {
             self.scans.answer_handshakes()?;
@@ -171,7 +167,7 @@ impl<'a> OwnPipeline<'a> {
                 self.require_living(progress.elapsed())?;
                 let taps: Vec<&dyn Tap> = self.taps.iter().map(|(_, tap)| tap.as_ref()).collect();
                 if self.rig.sleep(&taps, POLL_PERIOD)? {
-                    return Err(ConformanceError::Interrupted);
+                    return Err(ProgramError::Interrupted);
                 }
             }
         }
@@ -187,7 +183,7 @@ impl<'a> OwnPipeline<'a> {
         has_end(Pose::TOPIC) && self.taps.iter().all(|(topic, _)| has_end(topic))
     }
 
-    fn receive(&mut self) -> Result<bool, ConformanceError> {
+    fn receive(&mut self) -> Result<bool, ProgramError> {
         let mut any = false;
         for (topic, tap) in &self.taps {
             while let Some(message) = tap.receive()? {
@@ -199,7 +195,7 @@ impl<'a> OwnPipeline<'a> {
     }
 
     /// Publishes the pose of an item that all stages have answered; returns whether there was one.
-    fn integrate(&mut self) -> Result<bool, ConformanceError> {
+    fn integrate(&mut self) -> Result<bool, ProgramError> {
         let next = self.reference.topic(Pose::TOPIC).len() as u64;
         let is_done = |(topic, _): &(&str, _)| self.reference.get(topic, next).is_some();
         if !self.taps.iter().all(is_done) {
@@ -229,7 +225,7 @@ impl<'a> OwnPipeline<'a> {
     }
 
     /// Publishes the scans that the window admits; returns whether there was one.
-    fn admit(&mut self) -> Result<bool, ConformanceError> {
+    fn admit(&mut self) -> Result<bool, ProgramError> {
         let newest = (self.reference.topic(Pose::TOPIC).len() as u64).checked_sub(1);
         let window = self.rig.manifest().window;
         let mut any = false;
@@ -255,10 +251,10 @@ impl<'a> OwnPipeline<'a> {
         Ok(any)
     }
 
-    fn require_living(&mut self, idle: Duration) -> Result<(), ConformanceError> {
+    fn require_living(&mut self, idle: Duration) -> Result<(), ProgramError> {
         for (stage, process) in &mut self.processes {
             if let Some(death) = process.death() {
-                return Err(ConformanceError::Own {
+                return Err(ProgramError::Own {
                     stage: stage.name(),
                     reason: death.last_output.unwrap_or(death.cause),
                 });
@@ -266,7 +262,7 @@ impl<'a> OwnPipeline<'a> {
         }
         match idle < self.stall_timeout {
             true => Ok(()),
-            false => Err(ConformanceError::Own {
+            false => Err(ProgramError::Own {
                 stage: "pipeline",
                 reason: format!("it made no progress for {idle:.0?}"),
             }),

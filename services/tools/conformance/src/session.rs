@@ -10,18 +10,17 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_harness::{
-    Death, Direction, Harness, Recorded, Scheduling, Sent, result::result_bytes,
-    start_of_trajectory,
-};
 use gyre_messages::{Message, Pose, StageId, flag};
+use gyre_supervise::{Death, Scheduling, rig::Recorded};
 
 use crate::{
-    ConformanceError,
-    context::Context,
+    ProgramError,
+    harness::{Harness, Sent, start_of_trajectory},
     reference::{POLL_PERIOD, Reference},
+    result::result_bytes,
     rule::{Findings, Rule},
-    test::{Demands, Test},
+    test::{Context, Demands, Test},
+    topics::Direction,
 };
 
 /// The number of items under way at most.
@@ -90,20 +89,17 @@ impl fmt::Display for Waited {
 impl<'a> Session<'a> {
     /// Creates a run of this name, opens the topics of the stage, and sends the start of the
     /// trajectory. No process is started.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     pub(crate) fn open(
         context: Context<'a>,
         name: &str,
         findings: &'a mut Findings,
-    ) -> Result<Self, ConformanceError> {
+    ) -> Result<Self, ProgramError> {
         let Context {
             test,
             reference,
             signals,
         } = context;
-        let harness = Harness::open(test.rig(name, signals)?, test.candidate.stage)?;
+        let harness = Harness::open(test.rig(name, signals, true)?, test.candidate.stage)?;
         harness.feed(Pose::TOPIC, &start_of_trajectory())?;
         Ok(Self {
             harness,
@@ -132,25 +128,25 @@ impl<'a> Session<'a> {
 
     /// Returns the topic that the process publishes.
     pub(crate) fn output_topic(&self) -> &'static str {
-        self.harness.topics().output
+        self.harness.topics.output
     }
 
     /// Starts the process and waits until it has opened the topic that it publishes.
-    pub(crate) fn start(&mut self, command: &[String]) -> Result<Waited, ConformanceError> {
+    pub(crate) fn start(&mut self, command: &[String]) -> Result<Waited, ProgramError> {
         self.spawn(command)?;
         let limit = self.demands().start_timeout;
         self.wait(limit, |session| session.harness.has_publisher())
     }
 
     /// Starts the process.
-    pub(crate) fn spawn(&mut self, command: &[String]) -> Result<(), ConformanceError> {
+    pub(crate) fn spawn(&mut self, command: &[String]) -> Result<(), ProgramError> {
         self.last = None;
         self.notified.clear();
-        Ok(self.harness.start(command, &Scheduling::default())?)
+        self.harness.start(command, &Scheduling::default())
     }
 
     /// Waits until the process has answered an item; the limit is that for one item.
-    pub(crate) fn reach(&mut self, seq: u64) -> Result<Waited, ConformanceError> {
+    pub(crate) fn reach(&mut self, seq: u64) -> Result<Waited, ProgramError> {
         let limit = self.demands().item_timeout;
         self.wait(limit, |session| session.newest >= Some(seq))
     }
@@ -161,7 +157,7 @@ impl<'a> Session<'a> {
         &mut self,
         limit: Duration,
         done: impl Fn(&Self) -> bool,
-    ) -> Result<Waited, ConformanceError> {
+    ) -> Result<Waited, ProgramError> {
         self.progress = Instant::now();
         loop {
             self.exchange()?;
@@ -184,27 +180,27 @@ impl<'a> Session<'a> {
     }
 
     /// Lets time pass while the run goes on around the process; returns whether it is still alive.
-    pub(crate) fn rest(&mut self, time: Duration) -> Result<bool, ConformanceError> {
+    pub(crate) fn rest(&mut self, time: Duration) -> Result<bool, ProgramError> {
         let since = Instant::now();
         let ended = self.wait(time, |_| since.elapsed() >= time)?;
         Ok(!matches!(ended, Waited::Died(_)))
     }
 
-    fn sleep(&self) -> Result<(), ConformanceError> {
+    fn sleep(&self) -> Result<(), ProgramError> {
         match self.harness.sleep(POLL_PERIOD)? {
-            true => Err(ConformanceError::Interrupted),
+            true => Err(ProgramError::Interrupted),
             false => Ok(()),
         }
     }
 
     /// Answers handshakes and receives.
-    fn exchange(&mut self) -> Result<(), ConformanceError> {
+    fn exchange(&mut self) -> Result<(), ProgramError> {
         self.notified.extend(self.harness.answer_handshakes()?);
         self.receive()
     }
 
     /// Receives the messages of the process, and examines them.
-    fn receive(&mut self) -> Result<(), ConformanceError> {
+    fn receive(&mut self) -> Result<(), ProgramError> {
         while let Some(sent) = self.harness.receive()? {
             match sent {
                 Sent::Message(output) => {
@@ -228,24 +224,21 @@ impl<'a> Session<'a> {
     }
 
     /// Kills the process and removes what it leaves.
-    pub(crate) fn kill(&mut self) -> Result<(), ConformanceError> {
+    pub(crate) fn kill(&mut self) -> Result<(), ProgramError> {
         self.harness.kill()?;
         self.receive()?;
-        Ok(self.harness.rig().remove_dead()?)
+        Ok(self.harness.rig.remove_dead()?)
     }
 
     /// Sends SIGTERM; returns how the process ended, `None` if it did not in time.
-    pub(crate) fn stop(&mut self) -> Result<Option<Death>, ConformanceError> {
+    pub(crate) fn stop(&mut self) -> Result<Option<Death>, ProgramError> {
         self.harness.terminate();
         self.pace = Pace::Hold;
         self.ended_within(self.demands().stop_timeout)
     }
 
     /// Waits for the end of the process; `None` if it does not end in time.
-    pub(crate) fn ended_within(
-        &mut self,
-        limit: Duration,
-    ) -> Result<Option<Death>, ConformanceError> {
+    pub(crate) fn ended_within(&mut self, limit: Duration) -> Result<Option<Death>, ProgramError> {
         let since = Instant::now();
         loop {
             self.exchange()?;
@@ -262,7 +255,7 @@ impl<'a> Session<'a> {
 
     /// Returns the topics that the process has subscribed to without notifying their publishers.
     pub(crate) fn not_notified(&self) -> Vec<&'static str> {
-        let feeds = self.harness.feeds().iter();
+        let feeds = self.harness.feeds.iter();
         let silent =
             feeds.filter(|(topic, feed)| feed.subscribers() > 0 && !self.notified.contains(*topic));
         silent.map(|(topic, _)| *topic).collect()
@@ -270,15 +263,15 @@ impl<'a> Session<'a> {
 
     /// Returns whether the process has opened a topic.
     pub(crate) fn has_joined(&self) -> bool {
-        let mut feeds = self.harness.feeds().values();
+        let mut feeds = self.harness.feeds.values();
         feeds.any(|feed| feed.subscribers() > 0) || self.harness.has_publisher()
     }
 
     /// Returns the inputs that the process has not subscribed to.
     pub(crate) fn not_read(&self) -> Vec<&'static str> {
-        let feeds = self.harness.feeds();
+        let feeds = &self.harness.feeds;
         let is_unread = |topic: &&str| feeds.get(topic).is_some_and(|it| it.subscribers() == 0);
-        let inputs = self.harness.topics().leading(Direction::Forward);
+        let inputs = self.harness.topics.leading(Direction::Forward);
         inputs.filter(is_unread).collect()
     }
 
@@ -306,7 +299,7 @@ impl<'a> Session<'a> {
     }
 
     /// Returns the result bytes of the first message about each item.
-    pub(crate) fn results(&self) -> Result<BTreeMap<u64, Vec<u8>>, ConformanceError> {
+    pub(crate) fn results(&self) -> Result<BTreeMap<u64, Vec<u8>>, ProgramError> {
         let mut results = BTreeMap::new();
         for output in self.outputs.iter().filter(|it| !it.item().is(flag::BASE)) {
             let bytes = result_bytes(self.output_topic(), output)?;
@@ -322,11 +315,11 @@ impl<'a> Session<'a> {
         outputs: Range<usize>,
         rule: Rule,
         when: &str,
-    ) -> Result<(), ConformanceError> {
+    ) -> Result<(), ProgramError> {
         self.findings.checked(rule);
         for output in &self.outputs[outputs] {
             let item = output.item();
-            let bytes = result_bytes(self.harness.topics().output, output)?;
+            let bytes = result_bytes(self.harness.topics.output, output)?;
             let differs = first.get(&item.seq).is_some_and(|first| *first != bytes);
             if differs && !item.is(flag::BASE) {
                 let sentence = format!("item {} has other bytes {when}", item.seq);

@@ -3,11 +3,11 @@
 use std::{io, ops::Range, path::Path, time::Duration};
 
 use gyre_datasets::Dataset;
-use gyre_harness::{Candidate, Rig};
 use gyre_messages::StageId;
-use gyre_stage::{StageError, wake::Signals};
+use gyre_stage::wake::Signals;
+use gyre_supervise::rig::Rig;
 
-use crate::ConformanceError;
+use crate::{Candidate, ProgramError, reference::Reference};
 
 /// Writes files into the root of a run.
 pub type Prepare = Box<dyn Fn(&Path) -> io::Result<()>>;
@@ -64,37 +64,25 @@ pub struct InputScans {
 }
 
 impl Test {
-    /// Creates a run of this name with its services.
-    ///
-    /// # Errors
-    /// A folder or a service cannot be created.
+    /// Creates a run of this name, with or without its services.
     pub(crate) fn rig<'a>(
         &self,
         name: &str,
         signals: &'a Signals,
-    ) -> Result<Rig<'a>, ConformanceError> {
+        has_services: bool,
+    ) -> Result<Rig<'a>, ProgramError> {
         let out = self.candidate.manifest.out.join(name);
-        self.prepared(self.candidate.rig(out, signals)?)
+        let rig = self.candidate.rig(out, signals, has_services)?;
+        let root = &rig.manifest().root;
+        (self.prepare)(root).map_err(ProgramError::file(root))?;
+        Ok(rig)
     }
+}
 
-    /// Creates a run of this name without any service.
-    ///
-    /// # Errors
-    /// A folder cannot be created.
-    pub(crate) fn empty_rig<'a>(
-        &self,
-        name: &str,
-        signals: &'a Signals,
-    ) -> Result<Rig<'a>, ConformanceError> {
-        let out = self.candidate.manifest.out.join(name);
-        self.prepared(self.candidate.empty_rig(out, signals)?)
-    }
-
-    fn prepared<'a>(&self, rig: Rig<'a>) -> Result<Rig<'a>, ConformanceError> {
-        let path = rig.manifest().root.clone();
-        match (self.prepare)(&path) {
-            Ok(()) => Ok(rig),
-            Err(source) => Err(StageError::File { path, source }.into()),
-        }
-    }
+/// The test with its inputs, as all checks need it.
+#[derive(Clone, Copy)]
+pub(crate) struct Context<'a> {
+    pub test: &'a Test,
+    pub reference: &'a Reference,
+    pub signals: &'a Signals,
 }

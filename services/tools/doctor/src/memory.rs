@@ -7,7 +7,7 @@ use gyre_stage::{
     run::{RootError, RunRoot, SHARED_MEMORY, free_shared_memory},
     wake::Signals,
 };
-use gyre_stress::memory::Room;
+use gyre_supervise::memory::Room;
 use rustix::{
     fs::{Access, access, statfs, statvfs},
     process::getpid,

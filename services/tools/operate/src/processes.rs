@@ -6,21 +6,13 @@ use gyre_stage::{
     StageError,
     control::{Activity, Control, Phase, ProcessStatus, Status},
     source::Received,
-    usage::Usage,
 };
+use gyre_supervise::UsedRun;
 use gyre_terminal::{Failure, print};
-use serde::Serialize;
 
 use crate::arguments::PsArguments;
 
 const NO_RUN: &str = "no run is running";
-
-/// A run with what its processes use, in the order of the status.
-#[derive(Serialize)]
-struct ListedRun {
-    status: Status,
-    usage: Vec<Option<Usage>>,
-}
 
 /// Lists the runs of this user.
 ///
@@ -35,7 +27,7 @@ pub fn ps(arguments: &PsArguments) -> Result<ExitCode, Failure> {
     };
     for run in runs {
         match run.status() {
-            Ok(status) => rows.push(ListedRun::of(status)),
+            Ok(status) => rows.push(UsedRun::of(status)),
             // It has ended meanwhile.
             Err(StageError::NotRunning { .. }) => {}
             Err(error) => faults.push(error.to_string()),
@@ -49,7 +41,7 @@ pub fn ps(arguments: &PsArguments) -> Result<ExitCode, Failure> {
         }
         PsArguments { json: true, .. } => print::line(serde_json::to_string_pretty(&rows)?)?,
         _ if is_none => print::line(NO_RUN)?,
-        _ => rows.iter().try_for_each(print::line)?,
+        _ => rows.iter().map(Listed).try_for_each(print::line)?,
     }
     match faults.is_empty() {
         true => Ok(ExitCode::SUCCESS),
@@ -57,19 +49,12 @@ pub fn ps(arguments: &PsArguments) -> Result<ExitCode, Failure> {
     }
 }
 
-impl ListedRun {
-    fn of(status: Status) -> Self {
-        let usage = status.processes.iter().map(|it| Usage::of(it.pid));
-        Self {
-            usage: usage.collect(),
-            status,
-        }
-    }
-}
+/// A run as a table.
+struct Listed<'a>(&'a UsedRun);
 
-impl fmt::Display for ListedRun {
+impl fmt::Display for Listed<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let status = &self.status;
+        let UsedRun { status, usage } = self.0;
         writeln!(f, "{}", status.out.display())?;
         writeln!(f, "{}", summary(status))?;
         writeln!(
@@ -77,7 +62,7 @@ impl fmt::Display for ListedRun {
             "  {:20} {:>8} {:9} {:>8} {:>9} {:>8} {:>9}",
             "process", "pid", "state", "for", "cpu", "memory", "restarts"
         )?;
-        for (process, usage) in status.processes.iter().zip(&self.usage) {
+        for (process, usage) in status.processes.iter().zip(usage) {
             let usage = usage.unwrap_or_default();
             writeln!(
                 f,

@@ -9,13 +9,12 @@ use gyre_stage::run::{free_shared_memory, sweep};
 use crate::{
     Report, StressError, TestedPipeline,
     check::Check,
-    copying,
     fault::{self, FaultKind},
+    helper::Work,
     pipeline::{Measured, Setup, measure},
     report::{Figures, ScenarioOutcome, Step, Verdict},
     search::{Found, Steps, largest, step_duration},
     witness_fault::{self, WitnessFault},
-    work::Work,
 };
 
 /// Scans of a burst.
@@ -94,14 +93,6 @@ impl Campaign<'_> {
         match self.scenario {
             Scenario::Ramp => self.ramp(note),
             Scenario::Fleet => self.fleet(note),
-            Scenario::Copying => {
-                let rows =
-                    copying::compare(self.tested, self.options.duration.as_secs_f64(), note)?;
-                Ok(ScenarioOutcome {
-                    copying: rows,
-                    ..self.empty()
-                })
-            }
             _ => self.single(),
         }
     }
@@ -339,11 +330,6 @@ fn checks(limits: &Limits, figures: &Figures) -> Vec<Check> {
         ("p50_ms", percentile(latency.p50_ms), limits.p50_ms),
         ("p99_ms", percentile(latency.p99_ms), limits.p99_ms),
         ("max_ms", latency.max_ms, limits.max_ms),
-        (
-            "drops",
-            Some(figures.latency.counts.dropped as f64),
-            limits.drops,
-        ),
         (
             "drops_percent",
             figures.drops_percent(),

@@ -70,9 +70,6 @@ pub enum StressError {
     /// The transport.
     #[error(transparent)]
     Stage(#[from] StageError),
-    /// A plot.
-    #[error(transparent)]
-    Plot(#[from] gyre_evaluation::plot::PlotError),
     /// A request to stop.
     #[error("interrupted")]
     Interrupted,

@@ -5,25 +5,72 @@
 
 use std::{
     io::{BufRead, BufReader, Write},
-    path::Path,
-    process::{Child, ChildStdin, ChildStdout, Command, Stdio},
+    os::unix::process::CommandExt,
+    path::{Path, PathBuf},
+    process::{Child, ChildStdout, Command, Stdio},
 };
 
-use serde::{Serialize, de::DeserializeOwned};
+use gyre_stage::run::end_with;
+use rustix::process::Signal;
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
-use crate::{StressError, work::Work};
+use crate::{StressError, load};
 
-/// The command of `gyre` that calls [`help`](crate::help).
+/// The command of `gyre` that calls [`help`].
 pub const COMMAND: &str = "stress-helper";
 /// The line that a helper prints when it works.
 const READY: &str = "ready";
+
+/// The work of a helper, which it gets as JSON on its command line.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Work {
+    /// Becomes `gyre` with these arguments, and ends its stages first.
+    Run(Vec<String>),
+    /// Computes without end.
+    Spin,
+    /// Takes this share of the available memory, and churns it.
+    Memory(f64),
+    /// Reads all topics of the run that writes to this folder.
+    Observe(PathBuf),
+}
+
+/// Does the work of a helper: its arguments are the process that has started it, and the work.
+///
+/// # Errors
+/// Work that is not known, or a failure of it.
+pub fn help(program: &Path, arguments: &[String]) -> Result<(), StressError> {
+    let usage = || StressError::Usage(format!("`gyre {COMMAND}` is what `gyre stress` starts"));
+    let [parent, work] = arguments else {
+        return Err(usage());
+    };
+    let parent = parent.parse().map_err(|_| usage())?;
+    let work: Work = serde_json::from_str(work).map_err(|_| usage())?;
+    // A run has shared memory of its own: it ends itself, and removes that memory.
+    let signal = match &work {
+        Work::Run(_) => Signal::TERM,
+        _ => Signal::KILL,
+    };
+    let refused = |error: rustix::io::Errno| StressError::Usage(error.to_string());
+    if !end_with(parent, signal).map_err(refused)? {
+        return Err(StressError::Interrupted);
+    }
+    match work {
+        Work::Run(words) => Err(StressError::Start {
+            program: program.display().to_string(),
+            source: Command::new(program).args(words).exec(),
+        }),
+        Work::Spin => load::spin(),
+        Work::Memory(share) => load::churn(share),
+        Work::Observe(out) => load::observe(&out),
+    }
+}
 
 /// A helper process. It is killed when this is dropped.
 #[derive(Debug)]
 pub struct Helper {
     work: Work,
     process: Child,
-    input: Option<ChildStdin>,
     output: BufReader<ChildStdout>,
 }
 
@@ -34,28 +81,23 @@ impl Helper {
     /// It cannot be started.
     pub fn start(program: &Path, work: Work) -> Result<Self, StressError> {
         let mut command = command(program, &work)?;
-        command.stdin(Stdio::piped()).stdout(Stdio::piped());
+        command.stdin(Stdio::null()).stdout(Stdio::piped());
         let started = command.spawn().map_err(|source| StressError::Start {
             program: program.display().to_string(),
             source,
         });
         let mut process = started?;
-        let (input, output) = (process.stdin.take(), process.stdout.take());
-        let output = output.ok_or_else(|| failed(&work, "has no output"))?;
+        let output = process
+            .stdout
+            .take()
+            .ok_or_else(|| failed(&work, "has no output"))?;
         let mut helper = Self {
             output: BufReader::new(output),
             work,
             process,
-            input,
         };
         helper.await_line(READY)?;
         Ok(helper)
-    }
-
-    /// Closes its input, and waits until it has ended by itself.
-    pub fn end(mut self) {
-        self.input = None;
-        let _ = self.process.wait();
     }
 
     /// Returns a sentence about a helper that has ended although it should still work.
@@ -64,26 +106,7 @@ impl Helper {
         Some(format!("`{:?}` has ended: {status}", self.work))
     }
 
-    /// Sends a line.
-    ///
-    /// # Errors
-    /// The helper has ended.
-    pub fn send_line(&mut self, line: &str) -> Result<(), StressError> {
-        let sent = self
-            .input
-            .as_mut()
-            .map(|input| writeln!(input, "{line}").and_then(|()| input.flush()));
-        match sent {
-            Some(Ok(())) => Ok(()),
-            _ => Err(self.failed("has ended")),
-        }
-    }
-
-    /// Reads a line.
-    ///
-    /// # Errors
-    /// The helper has ended.
-    pub fn read_line(&mut self) -> Result<String, StressError> {
+    fn read_line(&mut self) -> Result<String, StressError> {
         let mut line = String::new();
         match self.output.read_line(&mut line) {
             Ok(read) if read > 0 => Ok(line.trim_end().to_owned()),

@@ -12,22 +12,16 @@
 //!    start to its end.
 //! 3. [`record`]: poses in, distributions out; drops are samples too.
 //! 4. [`fault`]: stops and kills of stages; [`witness_fault`]: those of gyro, wheels and radar;
-//!    [`helper`], `work`, `load`: the child processes that
-//!    load the machine.
+//!    [`helper`], `load`: the child processes that load the machine.
 //! 5. [`processes`]: the resources of each process.
-//! 6. [`copying`]: the transport beside copies through sockets.
-//! 7. [`report`]: `report.json`, `report.md` and the plots, all of one [`Report`].
+//! 6. [`report`]: a sentence for each scenario, `report.json`, and the latency scan by scan.
 
 mod campaign;
 pub mod check;
-pub mod copying;
 mod error;
 pub mod fault;
-mod hand_over;
-mod help;
 pub mod helper;
-mod load;
-pub mod memory;
+pub mod load;
 pub mod pipeline;
 pub mod processes;
 pub mod record;
@@ -35,12 +29,9 @@ pub mod report;
 mod search;
 mod tested;
 pub mod witness_fault;
-mod work;
 
 pub use campaign::{Options, stress};
 pub use error::StressError;
 pub use gyre_run::Scenario;
-pub use help::help;
 pub use report::{Provenance, Report};
-pub use tested::{MessageKind, Others, TestedPipeline};
-pub use work::Work;
+pub use tested::{Others, TestedPipeline};

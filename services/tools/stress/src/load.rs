@@ -14,13 +14,16 @@ use gyre_stage::{
     StageError,
     observer::{Next, ObservedRun},
 };
+use gyre_supervise::memory::Room;
+use serde::{Deserialize, Serialize};
 
 use crate::{
     StressError,
     helper::{say_ready, say_result},
-    memory::{LEFT, Room, Taken},
 };
 
+/// Memory that is always left, whatever the share: room for other programs that start meanwhile.
+const LEFT: u64 = 1 << 30;
 /// Bytes that are taken at once.
 const PIECE: usize = 32 << 20;
 const PAGE: usize = 4096;
@@ -30,6 +33,28 @@ const TAKING: Duration = Duration::from_secs(20);
 /// Time between two polls for memory when there is no more to take.
 const PAUSE: Duration = Duration::from_millis(20);
 const CACHE_LINE: usize = 64;
+
+/// Memory that the helper `memory` has taken when the measurement begins.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Taken {
+    /// Memory that it has taken, MB.
+    pub taken_mb: f64,
+    /// Memory that was available before, MB.
+    pub available_mb: f64,
+}
+
+impl Taken {
+    /// Returns the reason why it is no load.
+    pub(crate) fn omitted(&self) -> Option<String> {
+        (self.taken_mb == 0.0).then(|| {
+            format!(
+                "no memory was taken: {:.0} MB are available, and {:.0} MB are always left",
+                self.available_mb,
+                LEFT as f64 * 1e-6
+            )
+        })
+    }
+}
 
 /// Computes without end.
 pub(super) fn spin() -> ! {
@@ -136,10 +161,26 @@ fn follow<M: Message>(root: &Path, attached: Sender<()>) -> Result<(), StageErro
 }
 
 /// Reads a byte of each cache line.
-pub(crate) fn touched(bytes: &[u8]) -> u64 {
+fn touched(bytes: &[u8]) -> u64 {
     bytes
         .iter()
         .step_by(CACHE_LINE)
         .map(|byte| u64::from(*byte))
         .sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_load_that_has_taken_nothing_is_none() {
+        let taken = |taken_mb| Taken {
+            taken_mb,
+            available_mb: 900.0,
+        };
+        assert_eq!(taken(32.0).omitted(), None);
+        let reason = taken(0.0).omitted().unwrap_or_default();
+        assert!(reason.contains("900 MB are available"), "{reason}");
+    }
 }

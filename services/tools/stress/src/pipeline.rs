@@ -21,13 +21,12 @@ use serde::Deserialize;
 use crate::{
     StressError,
     fault::{FaultKind, Faults},
-    helper::Helper,
+    helper::{Helper, Work},
     processes::Sampler,
     record::Recorder,
     report::Figures,
     tested::TestedPipeline,
     witness_fault::{PlayedClock, WitnessFaults},
-    work::Work,
 };
 
 use running::Running;

@@ -9,7 +9,7 @@ use std::{
 };
 
 use gyre_messages::{FollowerId, StageId};
-use gyre_stage::usage::Usage;
+use gyre_supervise::Usage;
 use serde::Serialize;
 
 use members::Members;
@@ -29,20 +29,6 @@ pub struct Cost {
     pub preemptions_per_s: f64,
     /// Processes of this name: those that a stage has started, and those after restarts, included.
     pub processes: usize,
-}
-
-impl Cost {
-    /// Returns the sum over all processes; `None` without any.
-    pub(crate) fn sum(costs: &[Self]) -> Option<Self> {
-        costs.iter().cloned().reduce(|sum, cost| Self {
-            name: sum.name,
-            cpu_percent: sum.cpu_percent + cost.cpu_percent,
-            own_mb: sum.own_mb + cost.own_mb,
-            wake_ups_per_s: sum.wake_ups_per_s + cost.wake_ups_per_s,
-            preemptions_per_s: sum.preemptions_per_s + cost.preemptions_per_s,
-            processes: sum.processes + cost.processes,
-        })
-    }
 }
 
 /// Samples the processes of a run through `/proc`.

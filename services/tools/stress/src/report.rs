@@ -1,9 +1,7 @@
-//! The report: `report.json`, `report.md`, a plot of all scenarios and one of each.
+//! The report: `report.json`, and the latency of each scenario scan by scan.
 
 mod figures;
-mod markdown;
 mod outcome;
-mod plots;
 mod step;
 
 use std::{fmt::Write, fs, path::Path};
@@ -21,7 +19,7 @@ pub use step::Step;
 
 /// The version of `report.json`. A key that changes its meaning or goes raises it; one that is
 /// added does not.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// The origin of a report: computer, program, recording.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -89,14 +87,9 @@ impl Report {
             let measured = outcome.figures.iter();
             for figures in measured.filter(|it| !it.latency.timeline.is_empty()) {
                 write(&format!("{}.csv", outcome.scenario), csv(&figures.latency))?;
-                let svg = plots::timeline(outcome, figures)?;
-                write(&format!("{}.svg", outcome.scenario), svg)?;
             }
         }
-        if let Some(svg) = plots::percentiles(&self.outcomes, &self.provenance.machine)? {
-            write("report.svg", svg)?;
-        }
-        write("report.md", markdown::page(self))
+        Ok(())
     }
 }
 

@@ -26,8 +26,6 @@ pub struct TestedPipeline {
     pub stages: Vec<StageId>,
     /// The budget.
     pub budget: Budget,
-    /// The messages whose transport is compared with copies.
-    pub kinds: Vec<MessageKind>,
     /// Shared memory of a run, bytes.
     pub shared_bytes: u64,
 }
@@ -53,13 +51,4 @@ pub struct Others {
     pub wheels: bool,
     /// True if they are weighed against the radar: there is a refinement.
     pub are_weighed: bool,
-}
-
-/// A kind of message, by its size.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct MessageKind {
-    /// The topic of this size.
-    pub topic: &'static str,
-    /// Bytes of a message.
-    pub bytes: usize,
 }

@@ -12,6 +12,7 @@ mod check;
 pub mod checkpoint;
 mod error;
 pub mod keyframes;
+pub mod loops;
 pub mod objects;
 mod record;
 mod records;

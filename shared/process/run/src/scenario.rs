@@ -23,8 +23,6 @@ pub enum Judged {
     ByRecovery,
     /// By a figure of its own: the highest rate, the number of radars.
     ByItself,
-    /// Not at all: it compares.
-    Never,
 }
 
 /// Defines the scenarios: name, judgement, and a line that describes it.
@@ -100,8 +98,6 @@ scenarios! {
         "rates that rise until scans are dropped or p99 is over its limit: the knee, in scans/s";
     Fleet: "fleet", ByItself,
         "more and more pipelines until one misses its deadline: the number of 4 Hz radars";
-    Copying: "copying", Never,
-        "the transport beside copies through Unix sockets, with 1, 4 and 8 readers";
 }
 
 impl Scenario {

@@ -14,9 +14,7 @@
 //!    [`GnssReceiver`]: fixes that arrive during a run, as such a log.
 //! 7. [`observer`]: subscribers that the run does not depend on; [`relay`]: stand-ins for stages on
 //!    another machine.
-//! 8. [`processes`], [`usage`]: the processes of the machine, and what they use of it;
-//!    [`hand_over`]: one topic alone, to measure the transport.
-//! 9. [`schedule`], [`heartbeat`], [`remote_progress`], [`services`]: what the supervisor
+//! 8. [`schedule`], [`heartbeat`], [`remote_progress`], [`services`]: what the supervisor
 //!    (`gyre-supervise`) reads and creates.
 //!
 //! The protocol in one paragraph: items carry consecutive sequence numbers. The source may have W
@@ -38,7 +36,6 @@ mod error;
 pub mod follower;
 mod generation;
 mod gnss_receiver;
-pub mod hand_over;
 pub mod heartbeat;
 pub mod inputs;
 pub mod launch;
@@ -46,7 +43,6 @@ mod log_id;
 mod manifest;
 pub mod observer;
 mod outlet;
-pub mod processes;
 pub mod reader;
 pub mod relay;
 pub mod remote_progress;
@@ -62,7 +58,6 @@ pub mod stage;
 #[cfg(test)]
 mod tests;
 pub mod transport;
-pub mod usage;
 pub mod wake;
 pub mod writer;
 

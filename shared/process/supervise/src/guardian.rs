@@ -18,13 +18,13 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_stage::{processes::ProcessStat, run, wake::Signals};
+use gyre_stage::{run, wake::Signals};
 use rustix::{
     io::ioctl_fionbio,
     process::{Pid, RawPid, Signal, getpid, kill_process_group},
 };
 
-use crate::{SuperviseError, end::ends_within};
+use crate::{ProcessStat, SuperviseError, end::ends_within};
 
 /// Time for the guardian to end with the run.
 const STOP_TIMEOUT: Duration = Duration::from_secs(1);

@@ -12,8 +12,10 @@ use bytemuck::bytes_of;
 use gyre_messages::{
     Correction, Fix, Loop, Masked, Message, Motion, Objects, Pose, Refined, Rotation, Scan,
 };
-use gyre_recorder::LogTail;
-use gyre_recording::view::{LOG, POINTS, TRAJECTORY, View, views};
+use gyre_recording::{
+    LogTail,
+    view::{LOG, POINTS, TRAJECTORY, View, views},
+};
 use gyre_stage::{
     StageError, clock,
     observer::{Next, ObservedRun, Observer},

@@ -2,15 +2,15 @@
 
 use std::time::Instant;
 
-use gyre_harness::Scheduling;
+use gyre_supervise::Scheduling;
 
 use super::Examination;
-use crate::{ConformanceError, reference::POLL_PERIOD, rule::Rule};
+use crate::{ProgramError, reference::POLL_PERIOD, rule::Rule};
 
 impl Examination<'_> {
-    pub(super) fn start_without_topics(&mut self) -> Result<(), ConformanceError> {
+    pub(super) fn start_without_topics(&mut self) -> Result<(), ProgramError> {
         let test = self.context.test;
-        let rig = test.empty_rig("absence", self.context.signals)?;
+        let rig = test.rig("absence", self.context.signals, false)?;
         let command = &test.candidate.command;
         let mut process = rig.start(self.stage().name(), command, &Scheduling::default())?;
         let since = Instant::now();
@@ -21,7 +21,7 @@ impl Examination<'_> {
             && since.elapsed() <= test.demands.item_timeout
         {
             if rig.sleep(&[], POLL_PERIOD)? {
-                return Err(ConformanceError::Interrupted);
+                return Err(ProgramError::Interrupted);
             }
             has_created = !rig.services().is_empty();
         }

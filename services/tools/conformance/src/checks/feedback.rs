@@ -5,13 +5,13 @@ use gyre_messages::{Masked, Message, Scan};
 
 use super::{Examination, stream::starts};
 use crate::{
-    ConformanceError,
+    ProgramError,
     rule::Rule,
     session::{Pace, Session},
 };
 
 impl Examination<'_> {
-    pub(super) fn feedback(&mut self) -> Result<(), ConformanceError> {
+    pub(super) fn feedback(&mut self) -> Result<(), ProgramError> {
         if self.context.test.candidate.manifest.window.lag == 0 {
             return Ok(());
         }
@@ -28,14 +28,14 @@ impl Examination<'_> {
 
     /// A window of scans before the first pose: all motions come from the search, one after the
     /// other.
-    fn motions_of_the_search(&mut self) -> Result<(), ConformanceError> {
+    fn motions_of_the_search(&mut self) -> Result<(), ProgramError> {
         let compensates = self.compensates();
         let mut session = Session::open(self.context, "motions", &mut self.findings)?;
         session.pace = Pace::Hold;
         starts(&mut session)?;
         session.harness.connect()?;
         session.findings.checked(Rule::WaitsForMotion);
-        let (demands, window) = (session.demands(), session.harness.manifest().window);
+        let (demands, window) = (session.demands(), session.harness.rig.manifest().window);
         let lag = window.lag as u64;
         let scans = (window.scans as u64).min(self.context.reference.end());
         (0..scans).try_for_each(|seq| session.send_inputs(seq))?;
@@ -62,10 +62,10 @@ impl Examination<'_> {
 
     /// A start in the middle of the stream: the motions up to the newest pose come with the poses
     /// alone.
-    fn motions_of_poses(&mut self) -> Result<(), ConformanceError> {
+    fn motions_of_poses(&mut self) -> Result<(), ProgramError> {
         let reference = self.context.reference;
         let mut session = Session::open(self.context, "poses", &mut self.findings)?;
-        let (window, newest) = (session.harness.manifest().window, reference.end() / 2);
+        let (window, newest) = (session.harness.rig.manifest().window, reference.end() / 2);
         session.restart_inputs(newest)?;
         session.pace = Pace::Hold;
         starts(&mut session)?;

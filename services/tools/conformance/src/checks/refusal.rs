@@ -1,22 +1,23 @@
 //! Inputs that break the contract: the program ends with exit code 3 and a sentence, and sends
 //! nothing about them.
 
-use gyre_harness::{Death, Direction};
 use gyre_stage::StageError;
+use gyre_supervise::Death;
 
 use super::{Examination, stream::starts};
 use crate::{
-    ConformanceError,
+    ProgramError,
     malformed::{Malformed, malformed},
     rule::Rule,
     session::{Pace, Session},
+    topics::Direction,
 };
 
 /// The item that is sent wrong.
 const WRONG: u64 = 2;
 
 impl Examination<'_> {
-    pub(super) fn refusals(&mut self) -> Result<(), ConformanceError> {
+    pub(super) fn refusals(&mut self) -> Result<(), ProgramError> {
         let reference = self.context.reference;
         for (topic, direction) in self.context.test.candidate.topics().inputs {
             let Some(valid) = reference.get(topic, WRONG) else {
@@ -41,7 +42,7 @@ impl Examination<'_> {
         name: &str,
         (topic, direction): (&'static str, Direction),
         (fault, message): &Malformed,
-    ) -> Result<(), ConformanceError> {
+    ) -> Result<(), ProgramError> {
         let mut session = Session::open(self.context, name, &mut self.findings)?;
         session.until = WRONG;
         if !starts(&mut session)? {
@@ -53,7 +54,7 @@ impl Examination<'_> {
             return Ok(());
         }
         session.pace = Pace::Hold;
-        let forward = session.harness.topics().leading(Direction::Forward);
+        let forward = session.harness.topics.leading(Direction::Forward);
         for other in forward.filter(|other| *other != topic) {
             if let Some(valid) = self.context.reference.get(other, WRONG) {
                 session.harness.feed(other, valid)?;

@@ -1,17 +1,17 @@
 //! Two deaths. After the first the inputs are still there, with their history. After the second all
 //! other stages are restarted too: no more of the inputs is there than a restarted stage may need.
 
-use gyre_harness::Recorded;
 use gyre_messages::{Item, StageId, flag};
+use gyre_supervise::rig::Recorded;
 
 use super::{Examination, stream::starts};
-use crate::{ConformanceError, rule::Rule, session::Session};
+use crate::{ProgramError, rule::Rule, session::Session};
 
 /// Items on their way when the program is killed: fast ones would be done with all before.
 const UNDER_WAY: u64 = 2;
 
 impl Examination<'_> {
-    pub(super) fn restart(&mut self) -> Result<(), ConformanceError> {
+    pub(super) fn restart(&mut self) -> Result<(), ProgramError> {
         let mut session = Session::open(self.context, "restart", &mut self.findings)?;
         let end = self.context.reference.end();
         starts(&mut session)?;
@@ -57,7 +57,7 @@ struct Restart {
 
 impl Restart {
     /// Starts the program again, and requires that it resumes.
-    fn examine(&self, session: &mut Session<'_>) -> Result<(), ConformanceError> {
+    fn examine(&self, session: &mut Session<'_>) -> Result<(), ProgramError> {
         let Self { rule, when, until } = *self;
         let (newest, sent) = (session.newest(), session.outputs.len());
         let next = newest.map_or(0, |newest| newest + 1);

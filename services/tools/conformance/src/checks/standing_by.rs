@@ -11,7 +11,7 @@ use rustix::fs::{CWD, FileType, Mode, mknodat};
 
 use super::Examination;
 use crate::{
-    ConformanceError,
+    ProgramError,
     rule::Rule,
     session::{Session, Waited},
 };
@@ -22,10 +22,10 @@ const DOES_NOT: &str = "it does not stand by: `gyre swap` needs --cold";
 const WITH_INPUT: &str = "exec \"$@\" < \"$0\"";
 
 impl Examination<'_> {
-    pub(super) fn standing_by(&mut self) -> Result<(), ConformanceError> {
+    pub(super) fn standing_by(&mut self) -> Result<(), ProgramError> {
         let mut session = Session::open(self.context, "standing-by", &mut self.findings)?;
         let candidate = &session.test.candidate;
-        let root = session.harness.manifest().root.clone();
+        let root = session.harness.rig.manifest().root.clone();
         let ready = root.join(format!("{}.ready", candidate.stage.name()));
         let input = StandardInput::create(&root)?;
         session.admit()?;
@@ -67,7 +67,7 @@ fn breach(has_joined: bool, waited: &Waited) -> String {
 }
 
 /// Requires that the program works as at any start.
-fn takes_over(session: &mut Session<'_>) -> Result<(), ConformanceError> {
+fn takes_over(session: &mut Session<'_>) -> Result<(), ProgramError> {
     session.findings.checked(Rule::StandsBy);
     let limit = session.demands().start_timeout;
     let mut waited = session.wait(limit, |session| session.harness.has_publisher())?;
@@ -91,7 +91,7 @@ struct StandardInput {
 }
 
 impl StandardInput {
-    fn create(root: &Path) -> Result<Self, ConformanceError> {
+    fn create(root: &Path) -> Result<Self, ProgramError> {
         let path = root.join("standing-by.input");
         let created = mknodat(CWD, &path, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0);
         // Opened for both, it does not wait for the program.

@@ -6,7 +6,7 @@ use super::{
     stream::{starts, stops},
 };
 use crate::{
-    ConformanceError,
+    ProgramError,
     rule::Rule,
     session::{Pace, Session},
 };
@@ -15,7 +15,7 @@ use crate::{
 const BETWEEN: u64 = 3;
 
 impl Examination<'_> {
-    pub(super) fn steps(&mut self) -> Result<(), ConformanceError> {
+    pub(super) fn steps(&mut self) -> Result<(), ProgramError> {
         let mut session = Session::open(self.context, "steps", &mut self.findings)?;
         session.pace = Pace::Single;
         if !starts(&mut session)? {
@@ -23,7 +23,7 @@ impl Examination<'_> {
         }
         session.harness.connect()?;
         let output = session.output_topic();
-        let never_read = session.harness.rig().tap(output)?;
+        let never_read = session.harness.rig.tap(output)?;
         session.findings.checked(Rule::IgnoresObservers);
         for seq in 0..self.context.reference.end() * 2 / 3 {
             let waited = session.reach(seq)?;
@@ -36,7 +36,7 @@ impl Examination<'_> {
             }
             if seq % BETWEEN == 0 {
                 // It takes what is there, if anything, and leaves.
-                drop(session.harness.rig().tap(output)?.receive());
+                drop(session.harness.rig.tap(output)?.receive());
             }
         }
         // Items are on their way when the request comes.

@@ -7,7 +7,7 @@ use gyre_messages::{StageId, flag};
 
 use super::Examination;
 use crate::{
-    ConformanceError,
+    ProgramError,
     reference::POLL_PERIOD,
     rule::Rule,
     session::{Pace, Session, Waited},
@@ -15,9 +15,9 @@ use crate::{
 
 impl Examination<'_> {
     /// Returns whether the program has worked on items, so that more can be tested.
-    pub(super) fn stream(&mut self) -> Result<bool, ConformanceError> {
+    pub(super) fn stream(&mut self) -> Result<bool, ProgramError> {
         let mut session = Session::open(self.context, "stream", &mut self.findings)?;
-        let before = session.harness.rig().services();
+        let before = session.harness.rig.services();
         session.admit()?;
         if !starts(&mut session)? {
             return Ok(false);
@@ -26,7 +26,7 @@ impl Examination<'_> {
         let has_ended = reaches_the_end(&mut session)?;
         // It may have subscribed to a feedback since.
         asks_for_history(&mut session)?;
-        let services = session.harness.rig().services();
+        let services = session.harness.rig.services();
         let created = services.difference(&before).count();
         session
             .findings
@@ -45,11 +45,14 @@ impl Examination<'_> {
     }
 
     /// The source: without a pose it sends the items of one window, and waits.
-    pub(super) fn window(&mut self) -> Result<(), ConformanceError> {
+    pub(super) fn window(&mut self) -> Result<(), ProgramError> {
         let mut session = Session::open(self.context, "window", &mut self.findings)?;
         session.pace = Pace::Hold;
         starts(&mut session)?;
-        let (demands, scans) = (session.demands(), session.harness.manifest().window.scans);
+        let (demands, scans) = (
+            session.demands(),
+            session.harness.rig.manifest().window.scans,
+        );
         let window = scans.min(self.context.reference.end() as usize);
         let has_sent = |session: &Session<'_>| session.outputs.len() >= window;
         session.wait(demands.item_timeout, has_sent)?;
@@ -65,7 +68,7 @@ impl Examination<'_> {
 }
 
 /// Starts the program, and requires that it opens its topic.
-pub(super) fn starts(session: &mut Session<'_>) -> Result<bool, ConformanceError> {
+pub(super) fn starts(session: &mut Session<'_>) -> Result<bool, ProgramError> {
     let topic = session.output_topic();
     let waited = session.start(&session.test.candidate.command)?;
     let is_open = waited.is_done();
@@ -79,7 +82,7 @@ pub(super) fn starts(session: &mut Session<'_>) -> Result<bool, ConformanceError
 }
 
 /// Requires that it subscribes to its inputs, and the handshake of each.
-fn joins(session: &mut Session<'_>) -> Result<(), ConformanceError> {
+fn joins(session: &mut Session<'_>) -> Result<(), ProgramError> {
     session.findings.checked(Rule::AsksForHistory);
     session.wait(session.demands().item_timeout, |session| {
         session.not_read().is_empty()
@@ -93,7 +96,7 @@ fn joins(session: &mut Session<'_>) -> Result<(), ConformanceError> {
 }
 
 /// Requires that it notifies the publisher of each topic that it has subscribed to.
-fn asks_for_history(session: &mut Session<'_>) -> Result<(), ConformanceError> {
+fn asks_for_history(session: &mut Session<'_>) -> Result<(), ProgramError> {
     let waited = session.wait(session.demands().item_timeout, |session| {
         session.not_notified().is_empty()
     })?;
@@ -109,7 +112,7 @@ fn asks_for_history(session: &mut Session<'_>) -> Result<(), ConformanceError> {
 }
 
 /// Requires an item for each, and the end.
-fn reaches_the_end(session: &mut Session<'_>) -> Result<bool, ConformanceError> {
+fn reaches_the_end(session: &mut Session<'_>) -> Result<bool, ProgramError> {
     let end = session.reference.end();
     session.findings.checked(Rule::OneForOne);
     session.findings.checked(Rule::PassesEnd);
@@ -134,7 +137,7 @@ fn reaches_the_end(session: &mut Session<'_>) -> Result<bool, ConformanceError> 
     Ok(has_end)
 }
 
-fn waits_after_the_end(session: &mut Session<'_>) -> Result<(), ConformanceError> {
+fn waits_after_the_end(session: &mut Session<'_>) -> Result<(), ProgramError> {
     let sent = session.outputs.len();
     let lives = session.rest(session.demands().quiet)?;
     session.findings.require(Rule::PassesEnd, lives, || {
@@ -149,20 +152,20 @@ fn waits_after_the_end(session: &mut Session<'_>) -> Result<(), ConformanceError
 }
 
 /// Requires that a reader which comes now receives the newest items.
-fn gives_history(session: &mut Session<'_>) -> Result<(), ConformanceError> {
+fn gives_history(session: &mut Session<'_>) -> Result<(), ProgramError> {
     let topic = session.output_topic();
-    let history = session.harness.topics().sizes.history;
+    let history = session.harness.topics.sizes.history;
     let wanted = history.min(session.outputs.len());
-    let late = session.harness.rig().tap(topic)?;
+    let late = session.harness.rig.tap(topic)?;
     let mut received = 0;
     let since = Instant::now();
     while received < wanted && since.elapsed() < session.demands().item_timeout {
         while late.receive().is_ok_and(|message| message.is_some()) {
             received += 1;
         }
-        let rig = session.harness.rig();
+        let rig = &session.harness.rig;
         if rig.sleep(&[late.as_ref()], POLL_PERIOD)? {
-            return Err(ConformanceError::Interrupted);
+            return Err(ProgramError::Interrupted);
         }
     }
     session
@@ -187,7 +190,7 @@ fn begins_with_newest(session: &mut Session<'_>) {
 }
 
 /// Sends SIGTERM, and requires the exit code 0.
-pub(super) fn stops(session: &mut Session<'_>, when: &str) -> Result<(), ConformanceError> {
+pub(super) fn stops(session: &mut Session<'_>, when: &str) -> Result<(), ProgramError> {
     let limit = session.demands().stop_timeout;
     session.findings.checked(Rule::StopsOnRequest);
     match session.stop()? {

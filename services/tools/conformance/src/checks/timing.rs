@@ -3,7 +3,7 @@
 
 use super::{Examination, stream::starts};
 use crate::{
-    ConformanceError,
+    ProgramError,
     report::Work,
     rule::Rule,
     session::{Pace, Session},
@@ -12,9 +12,9 @@ use crate::{
 impl Examination<'_> {
     /// Measures the answers to all items. A source answers none: it is asked for the next by a
     /// pose.
-    pub(super) fn timing(&mut self) -> Result<Option<Work>, ConformanceError> {
+    pub(super) fn timing(&mut self) -> Result<Option<Work>, ProgramError> {
         let mut session = Session::open(self.context, "timing", &mut self.findings)?;
-        if session.harness.topics().copied().is_none() {
+        if session.harness.topics.copied().is_none() {
             return Ok(None);
         }
         session.pace = Pace::Single;

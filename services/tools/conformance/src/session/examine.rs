@@ -1,13 +1,13 @@
 //! The checks of each item that a process sends.
 
-use gyre_harness::{
-    Recorded,
-    item::{not_copied, wrong_stamps},
-};
 use gyre_messages::{Item, flag};
+use gyre_supervise::rig::Recorded;
 
 use super::Session;
-use crate::rule::Rule;
+use crate::{
+    item::{not_copied, wrong_stamps},
+    rule::Rule,
+};
 
 impl Session<'_> {
     /// Examines one item that the process has sent, alone and after the one before.
@@ -35,7 +35,7 @@ impl Session<'_> {
     }
 
     fn examine_copy(&mut self, item: &Item) {
-        let Some(copied) = self.harness.topics().copied() else {
+        let Some(copied) = self.harness.topics.copied() else {
             return;
         };
         let Some(input) = self.reference.get(copied, item.seq).map(Recorded::item) else {

@@ -11,8 +11,8 @@ use gyre_stage::{
     clock,
     control::{Control, Status},
     observer::Next,
-    usage::Usage,
 };
+use gyre_supervise::Usage;
 use gyre_terminal::Failure;
 
 use super::{Poses, Scans};

@@ -24,10 +24,9 @@ use rustix::process::{Pid, Signal, kill_process};
 use super::{Setup, Summary, TICK, drain};
 use crate::{
     StressError,
-    helper::{self, Helper},
-    memory::Taken,
+    helper::{self, Helper, Work},
+    load::Taken,
     tested::TestedPipeline,
-    work::Work,
 };
 
 /// Poses before the measurement: buffers grow, and memory is touched for the first time.

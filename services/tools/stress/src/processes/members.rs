@@ -9,7 +9,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use gyre_stage::{control::Control, processes::ProcessStat};
+use gyre_stage::control::Control;
+use gyre_supervise::ProcessStat;
 
 /// A living process of a run.
 #[derive(Clone, Debug, PartialEq, Eq)]

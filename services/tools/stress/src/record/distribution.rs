@@ -24,9 +24,6 @@ pub struct Distribution {
     pub p99_99_ms: Option<f64>,
     /// Maximum.
     pub max_ms: Option<f64>,
-    /// For the plot: pairs of log10(1 / (1 - q)) and ms.
-    #[serde(skip)]
-    pub curve: Vec<(f64, f64)>,
 }
 
 impl Distribution {
@@ -37,14 +34,6 @@ impl Distribution {
         // Rounded: 1 - 0.99 is not 0.01.
         let is_supported = |share: f64| samples >= (1.0 / (1.0 - share)).round() as u64;
         let supported = |share| at(share).filter(|_| is_supported(share));
-        // The last of n samples stands for the shares from 1 - 1 / n on: it is drawn in their
-        // middle.
-        let nines = (2.0 * samples.max(1) as f64).log10();
-        let steps = (nines * 40.0).ceil() as usize;
-        let curve = (0..=steps).filter_map(|step| {
-            let x = (step as f64 / 40.0).min(nines);
-            Some((x, at(1.0 - 10_f64.powf(-x))?))
-        });
         Self {
             samples,
             p50_ms: supported(0.5),
@@ -53,7 +42,6 @@ impl Distribution {
             p99_9_ms: supported(0.999),
             p99_99_ms: supported(0.9999),
             max_ms: at(1.0),
-            curve: curve.collect(),
         }
     }
 

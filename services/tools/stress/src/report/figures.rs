@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::{
     fault::Fault,
-    memory::Taken,
+    load::Taken,
     processes::Cost,
     record::{Counts, RunLatency},
     witness_fault::WitnessFault,
@@ -59,8 +59,14 @@ impl Figures {
         all?.into_iter().reduce(f64::max)
     }
 
-    /// Returns `p50 4.5, p99 7.0 of 480, max 7.2 ms; 0 of 480 scans dropped`.
+    /// Returns `p50 4.5, p99 7.0 of 480, max 7.2 ms; 0 of 480 scans dropped; processor 3.8 %, memory
+    /// 77 MB`.
     pub(super) fn sentence(&self) -> String {
+        let (cpu, memory) = (self.cpu_percent(), self.memory_mb());
+        let used = format!("processor {cpu:.1} %, memory {memory:.0} MB");
+        if self.latency.counts.due == 0 {
+            return used;
+        }
         let latency = &self.latency.sensor_to_pose;
         let ms = |ms: Option<f64>| ms.map_or("-".to_owned(), |ms| format!("{ms:.1}"));
         let Counts { due, dropped, .. } = self.latency.counts;
@@ -71,7 +77,9 @@ impl Figures {
             1 => "; 1 fault".to_owned(),
             faults => format!("; {faults} faults"),
         };
-        format!("p50 {p50}, p99 {p99}, max {max} ms; {dropped} of {due} scans dropped{faults}")
+        format!(
+            "p50 {p50}, p99 {p99}, max {max} ms; {dropped} of {due} scans dropped{faults}; {used}"
+        )
     }
 
     /// Returns the processor time of all processes, % of one processor.

@@ -6,7 +6,7 @@ use gyre_run::{Judged, Scenario};
 use serde::Serialize;
 
 use super::{Figures, Step};
-use crate::{check::Check, copying::HandOverCost};
+use crate::check::Check;
 
 /// The verdict on a scenario.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -63,9 +63,6 @@ pub struct ScenarioOutcome {
     /// The steps of a search.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub steps: Vec<Step>,
-    /// The transport beside copies.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub copying: Vec<HandOverCost>,
 }
 
 impl ScenarioOutcome {
@@ -83,7 +80,6 @@ impl ScenarioOutcome {
             best: None,
             failed: None,
             steps: Vec::new(),
-            copying: Vec::new(),
         }
     }
 
@@ -124,9 +120,7 @@ impl ScenarioOutcome {
         for reason in reasons {
             let _ = write!(sentence, "; {reason}");
         }
-        if let Some(figures) = &self.figures
-            && figures.latency.counts.due > 0
-        {
+        if let Some(figures) = &self.figures {
             let _ = write!(sentence, " ({})", figures.sentence());
         }
         match (self.best, self.failed) {

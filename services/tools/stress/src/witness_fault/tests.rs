@@ -140,7 +140,6 @@ fn what_a_scenario_lacks_is_named_with_its_remedy() {
         others: others(),
         stages: Vec::new(),
         budget: Budget::default(),
-        kinds: Vec::new(),
         shared_bytes: 0,
     };
     let lacks_in = |tested: &TestedPipeline, scenario| lacks(tested, scenario).unwrap_or_default();

@@ -42,10 +42,17 @@ pub fn write_web_tiles(folder: &Path, source: &mut impl TileSource) -> Result<()
     pyramid.build(0, 0, 0)?;
     let cell_m = pyramid.source.cell_m();
     let top = extent.corner_m(cell_m).y + (rows * TILE_CELLS) as f64 * cell_m;
-    let json = format!(
-        "{{\n  \"tiles\": [\"{{z}}/{{x}}/{{y}}.png\"],\n  \"minzoom\": 0,\n  \"maxzoom\": {zoom},\n  \"tile_size\": {TILE_CELLS},\n  \"left_m\": {:.3},\n  \"top_m\": {top:.3},\n  \"metres_per_pixel_at_maxzoom\": {cell_m}\n}}\n",
-        extent.corner_m(cell_m).x
-    );
+    let rounded = |metres: f64| (metres * 1e3).round() / 1e3;
+    let json = serde_json::json!({
+        "tiles": ["{z}/{x}/{y}.png"],
+        "minzoom": 0,
+        "maxzoom": zoom,
+        "tile_size": TILE_CELLS,
+        "left_m": rounded(extent.corner_m(cell_m).x),
+        "top_m": rounded(top),
+        "metres_per_pixel_at_maxzoom": cell_m,
+    });
+    let json = format!("{json:#}\n");
     Ok(gyre_storage::write(&folder.join("tiles.json"), json)?)
 }
 

@@ -1,38 +1,11 @@
-//! Memory that programs can still get, by the machine and by the control groups of this process;
-//! and the part that a load has taken.
+//! Memory that programs can still get, by the machine and by the control groups of this process.
 
 use std::{
     fs,
     path::{Path, PathBuf},
 };
 
-use serde::{Deserialize, Serialize};
-
 const CGROUPS: &str = "/sys/fs/cgroup";
-/// Memory that is always left, whatever the share: room for other programs that start meanwhile.
-pub(crate) const LEFT: u64 = 1 << 30;
-
-/// Memory that the helper `memory` has taken when the measurement begins.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Taken {
-    /// Memory that it has taken, MB.
-    pub taken_mb: f64,
-    /// Memory that was available before, MB.
-    pub available_mb: f64,
-}
-
-impl Taken {
-    /// Returns the reason why it is no load.
-    pub(crate) fn omitted(&self) -> Option<String> {
-        (self.taken_mb == 0.0).then(|| {
-            format!(
-                "no memory was taken: {:.0} MB are available, and {:.0} MB are always left",
-                self.available_mb,
-                LEFT as f64 * 1e-6
-            )
-        })
-    }
-}
 
 /// The memory that the machine and the control groups leave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -152,17 +125,6 @@ mod tests {
         let meminfo = "MemTotal:  100 kB\nMemAvailable:   42 kB\n";
         assert_eq!(available(meminfo), Some(42 * 1024));
         assert_eq!(available("MemTotal: 100 kB"), None);
-    }
-
-    #[test]
-    fn a_load_that_has_taken_nothing_is_none() {
-        let taken = |taken_mb| Taken {
-            taken_mb,
-            available_mb: 900.0,
-        };
-        assert_eq!(taken(32.0).omitted(), None);
-        let reason = taken(0.0).omitted().unwrap();
-        assert!(reason.contains("900 MB are available"), "{reason}");
     }
 
     #[test]

@@ -5,7 +5,7 @@ use gyre_stage::Manifest;
 
 /// The direction in which a topic leads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Direction {
+pub(crate) enum Direction {
     /// Down the stream: item `seq` is sent for the stage to answer with its item `seq`.
     Forward,
     /// Back to an earlier stage: item `seq` is sent after the stage has answered it.
@@ -14,7 +14,7 @@ pub enum Direction {
 
 /// The topics of a stage.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct StageTopics {
+pub(crate) struct StageTopics {
     /// The topics that it may subscribe to. Of several that lead
     /// forward, the last comes from farthest down the stream.
     pub inputs: Vec<(&'static str, Direction)>,
@@ -26,7 +26,7 @@ pub struct StageTopics {
 
 impl StageTopics {
     /// The topics of a stage in a run with this manifest.
-    pub fn of(stage: StageId, manifest: &Manifest) -> Self {
+    pub(crate) fn of(stage: StageId, manifest: &Manifest) -> Self {
         use Direction::{Feedback, Forward};
         let motions = match manifest.refines {
             true => Refined::TOPIC,
@@ -71,7 +71,10 @@ impl StageTopics {
     }
 
     /// Returns the inputs that lead in this direction.
-    pub fn leading(&self, direction: Direction) -> impl Iterator<Item = &'static str> + use<> {
+    pub(crate) fn leading(
+        &self,
+        direction: Direction,
+    ) -> impl Iterator<Item = &'static str> + use<> {
         let inputs = self.inputs.clone();
         inputs
             .into_iter()
@@ -80,7 +83,7 @@ impl StageTopics {
     }
 
     /// Returns the topic whose items the stage copies; `None` for a source.
-    pub fn copied(&self) -> Option<&'static str> {
+    pub(crate) fn copied(&self) -> Option<&'static str> {
         self.leading(Direction::Forward).last()
     }
 }

@@ -5,7 +5,8 @@ use std::fmt;
 use gyre_latency::Percentiles;
 use serde::Serialize;
 
-use crate::record::{Counts, Differences, Record, Times};
+use super::record::{Counts, Record, Times};
+use crate::Spreads;
 
 /// The comparison of a program with a stage of a run.
 #[derive(Clone, Debug, Serialize)]
@@ -42,31 +43,6 @@ pub enum Verdict {
     Nothing,
 }
 
-/// The differences of results; `None` where the stage's results have no such part, or none is
-/// different.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Spreads {
-    /// Mean absolute difference of the cells of the rasters.
-    pub mask: Option<Spread>,
-    /// Mean of the cells of the run's rasters, for comparison.
-    pub mask_level: Option<f64>,
-    /// Difference of the translations, m.
-    pub translation_m: Option<Spread>,
-    /// Difference of the rotations, degrees.
-    pub rotation_deg: Option<Spread>,
-}
-
-/// Percentiles of differences.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Spread {
-    /// Median.
-    pub p50: f64,
-    /// 99th percentile.
-    pub p99: f64,
-    /// Maximum.
-    pub max: f64,
-}
-
 /// Times of the same items.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Beside {
@@ -83,7 +59,7 @@ impl Report {
             stage,
             command: command.to_vec(),
             counts,
-            differences: Spreads::of(&record.differences),
+            differences: record.differences.spreads(),
             work: Beside::of(&record.work),
             answer: Beside::of(&record.answer),
             breaches: record.breaches.clone(),
@@ -123,43 +99,6 @@ impl Report {
             }
             Verdict::Nothing => format!("{stage}: no item was compared"),
         }
-    }
-}
-
-impl Spreads {
-    fn of(differences: &Differences) -> Self {
-        Self {
-            mask: Spread::of(&differences.mask),
-            mask_level: (!differences.mask.is_empty())
-                .then(|| differences.mask_levels / differences.mask.len() as f64),
-            translation_m: Spread::of(&differences.translation_m),
-            rotation_deg: Spread::of(&differences.rotation_deg),
-        }
-    }
-
-    /// Returns the rows of the table, with their units.
-    fn rows(&self) -> impl Iterator<Item = (&'static str, Spread, &'static str)> {
-        let rows = [
-            ("mask", self.mask, ""),
-            ("translation", self.translation_m, " m"),
-            ("rotation", self.rotation_deg, " deg"),
-        ];
-        rows.into_iter()
-            .filter_map(|(name, spread, unit)| Some((name, spread?, unit)))
-    }
-}
-
-impl Spread {
-    fn of(values: &[f64]) -> Option<Self> {
-        let mut values = values.to_vec();
-        values.sort_by(f64::total_cmp);
-        let at = |share: f64| values[((values.len() - 1) as f64 * share).ceil() as usize];
-        let max = *values.last()?;
-        Some(Self {
-            p50: at(0.5),
-            p99: at(0.99),
-            max,
-        })
     }
 }
 
@@ -229,20 +168,10 @@ impl Report {
             f,
             "results         {identical} identical, {differing} differ"
         )?;
-        for (name, Spread { p50, p99, max }, unit) in self.differences.rows() {
-            writeln!(
-                f,
-                "  {name:<13} p50 {p50:.4}{unit}, p99 {p99:.4}{unit}, max {max:.4}{unit}"
-            )?;
+        for row in self.differences.rows() {
+            writeln!(f, "  {row}")?;
         }
-        if let Some(level) = self.differences.mask_level {
-            writeln!(f, "  where the mean of the real ones is {level:.4}")?;
-        }
-        let is_elsewhere = self
-            .differences
-            .rows()
-            .all(|(_, spread, ..)| spread.max == 0.0);
-        match differing > 0 && is_elsewhere {
+        match differing > 0 && self.differences.are_zero() {
             true => writeln!(
                 f,
                 "  they differ in other fields only, as scores and covariances"

@@ -1,4 +1,4 @@
-//! The lines that are appended to `log.jsonl` while the recorder runs.
+//! The lines that are appended to `log.jsonl` of a run.
 
 use std::{
     fs::File,
@@ -6,8 +6,9 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use gyre_recording::LogLine;
 use serde_json::Value;
+
+use crate::LogLine;
 
 /// The most that is read at once, bytes.
 const MAX_BYTES: u64 = 1 << 20;

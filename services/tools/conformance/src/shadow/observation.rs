@@ -2,12 +2,14 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use gyre_harness::{Direction, Recorded, StageTopics};
 use gyre_messages::{StageId, flag};
 use gyre_stage::{
     Listener, StageError,
     observer::{ObservedRun, TopicObserver},
 };
+use gyre_supervise::rig::Recorded;
+
+use crate::topics::{Direction, StageTopics};
 
 /// Bytes of messages of items that are not complete. Beyond them the oldest is given up: in live
 /// mode most scans never become an item.
@@ -77,9 +79,6 @@ pub(crate) struct Observation<'run> {
 
 impl<'run> Observation<'run> {
     /// Observes the topics of a stage.
-    ///
-    /// # Errors
-    /// No place is free, the run has ended, or the transport fails.
     pub(crate) fn of(
         run: &'run ObservedRun,
         stage: StageId,
@@ -111,9 +110,6 @@ impl<'run> Observation<'run> {
     }
 
     /// Empties the queues; returns the items that are complete with it.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     pub(crate) fn take(&mut self) -> Result<Vec<Observed>, StageError> {
         let mut complete = Vec::new();
         for place in 0..self.observers.len() {

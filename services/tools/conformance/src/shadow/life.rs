@@ -7,12 +7,15 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_harness::{Candidate, Harness, Rig, Sent};
 use gyre_journal::checkpoint;
 use gyre_messages::StageId;
 use gyre_stage::{StageError, wake::Signals};
+use gyre_supervise::rig::Rig;
 
-use crate::ShadowError;
+use crate::{
+    Candidate, ProgramError,
+    harness::{Harness, Sent},
+};
 
 /// Messages that are taken at once of a program that may send without end.
 const AT_ONCE: usize = 64;
@@ -40,13 +43,10 @@ pub(crate) struct Life<'a> {
 
 impl<'a> Life<'a> {
     /// Starts the program in a run of its own.
-    ///
-    /// # Errors
-    /// A folder or a service cannot be created, or the command cannot be started.
     pub(crate) fn begin(
         program: &ShadowProgram,
         signals: &'a Signals,
-    ) -> Result<Self, ShadowError> {
+    ) -> Result<Self, ProgramError> {
         let candidate = &program.candidate;
         let mut harness = Harness::open(program.rig(signals)?, candidate.stage)?;
         harness.start(&candidate.command, &candidate.scheduling)?;
@@ -58,9 +58,6 @@ impl<'a> Life<'a> {
     }
 
     /// Answers the handshakes of the process. Returns whether it has opened its topics.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     pub(crate) fn attend(&mut self) -> Result<bool, StageError> {
         self.harness.answer_handshakes()?;
         if !self.is_open && self.harness.has_publisher() {
@@ -80,22 +77,16 @@ impl<'a> Life<'a> {
     }
 
     /// Takes some of its messages.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     pub(crate) fn take(&self) -> Result<Vec<Sent>, StageError> {
         let received = std::iter::from_fn(|| self.harness.receive().transpose());
         received.take(AT_ONCE).collect()
     }
 
     /// Asks it to end, and kills it if it does not.
-    ///
-    /// # Errors
-    /// The system refuses to wait.
     pub(crate) fn end(&mut self) -> Result<(), StageError> {
         self.harness.terminate();
         let since = Instant::now();
-        while self.harness.is_running() && since.elapsed() < STOP_TIMEOUT {
+        while self.harness.death().is_none() && since.elapsed() < STOP_TIMEOUT {
             std::thread::sleep(POLL_PERIOD);
             self.attend()?;
         }
@@ -105,36 +96,33 @@ impl<'a> Life<'a> {
 
 impl ShadowProgram {
     /// Creates a run of its own, with a copy of the state of the observed run's refinement.
-    fn rig<'a>(&self, signals: &'a Signals) -> Result<Rig<'a>, ShadowError> {
+    fn rig<'a>(&self, signals: &'a Signals) -> Result<Rig<'a>, ProgramError> {
         let out = self.folder.join("out");
         if out.exists() {
-            fs::remove_dir_all(&out).map_err(ShadowError::file(&out))?;
+            fs::remove_dir_all(&out).map_err(ProgramError::file(&out))?;
         }
         if self.candidate.stage == StageId::Refinement {
             self.copy_state(&out)?;
         }
-        Ok(self.candidate.rig(out, signals)?)
+        self.candidate.rig(out, signals, true)
     }
 
     /// Appends the output of a life of the program to the file for it.
-    ///
-    /// # Errors
-    /// A file that cannot be read or written.
-    pub(crate) fn keep_output(&self, life: &Life<'_>) -> Result<(), ShadowError> {
+    pub(crate) fn keep_output(&self, life: &Life<'_>) -> Result<(), ProgramError> {
         let Some(path) = &self.output else {
             return Ok(());
         };
         let log = format!("log/{}.txt", self.candidate.stage.name());
-        let appended = fs::read(life.harness.manifest().out.join(log)).and_then(|printed| {
+        let appended = fs::read(life.harness.rig.manifest().out.join(log)).and_then(|printed| {
             let file = fs::OpenOptions::new().create(true).append(true).open(path);
             file?.write_all(&printed)
         });
-        appended.map_err(ShadowError::file(path))
+        appended.map_err(ProgramError::file(path))
     }
 
     /// Copies the state of the run's refinement, from which a restarted one or one that is swapped
     /// in starts too.
-    fn copy_state(&self, out: &Path) -> Result<(), ShadowError> {
+    fn copy_state(&self, out: &Path) -> Result<(), ProgramError> {
         let from = checkpoint::path(&self.candidate.manifest.out);
         let to = checkpoint::path(out);
         let created = gyre_storage::create_folder(to.parent().unwrap_or(out));
@@ -142,7 +130,7 @@ impl ShadowProgram {
         match copied.and_then(|()| fs::copy(&from, to)) {
             // A replaced refinement need not have one.
             Err(error) if error.kind() != io::ErrorKind::NotFound => {
-                Err(ShadowError::file(&from)(error))
+                Err(ProgramError::file(&from)(error))
             }
             _ => Ok(()),
         }

@@ -11,11 +11,11 @@
 //! - refinement needs the state before its first item, with which each life begins: it is started
 //!   again.
 
-use gyre_harness::{Harness, start_of_trajectory};
 use gyre_messages::{Item, Message, Motion, Pose, StageId, flag};
 use gyre_stage::StageError;
 
-use crate::observation::Observed;
+use super::observation::Observed;
+use crate::harness::{Harness, start_of_trajectory};
 
 /// The numbers of the shadow's stream.
 #[derive(Clone, Copy, Debug)]
@@ -83,9 +83,6 @@ impl Renumbering {
     }
 
     /// Sends the inputs of an item.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     pub(crate) fn send(
         &mut self,
         shadow: &Harness<'_>,
@@ -176,8 +173,8 @@ fn send_start(shadow: &Harness<'_>, observed: &Observed) -> Result<(), StageErro
 
 #[cfg(test)]
 mod tests {
-    use gyre_harness::Recorded;
     use gyre_messages::{Masked, MaskedHeader};
+    use gyre_supervise::rig::Recorded;
 
     use super::*;
 

@@ -3,11 +3,10 @@
 
 use std::path::Path;
 
-use gyre_messages::LoopHeader;
-use gyre_slam::{Keyframe, Query, RecordReader};
-use gyre_stage::StageError;
-
-use crate::header;
+use gyre_geometry::{covariance, xy_yaw};
+use gyre_messages::{Item, LoopHeader};
+use gyre_slam::{Keyframe, LoopCandidate, Query, RecordReader};
+use gyre_storage::LogError;
 
 /// The loops of a run so far.
 pub struct LoggedLoops {
@@ -23,7 +22,7 @@ impl LoggedLoops {
     ///
     /// # Errors
     /// A log that cannot be read.
-    pub fn open(out: &Path) -> Result<Self, StageError> {
+    pub fn open(out: &Path) -> Result<Self, LogError> {
         Ok(Self {
             keyframes: RecordReader::open(out)?,
             queries: RecordReader::open(out)?,
@@ -36,7 +35,7 @@ impl LoggedLoops {
     ///
     /// # Errors
     /// A log that cannot be read.
-    pub fn refresh(&mut self) -> Result<&[LoopHeader], StageError> {
+    pub fn refresh(&mut self) -> Result<&[LoopHeader], LogError> {
         self.queries.refresh()?;
         self.keyframes.refresh()?;
         if self.queries.unchanged() < self.read {
@@ -50,10 +49,37 @@ impl LoggedLoops {
                 let [later, earlier] = ends.map(|index| self.keyframes.read_without_points(index));
                 let loops = self.loops.len() as u64;
                 self.loops
-                    .push(header(loops, &later?, &earlier?, candidate));
+                    .push(loop_header(loops, &later?, &earlier?, candidate));
             }
             self.read += 1;
         }
         Ok(&self.loops)
+    }
+}
+
+/// Returns the message of the loop with the number `loops`, which closes `candidate`.
+pub fn loop_header(
+    loops: u64,
+    later: &Keyframe,
+    earlier: &Keyframe,
+    candidate: &LoopCandidate,
+) -> LoopHeader {
+    let [x_m, y_m, yaw_rad] = xy_yaw(&candidate.motion.motion);
+    LoopHeader {
+        item: Item {
+            seq: loops,
+            scan: later.scan,
+            previous_scan: earlier.scan,
+            stamp_ns: later.stamp_ns,
+            ..Item::default()
+        },
+        later_seq: later.seq,
+        earlier_seq: earlier.seq,
+        x_m,
+        y_m,
+        yaw_rad,
+        covariance: covariance::pack(&candidate.motion.covariance),
+        correlation: candidate.correlation,
+        loops: loops + 1,
     }
 }

@@ -1,18 +1,20 @@
 //! The messages of the shadow: examined against the contract, and compared with the result of the
 //! run for the same item.
 
-use gyre_harness::{
-    Recorded, Sent,
-    item::{not_copied, wrong_stamps},
-};
 use gyre_messages::{Item, flag};
+use gyre_supervise::rig::Recorded;
 
 use super::{Shadowing, UnderWay};
-use crate::{ShadowError, record::Pair};
+use crate::{
+    ProgramError,
+    harness::Sent,
+    item::{not_copied, wrong_stamps},
+    shadow::record::Pair,
+};
 
 impl Shadowing<'_> {
     /// Examines a message of the shadow.
-    pub(super) fn receive(&mut self, sent: Sent) -> Result<(), ShadowError> {
+    pub(super) fn receive(&mut self, sent: Sent) -> Result<(), ProgramError> {
         let output = match sent {
             Sent::Message(output) => output,
             Sent::Malformed { sentence, .. } => {
@@ -39,7 +41,7 @@ impl Shadowing<'_> {
         Ok(())
     }
 
-    fn answered(&mut self, it: &UnderWay, output: &Recorded) -> Result<(), ShadowError> {
+    fn answered(&mut self, it: &UnderWay, output: &Recorded) -> Result<(), ProgramError> {
         let stage = self.options.stage;
         let (item, sent) = (output.item(), &it.sent.item);
         for field in not_copied(stage, sent, &item) {

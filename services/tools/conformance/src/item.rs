@@ -3,7 +3,7 @@
 use gyre_messages::{Item, StageId, flag};
 
 /// Returns the fields of an output's item that a stage has to copy from its input and has not.
-pub fn not_copied(stage: StageId, input: &Item, output: &Item) -> Vec<&'static str> {
+pub(crate) fn not_copied(stage: StageId, input: &Item, output: &Item) -> Vec<&'static str> {
     let mut hops = output.hops;
     hops[stage as usize] = input.hops[stage as usize];
     let places = Item::lost_azimuths;
@@ -30,7 +30,7 @@ pub fn not_copied(stage: StageId, input: &Item, output: &Item) -> Vec<&'static s
 /// Returns what is wrong with the time stamps of a stage's own hop; `None` if they are in order,
 /// and between the times at which its input was sent (if that is known) and its output was read,
 /// both CLOCK_MONOTONIC, ns.
-pub fn wrong_stamps(
+pub(crate) fn wrong_stamps(
     stage: StageId,
     output: &Item,
     sent_ns: Option<i64>,
@@ -59,7 +59,7 @@ pub fn wrong_stamps(
 }
 
 /// Returns the time of a stage's work on an item, ns.
-pub fn work_ns(stage: StageId, item: &Item) -> i64 {
+pub(crate) fn work_ns(stage: StageId, item: &Item) -> i64 {
     let hop = item.hops[stage as usize];
     hop.finished_ns.saturating_sub(hop.started_ns)
 }

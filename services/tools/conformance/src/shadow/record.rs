@@ -2,17 +2,17 @@
 
 use std::{fs::File, path::Path};
 
-use gyre_harness::{
-    Recorded,
-    item::work_ns,
-    result::{Difference, difference, result_bytes},
-};
 use gyre_latency::Durations;
 use gyre_messages::{Item, StageId};
 use gyre_stage::StageError;
+use gyre_supervise::rig::Recorded;
 use serde::Serialize;
 
-use crate::ShadowError;
+use crate::{
+    ProgramError,
+    item::work_ns,
+    result::{Differences, result_bytes},
+};
 
 /// Sentences about breaches and deaths that are kept; more are counted.
 const SENTENCES: usize = 5;
@@ -49,19 +49,6 @@ pub struct Counts {
     pub hangs: u64,
     /// Breaches of the contract of a stage.
     pub breaches: u64,
-}
-
-/// Differences of items that are not identical.
-#[derive(Debug, Default)]
-pub(crate) struct Differences {
-    /// Mean absolute difference of the cells of the rasters.
-    pub mask: Vec<f64>,
-    /// Sum of the means of the cells of the run's rasters.
-    pub mask_levels: f64,
-    /// Length of the difference of the translations, m.
-    pub translation_m: Vec<f64>,
-    /// Absolute difference of the yaws, degrees.
-    pub rotation_deg: Vec<f64>,
 }
 
 /// Times of the shadow and of the stage of the run, for the same items.
@@ -112,16 +99,13 @@ struct ComparedItem {
 
 impl Record {
     /// Begins a record; with `rows` each item becomes a row of this file.
-    ///
-    /// # Errors
-    /// A file that cannot be created.
     pub(crate) fn new(
         stage: StageId,
         topic: &'static str,
         rows: Option<&Path>,
-    ) -> Result<Self, ShadowError> {
+    ) -> Result<Self, ProgramError> {
         let rows = rows.map(|path| {
-            let file = File::create(path).map_err(ShadowError::file(path));
+            let file = File::create(path).map_err(ProgramError::file(path));
             file.map(csv::Writer::from_writer)
         });
         Ok(Self {
@@ -138,20 +122,16 @@ impl Record {
     }
 
     /// Compares the results for an item.
-    ///
-    /// # Errors
-    /// Messages of another topic, or a file that cannot be written.
-    pub(crate) fn compare(&mut self, pair: &Pair<'_>) -> Result<(), ShadowError> {
+    pub(crate) fn compare(&mut self, pair: &Pair<'_>) -> Result<(), ProgramError> {
         let identical =
             result_bytes(self.topic, pair.real)? == result_bytes(self.topic, pair.shadow)?;
         self.counts.compared += 1;
         self.counts.identical += u64::from(identical);
         let row = self.row(pair, identical)?;
         if let Some(rows) = &mut self.rows {
-            rows.serialize(row).map_err(ShadowError::Rows)?;
+            rows.serialize(row)?;
             // At once: a person or a script reads them as they come.
-            rows.flush()
-                .map_err(|error| ShadowError::Rows(error.into()))?;
+            rows.flush().map_err(csv::Error::from)?;
         }
         Ok(())
     }
@@ -160,7 +140,7 @@ impl Record {
         let (real, shadow) = (pair.real.item(), pair.shadow.item());
         let [mask_difference, translation_m, rotation_deg] = match identical {
             true => [None; 3],
-            false => self.differ(pair)?,
+            false => self.differences.add(self.topic, pair.real, pair.shadow)?,
         };
         let (shadow_work_ns, real_work_ns) =
             (work_ns(self.stage, &shadow), work_ns(self.stage, &real));
@@ -183,32 +163,6 @@ impl Record {
             real_work_ms: ms(real_work_ns),
             shadow_answer_ms: answers.map(|(shadow_ns, _)| ms(shadow_ns)),
             real_answer_ms: answers.map(|(_, real_ns)| ms(real_ns)),
-        })
-    }
-
-    /// Adds the differences of a pair; returns those of masks, of translation (m) and of rotation
-    /// (deg).
-    fn differ(&mut self, pair: &Pair<'_>) -> Result<[Option<f64>; 3], StageError> {
-        let all = &mut self.differences;
-        Ok(match difference(self.topic, pair.real, pair.shadow)? {
-            None => [None; 3],
-            Some(Difference::Masks {
-                mean_absolute,
-                level,
-                ..
-            }) => {
-                all.mask.push(mean_absolute);
-                all.mask_levels += level;
-                [Some(mean_absolute), None, None]
-            }
-            Some(Difference::Planar { x_m, y_m, yaw_rad }) => {
-                let rotation_deg = yaw_rad.to_degrees().abs();
-                all.rotation_deg.push(rotation_deg);
-                let has_translation = self.stage != StageId::RotationSearch;
-                let translation_m = has_translation.then(|| x_m.hypot(y_m));
-                all.translation_m.extend(translation_m);
-                [None, translation_m, Some(rotation_deg)]
-            }
         })
     }
 

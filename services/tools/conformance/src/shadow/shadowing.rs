@@ -15,13 +15,14 @@ use gyre_stage::{
     wake::{MAX_WAIT, Signals},
 };
 
-use crate::{
-    Options, ShadowError,
+use super::{
+    Options,
     life::{Life, ShadowProgram},
     observation::{Observation, Observed},
     record::Record,
     renumbering::{Entry, Renumbering, SentItem},
 };
+use crate::ProgramError;
 
 /// Items that wait for the shadow at most; then all but the newest are skipped.
 const BACKLOG: usize = 16;
@@ -77,7 +78,7 @@ impl<'a> Shadowing<'a> {
         run: &'a ObservedRun,
         signals: &'a Signals,
         record: Record,
-    ) -> Result<Self, ShadowError> {
+    ) -> Result<Self, ProgramError> {
         let now = Instant::now();
         let candidate = &program.candidate;
         let (topics, out) = (candidate.topics(), &candidate.manifest.out);
@@ -107,7 +108,7 @@ impl<'a> Shadowing<'a> {
     }
 
     /// Runs until the run has ended, enough is compared, or a signal requests a stop.
-    pub(crate) fn run(mut self, observe: &mut dyn FnMut(&str)) -> Result<Record, ShadowError> {
+    pub(crate) fn run(mut self, observe: &mut dyn FnMut(&str)) -> Result<Record, ProgramError> {
         let (began, mut reported) = (Instant::now(), Instant::now());
         loop {
             // Before the poll: the messages before the end are still in the queues.
@@ -149,7 +150,7 @@ impl<'a> Shadowing<'a> {
         format!("{compared} items compared, {identical} identical, {skipped} skipped")
     }
 
-    fn sleep(&self) -> Result<bool, ShadowError> {
+    fn sleep(&self) -> Result<bool, ProgramError> {
         let rest = REST.saturating_sub(self.taken.elapsed());
         let is_starting = self.life.as_ref().is_some_and(|life| !life.is_open());
         let limit = match (rest.is_zero(), is_starting) {
@@ -157,7 +158,7 @@ impl<'a> Shadowing<'a> {
             (true, true) => STARTING,
             (true, false) => MAX_WAIT,
         };
-        let shadow = self.life.iter().map(|life| life.harness.listener());
+        let shadow = self.life.iter().map(|life| life.harness.output.listener());
         let listeners: Vec<&Listener> = match rest.is_zero() {
             true => shadow.chain(self.observation.listeners()).collect(),
             false => shadow.collect(),
@@ -166,7 +167,7 @@ impl<'a> Shadowing<'a> {
     }
 
     /// Takes the messages of the run, if a poll is due.
-    fn take(&mut self, at_once: bool) -> Result<(), ShadowError> {
+    fn take(&mut self, at_once: bool) -> Result<(), ProgramError> {
         if !at_once && self.taken.elapsed() < REST {
             return Ok(());
         }
@@ -181,7 +182,7 @@ impl<'a> Shadowing<'a> {
     }
 
     /// Leaves out the items for which the shadow is too late.
-    fn bound_backlog(&mut self) -> Result<(), ShadowError> {
+    fn bound_backlog(&mut self) -> Result<(), ProgramError> {
         let is_full = match self.options.stage {
             StageId::Refinement if self.life.is_some() => {
                 self.backlog.iter().map(Observed::bytes).sum::<usize>() > BACKLOG_BYTES
@@ -208,7 +209,7 @@ impl<'a> Shadowing<'a> {
     }
 
     /// Starts the shadow if there is none, and exchanges messages with it.
-    fn attend(&mut self) -> Result<(), ShadowError> {
+    fn attend(&mut self) -> Result<(), ProgramError> {
         let Some(life) = &mut self.life else {
             return self.start();
         };
@@ -235,7 +236,7 @@ impl<'a> Shadowing<'a> {
         }
     }
 
-    fn start(&mut self) -> Result<(), ShadowError> {
+    fn start(&mut self) -> Result<(), ProgramError> {
         // A refinement begins with a copy of the state after its first item, which has to be there.
         let waits = self.options.stage == StageId::Refinement && self.backlog.is_empty();
         if waits || Instant::now() < self.due {
@@ -266,7 +267,7 @@ impl<'a> Shadowing<'a> {
     }
 
     /// Ends a life that has failed.
-    fn fail(&mut self, sentence: String) -> Result<(), ShadowError> {
+    fn fail(&mut self, sentence: String) -> Result<(), ProgramError> {
         self.failures += 1;
         let again = match self.failures >= MAX_FAILURES {
             true => "it is not started again",
@@ -277,7 +278,7 @@ impl<'a> Shadowing<'a> {
         self.end_life(BACKOFF)
     }
 
-    fn end_life(&mut self, backoff: Duration) -> Result<(), ShadowError> {
+    fn end_life(&mut self, backoff: Duration) -> Result<(), ProgramError> {
         self.record.counts.unanswered += u64::from(self.under_way.take().is_some());
         self.unanswerable = None;
         self.due = Instant::now() + backoff;
@@ -288,7 +289,7 @@ impl<'a> Shadowing<'a> {
     }
 
     /// Sends the next items: one that has to be answered, and those before it.
-    fn send(&mut self) -> Result<(), ShadowError> {
+    fn send(&mut self) -> Result<(), ProgramError> {
         while self.under_way.is_none()
             && let Some(observed) = self.backlog.pop_front()
         {
@@ -325,7 +326,7 @@ impl<'a> Shadowing<'a> {
         Ok(())
     }
 
-    fn finish(mut self) -> Result<Record, ShadowError> {
+    fn finish(mut self) -> Result<Record, ProgramError> {
         let counts = &mut self.record.counts;
         counts.left += self.backlog.len() as u64 + u64::from(self.under_way.is_some());
         if let Some(mut life) = self.life.take() {

@@ -2,9 +2,10 @@
 
 use std::{fs, path::Path, time::Duration};
 
+use gyre_stage::control::Status;
 use serde::{Deserialize, Serialize};
 
-use crate::processes::ProcessStat;
+use crate::ProcessStat;
 
 /// The resources that a process has used since its start, and the memory that it has now.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -53,7 +54,27 @@ impl Usage {
     }
 }
 
-/// Reads what `/proc` says of a process or thread.
+/// A run and the resources that its processes use.
+#[derive(Serialize)]
+pub struct UsedRun {
+    /// The supervisor's report.
+    pub status: Status,
+    /// The usage of each process, in the order of the status; `None` if it has ended.
+    pub usage: Vec<Option<Usage>>,
+}
+
+impl UsedRun {
+    /// Reads the usage of a run with this status.
+    pub fn of(status: Status) -> Self {
+        let usage = status.processes.iter().map(|it| Usage::of(it.pid));
+        Self {
+            usage: usage.collect(),
+            status,
+        }
+    }
+}
+
+/// Reads the file `status` of a process or thread in `/proc`.
 fn status(folder: &Path) -> Option<String> {
     fs::read_to_string(folder.join("status")).ok()
 }
