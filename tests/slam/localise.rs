@@ -24,8 +24,8 @@ const OTHER_TOWN: u64 = 4;
 enum Day {
     First,
     Second,
-    /// It rains, and things of the town have changed.
-    Rainy,
+    /// Other cars and other noise than on the second.
+    Third,
 }
 
 /// The drive that is mapped.
@@ -36,11 +36,9 @@ fn first_drive() -> PathBuf {
 /// A drive around a block of the town with the seed `town`, with traffic and noise of its own.
 fn drive(town: u64, day: Day) -> PathBuf {
     let settings = match day {
-        Day::First => format!("[town]\nseed = {town}\n"),
-        Day::Second => format!("seed = 9\n[town]\nseed = {town}\n"),
-        Day::Rainy => format!(
-            "seed = 9\nweather = [{{ rain_mm_h = 10.0 }}]\n[town]\nseed = {town}\nchanges_seed = 5\n"
-        ),
+        Day::First => format!("seed = {town}\n"),
+        Day::Second => format!("seed = {town}\nsensor.seed = 9\n"),
+        Day::Third => format!("seed = {town}\nsensor.seed = 10\n"),
     };
     recording::configured(
         &format!("town-{town}-{day:?}"),
@@ -76,7 +74,7 @@ fn localise(map: &Path, town: u64, out: &Path) -> Ended {
 }
 
 fn localising(map: &Path, town: u64, out: &Path) -> Command {
-    let drive = drive(town, Day::Rainy);
+    let drive = drive(town, Day::Third);
     let configuration = out.with_extension("toml");
     fs::write(&configuration, CONFIGURATION).unwrap();
     let mut command = gyre();

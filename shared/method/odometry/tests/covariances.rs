@@ -1,4 +1,5 @@
-//! Covariances of motions on simulated roads, whose truth is exact, with and without lost azimuths.
+//! Covariances of motions in simulated streets, whose truth is exact, with and without lost azimuths.
+//! Roads as hard as real ones are in `research/worlds/tests/method/covariances.rs`.
 
 use std::{fs, path::Path};
 
@@ -21,10 +22,9 @@ fn drive(seed: u64) -> SimulatedDrive {
     let text = format!(
         "scans = {SCANS}
         seed = {seed}
-        realism = 'road'
-        sensor.profile = 'cts350x-radiate'
+        sensor = {{ profile = 'cts350x-radiate', lost_azimuths = true }}
         output.format = 'radiate'
-        drive = {{ kind = 'file', file = '{PROJECT}/configs/stop-and-go.tum' }}"
+        drive.file = '{PROJECT}/configs/stop-and-go.tum'"
     );
     let config: SimulationConfig = toml::from_str(&text).unwrap();
     SimulatedDrive::new(&config).unwrap()
