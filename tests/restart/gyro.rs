@@ -34,7 +34,7 @@ fn with_log() -> PathBuf {
     config.wheels.rate_hz = 20.0;
     config.wheels.late_s = WHEELS_LATE_S;
     config.wheels.faults = true;
-    config.blind_s = Some([2.5, 4.0]);
+    config.blind_s = Some([2.5, 4.5]);
     recording::of("gyro-and-wheels", &config)
 }
 
