@@ -87,7 +87,7 @@ pub fn of_radiate(loses_azimuths: bool) -> PathBuf {
     config.sensor.profile = Profile::Cts350xRadiate;
     config.output.format = Some(OutputFormat::Radiate);
     config.drive.speed_mps = 5.0;
-    config.effects.lost_azimuths = Some(loses_azimuths);
+    config.sensor.lost_azimuths = loses_azimuths;
     simulated(&format!("radiate-{loses_azimuths}"), &config)
 }
 

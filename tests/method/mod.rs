@@ -3,7 +3,6 @@
 
 pub mod in_process;
 mod joint_search;
-mod k2pi;
 pub mod learned_masks;
 mod masks;
 mod pipeline;

@@ -3,7 +3,7 @@
 
 use std::path::PathBuf;
 
-use gyre_simulator::{OutputFormat, Profile, SimulationConfig, TunnelConfig};
+use gyre_simulator::{OutputFormat, Profile, SimulationConfig};
 
 use super::{assert_same_after_kills, assert_same_when_continued};
 use crate::{
@@ -20,10 +20,7 @@ fn in_a_tunnel() -> PathBuf {
     config.sensor.profile = Profile::Ras6;
     config.output.format = Some(OutputFormat::Boreas);
     config.drive.speed_mps = 8.0;
-    config.tunnels = vec![TunnelConfig {
-        from_m: 24.0,
-        length_m: 200.0,
-    }];
+    config.tunnel_m = Some([24.0, 100.0]);
     recording::of("chirps-alternate", &config)
 }
 

@@ -3,9 +3,7 @@
 
 use std::path::PathBuf;
 
-use gyre_simulator::{
-    GyroProfile, OutputFormat, Profile, SimulationConfig, weather::WeatherConfig,
-};
+use gyre_simulator::{GyroProfile, OutputFormat, Profile, SimulationConfig};
 
 use super::{assert_same_after_kills, assert_same_when_continued};
 use crate::{
@@ -29,23 +27,14 @@ fn with_log() -> PathBuf {
     config.sensor.profile = Profile::Cts350xRadiate;
     config.output.format = Some(OutputFormat::Radiate);
     config.drive.speed_mps = 5.0;
-    config.effects.lost_azimuths = Some(true);
+    config.sensor.lost_azimuths = true;
     config.gyro.profile = GyroProfile::Asm330lhh;
     config.gyro.late_s = LATE_S;
-    config.gyro.stall_every_s = 2.0;
-    config.gyro.stall_s = 0.06;
-    config.gyro.lost = 0.02;
+    config.gyro.faults = true;
     config.wheels.rate_hz = 20.0;
     config.wheels.late_s = WHEELS_LATE_S;
-    config.wheels.lost = 0.02;
-    config.wheels.slip_every_s = 4.0;
-    config.wheels.slip_s = 0.5;
-    let blind = |from_s, blocked_db| WeatherConfig {
-        from_s,
-        blocked_db,
-        ..WeatherConfig::default()
-    };
-    config.weather = vec![blind(2.5, 100.0), blind(4.0, 0.0)];
+    config.wheels.faults = true;
+    config.blind_s = Some([2.5, 4.5]);
     recording::of("gyro-and-wheels", &config)
 }
 

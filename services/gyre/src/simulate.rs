@@ -72,10 +72,7 @@ fn overrides(arguments: &SimulateArguments) -> Result<Vec<String>, Failure> {
         .map(path_value)
         .transpose()?;
     let file = file.map(|file| format!("simulation.drive.file={file}"));
-    let kind = file
-        .is_some()
-        .then(|| "simulation.drive.kind=file".to_owned());
-    let options = [scans, seed, format, kind, file].into_iter().flatten();
+    let options = [scans, seed, format, file].into_iter().flatten();
     Ok(arguments.set.iter().cloned().chain(options).collect())
 }
 

@@ -10,11 +10,10 @@ use toml::{Table, Value};
 use crate::{ConfigurationError, strict};
 
 /// The keys that name files or folders.
-const KEYS: [&str; 14] = [
+const KEYS: [&str; 13] = [
     "run.ground_truth",
     "source.data",
     "simulation.drive.file",
-    "simulation.town.streets",
     "masking.model",
     "masking.runtime",
     "slam.map",

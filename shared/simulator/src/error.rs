@@ -41,14 +41,6 @@ pub enum SimulatorError {
         /// The duration of the drive, seconds.
         duration_s: f64,
     },
-    /// The drive leaves the streets of the town.
-    #[error(
-        "the drive leaves the streets of `simulation.town.streets` {at_s:.1} s after its start: add its trajectory to them"
-    )]
-    OffStreets {
-        /// The time, seconds after the start of the drive.
-        at_s: f64,
-    },
     /// The output folder holds files of another dataset.
     #[error("{} holds `{other}`, which is no file of this dataset: choose an empty folder", folder.display())]
     OutputInUse {

@@ -5,11 +5,10 @@
 //! threads and their timing change nothing.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 
-use gyre_datasets::{Dataset, DatasetOptions, Format, ImageSize, ImageSource, OpenError};
+use gyre_datasets::ImageSource as _;
 
 use crate::simulated_drive::{Renderer, SimulatedDrive};
 
@@ -18,63 +17,24 @@ const AHEAD: usize = 6;
 /// The renderers yield to the stages: on a vehicle the radar does their work.
 const NICENESS: i32 = 10;
 
-/// See the module. Images may be read in any order; consecutive ones are fast.
-struct RenderAhead {
-    renderer: Renderer,
+/// The images ahead of a reader. They may be read in any order; consecutive ones are fast.
+#[derive(Default)]
+pub(crate) struct Ahead {
     /// Started with the second image: a reader may need the first only to inspect the recording.
     crew: Option<Crew>,
     looked: bool,
 }
 
-impl SimulatedDrive {
-    /// Opens the drive as a dataset that lies on no disk, its images rendered ahead on all
-    /// processors.
-    ///
-    /// # Errors
-    /// Options that do not fit the drive's format.
-    pub fn open(&self, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
-        gyre_datasets::open_source(Box::new(RenderAhead::new(self)), options)
-    }
-}
-
-impl RenderAhead {
-    fn new(drive: &SimulatedDrive) -> Self {
-        Self {
-            renderer: drive.renderer(),
-            crew: None,
-            looked: false,
+impl Ahead {
+    /// Copies image `index` to `pixels` as soon as it is rendered; false if the reader renders the
+    /// image itself.
+    pub fn take(&mut self, drive: &SimulatedDrive, index: usize, pixels: &mut [u8]) -> bool {
+        let looked = std::mem::replace(&mut self.looked, true);
+        if looked {
+            let crew = self.crew.get_or_insert_with(|| Crew::start(drive, index));
+            crew.take(index, pixels);
         }
-    }
-}
-
-impl ImageSource for RenderAhead {
-    fn format(&self) -> Format {
-        self.renderer.format()
-    }
-
-    fn size(&self) -> ImageSize {
-        self.renderer.size()
-    }
-
-    fn folder(&self) -> PathBuf {
-        self.renderer.folder()
-    }
-
-    fn files(&self) -> Vec<PathBuf> {
-        self.renderer.files()
-    }
-
-    fn stamps(&self) -> Option<String> {
-        self.renderer.stamps()
-    }
-
-    fn draw(&mut self, index: usize, pixels: &mut [u8]) {
-        if !std::mem::replace(&mut self.looked, true) {
-            return self.renderer.draw(index, pixels);
-        }
-        self.crew
-            .get_or_insert_with(|| Crew::start(self.renderer.drive(), index))
-            .take(index, pixels);
+        looked
     }
 }
 
@@ -242,7 +202,7 @@ mod tests {
             ..SimulationConfig::default()
         })
         .unwrap();
-        let (mut ahead, mut alone) = (RenderAhead::new(&drive), drive.renderer());
+        let (mut ahead, mut alone) = (drive.renderer_ahead(), drive.renderer());
         let (mut a, mut b) = (vec![0; ahead.size().bytes()], vec![0; ahead.size().bytes()]);
         for index in [0, 0, 1, 2, 9, 10, 3, 3, 5, 11] {
             ahead.draw(index, &mut a);

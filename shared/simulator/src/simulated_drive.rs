@@ -3,21 +3,21 @@
 
 use std::path::PathBuf;
 
-use gyre_datasets::{DatasetOptions, Format, ImageSize, ImageSource};
+use gyre_datasets::{Dataset, DatasetOptions, Format, ImageSize, ImageSource, OpenError};
 use gyre_radar::{OwnedScan, ScanSlot};
 use gyre_samples::Sample;
 
+use crate::cars;
 use crate::config::SimulationConfig;
 use crate::error::SimulatorError;
 use crate::gyro::log;
-use crate::layout::side_file::SideFile;
+use crate::layout::SideFile;
 use crate::layout::{boreas, oxford, radiate};
-use crate::objects;
 use crate::output::{HostStamps, OutputFormat};
 use crate::profile::Chirp;
 use crate::profile::METADATA_BYTES;
+use crate::render_ahead::Ahead;
 use crate::sensor::Sensor;
-use crate::sensor::effects::is_on;
 use crate::simulator::Simulator;
 use crate::truth;
 use crate::{gnss, wheels};
@@ -32,7 +32,7 @@ pub struct SimulatedDrive {
 }
 
 impl SimulatedDrive {
-    /// Builds the town and the path.
+    /// Builds the path and what stands along it.
     ///
     /// # Errors
     /// As [`Simulator::new`]; [`SimulatorError::Config`] if the radar does not fit the format.
@@ -41,12 +41,6 @@ impl SimulatedDrive {
         let output = config.output.format.unwrap_or_default();
         if output == OutputFormat::Radiate {
             radiate::check(&simulator)?;
-        } else if is_on(config.effects.lost_azimuths) {
-            return Err(SimulatorError::Config {
-                key: "effects.lost_azimuths",
-                value: "true".to_owned(),
-                expected: "false but for output.format = \"radiate\": in other formats the azimuth of each row is written beside it".to_owned(),
-            });
         }
         Ok(Self {
             simulator,
@@ -170,10 +164,7 @@ impl SimulatedDrive {
             truth::azimuth_poses_npy(&self.simulator),
         ));
         let stamps_ns = (0..self.scans()).map(|index| self.stamp_ns(index));
-        files.push((
-            objects::FILE.into(),
-            objects::csv(&self.simulator, stamps_ns),
-        ));
+        files.push((cars::FILE.into(), cars::csv(&self.simulator, stamps_ns)));
         files.extend(
             self.gyro_samples()
                 .map(|samples| (log::FILE.into(), log::csv(&samples))),
@@ -193,7 +184,7 @@ impl SimulatedDrive {
     }
 
     /// Returns the azimuths of a scan that the host loses, in order: see
-    /// [`Effects::lost_azimuths`](crate::Effects::lost_azimuths).
+    /// [`SensorConfig::lost_azimuths`](crate::SensorConfig::lost_azimuths).
     pub fn lost_azimuths(&self, index: usize) -> Vec<usize> {
         match self.output {
             OutputFormat::Radiate => radiate::lost_azimuths(&self.simulator, self.seed, index),
@@ -203,15 +194,29 @@ impl SimulatedDrive {
 
     /// Returns a new renderer; several can work at the same time.
     pub fn renderer(&self) -> Renderer {
-        let (sensor, scan) = (
-            self.simulator.sensor(),
-            OwnedScan::with_limits(self.simulator.limits()),
-        );
         Renderer {
             drive: self.clone(),
-            sensor,
-            scan,
+            sensor: self.simulator.sensor(),
+            scan: OwnedScan::with_limits(self.simulator.limits()),
+            ahead: None,
         }
+    }
+
+    /// Returns a renderer that renders the next images on all processors.
+    pub(crate) fn renderer_ahead(&self) -> Renderer {
+        Renderer {
+            ahead: Some(Ahead::default()),
+            ..self.renderer()
+        }
+    }
+
+    /// Opens the drive as a dataset that lies on no disk, its images rendered ahead on all
+    /// processors.
+    ///
+    /// # Errors
+    /// Options that do not fit the drive's format.
+    pub fn open(&self, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
+        gyre_datasets::open_source(Box::new(self.renderer_ahead()), options)
     }
 }
 
@@ -220,12 +225,33 @@ pub struct Renderer {
     drive: SimulatedDrive,
     sensor: Sensor,
     scan: OwnedScan,
+    ahead: Option<Ahead>,
 }
 
 impl Renderer {
-    /// The drive that is rendered.
-    pub fn drive(&self) -> &SimulatedDrive {
-        &self.drive
+    fn render(&mut self, index: usize, pixels: &mut [u8]) {
+        let simulator = &self.drive.simulator;
+        match self.drive.output {
+            OutputFormat::Radiate => {
+                let geometry =
+                    simulator.render_into(index, &mut self.sensor, &mut self.scan.slot());
+                radiate::transpose(
+                    &self.scan.bytes,
+                    geometry.stride,
+                    geometry.first_byte,
+                    pixels,
+                );
+                self.lose_azimuths(index, pixels);
+            }
+            // An image of these formats is the sweep as it is rendered.
+            OutputFormat::Oxford | OutputFormat::Boreas => {
+                let mut slot = ScanSlot {
+                    bytes: pixels,
+                    ..self.scan.slot()
+                };
+                simulator.render_into(index, &mut self.sensor, &mut slot);
+            }
+        }
     }
 
     /// Loses azimuths of an image as the host does: the image before may have lost some too.
@@ -233,7 +259,7 @@ impl Renderer {
         let azimuths = self.drive.lost_azimuths(index);
         if let Some(before) = index.checked_sub(1).filter(|_| !azimuths.is_empty()) {
             let mut recorded_before = vec![0; pixels.len()];
-            self.draw(before, &mut recorded_before);
+            self.render(before, &mut recorded_before);
             let columns = self.drive.image_size().width;
             radiate::lose(pixels, &recorded_before, columns, &azimuths);
         }
@@ -266,27 +292,9 @@ impl ImageSource for Renderer {
 
     /// Gives the same bytes whenever and on whatever thread it is called.
     fn draw(&mut self, index: usize, pixels: &mut [u8]) {
-        let simulator = &self.drive.simulator;
-        match self.drive.output {
-            OutputFormat::Radiate => {
-                let geometry =
-                    simulator.render_into(index, &mut self.sensor, &mut self.scan.slot());
-                radiate::transpose(
-                    &self.scan.bytes,
-                    geometry.stride,
-                    geometry.first_byte,
-                    pixels,
-                );
-                self.lose_azimuths(index, pixels);
-            }
-            // An image of these formats is the sweep as it is rendered.
-            OutputFormat::Oxford | OutputFormat::Boreas => {
-                let mut slot = ScanSlot {
-                    bytes: pixels,
-                    ..self.scan.slot()
-                };
-                simulator.render_into(index, &mut self.sensor, &mut slot);
-            }
+        let ahead = self.ahead.as_mut();
+        if !ahead.is_some_and(|ahead| ahead.take(&self.drive, index, pixels)) {
+            self.render(index, pixels);
         }
     }
 }

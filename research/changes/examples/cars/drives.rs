@@ -10,9 +10,9 @@ use gyre_geometry::pose;
 use gyre_localisation::{DriveSearch, Localiser, LocaliserOptions, Map};
 use gyre_odometry::{Odometry, OdometryConfig};
 use gyre_radar::{OwnedScan, Trajectory};
-use gyre_simulator::drive::{DriveConfig, DriveKind};
-use gyre_simulator::weather::WeatherConfig;
-use gyre_simulator::{SimulatedDrive, SimulationConfig};
+use gyre_worlds::drive::{DriveConfig, DriveKind};
+use gyre_worlds::weather::WeatherConfig;
+use gyre_worlds::{SimulatedDrive, SimulationConfig};
 use gyre_slam::{Keyframe, KeyframeBuilder, RecordLog, RecordReader, ScanPose};
 
 use crate::{Outcome, Pair};

@@ -21,7 +21,7 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use gyre_changes::{Change, Changes, Survey, changes};
-use gyre_simulator::Simulator;
+use gyre_worlds::Simulator;
 use gyre_slam::Keyframe;
 use nalgebra::Point2;
 

@@ -60,7 +60,7 @@ pub fn lacks(tested: &TestedPipeline, scenario: Scenario) -> Option<String> {
     };
     if let Some(lacking) = lacking {
         return Some(format!(
-            "{scenario} needs {lacking}: play a recording with its logs beside the scans and set gyro.kind=auto or wheels.kind=auto, or a simulated town with simulation.gyro.profile and simulation.wheels.rate_hz"
+            "{scenario} needs {lacking}: play a recording with its logs beside the scans and set gyro.kind=auto or wheels.kind=auto, or a simulation with simulation.gyro.profile and simulation.wheels.rate_hz"
         ));
     }
     if !others.are_weighed {

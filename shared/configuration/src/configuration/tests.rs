@@ -97,12 +97,8 @@ fn settings_without_effect_are_named() {
     }
     for used in [
         &["gyro.kind=log", "gyro.file=a.csv", "gyro.late_s=1"][..],
-        &[
-            "gyro.kind=none",
-            "run.window=3",
-            "simulation.drive.kind=town",
-        ],
-        &["masking.threshold=60", "simulation.gyro.rate_hz=100"],
+        &["gyro.kind=none", "run.window=3", "simulation.scans=3"],
+        &["masking.threshold=60", "simulation.gyro.late_s=1"],
     ] {
         assert_eq!(named(used), [""; 0], "{used:?}");
     }

@@ -8,7 +8,6 @@ use rand::Rng;
 
 use crate::error::SimulatorError;
 use crate::output::HostStamps;
-use crate::sensor::effects::is_on;
 use crate::simulator::Simulator;
 use crate::stream::Stream;
 
@@ -48,7 +47,7 @@ const LOST: f64 = 0.0015;
 
 /// Returns the azimuths of a scan that the host loses, in order.
 pub(crate) fn lost_azimuths(simulator: &Simulator, seed: u64, index: usize) -> Vec<usize> {
-    if index == 0 || !is_on(simulator.config().effects.lost_azimuths) {
+    if index == 0 || !simulator.config().sensor.lost_azimuths {
         return Vec::new();
     }
     let mut rng = Stream::Lost(index as u64).generator(seed);

@@ -63,11 +63,6 @@ impl BlockLoop {
         }
     }
 
-    /// Time of one lap, seconds.
-    pub fn lap_s(&self) -> f64 {
-        self.lap_s
-    }
-
     /// Length of one lap, metres.
     pub fn lap_m(&self) -> f64 {
         self.lap_m
@@ -75,6 +70,10 @@ impl BlockLoop {
 }
 
 impl Path for BlockLoop {
+    fn lap_s(&self) -> Option<f64> {
+        Some(self.lap_s)
+    }
+
     fn pose(&self, time_s: f64) -> Pose {
         let time = time_s.rem_euclid(self.lap_s);
         let next = self

@@ -129,7 +129,7 @@ fn other_dataset(out: &Path) -> SimulatorError {
 fn same_scans(config: &SimulationConfig) -> SimulationConfig {
     let mut config = SimulationConfig {
         scans: Some(1),
-        ..config.resolved()
+        ..config.clone()
     };
     config.output.store = false;
     config
