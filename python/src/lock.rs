@@ -32,9 +32,6 @@ impl<T: Send> Guarded<T> {
 
     /// Computes on the value. The GIL is released first, so that a thread that waits blocks no
     /// other.
-    ///
-    /// # Errors
-    /// Error: the value was made before this process was forked.
     pub fn with<R: Send>(
         &self,
         py: Python<'_>,

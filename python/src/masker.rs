@@ -65,9 +65,6 @@ pub fn points<'py>(
 }
 
 /// Returns the fields of points, one after the other.
-///
-/// # Errors
-/// TypeError: they are no points.
 pub fn fields_of<'py>(points: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArray1<'py, f32>> {
     let py = points.py();
     let none = self::points(&PyArray1::from_vec(py, Vec::new()), 0)?;

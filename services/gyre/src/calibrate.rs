@@ -32,11 +32,6 @@ const PICTURE: &str = "calibration.svg";
 const EVERY: Duration = Duration::from_secs(5);
 
 /// Finds the constants, prints them, and writes `calibration.toml`, and a picture of each drive.
-///
-/// # Errors
-/// A recording or a configuration that cannot be used, a drive that does not determine the
-/// constants, drives that are read with different ones, a file that cannot be written; a named log
-/// of a gyro or of wheels that the drive does not tell.
 pub fn calibrate(arguments: &CalibrateArguments) -> Result<ExitCode, Failure> {
     let started = Instant::now();
     let file = arguments.out.join(SECTION);

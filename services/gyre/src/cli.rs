@@ -246,9 +246,6 @@ impl RunOptions {
 
 impl RunArguments {
     /// Returns what is to be run.
-    ///
-    /// # Errors
-    /// Words that do not say it.
     pub fn given(&self) -> Result<Given, InputError> {
         let given = self.inputs.given()?.with_radar(self.radar.as_ref())?;
         // A topic of ROS 2 is a radar too.

@@ -30,9 +30,6 @@ const NOT_TESTED: u8 = 2;
 
 /// Tests a program, and prints what it breaks. The exit code is 0 if it keeps the contract, 1 if it
 /// breaks a rule, and 2 if not all could be tested.
-///
-/// # Errors
-/// Standard output cannot be written.
 pub fn conformance(arguments: &ConformanceArguments) -> Result<ExitCode, Failure> {
     match examine(arguments) {
         Ok(Some(report)) => print(&report, arguments.json),

@@ -63,9 +63,6 @@ pub struct Begun {
 impl Earlier {
     /// Looks at the folder, and finishes what a kill has left of a replacement. A `fresh` run goes
     /// on from nothing.
-    ///
-    /// # Errors
-    /// Files that cannot be read, or a damaged journal.
     pub fn of(
         out: &Out,
         configuration: &Configuration,
@@ -221,9 +218,6 @@ fn queries(out: &Out) -> Result<RecordReader<Query>, Failure> {
 }
 
 /// Returns whether the objects of all scans are known.
-///
-/// # Errors
-/// A file that cannot be read or is damaged.
 fn has_all_objects(out: &Out) -> Result<bool, Failure> {
     let opened = RecordReader::<LoggedObjects>::open(out.path());
     opened
@@ -329,9 +323,6 @@ pub fn is_closed(configuration: &Configuration) -> bool {
 
 /// Closes a run that the new one cannot continue: its folder keeps all that it holds under a name
 /// with a number. Returns the folder of the new run.
-///
-/// # Errors
-/// A folder that cannot be renamed, as one that is a file system of its own.
 pub fn close(out: Out, reason: &Failure) -> Result<Out, Failure> {
     let path = out.path();
     let mut names = (1..).map(|number: u32| {
@@ -391,9 +382,6 @@ fn state_of_recording(out: &Path) -> [PathBuf; 2] {
 /// one begins with. The journal goes first: without it nothing else is taken for part of a run. The
 /// results of an unfinished run go before the new configuration is there, those of a complete one
 /// stay until the new run has its own, and what its recording needs if that goes on.
-///
-/// # Errors
-/// A file that cannot be removed or written.
 pub fn begin(
     out: &Out,
     identity: &Identity,
@@ -433,9 +421,6 @@ pub fn replaces(out: &Out, poses: usize) -> bool {
 
 /// Returns the same before results take that place, where the complete run gives way to them: from
 /// then on it is not given back.
-///
-/// # Errors
-/// A file that cannot be removed.
 pub fn make_way(out: &Out, poses: usize) -> Result<bool, Failure> {
     let replaces = replaces(out, poses);
     if replaces {
@@ -446,9 +431,6 @@ pub fn make_way(out: &Out, poses: usize) -> Result<bool, Failure> {
 
 /// Ends a run whose results are in place, and survive a power failure by now. If it is complete,
 /// that is said.
-///
-/// # Errors
-/// A file that cannot be written or removed.
 pub fn end(out: &Out, poses: usize, is_complete: bool) -> Result<(), Failure> {
     if !replaces(out, poses) {
         return Ok(replaced::give_back(out)?);
@@ -461,9 +443,6 @@ pub fn end(out: &Out, poses: usize, is_complete: bool) -> Result<(), Failure> {
 
 /// Makes the folder ready for the run to go on: cuts off what a power failure has left of the last
 /// poses, and writes `config.toml` again if it is not what the run was begun with.
-///
-/// # Errors
-/// A file that cannot be written.
 pub fn resume(out: &Out, begun: &Begun) -> Result<(), Failure> {
     if begun.lost > 0 {
         journal::cut(&journal::path(out.path()), begun.poses)?;

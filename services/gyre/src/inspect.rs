@@ -10,9 +10,6 @@ use gyre_terminal::{Failure, print};
 use crate::cli::InspectArguments;
 
 /// Prints what a dataset contains and what looks wrong with it.
-///
-/// # Errors
-/// A folder that is not a dataset, a trajectory that cannot be read, a key that is none.
 pub fn inspect(arguments: &InspectArguments) -> Result<ExitCode, Failure> {
     let trajectory = arguments
         .trajectory

@@ -39,9 +39,6 @@ use cli::{Command, SchemaArguments};
 use split::absent as link;
 
 /// Executes a command of `gyre`.
-///
-/// # Errors
-/// One sentence that says what, where and what to do.
 pub fn execute(command: Command) -> Result<ExitCode, Failure> {
     gyre_stage::wake::report_file_size_limit()?;
     if is_private(&command) {

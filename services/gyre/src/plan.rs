@@ -101,9 +101,6 @@ pub fn recorder(record: &RecordConfig, gyre: &Path, out: &Path) -> Option<StageP
 }
 
 /// Checks that a run writes over no recording but one that it goes on with.
-///
-/// # Errors
-/// There is one.
 pub fn require_recordable(record: &RecordConfig, out: &Path, goes_on: bool) -> Result<(), Failure> {
     match (record.is_on(), goes_on) {
         (true, true) => Ok(gyre_recorder::require_own(&record.file, out)?),

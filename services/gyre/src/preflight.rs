@@ -113,9 +113,6 @@ pub struct Recording {
 pub type Ask<'a> = dyn FnMut(&Configuration) -> Result<Sizes, Failure> + 'a;
 
 /// Checks the dataset and the mask; `ask` may wait for the radar, and comes last.
-///
-/// # Errors
-/// A dataset or a mask that cannot be used.
 pub fn check(configuration: &Configuration, ask: &mut Ask<'_>) -> Result<Preflight, Failure> {
     split::check(configuration)?;
     let masker = Masker::new(
@@ -283,9 +280,6 @@ impl Scans {
 }
 
 /// Asks the radar once.
-///
-/// # Errors
-/// No radar, or one that cannot be used.
 pub fn ask(configuration: &Configuration) -> Result<Sizes, Failure> {
     let (source, options) = (&configuration.source, &configuration.dataset);
     match source.kind {
@@ -316,9 +310,6 @@ fn check_gnss(configuration: &Configuration) -> Result<(), Failure> {
 
 /// Checks that a process may open as many files as it needs. The transport's own errors would not
 /// say what is missing.
-///
-/// # Errors
-/// It may not.
 pub fn check_open_files() -> Result<(), PreflightError> {
     match getrlimit(Resource::Nofile).current {
         Some(limit) if limit < MOST_OPEN_FILES => Err(PreflightError::OpenFiles { limit }),
@@ -328,9 +319,6 @@ pub fn check_open_files() -> Result<(), PreflightError> {
 
 /// Checks that the run fits into shared memory. Runs that were killed may take some of it: acquire
 /// the run's root first, which removes them.
-///
-/// # Errors
-/// Too little shared memory.
 pub fn check_shared_memory(footprint: &Footprint) -> Result<(), PreflightError> {
     let free = free_shared_memory().map_err(PreflightError::NoSharedMemory)?;
     match free {

@@ -8,9 +8,6 @@ use gyre_terminal::{Failure, print, seconds};
 use crate::cli::{RecordArguments, SplitArguments};
 
 /// Records a run until it ends or an interrupt, and says what was recorded and what was missed.
-///
-/// # Errors
-/// There is no such run or topic.
 pub fn record(arguments: &RecordArguments) -> Result<ExitCode, Failure> {
     let span = seconds("--split-s", arguments.split.split_s)?;
     let options = Options {

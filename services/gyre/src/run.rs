@@ -47,9 +47,6 @@ const RECORDING: &str = "recording";
 
 /// Runs the pipeline and writes its results, however it ended. What an earlier run has begun is
 /// resumed; if it only lacks results, they are written.
-///
-/// # Errors
-/// A run that cannot start, fails, or finds fewer than two readable scans.
 pub fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
     detach_if_asked();
     let configuration = resolve(arguments)?;
@@ -67,9 +64,6 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, Failure> {
 
 /// Runs a resolved configuration, and prints its figures in a form. A `fresh` run goes on from
 /// nothing.
-///
-/// # Errors
-/// As [`run`].
 pub(crate) fn compute(
     mut configuration: Configuration,
     out: Out,
@@ -96,9 +90,6 @@ pub(crate) fn place_recording(configuration: &mut Configuration, out: &Out) {
 }
 
 /// Returns the folder of the results that the arguments name.
-///
-/// # Errors
-/// Arguments that do not say what to run.
 pub fn results_folder(arguments: &RunArguments) -> Result<PathBuf, Failure> {
     if let Some(out) = &arguments.options.out {
         return Ok(out.clone());

@@ -35,9 +35,6 @@ const RENDERED: usize = 240;
 
 /// Carries out the scenarios and writes the report. The exit code is 0 if all limits of the budget
 /// are kept, 1 if not, and 2 if the test could not be carried out.
-///
-/// # Errors
-/// Standard output cannot be written.
 pub fn stress(arguments: &StressArguments) -> Result<ExitCode, Failure> {
     if arguments.list {
         for scenario in Scenario::ALL {
@@ -57,9 +54,6 @@ pub fn stress(arguments: &StressArguments) -> Result<ExitCode, Failure> {
 }
 
 /// Does the work of a helper process.
-///
-/// # Errors
-/// A failure of it.
 pub fn help(arguments: &[String]) -> Result<ExitCode, Failure> {
     gyre_stress::help(&own(), arguments)?;
     Ok(ExitCode::SUCCESS)

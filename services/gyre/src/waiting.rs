@@ -36,9 +36,6 @@ fn notice(error: &Failure) -> String {
 
 /// Asks the radar, until it answers. Meanwhile `gyre ps` shows the run, and `signals` are
 /// installed.
-///
-/// # Errors
-/// A radar that cannot be used or does not come; [`RootError::Interrupted`].
 pub fn for_radar(
     configuration: &Configuration,
     out: &Out,

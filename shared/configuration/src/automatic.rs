@@ -58,9 +58,6 @@ pub enum AutomaticError {
 
 /// Returns the settings of a recording from its format, its `dataset.toml` and its scans; of a
 /// recorded run, those of the run. The options in `wished` go before those of the format.
-///
-/// # Errors
-/// A recording that cannot be opened, or of which no scan can be read.
 pub fn automatic(data: &Path, wished: &DatasetOptions) -> Result<Automatic, AutomaticError> {
     if gyre_recording::is_recording(data) {
         return of_recorded_run(data);
@@ -89,9 +86,6 @@ pub fn automatic(data: &Path, wished: &DatasetOptions) -> Result<Automatic, Auto
 
 /// Returns the format of a recording and the constants of its radar: those of its `dataset.toml`,
 /// then those of its format. A recorded run has its own.
-///
-/// # Errors
-/// A recording that cannot be opened.
 pub fn radar_constants(
     data: &Path,
     wished: &DatasetOptions,
@@ -164,9 +158,6 @@ struct Measured {
 
 impl Measured {
     /// Reads some scans of a recording.
-    ///
-    /// # Errors
-    /// None of them can be read.
     fn of(dataset: &mut dyn Dataset) -> Result<Self, AutomaticError> {
         let mut scan = OwnedScan::with_limits(dataset.limits());
         let (mut counts, mut failure) = ([0_u64; 256], None);

@@ -24,9 +24,6 @@ const WHOLE: [&str; 3] = ["dataset", "gyro", "wheels"];
 const RANGES: [&str; 2] = ["points", "raster"];
 
 /// Returns the constants in a file of `gyre calibrate` as overrides, as `dataset.key=value`.
-///
-/// # Errors
-/// A file that cannot be read, or has anything else.
 pub fn overrides(file: &Path) -> Result<Vec<String>, CalibrationError> {
     let unusable = |reason: String| CalibrationError {
         file: file.to_owned(),

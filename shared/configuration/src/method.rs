@@ -62,9 +62,6 @@ impl MethodConfig {
     ];
 
     /// Takes the sections out of a configuration; those that are missing have their defaults.
-    ///
-    /// # Errors
-    /// An unknown key of a section, or a value of another type.
     pub fn take(table: &mut Table) -> Result<Self, ConfigurationError> {
         Ok(Self {
             dataset: section(table, "dataset")?,
@@ -88,9 +85,6 @@ impl MethodConfig {
     }
 
     /// Checks the ranges of all values.
-    ///
-    /// # Errors
-    /// The first value that is out of its bounds.
     pub fn validate(&self) -> Result<(), ConfigurationError> {
         let odometry = &self.odometry;
         within("raster", odometry.raster.validate())?;

@@ -47,17 +47,11 @@ struct Note {
 impl Named {
     /// Reads the configuration of this path, or of this name in the program. A relative path in it
     /// is one beside it, else of the program, else, with a note, in the current folder.
-    ///
-    /// # Errors
-    /// As [`strict::read_table`]; a name that the program does not know.
     pub fn read(named: &Path) -> Result<Self, ConfigurationError> {
         Self::read_in(named, env::current_dir().ok())
     }
 
     /// As [`read`](Self::read), with this folder as the current one. `None`: it is not searched.
-    ///
-    /// # Errors
-    /// As [`read`](Self::read).
     pub fn read_in(named: &Path, here: Option<PathBuf>) -> Result<Self, ConfigurationError> {
         let own = shipped(named);
         let mut table = match own.as_deref().and_then(gyre_shipped::text) {
@@ -90,9 +84,6 @@ impl Named {
 /// Replaces each path that is one from the current folder by the whole one, so that the resolved
 /// configuration names the same from any folder; else by that of the program's file that it names:
 /// paths of the command line.
-///
-/// # Errors
-/// A path that is not UTF-8.
 pub fn resolve(table: &mut Table) -> Result<(), ConfigurationError> {
     visit(table, |path, key| {
         let written = Path::new(path.as_str());

@@ -75,9 +75,6 @@ pub struct Played {
 }
 
 /// Opens the recording or the simulation that is to be played.
-///
-/// # Errors
-/// No dataset is named, or it cannot be opened.
 pub fn open(configuration: &Configuration) -> Result<Played, SourceError> {
     let (data, options) = (&configuration.source.data, &configuration.dataset);
     let method = &configuration.odometry;
@@ -129,9 +126,6 @@ fn check_doppler(doppler: &DopplerConfig, dataset: &mut dyn Dataset) -> Result<(
 
 /// Returns the samples that go with the scans of a simulation: of its own gyro and wheels, unless
 /// other logs are named.
-///
-/// # Errors
-/// The simulation has no gyro or no wheels, or a log that cannot be used.
 pub fn simulated_samples(
     drive: &SimulatedDrive,
     (gyro, wheels): (&GyroConfig, &WheelsConfig),
@@ -157,9 +151,6 @@ pub fn simulated_samples(
 
 /// Returns the log of the fixes that the corrected trajectory is made with, of a run with its
 /// results in `out`; `None` without GNSS.
-///
-/// # Errors
-/// No log, or one that cannot be used.
 pub fn gnss_log(configuration: &Configuration, out: &Path) -> Result<Option<GnssLog>, SourceError> {
     let (config, data) = (&configuration.gnss, &configuration.source.data);
     let is_in_folder = configuration.streamed().is_none() && !data.as_os_str().is_empty();
@@ -170,9 +161,6 @@ pub fn gnss_log(configuration: &Configuration, out: &Path) -> Result<Option<Gnss
 }
 
 /// Returns the configuration with the options of the recording's `dataset.toml` where it has none.
-///
-/// # Errors
-/// The file cannot be read.
 pub fn with_stored_options(configuration: &Configuration) -> Result<Configuration, OpenError> {
     let mut resolved = configuration.clone();
     let data = &configuration.source.data;
@@ -184,9 +172,6 @@ pub fn with_stored_options(configuration: &Configuration) -> Result<Configuratio
 }
 
 /// Returns what tells the recording of a run from another one; `None`: its configuration does.
-///
-/// # Errors
-/// A recording that cannot be opened.
 pub fn fingerprint(configuration: &Configuration) -> Result<Option<Fingerprint>, SourceError> {
     let plays_scans = configuration.source.from == PlayedFrom::Scan && !configuration.is_radar();
     if !plays_scans || configuration.streamed().is_some() {

@@ -71,9 +71,6 @@ pub enum InputError {
 
 impl Inputs {
     /// Returns what is named.
-    ///
-    /// # Errors
-    /// A word that names nothing or has two meanings; two of a kind.
     pub fn given(&self) -> Result<Given, InputError> {
         let mut given = Given {
             configuration: self.config.clone(),
@@ -91,9 +88,6 @@ impl Inputs {
     }
 
     /// As [`given`](Self::given), for a command that receives no radar.
-    ///
-    /// # Errors
-    /// As [`given`](Self::given); a radar.
     pub fn given_recording(&self) -> Result<Given, InputError> {
         let given = self.given()?;
         match given.radar {
@@ -104,18 +98,12 @@ impl Inputs {
 
     /// Reads the configuration that is named; without one, that of the recording, which is said.
     /// The scans are those of the recording, or of the configuration.
-    ///
-    /// # Errors
-    /// As [`given`](Self::given); a configuration or a recording that cannot be used.
     pub fn configuration(&self) -> Result<Configuration, Failure> {
         self.configuration_of(&self.given_recording()?)
     }
 
     /// As [`configuration`](Self::configuration), of another recording that is read in the same
     /// way.
-    ///
-    /// # Errors
-    /// As [`configuration`](Self::configuration).
     pub fn configuration_with(&self, data: &Path) -> Result<Configuration, Failure> {
         self.configuration_of(&Given {
             data: Some(data.to_owned()),
@@ -139,9 +127,6 @@ impl Inputs {
 
 /// Reads a configuration by its path or its name, and says where its files are taken from if that
 /// is not clear.
-///
-/// # Errors
-/// A configuration that cannot be used.
 pub fn configuration(named: &Path, overrides: &[String]) -> Result<Configuration, Failure> {
     let (configuration, notes) = Configuration::named(named, overrides)?;
     let notes = notes.iter();
@@ -151,9 +136,6 @@ pub fn configuration(named: &Path, overrides: &[String]) -> Result<Configuration
 
 impl Given {
     /// Adds the radar of an option.
-    ///
-    /// # Errors
-    /// There is one already, or a recording.
     pub fn with_radar(mut self, radar: Option<&String>) -> Result<Self, InputError> {
         if let Some(radar) = radar {
             self.take(Path::new(radar), Kind::Radar)?;

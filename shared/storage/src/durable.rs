@@ -25,10 +25,6 @@ pub struct DurableFile {
 impl DurableFile {
     /// Opens or creates a file and its folder, and locks it for this process. `prepare` makes of
     /// what it finds there what the process goes on from, before the thread starts.
-    ///
-    /// # Errors
-    /// A file that cannot be read or written, or that another process changes; an error of
-    /// `prepare`.
     pub fn open<E: From<StorageError> + From<Busy>>(
         path: &Path,
         prepare: impl FnOnce(&File) -> Result<(), E>,
@@ -53,33 +49,23 @@ impl DurableFile {
 
     /// Fills `bytes` with the content of a slot; false if the file ends before.
     /// [`Checksum::is_right`] says whether it is whole.
-    ///
-    /// # Errors
-    /// The file cannot be read.
     pub fn read(&self, slots: &Slots, slot: u64, bytes: &mut [u8]) -> Result<bool, StorageError> {
         self.file.read_at(bytes, slots.offset(slot))
     }
 
     /// Writes `bytes` at the start of a slot. [`changed`](Self::changed) counts what was written.
-    ///
-    /// # Errors
-    /// The file cannot be written.
     pub fn write(&self, slots: &Slots, slot: u64, bytes: &[u8]) -> Result<(), StorageError> {
         self.file.write_at(bytes, slots.offset(slot))
     }
 
     /// Counts a change that has been made. Waits while [`GroupSync::LIMIT`] are in danger.
-    ///
-    /// # Errors
-    /// A synchronisation has failed: changes may be lost.
+    /// Fails if an earlier synchronisation has failed, because changes may be lost.
     pub fn changed(&self) -> Result<(), StorageError> {
         self.sync.changed()
     }
 
     /// Waits until all changes that were counted survive a power failure.
-    ///
-    /// # Errors
-    /// A synchronisation has failed: changes may be lost.
+    /// Fails if an earlier synchronisation has failed, because changes may be lost.
     pub fn finish(&self) -> Result<(), StorageError> {
         self.sync.finish()
     }

@@ -25,17 +25,11 @@ pub enum Attempt {
 }
 
 /// Creates and locks a file, without waiting. The file is the owner's alone.
-///
-/// # Errors
-/// The file cannot be opened or locked.
 pub fn try_lock(path: &Path) -> io::Result<Attempt> {
     lock(path, true)
 }
 
 /// Locks a file that exists, without waiting.
-///
-/// # Errors
-/// There is no such file, or it cannot be opened or locked.
 pub fn try_lock_existing(path: &Path) -> io::Result<Attempt> {
     lock(path, false)
 }

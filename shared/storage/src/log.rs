@@ -84,10 +84,6 @@ impl Log {
     /// Opens or creates a log, and cuts off what a death or a power failure has left of the last
     /// records. Of the others only the headers are read. What is in the log then survives a power
     /// failure.
-    ///
-    /// # Errors
-    /// A file that cannot be read or written, is not such a log, is damaged, or to which another
-    /// process writes.
     pub fn open(path: &Path, magic: LogMagic) -> Result<Self, LogError> {
         let mut records = Records::new(path, magic);
         let file = DurableFile::open(path, |file| {
@@ -127,10 +123,6 @@ impl Log {
     }
 
     /// Appends a record. A reader sees it when this returns.
-    ///
-    /// # Errors
-    /// A file that cannot be written or synchronised or that another program has removed, or a
-    /// record of more than 16 MiB.
     pub fn append(&mut self, record: &[u8]) -> Result<(), LogError> {
         if record.len() > MAX_BYTES {
             let too_long = io::ErrorKind::FileTooLarge.into();
@@ -149,9 +141,6 @@ impl Log {
     /// Counts a change of another file that is of use only with the records that were appended. At
     /// most [`GroupSync::LIMIT`](crate::GroupSync::LIMIT) of them are made before the records
     /// survive a power failure.
-    ///
-    /// # Errors
-    /// A file that cannot be synchronised.
     pub fn rely(&mut self) -> Result<(), LogError> {
         match self.file.safe() >= Some(self.appended) {
             true => Ok(()),
@@ -165,18 +154,12 @@ impl Log {
     }
 
     /// Makes all records survive a power failure.
-    ///
-    /// # Errors
-    /// A file that cannot be synchronised, or that another program has removed.
     pub fn sync(&self) -> Result<(), LogError> {
         self.file.file().require_name()?;
         Ok(self.file.finish()?)
     }
 
     /// Reads a record, which replaces the content of `bytes`.
-    ///
-    /// # Errors
-    /// [`LogError::Damaged`], or a file that cannot be read.
     ///
     /// # Panics
     /// There are no more than `index` records.
@@ -191,9 +174,6 @@ impl Log {
 
     /// Keeps the first `records` records and cuts off those behind them. The cut survives a power
     /// failure.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
     pub fn cut(&mut self, records: usize) -> Result<(), LogError> {
         if records < self.len() {
             self.records.truncate(records);

@@ -18,10 +18,6 @@ use gyre_stage::{
 };
 
 /// Runs the follower to the end of the keyframes, or until SIGTERM.
-///
-/// # Errors
-/// A map or keyframes that cannot be used, an invalid configuration, or an error of
-/// [`follower::run`].
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let slam: SlamConfig = launch.section("slam")?;
     let refinement: RefinementConfig = launch.section("refinement")?;

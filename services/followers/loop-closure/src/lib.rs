@@ -26,9 +26,6 @@ use gyre_stage::{
 pub use logged::LoggedLoops;
 
 /// Runs the follower to the end of the keyframes, or until SIGTERM.
-///
-/// # Errors
-/// Logs that cannot be used, an invalid configuration, or an error of [`follower::run`].
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     if !launch.take_place()? {
         return Ok(StageCounters::default());

@@ -20,9 +20,6 @@ pub struct LoggedLoops {
 
 impl LoggedLoops {
     /// Opens the logs of the run that writes to `out`.
-    ///
-    /// # Errors
-    /// A log that cannot be read.
     pub fn open(out: &Path) -> Result<Self, StageError> {
         Ok(Self {
             keyframes: RecordReader::open(out)?,
@@ -33,9 +30,6 @@ impl LoggedLoops {
     }
 
     /// Reads what was logged since the last call, and returns all loops so far, by their numbers.
-    ///
-    /// # Errors
-    /// A log that cannot be read.
     pub fn refresh(&mut self) -> Result<&[LoopHeader], StageError> {
         self.queries.refresh()?;
         self.keyframes.refresh()?;

@@ -22,9 +22,6 @@ use gyre_stage::{
 };
 
 /// Runs the follower to the end of the scans, or until SIGTERM.
-///
-/// # Errors
-/// Logs that cannot be used, an invalid configuration, or an error of [`follower::run`].
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     if !launch.take_place()? {
         return Ok(StageCounters::default());
@@ -46,9 +43,6 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
 }
 
 /// Returns a tracker whose network is computed by the library of learned masks.
-///
-/// # Errors
-/// An invalid configuration, or a library that cannot be used.
 pub fn tracker(
     config: &ObjectsConfig,
     masking: &MaskingConfig,

@@ -30,9 +30,6 @@ use gyre_stage::{
 use live_fixes::LiveFixes;
 
 /// Runs the follower to the end of both logs, or until SIGTERM.
-///
-/// # Errors
-/// Logs that cannot be used, or an error of [`follower::run`].
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     if !launch.take_place()? {
         return Ok(StageCounters::default());

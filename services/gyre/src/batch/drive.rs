@@ -50,9 +50,6 @@ enum DriveError {
 
 /// Computes a drive, unless it has been computed with the same configuration from the same scans.
 /// The exit code tells the outcome.
-///
-/// # Errors
-/// The system does not let the process end with the batch.
 pub fn drive(arguments: &BatchDriveArguments) -> Result<ExitCode, Failure> {
     if !end_with(arguments.parent, Signal::TERM)? {
         return Ok(DriveOutcome::Interrupted.exit_code(false).into());

@@ -21,9 +21,6 @@ pub(super) struct Gyro {
 impl Gyro {
     /// Reads the log that is named, or else that which lies beside the scans. One that lies there
     /// and cannot be used is named, and left alone.
-    ///
-    /// # Errors
-    /// A log that is named and cannot be used.
     pub(super) fn read(
         configuration: &Configuration,
         named: Option<&Path>,
@@ -66,9 +63,6 @@ impl Gyro {
 }
 
 /// Calibrates the gyro by the drives that have a log, and prints what they say.
-///
-/// # Errors
-/// Scans that cannot be registered; drives of which another axis points up.
 pub(super) fn section(logs: &[(&Gyro, &Drive)]) -> Result<Section, Failure> {
     let Some((first, _)) = logs.first() else {
         return Ok(Section::default());

@@ -21,9 +21,6 @@ pub(super) struct Wheels {
 impl Wheels {
     /// Reads the log that is named, or else that which lies beside the scans. One that lies there
     /// and cannot be used is named, and left alone.
-    ///
-    /// # Errors
-    /// A log that is named and cannot be used.
     pub(super) fn read(
         configuration: &Configuration,
         named: Option<&Path>,
@@ -67,9 +64,6 @@ impl Wheels {
 }
 
 /// Calibrates the wheels by the drives that have a log, and prints what they say.
-///
-/// # Errors
-/// Scans that cannot be registered.
 pub(super) fn section(logs: &[(&Wheels, &Drive)]) -> Result<Section, Failure> {
     let Some((first, _)) = logs.first() else {
         return Ok(Section::default());

@@ -40,9 +40,6 @@ pub(super) fn put_aside(out: &Out) -> Result<(), StorageError> {
 
 /// Finishes what a kill has interrupted: the complete run is removed if the new one has its
 /// results, and given back if that has computed nothing.
-///
-/// # Errors
-/// A journal that cannot be read, or a file that cannot be renamed or removed.
 pub fn settle(out: &Out) -> Result<(), Failure> {
     match (is_whole(out), is_untouched(out)?) {
         (false, _) => Ok(remove(out)?),
@@ -58,9 +55,6 @@ fn is_whole(out: &Out) -> bool {
 
 /// Returns whether the run that is to replace a complete one has computed nothing: that is given
 /// back.
-///
-/// # Errors
-/// A journal that cannot be read.
 pub fn is_untouched(out: &Out) -> Result<bool, Failure> {
     if !is_whole(out) {
         return Ok(false);

@@ -13,17 +13,11 @@ use crate::{cli::Ros2Arguments, features::Absent};
 const ABSENT: Absent = Absent("ROS 2");
 
 /// Says that there is no ROS 2.
-///
-/// # Errors
-/// Always.
 pub fn publish(_: &Ros2Arguments) -> Result<ExitCode, Failure> {
     Err(ABSENT.into())
 }
 
 /// Says that there is no ROS 2.
-///
-/// # Errors
-/// Always.
 pub fn ask(_: &SourceConfig, _: &DatasetOptions) -> Result<Sizes, Failure> {
     Err(ABSENT.into())
 }
@@ -34,9 +28,6 @@ pub fn may_come(_: &Failure) -> bool {
 }
 
 /// Says that there is no ROS 2.
-///
-/// # Errors
-/// Always.
 pub fn receive(
     _: &Launch,
     _: &SourceConfig,

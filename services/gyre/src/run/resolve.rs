@@ -12,9 +12,6 @@ use super::results_folder;
 use crate::cli::RunArguments;
 
 /// Reads the configuration and resolves what it leaves open.
-///
-/// # Errors
-/// An invalid configuration, or a model that cannot be read.
 pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
     let given = arguments.given()?;
     if arguments.from.is_some() && given.data.is_none() {
@@ -65,9 +62,6 @@ pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
 }
 
 /// The overrides: the calibration, `--set`, the options; of two for one key the later one holds.
-///
-/// # Errors
-/// A calibration that cannot be read.
 fn overrides(arguments: &RunArguments, given: &Given) -> Result<Vec<String>, Failure> {
     let options = &arguments.options;
     let calibration = arguments.calibration.as_deref().map(calibration::overrides);

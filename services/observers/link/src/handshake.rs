@@ -50,9 +50,6 @@ pub struct ScanSize {
 }
 
 /// Waits for the robot and asks for the size of its scans, which a base needs that receives them.
-///
-/// # Errors
-/// A link that cannot be opened.
 pub fn ask_robot(config: &LinkConfig) -> Result<ScanSize, LinkError> {
     let pause = || {
         thread::sleep(PAUSE);

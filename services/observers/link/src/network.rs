@@ -111,9 +111,6 @@ enum Protocol {
 
 impl Network {
     /// Checks the endpoints, and that the files of TLS can be read.
-    ///
-    /// # Errors
-    /// One sentence that says what is missing.
     pub fn check(&self) -> Result<(), NetworkError> {
         let is_word = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
         if self.name.is_empty() || !self.name.chars().all(is_word) {

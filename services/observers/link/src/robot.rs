@@ -27,9 +27,6 @@ use crate::{
 };
 
 /// Runs the robot's side until SIGTERM.
-///
-/// # Errors
-/// A base of another run, a journal that cannot be used, or a failure of the transport.
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     if !launch.take_place()? {
         return Ok(StageCounters::default());

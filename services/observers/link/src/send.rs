@@ -121,9 +121,6 @@ pub(crate) fn offer_key(name: &str) -> String {
 }
 
 /// Sends the topics of a run until all receivers have everything, or a signal requests a stop.
-///
-/// # Errors
-/// There is no such run or topic, or the network cannot be used.
 pub fn send(options: &SendOptions) -> Result<Sent, LinkError> {
     options.network.check()?;
     let run = ObservedRun::writing_to(&options.out)?;

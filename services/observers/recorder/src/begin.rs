@@ -64,9 +64,6 @@ pub(crate) fn begin(
 }
 
 /// Checks that a run that goes on can go on with its recording.
-///
-/// # Errors
-/// There is another recording of that name.
 pub fn require_own(file: &Path, out: &Path) -> Result<(), RecorderError> {
     match Ledger::of(out).read(file)? {
         Some(_) => Ok(()),
@@ -76,9 +73,6 @@ pub fn require_own(file: &Path, out: &Path) -> Result<(), RecorderError> {
 
 /// Checks that a recording that begins writes over none, and goes on in none, also where only later
 /// parts of one are left.
-///
-/// # Errors
-/// There is one.
 pub fn require_new(file: &Path) -> Result<(), RecorderError> {
     let first = parts(file).into_iter().next();
     // Also something else of that name, a folder for instance.

@@ -90,9 +90,6 @@ impl fmt::Display for Recorded {
 }
 
 /// Records a run until it ends, or a signal requests a stop.
-///
-/// # Errors
-/// There is no such run or topic, or the file cannot be written.
 pub fn record(options: &Options) -> Result<Recorded, RecorderError> {
     let run = match std::env::var_os(run::ENVIRONMENT) {
         // The supervisor's own: its root is the same for other names of the folder.

@@ -10,9 +10,6 @@ use crate::queue::{Entry, Receiver, Taken};
 const POLL_PERIOD: Duration = Duration::from_millis(100);
 
 /// Writes what comes until the queue ends; returns the number of messages missed by topic.
-///
-/// # Errors
-/// The file cannot be written.
 pub(crate) fn write(
     mut recording: SplitWriter,
     queue: &Receiver,

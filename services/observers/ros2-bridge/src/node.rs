@@ -89,9 +89,6 @@ fn join(domain: &Domain) -> Result<DomainParticipant, String> {
 
 impl Node {
     /// Joins a domain as a node of this name in this namespace, such as `/` or `/robot`.
-    ///
-    /// # Errors
-    /// The domain cannot be joined, or a name is none.
     pub fn new(domain: &Domain, namespace: &str, name: &str) -> Result<Self, NodeError> {
         let failed = |reason: String| NodeError::Domain {
             domain: domain.id(),
@@ -114,9 +111,6 @@ impl Node {
     }
 
     /// Returns the name on DDS of a topic, absolute or relative to the namespace.
-    ///
-    /// # Errors
-    /// The name is none.
     pub fn dds_name(&self, topic: &str) -> Result<String, NodeError> {
         Ok(format!("rt{}", self.absolute(topic)?))
     }
@@ -134,9 +128,6 @@ impl Node {
     }
 
     /// Publishes on a topic.
-    ///
-    /// # Errors
-    /// The name is none, or the topic cannot be opened.
     pub fn publish<M: Ros2Message>(
         &mut self,
         topic: &str,
@@ -150,9 +141,6 @@ impl Node {
     }
 
     /// Subscribes to a topic reliably, with room for so many messages that are not yet taken.
-    ///
-    /// # Errors
-    /// The name is none, or the topic cannot be opened.
     pub fn subscribe<M: Ros2Message + 'static>(
         &mut self,
         topic: &str,
@@ -165,9 +153,6 @@ impl Node {
 
     /// Subscribes to a topic of which messages may be lost, as drivers publish what a sensor
     /// measures, with room for so many messages that are not yet taken.
-    ///
-    /// # Errors
-    /// The name of the topic is none.
     pub fn subscribe_to_sensor<M: Ros2Message + 'static>(
         &mut self,
         topic: &str,

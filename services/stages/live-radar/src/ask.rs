@@ -93,9 +93,6 @@ pub struct Sizes {
 }
 
 /// Asks a radar for its configuration; one that sends by UDP says it with each datagram.
-///
-/// # Errors
-/// No answer, or one that cannot be used.
 pub fn ask(settings: &Settings) -> Result<Sizes, AskError> {
     let configuration = configuration(settings)?;
     match SweepAssembler::new(&configuration, settings.constants) {

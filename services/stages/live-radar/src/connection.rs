@@ -236,9 +236,6 @@ pub enum RadarSocket {
 
 impl RadarSocket {
     /// Connects and sends requests, or begins to receive.
-    ///
-    /// # Errors
-    /// The radar cannot be reached.
     pub fn open(address: &Address, requests: &[Request]) -> io::Result<Self> {
         match address {
             Address::Tcp(address) => connect(address, requests).map(Self::Tcp),
@@ -247,9 +244,6 @@ impl RadarSocket {
     }
 
     /// Reads bytes of a stream, or one datagram with its sender; does not wait.
-    ///
-    /// # Errors
-    /// Nothing has arrived, or the connection has ended.
     pub fn read(&mut self, space: &mut [u8]) -> io::Result<(usize, Option<SocketAddr>)> {
         match self {
             Self::Tcp(stream) => match stream.read(space)? {

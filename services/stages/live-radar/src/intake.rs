@@ -55,9 +55,6 @@ impl Intake {
     }
 
     /// Begins the scans of a configuration of at most `room` bytes; false if it is not new.
-    ///
-    /// # Errors
-    /// The scans do not fit into this run.
     pub fn configure(&mut self, radar: Configuration, room: usize) -> Result<bool, NoScans> {
         if self.scans.as_ref().is_some_and(|scans| scans.is_of(&radar)) {
             return Ok(false);

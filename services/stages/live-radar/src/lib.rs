@@ -26,10 +26,6 @@ pub use parser::RadarParser;
 pub use settings::{Settings, encoder_counts, silence};
 
 /// Receives the scans of a radar until SIGTERM, or until there are enough.
-///
-/// # Errors
-/// A radar that is connected to by TCP and whose scans are larger than at the start of the run, or
-/// a failure of the transport.
 pub fn run(launch: &Launch, settings: Settings) -> Result<StageCounters, StageError> {
     let scans = settings.scans;
     source::run_sensor(launch, &mut radar::Radar::new(settings), scans)

@@ -30,9 +30,6 @@ pub struct Settings {
 impl Settings {
     /// Returns the settings of the section `[source]`, with the constants of the section
     /// `[dataset]`.
-    ///
-    /// # Errors
-    /// The address is none.
     pub fn of(source: &SourceConfig, options: &DatasetOptions) -> Result<Self, BadAddress> {
         Ok(Self {
             address: Address::parse(&source.address, &source.interface)?,

@@ -25,9 +25,6 @@ use gyre_stage::{
 use gyre_storage::{LogError, continue_when_full, was_full};
 
 /// Runs the stage until SIGTERM.
-///
-/// # Errors
-/// A journal or a log of keyframes that cannot be used, or an error of [`sink::run`].
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     if !launch.take_place()? {
         return Ok(StageCounters::default());

@@ -16,9 +16,6 @@ pub struct Faults {
 
 impl Faults {
     /// Faults of a turn whose first scan has this stamp.
-    ///
-    /// # Errors
-    /// There are faults, and the stamp is not known.
     pub fn of(faults: Vec<PlayedFault>, first_ns: Option<i64>) -> Result<Self, StageError> {
         match (first_ns, faults.is_empty()) {
             (None, false) => Err(StageError::Input(
@@ -33,9 +30,6 @@ impl Faults {
     }
 
     /// Puts them into the samples of logs.
-    ///
-    /// # Errors
-    /// The samples are in the recording of a run, scan by scan.
     pub fn put_into(&self, samples: ScanSamples) -> Result<ScanSamples, StageError> {
         let is_of_samples = |fault: &PlayedFault| fault.kind != PlayedFaultKind::RadarBlind;
         if !self.faults.iter().any(is_of_samples) {

@@ -33,18 +33,12 @@ impl Listing {
     }
 
     /// Writes it into the root of a run.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
     pub fn write(&self, root: &Path) -> io::Result<()> {
         let format = self.format.name().as_bytes();
         fs::write(root.join(FILE), [format, self.files.as_bytes()].join(&0))
     }
 
     /// Reads that of a run; `None` if it has none.
-    ///
-    /// # Errors
-    /// A file that cannot be read, or is not such a list.
     pub fn read(root: &Path) -> io::Result<Option<Self>> {
         let mut bytes = match fs::read(root.join(FILE)) {
             Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),

@@ -18,9 +18,6 @@ use gyre_stage::{
 };
 
 /// Runs the stage until SIGTERM.
-///
-/// # Errors
-/// An invalid configuration, a checkpoint that cannot be used, or an error of [`stage::run`].
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let points: PointsConfig = launch.section("points")?;
     let config: RefinementConfig = launch.section("refinement")?;

@@ -28,9 +28,6 @@ use scans::ScanWriter;
 use source::Source;
 
 /// Writes the bag or the dataset.
-///
-/// # Errors
-/// A source that cannot be read, a bag or a dataset that exists or cannot be written.
 pub fn export(arguments: &ExportArguments) -> Result<ExitCode, Failure> {
     let mut source = Source::open(&arguments.source)?;
     match (&arguments.mcap, &arguments.out) {

@@ -30,10 +30,6 @@ const OPTIONS: &str = "dataset.toml";
 const LISTS: [&str; 6] = ["csv", "json", "npy", "toml", "tum", "txt"];
 
 /// Writes the scans that a run has played to a new folder.
-///
-/// # Errors
-/// Not the results of a run on a recording of RADIATE, a recording that is not as it was in the
-/// run, files that cannot be read or written.
 pub fn write(source: &Source, out: &Path) -> Result<(), Failure> {
     let Some((_, configuration)) = source.run() else {
         return Err(

@@ -148,9 +148,6 @@ impl Losses {
 
 impl ScanWriter {
     /// Adds the topics of scans, if they are wanted and there are any.
-    ///
-    /// # Errors
-    /// Scans that cannot be opened, or are of no such radar.
     pub fn begin(
         bag: &mut BagWriter,
         source: &mut Source,
@@ -225,9 +222,6 @@ impl ScanWriter {
     }
 
     /// Writes the next scan that can be read, and returns its time; `None` at the end.
-    ///
-    /// # Errors
-    /// A disk that does not give it, a bag that cannot be written.
     pub fn write_next(&mut self, bag: &mut BagWriter) -> Result<Option<i64>, Failure> {
         let Some(open) = &mut self.open else {
             return Ok(None);

@@ -35,9 +35,6 @@ const LOOPS: &str = "loops.csv";
 
 /// Draws the keyframes of a run along its trajectory, and writes the map in the forms that were
 /// asked for; or compares it with a later run.
-///
-/// # Errors
-/// A run without keyframes or without a trajectory, a folder that cannot be written.
 pub fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
     if let Some(later) = &arguments.later {
         return changes::compare(arguments, later);
@@ -90,9 +87,6 @@ fn draw_run(arguments: &MapArguments) -> Result<Drawing, Failure> {
 /// Draws the keyframes of a run along its trajectory, in the frame in which the frame of the
 /// trajectory has the pose `placed`. What does not fit into memory lies in a file in `folder`,
 /// which has no name.
-///
-/// # Errors
-/// A run without keyframes or without a trajectory.
 pub fn evidence(run: &Path, folder: &Path, placed: &Pose) -> Result<Evidence, Failure> {
     let mut keyframes = open(run)?;
     let poses = read_trajectory(&trajectory_of(run))?;
@@ -127,9 +121,6 @@ fn trajectory_of(run: &Path) -> PathBuf {
 }
 
 /// Returns whether a file exists. Of another user's run that may be unknown.
-///
-/// # Errors
-/// A folder that may not be read.
 pub fn exists(path: &Path) -> Result<bool, StorageError> {
     path.try_exists().map_err(StorageError::at("read", path))
 }

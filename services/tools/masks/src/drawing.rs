@@ -67,9 +67,6 @@ impl Canvas {
     }
 
     /// Writes it as PNG.
-    ///
-    /// # Errors
-    /// [`PictureError`] names the file.
     pub fn write(&self, path: &Path) -> Result<(), PictureError> {
         write_rgb(path, self.width, &self.pixels)
     }

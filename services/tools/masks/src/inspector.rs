@@ -44,9 +44,6 @@ pub struct MaskInspector {
 
 impl MaskInspector {
     /// Plans masks and search.
-    ///
-    /// # Errors
-    /// A setting that is out of its bounds, a network that cannot be used.
     pub fn new(configuration: &Configuration, played: Played) -> Result<Self, Failure> {
         let (dataset, samples) = (played.dataset, played.samples);
         let config = OdometryConfig {
@@ -89,9 +86,6 @@ impl MaskInspector {
 
     /// Advances to scan `number`, which is not before the last one, and inspects it; `None` if it
     /// cannot be read.
-    ///
-    /// # Errors
-    /// A scan that cannot be masked.
     pub fn inspect(&mut self, number: usize) -> Result<Option<Inspection>, Failure> {
         let from = number.saturating_sub(self.lag + RUN_UP);
         if from > self.next {

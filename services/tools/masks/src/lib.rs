@@ -46,9 +46,6 @@ pub struct MasksArguments {
 }
 
 /// Draws the chosen scans, and prints a line on each.
-///
-/// # Errors
-/// A recording or mask that cannot be used, a picture that cannot be written.
 pub fn masks(arguments: &MasksArguments) -> Result<ExitCode, Failure> {
     let configuration = arguments.inputs.configuration()?;
     let played = gyre_configuration::open(&configuration)?;

@@ -48,9 +48,6 @@ pub struct StageArguments {
 type File = (&'static str, &'static str);
 
 /// Writes a project.
-///
-/// # Errors
-/// The folder exists, or cannot be written.
 pub fn new(arguments: &NewArguments) -> Result<ExitCode, Failure> {
     let New::Stage(arguments) = &arguments.what;
     let stage = arguments.stage.as_str();

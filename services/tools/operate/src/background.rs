@@ -42,9 +42,6 @@ pub fn detach_if_asked() {
 
 /// Starts a run in the background, and returns when all its stages are there, or when it has ended
 /// before.
-///
-/// # Errors
-/// A run that does not start, in the words of `gyre run`.
 pub fn up(out: &Path) -> Result<ExitCode, Failure> {
     let log = out.join(LOG);
     let unwritable = |error: std::io::Error| format!("cannot write to {}: {error}", log.display());
@@ -133,9 +130,6 @@ fn ended(
 }
 
 /// Ends a run as an interrupt does, and waits until its results are written.
-///
-/// # Errors
-/// There is no such run, its supervisor does not answer, or it has ended without results.
 pub fn down(choice: &RunChoice) -> Result<ExitCode, Failure> {
     let run = chosen_to_change(choice, "end it")?;
     let status = run.status()?;

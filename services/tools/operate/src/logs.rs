@@ -20,9 +20,6 @@ const PERIOD: Duration = Duration::from_millis(200);
 
 /// Prints the newest lines of a run's logs, also of one that has ended, and goes on with those that
 /// come if asked to.
-///
-/// # Errors
-/// There is no such run or process, or a log cannot be read.
 pub fn logs(arguments: &LogsArguments) -> Result<ExitCode, Failure> {
     let process = arguments.process.as_deref();
     let run = arguments.run.run.as_deref();

@@ -23,10 +23,6 @@ struct ListedRun {
 }
 
 /// Lists the runs of this user.
-///
-/// # Errors
-/// There is no such run, one does not answer, standard output cannot be written, or, with
-/// `--check`, not all is well.
 pub fn ps(arguments: &PsArguments) -> Result<ExitCode, Failure> {
     let (mut rows, mut faults) = (Vec::new(), Vec::new());
     let runs = match arguments.run.named() {

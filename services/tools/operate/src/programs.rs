@@ -13,9 +13,6 @@ use crate::{
 };
 
 /// Starts a process of a running run again.
-///
-/// # Errors
-/// There is no such run or process, or the supervisor does not answer.
 pub fn restart(arguments: &RestartArguments) -> Result<ExitCode, Failure> {
     let what = format!("restart its {}", arguments.process);
     let run = chosen_to_change(&arguments.run, &what)?;
@@ -66,10 +63,7 @@ fn sentence(pending: &PendingSwap) -> String {
 const UNTRIED: u8 = 2;
 
 /// Goes on with another program in the place of a stage.
-///
-/// # Errors
-/// There is no such run or process, or the program does not come to take over, or fails at its
-/// first scan: the one before goes on.
+/// If the new program fails to take over, the previous program continues.
 pub fn swap(arguments: &SwapArguments) -> Result<ExitCode, Failure> {
     let what = format!("swap its {}", arguments.process);
     let run = chosen_to_change(&arguments.run, &what)?;

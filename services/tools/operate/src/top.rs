@@ -26,9 +26,6 @@ use snapshot::{Snapshot, Snapshots};
 const PERIOD: Duration = Duration::from_millis(50);
 
 /// Shows a run until it ends, or until `q` is pressed.
-///
-/// # Errors
-/// There is no such run, it has no place for an observer, or the terminal cannot be used.
 pub fn top(arguments: &TopArguments) -> Result<ExitCode, Failure> {
     let every = Duration::try_from_secs_f64(arguments.every)
         .ok()

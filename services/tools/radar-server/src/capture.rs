@@ -97,9 +97,6 @@ pub struct Captured {
 }
 
 /// Records the bytes of the radar at `address` until it ends, or `stop` returns true.
-///
-/// # Errors
-/// No radar answers, or the file cannot be written.
 pub fn record(
     address: &Address,
     path: &Path,
@@ -157,9 +154,6 @@ pub struct Capture {
 
 impl Capture {
     /// Opens a capture; `None` if the file is something else, or a folder.
-    ///
-    /// # Errors
-    /// It cannot be read.
     pub fn open(path: &Path) -> Result<Option<Self>, CaptureError> {
         let failed = &CaptureError::file(path);
         if !path.is_file() {
@@ -189,9 +183,6 @@ impl Capture {
 
     /// Reads the next record into `bytes`, which have room for [`MAX_RECORD_BYTES`]; returns the
     /// time and the number of bytes. `None` at the end.
-    ///
-    /// # Errors
-    /// It cannot be read, or is damaged.
     pub fn next(&mut self, bytes: &mut [u8]) -> Result<Option<(Duration, usize)>, CaptureError> {
         let failed = &CaptureError::file(&self.path);
         let (mut time_ns, mut count) = ([0; 8], [0; 4]);
@@ -215,9 +206,6 @@ impl Capture {
     }
 
     /// Reads up to the radar's first description of itself.
-    ///
-    /// # Errors
-    /// As [`Capture::next`]; there is none.
     pub fn configuration(mut self) -> Result<Configuration, CaptureError> {
         let mut bytes = vec![0; MAX_RECORD_BYTES];
         let mut parser = RadarParser::new(self.is_udp, ENCODER_COUNTS);
@@ -248,9 +236,6 @@ fn read_whole(file: &mut impl Read, bytes: &mut [u8]) -> io::Result<bool> {
 
 /// Plays a capture as its radar, until it has ended or `stop` returns true. `rate` is a factor of
 /// its pace; `None`: as fast as it is read.
-///
-/// # Errors
-/// A capture that cannot be read or is of the other protocol, or a failure of the network.
 pub fn play(
     audience: Audience,
     mut capture: Capture,

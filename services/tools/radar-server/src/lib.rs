@@ -17,9 +17,6 @@ use capture::Capture;
 use server::{Audience, ByteOrder, ClockFormat, Faults, Playback};
 
 /// Plays a recording or a simulation as a radar, until it has ended or a signal arrives.
-///
-/// # Errors
-/// A recording that cannot be read, or an address that cannot be served at.
 pub fn serve(arguments: &RadarServerArguments) -> Result<ExitCode, Failure> {
     if let (Some(file), Some(radar)) = (&arguments.capture, &arguments.radar) {
         return record(file, radar, arguments);

@@ -83,9 +83,6 @@ pub struct Played {
 }
 
 /// Plays a recording until it has ended or `stop` says so.
-///
-/// # Errors
-/// A scan that cannot be read, one that does not fit the protocol, or a failure of the network.
 pub fn serve(
     audience: Audience,
     dataset: &mut dyn Dataset,

@@ -16,9 +16,6 @@ const OF_KINDS: [(&str, &[&str]); 3] = [
 impl Configuration {
     /// Returns a sentence for each of these overrides that has no effect, since the kind of its
     /// section is another.
-    ///
-    /// # Errors
-    /// A value that TOML cannot hold.
     pub fn without_effect(&self, overrides: &[String]) -> Result<Vec<String>, toml::ser::Error> {
         let table = Table::try_from(self)?;
         let sentence = |setting: &String| {

@@ -44,9 +44,6 @@ pub enum BadAddress {
 
 impl Address {
     /// Parses `HOST`, `HOST:PORT` or `udp://GROUP:PORT`, for the last with an interface or "".
-    ///
-    /// # Errors
-    /// The text is no address.
     pub fn parse(text: &str, interface: &str) -> Result<Self, BadAddress> {
         let Some(to) = text.strip_prefix(UDP) else {
             return match interface {

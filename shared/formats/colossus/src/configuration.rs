@@ -76,9 +76,6 @@ impl Configuration {
     }
 
     /// Rejects numbers of which no scan can be made.
-    ///
-    /// # Errors
-    /// The first number out of bounds.
     pub fn check(&self) -> Result<(), BadConfiguration> {
         let check = |what, value: f64, bounds: RangeInclusive<f64>| match bounds.contains(&value) {
             true => Ok(()),

@@ -130,9 +130,6 @@ impl<'a> Powers<'a> {
 }
 
 /// Decodes the payload of a message.
-///
-/// # Errors
-/// A payload that does not fit the message `id`.
 pub fn decode(id: u8, payload: &[u8]) -> Result<Message<'_>, MalformedMessage> {
     if let Some(request) = Request::ALL.into_iter().find(|r| r.id() == id) {
         return Ok(Message::Request(request));

@@ -92,9 +92,6 @@ pub struct SweepAssembler {
 
 impl SweepAssembler {
     /// Returns an assembler at the start of a stream.
-    ///
-    /// # Errors
-    /// A configuration that does not pass [`Configuration::check`].
     pub fn new(
         configuration: &Configuration,
         constants: Constants,

@@ -44,9 +44,6 @@ pub enum BadMessage {
 }
 
 /// Returns a message as little-endian CDR, as `rosbag2` stores it and DDS sends it.
-///
-/// # Errors
-/// A sequence or a text of more than 2^32 elements.
 pub fn encode<T: Ros2Message>(message: &T) -> Result<Vec<u8>, BadMessage> {
     let mut bytes = LITTLE_ENDIAN.to_vec();
     cdr_encoding::to_writer::<_, LittleEndian, _>(&mut bytes, message)
@@ -56,9 +53,6 @@ pub fn encode<T: Ros2Message>(message: &T) -> Result<Vec<u8>, BadMessage> {
 
 /// Returns the message in these bytes. What follows it is padding. It allocates no more than the
 /// bytes hold, whatever lengths they give.
-///
-/// # Errors
-/// Bytes that are not CDR, or not of this type.
 pub fn decode<T: Ros2Message>(bytes: &[u8]) -> Result<T, BadMessage> {
     let (head, content) = bytes
         .split_at_checked(HEAD_BYTES)

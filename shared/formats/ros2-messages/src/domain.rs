@@ -43,9 +43,6 @@ impl Domain {
     /// on which this machine has this address, or on all. Where ROS 2 is restricted to this
     /// computer (`ROS_LOCALHOST_ONLY=1`, `ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST`), no address
     /// means the loopback.
-    ///
-    /// # Errors
-    /// No such domain, or no address.
     pub fn new(id: Option<u16>, interface: Option<&str>) -> Result<Self, DomainError> {
         let variable = |name: &str| env::var(name).ok().filter(|value| !value.is_empty());
         Self::of(id, interface, &variable)

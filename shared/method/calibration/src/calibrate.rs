@@ -109,9 +109,6 @@ fn change_of(facts: &[FactEstimate; FACTS], corrected: &[Fact]) -> FactVector {
 }
 
 /// Finds the facts of a drive.
-///
-/// # Errors
-/// A drive that does not determine them.
 pub fn calibrate(drive: &Drive) -> Result<Calibration, CalibrationError> {
     let none = FactVector::zeros();
     let before = drive.mean_track_with(&none)?;

@@ -69,9 +69,6 @@ pub struct Track {
 
 impl Drive {
     /// Creates an empty drive.
-    ///
-    /// # Errors
-    /// A configuration that cannot be used.
     pub fn new(config: &OdometryConfig) -> Result<Self, SetupError> {
         Ok(Self {
             odometry: Odometry::new(config)?,
@@ -90,9 +87,6 @@ impl Drive {
     }
 
     /// Adds the next scan, which has this number in the recording.
-    ///
-    /// # Errors
-    /// A scan that cannot be used.
     pub fn push(&mut self, number: usize, scan: &OwnedScan) -> Result<(), OdometryError> {
         let mut scan = scan.view();
         if scan.geometry.doppler_s == 0.0 {
@@ -183,9 +177,6 @@ impl Drive {
     }
 
     /// Returns the mean of the tracks in both directions of time, as configured.
-    ///
-    /// # Errors
-    /// The refinement's configuration.
     pub fn mean_track(&self) -> Result<Track, ConfigError> {
         self.mean_track_with(&FactVector::zeros())
     }
@@ -198,9 +189,6 @@ impl Drive {
     }
 
     /// Registers all scans under changed facts, in the order of time or against it.
-    ///
-    /// # Errors
-    /// The refinement's configuration.
     pub fn track(&self, change: &FactVector, reversed: bool) -> Result<Track, ConfigError> {
         let count = self.sweeps.len();
         let mut refiner = Refiner::new(&self.config.refinement, self.config.points.capacity)?;

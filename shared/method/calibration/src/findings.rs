@@ -51,9 +51,6 @@ pub struct Found {
 
 impl Found {
     /// Compares what was found with what is configured.
-    ///
-    /// # Errors
-    /// A length of the path that cannot be that of this drive.
     pub fn new(
         drive: &Drive,
         calibration: &Calibration,

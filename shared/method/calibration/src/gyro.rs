@@ -48,9 +48,6 @@ const MAX_SCALE_SIGMA: f64 = 0.05;
 /// Finds the offset, the axis, the scale and the bias of a gyro by a track of the drive.
 ///
 /// Over `max_gap_s` without samples its rate is not interpolated.
-///
-/// # Errors
-/// A log that does not tell them.
 pub fn calibrate_gyro(
     drive: &Drive,
     track: &Track,

@@ -16,9 +16,6 @@ pub struct Study {
 
 impl Study {
     /// Finds the constants of a drive.
-    ///
-    /// # Errors
-    /// A drive that does not determine them; a length of the path that cannot be its own.
     pub fn new(drive: Drive, configured: &Configured) -> Result<Self, CalibrationError> {
         let calibration = calibrate(&drive)?;
         let found = Found::new(&drive, &calibration, configured)?;
@@ -31,9 +28,6 @@ impl Study {
 
     /// Combines what this drive and others of one radar say, each with its own uncertainty. It is
     /// proposed if their scans overlap more with it, all together.
-    ///
-    /// # Errors
-    /// Scans that cannot be registered with it.
     pub fn combined(&self, others: &[Self]) -> Result<Found, CalibrationError> {
         let of_others: Vec<_> = others.iter().map(|it| &it.found).collect();
         let mean = Found::mean(&self.found, &of_others);

@@ -99,9 +99,6 @@ impl From<NoPeak> for WheelError {
 /// Finds the offset and the scale of the wheels by a track of the drive.
 ///
 /// Over `max_gap_s` without samples their speed is not interpolated.
-///
-/// # Errors
-/// A log that does not tell them.
 pub fn calibrate_wheels(
     drive: &Drive,
     track: &Track,

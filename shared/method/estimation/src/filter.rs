@@ -90,10 +90,6 @@ impl TrajectoryFilter {
     /// The result depends a little on the order of loops, as each is linearised at the estimate
     /// that it finds. A filter cannot take information back: of a group of dependent loops, each
     /// later one adds what it raises the information of the group by.
-    ///
-    /// # Errors
-    /// The constraint does not continue the trajectory, names unknown keyframes or has no usable
-    /// covariance; or the filter is full.
     pub fn apply(&mut self, constraint: &Constraint) -> Result<Verdict, EstimationError> {
         constraint.check(self.poses.len())?;
         match constraint.kind {
@@ -107,9 +103,6 @@ impl TrajectoryFilter {
 
     /// Predicts the pose of keyframe `to` in the frame of `from`, with its covariance (Checchin et
     /// al., Eq. 3): the initial guess of their registration (Eq. 4).
-    ///
-    /// # Errors
-    /// Either keyframe does not exist.
     pub fn predict(&self, from: usize, to: usize) -> Result<UncertainMotion, EstimationError> {
         keyframe_exists(from.max(to), self.poses.len())?;
         let observation = self.observe([from, to]);
@@ -126,9 +119,6 @@ impl TrajectoryFilter {
     }
 
     /// Returns the pose of a keyframe with its covariance along the axes of the frame of the poses.
-    ///
-    /// # Errors
-    /// The keyframe does not exist.
     pub fn pose(&self, keyframe: usize) -> Result<UncertainMotion, EstimationError> {
         keyframe_exists(keyframe, self.poses.len())?;
         let motion = self.poses[keyframe];

@@ -110,9 +110,6 @@ struct Raw {
 
 impl G2o {
     /// Reads the text of a g2o file.
-    ///
-    /// # Errors
-    /// The text is no g2o file of poses in the plane, or consecutive poses have no edge.
     pub fn parse(text: &str) -> Result<Self, G2oError> {
         let mut raw = Raw::default();
         for (number, line) in text.lines().enumerate() {

@@ -139,10 +139,6 @@ impl PoseGraph {
     /// Takes a constraint: an odometry constraint adds a keyframe where it leads, a loop is tested
     /// against the odometry between its keyframes. Loops correct no pose until
     /// [`PoseGraph::solve`].
-    ///
-    /// # Errors
-    /// The constraint does not continue the trajectory, names unknown keyframes or has no usable
-    /// covariance.
     pub fn apply(&mut self, constraint: &Constraint) -> Result<Verdict, EstimationError> {
         let Kind::Odometry = constraint.kind else {
             let tested = self.test(constraint)?;
@@ -162,9 +158,6 @@ impl PoseGraph {
     /// Takes a loop as [`PoseGraph::apply`] does, whose chi-square is known from an earlier
     /// [`PoseGraph::test`]: that takes time in proportion to the path between the keyframes, and
     /// the odometry between them does not change.
-    ///
-    /// # Errors
-    /// As [`PoseGraph::apply`].
     pub fn apply_tested(
         &mut self,
         constraint: &Constraint,
@@ -184,9 +177,6 @@ impl PoseGraph {
 
     /// Tests a loop against the odometry between its keyframes, as [`PoseGraph::apply`] does,
     /// without taking it.
-    ///
-    /// # Errors
-    /// As [`PoseGraph::apply`].
     pub fn test(&self, constraint: &Constraint) -> Result<Verdict, EstimationError> {
         let edge = self.edge(constraint)?;
         Ok(self.verdict(self.against_odometry(&edge)))
@@ -207,9 +197,6 @@ impl PoseGraph {
 
     /// Moves all poses, for instance to those of a file, as the start of the next solution. The
     /// first pose stays fixed where it is put.
-    ///
-    /// # Errors
-    /// There is not one pose for each keyframe.
     pub fn start_from(&mut self, poses: &[Pose]) -> Result<(), EstimationError> {
         if poses.len() != self.state.poses.len() {
             return Err(EstimationError::StartPoses {

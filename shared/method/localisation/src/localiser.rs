@@ -97,10 +97,6 @@ pub struct Localiser {
 impl Localiser {
     /// Plans the localisation of scans of at most `capacity` points. `refinement` is that of the
     /// odometry.
-    ///
-    /// # Errors
-    /// The first value of `refinement` that is out of its bounds, or a reach of more than the
-    /// rasters allow.
     pub fn new(
         map: Map,
         options: LocaliserOptions,

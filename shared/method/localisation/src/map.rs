@@ -57,9 +57,6 @@ pub struct Map {
 
 impl Map {
     /// Describes all keyframes of a drive. [`Keyframe::pose`] is in the map's frame.
-    ///
-    /// # Errors
-    /// No keyframes, or keyframes that are not in the order of the path.
     pub fn new(keyframes: Vec<Keyframe>) -> Result<Self, MapError> {
         let index = PlaceIndex::with_capacity(keyframes.len());
         let mut map = Self::with_index(keyframes, index)?;
@@ -77,9 +74,6 @@ impl Map {
 
     /// Writes the map into a folder: `keyframes.log` and `places.index`. A map that is there is
     /// replaced.
-    ///
-    /// # Errors
-    /// Files that cannot be written.
     pub fn save(&self, folder: &Path) -> Result<(), MapError> {
         let mut log = RecordLog::<Keyframe>::open_file(&folder.join(KEYFRAMES))?;
         log.cut(0)?;
@@ -91,9 +85,6 @@ impl Map {
     }
 
     /// Reads the map in a folder. All of it is kept in memory.
-    ///
-    /// # Errors
-    /// Files that cannot be read, are damaged, incomplete or not of one map.
     pub fn open(folder: &Path) -> Result<Self, MapError> {
         let mut reader = RecordReader::<Keyframe>::open_file(&folder.join(KEYFRAMES))?;
         let keyframes: Result<Vec<_>, _> = (0..reader.len()).map(|k| reader.read(k)).collect();

@@ -91,9 +91,6 @@ impl DriveSearch {
     /// Returns the poses of the drive in the map frame that fit its motions, its loops and its
     /// places on the map best; `None` if no keyframe was found. `drive` has the keyframes that were
     /// looked for.
-    ///
-    /// # Errors
-    /// Motions that determine no poses.
     pub fn place(&self, drive: &G2o) -> Result<Option<PlacedDrive>, EstimationError> {
         let Some(map_from_drive) = self.most_agreed(drive) else {
             return Ok(None);

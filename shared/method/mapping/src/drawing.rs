@@ -33,9 +33,6 @@ struct First {
 impl Drawing {
     /// Starts without a keyframe. What does not fit into memory lies in a file in `folder`, which
     /// has no name.
-    ///
-    /// # Errors
-    /// An option that is out of bounds.
     pub fn new(options: &MapOptions, folder: &Path) -> Result<Self, MapError> {
         Ok(Self {
             evidence: Evidence::new(options, folder)?,
@@ -46,9 +43,6 @@ impl Drawing {
     }
 
     /// Draws the next keyframe at `pose`.
-    ///
-    /// # Errors
-    /// The file of what does not fit into memory cannot be read or written.
     pub fn draw(&mut self, keyframe: &Keyframe, pose: &Pose) -> Result<(), MapError> {
         let odometry = keyframe.pose.motion;
         let pose = *pose;
@@ -73,9 +67,6 @@ impl Drawing {
 
     /// Returns the picture of the map as a PNG file, with the trajectory and both ends of each
     /// loop; and with odometry's trajectory where that is another one.
-    ///
-    /// # Errors
-    /// A map without keyframes or too large for a picture.
     pub fn png(&mut self, trajectory: &[Pose], loops: &[[Pose; 2]]) -> Result<Vec<u8>, MapError> {
         let map_from_given = self.first.map_or(Pose::identity(), |it| it.pose.inverse());
         let trajectory: Vec<Pose> = trajectory

@@ -66,9 +66,6 @@ impl Change {
 impl Evidence {
     /// Starts without any. Tiles that do not fit into memory lie in a file in `folder`, which has
     /// no name and does not outlive the process.
-    ///
-    /// # Errors
-    /// An option that is out of bounds.
     pub fn new(options: &MapOptions, folder: &Path) -> Result<Self, OptionError> {
         options.validate()?;
         Ok(Self {
@@ -115,9 +112,6 @@ impl Evidence {
 
     /// Draws a keyframe at `pose` in the map frame. If it is drawn already, it is taken out there
     /// first.
-    ///
-    /// # Errors
-    /// The file of the tiles cannot be read or written.
     pub fn draw(&mut self, keyframe: &Keyframe, pose: &Pose) -> Result<(), StorageError> {
         self.view.take(keyframe);
         if let Some(drawn) = self.drawn.insert(keyframe.seq, *pose) {
@@ -182,9 +176,6 @@ impl Evidence {
     }
 
     /// Makes the image of a tile, and returns whether some keyframe touches it.
-    ///
-    /// # Errors
-    /// The file of the tiles cannot be read or written.
     pub fn image(&mut self, index: TileIndex, image: &mut TileImage) -> Result<bool, StorageError> {
         let Some(tile) = self.store.get(index)? else {
             return Ok(false);

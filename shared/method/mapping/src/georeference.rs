@@ -42,9 +42,6 @@ const EARTH_M: f64 = 6_371_000.0;
 
 impl Origin {
     /// Checks that the origin is on the earth, within UTM.
-    ///
-    /// # Errors
-    /// Another one.
     pub fn validate(&self) -> Result<(), OriginError> {
         let fits = (-80.0..84.0).contains(&self.latitude_deg)
             && (-180.0..180.0).contains(&self.longitude_deg)

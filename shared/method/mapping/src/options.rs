@@ -46,9 +46,6 @@ pub struct OptionError {
 
 impl MapOptions {
     /// Checks the bounds of all options.
-    ///
-    /// # Errors
-    /// The first option that is out of bounds.
     pub fn validate(&self) -> Result<(), OptionError> {
         let option = |fits: bool, name, value, bounds| match fits {
             true => Ok(()),

@@ -73,9 +73,6 @@ pub fn legible(options: MapOptions, poses: &[Pose]) -> MapOptions {
 /// Returns the picture of a map as a PNG file: at most 4,096 pixels a side and a footer, x to the
 /// right, with the start and its heading, a scale bar with the metres of a pixel, and a legend.
 /// Memory: 250 MB at most.
-///
-/// # Errors
-/// A tile that cannot be read, and a map that is empty or wider than a million cells.
 pub fn map_png(source: &mut impl TileSource, overlay: &Overlay<'_>) -> Result<Vec<u8>, MapError> {
     let extent = TileExtent::of(&source.tiles()).ok_or(MapError::Empty)?;
     let ground = Ground::read(source, &extent)?;

@@ -5,9 +5,6 @@ use png::{BitDepth, ColorType};
 use crate::{Cell, MapError};
 
 /// Encodes rows of pixels of 8 bits a channel.
-///
-/// # Errors
-/// More pixels than a PNG file can have.
 pub fn encode(width: usize, color: ColorType, pixels: &[u8]) -> Result<Vec<u8>, MapError> {
     let height = pixels.len() / (width * color.samples()).max(1);
     let mut bytes = Vec::new();

@@ -64,9 +64,6 @@ pub trait TileSource {
     fn tiles(&self) -> Vec<TileIndex>;
 
     /// Reads a tile; one that does not exist is blank.
-    ///
-    /// # Errors
-    /// A tile that cannot be read.
     fn read(&mut self, tile: TileIndex, image: &mut TileImage) -> Result<(), MapError>;
 }
 

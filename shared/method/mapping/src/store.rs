@@ -98,9 +98,6 @@ impl TileStore {
     }
 
     /// Returns a tile that a keyframe touches; `None` for another one.
-    ///
-    /// # Errors
-    /// A file that cannot be read or written.
     pub fn get(&mut self, index: TileIndex) -> Result<Option<&mut Tile>, StorageError> {
         self.clock += 1;
         let clock = self.clock;

@@ -73,9 +73,6 @@ impl fmt::Display for Provider {
 }
 
 /// Reads a backend of a configuration.
-///
-/// # Errors
-/// No backend, or one that earlier versions had.
 pub(crate) fn deserialize<'de, D: Deserializer<'de>>(source: D) -> Result<Backend, D::Error> {
     let name = String::deserialize(source)?;
     if name == "tract" {

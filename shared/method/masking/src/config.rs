@@ -105,9 +105,6 @@ impl Default for MaskingConfig {
 
 impl MaskingConfig {
     /// Checks the bounds of all settings, without reading any file.
-    ///
-    /// # Errors
-    /// The first setting out of its bounds.
     pub fn validate(&self) -> Result<(), MaskingConfigError> {
         match () {
             () if !(1..=64).contains(&self.threads) => {

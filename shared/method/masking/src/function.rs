@@ -48,9 +48,6 @@ pub trait MaskFunction: fmt::Debug + Send + Sync {
     /// Returns factors from 0 to 1 for a scan. `raster` shows it with motion compensation, above
     /// the threshold: n x n, row 0 far ahead, column 0 far left. The same scan must give the same
     /// factors, after a restart too.
-    ///
-    /// # Errors
-    /// The scan cannot be masked.
     fn factors(
         &mut self,
         scan: &PolarScan<'_>,

@@ -19,9 +19,6 @@ impl Library {
     /// Returns the library that computes the networks of a configuration. ONNX Runtime that is
     /// named is required: only where none is named or installed, rten stands in for it, and only on
     /// the processor.
-    ///
-    /// # Errors
-    /// ONNX Runtime is required and missing.
     pub fn find(config: &MaskingConfig) -> Result<Self, RuntimeError> {
         if config.backend == Backend::Rten {
             return Ok(Self::Rten);

@@ -158,10 +158,6 @@ pub enum ModelError {
 
 impl Card {
     /// Reads the card that `masking.model` names.
-    ///
-    /// # Errors
-    /// No card is named, the file cannot be read or is not a card, or `masking.sha256` is that of
-    /// another model.
     pub fn read(config: &MaskingConfig) -> Result<Self, ModelError> {
         let path = config.model.as_deref().ok_or(ModelError::NotNamed)?;
         let not_a_card = |reason: String| ModelError::NotACard {
@@ -273,10 +269,6 @@ fn mismatch<T: PartialEq + fmt::Display>(key: &str, trained: Option<T>, here: T)
 
 impl Model {
     /// Reads the model that `masking.model` names and checks that it fits these rasters.
-    ///
-    /// # Errors
-    /// As [`Card::read`]; rasters of another size; a file with another checksum than its card
-    /// states, or with weights in another file.
     pub fn read(config: &MaskingConfig, raster: &RasterConfig) -> Result<Self, ModelError> {
         let card = Card::read(config)?;
         let path = config.model.as_deref().ok_or(ModelError::NotNamed)?;

@@ -106,9 +106,6 @@ enum Engine {
 
 impl Network {
     /// Loads the configured model and checks that it fits these rasters.
-    ///
-    /// # Errors
-    /// A model that does not fit, or a backend that is missing or rejects it.
     pub fn load(config: &MaskingConfig, raster: &RasterConfig) -> Result<Self, NetworkError> {
         let model = Model::read(config, raster)?;
         let (mut engine, inputs, outputs) = match Library::find(config)? {
@@ -138,9 +135,6 @@ impl Network {
 
     /// Computes the masks (scans x n x n) of rasters (scans x n x n). A mask is a factor from 0 to
     /// 1; the network's values are clamped to that range.
-    ///
-    /// # Errors
-    /// Rasters of the wrong shape, an error of the backend, or factors that are NaN.
     pub fn run(
         &mut self,
         rasters: ArrayView3<'_, f32>,

@@ -46,9 +46,6 @@ enum Engine {
 impl PlanesNetwork {
     /// Loads the network of a name in `gyre_shipped`, into the ONNX Runtime at a path or, without
     /// one, into rten, which takes several times as long.
-    ///
-    /// # Errors
-    /// A library or a network that cannot be used.
     pub fn load(
         name: &'static str,
         runtime: Option<&Path>,
@@ -80,9 +77,6 @@ impl PlanesNetwork {
     }
 
     /// Computes it, for planes row after row.
-    ///
-    /// # Errors
-    /// Planes of another size, or what the library says.
     pub fn compute(&mut self, planes: &[f32]) -> Result<Vec<f32>, PlanesError> {
         let [depth, rows, columns] = self.shown;
         let shape = [1, depth, rows, columns];

@@ -76,10 +76,6 @@ pub enum RuntimeError {
 /// environment, installed by [`INSTALL`], beside this program, or a package of the Python that
 /// Gyre is installed in. A library is code, so no folder is searched that is not the user's own or
 /// the program's; the current one may be anybody's.
-///
-/// # Errors
-/// [`RuntimeError::NotFound`] if a named path has no library, [`RuntimeError::Missing`] if none is
-/// named or installed.
 pub fn find(configured: Option<&Path>) -> Result<PathBuf, RuntimeError> {
     find_in(configured, env::var_os(VARIABLE), &installed_in())
 }
@@ -189,9 +185,6 @@ fn is_too_old(file: &Path) -> bool {
 }
 
 /// Opens the library. A process opens only one: later calls return the first one that succeeded.
-///
-/// # Errors
-/// A file that is not ONNX Runtime, or too old a version.
 pub fn open(path: &Path) -> Result<Environment, RuntimeError> {
     static OPENED: Mutex<Option<Environment>> = Mutex::new(None);
     let mut opened = OPENED.lock().unwrap_or_else(PoisonError::into_inner);
@@ -238,9 +231,6 @@ pub fn open(path: &Path) -> Result<Environment, RuntimeError> {
 }
 
 /// Returns a builder of sessions whose results are the same to the byte each time.
-///
-/// # Errors
-/// A setting that the library refuses.
 pub fn session(environment: &Environment, threads: usize) -> ort::Result<SessionBuilder> {
     let builder = Session::builder(environment)?
         .with_intra_threads(threads)?

@@ -149,9 +149,6 @@ impl ObjectsConfig {
     }
 
     /// Checks the bounds of all settings.
-    ///
-    /// # Errors
-    /// Returns the first setting that is out of bounds.
     pub fn validate(&self) -> Result<(), ObjectsError> {
         let positive = self.positive();
         let positive = positive.map(|(key, value)| (key, value, (1e-3, 1000.0), "0.001 to 1000"));

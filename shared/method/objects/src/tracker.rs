@@ -22,9 +22,6 @@ pub struct ObjectTracker {
 impl ObjectTracker {
     /// Creates a tracker without objects. The ONNX Runtime at a path computes its network, or else
     /// rten, which takes several times as long.
-    ///
-    /// # Errors
-    /// The first setting out of its bounds; a network that cannot be loaded.
     pub fn new(config: &ObjectsConfig, runtime: Option<&Path>) -> Result<Self, ObjectsError> {
         config.validate()?;
         Ok(Self {
@@ -42,9 +39,6 @@ impl ObjectTracker {
     ///
     /// A scan that is not later than the one before, or later by more than `max_gap_s`, ends all
     /// tracks.
-    ///
-    /// # Errors
-    /// A network that cannot be computed.
     pub fn update(
         &mut self,
         scan: &PlacedScan,

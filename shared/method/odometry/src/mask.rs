@@ -16,9 +16,7 @@ pub trait Mask: Send + Sync {
     }
 
     /// Rasterises and masks a scan. Returns the velocity that was used for motion compensation.
-    ///
-    /// # Errors
-    /// A scan that cannot be masked; it is left out.
+    /// On an error the scan is left out.
     fn mask(
         &mut self,
         sweep: &Sweep<'_>,
@@ -27,9 +25,7 @@ pub trait Mask: Send + Sync {
 
     /// Writes the scan's points to the start of `out` and returns their number. `twist` is what
     /// [`Mask::mask`] returned.
-    ///
-    /// # Errors
-    /// A scan that cannot be used; it is left out.
+    /// On an error the scan is left out.
     fn points(
         &mut self,
         scan: &PolarScan<'_>,

@@ -37,9 +37,6 @@ impl Odometry {
     /// Allocates all buffers. After the first scan, registering one allocates nothing but what a
     /// network does, and what finding lost azimuths does where a scan has more echoes than any
     /// before.
-    ///
-    /// # Errors
-    /// The first setting out of its bounds; a network that cannot be used.
     pub fn new(config: &OdometryConfig) -> Result<Self, SetupError> {
         Ok(Self::with_parts(config, Parts::new(config)?))
     }
@@ -72,10 +69,7 @@ impl Odometry {
     ///
     /// `samples` are those of a gyro and of wheels that come with the scan
     /// ([`gyre_samples::interval_of`]), in the order of [`Sample::order`]; none, for radar alone.
-    ///
-    /// # Errors
-    /// A scan that cannot be used. It is skipped: the next scan is registered against the one
-    /// before the error.
+    /// A scan that fails is skipped: the next scan is registered against the scan before it.
     pub fn register(
         &mut self,
         scan: &PolarScan<'_>,
@@ -108,9 +102,6 @@ impl Odometry {
 
     /// Places the scan's azimuths if some were lost, rasterises it with motion compensation, masks
     /// it (Weston et al., Sec. III-E) and extracts its points.
-    ///
-    /// # Errors
-    /// An inconsistent scan, or a network that fails.
     pub fn mask(
         &mut self,
         scan: &PolarScan<'_>,
@@ -132,9 +123,7 @@ impl Odometry {
     /// Searches for the rotation (Weston et al., Eq. 7), then for the translation (Eq. 8) between
     /// the last two masked scans, or for both together by trying every angle; `None` where the
     /// chain starts.
-    ///
-    /// # Errors
-    /// With rasters of [`Odometry::mask`] none but those of a search of your own.
+    /// With rasters of [`Odometry::mask`], only a search of your own can fail.
     pub fn search(&mut self) -> Result<Option<JointMatch>, OdometryError> {
         self.search.search(&self.pair)
     }

@@ -84,9 +84,6 @@ pub struct Parts {
 
 impl Parts {
     /// Makes the parts of a configuration, with all their buffers.
-    ///
-    /// # Errors
-    /// The first setting out of its bounds; a network that cannot be used.
     pub fn new(config: &OdometryConfig) -> Result<Self, SetupError> {
         Ok(Self {
             masker: Box::new(Masker::new(

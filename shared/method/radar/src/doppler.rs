@@ -82,9 +82,6 @@ pub enum NoDoppler {
 
 /// Checks that the chirps of a scan alternate and that its Doppler coefficient is known: what its
 /// radar needs to say the velocity.
-///
-/// # Errors
-/// The one of these that is missing.
 pub fn check_chirps(scan: &PolarScan<'_>) -> Result<(), NoDoppler> {
     scan.check()?;
     let azimuths = scan.geometry.azimuths;
@@ -140,9 +137,6 @@ impl DopplerEstimator {
     /// covariance that the scatter of the bearings says.
     ///
     /// Echoes nearer than `min_range_m` are left out: they are of the vehicle itself.
-    ///
-    /// # Errors
-    /// The reason why the scan does not say it.
     pub fn estimate(
         &mut self,
         scan: &PolarScan<'_>,

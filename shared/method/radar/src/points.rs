@@ -72,9 +72,6 @@ pub struct PointsError {
 
 impl PointsConfig {
     /// Checks the bounds of all settings.
-    ///
-    /// # Errors
-    /// Returns the first setting that is out of bounds.
     pub fn validate(&self) -> Result<(), PointsError> {
         let setting = |fits: bool, key, value: f32, bounds| match fits {
             true => Ok(()),
@@ -112,9 +109,6 @@ pub struct PointExtractor {
 
 impl PointExtractor {
     /// Returns an extractor.
-    ///
-    /// # Errors
-    /// See [`PointsConfig::validate`].
     pub fn new(config: &PointsConfig) -> Result<Self, PointsError> {
         config.validate()?;
         Ok(Self {
@@ -130,9 +124,7 @@ impl PointExtractor {
     /// [`PointsConfig::weight_cap`], at most 1. Returns the number of points, at most
     /// [`PointsConfig::capacity`] and `out.len()`. Azimuths that were not measured give no points
     /// and suppress none.
-    ///
-    /// # Errors
-    /// An inconsistent scan; `out` is unchanged then.
+    /// On an error `out` is unchanged.
     pub fn extract(
         &mut self,
         scan: &PolarScan<'_>,

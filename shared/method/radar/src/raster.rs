@@ -94,9 +94,6 @@ impl Default for RasterConfig {
 
 impl RasterConfig {
     /// Checks the bounds of all settings.
-    ///
-    /// # Errors
-    /// [`RasterError::Setting`] names the first key that is out of its bounds.
     pub fn validate(&self) -> Result<(), RasterError> {
         let setting = |key, value, bounds| Err(RasterError::Setting { key, value, bounds });
         if !(1..=MAX_CELLS_PER_SIDE).contains(&self.n) {
@@ -166,9 +163,6 @@ pub struct Rasteriser {
 
 impl Rasteriser {
     /// Allocates memory and computes the positions of the cells.
-    ///
-    /// # Errors
-    /// See [`RasterConfig::validate`].
     pub fn new(config: &RasterConfig) -> Result<Self, RasterError> {
         config.validate()?;
         let window_m = match config.sampling {
@@ -197,10 +191,7 @@ impl Rasteriser {
     /// of the ranges is compensated where the scan's Doppler coefficient is known. Cells that no
     /// azimuth or bin covers are zero; a scan without azimuths or bins gives zeros. Powers are
     /// interpolated between neighbouring azimuths, also between the last and the first.
-    ///
-    /// # Errors
-    /// A wrong shape or layout of `raster`, an inconsistent scan, a twist that is not finite or too
-    /// large. `raster` is unchanged then.
+    /// On an error `raster` is unchanged.
     pub fn rasterise(
         &mut self,
         scan: &PolarScan<'_>,

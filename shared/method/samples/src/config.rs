@@ -183,9 +183,6 @@ impl GyroConfig {
     }
 
     /// Checks every value.
-    ///
-    /// # Errors
-    /// The first key that is out of its bounds.
     pub fn validate(&self) -> Result<(), SampleConfigError> {
         let bounds = Bounds("gyro");
         let rate = "a rate in rad/s, at most 1";

@@ -119,9 +119,6 @@ impl DopplerConfig {
     }
 
     /// Checks every value.
-    ///
-    /// # Errors
-    /// The first key that is out of its bounds.
     pub fn validate(&self) -> Result<(), SampleConfigError> {
         let bounds = Bounds("doppler");
         bounds.within(

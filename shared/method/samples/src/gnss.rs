@@ -86,9 +86,6 @@ impl GnssConfig {
     }
 
     /// Checks every value.
-    ///
-    /// # Errors
-    /// The first key that is out of its bounds.
     pub fn validate(&self) -> Result<(), SampleConfigError> {
         let bounds = Bounds("gnss");
         bounds.late_s(self.late_s)?;

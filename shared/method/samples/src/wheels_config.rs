@@ -113,9 +113,6 @@ impl WheelsConfig {
     }
 
     /// Checks every value.
-    ///
-    /// # Errors
-    /// The first key that is out of its bounds.
     pub fn validate(&self) -> Result<(), SampleConfigError> {
         let bounds = Bounds("wheels");
         bounds.late_s(self.late_s)?;

@@ -215,9 +215,6 @@ impl RotationConfig {
     }
 
     /// Checks every value.
-    ///
-    /// # Errors
-    /// The first key that is out of its bounds.
     pub fn validate(&self) -> Result<(), ConfigError> {
         let section = Section("rotation");
         section.require(
@@ -258,9 +255,6 @@ impl TranslationConfig {
     }
 
     /// Checks every value.
-    ///
-    /// # Errors
-    /// The first key that is out of its bounds.
     pub fn validate(&self) -> Result<(), ConfigError> {
         let section = Section("translation");
         let fits = positive(self.reach_m);

@@ -133,9 +133,6 @@ fn expect_shape(
 }
 
 /// Views a slice of n * n cells, row after row, as an `n` x `n` raster.
-///
-/// # Errors
-/// If the slice has another number of cells.
 pub fn square<'a>(
     what: &'static str,
     cells: &'a [f32],

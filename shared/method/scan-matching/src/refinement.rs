@@ -140,9 +140,6 @@ pub struct Refiner {
 
 impl Refiner {
     /// Plans the refinement of scans of at most `capacity` points.
-    ///
-    /// # Errors
-    /// The first key of `config` that is out of its bounds.
     pub fn new(config: &RefinementConfig, capacity: usize) -> Result<Self, ConfigError> {
         config.validate()?;
         Ok(Self {

@@ -71,10 +71,7 @@ pub struct RotationSearch {
 
 impl RotationSearch {
     /// Plans a search over rasters of `n` x `n` cells.
-    ///
-    /// # Errors
-    /// A configuration value out of its bounds, or rasters of fewer than 16 or more than 8192 cells
-    /// a side.
+    /// `n` must be from 16 to 8192.
     pub fn new(n: usize, config: &RotationConfig) -> Result<Self, ConfigError> {
         config.validate()?;
         check_side(n)?;
@@ -118,9 +115,7 @@ impl RotationSearch {
     ///
     /// `raster` is n x n, row 0 far ahead, column 0 far left. Values that are not finite count as
     /// zero.
-    ///
-    /// # Errors
-    /// If `raster` is not n x n in standard layout, or `out` is another search's.
+    /// `raster` must be n x n in standard layout, and `out` from this search.
     pub fn spectrum(
         &mut self,
         raster: ArrayView2<'_, f32>,
@@ -144,9 +139,6 @@ impl RotationSearch {
 
     /// Finds the angle between two scans from their spectra; near the turn that a gyro has
     /// measured, rad, if it is given.
-    ///
-    /// # Errors
-    /// If a spectrum is another search's.
     pub fn search(
         &mut self,
         later: &PolarSpectrum,

@@ -24,9 +24,6 @@ pub trait KeyframeSource {
     type Error;
 
     /// Reads a keyframe that was given to [`LoopCloser::push`].
-    ///
-    /// # Errors
-    /// The keyframe cannot be read.
     fn keyframe(&mut self, index: usize) -> Result<Keyframe, Self::Error>;
 }
 
@@ -100,9 +97,6 @@ pub struct LoopCloser {
 impl LoopCloser {
     /// Plans the closing of loops between keyframes of at most `capacity` points. `refinement` is
     /// that of the odometry.
-    ///
-    /// # Errors
-    /// The first value of `refinement` that is out of its bounds.
     pub fn new(
         options: LoopOptions,
         refinement: &RefinementConfig,
@@ -128,9 +122,6 @@ impl LoopCloser {
     }
 
     /// Takes the next keyframe, of which it keeps the path and the motion.
-    ///
-    /// # Errors
-    /// A motion without a usable covariance.
     pub fn push(&mut self, keyframe: &Keyframe) -> Result<(), EstimationError> {
         self.extend(keyframe.path_m, &keyframe.motion)
     }
@@ -142,9 +133,6 @@ impl LoopCloser {
 
     /// Takes the next keyframe from its place, as [`LoopCloser::describe`] has returned it. The
     /// keyframes themselves follow after the last of the places.
-    ///
-    /// # Errors
-    /// A place that does not continue the path.
     pub fn restore_place<E>(&mut self, place: &Place) -> Result<(), ClosingError<E>> {
         self.extend(place.path_m, &place.motion)?;
         self.insert(place)
@@ -166,9 +154,6 @@ impl LoopCloser {
     }
 
     /// Describes the next keyframe whose submap is complete; `None` if there is none.
-    ///
-    /// # Errors
-    /// A keyframe that cannot be read, or does not continue the path.
     pub fn describe<S: KeyframeSource>(
         &mut self,
         source: &mut S,
@@ -192,9 +177,6 @@ impl LoopCloser {
 
     /// Queries the next keyframe that is described, and verifies its candidates; `None` if there is
     /// none.
-    ///
-    /// # Errors
-    /// A keyframe that cannot be read.
     pub fn close<S: KeyframeSource>(
         &mut self,
         source: &mut S,

@@ -65,9 +65,6 @@ impl SlamConfig {
     }
 
     /// Checks every value.
-    ///
-    /// # Errors
-    /// The first option that is out of its bounds.
     pub fn validate(&self) -> Result<(), PlaceOptionError> {
         self.places.validate()
     }

@@ -118,10 +118,6 @@ impl RecordReader<Keyframe> {
     /// Reads a keyframe without its points, which are a hundred times the rest. Its bytes are not
     /// checked: the checksum is that of the whole record.
     ///
-    /// # Errors
-    /// A file that cannot be read, is damaged at the header of the record, or has something else
-    /// there.
-    ///
     /// # Panics
     /// There are no more than `index` keyframes.
     pub fn read_without_points(&mut self, index: usize) -> Result<Keyframe, LogError> {

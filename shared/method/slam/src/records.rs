@@ -42,18 +42,11 @@ pub struct RecordLog<R> {
 impl<R: Record> RecordLog<R> {
     /// Opens or creates the file of the run that writes to `out`, and cuts off what a death or a
     /// power failure has left of the last records.
-    ///
-    /// # Errors
-    /// A file that cannot be read or written, is of another kind, is damaged, or to which another
-    /// process writes.
     pub fn open(out: &Path) -> Result<Self, LogError> {
         Self::open_file(&records_path::<R>(out))
     }
 
     /// As [`open`](Self::open), of a file that is not in the results of a run.
-    ///
-    /// # Errors
-    /// As [`open`](Self::open).
     pub fn open_file(path: &Path) -> Result<Self, LogError> {
         let log = Log::open(path, R::MAGIC)?;
         let mut buffer = Vec::new();
@@ -87,9 +80,6 @@ impl<R: Record> RecordLog<R> {
 
     /// Reads a record.
     ///
-    /// # Errors
-    /// A file that cannot be read, is damaged there, or has something else there.
-    ///
     /// # Panics
     /// There are no more than `index` records.
     pub fn read(&mut self, index: usize) -> Result<R, LogError> {
@@ -98,9 +88,6 @@ impl<R: Record> RecordLog<R> {
     }
 
     /// Appends a record. A reader sees it when this returns.
-    ///
-    /// # Errors
-    /// A file that cannot be written or synchronised.
     pub fn append(&mut self, record: &R) -> Result<(), LogError> {
         self.buffer.clear();
         record.encode(&mut self.buffer);
@@ -109,17 +96,11 @@ impl<R: Record> RecordLog<R> {
 
     /// Counts a change of another file that is of use only with the records that were appended. See
     /// [`Log::rely`].
-    ///
-    /// # Errors
-    /// A file that cannot be synchronised.
     pub fn rely(&mut self) -> Result<(), LogError> {
         self.log.rely()
     }
 
     /// Says that no more records follow. All of them survive a power failure when this returns.
-    ///
-    /// # Errors
-    /// A file that cannot be written or synchronised.
     pub fn end(&mut self) -> Result<(), LogError> {
         if !self.ended {
             self.log.append(&[])?;
@@ -129,18 +110,12 @@ impl<R: Record> RecordLog<R> {
     }
 
     /// Makes all records survive a power failure.
-    ///
-    /// # Errors
-    /// A file that cannot be synchronised.
     pub fn sync(&self) -> Result<(), LogError> {
         self.log.sync()
     }
 
     /// Keeps the first `records` records, and cuts off those behind them and the end. The cut
     /// survives a power failure.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
     pub fn cut(&mut self, records: usize) -> Result<(), LogError> {
         self.log.cut(records.min(self.len()))?;
         self.ended = false;
@@ -160,17 +135,11 @@ pub struct RecordReader<R> {
 impl<R: Record> RecordReader<R> {
     /// Opens the file of the run that writes to `out` and finds its complete records. One that does
     /// not exist yet is empty.
-    ///
-    /// # Errors
-    /// A file that cannot be read, is of another kind or damaged.
     pub fn open(out: &Path) -> Result<Self, LogError> {
         Self::open_file(&records_path::<R>(out))
     }
 
     /// As [`open`](Self::open), of a file that is not in the results of a run.
-    ///
-    /// # Errors
-    /// As [`open`](Self::open).
     pub fn open_file(path: &Path) -> Result<Self, LogError> {
         let mut reader = Self {
             log: LogReader::open(path, R::MAGIC)?,
@@ -184,9 +153,6 @@ impl<R: Record> RecordReader<R> {
 
     /// Looks for records that were appended or cut off meanwhile; returns the number of complete
     /// ones now.
-    ///
-    /// # Errors
-    /// A file that cannot be read, is of another kind or damaged.
     pub fn refresh(&mut self) -> Result<usize, LogError> {
         self.ended = match self.log.refresh()?.checked_sub(1) {
             Some(last) => {
@@ -220,9 +186,6 @@ impl<R: Record> RecordReader<R> {
     }
 
     /// Reads a record.
-    ///
-    /// # Errors
-    /// A file that cannot be read, is damaged there, or has something else there.
     ///
     /// # Panics
     /// There are no more than `index` records.

@@ -175,9 +175,6 @@ impl TrajectoryEstimator {
 
     /// Takes the next keyframe. The first one stays where odometry has it. Until the next solution,
     /// a keyframe continues from the one before by odometry.
-    ///
-    /// # Errors
-    /// A motion without a usable covariance, or too many keyframes for the filter.
     pub fn push(&mut self, keyframe: &Keyframe) -> Result<(), EstimationError> {
         match self.keyframes.len().checked_sub(1) {
             None => {
@@ -206,9 +203,6 @@ impl TrajectoryEstimator {
 
     /// Takes the accepted loops of a keyframe, for the next solution. They were tested against the
     /// same odometry.
-    ///
-    /// # Errors
-    /// Keyframes that were not pushed.
     pub fn close(&mut self, query: &Query) -> Result<(), EstimationError> {
         query
             .loops()
@@ -217,9 +211,6 @@ impl TrajectoryEstimator {
 
     /// Takes a loop from an earlier to a later keyframe, for the next solution. Its group is
     /// decided by its keyframes.
-    ///
-    /// # Errors
-    /// Keyframes that were not pushed.
     pub fn close_loop(&mut self, closing: &Constraint) -> Result<(), EstimationError> {
         let chi_square = match &self.estimator {
             Estimator::Graph(graph) => graph.test(closing)?.chi_square,
@@ -229,9 +220,6 @@ impl TrajectoryEstimator {
     }
 
     /// Moves all poses to where they fit best, and judges all loops anew.
-    ///
-    /// # Errors
-    /// The equations have no solution.
     pub fn solve(&mut self) -> Result<(), EstimationError> {
         match self.options.kind {
             EstimatorKind::Graph => {
@@ -246,9 +234,6 @@ impl TrajectoryEstimator {
     /// Judges the loops that came since the last solution, and moves all poses from where they are
     /// to where they fit best. All loops are judged anew from time to time, and if one was wrong
     /// the poses begin at the odometry.
-    ///
-    /// # Errors
-    /// The equations have no solution.
     pub fn update(&mut self) -> Result<(), EstimationError> {
         match self.options.kind {
             EstimatorKind::Graph => self.update_graph(),
@@ -267,9 +252,6 @@ impl TrajectoryEstimator {
 
     /// Returns the pose of a keyframe with its covariance along the axes of the frame of the first
     /// scan.
-    ///
-    /// # Errors
-    /// There is no such keyframe, or the constraints do not determine the poses.
     pub fn pose(&mut self, keyframe: usize) -> Result<UncertainMotion, EstimationError> {
         let mut pose = match &mut self.estimator {
             Estimator::Graph(graph) => graph.pose(keyframe)?,
@@ -284,9 +266,6 @@ impl TrajectoryEstimator {
     /// Scales the covariances of the poses from now on so that the residuals of odometry and loops
     /// are as large as they say. Returns the scale, which is 1 without loops and in the filter. It
     /// takes some 1,400 solutions of the equations.
-    ///
-    /// # Errors
-    /// The constraints do not determine the poses.
     pub fn scale_covariances(&mut self) -> Result<f64, EstimationError> {
         self.scale = match &mut self.estimator {
             Estimator::Graph(graph) => variance::scale(graph, &self.odometry, &self.loops)?,
@@ -322,9 +301,6 @@ impl TrajectoryEstimator {
 
     /// Returns the pose of the frame of the first scan in that of the fixes, east and north, with
     /// its covariance; `None` without fixes that tell it.
-    ///
-    /// # Errors
-    /// The constraints do not determine the poses.
     pub fn east_north_from_map(&mut self) -> Result<Option<UncertainMotion>, EstimationError> {
         let frame = match &mut self.estimator {
             Estimator::Graph(graph) => graph.uncertain_frame()?,

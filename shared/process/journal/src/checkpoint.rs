@@ -161,9 +161,6 @@ impl Layout {
 impl Checkpoint {
     /// Opens or creates a checkpoint for runs with this window and maps of at most `max_keyframes`
     /// keyframes of `cells` cells.
-    ///
-    /// # Errors
-    /// A file that cannot be read or written, or to which another process writes.
     pub fn open(
         path: &Path,
         window: usize,
@@ -208,9 +205,6 @@ impl Checkpoint {
     /// keyframes, then the state that names them. If the file has this state already, the process
     /// repeats items after a restart, and it is left: later states may still be needed. If it has
     /// another state, all later ones are obsolete.
-    ///
-    /// # Errors
-    /// A file that cannot be written or synchronised.
     pub fn write(
         &mut self,
         item: u64,
@@ -311,9 +305,6 @@ impl Checkpoint {
     }
 
     /// Restores the state after `item`.
-    ///
-    /// # Errors
-    /// [`CheckpointError::Missing`].
     pub fn restore(&mut self, item: u64, refiner: &mut Refiner) -> Result<(), CheckpointError> {
         let missing = CheckpointError::Missing {
             path: self.file.file().path().to_owned(),
@@ -355,9 +346,6 @@ impl Checkpoint {
 
     /// Returns the newest of these poses, given newest first, from which a run can go on: the one
     /// whose whole state is in the file.
-    ///
-    /// # Errors
-    /// A file that cannot be read.
     pub fn newest_known<'a>(
         &mut self,
         poses: impl IntoIterator<Item = &'a PoseHeader>,

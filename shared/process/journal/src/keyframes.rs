@@ -46,9 +46,6 @@ impl Keyframes {
     /// Opens or creates the log of the run that writes to `out`, whose journal has `poses` poses,
     /// and perhaps the end of the stream. Keyframes beyond them are cut off, and the motion since
     /// the last one is recovered from the journal.
-    ///
-    /// # Errors
-    /// A file that cannot be used, or a pose without its keyframe.
     pub fn open(
         out: &Path,
         options: &PlaceOptions,
@@ -82,9 +79,6 @@ impl Keyframes {
 
     /// Takes the next pose, before it is journalled. If it becomes a keyframe, that is appended
     /// with the scan's points. Returns whether it does.
-    ///
-    /// # Errors
-    /// A file that cannot be written or synchronised.
     pub fn add(
         &mut self,
         pose: &PoseHeader,
@@ -104,17 +98,11 @@ impl Keyframes {
 
     /// Says that the stream has ended, before that is journalled. All keyframes survive a power
     /// failure when this returns.
-    ///
-    /// # Errors
-    /// A file that cannot be written or synchronised.
     pub fn end(&mut self) -> Result<(), KeyframesError> {
         Ok(self.log.end()?)
     }
 
     /// Waits until all keyframes so far survive a power failure.
-    ///
-    /// # Errors
-    /// A file that cannot be synchronised.
     pub fn sync(&self) -> Result<(), KeyframesError> {
         Ok(self.log.sync()?)
     }
@@ -122,9 +110,6 @@ impl Keyframes {
 
 /// Returns how many of the first `poses` poses of the journal have all their keyframes. After a
 /// death all of them have; a power failure can take the last keyframes. Changes nothing.
-///
-/// # Errors
-/// A file that cannot be read or is damaged.
 pub fn complete_poses(
     out: &Path,
     options: &PlaceOptions,

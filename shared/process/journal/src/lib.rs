@@ -48,9 +48,6 @@ pub fn path(out: &Path) -> PathBuf {
 impl Journal {
     /// Opens or creates a journal and cuts off an incomplete record at its end. Only the end is
     /// read, however long it is.
-    ///
-    /// # Errors
-    /// A file that cannot be read or written, is not a journal, or to which another process writes.
     pub fn open(path: &Path) -> Result<Self, JournalError> {
         let mut records = 0;
         let file = DurableFile::open(path, |file| {
@@ -77,9 +74,6 @@ impl Journal {
 
     /// Returns the last poses, at most `count`, oldest first, and whether the end of the stream
     /// follows them.
-    ///
-    /// # Errors
-    /// A file that cannot be read, or a damaged record.
     pub fn last(&self, count: usize) -> Result<(Vec<PoseHeader>, bool), JournalError> {
         let mut poses = Vec::with_capacity(count);
         let mut ended = false;
@@ -106,9 +100,6 @@ impl Journal {
     }
 
     /// Appends a pose, or the end of the stream.
-    ///
-    /// # Errors
-    /// A file that cannot be written or synchronised, or that another program has removed.
     pub fn append(&mut self, pose: &PoseHeader) -> Result<(), JournalError> {
         let safe = self.file.safe().map_or(0, |appended| self.found + appended);
         let record = Record {
@@ -123,9 +114,6 @@ impl Journal {
     }
 
     /// Waits until all that was appended survives a power failure.
-    ///
-    /// # Errors
-    /// A file that cannot be synchronised, or that another program has removed.
     pub fn sync(&self) -> Result<(), JournalError> {
         self.file.file().require_name()?;
         Ok(self.file.finish()?)

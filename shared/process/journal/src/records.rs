@@ -36,18 +36,12 @@ pub(crate) struct Places {
 }
 
 /// Opens a journal to read it; `None` if there is none.
-///
-/// # Errors
-/// A file that cannot be read or is not a journal.
 pub fn records(path: &Path) -> Result<Option<Records>, JournalError> {
     let places = Places::open(path)?.filter(|places| places.has_header);
     Ok(places.map(|places| Records { places }))
 }
 
 /// As [`records`], from the pose number `first` on.
-///
-/// # Errors
-/// A file that cannot be read or is not a journal.
 pub fn records_from(path: &Path, first: u64) -> Result<Option<Records>, JournalError> {
     let Some(mut records) = records(path)? else {
         return Ok(None);

@@ -131,9 +131,6 @@ pub struct Scans {
 impl Scans {
     /// Opens or creates the log of the run that writes to `out`, whose journal has `poses` poses,
     /// and perhaps the end of the stream. Scans beyond them are cut off.
-    ///
-    /// # Errors
-    /// A file that cannot be used, or poses without their scans.
     pub fn open(out: &Path, poses: u64, ended: bool) -> Result<Self, ScansError> {
         let mut log = RecordLog::open(out)?;
         let scans = log.len() as u64;
@@ -159,9 +156,6 @@ impl Scans {
     }
 
     /// Appends the scan of the next pose, before that is journalled.
-    ///
-    /// # Errors
-    /// A file that cannot be written or synchronised.
     pub fn add(&mut self, pose: &PoseHeader, points: &[SparsePoint]) -> Result<(), ScansError> {
         let mut memory = std::mem::take(&mut self.points);
         memory.clear();
@@ -174,17 +168,11 @@ impl Scans {
 
     /// Says that the stream has ended, before that is journalled. All scans survive a power failure
     /// when this returns.
-    ///
-    /// # Errors
-    /// A file that cannot be written or synchronised.
     pub fn end(&mut self) -> Result<(), ScansError> {
         Ok(self.log.end()?)
     }
 
     /// Waits until all scans so far survive a power failure.
-    ///
-    /// # Errors
-    /// A file that cannot be synchronised.
     pub fn sync(&self) -> Result<(), ScansError> {
         Ok(self.log.sync()?)
     }
@@ -192,9 +180,6 @@ impl Scans {
 
 /// Returns how many of the first `poses` poses of the journal have their scans. After a death all
 /// of them have; a power failure can take the last scans. Changes nothing.
-///
-/// # Errors
-/// A file that cannot be read or is damaged.
 pub fn complete_scans(out: &Path, poses: u64) -> Result<u64, LogError> {
     let reader = RecordReader::<LoggedScan>::open(out)?;
     Ok(poses.min(reader.len() as u64))

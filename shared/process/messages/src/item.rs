@@ -152,9 +152,6 @@ impl Item {
     }
 
     /// Checks the numbers.
-    ///
-    /// # Errors
-    /// The first violation.
     pub(crate) fn check(&self) -> Result<(), Violation> {
         require(
             self.flags & !flag::ALL == 0,

@@ -104,9 +104,6 @@ impl TopicSizes {
 
 impl Window {
     /// Checks the bounds.
-    ///
-    /// # Errors
-    /// The first value out of its bounds.
     pub fn validate(&self) -> Result<(), WindowError> {
         if !(1..=64).contains(&self.scans) {
             return Err(WindowError::Scans(self.scans));

@@ -74,9 +74,6 @@ pub trait Message: 'static {
 
     /// Checks that a message keeps its contract, whatever program sent it. A receiver that has
     /// checked a message may rely on its numbers and on the length of its payload.
-    ///
-    /// # Errors
-    /// The first violation.
     fn check(
         header: &Self::Header,
         payload: &[Self::Element],
@@ -91,9 +88,6 @@ pub trait Message: 'static {
     }
 
     /// Checks all but the item; the end of the stream has no content.
-    ///
-    /// # Errors
-    /// The first violation.
     fn check_content(
         header: &Self::Header,
         payload: &[Self::Element],

@@ -60,9 +60,6 @@ pub(crate) fn name() -> String {
 
 impl Interpreter {
     /// Starts the interpreter that functions would be called in, and asks what it has.
-    ///
-    /// # Errors
-    /// It cannot be started, or it is no Python in which functions can be called.
     pub fn find() -> Result<Self, NoInterpreter> {
         let python = name();
         let mut command = Command::new(&python);

@@ -156,9 +156,6 @@ pub struct Function {
 
 impl Function {
     /// Starts the interpreter that `GYRE_PYTHON` names, or `python3`, and loads the file.
-    ///
-    /// # Errors
-    /// No such file or interpreter, no numpy, or an exception while the file is loaded.
     pub fn load(file: &Path, name: Name) -> Result<Self, FunctionError> {
         let absolute = std::path::absolute(file).ok().filter(|file| file.is_file());
         let file = absolute.ok_or_else(|| FunctionError::Missing(file.to_owned()))?;
@@ -205,9 +202,6 @@ impl Function {
     }
 
     /// Calls the function.
-    ///
-    /// # Errors
-    /// An exception, or a value that a function of its name does not return.
     pub fn call(&mut self, arguments: &[Argument<'_>]) -> Result<Returned, FunctionError> {
         if self.send(arguments).is_err() {
             return Err(self.ended());

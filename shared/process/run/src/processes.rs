@@ -105,9 +105,6 @@ impl StageConfig {
     ];
 
     /// Returns the function of Python that a process can be.
-    ///
-    /// # Errors
-    /// Of the others: those that can be one.
     pub fn function(process: &str) -> Result<&'static str, String> {
         let found = Self::PYTHON.iter().find(|(name, _)| *name == process);
         found.map(|(_, function)| *function).ok_or_else(|| {

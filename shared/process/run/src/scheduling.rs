@@ -39,9 +39,6 @@ impl Scheduling {
     }
 
     /// Checks the ranges of the values.
-    ///
-    /// # Errors
-    /// The key and the range, as the end of a sentence that begins with the section.
     pub fn validate(&self) -> Result<(), String> {
         if self.nice.is_some_and(|nice| !(-20..=19).contains(&nice)) {
             return Err("scheduling.nice must be from -20 to 19".to_owned());

@@ -214,9 +214,6 @@ pub struct Control {
 
 impl Control {
     /// Returns the control of the run that writes its results to `out`.
-    ///
-    /// # Errors
-    /// There is no such run.
     pub fn of(out: &Path) -> Result<Self, StageError> {
         let absolute = out.canonicalize().unwrap_or_else(|_| out.to_owned());
         Self::at(run::root_of(&absolute), out.to_owned()).ok_or_else(|| not_running(out.to_owned()))
@@ -253,9 +250,6 @@ impl Control {
     }
 
     /// Returns the state of the run.
-    ///
-    /// # Errors
-    /// The run has ended, or its supervisor does not answer.
     pub fn status(&self) -> Result<Status, StageError> {
         self.status_or("")
     }
@@ -268,17 +262,11 @@ impl Control {
     }
 
     /// Asks the run to end, as an interrupt does. It has ended when this run is there no more.
-    ///
-    /// # Errors
-    /// The run has ended, or its supervisor does not answer.
     pub fn stop(&self) -> Result<(), StageError> {
         self.order(&Request::Stop)
     }
 
     /// Starts a process of the run again.
-    ///
-    /// # Errors
-    /// There is no such process, the run has ended, or its supervisor does not answer.
     pub fn restart(&self, process: &str) -> Result<(), StageError> {
         let process = process.to_owned();
         self.order(&Request::Restart { process })
@@ -287,10 +275,7 @@ impl Control {
     /// Goes on with another program in the place of a stage. Returns when that has worked on a
     /// first pose; or, with a sentence, when it has taken over and no scan came for it to work on.
     /// Each second meanwhile `observe` gets what is waited for.
-    ///
-    /// # Errors
-    /// The program did not come to take over, or has failed, and the one before goes on; the run
-    /// has ended, or its supervisor does not answer.
+    /// If the new program fails to take over, the previous program continues.
     pub fn swap(
         &self,
         swap: Swap,

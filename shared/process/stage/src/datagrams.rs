@@ -12,9 +12,6 @@ use crate::StageError;
 pub(crate) const MAX_DATAGRAM: usize = 65_536;
 
 /// Opens the socket for what a section receives, which does not block.
-///
-/// # Errors
-/// An address at which nothing can be received.
 pub(crate) fn listen(what: &str, section: &str, address: &str) -> Result<UdpSocket, StageError> {
     let bound = UdpSocket::bind(address);
     let opened = bound.and_then(|socket| socket.set_nonblocking(true).map(|()| socket));

@@ -32,16 +32,10 @@ pub trait Follower {
 
     /// Works on the next records of the logs. A step should be short: requests to stop are looked
     /// for between two steps.
-    ///
-    /// # Errors
-    /// An error that ends the process.
     fn step(&mut self) -> Result<Step<<Self::Output as Message>::Header>, StageError>;
 
     /// Makes what it has written survive a power failure. A failure is found by nobody after the
     /// process.
-    ///
-    /// # Errors
-    /// A file that cannot be synchronised.
     fn sync(&mut self) -> Result<(), StageError>;
 
     /// Returns the position in the logs.
@@ -60,9 +54,6 @@ pub enum Step<H> {
 }
 
 /// Runs a follower to the end of its logs, or until SIGTERM.
-///
-/// # Errors
-/// A failure of the transport, or an error of the follower.
 pub fn run<F: Follower>(launch: &Launch, follower: &mut F) -> Result<StageCounters, StageError> {
     if !launch.take_place()? {
         return Ok(StageCounters::default());

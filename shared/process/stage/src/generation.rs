@@ -30,9 +30,6 @@ impl Generation {
     /// Begins a generation, in which a process gives its numbers from `first` on. The generation is
     /// kept beside the journal and survives a power failure, so that no number of one is given
     /// twice.
-    ///
-    /// # Errors
-    /// The file of the generations cannot be read or written.
     pub fn begin(
         manifest: &Manifest,
         by: NumberedBy,

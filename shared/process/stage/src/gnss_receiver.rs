@@ -58,9 +58,6 @@ impl Shared {
 
 impl GnssReceiver {
     /// Receives at an address, and goes on with the log if there is one.
-    ///
-    /// # Errors
-    /// An address at which nothing can be received, or a file that cannot be written.
     pub fn open(address: &str, log: &Path) -> Result<Self, StageError> {
         let socket = listen("fixes of GNSS", "gnss", address)?;
         let log = Log::open(log).map_err(unwritten)?;
@@ -89,9 +86,6 @@ impl GnssReceiver {
 
     /// Returns what `read` makes of the log, which meanwhile does not change; `None` if it has not
     /// grown since the last call.
-    ///
-    /// # Errors
-    /// Reception has failed.
     pub fn if_grown<T>(&mut self, read: impl FnOnce() -> T) -> Result<Option<T>, StageError> {
         if self.thread.as_ref().is_some_and(JoinHandle::is_finished) {
             self.finish()?;
@@ -102,9 +96,6 @@ impl GnssReceiver {
     }
 
     /// Takes what has arrived by now, and ends reception: the log does not change any more.
-    ///
-    /// # Errors
-    /// Reception has failed.
     pub fn finish(&mut self) -> Result<(), StageError> {
         self.shared.ends.store(true, Ordering::Relaxed);
         match self.thread.take().map(JoinHandle::join) {

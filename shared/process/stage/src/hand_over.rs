@@ -62,9 +62,6 @@ pub struct HandOver {
 impl HandOver {
     /// Creates the topic for parcels of so many bytes and so many readers, under the name of the
     /// folder `out`.
-    ///
-    /// # Errors
-    /// Shared memory cannot be used, or a failure of the transport.
     pub fn create(out: &Path, bytes: usize, readers: usize) -> Result<Self, StageError> {
         transport::silence();
         let root = RunRoot::acquire(out, &Signals::install()?)
@@ -89,25 +86,16 @@ impl HandOver {
     }
 
     /// Connects the readers that have attached.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     pub fn accept_readers(&self) -> Result<(), StageError> {
         self.writer.accept_readers()
     }
 
     /// Loans a parcel to fill in.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     pub fn loan(&self) -> Result<Draft<Parcel>, StageError> {
         self.writer.loan()
     }
 
     /// Sends a parcel.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     pub fn send(&self, draft: Draft<Parcel>) -> Result<(), StageError> {
         self.writer.send(draft, Parcel::HOP)
     }

@@ -31,14 +31,8 @@ pub trait Inputs: Sized {
         Self: 'a;
 
     /// Opens the topics.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     fn open(launch: &Launch) -> Result<Self, StageError>;
     /// Reads the queues and returns what to do next.
-    ///
-    /// # Errors
-    /// A failure of the transport, a sequence gap.
     fn next_action(&mut self) -> Result<Action, StageError>;
     /// Returns the inputs of the item of [`Action::Process`].
     fn view(&self) -> Option<Self::View<'_>>;
@@ -77,9 +71,6 @@ impl<M: Message> PairView<'_, M> {
 
 impl PairView<'_, Masked> {
     /// Returns the rasters to match.
-    ///
-    /// # Errors
-    /// A payload that is shorter than its header says.
     pub fn rasters(&self) -> Result<Pair<'_>, StageError> {
         let previous = self
             .previous

@@ -50,9 +50,6 @@ pub struct Launch {
 
 impl Launch {
     /// Joins the run that [`run::ENVIRONMENT`] names.
-    ///
-    /// # Errors
-    /// No run is named, its files cannot be read, or the transport fails.
     pub fn from_environment(name: &str) -> Result<Self, StageError> {
         let root = std::env::var_os(run::ENVIRONMENT).ok_or_else(|| StageError::NoRun {
             stage: name.to_owned(),
@@ -91,9 +88,6 @@ impl Launch {
     ///
     /// The loops of this crate call it. A stage with files of its own calls it before it opens
     /// them; once is enough.
-    ///
-    /// # Errors
-    /// A file of the run that cannot be written, or memory that cannot be locked.
     pub fn take_place(&self) -> Result<bool, StageError> {
         if self.has_place.get() {
             return Ok(true);
@@ -162,9 +156,6 @@ impl Launch {
     }
 
     /// Returns a section of the run's configuration, or its defaults if the section is missing.
-    ///
-    /// # Errors
-    /// A key or value that the section does not allow.
     pub fn section<T: DeserializeOwned>(&self, section: &str) -> Result<T, StageError> {
         let table = self
             .configuration
@@ -247,9 +238,6 @@ fn leave_last_words(stage: &str, sentence: &str) {
 }
 
 /// Returns the filter of the log: `GYRE_LOG`, or `FILTER` without it.
-///
-/// # Errors
-/// `GYRE_LOG` is no filter.
 fn log_filter() -> Result<Targets, StageError> {
     let filter = std::env::var("GYRE_LOG").unwrap_or_else(|_| FILTER.into());
     filter.parse().map_err(|error| {
@@ -261,9 +249,6 @@ fn log_filter() -> Result<Targets, StageError> {
 
 /// Starts logging to `log.jsonl`, to which all processes append one line per event. While the
 /// returned span lives, each line carries the name of the stage.
-///
-/// # Errors
-/// The log cannot be opened, or `GYRE_LOG` is no filter.
 pub fn start_log(manifest: &Manifest, name: &str) -> Result<EnteredSpan, StageError> {
     let path = manifest.events();
     let file = OpenOptions::new()

@@ -76,9 +76,6 @@ pub enum Next<'a, M: Message> {
 
 impl ObservedRun {
     /// Attaches to the run that writes its results to `out`.
-    ///
-    /// # Errors
-    /// There is no such run, or the transport fails.
     pub fn writing_to(out: &Path) -> Result<Self, StageError> {
         let absolute = out.canonicalize().unwrap_or_else(|_| out.to_owned());
         let root = run::root_of(&absolute);
@@ -90,9 +87,6 @@ impl ObservedRun {
     }
 
     /// Attaches to the run with this root, the value of [`run::ENVIRONMENT`] in its processes.
-    ///
-    /// # Errors
-    /// There is no such run, or the transport fails.
     pub fn at(root: &Path) -> Result<Self, StageError> {
         transport::silence();
         let manifest = Manifest::read(root)?;
@@ -117,18 +111,12 @@ impl ObservedRun {
 
     /// Tells the supervisor, which has started this process as its recorder under this name, that
     /// all topics are observed, and reports the waits for `signals` from here on.
-    ///
-    /// # Errors
-    /// A file of the run cannot be written.
     pub fn is_ready(&self, name: &str, signals: &Signals) -> Result<(), StageError> {
         signals.report_to(HeartbeatWriter::create(&self.manifest, name)?);
         run::write(ready_file(&self.manifest.root), "")
     }
 
     /// Tells the supervisor how many messages its recorder, this process, has missed so far.
-    ///
-    /// # Errors
-    /// A file of the run cannot be written.
     pub fn tell_missed(&self, missed: u64) -> Result<(), StageError> {
         let text = format!("{} {missed}", process::id());
         run::write(missed_file(&self.manifest.root), &text)
@@ -140,10 +128,6 @@ impl ObservedRun {
     }
 
     /// Subscribes to a topic. The first messages are those of the publisher's history.
-    ///
-    /// # Errors
-    /// The run has no such topic, all places of the topic are taken, the run has ended, or the
-    /// transport fails.
     pub fn observe<M: Message>(&self) -> Result<Observer<'_, M>, StageError> {
         let (subscriber, data) = self.attach(&Topic::of::<M>())?;
         Ok(Observer {
@@ -227,9 +211,6 @@ pub fn read_missed(root: &Path, recorder: u32) -> u64 {
 impl<M: Message> Observer<'_, M> {
     /// Returns the next message in the publisher's memory, and waits for it at most `limit`. The
     /// message before it is released, and the next call releases this one.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     pub fn next(&mut self, limit: Duration) -> Result<Next<'_, M>, StageError> {
         self.current = None;
         let since = Instant::now();
@@ -254,9 +235,6 @@ impl<M: Message> Observer<'_, M> {
 
     /// Returns, of the generations after `known` and before that of an item, the one that gave the
     /// smallest number anew.
-    ///
-    /// # Errors
-    /// The file of the generations cannot be read.
     pub fn skipped(&self, known: u32, item: &Item) -> Result<Option<GivenAnew>, StageError> {
         generation::skipped(
             &self.run.manifest.out,
@@ -305,9 +283,6 @@ impl<M: Message> Observer<'_, M> {
 
 /// Sleeps until one of several observers may have a message, a signal requests a stop (then true),
 /// or `limit` has passed, and on for as long as an observer rests between two looks.
-///
-/// # Errors
-/// The system refuses to wait.
 pub fn wait_for_any(
     signals: &Signals,
     listeners: &[&Listener],

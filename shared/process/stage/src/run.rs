@@ -40,9 +40,6 @@ pub fn keep_files_private() {
 
 /// Lets this process get a signal when the process that has started it, `parent`, ends, even if
 /// that is killed. False: it has ended already.
-///
-/// # Errors
-/// The system refuses.
 pub fn end_with(parent: i32, signal: Signal) -> Result<bool, Errno> {
     set_parent_process_death_signal(Some(signal))?;
     Ok(getppid().map(Pid::as_raw_pid) == Some(parent))

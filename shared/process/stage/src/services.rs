@@ -17,9 +17,6 @@ pub struct Services {
 
 impl Services {
     /// Creates the services.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     pub fn create(node: &Node, window: &Window) -> Result<Self, StageError> {
         let (mut topics, mut events) = (Vec::new(), Vec::new());
         for topic in gyre_messages::topics(window) {

@@ -58,9 +58,6 @@ pub trait Source {
     fn drops_missed_scans(&self) -> bool;
 
     /// Reads scan `index` into shared memory.
-    ///
-    /// # Errors
-    /// The reason why the scan cannot be used.
     fn read(
         &mut self,
         index: usize,
@@ -70,9 +67,6 @@ pub trait Source {
 }
 
 /// Runs the source until SIGTERM.
-///
-/// # Errors
-/// Input that cannot be read within `tolerance`, or a failure of the transport.
 pub fn run(
     launch: &Launch,
     source: &mut impl Source,

@@ -23,9 +23,6 @@ pub trait Stage {
 
     /// Processes one item: reads borrowed shared memory and writes header and payload of a loaned
     /// sample. The item of the header is filled in afterwards.
-    ///
-    /// # Errors
-    /// An error that ends the process.
     fn process(
         &mut self,
         input: <Self::Inputs as Inputs>::View<'_>,
@@ -38,9 +35,6 @@ pub trait Stage {
 }
 
 /// Runs a stage until SIGTERM.
-///
-/// # Errors
-/// A failure of the transport, a sequence gap, or an error of the stage.
 pub fn run<S: Stage>(launch: &Launch, stage: &mut S) -> Result<StageCounters, StageError> {
     if !launch.take_place()? {
         return Ok(StageCounters::default());

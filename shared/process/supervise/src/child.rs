@@ -226,9 +226,6 @@ impl Child {
     }
 
     /// Counts a death against the restart policy.
-    ///
-    /// # Errors
-    /// A permanent failure, or more deaths than the policy allows.
     pub(crate) fn may_restart(&mut self, death: &Death) -> Result<(), SuperviseError> {
         if let Some(message) = self.message_if_permanent(death) {
             return Err(SuperviseError::Permanent { message });
@@ -300,9 +297,6 @@ impl Child {
     }
 
     /// Waits for the end of a killed process.
-    ///
-    /// # Errors
-    /// It does not end.
     pub(crate) fn await_end(&mut self) -> Result<(), SuperviseError> {
         // What was waited for in vain once is not waited for again.
         if !self.has_exited() && !self.is_held {

@@ -179,9 +179,6 @@ impl Processes {
 
     /// Checks that no process has failed at its end, as one that cannot keep what it has written.
     /// Followers that were given up are left out: their end was reported when it came.
-    ///
-    /// # Errors
-    /// The failure of one that says so by its exit code.
     pub fn require_good_ends(&mut self, followers: &Followers<'_>) -> Result<(), SuperviseError> {
         let children = self.children.iter_mut().enumerate();
         let mut judged = children.filter(|(i, _)| !followers.has_given_up(*i));

@@ -36,9 +36,6 @@ impl State {
 
 impl Program {
     /// Returns the file at `path` as it is now.
-    ///
-    /// # Errors
-    /// A file that does not exist or may not be looked at.
     pub fn at(path: &Path) -> io::Result<Self> {
         Ok(Self {
             path: path.to_owned(),

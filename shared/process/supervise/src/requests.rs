@@ -22,9 +22,6 @@ const MAX_REQUESTS: usize = 8;
 
 /// Waits until `look`, which updates the status, returns something, before there are processes.
 /// `None`: the run is to end.
-///
-/// # Errors
-/// The socket cannot be opened in the run's root, or the system refuses to wait.
 pub fn wait<T>(
     root: &Path,
     signals: &Signals,

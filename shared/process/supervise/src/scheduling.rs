@@ -53,9 +53,6 @@ pub(crate) struct Prepared {
 
 impl Prepared {
     /// Applies it to this process, and so to all that it will start. It only calls the system.
-    ///
-    /// # Errors
-    /// What could not be set, and why.
     pub fn apply(&self) -> Result<(), (Key, io::Error)> {
         if let Some(set) = &self.cpus {
             sched_setaffinity(None, set).map_err(|error| (Key::Cpus, error.into()))?;

@@ -20,9 +20,6 @@ pub(crate) struct WakeLimit {
 impl WakeLimit {
     /// Lets no processor sleep so deeply that it takes longer than `us` microseconds to wake; with
     /// 0 none sleeps.
-    ///
-    /// # Errors
-    /// The system refuses it.
     pub fn hold(us: u32) -> Result<Self, SuperviseError> {
         let set = || {
             let mut file = File::options().write(true).open(FILE)?;

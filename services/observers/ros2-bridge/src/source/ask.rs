@@ -64,9 +64,6 @@ pub enum AskError {
 }
 
 /// Asks a driver for the sizes of its radar's scans, or estimates them from azimuths.
-///
-/// # Errors
-/// No driver, or a radar that cannot be used.
 pub fn ask(settings: &Settings) -> Result<Sizes, AskError> {
     let mut driver = Driver::open(settings)?;
     let configuration = match published(&driver, settings)? {

@@ -112,9 +112,6 @@ impl PacketMessage {
     }
 
     /// Returns the only azimuth; `None` of a turn.
-    ///
-    /// # Errors
-    /// A number that has not the bytes of its type.
     pub fn azimuth(&self) -> Result<Option<Azimuth<'_>>, BadMessage> {
         match self {
             Self::Azimuth(message) => Ok(Some(message.azimuth())),
@@ -165,9 +162,6 @@ pub struct DescribedRadar {
 
 impl Driver {
     /// Subscribes to the configuration.
-    ///
-    /// # Errors
-    /// The domain cannot be joined, or the name of the topic is none.
     pub fn open(settings: &Settings) -> Result<Self, DriverError> {
         let mut node = Node::new(&settings.domain, "/", NODE)?;
         let mut wakeups = Wakeups::new()?;
@@ -206,9 +200,6 @@ impl Driver {
     }
 
     /// Returns the type of the azimuths' topic on DDS; `None` while there is no publisher.
-    ///
-    /// # Errors
-    /// It is none that is read.
     pub fn found(&self) -> Result<Option<String>, DriverError> {
         match self.node.type_of(&self.dds_name) {
             Some(found) if !names().contains(&found) => Err(DriverError::Type {
@@ -220,9 +211,6 @@ impl Driver {
     }
 
     /// Subscribes to the azimuths once there is a publisher; returns whether there is one.
-    ///
-    /// # Errors
-    /// The topic has another type, or cannot be opened.
     pub fn receive(&mut self) -> Result<bool, DriverError> {
         if self.azimuths.is_some() {
             return Ok(true);
@@ -248,18 +236,12 @@ impl Driver {
     }
 
     /// Clears the descriptor: take all messages after this.
-    ///
-    /// # Errors
-    /// The system refuses.
     pub fn clear(&mut self) -> io::Result<()> {
         self.wakeups.clear()
     }
 
     /// Takes the next configuration. A reader also receives messages of the other type, and may
     /// decode them to meaningless numbers: the published type decides.
-    ///
-    /// # Errors
-    /// The counts of a message are none of a radar.
     pub fn configuration(&self) -> Result<Option<DescribedRadar>, BadPacket> {
         if let Ok(Some((message, _))) = self.configurations.take()
             && self.is_described_as(RadarConfigurationMsg::DEFINITION)
@@ -312,9 +294,6 @@ impl Driver {
     }
 
     /// Takes the next message with azimuths.
-    ///
-    /// # Errors
-    /// A message of another form.
     pub fn packet(&self) -> Result<Option<Packet>, ReadError> {
         Ok(match &self.azimuths {
             Some(Azimuths::Azimuth(topic)) => take(topic, PacketMessage::Azimuth)?,

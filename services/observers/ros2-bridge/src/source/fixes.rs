@@ -50,9 +50,6 @@ pub struct Fixes {
 
 impl Fixes {
     /// Subscribes.
-    ///
-    /// # Errors
-    /// The name of the topic or the address is none, or the system gives no socket.
     pub fn open(
         node: &mut Node,
         wakeups: &mut Wakeups,

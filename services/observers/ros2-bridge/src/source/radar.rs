@@ -53,9 +53,6 @@ pub struct Radar {
 
 impl Radar {
     /// Joins the domain.
-    ///
-    /// # Errors
-    /// The domain cannot be joined, or a topic cannot be opened.
     pub fn open(settings: Settings) -> Result<Self, DriverError> {
         let now = Instant::now();
         Ok(Self {

@@ -42,9 +42,6 @@ struct Report<'a> {
 
 /// Compares a later run with an earlier run or map, and writes `changes.csv` and `changes.png`, all
 /// in the frame of the earlier one.
-///
-/// # Errors
-/// Runs without keyframes, and drives that have no place in common.
 pub fn compare(arguments: &MapArguments, later: &Path) -> Result<ExitCode, Failure> {
     let (earlier, out) = (&arguments.run, &arguments.out);
     let mut keyframes = super::open(later)?;

@@ -60,9 +60,6 @@ impl RadarBScanMsg {
     /// receives has encoder count 0, it publishes the turn before that.
     ///
     /// `arrived_ns` is the host's time at which the message was received.
-    ///
-    /// # Errors
-    /// An image that is not of powers, or values that do not fit it.
     pub fn rows<'a>(
         &'a self,
         radar: &Configuration,
@@ -127,9 +124,6 @@ fn unit_ns(radar: &Configuration, encoders: &[u16], stamps: &[u64]) -> u64 {
 impl Image {
     /// Returns the azimuths of a `b_scan_image`, which has neither encoder values nor times: they
     /// are evenly spaced, and a turn ends when the image is received.
-    ///
-    /// # Errors
-    /// An image that is not of powers.
     pub fn rows(
         &self,
         radar: &Configuration,

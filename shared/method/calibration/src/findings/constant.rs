@@ -124,9 +124,6 @@ pub(super) fn constant(
 }
 
 /// The range resolution from the length of the path, or why the drive cannot tell it.
-///
-/// # Errors
-/// A length that is not of this drive.
 pub(super) fn resolution(
     path_m: f64,
     configured: &Configured,

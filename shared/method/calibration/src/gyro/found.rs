@@ -37,9 +37,6 @@ pub struct GyroCalibration {
 
 impl GyroCalibration {
     /// Returns the mean of what drives of one gyro say, each weighted by its uncertainty.
-    ///
-    /// # Errors
-    /// Another axis points up in one of them.
     pub fn mean(&self, others: &[Self]) -> Result<Self, GyroError> {
         let mut mean = self.clone();
         for other in others {

@@ -52,9 +52,6 @@ impl<T> Lists<T> {
 impl Cholesky {
     /// Finds the structure of the factor of a matrix of `blocks` x `blocks` blocks, of which
     /// `pairs` are not zero: columns and rows below the diagonal, sorted.
-    ///
-    /// # Errors
-    /// The factor does not fit into memory.
     pub fn new(blocks: usize, pairs: &[[usize; 2]]) -> Result<Self, TryReserveError> {
         let [order, place] = elimination_order(blocks, pairs);
         let left = left_of_diagonal(pairs, &place);

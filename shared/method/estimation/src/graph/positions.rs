@@ -124,10 +124,6 @@ impl Measured {
 impl PoseGraph {
     /// Takes a measured position. Positions move no pose until [`PoseGraph::solve`], nor before
     /// they tell the heading of the frame.
-    ///
-    /// # Errors
-    /// An unknown keyframe, values that are not finite, a variance or a share that is not above
-    /// zero.
     pub fn measure(&mut self, position: Position) -> Result<(), EstimationError> {
         let keyframe = position.keyframe;
         keyframe_exists(keyframe, self.state.poses.len())?;
@@ -162,9 +158,6 @@ impl PoseGraph {
     }
 
     /// Returns that pose with its covariance.
-    ///
-    /// # Errors
-    /// The constraints do not determine it.
     pub fn uncertain_frame(&mut self) -> Result<Option<UncertainMotion>, EstimationError> {
         let Some(motion) = self.state.frame else {
             return Ok(None);
@@ -200,9 +193,6 @@ impl PoseGraph {
     /// graduated non-convexity (Yang et al., RA-L 2020). With a wide kernel all count alike, and
     /// the poses follow most of them; as it narrows those that contradict lose their weight. What
     /// is beyond the gate at the end is not used.
-    ///
-    /// # Errors
-    /// The equations have no solution.
     pub(super) fn choose_positions(&mut self) -> Result<(), EstimationError> {
         for measured in &mut self.positions {
             (measured.weight, measured.is_refused) = (1.0, false);

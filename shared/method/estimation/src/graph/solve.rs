@@ -38,10 +38,7 @@ impl PoseGraph {
     /// does not speak against the loop that corrects it; then the kernel decides. With many loops
     /// the result can depend on the order in which they came and on when the graph was solved
     /// between: [`PoseGraph::solve_anew`] depends on neither.
-    ///
-    /// # Errors
-    /// The equations have no solution within the range of numbers, or do not fit into memory. The
-    /// poses are then those before.
+    /// On an error the poses are unchanged.
     pub fn solve(&mut self) -> Result<Solution, EstimationError> {
         let before = self.state.clone();
         self.place_frame();
@@ -60,9 +57,6 @@ impl PoseGraph {
 
     /// Solves the graph from the odometry alone. The result depends on the constraints, and not on
     /// the order in which loops came.
-    ///
-    /// # Errors
-    /// As [`PoseGraph::solve`].
     pub fn solve_anew(&mut self) -> Result<Solution, EstimationError> {
         for edge in &self.odometry {
             let [from, to] = edge.ends;

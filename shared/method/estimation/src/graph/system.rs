@@ -22,9 +22,6 @@ pub(super) struct System {
 
 impl System {
     /// Finds the structure of the matrix and of its factor.
-    ///
-    /// # Errors
-    /// The factor does not fit into memory.
     pub fn new(poses: usize, edges: &[Ends]) -> Result<Self, TryReserveError> {
         let blocks = poses - 1;
         let of_edges: Vec<_> = edges.iter().map(pair).collect();

@@ -68,9 +68,6 @@ pub enum PlaceFileError {
 
 impl PlaceIndex {
     /// Writes all places to a file, which is replaced only once it is complete.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
     pub fn save(&self, path: &Path) -> Result<(), PlaceFileError> {
         let error = |source| PlaceFileError::Write {
             path: path.to_owned(),
@@ -111,9 +108,6 @@ impl PlaceIndex {
     }
 
     /// Reads the places of a file.
-    ///
-    /// # Errors
-    /// A file that cannot be read, is something else, has another version, or is damaged.
     pub fn load(path: &Path) -> Result<Self, PlaceFileError> {
         let read = |source| PlaceFileError::Read {
             path: path.to_owned(),

@@ -100,9 +100,7 @@ impl PlaceIndex {
     }
 
     /// Adds a place, `path_m` metres along the path. Returns its number.
-    ///
-    /// # Errors
-    /// A path that is not finite or shorter than that of the place before; the index is as it was.
+    /// On an error the index is unchanged.
     pub fn insert(
         &mut self,
         id: u64,

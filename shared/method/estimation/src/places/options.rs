@@ -48,9 +48,6 @@ impl Default for PlaceOptions {
 
 impl PlaceOptions {
     /// Checks every value.
-    ///
-    /// # Errors
-    /// The first option that is out of its bounds.
     pub fn validate(&self) -> Result<(), PlaceOptionError> {
         let check = |fits: bool, option, actual, expected| match fits {
             true => Ok(()),

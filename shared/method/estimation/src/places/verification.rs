@@ -68,10 +68,6 @@ pub struct LoopVerifier {
 impl LoopVerifier {
     /// Plans registrations of keyframes of at most `capacity` points. `refinement` is that of the
     /// odometry: its cells and reach, and the scales of its covariance.
-    ///
-    /// # Errors
-    /// The first value of `refinement` that is out of its bounds, or a reach of more than the
-    /// rasters allow.
     pub fn new(
         options: &PlaceOptions,
         refinement: &RefinementConfig,

@@ -31,10 +31,6 @@ const BANDS: &str = "<GDALMetadata>\
 /// Writes the map as one GeoTIFF of two bands: evidence, and how often a cell was looked at as
 /// opacity (see [`Cell`](crate::Cell)). With an origin it is in the UTM zone of that, turned by the
 /// heading; without, in metres of the map frame.
-///
-/// # Errors
-/// A file that cannot be written, an origin that is not on the earth, and a map that is empty or
-/// too large.
 pub fn write_geotiff(
     path: &Path,
     source: &mut impl TileSource,

@@ -28,9 +28,6 @@ pub struct Grid {
 /// Returns a map as a grid in the frame of its tiles: the grid has no rotation, since Nav2 ignores
 /// it. Blocks of 2 x 2, 4 x 4 and so on become one cell where it would have more than a million:
 /// occupied if one of them is, free if one is and none is occupied.
-///
-/// # Errors
-/// A tile that cannot be read, and a map without a keyframe.
 pub fn grid(source: &mut impl TileSource) -> Result<Grid, MapError> {
     let extent = TileExtent::of(&source.tiles()).ok_or(MapError::Empty)?;
     let block = block(extent);

@@ -16,9 +16,6 @@ const MAX_ZOOM: u32 = 20;
 /// Writes `Z/X/Y.png` into `folder`, X to the right and Y down from the map's upper left corner,
 /// and `tiles.json` with what a viewer needs to know. The deepest level has the map's own cells;
 /// each level above half as many a side. Unknown places are transparent.
-///
-/// # Errors
-/// A folder that cannot be written, and a map that is empty.
 pub fn write_web_tiles(folder: &Path, source: &mut impl TileSource) -> Result<(), MapError> {
     let tiles = source.tiles();
     let extent = TileExtent::of(&tiles).ok_or(MapError::Empty)?;

@@ -73,9 +73,6 @@ impl View {
 
 impl Canvas {
     /// Draws the ground, with room for a footer.
-    ///
-    /// # Errors
-    /// A picture that is too large.
     pub fn over(ground: &Ground) -> Result<Self, MapError> {
         let height = ground.height();
         let unit = (ground.width.max(height) as f32 / UNIT_SIDE).max(1.0);

@@ -21,9 +21,6 @@ pub struct Ground {
 
 impl Ground {
     /// Reads a map.
-    ///
-    /// # Errors
-    /// A tile that cannot be read, and more tiles a side than pixels.
     pub fn read(source: &mut impl TileSource, extent: &TileExtent) -> Result<Self, MapError> {
         let [columns, rows] = extent.cells();
         // A power of two, so that a tile has a whole number of blocks.

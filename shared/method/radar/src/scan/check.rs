@@ -72,9 +72,6 @@ pub enum ScanError {
 impl PolarScan<'_> {
     /// Checks that the slices are as long as the geometry requires, and that every number is within
     /// its bounds.
-    ///
-    /// # Errors
-    /// Returns the first inconsistency.
     pub fn check(&self) -> Result<(), ScanError> {
         let geometry = &self.geometry;
         check_length("azimuth table", self.azimuth_rad.len(), geometry.azimuths)?;
@@ -126,9 +123,6 @@ impl PolarScan<'_> {
 
     /// Checks that the times of the rows, and the scan's own, are those of one sweep. For a scan
     /// that passes [`PolarScan::check`].
-    ///
-    /// # Errors
-    /// Returns the first row that is not of the sweep.
     pub fn check_times(&self) -> Result<(), ScanError> {
         let stamps = &self.stamp_ns[..self.geometry.azimuths];
         check_sweep(stamps, MAX_INTERVAL_NS)?;
@@ -146,9 +140,6 @@ impl PolarScan<'_> {
 }
 
 /// Checks that the times of the rows, ns, do not decrease, and span at most `max_sweep_ns`.
-///
-/// # Errors
-/// If they do not, with the row.
 pub fn check_sweep(stamp_ns: &[i64], max_sweep_ns: i64) -> Result<(), ScanError> {
     let Some(first) = stamp_ns.first().copied() else {
         return Ok(());

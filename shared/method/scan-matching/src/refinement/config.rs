@@ -107,9 +107,6 @@ impl Default for RefinementConfig {
 
 impl RefinementConfig {
     /// Checks every value.
-    ///
-    /// # Errors
-    /// The first key that is out of its bounds.
     pub fn validate(&self) -> Result<(), ConfigError> {
         let section = Section("refinement");
         section.within("keyframes", self.keyframes, 1..=64, "1 to 64")?;

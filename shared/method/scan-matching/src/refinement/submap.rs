@@ -66,9 +66,6 @@ impl Submap {
     /// Draws the submap: each cell of the square `raster`, row 0 far ahead, is the sum of the
     /// weights of the points in it, each shared bilinearly between four cells of `cell_m` metres.
     /// Points outside are left out.
-    ///
-    /// # Errors
-    /// If the raster is not square or not in standard layout.
     pub fn draw(&self, cell_m: f64, mut raster: ArrayViewMut2<'_, f32>) -> Result<(), ShapeError> {
         const WHAT: &str = "raster of a submap";
         let n = raster.nrows();

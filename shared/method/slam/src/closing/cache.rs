@@ -19,9 +19,6 @@ impl Cache {
     }
 
     /// Returns a keyframe, which is read if its slot has another one.
-    ///
-    /// # Errors
-    /// The keyframe cannot be read.
     pub fn get<S: KeyframeSource>(
         &mut self,
         source: &mut S,

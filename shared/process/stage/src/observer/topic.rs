@@ -16,9 +16,7 @@ pub trait TopicObserver {
     fn topic(&self) -> &'static str;
 
     /// Takes the next message that is there; `None` if there is none.
-    ///
-    /// # Errors
-    /// A message that breaks its contract, which counts as missed; a failure of the transport.
+    /// A message that breaks its contract is an error and counts as missed.
     fn take(&mut self) -> Result<Option<RecordedMessage>, StageError>;
 
     /// Returns whether the end of the stream or of the run has been taken.
@@ -34,9 +32,6 @@ pub trait TopicObserver {
     fn missed(&self) -> u64;
 
     /// See [`Observer::skipped`].
-    ///
-    /// # Errors
-    /// The same.
     fn skipped(&self, known: u32, item: &Item) -> Result<Option<GivenAnew>, StageError>;
 }
 
@@ -47,9 +42,6 @@ struct Typed<'run, M: Message> {
 
 impl ObservedRun {
     /// Subscribes to the topic of this name; `None` if there is none.
-    ///
-    /// # Errors
-    /// As [`observe`](Self::observe).
     pub fn observe_topic(
         &self,
         topic: &str,

@@ -100,9 +100,6 @@ impl RootError {
 impl RunRoot {
     /// Creates and locks the root of the run that writes to `out`, after removing the files of the
     /// user's dead runs.
-    ///
-    /// # Errors
-    /// Another run writes to `out`, shared memory cannot be used, or a signal requested a stop.
     pub fn acquire(out: &Path, signals: &Signals) -> Result<Self, RootError> {
         let name = name(out, geteuid());
         let deadline = Instant::now() + LIMIT;
@@ -363,9 +360,6 @@ pub fn own_files(directory: &Path, prefix: &str) -> impl Iterator<Item = (PathBu
 
 /// Closes the files of a run to other users. The transport opens one of them, the counter of its
 /// nodes, to all.
-///
-/// # Errors
-/// A file whose mode cannot be changed.
 pub fn close_to_others(prefix: &str) -> io::Result<()> {
     own_files(Path::new(SHARED_MEMORY), prefix)
         .filter(|(_, file)| file.mode() & 0o077 != 0)

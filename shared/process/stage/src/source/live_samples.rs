@@ -47,9 +47,6 @@ struct Live {
 
 impl LiveSensors {
     /// Opens those of the sections `[gyro]` and `[wheels]`; `None` without one.
-    ///
-    /// # Errors
-    /// An address at which nothing can be received.
     pub fn open(launch: &Launch) -> Result<Option<Self>, StageError> {
         let (gyro, wheels): (GyroConfig, WheelsConfig) =
             (launch.section("gyro")?, launch.section("wheels")?);
@@ -90,9 +87,6 @@ impl LiveSensors {
     }
 
     /// Takes the samples that have arrived, at most one turn of them.
-    ///
-    /// # Errors
-    /// A socket fails.
     pub fn receive(&mut self, radar: &mut impl Sensor) -> Result<(), StageError> {
         let sensors = [
             (SampleKind::Gyro, &mut self.gyro),

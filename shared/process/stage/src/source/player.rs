@@ -24,16 +24,10 @@ pub trait Recorded {
     fn items(&self) -> Range<u64>;
 
     /// Reads a message.
-    ///
-    /// # Errors
-    /// The reason why it cannot be used.
     fn read(&mut self, topic: &str, seq: u64) -> Result<RecordedMessage, StageError>;
 }
 
 /// Plays recorded messages until SIGTERM.
-///
-/// # Errors
-/// A message that cannot be read, or a failure of the transport.
 pub fn run_player(
     launch: &Launch,
     recorded: &mut impl Recorded,

@@ -36,9 +36,6 @@ pub trait Sensor {
 
     /// Takes what has arrived and writes it into shared memory, without waiting. After
     /// [`Arrival::Scan`] it is called again at once, with memory for the next scan.
-    ///
-    /// # Errors
-    /// Input that this run can do nothing with.
     fn take(&mut self, header: &mut ScanHeader, bytes: &mut [u8]) -> Result<Arrival, StageError>;
 
     /// Returns when the scan that was returned last was complete by the sensor's clock,
@@ -79,9 +76,6 @@ pub enum Arrival {
 }
 
 /// Publishes what a sensor delivers until SIGTERM, or until `scans` scans are published.
-///
-/// # Errors
-/// Input that cannot be used, or a failure of the transport.
 pub fn run_sensor(
     launch: &Launch,
     sensor: &mut impl Sensor,

@@ -37,9 +37,6 @@ impl Service {
     }
 
     /// Opens a topic, which the supervisor has created.
-    ///
-    /// # Errors
-    /// A failure of the transport.
     pub fn open(node: &Node, topic: &Topic) -> Result<Self, StageError> {
         let factory = builder(node, topic)?
             .open()

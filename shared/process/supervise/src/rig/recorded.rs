@@ -43,9 +43,6 @@ impl Recorded {
     }
 
     /// Returns the header of a message of topic `M`.
-    ///
-    /// # Errors
-    /// It is of another topic, whose headers have another size.
     pub fn header<M: Message<Header: Copy>>(&self) -> Result<M::Header, StageError> {
         match self.header.len() == size_of::<M::Header>() {
             // SAFETY: the bytes are those of a header of this size, which is plain numbers: any
