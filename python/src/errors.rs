@@ -23,14 +23,8 @@ macro_rules! exception {
     };
 }
 
-exception!(
-    /// Any other failure.
-    other, "Error"
-);
-exception!(
-    /// An invalid configuration.
-    config, "ConfigError"
-);
+exception!(other, "Error");
+exception!(config, "ConfigError");
 exception!(
     /// A file that cannot be read.
     read, "ReadError"

@@ -72,7 +72,6 @@ pub fn converted<'py, T: Element>(
     given(&sliceable::<T>(&cast)?, name, expected)
 }
 
-/// Returns a matrix as an array.
 pub fn matrix<'py>(py: Python<'py>, matrix: &Matrix3<f64>) -> Bound<'py, PyArray2<f64>> {
     let element = |(row, column)| matrix[(row, column)];
     PyArray2::from_owned_array(py, ndarray::Array2::from_shape_fn((3, 3), element))

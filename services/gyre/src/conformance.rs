@@ -165,7 +165,6 @@ fn configuration(
     Ok(configuration)
 }
 
-/// The command to test.
 fn command(
     arguments: &ConformanceArguments,
     configuration: &Configuration,

@@ -19,7 +19,6 @@ pub struct Notifier {
     listens: bool,
     /// systemd takes keep-alives from the start of the service on.
     is_ready: bool,
-    /// Time between two keep-alives.
     every: Option<Duration>,
     kept_alive: Instant,
     status: Instant,

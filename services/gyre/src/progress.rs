@@ -65,7 +65,6 @@ impl Progress {
         self.radar = Some((Silence::new(radar, clock::now_ns()), manifest));
     }
 
-    /// Shows an event.
     pub fn show(&mut self, event: &Event<'_>) {
         match event {
             Event::Started { stage, pid } => self.say(&format!("{stage:20} pid {pid}")),
@@ -102,7 +101,6 @@ impl Progress {
         }
     }
 
-    /// Removes the bar.
     pub fn finish(&self) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();

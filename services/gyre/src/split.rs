@@ -67,17 +67,14 @@ pub mod absent {
 
     pub(super) const ABSENT: Absent = Absent("zenoh, which links machines");
 
-    /// Refuses to run.
     pub fn run_robot(_: &Launch) -> Result<StageCounters, StageError> {
         Err(ABSENT.into())
     }
 
-    /// Refuses to run.
     pub fn run_base(_: &Launch) -> Result<StageCounters, StageError> {
         Err(ABSENT.into())
     }
 
-    /// Refuses to link.
     pub fn link(_: &LinkArguments) -> Result<ExitCode, Failure> {
         Err(ABSENT.into())
     }

@@ -20,7 +20,6 @@ use gyre_terminal::{Failure, print};
 
 use crate::{notify::Notifier, preflight::ask, ros2};
 
-/// Time between two attempts.
 const PAUSE: Duration = Duration::from_secs(1);
 /// Time between two reports that the radar is waited for.
 const REPORT_EVERY: Duration = Duration::from_secs(60);

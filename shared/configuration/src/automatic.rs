@@ -27,10 +27,8 @@ const LONG_PERIOD_S: f64 = 0.5;
 /// Angle that a vehicle turns by in such a time, degrees.
 const LONG_REACH_DEG: f64 = 45.0;
 
-/// Settings that were found.
 #[derive(Clone, Debug)]
 pub struct Automatic {
-    /// The configuration.
     pub table: Table,
     /// The settings and their reasons, in a sentence.
     pub sentence: String,
@@ -39,19 +37,15 @@ pub struct Automatic {
 /// The reason why there are no settings.
 #[derive(Debug, Error)]
 pub enum AutomaticError {
-    /// The recording cannot be opened.
     #[error(transparent)]
     Open(#[from] OpenError),
-    /// None of its scans can be read.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// There is no scan.
     #[error("the recording has no scans")]
     Empty,
     /// The configuration of a recorded run, or constants of a radar that TOML cannot hold.
     #[error(transparent)]
     Configuration(#[from] ConfigurationError),
-    /// The configuration of a recorded run is not TOML.
     #[error("the recording's configuration: {0}")]
     Recorded(String),
 }

@@ -32,7 +32,6 @@ const RECORDING: &str = "record.file";
 /// A configuration as its file has it, but with each path absolute, or a file of the program.
 #[derive(Clone, Debug)]
 pub struct Named {
-    /// The sections.
     pub table: Table,
     notes: Vec<Note>,
 }

@@ -18,55 +18,40 @@ use crate::configuration::Configuration;
 /// Why the scans of a configuration cannot be read.
 #[derive(Debug, Error)]
 pub enum SourceError {
-    /// Nothing to play.
     #[error(
         "no dataset is named: give its folder with --data, or as source.data in the configuration, or add a section [simulation]"
     )]
     NoData,
-    /// A recording is needed.
     #[error("the configuration is of {radar}, but this needs a recording: name one with --data")]
-    Radar {
-        /// The radar.
-        radar: String,
-    },
-    /// The simulation cannot be rendered.
+    Radar { radar: String },
     #[error(transparent)]
     Simulator(#[from] SimulatorError),
-    /// The recording cannot be opened.
     #[error(transparent)]
     Open(#[from] OpenError),
-    /// The first scan to play is behind the last one.
     #[error("source.first is {0}, but {1} has {n} scans, from {start} to {last}: give a smaller one", n = .2.len(), start = .2.start, last = .2.end - 1)]
     BeyondEnd(usize, String, Range<usize>),
-    /// The log of the gyro or of the wheels cannot be used.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// The log of the GNSS receiver cannot be used.
     #[error(transparent)]
     Gnss(#[from] GnssLogError),
-    /// Scans that lie in no folder, as those of a simulation.
     #[error(
         "gnss.kind is `auto`, but these scans lie in no folder, so that no log lies beside them: name one with gnss.kind = \"log\" and gnss.file, or set gnss.kind = \"none\""
     )]
     NoGnss,
-    /// A simulation without a gyro.
     #[error(
         "gyro.kind is `auto`, but the simulation has no gyro: give it one in [simulation.gyro], or set gyro.kind = \"none\""
     )]
     NoGyro,
-    /// A simulation without wheels.
     #[error(
         "wheels.kind is `auto`, but the simulation has no wheels that measure: give them a rate in [simulation.wheels], or set wheels.kind = \"none\""
     )]
     NoWheels,
-    /// A radar that does not say the velocity.
     #[error("doppler.kind is `auto`, but {0}; with doppler.kind = \"none\" it is not used")]
     NoDoppler(NoDoppler),
 }
 
 /// An open recording or simulation.
 pub struct Played {
-    /// The scans.
     pub dataset: Box<dyn Dataset>,
     /// `ground_truth.tum` of a simulation that is played without being stored.
     pub truth: Option<Vec<u8>>,

@@ -112,7 +112,6 @@ pub fn sections<T: DeserializeOwned>(
         .collect()
 }
 
-/// Returns the error for an unknown key.
 pub fn unknown(section: &str, key: &str, known: &[&str]) -> ConfigurationError {
     ConfigurationError::UnknownKey {
         section: section.to_owned(),

@@ -32,7 +32,6 @@ pub struct Inputs {
 pub struct Given {
     /// The configuration: a file, or the name of one in the program.
     pub configuration: Option<PathBuf>,
-    /// The recording.
     pub data: Option<PathBuf>,
     /// The address of a radar.
     pub radar: Option<String>,
@@ -41,28 +40,22 @@ pub struct Given {
 /// Why the arguments of a command are refused.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum InputError {
-    /// Two of a kind.
     #[error("`{0}` and `{1}` are both {2}: name one")]
     Twice(String, String, &'static str),
-    /// A recording and a radar.
     #[error("`{0}` is a recording and `{1}` the address of a radar: name one")]
     Both(String, String),
-    /// The results of a run.
     #[error(
         "{0} has the results of a run: name {0}/config.toml to compute them again, or export a recording of it (`gyre export`)"
     )]
     Results(String),
-    /// A name with two meanings.
     #[error(
         "`{0}` is a folder here and the name of a configuration: write ./{0} for the folder, --config {0} for the configuration"
     )]
     Ambiguous(String),
-    /// A word that names nothing.
     #[error(
         "`{0}` is no file or folder, no name that `gyre config` lists, and not the address of a radar{1}"
     )]
     Unknown(String, String),
-    /// A radar, for a command that reads recordings.
     #[error(
         "`{0}` is the address of a radar, and only `gyre run` and `gyre up` receive one: name a recording"
     )]
@@ -70,7 +63,6 @@ pub enum InputError {
 }
 
 impl Inputs {
-    /// Returns what is named.
     pub fn given(&self) -> Result<Given, InputError> {
         let mut given = Given {
             configuration: self.config.clone(),

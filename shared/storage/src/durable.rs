@@ -11,7 +11,6 @@ use crate::{File, GroupSync, StorageError, create_folder};
 #[derive(Debug, Error)]
 #[error("another process is writing to {path}")]
 pub struct Busy {
-    /// The file.
     pub path: PathBuf,
 }
 
@@ -42,7 +41,6 @@ impl DurableFile {
         })
     }
 
-    /// Returns the file.
     pub fn file(&self) -> &File {
         &self.file
     }
@@ -82,12 +80,10 @@ impl DurableFile {
 pub struct Slots {
     /// The offset of the first one.
     pub start: u64,
-    /// The size of each.
     pub bytes: usize,
 }
 
 impl Slots {
-    /// Returns the offset of a slot.
     pub const fn offset(&self, slot: u64) -> u64 {
         self.start + slot * self.bytes as u64
     }

@@ -105,7 +105,6 @@ impl File {
         }))
     }
 
-    /// Returns the path.
     pub fn path(&self) -> &Path {
         &self.path
     }

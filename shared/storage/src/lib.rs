@@ -50,9 +50,7 @@ pub use quoted::quoted;
 pub struct StorageError {
     /// The operation: `read`, `write`, `keep`, `synchronise`, `rename`, `remove`.
     pub action: &'static str,
-    /// The file or folder.
     pub path: PathBuf,
-    /// The system error.
     pub source: io::Error,
 }
 

@@ -35,22 +35,14 @@ const MAX_BYTES: usize = 16 << 20;
 /// Records for which memory is taken at once.
 const MANY: usize = 4096;
 
-/// An error of a log.
 #[derive(Debug, Error)]
 pub enum LogError {
-    /// The file cannot be read or written.
     #[error(transparent)]
     Storage(#[from] StorageError),
-    /// The file is not such a log, or of another version.
     #[error("{path} is not a log of this kind and version: move it away, or choose another --out")]
-    Foreign {
-        /// The file.
-        path: PathBuf,
-    },
-    /// A record is not what was written.
+    Foreign { path: PathBuf },
     #[error("{path} is damaged at record {record}, although it had been written whole")]
     Damaged {
-        /// The file.
         path: PathBuf,
         /// The number of the record, from 0.
         record: usize,
@@ -58,12 +50,10 @@ pub enum LogError {
     /// A record is what was written, and not of the kind of this log.
     #[error("record {record} of {path} is of another kind: move it away, or choose another --out")]
     Malformed {
-        /// The file.
         path: PathBuf,
         /// The number of the record, from 0.
         record: usize,
     },
-    /// Another process appends to the file.
     #[error(transparent)]
     Busy(#[from] Busy),
 }

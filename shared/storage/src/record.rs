@@ -11,13 +11,10 @@ use std::{
 /// A change of a file or folder.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Operation {
-    /// A new folder.
     CreateFolder(PathBuf),
-    /// A new, empty file.
     Create(PathBuf),
     /// Bytes written at an offset.
     Write {
-        /// The file.
         path: PathBuf,
         /// The place of the first byte.
         offset: u64,
@@ -26,33 +23,26 @@ pub enum Operation {
     },
     /// A file cut or extended.
     SetLength {
-        /// The file.
         path: PathBuf,
         /// The new length, bytes.
         length: u64,
     },
-    /// A synchronisation begins.
     SyncBegins {
-        /// The file.
         path: PathBuf,
         /// The number of the synchronisation.
         id: u64,
     },
     /// It has ended: what was written before it began survives.
     SyncEnds {
-        /// The file.
         path: PathBuf,
         /// The number of the synchronisation.
         id: u64,
     },
     /// A file renamed, in place of another one.
     Rename {
-        /// The old name.
         from: PathBuf,
-        /// The new name.
         to: PathBuf,
     },
-    /// A file removed.
     Remove(PathBuf),
     /// The names in a folder survive from here on.
     SyncFolder(PathBuf),

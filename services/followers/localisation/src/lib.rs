@@ -44,7 +44,6 @@ struct Fixes {
     out: PathBuf,
     keyframes: RecordReader<Keyframe>,
     localiser: Localiser,
-    /// Keyframes that were read.
     read: usize,
 }
 

@@ -61,7 +61,6 @@ struct Tracking {
     scans: RecordReader<LoggedScan>,
     tracked: RecordLog<LoggedObjects>,
     tracker: ObjectTracker,
-    /// Scans that were read.
     read: usize,
 }
 

@@ -43,7 +43,6 @@ enum DriveError {
         "the configuration is of {0}, which has no end: a batch is of recordings and simulations"
     )]
     Endless(String),
-    /// The settings, in the words of who read them.
     #[error("{0}")]
     Configuration(Failure),
 }

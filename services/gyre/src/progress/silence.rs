@@ -17,7 +17,6 @@ pub struct Silence {
     reported: Option<i64>,
 }
 
-/// A report.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Report {
     pub sentence: String,

@@ -60,7 +60,6 @@ struct State {
 pub(crate) struct Request {
     /// The key of the topic.
     pub key: String,
-    /// The first message.
     pub from: u64,
     /// The generation of the messages before, 0 without any; `None` where no number is given anew.
     pub generation: Option<u32>,

@@ -48,35 +48,27 @@ impl From<&LinkConfig> for Network {
 /// A network that cannot be used.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum NetworkError {
-    /// No endpoint is given.
     #[error(
         "no endpoint is named: give one side `listen`, as in tls/0.0.0.0:7447, and the other `connect`, as in tls/base.internal:7447"
     )]
     NoEndpoint,
-    /// The text is no endpoint.
     #[error("`{0}` is no endpoint: it is tls/HOST:PORT, or on this machine tcp/127.0.0.1:PORT")]
     Malformed(String),
-    /// The endpoint is plain text on a network.
     #[error(
         "{0} would leave this machine unencrypted, and anybody could connect: use tls/ with certificates (docs/link.md); tcp/ is for loopback addresses alone"
     )]
     Plain(String),
-    /// The endpoint needs a certificate.
     #[error(
         "{endpoint} needs {what}: both sides show a certificate that the same authority has signed (docs/link.md has the recipe)"
     )]
     NoCertificate {
-        /// The endpoint.
         endpoint: String,
-        /// The missing file.
         what: &'static str,
     },
-    /// A file cannot be read.
     #[error("{what} {path} cannot be read: {reason}")]
     File {
         /// The kind of the file.
         what: &'static str,
-        /// The file.
         path: PathBuf,
         /// The system's reason.
         reason: String,
@@ -86,7 +78,6 @@ pub enum NetworkError {
         "{0} has a public name or address, for which others can obtain a publicly trusted certificate: connect to a private address, or to a name within `.internal` (in /etc/hosts, and in the certificate)"
     )]
     Public(String),
-    /// The name of the link cannot be part of a key.
     #[error("`{0}` is no name of a link: it has letters, digits, `-` and `_`")]
     Name(String),
 }

@@ -49,7 +49,6 @@ pub(crate) struct Place {
 }
 
 impl Place {
-    /// Goes behind a message.
     pub fn pass(&mut self, message: &Message) {
         self.seq = message.seq.saturating_add(1);
         self.generation = self.generation.map(|_| message.generation);
@@ -64,7 +63,6 @@ impl Place {
 /// The next message of a buffer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Next {
-    /// A message.
     Message(Message),
     /// There is none yet.
     Nothing,

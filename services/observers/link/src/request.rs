@@ -25,7 +25,6 @@ pub(crate) struct Question {
 pub(crate) type Answers = FifoChannelHandler<Reply>;
 
 impl Question {
-    /// Sends the question.
     pub fn send(
         self,
         session: &Session,

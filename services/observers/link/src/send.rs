@@ -60,7 +60,6 @@ pub struct SendOptions {
 /// The messages and bytes that were sent to all receivers together.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Sent {
-    /// The counts by topic.
     pub topics: BTreeMap<String, (u64, u64)>,
     /// True if a receiver was out of reach at the end, and has not received everything.
     pub is_incomplete: bool,

@@ -91,7 +91,6 @@ impl Server {
         }
     }
 
-    /// Offers a topic.
     pub fn offer(
         &mut self,
         topic: &str,

@@ -14,7 +14,6 @@ use gyre_stage::{
 };
 use serde::Serialize;
 
-/// Time between two questions.
 const PERIOD: Duration = Duration::from_secs(1);
 
 /// The health of a run, as `gyre ps --json` prints it.

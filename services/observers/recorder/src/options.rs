@@ -14,7 +14,6 @@ pub(crate) const HEALTH: &str = "health";
 pub struct Options {
     /// The folder of the run's results.
     pub out: PathBuf,
-    /// The file.
     pub to: PathBuf,
     /// The topics, `log` and `health` among them; empty: the default ones that the run has.
     pub topics: Vec<String>,

@@ -47,7 +47,6 @@ const SENTENCE_PERIOD: Duration = Duration::from_secs(1);
 /// A recording that has ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Recorded {
-    /// The file.
     pub path: PathBuf,
     /// The messages of each topic.
     pub counts: Vec<Counts>,

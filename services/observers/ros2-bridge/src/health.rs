@@ -17,7 +17,6 @@ use crate::{
     run_state::{RunPhase, RunState, Shared},
 };
 
-/// Time between two reports.
 const PERIOD: Duration = Duration::from_secs(1);
 
 /// The counts of the last report.
@@ -126,7 +125,6 @@ fn figures(status: &Status) -> Vec<KeyValue> {
     figures
 }
 
-/// Returns the diagnostics of one process.
 fn process(process: &ProcessStatus) -> DiagnosticStatus {
     let level = match process.activity {
         Activity::Waiting | Activity::Working | Activity::Running => OK,

@@ -18,35 +18,16 @@ const MAX_WAIT: Duration = Duration::from_millis(100);
 /// A node that cannot be made, or a topic.
 #[derive(Debug, Error)]
 pub enum NodeError {
-    /// The domain cannot be joined.
     #[error("cannot join domain {domain} of ROS 2: {reason}")]
-    Domain {
-        /// The domain.
-        domain: u16,
-        /// The reason.
-        reason: String,
-    },
-    /// The name is invalid in ROS 2.
+    Domain { domain: u16, reason: String },
     #[error(
         "`{name}` is no name of ROS 2: {reason}; names are letters, digits and single `_`, between single `/`"
     )]
-    Name {
-        /// The name.
-        name: String,
-        /// The reason.
-        reason: String,
-    },
-    /// A topic cannot be opened.
+    Name { name: String, reason: String },
     #[error("cannot open the topic {topic} of ROS 2: {reason}")]
-    Topic {
-        /// The topic.
-        topic: String,
-        /// The reason.
-        reason: String,
-    },
+    Topic { topic: String, reason: String },
 }
 
-/// A node.
 pub struct Node {
     node: ros2_client::Node,
     context: Context,
@@ -127,7 +108,6 @@ impl Node {
         }
     }
 
-    /// Publishes on a topic.
     pub fn publish<M: Ros2Message>(
         &mut self,
         topic: &str,

@@ -29,7 +29,6 @@ const RECEIVE_BYTES: usize = 4 << 20;
 pub enum ReadResult {
     /// Bytes were read, and are in the parser.
     Bytes,
-    /// The connection was opened.
     Opened,
     /// Nothing was read; try again after this time.
     Nothing(Duration),
@@ -128,7 +127,6 @@ impl Connection {
         self.pause = RETRY_PAUSES[0];
     }
 
-    /// Returns whether azimuths arrive.
     pub fn receives_azimuths(&self) -> bool {
         self.receives_azimuths
     }
@@ -228,7 +226,6 @@ impl Drop for Connection {
 /// An open connection, or the socket that receives datagrams.
 #[derive(Debug)]
 pub enum RadarSocket {
-    /// A connection by TCP.
     Tcp(TcpStream),
     /// A socket that receives datagrams.
     Udp(UdpSocket),
@@ -284,7 +281,6 @@ fn join(to: SocketAddrV4, interface: Ipv4Addr) -> io::Result<UdpSocket> {
     Ok(socket)
 }
 
-/// Connects and sends requests.
 fn connect(address: &str, requests: &[Request]) -> io::Result<TcpStream> {
     let mut last = None;
     for address in address.to_socket_addrs()? {

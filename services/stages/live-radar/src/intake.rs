@@ -25,10 +25,8 @@ pub struct Intake {
 /// A configuration whose scans do not fit into this run.
 #[derive(Debug, Error)]
 pub enum NoScans {
-    /// The configuration makes no scans.
     #[error(transparent)]
     Bad(#[from] BadConfiguration),
-    /// The scans are larger than at the start of the run.
     #[error(
         "the scans of the radar have {bytes} bytes now, {room} at the start of the run: start the run again"
     )]

@@ -30,7 +30,6 @@ pub struct ScanAssembly {
     is_delay_logged: bool,
 }
 
-/// A scan that is complete.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CompleteScan {
     /// The number of missing azimuths.

@@ -29,7 +29,6 @@ pub struct AzimuthTime {
 pub struct TurnCounter {
     /// Duration of a turn: as configured, then as measured. 0: not known.
     turn_ns: f64,
-    /// The configured one.
     configured_ns: i64,
     last: Option<LastScan>,
     newest: Option<AzimuthTime>,
@@ -82,7 +81,6 @@ impl TurnCounter {
         self.last = Some(scan);
     }
 
-    /// Returns the last scan.
     pub fn last(&self) -> Option<LastScan> {
         self.last
     }

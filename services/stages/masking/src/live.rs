@@ -68,7 +68,6 @@ impl NewestOnly {
         })
     }
 
-    /// Receives the new scans.
     pub fn receive(&mut self) -> Result<(), StageError> {
         while let Some(received) = self.port.receive()? {
             if self

@@ -25,7 +25,6 @@ impl InOrder {
         })
     }
 
-    /// Receives the next scan.
     pub fn receive(&mut self) -> Result<(), StageError> {
         self.reader.head().map(drop)
     }

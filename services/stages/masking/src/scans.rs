@@ -32,9 +32,7 @@ enum Queue {
     Live(Box<NewestOnly>),
 }
 
-/// A scan to mask.
 pub struct ScanView<'a> {
-    /// The scan.
     pub scan: &'a Received<Scan>,
     /// The velocity for its motion compensation: of the motion of the scan `lag` scans earlier,
     /// with the yaw rate of the gyro; `None` without such a motion.
@@ -51,7 +49,6 @@ pub struct ScanView<'a> {
 
 /// The scan before the one to mask.
 pub struct PreviousScan<'a> {
-    /// The scan.
     pub scan: &'a Received<Scan>,
     /// The velocity with which it was compensated.
     pub twist: Option<Twist>,

@@ -17,9 +17,7 @@ const FILE: &str = "recording.list";
 /// The format and the files of a recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Listing {
-    /// The format.
     pub format: Format,
-    /// The images.
     pub files: FileList,
 }
 

@@ -188,13 +188,11 @@ fn copy_lists(images: &Path, root: &Path, out: &Path) -> Result<(), Failure> {
     copy(&times, &out.join(IMAGES).with_extension("txt"))
 }
 
-/// Copies a file.
 fn copy(from: &Path, to: &Path) -> Result<(), Failure> {
     let bytes = fs::read(from).map_err(StorageError::at("read", from))?;
     Ok(write_file(to, bytes)?)
 }
 
-/// Counts of scans.
 #[derive(Debug, Default)]
 struct Counts {
     scans: usize,

@@ -42,7 +42,6 @@ enum Kind {
     Run(Box<Configuration>),
     /// A recording of a run.
     Recording,
-    /// Scans.
     Dataset,
 }
 

@@ -13,7 +13,6 @@ use crate::{
 
 type Colour = [u8; 3];
 
-/// Pixels around each panel.
 const MARGIN: usize = 6;
 const AROUND: Colour = [60; 3];
 /// Panels are enlarged to about so many pixels a side.
@@ -25,7 +24,6 @@ const BRIGHT: f32 = 120.0;
 const BRIGHTEST: f32 = 1e-3;
 /// Maximum brightness of the raster behind the points.
 const FAINT: f32 = 0.4;
-/// A picture in colour.
 pub struct Canvas {
     width: usize,
     /// Row by row.
@@ -33,7 +31,6 @@ pub struct Canvas {
 }
 
 impl Canvas {
-    /// Draws an inspected scan.
     pub fn of(inspection: &Inspection) -> Self {
         let rows: Vec<[Array2<Colour>; 4]> = inspection.rasters.iter().map(panels).collect();
         let n = rows.first().map_or(1, |panels| panels[0].nrows());
@@ -66,7 +63,6 @@ impl Canvas {
         }
     }
 
-    /// Writes it as PNG.
     pub fn write(&self, path: &Path) -> Result<(), PictureError> {
         write_rgb(path, self.width, &self.pixels)
     }

@@ -43,7 +43,6 @@ pub struct MaskInspector {
 }
 
 impl MaskInspector {
-    /// Plans masks and search.
     pub fn new(configuration: &Configuration, played: Played) -> Result<Self, Failure> {
         let (dataset, samples) = (played.dataset, played.samples);
         let config = OdometryConfig {

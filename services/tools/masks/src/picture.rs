@@ -8,9 +8,7 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 #[error("cannot write the picture {path}: {source}", path = path.display())]
 pub struct PictureError {
-    /// The file.
     path: std::path::PathBuf,
-    /// Why.
     source: png::EncodingError,
 }
 

@@ -88,7 +88,6 @@ fn open(out: &Path, process: Option<&str>) -> Result<Vec<Log>, Failure> {
     Ok(logs)
 }
 
-/// A log that grows.
 struct Log {
     path: PathBuf,
     kind: Kind,

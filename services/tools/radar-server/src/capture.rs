@@ -32,7 +32,6 @@ const ENCODER_COUNTS: u16 = 5600;
 /// A failure to make or to play a capture.
 #[derive(Debug, Error)]
 pub enum CaptureError {
-    /// No radar answers.
     #[error("no radar answers at {address} ({source}): check the address")]
     NoAnswer {
         /// The address of the radar.
@@ -40,33 +39,25 @@ pub enum CaptureError {
         /// The system's reason.
         source: io::Error,
     },
-    /// The file cannot be read or written.
     #[error("{}: {source}", path.display())]
     File {
-        /// The path of the file.
         path: PathBuf,
         /// The system's reason.
         source: io::Error,
     },
-    /// The file is no capture, or a damaged one.
     #[error("{} is a damaged capture: {reason}", path.display())]
     Damaged {
         /// The path of the file.
         path: PathBuf,
-        /// The damage.
         reason: &'static str,
     },
-    /// The capture is of the other protocol.
     #[error("{} was captured by {of}, and can only be played so: {advice}", path.display())]
     Protocol {
         /// The path of the file.
         path: PathBuf,
-        /// The protocol.
         of: &'static str,
-        /// The remedy.
         advice: &'static str,
     },
-    /// The network fails.
     #[error("cannot serve as a radar: {0}")]
     Network(#[from] io::Error),
 }
@@ -90,7 +81,6 @@ impl CaptureError {
 /// The size of what was recorded or played.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Captured {
-    /// The number of records.
     pub records: u64,
     /// The bytes of the records.
     pub bytes: u64,

@@ -83,7 +83,6 @@ fn record(file: &Path, radar: &str, arguments: &RadarServerArguments) -> Result<
     Ok(ExitCode::SUCCESS)
 }
 
-/// Plays what was recorded.
 fn play(
     data: &Path,
     capture: Capture,

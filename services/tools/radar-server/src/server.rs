@@ -40,7 +40,6 @@ pub struct Playback {
     pub scans: Range<usize>,
     /// Play the recording again and again, its times going on.
     pub repeats: bool,
-    /// Faults to inject.
     pub faults: Faults,
     /// The format of the times.
     pub clock: ClockFormat,
@@ -49,18 +48,14 @@ pub struct Playback {
 /// A failure to play a recording as a radar.
 #[derive(Debug, Error)]
 pub enum ServeError {
-    /// A scan cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// The network.
     #[error("cannot serve as a radar: {0}")]
     Network(#[from] io::Error),
-    /// The recording does not fit the protocol.
     #[error(
         "scans of {azimuths} azimuths and {bins} range bins do not fit the protocol, which counts both in 16 bits"
     )]
     TooLarge {
-        /// Azimuths of a scan.
         azimuths: usize,
         /// Range bins of an azimuth.
         bins: usize,
@@ -70,15 +65,12 @@ pub enum ServeError {
 /// The counts of a playback.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Played {
-    /// Scans.
     pub scans: u64,
     /// Azimuths that were left out.
     pub lost_azimuths: u64,
     /// Datagrams that were left out.
     pub lost_datagrams: u64,
-    /// Connections that were reset.
     pub resets: u64,
-    /// Stalls.
     pub stalls: u64,
 }
 

@@ -28,7 +28,6 @@ Editors that know [Taplo](https://taplo.tamasfe.dev) complete and check keys wit
 
 This page is made by `gyre schema --markdown` from the structures in the code.";
 
-/// The whole page.
 pub fn reference(schema: &Schema) -> String {
     let mut page = INTRODUCTION.to_owned();
     for (name, section) in properties(schema.as_value()) {

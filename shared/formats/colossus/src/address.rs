@@ -29,15 +29,12 @@ pub enum Address {
 /// An address that cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum BadAddress {
-    /// The address is none for datagrams.
     #[error(
         "address `{0}` is none for datagrams: give group and port, as in `udp://239.192.43.78:4378`"
     )]
     Udp(String),
-    /// The interface is no address of this machine.
     #[error("interface `{0}` is no IPv4 address: give this machine's, as in `192.168.0.2`")]
     Interface(String),
-    /// A connection by TCP needs no interface.
     #[error("interface is set, but only an address that begins with `udp://` needs one: remove it")]
     Unused,
 }

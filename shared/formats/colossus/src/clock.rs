@@ -43,7 +43,6 @@ pub enum SplitUnit {
     /// Nanoseconds.
     #[default]
     Nanoseconds,
-    /// Microseconds.
     Microseconds,
 }
 

@@ -42,11 +42,8 @@ pub struct Configuration {
     "the radar's configuration gives {what} as {value}, expected {} to {}", bounds.start(), bounds.end()
 )]
 pub struct BadConfiguration {
-    /// The number.
     pub what: &'static str,
-    /// The value.
     pub value: f64,
-    /// Permitted values.
     pub bounds: RangeInclusive<f64>,
 }
 
@@ -113,7 +110,6 @@ impl Configuration {
     }
 }
 
-/// Decodes the payload of a configuration.
 pub(crate) fn decode(payload: &[u8]) -> Result<Configuration, MalformedMessage> {
     let head: [u8; CONFIGURATION_BYTES] = head("a configuration", payload)?;
     let number = |k: usize| u16::from_be_bytes([head[2 * k], head[2 * k + 1]]);

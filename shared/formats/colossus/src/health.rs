@@ -37,9 +37,7 @@ pub struct Health {
 /// by their limits).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reading {
-    /// The value.
     pub value: f32,
-    /// The quality.
     pub status: HealthStatus,
 }
 
@@ -48,9 +46,7 @@ pub struct Reading {
 pub enum HealthStatus {
     /// It is beyond its limits.
     Unhealthy,
-    /// It is near them.
     Warning,
-    /// It is within them.
     Healthy,
     /// The radar does not say.
     #[default]
@@ -76,7 +72,6 @@ impl Health {
     }
 }
 
-/// Decodes the payload of a health message.
 pub(crate) fn decode(payload: &[u8]) -> Result<Health, MalformedMessage> {
     let mut health = Health::default();
     fields(MESSAGE, payload, |number, value| {

@@ -15,11 +15,9 @@ pub const MAX_BUFFER_BYTES: usize =
 /// One element of a stream.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event<'a> {
-    /// A message.
     Message(Message<'a>),
     /// Bytes that are no message; they are skipped.
     Damaged {
-        /// The first fault.
         reason: Damage,
         /// Bytes up to the next message.
         skipped_bytes: usize,
@@ -29,22 +27,16 @@ pub enum Event<'a> {
 /// A fault of a stream.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum Damage {
-    /// The bytes are not the start of a message.
     #[error("the bytes do not start with Colossus' signature")]
     Signature,
-    /// The version of the protocol is unknown.
     #[error("a message has version {0} of the protocol, expected {VERSION}")]
     Version(u8),
-    /// The message is too long.
     #[error("a message has a payload of {0} bytes, more than {MAX_PAYLOAD_BYTES}")]
     PayloadSize(u32),
-    /// Another message starts within the payload.
     #[error("a message is cut short: another one starts within its payload")]
     CutShort,
-    /// The payload does not fit the message.
     #[error(transparent)]
     Malformed(#[from] MalformedMessage),
-    /// A datagram is no part of an azimuth.
     #[error(transparent)]
     Datagram(#[from] MalformedDatagram),
 }

@@ -60,7 +60,6 @@ pub struct Sweep {
 enum State {
     /// Dropped: the sweep has begun before.
     Waiting,
-    /// Written.
     Open,
     /// Dropped: the sweep is complete.
     Complete,

@@ -13,34 +13,23 @@ const HEAD_BYTES: usize = LITTLE_ENDIAN.len();
 /// Bytes that are not a message of a type.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum BadMessage {
-    /// The bytes before the message.
     #[error(
         "{type_name}: {found:02x?} does not begin a message in CDR, expected [00, 00] or [00, 01]"
     )]
     Encoding {
-        /// The type expected.
         type_name: String,
         /// The first bytes, at most four.
         found: Vec<u8>,
     },
-    /// The message.
     #[error("{type_name}: {reason} in a message of {bytes} bytes")]
     Content {
-        /// The type expected.
         type_name: String,
         /// The bytes of the message.
         bytes: usize,
-        /// The problem.
         reason: String,
     },
-    /// A field that is not what its type is.
     #[error("{type_name}: {reason}")]
-    Field {
-        /// The type expected.
-        type_name: String,
-        /// The problem.
-        reason: String,
-    },
+    Field { type_name: String, reason: String },
 }
 
 /// Returns a message as little-endian CDR, as `rosbag2` stores it and DDS sends it.

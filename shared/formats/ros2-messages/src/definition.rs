@@ -54,7 +54,6 @@ impl Definition {
 
 /// A message of ROS 2.
 pub trait Ros2Message: serde::Serialize + serde::de::DeserializeOwned {
-    /// The definition.
     const DEFINITION: &'static Definition;
 }
 

@@ -24,7 +24,6 @@ pub const UNKNOWN: f64 = 1e6;
 /// Where x, y and yaw are among x, y, z, roll, pitch and yaw.
 const PLANAR: [usize; 3] = [0, 1, 5];
 
-/// Names of the frames.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Frames {
     /// The frame in which loops are closed.

@@ -11,7 +11,6 @@ use thiserror::Error;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mounting(Pose);
 
-/// No mounting.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error(
     "three numbers are needed: m forward, m to the left, degrees counter-clockwise, as in 1.2,0,90"

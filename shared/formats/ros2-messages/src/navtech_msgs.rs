@@ -27,7 +27,6 @@ pub struct RadarFftDataMsg {
     /// The powers, nearest bin first.
     #[serde(with = "serde_bytes")]
     pub data: Vec<u8>,
-    /// Their number.
     pub data_length: u16,
 }
 message!(
@@ -55,9 +54,7 @@ pub struct RadarConfigurationMsg {
     pub range_in_bins: u16,
     /// Turns per second, or per 1000 s, as the version of the driver.
     pub expected_rotation_rate: u16,
-    /// Factor of ranges.
     pub range_gain: f32,
-    /// Offset of ranges.
     pub range_offset: f32,
 }
 message!(

@@ -7,7 +7,6 @@ use crate::{builtin_interfaces::Time, definition::message};
 /// Time and frame of what a message says.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Header {
-    /// The time.
     pub stamp: Time,
     /// The name of the frame.
     pub frame_id: String,
@@ -42,11 +41,8 @@ impl Header {
 pub struct ColorRGBA {
     /// Red.
     pub r: f32,
-    /// Green.
     pub g: f32,
-    /// Blue.
     pub b: f32,
-    /// Opacity.
     pub a: f32,
 }
 message!(

@@ -35,7 +35,6 @@ pub(crate) const SOLVED: [Fact; 3] = [Fact::RangeOffset, Fact::EccentricityCos, 
 /// A fact with its change against the configured value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FactEstimate {
-    /// The fact.
     pub fact: Fact,
     /// Change against the configured value, in the fact's unit.
     pub change: Estimate,

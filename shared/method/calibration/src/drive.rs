@@ -68,7 +68,6 @@ pub struct Track {
 }
 
 impl Drive {
-    /// Creates an empty drive.
     pub fn new(config: &OdometryConfig) -> Result<Self, SetupError> {
         Ok(Self {
             odometry: Odometry::new(config)?,

@@ -30,9 +30,7 @@ pub struct Configured {
 /// A configured value that is off by so many standard deviations is wrong.
 const WRONG_SIGMAS: f64 = 3.0;
 
-/// All that was found.
 pub struct Found {
-    /// Number of scans.
     pub scans: usize,
     /// Length of the path, m.
     pub path_m: f64,

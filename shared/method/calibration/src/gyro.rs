@@ -42,7 +42,6 @@ const SCALE_SIGMA: f64 = 1e-3;
 const BIAS_SIGMA_RADPS: f64 = 1e-4;
 /// An offset that is known less well is refused, s: at 10 degrees per second it is half a degree.
 const MAX_LATE_SIGMA_S: f64 = 0.05;
-/// As is a scale.
 const MAX_SCALE_SIGMA: f64 = 0.05;
 
 /// Finds the offset, the axis, the scale and the bias of a gyro by a track of the drive.

@@ -60,7 +60,6 @@ pub use wheels::{WheelCalibration, WheelError, calibrate_wheels};
 /// A number with its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
-    /// The number.
     pub value: f64,
     /// The standard deviation.
     pub sigma: f64,

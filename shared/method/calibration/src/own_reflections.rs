@@ -11,7 +11,6 @@ const CELLS: usize = (OwnReflections::REACH_M / CELL_M) as usize;
 const SECTORS: usize = 90;
 /// Share of the scans in which a cell of the vehicle's own returns power.
 const SHARE: f64 = 0.9;
-/// Scans that are needed.
 const MIN_SCANS: usize = 50;
 
 /// Counts the scans in which the cells around the vehicle return power.

@@ -6,9 +6,7 @@ use crate::{Calibration, CalibrationError, Configured, Drive, Found, calibrate};
 
 /// A drive, and what it says.
 pub struct Study {
-    /// The drive.
     pub drive: Drive,
-    /// The solution.
     pub calibration: Calibration,
     /// The constants beside the configured ones.
     pub found: Found,

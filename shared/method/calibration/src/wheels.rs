@@ -44,7 +44,6 @@ pub struct WheelCalibration {
 /// Why a drive does not tell the clock of the wheels.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum WheelError {
-    /// The times of the log are not those of the scans.
     #[error(
         "with offsets of the clocks up to {MAX_LATE_S:.0} s the log covers {seconds} distances of a second, and {MIN_TURNS} are needed: the drive is too short, or the log is of another one"
     )]
@@ -52,7 +51,6 @@ pub enum WheelError {
         /// Distances that the log has samples for, at most.
         seconds: usize,
     },
-    /// Two offsets fit about as well.
     #[error(
         "the wheels drive as the radar best with late_s = {:.2} (correlation {:.2}), but about as well with {:.2} ({:.2}): the speed changes too little, or the log is of another drive",
         best[0], best[1], rival[0], rival[1]
@@ -60,21 +58,17 @@ pub enum WheelError {
     Ambiguous {
         /// The best offset, s, and its correlation.
         best: [f64; 2],
-        /// Another one.
         rival: [f64; 2],
     },
-    /// The least squares do not end near the peak.
     #[error(
         "the offset of the clocks is not determined: parts of the drive lead to different ones"
     )]
     Unsettled,
-    /// The speed changes too little.
     #[error(
         "the offset of the clocks is {:.2} \u{b1} {:.2} s, which is too uncertain to be used: the speed changes too little, or a clock drifts",
         .0.value, .0.sigma
     )]
     Steady(Estimate),
-    /// The speeds have another unit.
     #[error(
         "the radar drives {0:.3} times as far as the wheels measure: their speeds have another unit (0.278 is km/h, 0.447 mph)"
     )]

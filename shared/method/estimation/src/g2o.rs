@@ -29,14 +29,12 @@ pub struct G2o {
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum G2oError {
-    /// A line is neither a vertex, an edge nor a comment.
     #[error(
         "line {line}: {tag:?} is not read, only VERTEX_SE2, EDGE_SE2, FIX of the first vertex, and comments"
     )]
     Tag {
         /// The line, counted from 1.
         line: usize,
-        /// The first word.
         tag: String,
     },
     /// A line has too few or too many fields, or one that is not a finite number.
@@ -44,20 +42,15 @@ pub enum G2oError {
     Fields {
         /// The line, counted from 1.
         line: usize,
-        /// The first word.
         tag: &'static str,
-        /// The fields that it needs.
         needed: &'static str,
     },
-    /// A vertex appears twice.
     #[error("line {line}: vertex {id} appears a second time")]
     Twice {
         /// The line, counted from 1.
         line: usize,
-        /// The vertex.
         id: u64,
     },
-    /// An edge has an information matrix that is not positive definite.
     #[error(
         "line {line}: the information matrix of the edge from {from} to {to} is not positive definite"
     )]
@@ -75,22 +68,17 @@ pub enum G2oError {
     Vertex {
         /// The line, counted from 1.
         line: usize,
-        /// The vertex.
         id: u64,
-        /// The problem.
         problem: &'static str,
     },
-    /// Two consecutive keyframes have no edge.
     #[error(
         "there is no edge from vertex {from} to the next one, {to}: a trajectory needs odometry between all its keyframes"
     )]
     Gap {
         /// The earlier vertex.
         from: u64,
-        /// The later vertex.
         to: u64,
     },
-    /// The file has no edge.
     #[error("there is no EDGE_SE2")]
     Empty,
 }

@@ -73,7 +73,6 @@ pub struct PoseGraph {
     factorised: bool,
 }
 
-/// The estimate.
 #[derive(Clone)]
 struct State {
     poses: Vec<Pose>,
@@ -111,7 +110,6 @@ pub struct WeightedLoop {
 pub struct Solution {
     /// Half the sum of the squared normalised residuals, those of loops after the kernel.
     pub cost: f64,
-    /// Number of linearisations.
     pub iterations: usize,
     /// True if the poses are at a minimum of the cost. If not, the iterations were too few, and a
     /// further solution goes on from there.

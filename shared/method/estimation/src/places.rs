@@ -86,5 +86,4 @@ pub use verification::{LoopVerifier, Verification, VerificationOutcome};
 const RASTER_CELLS: usize = 255;
 const CELL_M: f64 = 0.8;
 
-/// The rasters are planned for the searches.
 const PLANNED: &str = "rasters and spectra have the shape that the searches are planned for";

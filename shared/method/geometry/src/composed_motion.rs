@@ -8,7 +8,6 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::{Pose, UncertainMotion, xy_yaw};
 
-/// A motion of an odometry.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OdometryMotion {
     /// The pose of the later frame in the earlier one.

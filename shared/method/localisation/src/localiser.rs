@@ -30,7 +30,6 @@ pub struct Observation<'a> {
 /// The state of the localisation of a scan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
-    /// Nothing.
     Lost,
     /// A first fix, without prior.
     Found,
@@ -57,7 +56,6 @@ pub struct Fix {
 /// The place of a scan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Localisation {
-    /// The state.
     pub status: Status,
     /// The fix, or the prediction; `None` if lost or outside the map.
     pub fix: Option<Fix>,
@@ -71,7 +69,6 @@ struct Hypothesis {
     keyframe: usize,
 }
 
-/// The last known place.
 #[derive(Clone, Copy)]
 struct Track {
     pose: UncertainMotion,
@@ -118,7 +115,6 @@ impl Localiser {
         })
     }
 
-    /// Returns the map.
     pub fn map(&self) -> &Map {
         &self.map
     }
@@ -128,7 +124,6 @@ impl Localiser {
         self.track = None;
     }
 
-    /// Localises the next scan.
     pub fn locate(&mut self, observation: &Observation<'_>) -> Localisation {
         match self.track {
             None => self.start(observation),

@@ -21,29 +21,22 @@ const PLACES: &str = "places.index";
 /// Keyframes that make no map, or a map that cannot be read or written.
 #[derive(Debug, Error)]
 pub enum MapError {
-    /// There is none.
     #[error("a map needs keyframes: there is none")]
     Empty,
-    /// They are not in the order of the path.
     #[error(transparent)]
     Order(#[from] OrderError),
-    /// The keyframes cannot be read or written.
     #[error(transparent)]
     Keyframes(#[from] LogError),
-    /// The descriptors of submaps cannot be read or written.
     #[error(transparent)]
     Places(#[from] PlaceFileError),
-    /// The two files are not of one map.
     #[error(
         "{KEYFRAMES} has {keyframes} keyframes{end}, and {PLACES} {places}: draw the map again with gyre map",
         end = if *.is_complete { "" } else { " and no end" }
     )]
     Unlike {
-        /// The number of keyframes.
         keyframes: usize,
         /// The file of keyframes was written to its end.
         is_complete: bool,
-        /// The number of places.
         places: usize,
     },
 }
@@ -116,7 +109,6 @@ impl Map {
         &self.keyframes
     }
 
-    /// Returns the pose of a keyframe.
     pub fn pose(&self, keyframe: usize) -> Pose {
         self.keyframes[keyframe].pose.motion
     }

@@ -1,6 +1,5 @@
 //! The options of localisation.
 
-/// The options of localisation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LocaliserOptions {
     /// Number of places and headings that are searched first for a first fix; if none of them is

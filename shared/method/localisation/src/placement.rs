@@ -31,7 +31,6 @@ const NEAR_STRETCHES: u64 = 4;
 pub struct FoundKeyframe {
     /// The number of the keyframe in its drive.
     pub keyframe: usize,
-    /// The place.
     pub fix: Fix,
 }
 

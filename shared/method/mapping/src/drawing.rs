@@ -60,7 +60,6 @@ impl Drawing {
         &mut self.evidence
     }
 
-    /// Returns the number of keyframes.
     pub fn keyframes(&self) -> usize {
         self.odometry.len()
     }

@@ -78,12 +78,10 @@ impl Evidence {
         })
     }
 
-    /// Returns the options.
     pub fn options(&self) -> &MapOptions {
         &self.options
     }
 
-    /// Returns the number of keyframes.
     pub fn keyframes(&self) -> usize {
         self.drawn.len()
     }

@@ -14,7 +14,6 @@ pub enum Occupancy {
     Unknown,
     /// It returned little of the power that it might have.
     Free,
-    /// It returned power.
     Occupied,
 }
 

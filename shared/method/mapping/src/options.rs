@@ -36,11 +36,8 @@ impl Default for MapOptions {
 #[derive(Clone, Debug, PartialEq, Error)]
 #[error("the map's {name} is {value}, but must be {bounds}")]
 pub struct OptionError {
-    /// The option.
     pub name: &'static str,
-    /// The value.
     pub value: f64,
-    /// Permitted values.
     pub bounds: &'static str,
 }
 

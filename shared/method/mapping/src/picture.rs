@@ -45,7 +45,6 @@ pub struct Overlay<'a> {
 }
 
 impl Overlay<'_> {
-    /// Returns the changes of a kind.
     fn changes(&self, kind: ChangeKind) -> impl Iterator<Item = &Change> {
         self.changes
             .iter()

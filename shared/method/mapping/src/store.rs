@@ -28,7 +28,6 @@ pub const ONE: u32 = 1 << 14;
 pub struct Tile {
     /// The returns of each cell, row after row, that of the lowest y first.
     pub returned: [u32; CELLS],
-    /// Number of looks at each block.
     pub looked: [u32; BLOCKS * BLOCKS],
 }
 

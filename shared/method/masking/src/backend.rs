@@ -34,7 +34,6 @@ impl Backend {
 }
 
 impl fmt::Display for Backend {
-    /// The value in configurations.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Auto => "auto",

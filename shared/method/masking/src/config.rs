@@ -68,13 +68,10 @@ pub enum MaskKind {
 /// A setting out of its bounds.
 #[derive(Debug, Error, PartialEq)]
 pub enum MaskingConfigError {
-    /// The number of threads.
     #[error("threads is {0}, but must be 1 to 64")]
     Threads(usize),
-    /// The exponent of the mask.
     #[error("point_exponent is {0}, but must be 0 to 4")]
     PointExponent(f32),
-    /// rten with a setting of ONNX Runtime.
     #[error(
         "backend is `rten`, but {0} is a setting of ONNX Runtime: set backend to `onnxruntime`, or leave {0} out"
     )]

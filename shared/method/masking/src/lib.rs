@@ -53,7 +53,6 @@ pub struct Masker {
 /// The origin of the factors.
 #[derive(Debug)]
 enum Weights {
-    /// The threshold alone counts.
     None,
     Network(LearnedMask),
     Function(AppliedFunction),

@@ -11,7 +11,6 @@ use crate::{Backend, MaskingConfig, Provider};
 pub enum Library {
     /// ONNX Runtime, with the path of its library.
     OnnxRuntime(PathBuf),
-    /// rten.
     Rten,
 }
 
@@ -39,7 +38,6 @@ impl Library {
         }
     }
 
-    /// Returns the backend.
     pub fn backend(&self) -> Backend {
         match self {
             Self::OnnxRuntime(_) => Backend::OnnxRuntime,

@@ -28,13 +28,10 @@ const OUTPUT: &str = "masks";
 /// An error in loading or running a network.
 #[derive(Debug, Error)]
 pub enum NetworkError {
-    /// The model cannot be used.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// ONNX Runtime cannot be used.
     #[error(transparent)]
     Runtime(#[from] RuntimeError),
-    /// This build does not have the execution provider.
     #[error(
         "masking.provider is `{0}`, which this build does not have: build Gyre with --features {0}, or set it to `cpu`"
     )]
@@ -44,22 +41,18 @@ pub enum NetworkError {
         "masking.provider is `{provider}`, but ONNX Runtime cannot use it here: {reason}; `cpu` always works"
     )]
     Provider {
-        /// The execution provider.
         provider: Provider,
         /// ONNX Runtime's error.
         reason: String,
     },
-    /// The backend rejects the model.
     #[error("{} cannot load {path}: {reason}", .by.name())]
     Load {
-        /// The backend.
         by: Backend,
         /// The model's file.
         path: PathBuf,
         /// The backend's error.
         reason: String,
     },
-    /// The backend does not know the model's operators.
     #[error(
         "{path} has operators of version {opset}, and this {} knows them up to {known}: export it again with opset={known}, or use a newer ONNX Runtime",
         .by.name()
@@ -69,22 +62,17 @@ pub enum NetworkError {
         path: PathBuf,
         /// The version of its operators.
         opset: i64,
-        /// The backend.
         by: Backend,
         /// The newest version that the backend supports.
         known: String,
     },
-    /// The inputs or outputs of the model do not fit its card.
     #[error("{path} {has}, but by its card it must have only {expected}: export it again")]
     Interface {
         /// The model's file.
         path: PathBuf,
-        /// The actual tensors.
         has: String,
-        /// The expected tensor.
         expected: String,
     },
-    /// The network fails.
     #[error("the learned mask cannot be computed: {0}")]
     Run(String),
 }

@@ -14,10 +14,8 @@ use crate::runtime::{self, RuntimeError};
 /// A network could not be loaded or computed.
 #[derive(Debug, Error)]
 pub enum PlanesError {
-    /// ONNX Runtime cannot be used.
     #[error(transparent)]
     Runtime(#[from] RuntimeError),
-    /// The library does not compute it.
     #[error("{network} cannot be computed: {reason}")]
     Network {
         /// The name of the file.

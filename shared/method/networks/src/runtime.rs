@@ -35,23 +35,18 @@ static PACKAGES: OnceLock<PathBuf> = OnceLock::new();
 /// An error in finding or opening ONNX Runtime.
 #[derive(Debug, Error)]
 pub enum RuntimeError {
-    /// It is not installed.
     #[error(
         "ONNX Runtime is not installed: `{INSTALL}` installs it; masking.runtime or {VARIABLE} names one in another place; \
          masking.backend = \"rten\" does not need it"
     )]
     Missing,
-    /// The named path has no library.
     #[error(
         "{named_by} is {path}, but there is no {LIBRARY}: correct it, or leave it out and run `{INSTALL}`"
     )]
     NotFound {
-        /// The setting or variable.
         named_by: &'static str,
-        /// The path.
         path: PathBuf,
     },
-    /// It is too old.
     #[error(
         "ONNX Runtime at {path} is version {version}, but at least 1.{} is needed: `{INSTALL}` installs one",
         ort::MINOR_VERSION
@@ -67,7 +62,6 @@ pub enum RuntimeError {
     Unusable {
         /// The path of the library.
         path: PathBuf,
-        /// The reason.
         reason: String,
     },
 }

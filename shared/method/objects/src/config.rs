@@ -121,17 +121,12 @@ impl Default for ObjectsConfig {
 /// An error of the tracking of objects.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ObjectsError {
-    /// A setting is out of bounds.
     #[error("objects.{key} is {value}, but must be {bounds}")]
     Setting {
-        /// The setting.
         key: &'static str,
-        /// The value.
         value: f64,
-        /// Permitted values.
         bounds: &'static str,
     },
-    /// The network cannot be loaded or computed.
     #[error("{0}")]
     Network(String),
 }

@@ -65,7 +65,6 @@ impl Detector {
         })
     }
 
-    /// Forgets all scans.
     pub fn clear(&mut self) {
         self.memory.clear();
     }

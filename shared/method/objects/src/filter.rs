@@ -27,7 +27,6 @@ pub(crate) struct Filter {
     mean: Estimate,
 }
 
-/// A Kalman filter.
 #[derive(Clone, Copy, Debug)]
 struct Model {
     probability: f64,

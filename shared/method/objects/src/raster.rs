@@ -39,7 +39,6 @@ struct Seen {
     returns: Vec<Return>,
 }
 
-/// The last scans.
 pub(crate) struct Memory {
     /// The newest first.
     scans: VecDeque<Seen>,
@@ -78,7 +77,6 @@ impl Memory {
         self.scans.truncate(REMEMBERED);
     }
 
-    /// Forgets all scans.
     pub fn clear(&mut self) {
         self.scans.clear();
     }

@@ -38,7 +38,6 @@ pub(crate) struct Track {
 }
 
 impl Track {
-    /// Begins a track.
     pub fn new(detection: &Detection, config: &ObjectsConfig) -> Self {
         let mut filter = Filter::new(&sighting(detection), UNKNOWN_MPS);
         measure_velocity(&mut filter, detection, config);

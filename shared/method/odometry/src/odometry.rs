@@ -22,7 +22,6 @@ pub struct Odometry {
     gyro: Gyro,
     wheels: Wheels,
     doppler: Option<DopplerEstimator>,
-    /// By the last scan.
     velocity: Option<Result<DopplerVelocity, NoDoppler>>,
     min_range_m: f32,
     finder: LostAzimuthFinder,

@@ -6,7 +6,6 @@ use gyre_scan_matching::{ExhaustiveSearch, Refined, RefinementKind, Refiner};
 
 use crate::{DecoupledSearch, Mask, OdometryConfig, Pair, Search, SearchKind, SetupError};
 
-/// Refines searched motions.
 pub trait Refine: Send + Sync {
     /// Refines the motion between two scans that the search found.
     fn refine(&mut self, pair: &Pair, searched: &Pose) -> Refined;

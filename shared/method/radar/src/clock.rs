@@ -148,7 +148,6 @@ fn motions(reference: &Trajectory) -> Vec<Motion> {
     starts.map_while(over_baseline).collect()
 }
 
-/// Correlation at one offset.
 struct Fit {
     late_ns: i64,
     count: usize,

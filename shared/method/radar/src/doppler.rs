@@ -39,43 +39,34 @@ const MIN_DOPPLER_S: f32 = 1e-3;
 /// The reason why a scan does not say the velocity.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum NoDoppler {
-    /// The radar does not report chirps.
     #[error(
         "the radar does not say which azimuths it measures with rising chirps and which with falling ones"
     )]
     UnknownChirps,
-    /// All chirps are alike, or neighbours are.
     #[error(
         "rising and falling chirps do not alternate from azimuth to azimuth: at {alternating} of {azimuths} azimuths they do"
     )]
     NotAlternating {
         /// Azimuths between two of the other chirp.
         alternating: usize,
-        /// All.
         azimuths: usize,
     },
-    /// The coefficient is not known.
     #[error(
         "the Doppler coefficient of the radar is not known: set dataset.doppler_s, the metres by which a closing speed of 1 m/s shifts a range (about 0.05 for a RAS6)"
     )]
     NoCoefficient,
-    /// Too few bearings have echoes.
     #[error("{bearings} bearings have echoes that both chirps see, but {needed} are needed")]
     TooFewBearings {
-        /// Bearings.
         bearings: usize,
         /// The least number.
         needed: usize,
     },
-    /// There is no velocity that explains the shifts.
     #[error("{agreeing} of {bearings} bearings agree on a velocity, which is too few")]
     NoAgreement {
         /// Bearings that agree on the best one.
         agreeing: usize,
-        /// Bearings with echoes.
         bearings: usize,
     },
-    /// An inconsistent scan.
     #[error(transparent)]
     Scan(#[from] ScanError),
 }

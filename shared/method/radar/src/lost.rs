@@ -83,7 +83,6 @@ impl LostAzimuths {
         }
     }
 
-    /// Returns the number of lost azimuths.
     pub fn count(&self) -> usize {
         self.gaps.iter().map(|gap| usize::from(gap[2])).sum()
     }
@@ -132,7 +131,6 @@ impl LostAzimuths {
 pub struct LostAzimuthFinder {
     /// The echoes of the rows as they follow each other.
     rows: Echoes,
-    /// The scan before.
     previous: Option<Previous>,
     /// The echoes of that scan, each at its azimuth: only where the next scan has lost some.
     placed: Echoes,
@@ -211,7 +209,6 @@ impl LostAzimuthFinder {
         swap(&mut previous.rows, &mut self.rows);
     }
 
-    /// Forgets the scan before.
     pub fn reset(&mut self) {
         self.previous = None;
     }

@@ -62,11 +62,8 @@ impl Default for PointsConfig {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("points.{key} is {value}, but must be {bounds}")]
 pub struct PointsError {
-    /// The setting.
     pub key: &'static str,
-    /// The value.
     pub value: f64,
-    /// Permitted values.
     pub bounds: &'static str,
 }
 
@@ -108,7 +105,6 @@ pub struct PointExtractor {
 }
 
 impl PointExtractor {
-    /// Returns an extractor.
     pub fn new(config: &PointsConfig) -> Result<Self, PointsError> {
         config.validate()?;
         Ok(Self {

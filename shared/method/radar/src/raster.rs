@@ -115,14 +115,10 @@ impl RasterConfig {
 /// A raster that cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RasterError {
-    /// A setting is out of bounds.
     #[error("raster.{key} is {value}, but must be {bounds}")]
     Setting {
-        /// The setting.
         key: &'static str,
-        /// The value.
         value: f64,
-        /// Permitted values.
         bounds: &'static str,
     },
     /// The array for the raster is not `n x n`, or not contiguous and row-major.
@@ -133,7 +129,6 @@ pub enum RasterError {
         /// Rows and columns of the array.
         actual: [usize; 2],
     },
-    /// The scan is inconsistent.
     #[error(transparent)]
     Scan(#[from] ScanError),
     /// The motion to compensate is not finite, or exceeds [`MAX_TURN_RAD`] or [`MAX_TRAVEL_M`].
@@ -141,7 +136,6 @@ pub enum RasterError {
         "a turn of {turn_rad} rad and a travel of {travel_m} m within half a sweep are out of bounds (twist {twist:?})"
     )]
     Twist {
-        /// The twist.
         twist: Twist,
         /// The turn between the scan's stamp and the azimuth furthest from it in time, rad.
         turn_rad: f64,
@@ -179,7 +173,6 @@ impl Rasteriser {
         })
     }
 
-    /// Returns the configuration.
     pub fn config(&self) -> &RasterConfig {
         &self.config
     }

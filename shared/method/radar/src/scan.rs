@@ -211,7 +211,6 @@ impl OwnedScan {
         }
     }
 
-    /// Returns a view of the scan.
     pub fn view(&self) -> PolarScan<'_> {
         let azimuths = self.geometry.azimuths;
         PolarScan {

@@ -182,7 +182,6 @@ impl GyroConfig {
         (scale - 1.0).abs() <= 4.0 * self.scale_sigma.max(LEANING)
     }
 
-    /// Checks every value.
     pub fn validate(&self) -> Result<(), SampleConfigError> {
         let bounds = Bounds("gyro");
         let rate = "a rate in rad/s, at most 1";

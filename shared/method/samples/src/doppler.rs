@@ -118,7 +118,6 @@ impl DopplerConfig {
         }
     }
 
-    /// Checks every value.
     pub fn validate(&self) -> Result<(), SampleConfigError> {
         let bounds = Bounds("doppler");
         bounds.within(

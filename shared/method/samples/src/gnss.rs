@@ -85,7 +85,6 @@ impl GnssConfig {
         matches!(self.kind, GnssKind::Udp | GnssKind::Ros2)
     }
 
-    /// Checks every value.
     pub fn validate(&self) -> Result<(), SampleConfigError> {
         let bounds = Bounds("gnss");
         bounds.late_s(self.late_s)?;

@@ -49,7 +49,6 @@ impl Gyro {
         self.yaw.drop_scan(samples);
     }
 
-    /// Forgets all samples.
     pub fn clear(&mut self) {
         self.yaw.clear();
     }

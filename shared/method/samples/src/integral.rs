@@ -81,7 +81,6 @@ impl Integrator {
         self.dropped = dropped;
     }
 
-    /// Forgets all samples.
     pub fn clear(&mut self) {
         self.dropped.clear();
         (self.earlier, self.later, self.integral) = (None, None, None);

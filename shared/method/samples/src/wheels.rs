@@ -48,7 +48,6 @@ impl Wheels {
         self.speed.drop_scan(samples);
     }
 
-    /// Forgets all samples.
     pub fn clear(&mut self) {
         self.speed.clear();
     }

@@ -112,7 +112,6 @@ impl WheelsConfig {
         Sample::speed(sample.stamp_ns.saturating_sub(late_ns), speed_mps)
     }
 
-    /// Checks every value.
     pub fn validate(&self) -> Result<(), SampleConfigError> {
         let bounds = Bounds("wheels");
         bounds.late_s(self.late_s)?;

@@ -12,11 +12,8 @@ pub struct ConfigError {
     /// Section of the configuration: `rotation`, `translation`, `exhaustive`, `refinement` or
     /// `raster`.
     pub section: &'static str,
-    /// Key within the section.
     pub key: &'static str,
-    /// The rejected value.
     pub actual: String,
-    /// The accepted values.
     pub expected: &'static str,
 }
 
@@ -214,7 +211,6 @@ impl RotationConfig {
         }
     }
 
-    /// Checks every value.
     pub fn validate(&self) -> Result<(), ConfigError> {
         let section = Section("rotation");
         section.require(
@@ -254,7 +250,6 @@ impl TranslationConfig {
         }
     }
 
-    /// Checks every value.
     pub fn validate(&self) -> Result<(), ConfigError> {
         let section = Section("translation");
         let fits = positive(self.reach_m);

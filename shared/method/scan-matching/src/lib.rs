@@ -94,22 +94,16 @@ pub use translation::{MotionMatch, MotionRunnerUp, TranslationSearch};
 /// A raster or a spectrum that does not fit the search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum ShapeError {
-    /// The search was planned for another shape.
     #[error("{what} is {}: expected {}", by(.actual), by(.expected))]
     Shape {
-        /// The input.
         what: &'static str,
         /// Rows and columns of the input.
         actual: [usize; 2],
         /// The rows and columns that the search was planned for.
         expected: [usize; 2],
     },
-    /// The values are not in standard (row-major, contiguous) layout.
     #[error("{what} is not in row-major, contiguous layout")]
-    Layout {
-        /// The input.
-        what: &'static str,
-    },
+    Layout { what: &'static str },
 }
 
 fn by([rows, columns]: &[usize; 2]) -> String {

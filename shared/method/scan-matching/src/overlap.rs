@@ -61,7 +61,6 @@ impl OverlapEnergy {
         }
     }
 
-    /// Measures a raster.
     pub fn measure(&mut self, raster: &[f32]) {
         self.columns.fill(0.0);
         for (row, sum) in raster.chunks_exact(self.n).zip(&mut self.rows) {

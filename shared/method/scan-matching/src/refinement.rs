@@ -72,7 +72,6 @@ const MAX_DOUBTFUL: u32 = 2;
 /// The reliability of a refined motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
-    /// Aligned with the map.
     Refined,
     /// Aligned, but doubtful; kept out of the map.
     Weak,
@@ -80,7 +79,6 @@ pub enum Outcome {
     Predicted,
 }
 
-/// A refined motion.
 #[derive(Debug, Clone, Copy)]
 pub struct Refined {
     /// Pose of the later scan's frame in the earlier one's, with its covariance.
@@ -134,7 +132,6 @@ pub struct Refiner {
     turn: Option<GyroTurn>,
     distance: Option<WheelDistance>,
     velocities: [Option<DopplerVelocity>; 2],
-    /// By these.
     way: Option<DopplerWay>,
 }
 

@@ -27,7 +27,6 @@ const SAME_PEAK_RAD: f64 = 2.0 * PI / 180.0;
 pub struct RotationRunnerUp {
     /// Angle, radians.
     pub angle_rad: f64,
-    /// Correlation coefficient.
     pub score: f64,
 }
 

@@ -23,7 +23,6 @@ pub struct MotionRunnerUp {
     pub x_m: f64,
     /// Left, m, in the earlier scan's frame.
     pub y_m: f64,
-    /// Correlation coefficient.
     pub score: f64,
 }
 
@@ -68,7 +67,6 @@ pub struct TranslationSearch {
     turned: Vec<f32>,
     later_energy: OverlapEnergy,
     turned_energy: OverlapEnergy,
-    /// Correlation coefficients.
     scores: Scores,
 }
 

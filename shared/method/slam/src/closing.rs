@@ -61,13 +61,10 @@ impl Default for LoopOptions {
 /// Errors of [`LoopCloser`].
 #[derive(Debug, Error)]
 pub enum ClosingError<E> {
-    /// A keyframe cannot be read.
     #[error(transparent)]
     Source(E),
-    /// A keyframe does not continue the path.
     #[error(transparent)]
     Order(#[from] OrderError),
-    /// A motion cannot be used.
     #[error(transparent)]
     Estimation(#[from] EstimationError),
 }

@@ -64,7 +64,6 @@ impl SlamConfig {
         self.kind != SlamKind::None
     }
 
-    /// Checks every value.
     pub fn validate(&self) -> Result<(), PlaceOptionError> {
         self.places.validate()
     }

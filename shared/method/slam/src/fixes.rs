@@ -30,12 +30,7 @@ pub enum FixRefusal {
     /// Their clock is another one than the radar's by this.
     Clock(ClockOffset),
     /// Most of them contradict the others, the odometry or the loops.
-    Contradictory {
-        /// Fixes that agree.
-        agreeing: usize,
-        /// All that were taken.
-        taken: usize,
-    },
+    Contradictory { agreeing: usize, taken: usize },
     /// They lie so near each other that they do not tell the heading.
     Undetermined,
 }

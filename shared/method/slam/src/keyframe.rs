@@ -26,7 +26,6 @@ pub struct Keyframe {
     /// corrected pose, and in none of motions or loops. See
     /// [`OdometryMotion`](gyre_geometry::OdometryMotion).
     pub noise: Matrix3<f64>,
-    /// Velocity of the sensor.
     pub twist: Twist,
     /// Length of the path through all keyframes up to this one, m.
     pub path_m: f64,

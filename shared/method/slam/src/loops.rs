@@ -43,14 +43,12 @@ pub struct LoopCandidate {
     /// Chi-square of the motion against the odometry, with three degrees of freedom; NaN if it was
     /// rejected before.
     pub chi_square: f64,
-    /// The verdict.
     pub outcome: LoopOutcome,
 }
 
 /// A queried keyframe with its candidates, the most similar one first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Query {
-    /// The number of the keyframe.
     pub keyframe: usize,
     /// The candidates that were verified.
     pub candidates: Vec<LoopCandidate>,

@@ -61,7 +61,6 @@ impl<R: Record> RecordLog<R> {
         })
     }
 
-    /// Returns the number of records.
     pub fn len(&self) -> usize {
         self.log.len() - usize::from(self.ended)
     }

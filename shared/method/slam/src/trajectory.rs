@@ -28,7 +28,6 @@ pub enum EstimatorKind {
 /// Options of [`TrajectoryEstimator`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrajectoryOptions {
-    /// The estimator.
     pub kind: EstimatorKind,
     /// Loops between two stretches of the path of this length count as one: their errors are
     /// dependent, m.
@@ -126,7 +125,6 @@ impl Estimator {
 }
 
 impl TrajectoryEstimator {
-    /// Starts without a keyframe.
     pub fn new(options: TrajectoryOptions) -> Self {
         Self {
             estimator: Estimator::new(Pose::identity(), options.kind),

@@ -13,7 +13,6 @@ const LAST: usize = 8 * GroupSync::LIMIT as usize;
 /// The content of a journal.
 #[derive(Clone, Debug, Default)]
 pub struct Content {
-    /// Number of poses.
     pub poses: u64,
     /// True if the end of the stream follows them.
     pub ended: bool,

@@ -48,10 +48,8 @@ const fn look_back(window: usize) -> usize {
     2 * window + GroupSync::LIMIT as usize + HEADROOM
 }
 
-/// An error of a checkpoint.
 #[derive(Debug, Error)]
 pub enum CheckpointError {
-    /// The file cannot be read or written.
     #[error(transparent)]
     Storage(#[from] StorageError),
     /// The state is not in the file, which is of another version or configuration, or damaged.
@@ -59,17 +57,14 @@ pub enum CheckpointError {
         "{path} does not have the state of the refinement before item {item}: start again with --fresh"
     )]
     Missing {
-        /// The file.
         path: PathBuf,
         /// The item whose state is missing.
         item: u64,
     },
-    /// Another process writes to the file.
     #[error(transparent)]
     Busy(#[from] Busy),
 }
 
-/// An open checkpoint.
 #[derive(Debug)]
 pub struct Checkpoint {
     file: DurableFile,

@@ -17,20 +17,12 @@ use crate::JournalError;
 /// An error of the keyframes of a run.
 #[derive(Debug, Error)]
 pub enum KeyframesError {
-    /// The log of keyframes.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// The journal.
     #[error(transparent)]
     Journal(#[from] JournalError),
-    /// A pose of the journal should have a keyframe, and has none.
     #[error("{path} lacks the keyframe of pose {pose}: the same command computes it anew")]
-    Missing {
-        /// The log of keyframes.
-        path: PathBuf,
-        /// The number of the pose.
-        pose: u64,
-    },
+    Missing { path: PathBuf, pose: u64 },
 }
 
 /// The keyframes of a run, open for appending.
@@ -123,7 +115,6 @@ pub fn complete_poses(
 
 /// The keyframes of a journal.
 struct Found {
-    /// Number of keyframes.
     keyframes: usize,
     last: Option<Keyframe>,
 }

@@ -29,7 +29,6 @@ pub(crate) struct Places {
     path: PathBuf,
     reader: BufReader<File>,
     bytes: Box<[u8; RECORD]>,
-    /// Number of the next place.
     pub next: u64,
     /// True if the header is whole.
     pub has_header: bool,

@@ -40,7 +40,6 @@ struct Fixed {
 }
 
 impl LoggedScan {
-    /// Returns the scan of a pose.
     pub fn of(header: &PoseHeader, points: Vec<SparsePoint>) -> Self {
         let interval_s = header.motion.interval_ns as f64 * 1e-9;
         Self {
@@ -105,15 +104,11 @@ impl Record for LoggedScan {
 /// An error of the scans of a run.
 #[derive(Debug, Error)]
 pub enum ScansError {
-    /// The log of scans.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// Poses of the journal should have their scans, and have none.
     #[error("{path} has {scans} scans of {poses} poses: the same command computes them anew")]
     Missing {
-        /// The log of scans.
         path: PathBuf,
-        /// The scans in it.
         scans: u64,
         /// The poses of the journal.
         poses: u64,

@@ -25,7 +25,6 @@ impl Durations {
         }
     }
 
-    /// Returns the number of durations.
     pub fn count(&self) -> u64 {
         self.0.as_ref().map_or(0, Histogram::len)
     }

@@ -23,7 +23,6 @@ pub enum Basis {
 }
 
 impl Basis {
-    /// All of them.
     pub const ALL: [Self; 7] = [
         Self::ScanToScan,
         Self::RadarOnly,
@@ -100,7 +99,6 @@ pub struct WitnessCounts {
 }
 
 impl WitnessCounts {
-    /// Counts a motion.
     pub fn add(&mut self, motion: &RefinementRecord) {
         self.by_basis[motion.basis() as usize] += 1;
         self.gyro_used += u64::from(motion.uses_gyro());
@@ -111,14 +109,12 @@ impl WitnessCounts {
         self.doppler_refused += u64::from(motion.doppler == doppler::REFUSED);
     }
 
-    /// Counts all of these.
     pub fn of<'a>(motions: impl IntoIterator<Item = &'a RefinementRecord>) -> Self {
         let mut counts = Self::default();
         motions.into_iter().for_each(|motion| counts.add(motion));
         counts
     }
 
-    /// Returns the number of motions.
     pub fn motions(&self) -> u64 {
         self.by_basis.iter().sum()
     }

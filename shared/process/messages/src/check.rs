@@ -44,7 +44,6 @@ pub(crate) fn within(
     }
 }
 
-/// Requires finite values.
 pub(crate) fn finite<const N: usize>(fields: [(&str, f64); N]) -> Result<(), Violation> {
     fields
         .into_iter()

@@ -45,9 +45,7 @@ pub struct CorrectionHeader {
     pub item: Item,
     /// Number of the newest keyframe's scan in the run.
     pub keyframe_seq: u64,
-    /// Keyframes in the correction.
     pub keyframes: u64,
-    /// Loops in the correction.
     pub loops: u64,
     /// Forward, m.
     pub x_m: f64,

@@ -6,13 +6,11 @@ use crate::limits::Window;
 /// stream of scans, so they have no [`Hop`](crate::Hop) and give no credit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum FollowerId {
-    /// Finds loops between keyframes.
     LoopClosure,
     /// Corrects the trajectory by the loops.
     Trajectory,
     /// Finds the keyframes in the map of an earlier drive, in a run that names one.
     Localisation,
-    /// Tracks moving objects.
     Objects,
 }
 

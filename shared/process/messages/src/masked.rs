@@ -60,7 +60,6 @@ header!(MaskedHeader, "gyre_masked_header_v9");
 
 /// Values of [`MaskedHeader::mask`].
 pub mod mask_kind {
-    /// No mask.
     pub const NONE: u32 = 0;
     /// Power up to a threshold is set to zero.
     pub const THRESHOLD: u32 = 1;
@@ -72,7 +71,6 @@ pub mod mask_kind {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct MaskedHeader {
-    /// The scan.
     pub item: Item,
     /// Cells per side. Row 0 is far ahead, column 0 far left, the sensor is in the middle.
     pub n: u32,
@@ -226,7 +224,6 @@ impl MaskedHeader {
         (self.has_gyro == 1).then_some(self.gyro)
     }
 
-    /// Sets it.
     pub fn set_turn(&mut self, turn: Option<GyroTurn>) {
         self.gyro = turn.unwrap_or_default();
         self.has_gyro = turn.is_some().into();
@@ -238,7 +235,6 @@ impl MaskedHeader {
         (self.has_wheels == 1).then_some(self.wheels)
     }
 
-    /// Sets it.
     pub fn set_distance(&mut self, distance: Option<WheelDistance>) {
         self.wheels = distance.unwrap_or_default();
         self.has_wheels = distance.is_some().into();
@@ -249,7 +245,6 @@ impl MaskedHeader {
         (self.has_doppler == 1).then_some(self.doppler)
     }
 
-    /// Sets it.
     pub fn set_velocity(&mut self, velocity: Option<DopplerVelocity>) {
         self.doppler = velocity.unwrap_or_default();
         self.has_doppler = velocity.is_some().into();

@@ -52,7 +52,6 @@ impl Sender {
     }
 }
 
-/// A message type.
 pub trait Message: 'static {
     /// The name of the topic.
     const TOPIC: &'static str;
@@ -62,7 +61,6 @@ pub trait Message: 'static {
     const READERS: usize;
     /// The reach of the publisher's history.
     const HISTORY: History;
-    /// The header of each message.
     type Header: Header;
     /// The element that the payload is a slice of.
     type Element: Element;

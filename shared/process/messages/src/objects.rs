@@ -54,7 +54,6 @@ pub struct ObjectsHeader {
     pub yaw_rad: f64,
     /// Objects that move, or did and stand now.
     pub objects: u64,
-    /// Those that move.
     pub moving: u64,
     /// Number of objects in `list`.
     pub listed: u64,
@@ -92,7 +91,6 @@ pub struct ListedObject {
     pub age: u32,
 }
 
-/// No objects.
 impl Default for ObjectsHeader {
     fn default() -> Self {
         Self::zeroed()
@@ -100,7 +98,6 @@ impl Default for ObjectsHeader {
 }
 
 impl ObjectsHeader {
-    /// Returns the listed objects.
     pub fn list(&self) -> &[ListedObject] {
         &self.list[..(self.listed as usize).min(MAX_LISTED)]
     }
@@ -122,7 +119,6 @@ impl ObjectsHeader {
 }
 
 impl ListedObject {
-    /// Returns whether it moves.
     pub fn is_moving(&self) -> bool {
         self.moving != 0
     }

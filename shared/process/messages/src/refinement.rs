@@ -9,7 +9,6 @@ use crate::check::{Violation, finite, require};
 pub mod outcome {
     /// The searched motion: there is no refinement, or the chain starts here.
     pub const SEARCHED: u32 = 0;
-    /// Refined.
     pub const REFINED: u32 = 1;
     /// Refined with little support: the motion is used, but the scan does not enter the map.
     pub const WEAK: u32 = 2;
@@ -19,11 +18,9 @@ pub mod outcome {
 
 /// Values of [`RefinementRecord::initial_guess`].
 pub mod initial_guess {
-    /// There was no refinement.
     pub const NONE: u32 = 0;
     /// The prediction at constant velocity.
     pub const PREDICTION: u32 = 1;
-    /// The searched motion.
     pub const SEARCH: u32 = 2;
     /// The prediction with a yaw offset, tried when no other guess matched.
     pub const YAW_OFFSET: u32 = 3;

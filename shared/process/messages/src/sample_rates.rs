@@ -24,9 +24,7 @@ pub struct SampleRates {
 /// Counts and rates of samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct SampleHealth {
-    /// Samples of the gyro.
     pub gyro: u64,
-    /// Samples of the wheels.
     pub wheels: u64,
     /// Samples that were left out, since they came late or were unusable.
     pub left_out: u64,

@@ -69,7 +69,6 @@ header!(ScanHeader, "gyre_scan_header_v7");
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct ScanHeader {
-    /// The scan.
     pub item: Item,
     /// Number of rows.
     pub azimuths: u32,

@@ -46,7 +46,6 @@ impl WireType {
 /// The properties of a message type as values.
 #[derive(Clone, Copy, Debug)]
 pub struct Topic {
-    /// The name of the topic.
     pub name: &'static str,
     /// The process that publishes it.
     pub sender: Sender,
@@ -54,7 +53,6 @@ pub struct Topic {
     pub sizes: fn(&Window) -> TopicSizes,
     /// The longest payload, in elements.
     pub max_elements: fn(&Limits) -> usize,
-    /// The type of its header.
     pub header: WireType,
     /// The type of the elements of its payload.
     pub element: WireType,

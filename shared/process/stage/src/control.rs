@@ -34,7 +34,6 @@ pub enum Request {
     Status,
     /// End the run as an interrupt does: its journal stays, and the same command goes on.
     Stop,
-    /// Start a process again.
     Restart {
         /// The name of the stage or follower, or `recorder`.
         process: String,
@@ -80,7 +79,6 @@ pub struct Status {
     pub out: PathBuf,
     /// The current folder of the command that has started the run.
     pub started_in: PathBuf,
-    /// True in live mode.
     pub live: bool,
     /// Where the run is between its start and its end.
     pub phase: Phase,
@@ -88,7 +86,6 @@ pub struct Status {
     pub uptime_s: f64,
     /// Scans that the source has published; `None` if a replaced source does not tell.
     pub published: Option<u64>,
-    /// Poses.
     pub poses: u64,
     /// Scans that were dropped before the newest pose.
     pub dropped: u64,
@@ -108,7 +105,6 @@ pub struct Status {
 pub struct PendingSwap {
     /// The name of the stage or follower.
     pub process: String,
-    /// Program and arguments.
     pub command: Vec<String>,
     /// True if the program has taken over, and no scan has gone through it yet; false if it has not
     /// said that it is ready to take over.
@@ -126,14 +122,12 @@ pub enum Phase {
     /// A stage has not opened its topics.
     #[default]
     Starting,
-    /// All stages are there.
     Running,
     /// The stream has ended, and followers read their logs to the end.
     Following,
 }
 
 impl Phase {
-    /// Returns its name.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Starting => "starting",
@@ -148,13 +142,10 @@ impl Phase {
 pub struct ProcessStatus {
     /// The name of the stage or follower, or `recorder`.
     pub name: String,
-    /// The process.
     pub pid: u32,
-    /// Program and arguments.
     pub command: Vec<String>,
     /// True if the program is another one than the run was begun with.
     pub is_swapped: bool,
-    /// The activity.
     pub activity: Activity,
     /// For how long it has done that, s; `None` if it does not tell.
     pub activity_s: Option<f64>,
@@ -185,12 +176,10 @@ pub enum Activity {
     Silent,
     /// It runs, and writes no heartbeat, as a replacement need not.
     Running,
-    /// It has ended.
     Ended,
 }
 
 impl Activity {
-    /// Returns its name.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Starting => "starting",

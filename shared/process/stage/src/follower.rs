@@ -25,7 +25,6 @@ const NICENESS: i32 = 10;
 
 /// A follower: a function of its logs.
 pub trait Follower {
-    /// The published message.
     type Output: Message;
     /// The logs whose growth wakes it.
     const LOGS: &'static [LogId];

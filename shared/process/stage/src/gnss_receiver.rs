@@ -153,7 +153,6 @@ impl Log {
     }
 }
 
-/// The thread that receives.
 struct Reception {
     socket: UdpSocket,
     log: Log,

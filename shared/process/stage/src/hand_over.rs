@@ -95,7 +95,6 @@ impl HandOver {
         self.writer.loan()
     }
 
-    /// Sends a parcel.
     pub fn send(&self, draft: Draft<Parcel>) -> Result<(), StageError> {
         self.writer.send(draft, Parcel::HOP)
     }

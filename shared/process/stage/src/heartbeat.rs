@@ -43,9 +43,7 @@ pub enum Activity {
 pub struct Heartbeat {
     /// Time at which the activity began, `CLOCK_MONOTONIC`, ns.
     pub since_ns: i64,
-    /// The process.
     pub pid: u32,
-    /// The activity since then.
     pub activity: Activity,
 }
 

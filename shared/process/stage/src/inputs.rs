@@ -30,7 +30,6 @@ pub trait Inputs: Sized {
     where
         Self: 'a;
 
-    /// Opens the topics.
     fn open(launch: &Launch) -> Result<Self, StageError>;
     /// Reads the queues and returns what to do next.
     fn next_action(&mut self) -> Result<Action, StageError>;
@@ -53,7 +52,6 @@ pub struct Pairs<M: Message> {
 
 /// A view of [`Pairs`].
 pub struct PairView<'a, M: Message> {
-    /// The current item.
     pub current: &'a Received<M>,
     /// The previous item; `None` where the chain starts.
     pub previous: Option<&'a Received<M>>,

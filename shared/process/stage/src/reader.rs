@@ -34,7 +34,6 @@ impl<M: Message> Received<M> {
         }
     }
 
-    /// Returns the header.
     pub fn header(&self) -> &M::Header {
         bytemuck::from_bytes(self.sample.header())
     }

@@ -58,7 +58,6 @@ fn from_bytes(bytes: [u8; 16]) -> (i64, i64) {
     (first, second)
 }
 
-/// Writes the schedule.
 pub(crate) struct ScheduleWriter {
     path: PathBuf,
     file: File,

@@ -16,7 +16,6 @@ pub struct Services {
 }
 
 impl Services {
-    /// Creates the services.
     pub fn create(node: &Node, window: &Window) -> Result<Self, StageError> {
         let (mut topics, mut events) = (Vec::new(), Vec::new());
         for topic in gyre_messages::topics(window) {

@@ -89,7 +89,6 @@ pub fn notice(manifest: &Manifest) -> Option<String> {
     (!notice.is_empty()).then_some(notice)
 }
 
-/// Writes it.
 pub fn set_notice(manifest: &Manifest, notice: &str) -> Result<(), StageError> {
     run::write(manifest.root.join(NOTICE), notice)
 }

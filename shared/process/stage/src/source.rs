@@ -32,7 +32,6 @@ pub use player::{Recorded, run_player};
 pub use received::{LastScan, Received, read as received_of};
 pub use sensor::{Arrival, Sensor, run_sensor};
 
-/// A source of scans.
 pub trait Source {
     /// The stage that it is, or replaces.
     const HOP: StageId;

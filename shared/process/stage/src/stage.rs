@@ -14,9 +14,7 @@ use crate::{
 /// A stage: a function of its inputs. This crate does the waiting, joining, publishing and
 /// restarting.
 pub trait Stage {
-    /// The inputs.
     type Inputs: Inputs;
-    /// The published message.
     type Output: Message;
     /// The stage that it is, or replaces.
     const HOP: gyre_messages::StageId;

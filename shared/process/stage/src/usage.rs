@@ -22,7 +22,6 @@ pub struct Usage {
     /// Times that its threads were taken off a processor while they had work; those of threads
     /// that have ended are gone too.
     pub preemptions: u64,
-    /// Number of threads.
     pub threads: u64,
 }
 

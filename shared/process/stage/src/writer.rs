@@ -147,7 +147,6 @@ impl UntypedWriter {
 }
 
 impl<M: Message> Draft<M> {
-    /// Returns the header.
     pub fn header(&mut self) -> &mut M::Header {
         bytemuck::from_bytes_mut(self.loan.header())
     }
@@ -157,7 +156,6 @@ impl<M: Message> Draft<M> {
         self.parts().1
     }
 
-    /// Returns header and payload.
     pub fn parts<T: bytemuck::Pod>(&mut self) -> (&mut M::Header, &mut [T]) {
         let (header, payload) = self.loan.parts();
         (

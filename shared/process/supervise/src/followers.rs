@@ -56,12 +56,10 @@ pub(crate) struct Followers<'a> {
 /// The decision about a follower that the run waits for.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum Patience {
-    /// It goes on.
     Wait,
     /// It has stayed where it is for too long: it is ended, and then started again as after a
     /// death.
     End(Stall),
-    /// That has not helped.
     GiveUp(Stall),
 }
 

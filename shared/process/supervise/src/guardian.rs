@@ -31,7 +31,6 @@ const STOP_TIMEOUT: Duration = Duration::from_secs(1);
 /// Time between two looks at processes that were killed.
 const PERIOD: Duration = Duration::from_millis(10);
 
-/// The running guardian.
 pub(crate) struct Guardian {
     process: Child,
     groups: Option<PipeWriter>,

@@ -203,7 +203,6 @@ impl Logs {
         }
     }
 
-    /// Bounds all logs.
     pub fn bound(&self) {
         self.files.iter().for_each(|file| bound(file));
     }

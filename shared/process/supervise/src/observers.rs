@@ -9,7 +9,6 @@ use gyre_stage::Manifest;
 
 use crate::run::Run;
 
-/// Time between two looks.
 const PERIOD: Duration = Duration::from_secs(1);
 /// The same after a cleanup that failed or did not end. No stage needs it: every restart of a stage
 /// cleans up by itself.

@@ -61,7 +61,6 @@ impl Program {
         place.unwrap_or_else(|| PathBuf::from(program))
     }
 
-    /// Returns the path.
     pub fn path(&self) -> &Path {
         &self.path
     }

@@ -219,7 +219,6 @@ impl<'a> Rig<'a> {
 pub enum Joining {
     /// It notifies the publisher, and so receives its history.
     Asks,
-    /// It does not.
     Silently,
 }
 

@@ -70,7 +70,6 @@ impl<'a> Run<'a> {
         Starter::new(&self.signals, &self.guardian)
     }
 
-    /// Reports an event.
     pub fn say(&mut self, event: Event<'_>) {
         (self.observe)(event);
     }

@@ -92,7 +92,6 @@ pub(super) struct Records {
 /// The place of a record.
 #[derive(Clone, Copy, Debug)]
 struct Place {
-    /// The offset behind it.
     end: u64,
     length: u32,
     check: u32,

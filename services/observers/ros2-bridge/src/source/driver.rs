@@ -35,32 +35,21 @@ const TURNS: usize = 10;
 /// A driver that cannot be received.
 #[derive(Debug, Error)]
 pub enum DriverError {
-    /// The node cannot be made.
     #[error(transparent)]
     Node(#[from] NodeError),
-    /// Fixes of GNSS cannot be received, or not be passed on.
     #[error(transparent)]
     Fixes(#[from] FixError),
-    /// The system refuses a descriptor.
     #[error("cannot wait for topics of ROS 2: {0}")]
     Wait(#[from] io::Error),
-    /// The topic has another type.
     #[error("{topic} carries {found}, but Gyre reads {}", names().join(", "))]
-    Type {
-        /// The topic.
-        topic: String,
-        /// The type on DDS.
-        found: String,
-    },
+    Type { topic: String, found: String },
 }
 
 /// A message that cannot be used.
 #[derive(Debug, Error)]
 pub enum BadPacket {
-    /// The message is not CDR of its type.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// A number of the message is invalid.
     #[error(transparent)]
     Message(#[from] BadMessage),
 }
@@ -77,15 +66,11 @@ fn names() -> [String; 3] {
 
 /// A message of a driver, and its publisher.
 pub struct Packet {
-    /// The message.
     pub message: PacketMessage,
-    /// The publisher.
     pub publisher: Gid,
 }
 
-/// A message with azimuths.
 pub enum PacketMessage {
-    /// One azimuth.
     Azimuth(RadarFftDataMsg),
     /// One azimuth of a driver before 2024.
     Bytes(RadarFftDataMessage),
@@ -145,7 +130,6 @@ pub struct Driver {
     pub sample_wakeups: Wakeups,
     /// Samples of an inertial sensor.
     gyro: Option<Subscription<Imu>>,
-    /// The odometry of the wheels.
     wheels: Option<Subscription<Odometry>>,
     /// A GNSS receiver, whose fixes others need.
     fixes: Option<Fixes>,
@@ -154,14 +138,12 @@ pub struct Driver {
 /// The radar's description of itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DescribedRadar {
-    /// The description.
     pub radar: Configuration,
     /// Rows by which images of turns are turned.
     pub azimuth_offset: u16,
 }
 
 impl Driver {
-    /// Subscribes to the configuration.
     pub fn open(settings: &Settings) -> Result<Self, DriverError> {
         let mut node = Node::new(&settings.domain, "/", NODE)?;
         let mut wakeups = Wakeups::new()?;

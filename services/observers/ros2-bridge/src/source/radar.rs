@@ -52,7 +52,6 @@ pub struct Radar {
 }
 
 impl Radar {
-    /// Joins the domain.
     pub fn open(settings: Settings) -> Result<Self, DriverError> {
         let now = Instant::now();
         Ok(Self {

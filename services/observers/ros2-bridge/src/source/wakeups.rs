@@ -31,7 +31,6 @@ impl Wakeups {
         })
     }
 
-    /// Adds a topic.
     pub fn add<M>(&mut self, topic: &mut Subscription<M>) -> io::Result<()>
     where
         Subscription<M>: Source,
@@ -43,7 +42,6 @@ impl Wakeups {
             .register(topic, token, Interest::READABLE)
     }
 
-    /// Returns the descriptor.
     pub fn descriptor(&self) -> BorrowedFd<'_> {
         self.poll.registry().as_fd()
     }

@@ -29,7 +29,6 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// Counts a scan.
     pub fn add(&mut self, scan: &RegisteredScan<'_>, status: Status) {
         let stamp_ns = scan.observation.stamp_ns;
         self.count(scan.number, stamp_ns, status);
@@ -56,7 +55,6 @@ impl Counts {
         self.was_lost = is_lost;
     }
 
-    /// Returns the number of scans.
     pub fn scans(&self) -> usize {
         self.found + self.tracked + self.predicted + self.lost
     }

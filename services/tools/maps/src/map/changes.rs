@@ -22,7 +22,6 @@ use serde::Serialize;
 use super::{MapArguments, keyframes, placing};
 use crate::localise::searched_map;
 
-/// The table of all changes.
 const TABLE: &str = "changes.csv";
 /// The map of the later drive with the changes in it.
 const PICTURE: &str = "changes.png";
@@ -138,7 +137,6 @@ fn draw(
     Ok(map_png(&mut evidence, &overlay)?)
 }
 
-/// Prints the changes.
 fn report(arguments: &MapArguments, found: &Changes) -> Result<(), Failure> {
     let count = |kind| found.changes.iter().filter(|it| it.kind == kind).count();
     let report = Report {

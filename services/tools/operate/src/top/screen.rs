@@ -45,7 +45,6 @@ fn columns(width: u16) -> Vec<usize> {
     shown
 }
 
-/// Draws a snapshot.
 pub fn draw(frame: &mut Frame<'_>, snapshot: &Snapshot) {
     let rows = snapshot.status.processes.len() as u16;
     let lines = head_lines(snapshot, frame.area().width);

@@ -124,7 +124,6 @@ impl<'run> Snapshots<'run> {
         Ok(())
     }
 
-    /// Snapshots at the run.
     pub fn take(&mut self) -> Result<Snapshot, Failure> {
         let status = self.control.status()?;
         let now = Instant::now();

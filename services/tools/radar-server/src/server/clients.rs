@@ -69,7 +69,6 @@ impl Clients {
         });
     }
 
-    /// Breaks all connections.
     pub fn reset(&self) {
         for client in lock(&self.all).drain(..) {
             let _ = client.stream.shutdown(Shutdown::Both);

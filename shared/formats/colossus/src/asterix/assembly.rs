@@ -60,7 +60,6 @@ impl Assembly {
         self.is_done
     }
 
-    /// Forgets the azimuth.
     pub(super) fn clear(&mut self) {
         self.of = None;
     }

@@ -3,7 +3,6 @@
 /// Counts of what has been lost, dropped and changed since the start of a stream.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counters {
-    /// Sweeps returned.
     pub sweeps: u64,
     /// Azimuths that did not arrive, of the sweeps returned.
     pub missing_azimuths: u64,

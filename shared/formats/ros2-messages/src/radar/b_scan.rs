@@ -10,13 +10,8 @@ const SECOND_NS: u64 = 1_000_000_000;
 /// A message that is no scan.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum BadScan {
-    /// Powers that are not one byte a bin.
     #[error("its pixels are `{encoding}`, expected `8UC1` or `mono8`")]
-    Encoding {
-        /// The encoding given.
-        encoding: String,
-    },
-    /// Sizes that contradict each other.
+    Encoding { encoding: String },
     #[error(
         "it has {bytes} bytes, and says that it has {height} rows of {step} bytes for {width} bins"
     )]
@@ -30,7 +25,6 @@ pub enum BadScan {
         /// Columns.
         width: u32,
     },
-    /// Values beside the image that do not fit it.
     #[error(
         "it has {rows} rows of powers, but {encoders} encoder values and {stamps} times, and needs one of each for a row"
     )]
@@ -39,7 +33,6 @@ pub enum BadScan {
         rows: usize,
         /// Encoder values.
         encoders: usize,
-        /// Times.
         stamps: usize,
     },
 }
@@ -47,7 +40,6 @@ pub enum BadScan {
 /// An azimuth of a turn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimedAzimuth<'a> {
-    /// The azimuth.
     pub azimuth: Azimuth<'a>,
     /// When it was received, ns, if the message is received when the turn has ended.
     pub arrived_ns: i64,
@@ -194,7 +186,6 @@ impl<'a> PowerImage<'a> {
         })
     }
 
-    /// Returns the powers of an azimuth.
     fn row(&self, azimuth: usize) -> &'a [u8] {
         let row = (azimuth + self.offset) % self.height;
         &self.data[row * self.step..][..self.width]

@@ -23,7 +23,6 @@ pub struct Constant {
     pub unit: &'static str,
     /// The factor to the printed unit.
     pub scale: f64,
-    /// The configured value.
     pub configured: f64,
     /// The value by the drive.
     pub found: Estimate,

@@ -111,7 +111,6 @@ struct Problem<'a> {
 }
 
 impl Problem<'_> {
-    /// Solves for the parameters that are free.
     fn solve(&self, turns: &[Turn], free: Free) -> Option<Parameters> {
         let mut at = Parameters::new(1.0, 0.0, self.late_s, 0.0);
         for _ in 0..ROUNDS {

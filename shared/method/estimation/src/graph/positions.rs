@@ -38,7 +38,6 @@ pub struct Position {
 /// A position with what the last solution makes of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WeightedPosition {
-    /// The measurement.
     pub position: Position,
     /// Squared normalised difference from the estimate; 2 is expected of a right one.
     pub chi_square: f64,
@@ -51,7 +50,6 @@ pub(super) struct Measured {
     it: Position,
     /// The kernel's weight.
     pub(super) weight: f64,
-    /// It contradicts the others.
     is_refused: bool,
 }
 
@@ -64,7 +62,6 @@ impl Measured {
         [self.it.keyframe, keyframes]
     }
 
-    /// Weighs it by the kernel.
     pub(super) fn weigh(&mut self, kernel: &Kernel, chi_square: f64) {
         self.weight = match self.is_refused {
             true => 0.0,

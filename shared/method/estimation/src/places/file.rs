@@ -24,46 +24,26 @@ const CHECKSUM_BYTES: usize = 4;
 /// A file of places that cannot be written or read.
 #[derive(Debug, thiserror::Error)]
 pub enum PlaceFileError {
-    /// The file cannot be written.
     #[error("cannot write the places to {path}: {source}")]
     Write {
-        /// The file.
         path: PathBuf,
         /// The error of the operating system.
         source: io::Error,
     },
-    /// The file cannot be read.
     #[error("cannot read the places in {path}: {source}")]
     Read {
-        /// The file.
         path: PathBuf,
         /// The error of the operating system.
         source: io::Error,
     },
-    /// The file is something else.
     #[error("{path} is not a file of places")]
-    Foreign {
-        /// The file.
-        path: PathBuf,
-    },
-    /// The file was written by another version.
+    Foreign { path: PathBuf },
     #[error(
         "{path} has version {version} of places, but this program reads version {VERSION}: build the places again from their keyframes"
     )]
-    Version {
-        /// The file.
-        path: PathBuf,
-        /// The version.
-        version: u32,
-    },
-    /// The file is damaged.
+    Version { path: PathBuf, version: u32 },
     #[error("{path} is damaged: {reason}; build the places again from their keyframes")]
-    Damaged {
-        /// The file.
-        path: PathBuf,
-        /// The problem.
-        reason: String,
-    },
+    Damaged { path: PathBuf, reason: String },
 }
 
 impl PlaceIndex {

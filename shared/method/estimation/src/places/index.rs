@@ -57,7 +57,6 @@ pub struct PlaceIndex {
     pub(super) places: Vec<PathPoint>,
     pub(super) sieves: Vec<u8>,
     pub(super) spectra: Vec<i8>,
-    /// Norm of each spectrum.
     norms: Vec<f32>,
     query: Query,
 }
@@ -119,7 +118,6 @@ impl PlaceIndex {
         Ok(self.places.len() - 1)
     }
 
-    /// Returns the number of places.
     pub fn len(&self) -> usize {
         self.places.len()
     }
@@ -134,7 +132,6 @@ impl PlaceIndex {
         self.places.get(place).map(|place| (place.id, place.path_m))
     }
 
-    /// Returns the descriptor of a place.
     pub fn descriptor(&self, place: usize) -> Option<Descriptor> {
         let (sieves, spectra) = (Descriptor::SIEVE_BYTES, SPECTRUM_BYTES);
         (place < self.len()).then(|| Descriptor {

@@ -25,11 +25,8 @@ pub struct PlaceOptions {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{option} = {actual}: expected {expected}")]
 pub struct PlaceOptionError {
-    /// The option.
     pub option: &'static str,
-    /// The rejected value.
     pub actual: f64,
-    /// The accepted values.
     pub expected: &'static str,
 }
 
@@ -47,7 +44,6 @@ impl Default for PlaceOptions {
 }
 
 impl PlaceOptions {
-    /// Checks every value.
     pub fn validate(&self) -> Result<(), PlaceOptionError> {
         let check = |fits: bool, option, actual, expected| match fits {
             true => Ok(()),

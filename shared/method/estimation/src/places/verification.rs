@@ -30,10 +30,8 @@ pub enum VerificationOutcome {
     Undetermined,
 }
 
-/// A verified candidate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Verification {
-    /// The verdict.
     pub outcome: VerificationOutcome,
     /// The pose of the queried keyframe in the frame of the found one, with its covariance; only as
     /// searched, with a covariance of zero, if the outcome is `LowCorrelation` before the

@@ -17,7 +17,6 @@ pub type Colour = [u8; 3];
 #[derive(Clone, Copy)]
 pub struct Pen {
     pub colour: Colour,
-    /// Units of the canvas.
     pub width: f32,
     /// 0 to 1.
     pub opacity: f32,
@@ -127,7 +126,6 @@ impl Canvas {
             .collect()
     }
 
-    /// Draws lines through points.
     pub fn lines<P: AsRef<[(f32, f32)]>>(&mut self, lines: impl IntoIterator<Item = P>, pen: Pen) {
         let mut builder = PathBuilder::new();
         for line in lines {

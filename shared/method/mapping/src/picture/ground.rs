@@ -20,7 +20,6 @@ pub struct Ground {
 }
 
 impl Ground {
-    /// Reads a map.
     pub fn read(source: &mut impl TileSource, extent: &TileExtent) -> Result<Self, MapError> {
         let [columns, rows] = extent.cells();
         // A power of two, so that a tile has a whole number of blocks.

@@ -12,7 +12,6 @@ pub struct Constants<'a>(HashMap<&'a str, &'a TensorProto>);
 /// Quantised weights with their scales, one for each output. All their zeros are 0.
 #[derive(Clone)]
 pub struct Weights {
-    /// Integers.
     pub values: Vec<f32>,
     pub shape: Vec<usize>,
     pub scales: Vec<f32>,

@@ -29,7 +29,6 @@ const AGREES_CELLS: f64 = 1.5;
 /// Azimuths apart from each other at which errors are independent: a vehicle 20 m away covers ten.
 const DEPENDENT_AZIMUTHS: usize = 10;
 
-/// Fits velocities.
 #[derive(Debug, Default)]
 pub(super) struct Fit {
     seen: Vec<Seen>,

@@ -77,7 +77,6 @@ impl Places {
 }
 
 impl Alignment {
-    /// Begins with a scan.
     pub fn begin(&mut self) {
         self.places.likelihood = f64::NEG_INFINITY;
         self.noise = 0.0;

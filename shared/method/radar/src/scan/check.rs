@@ -8,30 +8,21 @@ use std::ops::RangeInclusive;
 /// is displaced by less than a cell of a raster.
 const MAX_STEP_BACK_NS: i64 = 5_000_000;
 
-/// An inconsistent scan.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ScanError {
-    /// A slice is shorter than the geometry requires.
     #[error("the scan's {what} has {actual} elements, but its geometry requires {expected}")]
     Length {
-        /// The slice.
         what: &'static str,
         /// Elements required by the geometry.
         expected: usize,
-        /// Elements present.
         actual: usize,
     },
-    /// A number of the geometry is out of bounds.
     #[error("the scan's {what} is {value}, expected {} to {}", bounds.start(), bounds.end())]
     Geometry {
-        /// The number.
         what: &'static str,
-        /// The value.
         value: f64,
-        /// Permitted values.
         bounds: RangeInclusive<f64>,
     },
-    /// A stamp is before that of an earlier row.
     #[error(
         "row {row}: stamp is {back_s:.3} s before that of an earlier row, so the rows are not one sweep: the clock was set in between, or a stamp is damaged"
     )]
@@ -41,7 +32,6 @@ pub enum ScanError {
         /// Time by which it is earlier, s.
         back_s: f64,
     },
-    /// Stamps are farther apart than a sweep takes.
     #[error(
         "row {row}: stamp is {after_s:.3} s after that of the first row, so the rows are not one sweep of at most {max_s:.3} s: the clock was set in between, or a stamp is damaged"
     )]
@@ -53,18 +43,15 @@ pub enum ScanError {
         /// The longest sweep, s.
         max_s: f64,
     },
-    /// The stamp of the scan is not one of its sweep.
     #[error("the scan's stamp is {apart_s:.3} s from that of its first row")]
     StampApart {
         /// Stamp of the scan minus that of the first row, s.
         apart_s: f64,
     },
-    /// The angle of an azimuth is not finite.
     #[error("azimuth {index} of the scan is at {value} rad")]
     Azimuth {
         /// The row.
         index: usize,
-        /// The angle.
         value: f32,
     },
 }

@@ -50,7 +50,6 @@ impl ExhaustiveConfig {
         }
     }
 
-    /// Checks every value.
     pub fn validate(&self) -> Result<(), ConfigError> {
         let section = Section("exhaustive");
         let fits = self.reach_deg > 0.0 && self.reach_deg <= 180.0;

@@ -29,7 +29,6 @@ const SHARE_FACTORS: (f64, f64) = (0.25, 4.0);
 pub(super) struct Alignment {
     /// Pose of the points' frame in the map.
     pub pose: Pose,
-    /// The normal equations there.
     pub normal: NormalEquations,
 }
 

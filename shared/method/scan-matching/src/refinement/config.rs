@@ -106,7 +106,6 @@ impl Default for RefinementConfig {
 }
 
 impl RefinementConfig {
-    /// Checks every value.
     pub fn validate(&self) -> Result<(), ConfigError> {
         let section = Section("refinement");
         section.within("keyframes", self.keyframes, 1..=64, "1 to 64")?;

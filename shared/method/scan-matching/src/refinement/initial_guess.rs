@@ -8,7 +8,6 @@ const YAW_OFFSETS_RAD: [f64; 4] = [-0.1, 0.1, -0.2, 0.2];
 /// The initial guess that an alignment started from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum InitialGuess {
-    /// Constant velocity.
     Prediction,
     /// The motion that the search found; along walls also the mean of that and the prediction.
     Search,

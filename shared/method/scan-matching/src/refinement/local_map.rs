@@ -15,7 +15,6 @@ use super::{
 /// A scan that is part of the local map.
 #[derive(Debug, Clone)]
 pub struct Keyframe {
-    /// Number of the scan.
     pub id: u64,
     /// Pose in the first scan's frame.
     pub pose: Pose,

@@ -277,7 +277,6 @@ fn exposed(by: i64, n: usize) -> std::ops::Range<usize> {
     if by >= 0 { n - count..n } else { 0..count }
 }
 
-/// Where points are drawn.
 struct Drawing {
     /// Of the scan, in map coordinates.
     pose: Pose,

@@ -51,7 +51,6 @@ pub(super) struct StateHeader {
 /// The name of a keyframe's content: two keyframes of one scan can differ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Name {
-    /// The scan.
     pub id: u64,
     /// The checksum of the slot.
     pub check: u64,

@@ -15,7 +15,6 @@ use crate::{Manifest, StageError};
 pub struct Progress {
     /// Records that it has worked on.
     pub done: u64,
-    /// Records that are there.
     pub total: u64,
 }
 
@@ -23,7 +22,6 @@ pub struct Progress {
 /// each as eight bytes, little-endian.
 const LENGTH: usize = 24;
 
-/// Writes the progress.
 pub(super) struct ProgressWriter {
     path: PathBuf,
     file: File,

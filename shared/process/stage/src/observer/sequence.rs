@@ -12,7 +12,6 @@ pub struct Sequence {
     pub generation: u32,
     /// The item from which on a missing one counts; `None`: from the first one received.
     pub expected: Option<u64>,
-    /// Items missed so far.
     pub missed: u64,
     /// True if the newest item was the end of the stream.
     pub ended: bool,

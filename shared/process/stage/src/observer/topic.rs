@@ -12,7 +12,6 @@ use crate::{Listener, StageError, outlet::RecordedMessage};
 
 /// The observer of a topic, whatever its type.
 pub trait TopicObserver {
-    /// Returns the topic.
     fn topic(&self) -> &'static str;
 
     /// Takes the next message that is there; `None` if there is none.

@@ -142,7 +142,6 @@ impl<'a> FirstStages<'a> {
         Ok(woken.stop)
     }
 
-    /// Returns what was counted.
     pub fn counters(&self) -> StageCounters {
         self.counters.clone()
     }

@@ -89,7 +89,6 @@ impl<'a> LastStages<'a> {
         sink::publish(&self.poses, end, StageId::PoseIntegration)
     }
 
-    /// Publishes a motion.
     pub fn publish_motion(&self, motion: MotionHeader) -> Result<(), StageError> {
         let Some(motions) = &self.motions else {
             return Ok(());
@@ -118,7 +117,6 @@ impl<'a> LastStages<'a> {
         Ok(woken.stop)
     }
 
-    /// Returns what was counted.
     pub fn counters(&self) -> StageCounters {
         self.counters.clone()
     }

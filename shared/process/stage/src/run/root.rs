@@ -49,38 +49,24 @@ pub struct RunRoot {
 /// An error in creating the root of a run.
 #[derive(Debug, Error)]
 pub enum RootError {
-    /// Another run writes to the same results.
     #[error("another run is writing to {out}{holder}: wait for it, or choose another --out")]
     Busy {
-        /// The results.
         out: PathBuf,
         /// The process of the other run, after a comma.
         holder: String,
     },
-    /// Shared memory cannot be used.
     #[error(
         "cannot use {path} for the run's shared memory: {source}; Gyre needs a writable tmpfs at /dev/shm"
     )]
-    Unusable {
-        /// The path.
-        path: PathBuf,
-        /// The system error.
-        source: io::Error,
-    },
-    /// The user's directory is not the user's alone.
+    Unusable { path: PathBuf, source: io::Error },
     #[error("{path} {state}, so the shared memory of a run would not be safe in it: {remedy}")]
     Unsafe {
-        /// The directory.
         path: PathBuf,
-        /// The problem.
         state: String,
-        /// The remedy.
         remedy: String,
     },
-    /// A signal requested a stop.
     #[error("interrupted before the start")]
     Interrupted,
-    /// Signals cannot be waited for.
     #[error(transparent)]
     Signals(#[from] StageError),
 }
@@ -149,7 +135,6 @@ impl RunRoot {
         self.prefix.clone()
     }
 
-    /// Returns the path of the root.
     pub fn path(&self) -> &Path {
         &self.path
     }

@@ -4,7 +4,6 @@ use std::time::{Duration, Instant};
 
 use crate::{Launch, StageError};
 
-/// Pause between two attempts.
 pub(super) const PAUSE: Duration = Duration::from_millis(100);
 
 /// Why a scan cannot be read: one sentence each.

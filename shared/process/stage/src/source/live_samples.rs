@@ -33,7 +33,6 @@ pub(super) struct LiveSensors {
     said_at: usize,
 }
 
-/// A live sensor.
 struct Live {
     samples: LiveSamples,
     socket: Option<UdpSocket>,

@@ -23,7 +23,6 @@ pub trait Recorded {
     /// The messages to play, by their sequence number: each topic has all of them.
     fn items(&self) -> Range<u64>;
 
-    /// Reads a message.
     fn read(&mut self, topic: &str, seq: u64) -> Result<RecordedMessage, StageError>;
 }
 

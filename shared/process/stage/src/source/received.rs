@@ -29,9 +29,7 @@ pub struct Received {
     /// Datagrams of others, and descriptions of scans that do not fit into the run. They were
     /// passed over.
     pub foreign_messages: u64,
-    /// Connections so far.
     pub connections: u64,
-    /// Azimuths arrive.
     pub is_receiving: bool,
     /// The scan that was published last.
     pub last_scan: Option<LastScan>,
@@ -115,7 +113,6 @@ pub fn read(manifest: &Manifest) -> Option<Received> {
     Some(Received::from_bytes(&bytes))
 }
 
-/// Writes what is received.
 pub(super) struct ReceivedWriter {
     path: PathBuf,
     file: File,

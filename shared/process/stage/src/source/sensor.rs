@@ -65,7 +65,6 @@ pub trait Sensor {
 /// The event of a sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Arrival {
-    /// A scan is complete.
     Scan,
     /// No scan is complete yet. Without a connection [`Sensor::take`] is to be called again after
     /// this time.

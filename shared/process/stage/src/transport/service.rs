@@ -59,7 +59,6 @@ impl Service {
         self.factory.dynamic_config().number_of_publishers() > 0
     }
 
-    /// Returns the number of subscribers.
     pub fn subscribers(&self) -> usize {
         self.factory.dynamic_config().number_of_subscribers()
     }

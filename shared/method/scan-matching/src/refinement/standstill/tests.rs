@@ -21,7 +21,6 @@ struct Drive {
     path_m: f64,
 }
 
-/// One scan of it.
 struct Step {
     stationary: bool,
     /// Distance of the reported pose from the estimated one.
