@@ -58,7 +58,7 @@ pub fn log(error: LogError) -> PyErr {
     }
 }
 
-/// A radar that does not say its velocity by Doppler.
+/// The radar reports no velocity by Doppler.
 pub fn doppler(error: NoDoppler) -> PyErr {
     config(format!("doppler.kind is `auto`, but {error}"))
 }

@@ -28,7 +28,7 @@ impl State {
         samples: &[Sample],
     ) -> Result<Registered, OdometryError> {
         let mut registered = self.odometry.register(scan, samples)?;
-        // Numbers are those of a run, which counts on where a new chain starts.
+        // Numbering is the same as in a run, which continues to count where a new chain starts.
         registered.seq = self.trajectory.len() as u64;
         let stamp_ns = scan.geometry.stamp_ns;
         let stamps = self.trajectory.stamp_ns.get_or_insert_default();

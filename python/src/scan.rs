@@ -1,4 +1,4 @@
-//! Scans, whose memory is that of numpy arrays.
+//! Scans in the memory of numpy arrays.
 
 use gyre_datasets::ReadError;
 use gyre_radar::{PolarScan, ScanSlot, Sense, SweepGeometry, scan::flag};
@@ -178,7 +178,7 @@ fn power<'py>(bytes: &Bound<'py, PyAny>, geometry: &SweepGeometry) -> PyResult<B
     array.call((shape, dtype), Some(&keywords))
 }
 
-/// Returns the times of azimuths that are measured evenly in time: their mean is that of the scan.
+/// Returns times of azimuths at equal intervals, with the scan's time as their mean.
 fn even_stamps_ns(stamp_ns: i64, sweep_s: f64, azimuths: usize) -> PyResult<Vec<i64>> {
     if !(sweep_s > 0.0 && sweep_s <= 10.0) {
         let sentence = format!("sweep_s is {sweep_s}, but must be above 0 and at most 10 s");

@@ -105,7 +105,7 @@ fn jobs() -> usize {
     thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// Writes the table, and says if it is of several builds.
+/// Writes the table, and reports if several builds computed it.
 fn written(list: &List, settings: &Settings, out: &Path) -> Result<Table, Failure> {
     let table = collect(list, settings, out)?;
     table.write(out)?;

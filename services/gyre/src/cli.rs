@@ -245,7 +245,7 @@ impl RunOptions {
 }
 
 impl RunArguments {
-    /// Returns what is to be run.
+    /// Returns the inputs to run.
     pub fn given(&self) -> Result<Given, InputError> {
         let given = self.inputs.given()?.with_radar(self.radar.as_ref())?;
         // A topic of ROS 2 is a radar too.

@@ -284,7 +284,7 @@ fn check_gnss(configuration: &Configuration) -> Result<(), Failure> {
 }
 
 /// Checks that a process may open as many files as it needs. The transport's own errors would not
-/// say what is missing.
+/// name the missing limit.
 pub fn check_open_files() -> Result<(), PreflightError> {
     match getrlimit(Resource::Nofile).current {
         Some(limit) if limit < MOST_OPEN_FILES => Err(PreflightError::OpenFiles { limit }),

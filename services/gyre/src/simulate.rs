@@ -73,8 +73,8 @@ fn overrides(arguments: &SimulateArguments) -> Result<Vec<String>, Failure> {
     Ok(arguments.set.iter().cloned().chain(options).collect())
 }
 
-/// Writes the recording of a run to `out`, or completes it. If `replace`, it takes the place of
-/// that of an earlier run.
+/// Writes the recording of a run to `out`, or completes it. If `replace`, it replaces the recording
+/// of an earlier run.
 pub fn store(simulation: &SimulationConfig, out: &Path, replace: bool) -> Result<(), Failure> {
     let threads = available_parallelism().unwrap_or(NonZeroUsize::MIN);
     match write(threads, simulation, out) {

@@ -24,7 +24,7 @@ use crate::{
     simulate,
 };
 
-/// The exit code of a stress test that could not be carried out, which says nothing of the
+/// The exit code of a stress test that could not be carried out, which is no verdict on the
 /// pipeline.
 const NOT_CARRIED_OUT: u8 = 2;
 /// Duration of a scenario with `--quick`, s.
@@ -122,8 +122,8 @@ fn carry_out(arguments: &StressArguments) -> Result<Report, Failure> {
     Ok(report)
 }
 
-/// Stores a simulation, so that rendering does not bound the pipeline. What is stored already and
-/// is the same is kept.
+/// Stores a simulation, so that rendering does not bound the pipeline. An unchanged stored
+/// simulation is kept.
 fn render(configuration: &mut Configuration, out: &Out) -> Result<(), Failure> {
     let Some(mut simulation) = configuration.simulation.take() else {
         return Ok(());
@@ -138,7 +138,7 @@ fn render(configuration: &mut Configuration, out: &Out) -> Result<(), Failure> {
     Ok(())
 }
 
-/// All scenarios but those of gyro and wheels that the run or its recording has no place for.
+/// All scenarios except faults of gyro and wheels that are absent from the run or its recording.
 fn possible(tested: &TestedPipeline) -> Vec<Scenario> {
     let all = Scenario::ALL.into_iter();
     all.filter(|scenario| match witness_fault::lacks(tested, *scenario) {

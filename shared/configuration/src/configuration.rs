@@ -195,7 +195,7 @@ impl Configuration {
         }
     }
 
-    /// Returns whether the scans are those of a radar on the network.
+    /// Returns whether the scans come from a radar on the network.
     pub fn is_radar(&self) -> bool {
         self.source.kind != SourceKind::Recording
     }
@@ -205,7 +205,7 @@ impl Configuration {
         self.link.side == Some(side)
     }
 
-    /// Leaves to the other side what it has: the robot has no SLAM, and the base has no scans of
+    /// Removes the sections of the other side: the robot has no SLAM, and the base has no scans of
     /// its own.
     pub fn leave_other_side(&mut self) {
         match self.link.side {
@@ -323,8 +323,8 @@ impl Configuration {
         toml::to_string_pretty(self)
     }
 
-    /// Returns the first key in which this configuration differs from `begun`, of those that the
-    /// result depends on. `None`: a run that was begun with it can be resumed with this.
+    /// Returns the first result-relevant key that differs between this configuration and `begun`.
+    /// `None`: a run that was begun with it can be resumed with this.
     pub fn difference(&self, begun: &toml::Table) -> Result<Option<String>, toml::ser::Error> {
         let relevant = |table: &toml::Table| {
             let mut table = table.clone();

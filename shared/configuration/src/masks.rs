@@ -1,4 +1,4 @@
-//! The library that computes networks, and what the training of masks had otherwise.
+//! The library that computes networks, and the differences from the training of masks.
 
 use std::error::Error;
 

@@ -1,4 +1,4 @@
-//! The settings that decide what is computed.
+//! The settings that decide the computed result.
 
 use gyre_datasets::DatasetOptions;
 use gyre_objects::ObjectsConfig;
@@ -13,8 +13,8 @@ use crate::{
     strict::{section, within},
 };
 
-/// The sections of a configuration that say what is computed of which radar's scans: its file may
-/// have others, which are for a run of processes.
+/// The sections of a configuration that decide the result and the radar; its file may have other
+/// sections, which are for a run of processes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct MethodConfig {
     /// The format of the recording, and the constants of its radar.

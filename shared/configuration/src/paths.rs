@@ -80,9 +80,9 @@ impl Named {
     }
 }
 
-/// Replaces each path that is one from the current folder by the whole one, so that the resolved
-/// configuration names the same from any folder; else by that of the program's file that it names:
-/// paths of the command line.
+/// Replaces each relative path of an existing file by its absolute path, so that the resolved
+/// configuration names the same file from any folder. Other paths of the command line become the
+/// path of the program's file of that name.
 pub fn resolve(table: &mut Table) -> Result<(), ConfigurationError> {
     visit(table, |path, key| {
         let written = Path::new(path.as_str());
@@ -106,8 +106,8 @@ fn put(path: &mut String, found: PathBuf) -> Result<(), ConfigurationError> {
     Ok(())
 }
 
-/// Visits the paths of all keys, and those in the commands of stages: that of the program, others
-/// that begin with a dot, and that of a function of Python.
+/// Visits the paths of all keys, and the paths in the commands of stages: the program, others that
+/// begin with a dot, and a function of Python.
 fn visit(
     table: &mut Table,
     mut each: impl FnMut(&mut String, &str) -> Result<(), ConfigurationError>,
@@ -156,14 +156,14 @@ pub fn shipped(named: &Path) -> Option<PathBuf> {
     }
 }
 
-/// Returns a question for the configuration of the program with the nearest name; empty if none is
-/// alike.
+/// Returns a question for the configuration of the program with the nearest name; empty without a
+/// similar name.
 pub fn suggestion(named: &Path) -> String {
     let known: Vec<&str> = gyre_shipped::configurations().map(|(it, _)| it).collect();
     strict::suggestion(&named.display().to_string(), &known)
 }
 
-/// Returns the error for a name that is neither that of a file nor known.
+/// Returns the error for a name that is neither a file nor known.
 fn unknown(named: &Path, error: ConfigurationError) -> ConfigurationError {
     let is_name = named.extension().is_none() && named.file_name() == Some(named.as_os_str());
     match is_name && !named.exists() {
@@ -229,7 +229,7 @@ impl Places<'_> {
     }
 }
 
-/// Returns whether a file has another content than that of the program.
+/// Returns whether a file differs from the program's file.
 fn differs(own: &Path, file: &Path) -> bool {
     let own = gyre_shipped::bytes(own);
     own.is_some_and(|own| fs::read(file).is_ok_and(|bytes| bytes != own))

@@ -101,7 +101,7 @@ fn check_first(configuration: &Configuration, dataset: &dyn Dataset) -> Result<(
     }
 }
 
-/// Checks that the radar says its velocity by Doppler, if that is used.
+/// Checks that the radar reports its velocity by Doppler, if Doppler is used.
 fn check_doppler(doppler: &DopplerConfig, dataset: &mut dyn Dataset) -> Result<(), SourceError> {
     match doppler.is_used() {
         true => check_first_scan(dataset).map_err(SourceError::NoDoppler),
@@ -156,7 +156,7 @@ pub fn with_stored_options(configuration: &Configuration) -> Result<Configuratio
     Ok(resolved)
 }
 
-/// Returns what tells the recording of a run from another one; `None`: its configuration does.
+/// Returns the identification of a recording; `None`: its configuration does.
 pub fn fingerprint(configuration: &Configuration) -> Result<Option<Fingerprint>, SourceError> {
     let plays_scans = configuration.source.from == PlayedFrom::Scan && !configuration.is_radar();
     if !plays_scans || configuration.streamed().is_some() {

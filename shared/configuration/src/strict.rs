@@ -34,8 +34,8 @@ pub fn parse(path: &Path, text: &str) -> Result<Table, ConfigurationError> {
     })
 }
 
-/// Returns the error for a folder that is named in place of a configuration: that of the results of
-/// a run, or a recording.
+/// Returns the error for a folder that is named in place of a configuration: the results of a run,
+/// or a recording.
 fn folder(path: &Path) -> ConfigurationError {
     let own = path.join("config.toml");
     let remedy = match own.is_file() {
@@ -95,8 +95,7 @@ pub fn section<T: DeserializeOwned>(
     read(name, value)
 }
 
-/// Takes a section of sections out of the table, each of which must have one of the names in
-/// `known`.
+/// Takes a section of sections out of the table, each with one of the names in `known`.
 pub fn sections<T: DeserializeOwned>(
     table: &mut Table,
     name: &str,
@@ -123,7 +122,7 @@ pub fn unknown(section: &str, key: &str, known: &[&str]) -> ConfigurationError {
     }
 }
 
-/// Returns a question for the nearest known name; empty if none is alike.
+/// Returns a question for the nearest known name; empty without a similar name.
 pub(crate) fn suggestion(name: &str, known: &[&str]) -> String {
     let alike = |known: &&str| (strsim::jaro_winkler(name, known) * 1e6) as u64;
     let nearest = known.iter().copied().max_by_key(alike);

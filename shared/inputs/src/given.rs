@@ -1,4 +1,4 @@
-//! The arguments, and what they name.
+//! The arguments and the inputs that they name.
 
 use std::path::{Path, PathBuf};
 
@@ -88,8 +88,8 @@ impl Inputs {
         }
     }
 
-    /// Reads the configuration that is named; without one, that of the recording, which is said.
-    /// The scans are those of the recording, or of the configuration.
+    /// Reads the named configuration; without a name, the configuration of the recording, which is
+    /// then printed. The scans come from the recording, or from the configuration.
     pub fn configuration(&self) -> Result<Configuration, Failure> {
         self.configuration_of(&self.given_recording()?)
     }
@@ -117,8 +117,8 @@ impl Inputs {
     }
 }
 
-/// Reads a configuration by its path or its name, and says where its files are taken from if that
-/// is not clear.
+/// Reads a configuration by its path or its name, and prints the place of its files if that is not
+/// clear.
 pub fn configuration(named: &Path, overrides: &[String]) -> Result<Configuration, Failure> {
     let (configuration, notes) = Configuration::named(named, overrides)?;
     let notes = notes.iter();

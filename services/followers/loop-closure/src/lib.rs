@@ -1,9 +1,9 @@
 //! Loop closing: finds the places that the vehicle has come back to, among the keyframes of the
 //! run.
 //!
-//! It follows `journal/keyframes.log`. The places of keyframes are kept in `journal/places.log` and
-//! the verdicts on all candidates in `journal/loops.log`, from which a restarted process continues.
-//! Both follow from the keyframes, whenever those come.
+//! It follows `journal/keyframes.log`. It keeps the places of keyframes in `journal/places.log` and
+//! the verdicts on all candidates in `journal/loops.log`. A restarted process continues from both
+//! logs. Both follow from the keyframes, whenever those come.
 
 mod logged;
 
@@ -104,7 +104,7 @@ impl Follower for LoopClosing {
     }
 }
 
-/// The logs, and what has been read of them.
+/// The logs and the records read so far.
 struct State {
     keyframes: RecordReader<Keyframe>,
     places: RecordLog<Place>,

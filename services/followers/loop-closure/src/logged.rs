@@ -29,7 +29,7 @@ impl LoggedLoops {
         })
     }
 
-    /// Reads what was logged since the last call, and returns all loops so far, by their numbers.
+    /// Reads new records of the log, and returns all loops so far, by their numbers.
     pub fn refresh(&mut self) -> Result<&[LoopHeader], StageError> {
         self.queries.refresh()?;
         self.keyframes.refresh()?;

@@ -32,7 +32,7 @@ impl LiveFixes {
         })
     }
 
-    /// Ends reception. What has arrived survives a power failure.
+    /// Ends reception. Received fixes survive a power failure.
     pub fn finish(&mut self) -> Result<(), StageError> {
         self.receiver.finish()
     }

@@ -1,5 +1,5 @@
-//! The process of a drive: a run that knows whether it has been computed, and by whose exit code
-//! failures are told apart.
+//! The process of a drive: a run that knows whether it has been computed, and that reports the kind
+//! of a failure by its exit code.
 
 use std::{
     path::Path,
@@ -48,7 +48,7 @@ enum DriveError {
 }
 
 /// Computes a drive, unless it has been computed with the same configuration from the same scans.
-/// The exit code tells the outcome.
+/// The exit code reports the outcome.
 pub fn drive(arguments: &BatchDriveArguments) -> Result<ExitCode, Failure> {
     if !end_with(arguments.parent, Signal::TERM)? {
         return Ok(DriveOutcome::Interrupted.exit_code(false).into());
@@ -65,7 +65,7 @@ pub fn drive(arguments: &BatchDriveArguments) -> Result<ExitCode, Failure> {
 
 /// Returns how the drive has ended, and whether it had before.
 fn computed(arguments: &RunArguments) -> Result<(DriveOutcome, bool), Failure> {
-    // What was to be there when the batch began may have gone.
+    // Input that existed when the batch began may be gone.
     let given = &arguments.inputs;
     let path = given.data.as_ref().or(given.what.first());
     let is_missing = |path: &Path| matches!(path.try_exists(), Ok(false));
@@ -105,7 +105,7 @@ fn locked(path: &Path) -> Result<Out, OutError> {
 /// Returns whether the folder has the results of all these scans with this configuration.
 fn is_finished(out: &Out, configuration: &Configuration) -> bool {
     let is_complete = earlier::is_complete(out.path()) && out.join(SUMMARY).exists();
-    // Where it is not known what the results are of, the run says what cannot be read.
+    // If the source of the results is unknown, the run reports the unreadable file.
     let is_same =
         |begun: Identity| begun.has_inputs_of(configuration, &program::replaced(configuration)?);
     is_complete
@@ -114,7 +114,7 @@ fn is_finished(out: &Out, configuration: &Configuration) -> bool {
             .unwrap_or(false)
 }
 
-/// Returns how a finished drive has ended, and says again what is wrong with it.
+/// Returns the outcome of a finished drive, and repeats its warnings.
 fn finished(out: &Out) -> Result<DriveOutcome, Failure> {
     let text = gyre_storage::read_text(&out.join(SUMMARY), gyre_storage::SETTINGS)?;
     let summary: serde_json::Value = serde_json::from_str(&text)?;
@@ -127,7 +127,7 @@ fn finished(out: &Out) -> Result<DriveOutcome, Failure> {
     })
 }
 
-/// Returns whether an unfinished run in the folder, if there is one, goes on with this
+/// Returns whether an unfinished run in the folder, if there is one, continues with this
 /// configuration. One of another configuration, build or version is discarded, as are complete
 /// results of such a run.
 fn continues(out: &Out, configuration: &Configuration) -> Result<bool, Failure> {
@@ -139,14 +139,14 @@ fn continues(out: &Out, configuration: &Configuration) -> Result<bool, Failure> 
     };
     let programs = program::now(configuration)?;
     let goes_on = begun.require(configuration, &programs, out.path(), Holds::Unfinished(0));
-    // What cannot be read the run itself reports, and keeps what it has.
+    // The run itself reports unreadable files, and keeps the results.
     let is_same = program::replaced(configuration)
         .map_err(Failure::from)
         .and_then(|replaced| begun.has_inputs_of(configuration, &replaced));
     Ok(goes_on.is_ok() && is_same.unwrap_or(true))
 }
 
-/// Says of what has no type of its own that it is the configuration's.
+/// Marks a failure without a type of its own as a failure of the configuration.
 fn of_settings(error: Failure) -> Failure {
     match error.is::<AutomaticError>() || error.is::<ConfigurationError>() {
         true => error,

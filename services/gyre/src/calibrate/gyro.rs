@@ -1,4 +1,4 @@
-//! The gyro beside the scans of a drive: its log, and what the radar says of it.
+//! The gyro beside the scans of a drive: its log, and the radar's findings about the gyro.
 
 use std::path::{Path, absolute};
 
@@ -10,7 +10,7 @@ use gyre_terminal::{Failure, print};
 
 use super::Section;
 
-/// A log, and what is configured of its gyro.
+/// A log and the configuration of its gyro.
 pub(super) struct Gyro {
     log: GyroLog,
     configured: GyroConfig,
@@ -62,7 +62,7 @@ impl Gyro {
     }
 }
 
-/// Calibrates the gyro by the drives that have a log, and prints what they say.
+/// Calibrates the gyro by the drives that have a log, and prints the findings.
 pub(super) fn section(logs: &[(&Gyro, &Drive)]) -> Result<Section, Failure> {
     let Some((first, _)) = logs.first() else {
         return Ok(Section::default());

@@ -37,7 +37,7 @@ pub struct SplitArguments {
     pub split_s: f64,
 }
 
-/// Parses the name of a recording, which readers tell by its ending.
+/// Parses the name of a recording. Readers recognise the format by the ending.
 pub fn recording(text: &str) -> Result<PathBuf, String> {
     match text.strip_suffix(".mcap") {
         Some(name) if !name.is_empty() && !name.ends_with('/') => Ok(text.into()),

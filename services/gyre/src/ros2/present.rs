@@ -19,7 +19,7 @@ use crate::cli::Ros2Arguments;
 
 /// Publishes the runs of a folder until a signal arrives.
 pub fn publish(arguments: &Ros2Arguments) -> Result<ExitCode, Failure> {
-    // One who names the wrong folder is told at once.
+    // A wrong folder is reported at once.
     let run = arguments.run.folder()?;
     if !arguments.wait {
         ObservedRun::writing_to(&run)?;

@@ -11,7 +11,7 @@ use gyre_terminal::{Failure, print};
 use super::results_folder;
 use crate::cli::RunArguments;
 
-/// Reads the configuration and resolves what it leaves open.
+/// Reads the configuration and resolves its open settings.
 pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
     let given = arguments.given()?;
     if arguments.from.is_some() && given.data.is_none() {
@@ -56,7 +56,7 @@ pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
     let idle = configuration.without_effect(&arguments.inputs.set)?;
     idle.iter()
         .for_each(|sentence| print::note(format_args!("gyre: {sentence}")));
-    // The run's processes are told where it is.
+    // The run's processes receive the path of the run.
     path_value(&absolute(&results_folder(arguments)?)?)?;
     Ok(configuration)
 }

@@ -33,7 +33,7 @@ use crate::{
     waker::Waker,
 };
 
-/// Time after which it is said that the robot is waited for at the end.
+/// Time after which a message reports that the base is waiting for the robot at the end.
 const QUIET: Duration = Duration::from_secs(1);
 /// Time between two checks whether the robot has confirmed the end.
 const POLL_INTERVAL: Duration = Duration::from_millis(20);

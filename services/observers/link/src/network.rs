@@ -5,9 +5,9 @@ use std::{net::IpAddr, path::PathBuf};
 use gyre_run::LinkConfig;
 use thiserror::Error;
 
-/// The environment variable, and its value, with which zenoh does all its work in one thread.
+/// The environment variable, and its value, that make zenoh do all its work in one thread.
 ///
-/// By itself zenoh (1.10) reads from and writes to a TLS connection in two threads at once, which
+/// By default zenoh (1.10) reads from and writes to a TLS connection in two threads at once, which
 /// the connection does not allow (eclipse-zenoh/zenoh#2557): under load it breaks within seconds.
 /// Set it before the program starts; TLS is refused without.
 pub const ONE_THREAD: (&str, &str) = (
@@ -20,7 +20,7 @@ pub const ONE_THREAD: (&str, &str) = (
 pub struct Network {
     /// The name of the link, the same on both sides.
     pub name: String,
-    /// Endpoints at which this side waits, as in `tls/0.0.0.0:7447`.
+    /// Endpoints where this side waits for connections, as in `tls/0.0.0.0:7447`.
     pub listen: Vec<String>,
     /// Endpoints that it connects to.
     pub connect: Vec<String>,
@@ -82,7 +82,8 @@ pub enum NetworkError {
     Name(String),
 }
 
-/// The suffixes of names that no public authority certifies: private zones, and those of documents.
+/// The suffixes of names that no public authority certifies: private zones, and names reserved for
+/// documents.
 const PRIVATE_ZONES: [&str; 7] = [
     ".internal",
     ".lan",

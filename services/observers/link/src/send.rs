@@ -39,7 +39,7 @@ const NAME: &str = "link";
 const DEFAULT: [&str; 6] = ["motion", "refined", "pose", "loop", "correction", "fix"];
 /// Bytes that are kept of a topic without payloads: hours.
 const MAX_BYTES: usize = 64 << 20;
-/// Time in which a receiver reconnects whose sender was restarted just before the end.
+/// Time for a receiver to reconnect if its sender was restarted just before the end.
 const RECONNECT_TIME: Duration = Duration::from_secs(6);
 /// Scans that are kept. With one more the newest would arrive later.
 const MAX_SCANS: usize = 2;
@@ -246,7 +246,7 @@ impl SentTopic<'_> {
             match self.observer.take() {
                 Ok(Some(message)) => self.buffer.add(&message),
                 Ok(None) => return Ok(()),
-                // The run judges what its stages send. The message counts as missed.
+                // The run judges the messages of its stages. The message counts as missed.
                 Err(StageError::Malformed { .. }) => {}
                 Err(error) => return Err(error),
             }

@@ -6,7 +6,7 @@ use gyre_recording::RecordingError;
 use gyre_stage::StageError;
 use thiserror::Error;
 
-/// An error because of which there is no recording, or no complete one.
+/// An error that leaves no recording, or an incomplete recording.
 #[derive(Debug, Error)]
 pub enum RecorderError {
     #[error(transparent)]

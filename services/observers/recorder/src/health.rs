@@ -1,5 +1,5 @@
-//! The health of the run, as its supervisor reports it: for recordings, in which one sees later
-//! when a process died.
+//! The health of the run, as its supervisor reports it. In a recording it shows later when a
+//! process died.
 
 use std::{
     path::PathBuf,
@@ -25,7 +25,7 @@ struct Health {
 }
 
 /// Asks the supervisor of a run once a second, in a thread of its own, which ends when nobody takes
-/// what it says. A supervisor that is busy answers late, and recording does not wait for it.
+/// the reports. A supervisor that is busy answers late, and recording does not wait for it.
 pub(crate) fn health(out: PathBuf) -> Receiver<String> {
     let (sender, receiver) = mpsc::sync_channel(1);
     thread::spawn(move || {

@@ -179,7 +179,7 @@ struct Recorder<'run> {
     is_of_run: bool,
     /// Missed messages that the log has reported.
     reported: u64,
-    /// The time at which the next sentence about them is due.
+    /// The time at which the next message about missed messages is due.
     due: Instant,
 }
 
@@ -190,8 +190,8 @@ impl Recorder<'_> {
             // Before the queues are emptied: the messages before the end are still there.
             let has_ended = self.run.has_ended();
             self.take_all()?;
-            // As long as poses are to come masking may be killed, and number anew what it has sent,
-            // the end of the stream too.
+            // As long as poses are to come, masking may be killed and may number its messages
+            // again, even the end of the stream.
             let is_last = |tap: &Tap<'_>| tap.counts().topic == Pose::TOPIC;
             let have_ended = self.taps.iter().any(is_last) && self.taps.iter().all(Tap::has_ended);
             if has_ended || have_ended || writing.is_finished() {

@@ -212,8 +212,8 @@ mod tests {
                 .collect::<Vec<_>>()
         };
         assert_eq!(levels(&state, None), [STALE]);
-        // What was dropped before the bridge began, or while the supervisor did not answer, is not
-        // dropped now.
+        // Drops from before the bridge began, or while the supervisor did not answer, do not count
+        // as present drops.
         state.phase = RunPhase::Working;
         assert_eq!(levels(&state, Some(status(9))), [OK, OK, ERROR]);
         assert_eq!(levels(&state, None), [OK]);

@@ -131,8 +131,8 @@ impl Node {
         subscription.map_err(|error| topic_error(topic, &error))
     }
 
-    /// Subscribes to a topic of which messages may be lost, as drivers publish what a sensor
-    /// measures, with room for so many messages that are not yet taken.
+    /// Subscribes to a lossy topic, as drivers use for sensor data, with room for `depth` messages
+    /// that are not yet taken.
     pub fn subscribe_to_sensor<M: Ros2Message + 'static>(
         &mut self,
         topic: &str,

@@ -77,7 +77,8 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// Counts a message, and what is missing before it. False for one that was published before.
+    /// Counts a message, and the messages missing before it. False for one that was published
+    /// before.
     pub fn count(&mut self, seq: u64) -> bool {
         let next = self.newest.map_or(seq, |newest| newest + 1);
         if seq < next {
@@ -108,7 +109,7 @@ impl RunState {
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum RunPhase {
-    /// There is none yet.
+    /// There is no pose yet.
     #[default]
     Waiting,
     Working,

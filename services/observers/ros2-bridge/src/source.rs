@@ -70,7 +70,7 @@ impl Settings {
         })
     }
 
-    /// The topic of the configuration, beside that of the azimuths.
+    /// The topic of the configuration, beside the topic of the azimuths.
     fn configuration_topic(&self) -> String {
         match self.topic.rsplit_once('/') {
             Some((place, _)) => format!("{place}/configuration_data"),

@@ -84,7 +84,8 @@ pub struct Sizes {
     pub limits: ScanLimits,
 }
 
-/// Asks a radar for its configuration; one that sends by UDP says it with each datagram.
+/// Asks a radar for its configuration. A radar that sends by UDP includes the configuration in each
+/// datagram.
 pub fn ask(settings: &Settings) -> Result<Sizes, AskError> {
     let configuration = configuration(settings)?;
     match SweepAssembler::new(&configuration, settings.constants) {

@@ -16,7 +16,7 @@ use crate::{Settings, parser::RadarParser};
 
 /// The longest time for an attempt to connect.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(1);
-/// Pauses between attempts to connect: the first, and the limit up to which they double.
+/// Pauses between attempts to connect: the first pause, which doubles up to the second.
 const RETRY_PAUSES: [Duration; 2] = [Duration::from_millis(100), Duration::from_secs(5)];
 /// Bytes of other messages, more than wait for a stage that was held up, after which a radar that
 /// sends no azimuths is left although it never falls silent.
@@ -89,7 +89,7 @@ impl Connection {
         self.socket.as_ref().map(RadarSocket::as_fd)
     }
 
-    /// Reads what has arrived, or opens the connection; does not wait for bytes.
+    /// Reads the bytes that have arrived, or opens the connection; does not wait for bytes.
     pub fn receive(&mut self, messages: &mut RadarParser) -> ReadResult {
         let Some(socket) = &mut self.socket else {
             return self.open();
@@ -118,8 +118,8 @@ impl Connection {
         }
     }
 
-    /// Notes that an azimuth has arrived. Other messages do not count: a radar may send no powers
-    /// and still say that it is alive.
+    /// Notes that an azimuth has arrived. Other messages do not count: a radar may send keep-alives
+    /// without powers.
     pub fn note_azimuth(&mut self) {
         self.last_azimuth = Instant::now();
         self.without_azimuth = 0;

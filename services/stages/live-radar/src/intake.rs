@@ -9,7 +9,7 @@ use thiserror::Error;
 
 use crate::{scan_assembly::ScanAssembly, turn_counter::TurnCounter};
 
-/// Assembles the scans of a live source, and counts what is lost.
+/// Assembles the scans of a live source, and counts losses.
 pub struct Intake {
     constants: Constants,
     /// `None` until the radar has sent its configuration.
@@ -110,12 +110,12 @@ impl Intake {
         }
     }
 
-    /// Returns the pause until a scan can be complete, if it is that of a few azimuths.
+    /// Returns the pause until a scan can be complete, if only a few azimuths are missing.
     pub fn pause(&self) -> Option<Duration> {
         self.scans.as_ref().and_then(ScanAssembly::pause)
     }
 
-    /// Returns the time at which the last scan was complete by the radar's clock,
+    /// Returns the time at which the last scan was complete by the radar's clock, in
     /// `CLOCK_MONOTONIC`, ns; `None`: not known.
     pub fn due_ns(&self) -> Option<i64> {
         self.due_ns

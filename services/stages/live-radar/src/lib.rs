@@ -3,7 +3,7 @@
 //!
 //! Reading order: `radar` (the sensor), `connection` and `parser` (bytes to messages), [`Intake`]
 //! and `scan_assembly` (azimuths to scans), `turn_counter` (turns without a scan), `read_delay`
-//! (the time at which a scan was complete).
+//! (the completion time of a scan).
 
 mod ask;
 mod connection;

@@ -89,7 +89,7 @@ impl Sink for Integration {
     }
 
     fn restore(&mut self, count: usize) -> Result<(Vec<PoseHeader>, bool), StageError> {
-        // One at least, to go on from.
+        // At least one pose, to continue from.
         let (mut poses, ended) = self.journal.last(count.max(1)).map_err(unusable)?;
         self.last = poses.last().copied();
         poses.drain(..poses.len().saturating_sub(count));

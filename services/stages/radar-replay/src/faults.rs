@@ -1,4 +1,4 @@
-//! Faults that are put into what is played: `source.faults`.
+//! Faults to inject into the played scans: `source.faults`.
 
 use gyre_datasets::ScanSamples;
 use gyre_messages::ScanHeader;
@@ -62,7 +62,7 @@ impl Faults {
         spoilt.is_valid().then_some(spoilt)
     }
 
-    /// Removes what the radar sees, if it is blind.
+    /// Removes the echoes of the radar, if it is blind.
     pub fn blind(&self, header: &ScanHeader, bytes: &mut [u8]) {
         let is_blind = |fault: &PlayedFault| fault.kind == PlayedFaultKind::RadarBlind;
         if !self.at(header.item.stamp_ns).any(is_blind) {

@@ -31,7 +31,7 @@ const NOTABLE_SLIP_S: f64 = 0.01;
 /// or down.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
-    /// They are dropped, as those of a real sensor.
+    /// They are dropped, as a real sensor would.
     Sensor,
     /// They are played late, since each scan is rendered only when it is read.
     OnDemand,

@@ -22,7 +22,7 @@ pub struct Listing {
 }
 
 impl Listing {
-    /// Returns those of an open dataset.
+    /// Returns the listing of an open dataset.
     pub fn of(dataset: &dyn Dataset) -> Self {
         Self {
             format: dataset.format(),
@@ -36,7 +36,7 @@ impl Listing {
         fs::write(root.join(FILE), [format, self.files.as_bytes()].join(&0))
     }
 
-    /// Reads that of a run; `None` if it has none.
+    /// Reads the listing of a run; `None` if it has none.
     pub fn read(root: &Path) -> io::Result<Option<Self>> {
         let mut bytes = match fs::read(root.join(FILE)) {
             Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),

@@ -1,5 +1,5 @@
-//! `gyre export`: what a run has found, and its scans, as a bag of ROS 2; or the repaired recording
-//! of a run, as RADIATE has it (`repaired`).
+//! `gyre export`: the results of a run, and its scans, as a bag of ROS 2; or the repaired recording
+//! of a run, in RADIATE's format (`repaired`).
 
 mod arguments;
 mod places;

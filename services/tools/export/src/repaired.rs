@@ -1,7 +1,7 @@
 //! The recording of a run with its lost azimuths put back, in RADIATE's form: so that others can be
 //! run on the same scans.
 //!
-//! Where they were lost is taken from the run's journal, which keeps it with each pose.
+//! The places of the losses come from the run's journal, which keeps them with each pose.
 
 use std::{
     fs,
@@ -81,7 +81,7 @@ fn recording(configuration: &Configuration) -> Result<Box<dyn Dataset>, Failure>
     Ok(dataset)
 }
 
-/// Creates the folder of a dataset and of its images, and returns that of the images.
+/// Creates the folder of a dataset and of its images, and returns the folder of the images.
 fn new_folder(out: &Path) -> Result<PathBuf, Failure> {
     let is_free = !out.exists() || fs::read_dir(out).is_ok_and(|mut files| files.next().is_none());
     if !is_free {
@@ -199,7 +199,7 @@ struct Counts {
     repaired: usize,
     /// Azimuths that were put back.
     azimuths: usize,
-    /// Scans of which it is not known where they lost azimuths.
+    /// Scans whose lost azimuths have unknown places.
     anywhere: usize,
 }
 

@@ -64,7 +64,7 @@ pub struct Scans {
 }
 
 impl Source {
-    /// Finds out what a path is.
+    /// Determines the kind of a path.
     pub fn open(path: &Path) -> Result<Self, Failure> {
         let kind = match path {
             path if gyre_recording::is_recording(path) => Kind::Recording,

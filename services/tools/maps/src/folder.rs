@@ -63,8 +63,8 @@ pub fn write(
     })
 }
 
-/// Lets `write` fill a folder, whose files and folders then take the place of those of the same
-/// names in `out`. A process that is killed between these renames leaves what [`finish`] needs.
+/// Lets `write` fill a folder, whose files and folders then replace the entries of the same names
+/// in `out`. A process that is killed between these renames leaves what [`finish`] needs.
 fn replace(out: &Path, write: impl FnOnce(&Path) -> Result<(), Failure>) -> Result<(), Failure> {
     let next = out.join(NEXT);
     storage::create_folder(&next)?;
@@ -81,8 +81,8 @@ fn is_interrupted(out: &Path) -> bool {
     out.join(NEXT).join(MANIFEST).exists()
 }
 
-/// Finishes what a killed process has left: the next map, if it is whole, takes its place, and all
-/// else is removed.
+/// Finishes an exchange that a kill interrupted: the next map, if it is whole, takes its place, and
+/// all else is removed.
 fn finish(out: &Path) -> Result<(), StorageError> {
     let [next, earlier] = [NEXT, EARLIER].map(|name| out.join(name));
     if is_interrupted(out) {
@@ -198,7 +198,7 @@ mod tests {
         assert_eq!(content(map, "map.toml"), "later");
     }
 
-    /// All states in which a kill between two renames leaves the folder.
+    /// All states of the folder after a kill between two renames.
     #[test]
     fn an_exchange_that_was_interrupted_anywhere_is_finished() {
         for renames in 0..=6 {

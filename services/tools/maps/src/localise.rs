@@ -3,7 +3,7 @@
 //! - `scans`: registers scan after scan by odometry in this process;
 //! - `known`: opens the map;
 //! - `fixes`: `fixes.csv`;
-//! - `counts`: what was found, lost and left out.
+//! - `counts`: found, lost and skipped scans.
 
 mod counts;
 pub mod fixes;

@@ -1,4 +1,4 @@
-//! `gyre map`: draws the map of a run, or what has changed from one to another.
+//! `gyre map`: draws the map of a run, or the changes between two runs.
 
 mod arguments;
 mod changes;
@@ -28,7 +28,7 @@ use gyre_terminal::{Failure, print};
 use crate::folder;
 pub use arguments::{MapArguments, MapFormat};
 
-/// The corrected trajectory, and that of odometry.
+/// The corrected trajectory, and the trajectory of odometry.
 const CORRECTED: &str = "trajectory_slam.tum";
 const ODOMETRY: &str = "trajectory.tum";
 const LOOPS: &str = "loops.csv";
@@ -84,9 +84,9 @@ fn draw_run(arguments: &MapArguments) -> Result<Drawing, Failure> {
     Ok(drawing)
 }
 
-/// Draws the keyframes of a run along its trajectory, in the frame in which the frame of the
-/// trajectory has the pose `placed`. What does not fit into memory lies in a file in `folder`,
-/// which has no name.
+/// Draws the keyframes of a run along its trajectory, whose frame has the pose `placed` in the
+/// frame of the drawing. What does not fit into memory lies in a file in `folder`, which has no
+/// name.
 pub fn evidence(run: &Path, folder: &Path, placed: &Pose) -> Result<Evidence, Failure> {
     let mut keyframes = open(run)?;
     let poses = read_trajectory(&trajectory_of(run))?;
@@ -100,7 +100,7 @@ pub fn evidence(run: &Path, folder: &Path, placed: &Pose) -> Result<Evidence, Fa
     Ok(evidence)
 }
 
-/// Returns the place of the map on the earth: the one that was given, else that of the run by GNSS.
+/// Returns the place of the map on the earth: the given place, else the place of the run by GNSS.
 /// Another trajectory has a frame of its own, and so has odometry once fixes have corrected it.
 fn origin(arguments: &MapArguments) -> Result<Option<Origin>, Failure> {
     let is_corrected = trajectory_of(&arguments.run).ends_with(CORRECTED);
@@ -256,7 +256,7 @@ mod tests {
         }
     }
 
-    /// The results of a run of four keyframes, of which the last one is not in the trajectory.
+    /// The results of a run of four keyframes, where the trajectory lacks the last keyframe.
     fn run(folder: &Path) {
         fs::create_dir_all(folder.join("run/journal")).unwrap();
         fs::write(

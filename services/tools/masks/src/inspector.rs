@@ -15,8 +15,8 @@ use ndarray::{Array2, ArrayView2};
 use crate::inspection::{Inspection, MaskedRaster};
 
 /// Scans registered before each inspected one where those are far apart. The first motions are
-/// found without motion compensation, as at a run's start; a few scans later they are what a run
-/// finds, but for its noise.
+/// found without motion compensation, as at a run's start; a few scans later they equal a run's
+/// motions, except for noise.
 const RUN_UP: usize = 8;
 
 /// Masks scans as a run does.

@@ -1,7 +1,7 @@
-//! `gyre masks`: draws what the mask keeps of scans.
+//! `gyre masks`: draws the mask's effect on scans.
 //!
 //! - `inspector`: masks scans one after the other as in a run, and inspects chosen ones;
-//! - `inspection`: what the mask keeps of one of them, in figures;
+//! - `inspection`: the power that the mask keeps of one scan, in figures;
 //! - `drawing`: the same as a picture.
 
 mod drawing;

@@ -12,7 +12,7 @@ use gyre_terminal::{Failure, print};
 use crate::arguments::RunChoice;
 
 impl RunChoice {
-    /// Returns the folder that is named, or that of the only run there is.
+    /// Returns the named folder, or the folder of the only run.
     pub fn folder(&self) -> Result<PathBuf, Failure> {
         match self.named() {
             Some(run) => Ok(run.to_owned()),

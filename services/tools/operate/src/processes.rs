@@ -15,7 +15,7 @@ use crate::arguments::PsArguments;
 
 const NO_RUN: &str = "no run is running";
 
-/// A run with what its processes use, in the order of the status.
+/// A run with the resource use of its processes, in the order of the status.
 #[derive(Serialize)]
 struct ListedRun {
     status: Status,
@@ -92,7 +92,7 @@ impl fmt::Display for ListedRun {
     }
 }
 
-/// Returns what is wrong with a run, a sentence each.
+/// Returns the faults of a run, a sentence each.
 fn ills(status: &Status) -> Vec<String> {
     let out = status.out.display();
     let is_ill = |activity| matches!(activity, Activity::Silent | Activity::Ended);
@@ -131,7 +131,7 @@ pub fn summary(status: &Status) -> String {
     )
 }
 
-/// Returns what is unusual about a process.
+/// Returns the unusual facts about a process.
 fn remarks(process: &ProcessStatus) -> String {
     let mut remarks = String::new();
     if let Some(death) = &process.last_death {
@@ -149,7 +149,7 @@ fn remarks(process: &ProcessStatus) -> String {
     remarks
 }
 
-/// Returns what a radar has not delivered.
+/// Returns the missing deliveries of a radar.
 pub fn lacks(received: &Received) -> String {
     let counts = [
         (received.scans_left_out, "scans left out"),

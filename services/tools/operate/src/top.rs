@@ -58,7 +58,7 @@ pub fn top(arguments: &TopArguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Returns the columns of the terminal; any number where the output is none.
+/// Returns the columns of the terminal; an arbitrary number if the output is not a terminal.
 fn width() -> u16 {
     match io::stdout().is_terminal() {
         true => ratatui::crossterm::terminal::size().map_or(WIDTH as u16, |(columns, _)| columns),
@@ -97,7 +97,7 @@ fn show(
     }
 }
 
-/// Takes the poses that come within `time`; true if `quit` says so.
+/// Takes the poses that come within `time`; true if `quit` returns true.
 fn wait(
     snapshots: &mut Snapshots<'_>,
     time: Duration,

@@ -78,7 +78,7 @@ impl CaptureError {
     }
 }
 
-/// The size of what was recorded or played.
+/// The size of a recorded or played capture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Captured {
     pub records: u64,

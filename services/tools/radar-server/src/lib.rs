@@ -62,7 +62,7 @@ fn played(inputs: &Inputs) -> Result<Configuration, Failure> {
     Ok(configuration.streaming(given.data.as_deref()))
 }
 
-/// Records what a radar sends.
+/// Records the data of a radar.
 fn record(file: &Path, radar: &str, arguments: &RadarServerArguments) -> Result<ExitCode, Failure> {
     let interface = match radar.starts_with("udp://") {
         true => arguments.interface.to_string(),
@@ -99,7 +99,7 @@ fn play(
     Ok(ExitCode::SUCCESS)
 }
 
-/// Returns to whom is played, and says so.
+/// Returns the audience, and prints it.
 fn announced(what: &str, arguments: &RadarServerArguments) -> Result<Audience, Failure> {
     let (audience, address, is_public) = audience(arguments)?;
     print::note(format_args!("gyre: playing {what} as a radar at {address}"));
@@ -111,8 +111,7 @@ fn announced(what: &str, arguments: &RadarServerArguments) -> Result<Audience, F
     Ok(audience)
 }
 
-/// Returns to whom is played, the address at which the radar is received, and whether others than
-/// this machine reach it.
+/// Returns the audience, the address for receiving the radar, and whether other machines reach it.
 fn audience(arguments: &RadarServerArguments) -> Result<(Audience, String, bool), Failure> {
     if let Some(to) = arguments.udp {
         if arguments.rate.factor().is_none() {

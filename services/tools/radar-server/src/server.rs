@@ -24,7 +24,7 @@ pub use gyre_colossus::{ByteOrder, ClockFormat};
 pub use output::Audience;
 pub(crate) use output::{Output, sleep_until};
 
-/// Encoder counts in a turn, where a recording does not say.
+/// Encoder counts in a turn, unless a recording contains them.
 const ENCODER_COUNTS: u16 = 5600;
 /// The longest wait within a recording: longer gaps are shortened to it.
 const MAX_WAIT: Duration = Duration::from_secs(2);
@@ -74,7 +74,7 @@ pub struct Played {
     pub stalls: u64,
 }
 
-/// Plays a recording until it has ended or `stop` says so.
+/// Plays a recording until it has ended or `stop` returns true.
 pub fn serve(
     audience: Audience,
     dataset: &mut dyn Dataset,

@@ -4,8 +4,8 @@ use toml::{Table, Value};
 
 use super::Configuration;
 
-/// Sections of sensors, and the kinds with which a key of them has an effect; with all but `none`
-/// the other keys have one.
+/// Sections of sensors, and the kinds that give one of their keys an effect; the other keys have an
+/// effect with all kinds except `none`.
 const SENSORS: [&str; 3] = ["gyro", "wheels", "gnss"];
 const OF_KINDS: [(&str, &[&str]); 3] = [
     ("file", &["log"]),

@@ -1,4 +1,4 @@
-//! The address at which a radar is received.
+//! The address where a radar is received.
 
 use std::{
     fmt,
@@ -12,7 +12,7 @@ use crate::PORT;
 /// The prefix of an address of datagrams.
 const UDP: &str = "udp://";
 
-/// The address at which a radar is received.
+/// The address where a radar is received.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Address {
     /// Host and port of the radar, which is connected to by TCP.

@@ -67,12 +67,12 @@ impl Configuration {
         f64::from(self.encoder_size.max(1)) / f64::from(self.azimuth_samples.max(1))
     }
 
-    /// Returns the time in which the encoder advances by one count, ns.
+    /// Returns the time per encoder count, ns.
     pub(crate) fn ns_per_count(&self) -> f64 {
         self.period_ns() as f64 / f64::from(self.encoder_size.max(1))
     }
 
-    /// Rejects numbers of which no scan can be made.
+    /// Rejects numbers that make no scan.
     pub fn check(&self) -> Result<(), BadConfiguration> {
         let check = |what, value: f64, bounds: RangeInclusive<f64>| match bounds.contains(&value) {
             true => Ok(()),

@@ -20,7 +20,7 @@ pub enum MalformedMessage {
         "the powers of an azimuth begin at byte {offset} of a payload of {payload_bytes} bytes, expected {AZIMUTH_BYTES} or more"
     )]
     DataOffset {
-        /// The first byte of the powers, as the message says.
+        /// The first byte of the powers, as stated by the message.
         offset: u16,
         /// Bytes of the payload.
         payload_bytes: usize,
@@ -57,7 +57,7 @@ pub enum MalformedDatagram {
     Category(u8),
     #[error("a message of {expected} bytes is in a datagram of {actual}")]
     Length {
-        /// Bytes of the message, as it says.
+        /// Bytes of the message, as stated by it.
         expected: usize,
         /// Bytes of the datagram.
         actual: usize,

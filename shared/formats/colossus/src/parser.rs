@@ -1,4 +1,4 @@
-//! Messages from a stream of bytes, whatever the pieces in which it arrives.
+//! Messages from a stream of bytes that arrives in arbitrary pieces.
 
 use thiserror::Error;
 
@@ -43,19 +43,19 @@ pub enum Damage {
 
 /// A buffer that is filled from a socket, and the messages in it.
 ///
-/// Read into [`Parser::space`], say how much with [`Parser::filled`], and take all events with
-/// [`Parser::next`].
+/// Read into [`Parser::space`], pass the number of bytes to [`Parser::filled`], and take all events
+/// with [`Parser::next`].
 ///
-/// After a fault the parser looks for the next signature. All whole messages after it are found; a
-/// message that is cut short may be returned with some bytes of the next one, and hold up the next
-/// ones until as many bytes are there as it says it has.
+/// After a fault the parser looks for the next signature. All whole messages after it are found. A
+/// message that is cut short may be returned with some bytes of the next message, and may delay the
+/// next messages until its stated number of bytes has arrived.
 #[derive(Debug, Default)]
 pub struct Parser {
     buffer: Vec<u8>,
     /// Received and not yet parsed: `buffer[start..end]`.
     start: usize,
     end: usize,
-    /// Bytes before `start`, of the last message, with which a signature may begin: the message was
+    /// Bytes before `start`, from the last message, that may begin a signature: that message was
     /// cut short then.
     before: usize,
     /// The first fault of the bytes that are being skipped.
@@ -195,8 +195,8 @@ fn agree(one: &[u8], other: &[u8]) -> bool {
     one.iter().zip(other).all(|(a, b)| a == b)
 }
 
-/// Returns the number of bytes at the end with which a signature begins. There is one at most, as
-/// its first byte does not repeat.
+/// Returns the number of bytes at the end that begin a signature. There is one at most, as its
+/// first byte does not repeat.
 fn begun(bytes: &[u8]) -> usize {
     let most = bytes.len().min(SIGNATURE.len() - 1);
     let begun = (1..=most).find(|n| bytes.ends_with(&SIGNATURE[..*n]));

@@ -1,4 +1,4 @@
-//! Messages as bytes: CDR, with the four bytes before it that say its byte order.
+//! Messages as bytes: CDR, after four bytes that state the byte order.
 
 use byteorder::{BigEndian, LittleEndian};
 use thiserror::Error;

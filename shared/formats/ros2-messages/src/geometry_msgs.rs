@@ -178,7 +178,7 @@ message!(
     [Twist]
 );
 
-/// The pose of a frame in another one.
+/// The pose of a frame in another frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Transform {
     /// The position, m.

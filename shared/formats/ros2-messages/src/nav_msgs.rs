@@ -15,7 +15,7 @@ use crate::{
 pub struct Odometry {
     /// Time and frame of the pose.
     pub header: Header,
-    /// The vehicle's frame, in which the velocity is.
+    /// The vehicle's frame, which is the frame of the velocity.
     pub child_frame_id: String,
     pub pose: PoseWithCovariance,
     pub twist: TwistWithCovariance,

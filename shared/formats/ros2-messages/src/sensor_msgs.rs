@@ -1,4 +1,4 @@
-//! `sensor_msgs`: images, and what an inertial sensor and a GNSS receiver measure.
+//! `sensor_msgs`: images, and the measurements of inertial sensors and GNSS receivers.
 
 use gyre_samples::{RawFix, Sample, SampleKind};
 use serde::{Deserialize, Serialize};

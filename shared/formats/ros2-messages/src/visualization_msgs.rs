@@ -110,7 +110,7 @@ message!(
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MarkerArray {
-    /// The shapes, in the order in which they are drawn or removed.
+    /// The shapes, in the order of drawing or removal.
     pub markers: Vec<Marker>,
 }
 message!(

@@ -123,10 +123,10 @@ impl Drive {
         Ok(())
     }
 
-    /// Extracts the points of rising chirps, then those of falling ones. Together, the stronger of
-    /// two neighbours suppresses the other where both chirps see it: of rising chirps the near edge
-    /// of a thing would remain, of falling ones the far edge, which looks like a larger Doppler
-    /// shift.
+    /// Extracts the points of rising chirps, then the points of falling chirps. Together, the
+    /// stronger of two neighbours suppresses the other where both chirps see it: of rising chirps
+    /// the near edge of a thing would remain, of falling ones the far edge, which looks like a
+    /// larger Doppler shift.
     fn points_of_each_chirp(
         &mut self,
         scan: &PolarScan<'_>,
@@ -150,7 +150,7 @@ impl Drive {
         Ok(points)
     }
 
-    /// Returns whether chirps rise and fall by turns, as the scans say.
+    /// Returns whether chirps rise and fall by turns, as the scans report.
     pub fn alternates(&self) -> bool {
         self.alternates
     }
@@ -271,7 +271,7 @@ impl Track {
             .collect()
     }
 
-    /// Returns whether the chain of motions starts anew between two scans.
+    /// Returns whether the chain of motions restarts between two scans.
     pub(crate) fn is_broken(&self, earlier: usize, later: usize) -> bool {
         self.starts[earlier + 1..=later].contains(&true)
     }

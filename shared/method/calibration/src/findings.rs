@@ -17,7 +17,7 @@ use constant::{constant, resolution};
 
 /// The configuration of the drive before it is calibrated.
 pub struct Configured {
-    /// The constants by which the scans were read.
+    /// The constants that were used to read the scans.
     pub geometry: SweepGeometry,
     /// The eccentricity of the encoder by which they were read, rad.
     pub eccentricity_rad: f64,

@@ -139,7 +139,7 @@ pub struct Driver {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DescribedRadar {
     pub radar: Configuration,
-    /// Rows by which images of turns are turned.
+    /// Rows by which the driver turns the images.
     pub azimuth_offset: u16,
 }
 
@@ -251,8 +251,8 @@ impl Driver {
         self.node.type_of(&self.configuration_dds_name) == Some(form.dds_name())
     }
 
-    /// Takes the next sample of the gyro. That of a message that cannot be read, or has no rates,
-    /// is not a number, so that it is counted.
+    /// Takes the next sample of the gyro. The sample of an unreadable message, or one without
+    /// rates, is not a number, so that it is counted.
     pub fn gyro_sample(&self) -> Option<Sample> {
         match self.gyro.as_ref()?.take() {
             Ok(taken) => taken.map(|(imu, _)| imu.sample(clock::since_1970_ns())),

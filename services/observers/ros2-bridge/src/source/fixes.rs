@@ -62,7 +62,7 @@ impl Fixes {
         })
     }
 
-    /// Passes on what has arrived, as many as are kept at most. Those who receive it count lines
+    /// Passes on the arrived fixes, up to the number that is kept. Those who receive it count lines
     /// that are no fix.
     pub fn pass_on(&mut self) {
         for _ in 0..FIXES {

@@ -34,7 +34,7 @@ pub struct RegisteredScan<'a> {
 }
 
 impl Scans {
-    /// Opens what a configuration plays.
+    /// Opens the scans that a configuration plays.
     pub fn open(configuration: &Configuration) -> Result<Self, Failure> {
         let played = gyre_configuration::open(configuration)?;
         let dataset = played.dataset;

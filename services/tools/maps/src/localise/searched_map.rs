@@ -1,4 +1,4 @@
-//! The map in which scans are localised.
+//! The map for localising scans.
 
 use std::path::Path;
 

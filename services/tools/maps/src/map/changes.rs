@@ -1,4 +1,5 @@
-//! `gyre map EARLIER LATER`: what has appeared and gone between two drives through one place.
+//! `gyre map EARLIER LATER`: the things that appeared or vanished between two drives through one
+//! place.
 
 use std::{
     io::Write,

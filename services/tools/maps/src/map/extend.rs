@@ -49,7 +49,7 @@ pub fn extend(arguments: &MapArguments, map: &Path) -> Result<Drawing, Failure> 
     Ok(drawing)
 }
 
-/// The keyframes of the map and those of the run at their poses, numbered through.
+/// The keyframes of the map and the keyframes of the run at their poses, numbered through.
 fn all(
     known: &[Keyframe],
     keyframes: &mut RecordReader<Keyframe>,

@@ -30,7 +30,8 @@ pub fn read_graph(run: &Path, keyframes: usize) -> Result<G2o, Failure> {
     }
 }
 
-/// Places a run in a map, and says how much of it was found. `names` are the folders of both.
+/// Places a run in a map, and reports the share of the run that was found. `names` are the folders
+/// of both.
 pub fn place(
     graph: &G2o,
     keyframes: &mut RecordReader<Keyframe>,

@@ -75,7 +75,7 @@ impl Clients {
         }
     }
 
-    /// Ends all connections when the clients have read what was sent.
+    /// Ends all connections when the clients have read all sent bytes.
     pub fn close(&self) {
         let clients: Vec<_> = lock(&self.all).drain(..).collect();
         for mut client in clients {

@@ -7,7 +7,7 @@ use crate::{
 };
 
 impl RadarFftDataMsg {
-    /// Returns the azimuth as the radar sent it. Its angle is that of the encoder:
+    /// Returns the azimuth as the radar sent it. The angle comes from the encoder, because
     /// [`RadarFftDataMsg::angle`] is wrong.
     pub fn azimuth(&self) -> Azimuth<'_> {
         Azimuth {

@@ -46,12 +46,12 @@ pub struct TimedAzimuth<'a> {
 }
 
 impl RadarBScanMsg {
-    /// Returns the azimuths in order. Rows that the driver has not written (its index overruns the
-    /// image where the encoder's counts are no multiple of the azimuths, and leaves other rows out)
-    /// are none. The driver's first turn may have none at all: where the first azimuth that it
+    /// Returns the azimuths in order. Rows that the driver has not written are left out: its index
+    /// overruns the image where the encoder's counts are no multiple of the azimuths, and skips
+    /// other rows. The driver's first turn may have none at all: where the first azimuth that it
     /// receives has encoder count 0, it publishes the turn before that.
     ///
-    /// `arrived_ns` is the host's time at which the message was received.
+    /// `arrived_ns` is the host's time of receipt of the message.
     pub fn rows<'a>(
         &'a self,
         radar: &Configuration,
@@ -95,8 +95,8 @@ impl RadarBScanMsg {
     }
 }
 
-/// Returns the unit of the times of rows: the one in which they advance most nearly as the radar
-/// turns.
+/// Returns the unit of the times of rows: the unit that makes the times advance most nearly as the
+/// radar turns.
 fn unit_ns(radar: &Configuration, encoders: &[u16], stamps: &[u64]) -> u64 {
     let mut written = encoders.iter().zip(stamps).filter(|(_, stamp)| **stamp > 0);
     let (Some(first), Some(last)) = (written.next(), written.next_back()) else {
