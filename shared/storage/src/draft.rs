@@ -11,7 +11,7 @@ use std::{
 use crate::record::{self, Operation};
 use crate::{File, StorageError, folder::sync_folder};
 
-/// The name of a draft is that of its file between these.
+/// The name of a draft is the name of its file between these.
 const AHEAD: &str = ".";
 const BEHIND: &str = ".tmp";
 /// Processes that write drafts of one file at once.

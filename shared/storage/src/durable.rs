@@ -22,8 +22,8 @@ pub struct DurableFile {
 }
 
 impl DurableFile {
-    /// Opens or creates a file and its folder, and locks it for this process. `prepare` makes of
-    /// what it finds there what the process goes on from, before the thread starts.
+    /// Opens or creates a file and its folder, and locks it for this process. `prepare` turns the
+    /// existing content into a state from where the process continues, before the thread starts.
     pub fn open<E: From<StorageError> + From<Busy>>(
         path: &Path,
         prepare: impl FnOnce(&File) -> Result<(), E>,
@@ -46,12 +46,12 @@ impl DurableFile {
     }
 
     /// Fills `bytes` with the content of a slot; false if the file ends before.
-    /// [`Checksum::is_right`] says whether it is whole.
+    /// [`Checksum::is_right`] checks whether it is whole.
     pub fn read(&self, slots: &Slots, slot: u64, bytes: &mut [u8]) -> Result<bool, StorageError> {
         self.file.read_at(bytes, slots.offset(slot))
     }
 
-    /// Writes `bytes` at the start of a slot. [`changed`](Self::changed) counts what was written.
+    /// Writes `bytes` at the start of a slot. [`changed`](Self::changed) counts the writes.
     pub fn write(&self, slots: &Slots, slot: u64, bytes: &[u8]) -> Result<(), StorageError> {
         self.file.write_at(bytes, slots.offset(slot))
     }
@@ -89,8 +89,7 @@ impl Slots {
     }
 }
 
-/// The place of a CRC-32 by which the content of a slot is known to be whole. Numbers are
-/// little-endian.
+/// The place of a CRC-32 that proves the content of a slot whole. Numbers are little-endian.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Checksum {
     /// The first eight bytes, with one more bit set: it is never zero, as in an empty slot.
@@ -117,7 +116,7 @@ impl Checksum {
         }
     }
 
-    /// Returns whether the checksum is that of the content.
+    /// Returns whether the checksum matches the content.
     #[must_use]
     pub fn is_right(self, slot: &[u8]) -> bool {
         match self {

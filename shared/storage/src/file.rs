@@ -140,7 +140,7 @@ impl File {
         }
     }
 
-    /// Checks that the file still has its name. Without it nobody else finds what is written.
+    /// Checks that the file still has its name. Without it no other process finds the written data.
     pub fn require_name(&self) -> Result<(), StorageError> {
         let failed = StorageError::at("keep", &self.path);
         let id = |metadata: fs::Metadata| (metadata.dev(), metadata.ino());
@@ -215,7 +215,7 @@ impl File {
         Ok(())
     }
 
-    /// Cuts off what is behind `end`, if there is anything.
+    /// Cuts off the bytes behind `end`, if there are any.
     pub fn cut_to(&self, end: u64) -> Result<(), StorageError> {
         match self.length()? > end {
             true => self.set_length(end),

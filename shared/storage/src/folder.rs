@@ -6,7 +6,7 @@ use crate::StorageError;
 #[cfg(feature = "record")]
 use crate::record::{self, Operation};
 
-/// Makes the names in a folder survive a power failure: those of its new, renamed and removed
+/// Makes the names in a folder survive a power failure: the names of its new, renamed and removed
 /// files. An empty path, as above a bare name, is the current folder.
 pub fn sync_folder(folder: &Path) -> Result<(), StorageError> {
     let folder = match folder.as_os_str().is_empty() {

@@ -34,7 +34,7 @@ struct Progress {
     /// The number of changes that somebody waits for.
     awaited: u64,
     ending: bool,
-    /// Why a synchronisation has failed. There is none after it.
+    /// Why a synchronisation has failed. No synchronisation follows it.
     failure: Option<(io::ErrorKind, String)>,
 }
 

@@ -20,7 +20,7 @@ use rustix::{
 pub enum Attempt {
     /// It is locked as long as this file is open.
     Locked(File),
-    /// Another process holds the lock: `process 123 (gyre)`, where the system tells.
+    /// Another process holds the lock: `process 123 (gyre)`, if the system reports it.
     Held(Option<String>),
 }
 

@@ -1,6 +1,6 @@
 //! A log: a file of records of any length, each with a checksum, that grows at its end.
 //!
-//! One process appends, others read what is complete meanwhile. Each record is one `write`. A
+//! One process appends, others read complete records meanwhile. Each record is one `write`. A
 //! record that is cut short by a death is the last one; a thread synchronises the file, so that a
 //! power failure takes or damages at most the last [`GroupSync::LIMIT`](crate::GroupSync::LIMIT)
 //! records. Those are cut off when the log is opened. Any other damaged record was whole once, and
@@ -27,10 +27,10 @@ use crate::{Busy, DurableFile, StorageError};
 pub use reader::LogReader;
 use records::{Records, encode};
 
-/// The start of a log: what its records are, and their version.
+/// The start of a log: the kind of its records, and their version.
 pub type LogMagic = [u8; 16];
 
-/// The longest record. So the memory for reading one is bounded, whatever the file says.
+/// The longest record. So the memory for reading one is bounded, even for a damaged file.
 const MAX_BYTES: usize = 16 << 20;
 /// Records for which memory is taken at once.
 const MANY: usize = 4096;
@@ -47,7 +47,7 @@ pub enum LogError {
         /// The number of the record, from 0.
         record: usize,
     },
-    /// A record is what was written, and not of the kind of this log.
+    /// A record is undamaged, but of a different kind than this log.
     #[error("record {record} of {path} is of another kind: move it away, or choose another --out")]
     Malformed {
         path: PathBuf,
@@ -71,9 +71,9 @@ pub struct Log {
 }
 
 impl Log {
-    /// Opens or creates a log, and cuts off what a death or a power failure has left of the last
-    /// records. Of the others only the headers are read. What is in the log then survives a power
-    /// failure.
+    /// Opens or creates a log, and cuts off incomplete last records, left by a death or a power
+    /// failure. Of the others only the headers are read. The contents of the log then survive a
+    /// power failure.
     pub fn open(path: &Path, magic: LogMagic) -> Result<Self, LogError> {
         let mut records = Records::new(path, magic);
         let file = DurableFile::open(path, |file| {
@@ -105,8 +105,8 @@ impl Log {
         self.len() == 0
     }
 
-    /// Takes the memory for appending many records of up to so many bytes: none is allocated for
-    /// each.
+    /// Allocates the memory for appending records of up to `bytes` bytes: later appends allocate
+    /// nothing.
     pub fn reserve(&mut self, bytes: usize) {
         self.buffer.reserve(bytes + records::MARGIN);
         self.records.reserve(MANY);

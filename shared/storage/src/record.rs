@@ -32,13 +32,13 @@ pub enum Operation {
         /// The number of the synchronisation.
         id: u64,
     },
-    /// It has ended: what was written before it began survives.
+    /// It has ended: writes before its begin survive.
     SyncEnds {
         path: PathBuf,
         /// The number of the synchronisation.
         id: u64,
     },
-    /// A file renamed, in place of another one.
+    /// A file renamed, in place of an existing one.
     Rename {
         from: PathBuf,
         to: PathBuf,
@@ -48,7 +48,7 @@ pub enum Operation {
     SyncFolder(PathBuf),
 }
 
-/// Records the changes below a folder while it lives, those of all threads of this process.
+/// Records the changes below a folder while it lives, by all threads of this process.
 #[derive(Debug)]
 pub struct Recorder(PathBuf);
 

@@ -43,8 +43,8 @@ pub fn note(text: impl Display) {
     let _ = writeln!(io::stderr(), "{text}");
 }
 
-/// Replaces what a terminal would take as a command: names and words of files are quoted as they
-/// are.
+/// Replaces characters that a terminal would execute as commands: names and words of files are
+/// quoted unchanged.
 fn printable(text: &str) -> String {
     let plain = |c: char| {
         if c.is_control() && c != '\n' {

@@ -18,7 +18,7 @@ pub fn parse<P: Parser>(program: &str) -> Result<P, ExitCode> {
     parse_as(P::command(), program)
 }
 
-/// As [`parse`], by this command, whose arguments are those of `P`.
+/// As [`parse`], by this command, whose arguments are `P`'s.
 pub fn parse_as<P: Parser>(command: clap::Command, program: &str) -> Result<P, ExitCode> {
     let matches = command.max_term_width(WIDTH).try_get_matches();
     let parsed = matches.and_then(|matches| P::from_arg_matches(&matches));

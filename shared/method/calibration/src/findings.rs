@@ -19,9 +19,9 @@ use constant::{constant, resolution};
 pub struct Configured {
     /// The constants that were used to read the scans.
     pub geometry: SweepGeometry,
-    /// The eccentricity of the encoder by which they were read, rad.
+    /// The eccentricity of the encoder that was used to read them, rad.
     pub eccentricity_rad: f64,
-    /// The range from which on points are used, m.
+    /// The shortest range of the points that are used, m.
     pub min_range_m: f64,
     /// Length of the path by another sensor, m.
     pub distance_m: Option<f64>,
@@ -35,7 +35,7 @@ pub struct Found {
     /// Length of the path, m.
     pub path_m: f64,
     has_settled: bool,
-    /// Mean overlap of scans of one place as configured, and with what the drive determines.
+    /// Mean overlap of scans of one place as configured, and with the drive's findings.
     overlap: [f64; 2],
     /// The constants but for the range resolution.
     pub constants: Vec<Constant>,
@@ -48,7 +48,7 @@ pub struct Found {
 }
 
 impl Found {
-    /// Compares what was found with what is configured.
+    /// Compares the findings with the configuration.
     pub fn new(
         drive: &Drive,
         calibration: &Calibration,
@@ -61,7 +61,7 @@ impl Found {
             .copied()
             .unwrap_or_default();
         let geometry = &configured.geometry;
-        // Where the scans say which chirps rise, its sign is that of the chirp.
+        // If the scans contain the direction of chirps, its sign is the chirp's.
         let doppler_s = match (drive.alternates(), f64::from(geometry.doppler_s)) {
             (true, configured) => configured.abs(),
             (false, configured) => configured,
@@ -105,8 +105,8 @@ impl Found {
         })
     }
 
-    /// Returns the means of what several drives say, each weighted by its uncertainty, and their
-    /// overlap yet to be compared. The rest is in what each of them says alone.
+    /// Returns the means over several drives, each weighted by its uncertainty, with their overlap
+    /// yet to be compared. Each drive keeps the rest in its own findings.
     pub(crate) fn mean(first: &Self, others: &[&Self]) -> Self {
         let drives = || iter::once(&first).chain(others);
         let constants = (0..first.constants.len()).map(|k| {
@@ -136,7 +136,7 @@ impl Found {
         change
     }
 
-    /// Takes the overlap as configured and with what is proposed, which is not if that is less.
+    /// Takes the overlap as configured and as proposed; a lower overlap revokes the proposal.
     pub(crate) fn compared(mut self, overlap: [f64; 2]) -> Self {
         self.overlap = overlap;
         if overlap[1] < overlap[0] {

@@ -1,10 +1,10 @@
-//! A drive with what it says, and several drives of one radar together.
+//! A drive with its findings, and several drives of one radar together.
 
 use std::iter;
 
 use crate::{Calibration, CalibrationError, Configured, Drive, Found, calibrate};
 
-/// A drive, and what it says.
+/// A drive and its findings.
 pub struct Study {
     pub drive: Drive,
     pub calibration: Calibration,
@@ -24,8 +24,8 @@ impl Study {
         })
     }
 
-    /// Combines what this drive and others of one radar say, each with its own uncertainty. It is
-    /// proposed if their scans overlap more with it, all together.
+    /// Combines the findings of this drive and of others of one radar, each with its own
+    /// uncertainty. It is proposed if their scans overlap more with it, all together.
     pub fn combined(&self, others: &[Self]) -> Result<Found, CalibrationError> {
         let of_others: Vec<_> = others.iter().map(|it| &it.found).collect();
         let mean = Found::mean(&self.found, &of_others);

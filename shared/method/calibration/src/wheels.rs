@@ -1,7 +1,7 @@
 //! The clock and the scale of the wheels, from the distances that the radar drives.
 //!
 //! As for a [gyro](crate::calibrate_gyro): the log fits where the radar's distances correlate with
-//! it best, over all offsets of its clock. What tells the offset is how the speed changes.
+//! it best, over all offsets of its clock. Changes of the speed determine the offset.
 
 use std::path::Path;
 
@@ -25,23 +25,23 @@ const PERIOD_SHARE: f64 = 0.1;
 const SCALE_SIGMA: f64 = 2e-3;
 /// An offset that is known less well is refused, s: while braking at 5 m/s² it is half a m/s.
 const MAX_LATE_SIGMA_S: f64 = 0.1;
-/// Scales that wheels can have: beyond, their unit is another one.
+/// Scales that wheels can have: beyond, their unit is different.
 const SCALES: std::ops::RangeInclusive<f64> = 0.8..=1.25;
 
 /// The clock and the scale of the wheels, by the distances of the radar.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WheelCalibration {
-    /// Time by which the stamps of the wheels are late, s.
+    /// The delay of the wheels' stamps, s.
     pub late_s: Estimate,
     /// True distance over the measured one.
     pub scale: Estimate,
-    /// Correlation of the distances with those of the radar.
+    /// Correlation of the distances with the radar's.
     pub correlation: f64,
     /// Number of distances that were compared, of a second each.
     pub distances: usize,
 }
 
-/// Why a drive does not tell the clock of the wheels.
+/// Why a drive does not determine the clock of the wheels.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum WheelError {
     #[error(
@@ -145,7 +145,7 @@ fn calibrate_distances(
 }
 
 impl WheelCalibration {
-    /// Returns the mean of what drives of one vehicle say, each weighted by its uncertainty.
+    /// Returns the mean over drives of one vehicle, each weighted by its uncertainty.
     #[must_use]
     pub fn mean(&self, others: &[Self]) -> Self {
         others.iter().fold(*self, |mean, other| Self {
@@ -177,7 +177,7 @@ impl WheelCalibration {
         )
     }
 
-    /// Returns the lines of a table, beside what is configured if wheels are used.
+    /// Returns the lines of a table, beside the configured values if wheels are used.
     pub fn table(&self, configured: &WheelsConfig) -> String {
         let line = |name: &str, found: &Estimate, unit: &str, value: f64| {
             let verdict = match (value - found.value).abs() > WRONG_SIGMAS * found.sigma {

@@ -66,7 +66,7 @@ pub enum EstimationError {
     },
     #[error("there is no keyframe {keyframe}: there are {keyframes}, counted from 0")]
     NoKeyframe { keyframe: usize, keyframes: usize },
-    /// Poses to start from are not those of the keyframes of the graph.
+    /// The number of poses to start from differs from the number of keyframes of the graph.
     #[error(
         "there are {poses} poses to start from, and {keyframes} keyframes: each keyframe needs one"
     )]

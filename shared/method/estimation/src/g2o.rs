@@ -143,8 +143,8 @@ fn line(text: &mut String, content: std::fmt::Arguments<'_>) {
     let _ = writeln!(text, "{content}");
 }
 
-/// Returns the matrix that turns (x, y, yaw) along the axes of the keyframe `to` into that along
-/// those of `from`.
+/// Returns the matrix that turns (x, y, yaw) along the axes of the keyframe `to` into (x, y, yaw)
+/// along the axes of `from`.
 fn axes(motion: &Pose) -> Matrix3<f64> {
     motion.rotation.to_rotation_matrix().to_homogeneous()
 }

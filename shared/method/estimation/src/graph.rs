@@ -38,8 +38,8 @@ pub struct GraphOptions {
 }
 
 impl Default for GraphOptions {
-    /// Returns a gate at 99.9 %, dynamic covariance scaling from a quarter of it, and groups of
-    /// which each counts as one loop.
+    /// Returns a gate at 99.9 %, dynamic covariance scaling from a quarter of it, and groups that
+    /// count as one loop each.
     fn default() -> Self {
         Self {
             gate: CHI_SQUARE_99_9,
@@ -57,8 +57,8 @@ impl Default for GraphOptions {
 /// squares.
 ///
 /// The first pose is known exactly. Loops are tested twice: each against the odometry alone when it
-/// comes, so that the verdict does not depend on what came before it, and all against each other by
-/// the kernel when the graph is solved.
+/// comes, so that the verdict does not depend on earlier loops, and all against each other by the
+/// kernel when the graph is solved.
 pub struct PoseGraph {
     options: GraphOptions,
     state: State,
@@ -76,8 +76,8 @@ pub struct PoseGraph {
 #[derive(Clone)]
 struct State {
     poses: Vec<Pose>,
-    /// The pose of the graph's frame in that of the positions; `None` without positions that tell
-    /// it. In the equations it follows the poses.
+    /// The pose of the graph's frame in the frame of the positions; `None` without positions that
+    /// determine it. In the equations it follows the poses.
     frame: Option<Pose>,
 }
 
@@ -108,11 +108,11 @@ pub struct WeightedLoop {
 /// The result of solving a pose graph.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Solution {
-    /// Half the sum of the squared normalised residuals, those of loops after the kernel.
+    /// Half the sum of the squared normalised residuals, with loops after the kernel.
     pub cost: f64,
     pub iterations: usize,
     /// True if the poses are at a minimum of the cost. If not, the iterations were too few, and a
-    /// further solution goes on from there.
+    /// further solution continues from there.
     pub converged: bool,
 }
 
@@ -193,7 +193,7 @@ impl PoseGraph {
         &self.state.poses
     }
 
-    /// Moves all poses, for instance to those of a file, as the start of the next solution. The
+    /// Moves all poses, for instance to the poses of a file, as the start of the next solution. The
     /// first pose stays fixed where it is put.
     pub fn start_from(&mut self, poses: &[Pose]) -> Result<(), EstimationError> {
         if poses.len() != self.state.poses.len() {
@@ -207,14 +207,14 @@ impl PoseGraph {
         Ok(())
     }
 
-    /// Returns half the sum of the squared normalised residuals at the present poses, those of
-    /// loops after the kernel.
+    /// Returns half the sum of the squared normalised residuals at the present poses, with loops
+    /// after the kernel.
     pub fn cost(&self) -> f64 {
         0.5 * self.chi_square(&self.state, Weights::Kernel)
     }
 
-    /// Returns all loops that passed the gate, in the order in which they came, or by keyframes
-    /// after [`PoseGraph::solve_anew`].
+    /// Returns all loops that passed the gate, in the order of arrival, or by keyframes after
+    /// [`PoseGraph::solve_anew`].
     pub fn loops(&self) -> impl Iterator<Item = WeightedLoop> + '_ {
         self.loops.iter().map(|closing| {
             let [from, to] = closing.edge.ends;
@@ -255,7 +255,7 @@ impl PoseGraph {
         Edge::new([from, to], motion).ok_or(EstimationError::Covariance { from, to })
     }
 
-    /// The system is not that of the present constraints.
+    /// Marks the system as out of date.
     fn forget_system(&mut self) {
         self.system = None;
         self.factorised = false;

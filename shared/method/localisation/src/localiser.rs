@@ -46,10 +46,9 @@ pub struct Fix {
     pub pose: UncertainMotion,
     /// Masked correlation of the scan with the submap.
     pub correlation: f64,
-    /// Difference of the correlation from that of any other pose that was tried; for a first fix
-    /// only.
+    /// Difference of the correlation from the next best pose that was tried; for a first fix only.
     pub margin: f64,
-    /// The keyframe of the map with which it was registered.
+    /// The keyframe of the map that was used for registration.
     pub keyframe: usize,
 }
 
@@ -92,8 +91,8 @@ pub struct Localiser {
 }
 
 impl Localiser {
-    /// Plans the localisation of scans of at most `capacity` points. `refinement` is that of the
-    /// odometry.
+    /// Plans the localisation of scans of at most `capacity` points. `refinement` is the
+    /// odometry's.
     pub fn new(
         map: Map,
         options: LocaliserOptions,
@@ -148,7 +147,7 @@ impl Localiser {
         fix.filter(|fix| self.is_accepted(fix))
     }
 
-    /// Finds the pose at which a scan is most similar to the map, however little.
+    /// Finds the pose with the highest similarity of a scan to the map, however low.
     pub fn most_similar(&mut self, points: &[SparsePoint], twist: &Twist) -> Option<Fix> {
         self.scan.start(points, twist);
         self.registration.set_scan(&self.scan);
@@ -196,7 +195,8 @@ impl Localiser {
         }
     }
 
-    /// Searches around a candidate, at both headings that its descriptor cannot tell apart.
+    /// Searches around a candidate, at both headings, since its descriptor is ambiguous by half a
+    /// turn.
     fn search(&mut self, candidate: usize) {
         let Candidate { place, yaw_rad, .. } = self.candidates[candidate];
         self.draw(place);

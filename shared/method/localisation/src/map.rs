@@ -140,7 +140,7 @@ impl Map {
         }
     }
 
-    /// Plans a submap with room for that of any keyframe.
+    /// Plans a submap with room for any keyframe's submap.
     pub(crate) fn new_submap(&self) -> Submap {
         Submap::with_capacity(self.largest() * (2 * MAX_NEIGHBOURS + 1))
     }

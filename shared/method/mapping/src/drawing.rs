@@ -8,8 +8,8 @@ use nalgebra::Point2;
 
 use crate::{Evidence, MapError, MapOptions, Overlay, map_png};
 
-/// Odometry's trajectory is drawn if it is somewhere by so many cells beside the other one: nearer
-/// lines are one.
+/// Odometry's trajectory is drawn if it is somewhere this many cells away from the other one:
+/// nearer lines coincide.
 const APART_CELLS: f64 = 3.0;
 
 /// The map of keyframes in the frame of the first one that is drawn. Poses are given in one other
@@ -23,7 +23,7 @@ pub struct Drawing {
     is_corrected: bool,
 }
 
-/// The first keyframe, in the frame that poses are given in, and in that of odometry.
+/// The first keyframe, in the frame of the given poses, and in the frame of odometry.
 #[derive(Clone, Copy)]
 struct First {
     pose: Pose,
@@ -55,7 +55,7 @@ impl Drawing {
         Ok(())
     }
 
-    /// Returns what the keyframes say.
+    /// Returns the evidence of the keyframes.
     pub fn evidence(&mut self) -> &mut Evidence {
         &mut self.evidence
     }
@@ -65,7 +65,7 @@ impl Drawing {
     }
 
     /// Returns the picture of the map as a PNG file, with the trajectory and both ends of each
-    /// loop; and with odometry's trajectory where that is another one.
+    /// loop, and with odometry's trajectory if it differs.
     pub fn png(&mut self, trajectory: &[Pose], loops: &[[Pose; 2]]) -> Result<Vec<u8>, MapError> {
         let map_from_given = self.first.map_or(Pose::identity(), |it| it.pose.inverse());
         let trajectory: Vec<Pose> = trajectory

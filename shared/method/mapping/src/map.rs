@@ -171,7 +171,7 @@ impl Map {
         })
     }
 
-    /// The version, which other versions of this program say in the same way.
+    /// The version, which other versions of this program write in the same form.
     fn version(text: &str) -> Result<i64, String> {
         let table: toml::Table =
             toml::from_str(text).map_err(|error| format!("map.toml: {}", error.message()))?;

@@ -18,7 +18,7 @@ pub enum Occupancy {
 }
 
 impl Occupancy {
-    /// Returns what a cell is.
+    /// Classifies a cell.
     pub fn of(cell: Cell) -> Self {
         match cell {
             cell if cell.looked < KNOWN_LOOKED => Self::Unknown,

@@ -34,7 +34,8 @@ const MAX_CELL_M: f64 = 3.2;
 /// The overlay drawn over a map, all in the map frame.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Overlay<'a> {
-    /// The trajectory by which the map was drawn, or one through it, in pieces that are not joined.
+    /// The trajectory that was used to draw the map, or one through it, in pieces that are not
+    /// joined.
     pub trajectory: &'a [&'a [Pose]],
     /// The trajectory by odometry alone, drawn thin; empty where it is the same.
     pub odometry: &'a [Pose],
@@ -52,8 +53,8 @@ impl Overlay<'_> {
     }
 }
 
-/// Returns options with the smallest cells, doubled from the default ones, of which a picture of
-/// the map around `poses` has at most 2,048 a side; none are larger than 3.2 m.
+/// Returns options with the smallest cells, doubled from the default, that give a picture of the
+/// map around `poses` at most 2,048 cells a side; cells are at most 3.2 m.
 pub fn legible(options: MapOptions, poses: &[Pose]) -> MapOptions {
     let finite = || {
         let places = poses.iter().map(|pose| pose.translation.vector);

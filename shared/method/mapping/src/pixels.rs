@@ -47,8 +47,8 @@ const STRONG: [f32; 3] = [255.0, 236.0, 190.0];
 const WEAK_EVIDENCE: f32 = 45.0;
 const STRONG_EVIDENCE: f32 = 100.0;
 
-/// Steps of evidence and of looks that the eye does not tell apart: a picture without them is half
-/// as large.
+/// Steps of evidence and of looks that are invisible to the eye: a picture without them is half as
+/// large.
 const EVIDENCE_STEP: u8 = 4;
 const LOOKED_STEP: u8 = 15;
 

@@ -19,8 +19,8 @@ pub fn extent(source: &impl TileSource, form: &'static str) -> Result<TileExtent
     }
 }
 
-/// Calls `take` with the cells of each row of tiles, that of the highest y first, as rows of the
-/// whole width.
+/// Calls `take` with the cells of each row of tiles, from the highest y down, as rows of the whole
+/// width.
 pub fn for_each(
     source: &mut impl TileSource,
     extent: &TileExtent,

@@ -121,7 +121,7 @@ impl MaskingConfig {
         }
     }
 
-    /// Returns the power up to which returns are set to zero.
+    /// Returns the highest power that is set to zero.
     pub fn floor(&self) -> u8 {
         match self.kind {
             MaskKind::None => 0,

@@ -122,10 +122,10 @@ impl Masker {
     }
 
     /// Masks a scan into `later` (n x n, row 0 far ahead). If the mask takes two scans, the
-    /// previous scan that this one `follows`, masked for this pair, goes into `earlier`; a scan
-    /// that follows none is its own previous scan. Returns the velocity that was used for motion
-    /// compensation.
-    /// Fails if the scan [cannot follow](Masker::can_follow) the previous scan.
+    /// previous scan that this one `follows`, masked for this pair, is written to `earlier`; a scan
+    /// without a predecessor is its own previous scan. Returns the velocity that was used for
+    /// motion compensation. Fails if the scan [cannot follow](Masker::can_follow) the previous
+    /// scan.
     pub fn mask(
         &mut self,
         sweep: &Sweep<'_>,

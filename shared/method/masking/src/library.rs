@@ -15,9 +15,9 @@ pub enum Library {
 }
 
 impl Library {
-    /// Returns the library that computes the networks of a configuration. ONNX Runtime that is
-    /// named is required: only where none is named or installed, rten stands in for it, and only on
-    /// the processor.
+    /// Returns the library that computes the networks of a configuration. ONNX Runtime is required
+    /// if it is named. If it is neither named nor installed, rten replaces it, but only on the
+    /// processor.
     pub fn find(config: &MaskingConfig) -> Result<Self, RuntimeError> {
         if config.backend == Backend::Rten {
             return Ok(Self::Rten);

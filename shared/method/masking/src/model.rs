@@ -13,7 +13,7 @@ use thiserror::Error;
 
 use crate::{MaskingConfig, external::external_file};
 
-/// The largest model: hundreds of times that of a mask.
+/// The size limit of models: hundreds of times a mask's.
 const MAX_BYTES: u64 = 1 << 30;
 
 /// The card of a model (`NAME.toml`). It may have other sections, on the provenance of the model.
@@ -58,7 +58,7 @@ pub struct RasterFacts {
 /// The section `[masking]` of a card: the processing of a raster before the network.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 pub struct MaskingFacts {
-    /// Power up to which returns were set to zero.
+    /// The highest power that was set to zero.
     pub floor: Option<u8>,
     /// True if rasters were motion-compensated.
     pub compensate: Option<bool>,
@@ -101,7 +101,7 @@ pub enum ModelError {
         expected: String,
         actual: String,
     },
-    /// The file has weights that are in another one, which no checksum covers.
+    /// The file keeps weights in another file, which no checksum covers.
     #[error(
         "{path} keeps weights in another file, {}, which the SHA-256 of its card does not cover: write them into it, in Python by \
          `onnx.save(onnx.load(NAME), NAME)` of the package onnx, and its new SHA-256 into the card",

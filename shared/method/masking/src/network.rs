@@ -144,7 +144,8 @@ impl Network {
     }
 }
 
-/// Loads a model without ONNX Runtime. Returns the engine, and what the model takes and gives.
+/// Loads a model without ONNX Runtime. Returns the engine, and the names of the model's inputs and
+/// outputs.
 fn built_in(model: &Model) -> Result<(Engine, Vec<String>, Vec<String>), NetworkError> {
     let file = rten::parse(model)?;
     let (inputs, outputs) = (rten::inputs(&file), rten::outputs(&file));

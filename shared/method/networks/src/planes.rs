@@ -30,7 +30,7 @@ pub enum PlanesError {
 pub struct PlanesNetwork {
     name: &'static str,
     engine: Engine,
-    /// Planes, rows and columns of what it is shown, and of what it gives.
+    /// Planes, rows and columns of its input and of its output.
     shown: [usize; 3],
     given: [usize; 3],
 }

@@ -22,7 +22,7 @@ use thiserror::Error;
 pub const INSTALL: &str = "python3 -m pip install --no-deps --python-version 3.12 --target \"${XDG_DATA_HOME:-$HOME/.local/share}/gyre/onnxruntime\" onnxruntime==1.31.1";
 /// The environment variable that may name the library.
 const VARIABLE: &str = "ORT_DYLIB_PATH";
-/// The folder that [`INSTALL`] creates in that of Gyre's data; beside the program it has the same
+/// The folder that [`INSTALL`] creates in Gyre's data folder; beside the program it has the same
 /// name.
 const INSTALLED: &str = "onnxruntime";
 /// Positions of the library in a named folder: the folder itself, the package, the parent of the
@@ -136,7 +136,7 @@ fn packages_beside(bin: &Path) -> Vec<PathBuf> {
 }
 
 /// Returns the folder of Gyre's data. A relative path would be in the current folder and is
-/// ignored, as the XDG specification says.
+/// ignored, as the XDG specification demands.
 fn data_folder(data_home: Option<OsString>, home: Option<OsString>) -> Option<PathBuf> {
     let absolute =
         |path: Option<OsString>| path.map(PathBuf::from).filter(|path| path.is_absolute());
@@ -172,7 +172,7 @@ fn version(file: &Path) -> Option<Vec<u32>> {
     numbers.map(|number| number.parse().ok()).collect()
 }
 
-/// Returns whether the name of a library says a version older than the one that is needed.
+/// Returns whether the name of a library contains an older version than the required one.
 fn is_too_old(file: &Path) -> bool {
     let version = version(file).filter(|version| version.len() > 1);
     version.is_some_and(|version| version < vec![1, ort::MINOR_VERSION])

@@ -4,8 +4,8 @@
 //!
 //! With a known turn rate the motion is linear in position and velocity (Bar-Shalom, Li and
 //! Kirubarajan, "Estimation with Applications to Tracking and Navigation", 2001, Sec. 11.7.1): no
-//! model is linearised, and a vehicle that stops has no heading to lose. Which turn rate it is
-//! follows from how well each predicts, and what is not known of it is in the covariance.
+//! model is linearised, and a vehicle that stops has no heading to lose. The prediction errors
+//! determine the turn rate, and the covariance contains its uncertainty.
 
 use nalgebra::{Matrix2, Matrix2x4, Matrix4, Point2, Vector2, Vector4};
 
@@ -16,7 +16,8 @@ const TURNS: [f64; 5] = [-1.0, -0.5, 0.0, 0.5, 1.0];
 /// Their shares of the time: vehicles drive straight for most of it.
 const SHARES: [f64; 5] = [0.075, 0.075, 0.7, 0.075, 0.075];
 
-/// Distance by which an object that stood may be seen behind its place, m: less than its length.
+/// Distance of a possible detection behind the place of an object that stood, m: less than its
+/// length.
 const BEHIND_M: f64 = 4.0;
 
 /// Position and velocity with their covariance, by models of different turn rates.
@@ -52,7 +53,7 @@ pub(crate) struct Sighting {
     pub by_velocity: Matrix2<f64>,
 }
 
-/// The difference of a measurement to what was predicted.
+/// The difference between a measurement and its prediction.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Innovation {
     /// Measured less predicted, m.
@@ -152,7 +153,7 @@ impl Filter {
         let kept = (-dt_s / config.turn_lasts_s).exp();
         let noise = acceleration_noise(dt_s, heading, config);
         for (index, model) in self.models.iter_mut().enumerate() {
-            // A model stays what it is, or any of them begins.
+            // A model continues, or any of them begins.
             let from = |other: usize| {
                 let stays = if other == index { kept } else { 0.0 };
                 before[other].probability * (stays + (1.0 - kept) * SHARES[index])
@@ -216,9 +217,9 @@ impl Filter {
         })
     }
 
-    /// Returns the squared Mahalanobis distance of the place at which another one began to drive
-    /// from that of this one, which stood: it came so fast with the usual acceleration. It is
-    /// infinite for one that has yet to come to that place.
+    /// Returns the squared Mahalanobis distance between the place where the other track began to
+    /// drive and the place where this one stood, if the other reached its speed with the usual
+    /// acceleration. It is infinite for one that has yet to come to that place.
     pub fn apart_from_start(&self, started: &Self, config: &ObjectsConfig) -> f64 {
         let velocity = started.velocity();
         let ahead = started.position() - self.position();

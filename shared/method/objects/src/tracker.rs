@@ -81,7 +81,8 @@ impl ObjectTracker {
         self.stamp_ns = Some(stamp_ns);
     }
 
-    /// Updates the tracks by what the scan shows, objects first. Returns what is left.
+    /// Updates the tracks with the detections of the scan, objects first. Returns the remaining
+    /// detections.
     fn assign(&mut self, found: Vec<Detection>) -> Vec<Detection> {
         let (objects, others): (Vec<usize>, Vec<usize>) = (0..self.tracks.len())
             .filter(|index| !self.tracks[*index].is_lost())
@@ -122,8 +123,8 @@ impl ObjectTracker {
         self.tracks.extend(tracks);
     }
 
-    /// Ends tracks, also those of one vehicle but the first, and decides which move. What was an
-    /// object keeps its identity: two vehicles that are close may have been taken for one.
+    /// Ends tracks, including later tracks of the same vehicle, and decides which move. An object
+    /// keeps its identity: two close vehicles may have been confused.
     fn judge(&mut self) {
         let config = &self.config;
         // Objects first, then the older ones.

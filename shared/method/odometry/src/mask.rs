@@ -34,7 +34,7 @@ pub trait Mask: Send + Sync {
     ) -> Result<usize, OdometryError>;
 
     /// Returns the factors from 0 to 1, n x n, of the last masked scan (0) or of the one before
-    /// (1). `None` if there are none.
+    /// (1). `None` without factors.
     fn factors(&self, _scan: usize) -> Option<ArrayView2<'_, f32>> {
         None
     }

@@ -14,8 +14,8 @@ pub trait Refine: Send + Sync {
     fn reset(&mut self);
 }
 
-/// The parts that an [`Odometry`](crate::Odometry) is composed of. Those of a configuration, of
-/// which each can be replaced:
+/// The parts that an [`Odometry`](crate::Odometry) is composed of. Each part comes from the
+/// configuration and can be replaced:
 ///
 /// ```
 /// use gyre_geometry::{SparsePoint, Twist};

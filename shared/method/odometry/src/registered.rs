@@ -70,7 +70,7 @@ pub enum SetupError {
 pub enum OdometryError {
     #[error(transparent)]
     Mask(#[from] MaskError),
-    /// The scan is inconsistent, or its times are not those of one sweep.
+    /// The scan is inconsistent, or its times do not form one sweep.
     #[error(transparent)]
     Scan(#[from] ScanError),
     #[error(transparent)]

@@ -1,4 +1,4 @@
-//! Bounds of what sections about sensors beside the radar can say.
+//! Bounds of the settings of sensors beside the radar.
 
 use thiserror::Error;
 

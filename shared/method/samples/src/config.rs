@@ -102,9 +102,9 @@ pub enum UpAxis {
 }
 
 impl UpAxis {
-    /// Returns a vector along the axes of the gyro in right-handed axes of which the third points
-    /// up. The axis that points ahead is not known: z down is taken for x ahead and y right, z up
-    /// for x ahead and y left; other axes are named in their order.
+    /// Returns a vector along the axes of the gyro in right-handed axes whose third points up. The
+    /// axis that points ahead is unknown: z down implies x ahead and y right, z up implies x ahead
+    /// and y left; other axes are named in their order.
     pub fn in_vehicle(self, [x, y, z]: [f64; 3]) -> [f64; 3] {
         match self {
             Self::Z => [x, y, z],

@@ -1,5 +1,5 @@
-//! The velocity of the radar by the Doppler shift of one scan, and the way between two scans by
-//! those of both.
+//! The velocity of the radar by the Doppler shift of one scan, and the displacement between two
+//! scans by both velocities.
 
 use std::f64::consts::PI;
 
@@ -97,9 +97,9 @@ impl DopplerConfig {
     /// at the mean of both.
     ///
     /// Each velocity counts half in two ways, so that the errors of these do not cancel and their
-    /// variances are such that they add up. A velocity that changes evenly moves that of a sweep to
-    /// the side by 1 / (4 pi) of the change in a turn, and as much along the path where the echoes
-    /// are uneven: that is added.
+    /// variances are such that they add up. A velocity that changes evenly shifts a sweep's
+    /// velocity to the side by 1 / (4 pi) of the change in a turn, and by as much along the path if
+    /// the echoes are uneven: that is added.
     pub fn way(&self, [earlier, later]: [&DopplerVelocity; 2], interval_s: f64) -> DopplerWay {
         let mean = |of: fn(&DopplerVelocity) -> f64| 0.5 * (of(earlier) + of(later));
         let [ahead, left] = [mean(|it| it.velocity_mps[0]), mean(|it| it.velocity_mps[1])];
@@ -146,8 +146,9 @@ mod tests {
     }
 
     proptest! {
-        /// The way of a velocity that changes evenly is exact, and the sum of ways whose velocities
-        /// have independent errors has at most the sum of the variances that are said.
+        /// The displacement of a velocity that changes evenly is exact, and the sum of
+        /// displacements whose velocities have independent errors has at most the sum of the stated
+        /// variances.
         #[test]
         fn ways_add_up_and_so_do_their_variances(
             start in -30.0..30.0f64, change in -1.0..1.0f64, sigma in 0.01..0.3f64, scans in 2usize..20,

@@ -58,8 +58,8 @@ pub enum GnssKind {
 }
 
 impl Default for GnssConfig {
-    /// A receiver without corrections: 2.5 m circular error probable, which its data sheet says,
-    /// are 2.1 m along each axis.
+    /// A receiver without corrections: 2.5 m circular error probable, as in its data sheet, are 2.1
+    /// m along each axis.
     fn default() -> Self {
         Self {
             kind: GnssKind::None,
@@ -111,7 +111,7 @@ pub struct GnssFix {
     pub sigma_m: f64,
 }
 
-/// A fix as it was logged, whatever it says.
+/// A fix as it was logged, even if it is invalid.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RawFix {
     /// Time on the receiver's clock, ns since 1970.
@@ -152,6 +152,6 @@ pub struct BagFixes {
     pub topic: String,
     /// The fixes in the order of the bag.
     pub fixes: Vec<RawFix>,
-    /// Messages in which the receiver had no fix.
+    /// Messages without a fix.
     pub without_fix: usize,
 }

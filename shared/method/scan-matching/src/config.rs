@@ -308,7 +308,7 @@ impl Section {
         self.require(bounds.contains(&value), key, &value, expected)
     }
 
-    /// Rejects what is not a positive number.
+    /// Rejects a number that is not positive.
     pub fn positive(self, key: &'static str, value: f64) -> Result<(), ConfigError> {
         self.require(positive(value), key, &value, "a positive number")
     }

@@ -6,7 +6,7 @@
 //!
 //! # Layout, in the order of the data
 //! - `taper`, `fft`, `polar`: the magnitude spectrum of a raster on a polar grid;
-//! - `spectrum`: [`PolarSpectrum`], what is kept of a scan; `rotation`: [`RotationSearch`], the
+//! - `spectrum`: [`PolarSpectrum`], the kept part of a scan; `rotation`: [`RotationSearch`], the
 //!   angle; `sequential`: [`SequentialRotation`], the angles along a stream of scans;
 //! - `warp`: the earlier raster turned by that angle;
 //! - `translation`: [`TranslationSearch`], the shift and the whole motion; `scores`: one score a

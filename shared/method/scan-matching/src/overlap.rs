@@ -1,4 +1,4 @@
-//! The energy of a raster within its overlap with another one that is shifted.
+//! The energy of a raster within its overlap with a shifted raster.
 
 use nalgebra::Vector2;
 

@@ -1,8 +1,8 @@
 //! Refinement of (x, y, yaw) by aligning sparse points with a local map of the last keyframes.
 //!
-//! The map is the mean of what the last keyframes saw, each drawn once from its own points at its
-//! own pose, blurred and saturated. A scan is aligned with it by Gauss-Newton steps, first on a
-//! coarse map and then on the fine one, and is deskewed with the very motion that is sought.
+//! The map is the mean of the last keyframes, each drawn once from its own points at its own pose,
+//! blurred and saturated. A scan is aligned with it by Gauss-Newton steps, first on a coarse map
+//! and then on the fine one, and is deskewed with the very motion that is sought.
 //!
 //! Reading order:
 //! - [`Refiner::refine`]: the method;
@@ -10,13 +10,13 @@
 //! - `points`: a scan's points, deskewed;
 //! - `local_map`, `map_level`: the keyframes, and the two rasters that points are aligned with;
 //! - `alignment`, `normal_equations`: Gauss-Newton with a line search;
-//! - `tracker`: the last poses, what is predicted from them, and which poses a vehicle can have
+//! - `tracker`: the last poses, predictions from them, and the poses that a vehicle can have
 //!   reached;
-//! - `witnesses`: what gyro, wheels and Doppler say of a motion, against what the radar says;
+//! - `witnesses`: the motion by gyro, wheels and Doppler, against the radar's;
 //! - `heading`: with a gyro, the heading and the gyro's bias;
 //! - `wheels`: with wheels or Doppler, their scale, and the motions of scans that match nothing;
-//! - `along_walls`: the way where nothing but other sensors tells how far it is; `structure`: where
-//!   that is so;
+//! - `along_walls`: the displacement where only other sensors determine the distance; `structure`:
+//!   where that is so; `structure`: where that is so;
 //! - `uncertainty`: covariances, and the shares of them that accumulate;
 //! - `standstill`: the pose of a standing vehicle is held;
 //! - [`Submap`]: the points of a keyframe and of those around it;
@@ -85,11 +85,11 @@ pub struct Refined {
     pub motion: OdometryMotion,
     /// Mean of the map under the points, 0 to 1.
     pub overlap: f64,
-    /// Weight of the points as a share of its running mean; 1 if there is none yet.
+    /// Weight of the points as a share of its running mean; 1 without a mean yet.
     pub support: f64,
     /// The reliability of the motion.
     pub outcome: Outcome,
-    /// The initial guess of the accepted match; the prediction if there is none.
+    /// The initial guess of the accepted match; the prediction without a match.
     pub guess: InitialGuess,
     /// The vehicle stands: the motion is zero.
     pub stationary: bool,
@@ -97,7 +97,7 @@ pub struct Refined {
     pub gyro: Option<GyroBias>,
     /// The scale of the wheels; `None` where they have not measured the distance.
     pub wheels: Option<WheelScale>,
-    /// The scale of the velocity by Doppler; `None` where one of both scans does not say it.
+    /// The scale of the velocity by Doppler; `None` if one of both scans does not determine it.
     pub doppler: Option<WheelScale>,
 }
 
@@ -106,7 +106,7 @@ struct Accepted {
     outcome: Outcome,
     pose: UncertainMotion,
     guess: InitialGuess,
-    /// Way by which the search leads beyond a place that is a guess, m.
+    /// Displacement by the search beyond a predicted place, m.
     ahead_m: Vector2<f64>,
     /// Walls without structure have ended: the map is left.
     leaves_map: bool,
@@ -126,7 +126,7 @@ pub struct Refiner {
     map: LocalMap,
     state: TrackerState,
     points: DeskewedPoints,
-    /// Those of a match that may be taken instead.
+    /// The points of an alternative match.
     other_points: DeskewedPoints,
     azimuth_variance_rad2: f64,
     turn: Option<GyroTurn>,
@@ -171,7 +171,7 @@ impl Refiner {
         self
     }
 
-    /// Uses the velocities by Doppler, if this says so: [`Refiner::expect_velocities`].
+    /// Uses the velocities by Doppler, if `doppler` enables them: [`Refiner::expect_velocities`].
     #[must_use]
     pub fn with_doppler(mut self, doppler: &DopplerConfig) -> Self {
         self.doppler = doppler.clone();
@@ -179,8 +179,8 @@ impl Refiner {
         self
     }
 
-    /// Sets the velocities by Doppler of the earlier scan and of the later one; `None` where a scan
-    /// does not say it.
+    /// Sets the velocities by Doppler of the earlier scan and of the later one; `None` if a scan
+    /// does not determine it.
     pub fn expect_velocities(&mut self, velocities: [Option<DopplerVelocity>; 2]) {
         self.velocities = velocities;
     }
@@ -293,9 +293,9 @@ impl Refiner {
         self.map.keyframe_cells()
     }
 
-    /// Starts a map if there is none. Returns the number of predictions in a row whose error a
-    /// match takes back: none with a new map, which starts at the pose that they led to, with their
-    /// error.
+    /// Starts a map if the refiner has no map. Returns the number of predictions in a row whose
+    /// error a match takes back: none with a new map, which starts at the pose that they led to,
+    /// with their error.
     fn ensure_map(&mut self, scan: &Scan<'_>, earlier: &[SparsePoint]) -> u32 {
         if !self.map.is_empty() {
             return self.state.unmatched;
@@ -402,7 +402,7 @@ impl Refiner {
     }
 
     /// Returns whether the scan overlaps the map well, has enough points, and agrees with the
-    /// search, but for a direction in which neither can tell.
+    /// search, except in a direction that both leave undetermined.
     fn is_firm(
         &self,
         scan: &Scan<'_>,
@@ -418,8 +418,8 @@ impl Refiner {
             && best.support >= self.config.min_support
     }
 
-    /// Returns whether the motion is about that of the search, but for a direction in which neither
-    /// can tell.
+    /// Returns whether the motion is near the search's, except in a direction that both leave
+    /// undetermined.
     fn agrees_with_search(
         &self,
         scan: &Scan<'_>,
@@ -437,8 +437,9 @@ impl Refiner {
             && apart.rotation.angle().abs() <= config.search_agrees_deg.to_radians()
     }
 
-    /// Returns the motion to the estimated pose; none while the vehicle stands. Where the radar
-    /// does not see the way it cannot tell, as little as a prediction.
+    /// Returns the motion to the estimated pose; none while the vehicle stands. Displacement along
+    /// a featureless corridor is unobservable, so standstill cannot be detected there, and a
+    /// prediction cannot detect it either.
     fn hold_standstill(&mut self, scan: &Scan<'_>, accepted: &Accepted) -> Report {
         let estimate = Estimate {
             pose: accepted.pose,
@@ -460,7 +461,7 @@ impl Refiner {
     fn update(&mut self, scan: &Scan<'_>, best: &Candidate, accepted: &Accepted) {
         let (pose, outcome) = (&accepted.pose.motion, accepted.outcome);
         let (config, fit) = (&self.config, [best.overlap, best.weight]);
-        // Along guessed ways keyframes lie as the search says, and are deskewed so.
+        // Along predicted displacements, keyframes are placed and deskewed by the search.
         let mut by_search = *pose;
         by_search.translation.vector += accepted.ahead_m;
         let twist = self.state.twist_to(&by_search, &scan.step);

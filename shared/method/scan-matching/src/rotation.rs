@@ -17,9 +17,9 @@ use crate::spectrum::PolarSpectrum;
 use crate::whiten::Whitening;
 use crate::{ShapeError, cells, kernels, taper};
 
-/// Distance from the turn of a gyro beyond which a maximum is that of something else, rad.
+/// Distance from the turn of a gyro beyond which a maximum counts as spurious, rad.
 const NEAR_GYRO_RAD: f64 = 4.0 * PI / 180.0;
-/// Half width of the neighbourhood in which a second maximum counts as the same peak, rad.
+/// Half width of the neighbourhood where a second maximum counts as the same peak, rad.
 const SAME_PEAK_RAD: f64 = 2.0 * PI / 180.0;
 
 /// The second-best angle.
@@ -36,8 +36,8 @@ pub struct RotationMatch {
     /// Yaw of the later scan's frame in the earlier one's, radians, counter-clockwise, within the
     /// reach.
     pub angle_rad: f64,
-    /// Variance, from the shape of the peak; that of a uniform distribution over the reach if there
-    /// is no peak.
+    /// Variance, from the shape of the peak; without a peak, the variance of a uniform distribution
+    /// over the reach.
     pub variance_rad2: f64,
     /// Correlation coefficient of the two polar spectra at the peak, at most 1; 0 if there is no
     /// match.
@@ -276,8 +276,8 @@ impl RotationSearch {
         }
     }
 
-    /// (1 - score) over the peak's curvature, scaled; at most that of a uniform distribution over
-    /// the reach.
+    /// (1 - score) over the peak's curvature, scaled; at most the variance of a uniform
+    /// distribution over the reach.
     fn variance(&self, score: f64, curvature: f64) -> f64 {
         let variance = self.config.variance_scale * (1.0 - score).max(1e-6) / -curvature;
         let guess = self.config.reach_deg.to_radians().powi(2) / 3.0;

@@ -46,7 +46,7 @@ impl SequentialRotation {
         self.search.spectrum(later, &mut self.later)?;
         let mut rotation = None;
         if let Some(earlier) = earlier {
-            // After a restart or a gap the kept spectrum is not that of the scan before.
+            // After a restart or a gap the kept spectrum does not belong to the scan before.
             let is_kept = self
                 .kept
                 .is_some_and(|kept| kept.checked_add(1) == Some(seq));

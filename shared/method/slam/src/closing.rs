@@ -69,7 +69,7 @@ pub enum ClosingError<E> {
     Estimation(#[from] EstimationError),
 }
 
-/// Closes loops: a function of the sequence of keyframes, whatever the time at which they come.
+/// Closes loops: a function of the sequence of keyframes, independent of their time of arrival.
 ///
 /// A keyframe is described and queried once its submap is complete, which lies as far ahead as
 /// behind: some keyframes later, or at the end. Descriptors are kept in memory and points are not:
@@ -87,13 +87,13 @@ pub struct LoopCloser {
     /// Number of the keyframe that is queried next.
     next_query: usize,
     cache: Cache,
-    /// The submap of a query and that of a candidate.
+    /// The submap of a query and the submap of a candidate.
     submaps: [Submap; 2],
 }
 
 impl LoopCloser {
     /// Plans the closing of loops between keyframes of at most `capacity` points. `refinement` is
-    /// that of the odometry.
+    /// the odometry's.
     pub fn new(
         options: LoopOptions,
         refinement: &RefinementConfig,
@@ -118,7 +118,7 @@ impl LoopCloser {
         })
     }
 
-    /// Takes the next keyframe, of which it keeps the path and the motion.
+    /// Takes the next keyframe and keeps its path and motion.
     pub fn push(&mut self, keyframe: &Keyframe) -> Result<(), EstimationError> {
         self.extend(keyframe.path_m, &keyframe.motion)
     }
@@ -150,7 +150,7 @@ impl LoopCloser {
         self.index.len()
     }
 
-    /// Describes the next keyframe whose submap is complete; `None` if there is none.
+    /// Describes the next keyframe whose submap is complete; returns `None` without one.
     pub fn describe<S: KeyframeSource>(
         &mut self,
         source: &mut S,
@@ -172,8 +172,8 @@ impl LoopCloser {
         Ok(Some(place))
     }
 
-    /// Queries the next keyframe that is described, and verifies its candidates; `None` if there is
-    /// none.
+    /// Queries the next keyframe that is described, and verifies its candidates; returns `None`
+    /// without one.
     pub fn close<S: KeyframeSource>(
         &mut self,
         source: &mut S,
@@ -226,7 +226,7 @@ impl LoopCloser {
         neighbours(&self.path_m, middle, self.options.places.submap_reach_m)
     }
 
-    /// The places that look most like that of a keyframe.
+    /// The places that look most similar to a keyframe's place.
     fn candidates(&mut self, keyframe: usize) -> Vec<Candidate> {
         let eligible = self
             .index
@@ -240,7 +240,7 @@ impl LoopCloser {
         found[..found.len().min(self.options.candidates)].to_vec()
     }
 
-    /// Draws the submap around a keyframe as that of the query (0) or of the candidate (1).
+    /// Draws the submap around a keyframe as the query's (0) or as the candidate's (1).
     fn draw<S: KeyframeSource>(
         &mut self,
         source: &mut S,

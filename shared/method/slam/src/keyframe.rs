@@ -115,7 +115,7 @@ impl Record for Keyframe {
 
 impl RecordReader<Keyframe> {
     /// Reads a keyframe without its points, which are a hundred times the rest. Its bytes are not
-    /// checked: the checksum is that of the whole record.
+    /// checked: the checksum covers the whole record.
     ///
     /// # Panics
     /// There are no more than `index` keyframes.

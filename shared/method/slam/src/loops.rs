@@ -23,7 +23,7 @@ pub enum LoopOutcome {
     ContradictsOdometry,
 }
 
-/// A place that looks like that of a queried keyframe.
+/// A place that looks similar to the place of a queried keyframe.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoopCandidate {
     /// The number of the found keyframe.
@@ -120,7 +120,7 @@ impl Record for Query {
         }
     }
 
-    /// `None` for a length that none has, and for an unknown verdict.
+    /// `None` for an invalid length, and for an unknown verdict.
     fn decode(bytes: &[u8]) -> Option<Self> {
         let (keyframe, candidates) = bytes.split_at_checked(8)?;
         if candidates.len() % size_of::<Fixed>() != 0 {

@@ -1,9 +1,9 @@
-//! The files of keyframes, of places and of queries, from which SLAM continues.
+//! The files of keyframes, of places and of queries, for resuming SLAM.
 //!
 //! A keyframe is appended before its pose is journalled. So each pose of the journal that the
 //! selection of keyframes takes has its keyframe. Places and queries follow from the keyframes:
-//! they are made anew where they are missing, and what the keyframes lack is cut off. The end of
-//! the stream is a record without bytes.
+//! missing ones are computed again, and those beyond the last keyframe are cut off. The end of the
+//! stream is a record without bytes.
 
 use std::{
     marker::PhantomData,
@@ -40,8 +40,8 @@ pub struct RecordLog<R> {
 }
 
 impl<R: Record> RecordLog<R> {
-    /// Opens or creates the file of the run that writes to `out`, and cuts off what a death or a
-    /// power failure has left of the last records.
+    /// Opens or creates the file of the run that writes to `out`, and cuts off incomplete last
+    /// records, left by a death or a power failure.
     pub fn open(out: &Path) -> Result<Self, LogError> {
         Self::open_file(&records_path::<R>(out))
     }
@@ -70,8 +70,8 @@ impl<R: Record> RecordLog<R> {
         self.len() == 0
     }
 
-    /// Takes the memory for appending many records whose form in a file has up to so many bytes:
-    /// none is allocated for each.
+    /// Allocates the memory for appending records of up to `bytes` bytes in the file: later appends
+    /// allocate nothing.
     pub fn reserve(&mut self, bytes: usize) {
         self.buffer.reserve(bytes);
         self.log.reserve(bytes);
@@ -99,7 +99,7 @@ impl<R: Record> RecordLog<R> {
         self.log.rely()
     }
 
-    /// Says that no more records follow. All of them survive a power failure when this returns.
+    /// Marks the end of the records. All of them survive a power failure when this returns.
     pub fn end(&mut self) -> Result<(), LogError> {
         if !self.ended {
             self.log.append(&[])?;
@@ -122,7 +122,7 @@ impl<R: Record> RecordLog<R> {
     }
 }
 
-/// Reads a file of records to which another process may append.
+/// Reads a file of records while another process may append to it.
 #[derive(Debug)]
 pub struct RecordReader<R> {
     log: LogReader,

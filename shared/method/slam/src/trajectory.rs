@@ -11,7 +11,7 @@ use crate::consistency::{DeadReckoning, Speakers};
 use crate::fixes::{Fixes, Stamped};
 use crate::{Correction, JudgedLoop, Keyframe, LoopVerdict, Query, variance};
 
-/// All loops are judged anew when their number has grown by this share of it: that takes time in
+/// All loops are judged again when their number has grown by this share of it: that takes time in
 /// proportion to it.
 const GROWTH: usize = 8;
 
@@ -149,9 +149,9 @@ impl TrajectoryEstimator {
         self
     }
 
-    /// Uses these fixes in place of those before, as while a live receiver sends them: if keyframes
-    /// that have been solved have others now, the next solution takes all anew. Returns whether the
-    /// next solution has others.
+    /// Uses these fixes in place of the earlier ones, as while a live receiver sends them. If the
+    /// fixes of solved keyframes have changed, the next solution uses all fixes again. Returns
+    /// whether the next solution has others.
     pub fn replace_fixes(&mut self, mut fixes: Fixes) -> bool {
         for (keyframe, ends) in self.keyframes.windows(2).enumerate() {
             fixes.advance(keyframe, ends[0].stamped(), ends[1].stamped());
@@ -217,7 +217,7 @@ impl TrajectoryEstimator {
         self.insert(closing, chi_square)
     }
 
-    /// Moves all poses to where they fit best, and judges all loops anew.
+    /// Moves all poses to where they fit best, and judges all loops again.
     pub fn solve(&mut self) -> Result<(), EstimationError> {
         match self.options.kind {
             EstimatorKind::Graph => {
@@ -230,7 +230,7 @@ impl TrajectoryEstimator {
     }
 
     /// Judges the loops that came since the last solution, and moves all poses from where they are
-    /// to where they fit best. All loops are judged anew from time to time, and if one was wrong
+    /// to where they fit best. All loops are judged again from time to time, and if one was wrong
     /// the poses begin at the odometry.
     pub fn update(&mut self) -> Result<(), EstimationError> {
         match self.options.kind {
@@ -261,9 +261,9 @@ impl TrajectoryEstimator {
         Ok(pose)
     }
 
-    /// Scales the covariances of the poses from now on so that the residuals of odometry and loops
-    /// are as large as they say. Returns the scale, which is 1 without loops and in the filter. It
-    /// takes some 1,400 solutions of the equations.
+    /// Scales the covariances of later poses so that they match the residuals of odometry and
+    /// loops. Returns the scale, which is 1 without loops and in the filter. It takes some 1,400
+    /// solutions of the equations.
     pub fn scale_covariances(&mut self) -> Result<f64, EstimationError> {
         self.scale = match &mut self.estimator {
             Estimator::Graph(graph) => variance::scale(graph, &self.odometry, &self.loops)?,
@@ -297,8 +297,8 @@ impl TrajectoryEstimator {
         }
     }
 
-    /// Returns the pose of the frame of the first scan in that of the fixes, east and north, with
-    /// its covariance; `None` without fixes that tell it.
+    /// Returns the pose of the frame of the first scan in the frame of the fixes, east and north,
+    /// with its covariance; `None` without fixes that determine it.
     pub fn east_north_from_map(&mut self) -> Result<Option<UncertainMotion>, EstimationError> {
         let frame = match &mut self.estimator {
             Estimator::Graph(graph) => graph.uncertain_frame()?,
@@ -370,7 +370,7 @@ impl TrajectoryEstimator {
         }
     }
 
-    /// Compares the clock of the fixes with that of the keyframes.
+    /// Compares the clock of the fixes with the keyframes' clock.
     fn compare_clocks(&mut self) {
         let stamped: Vec<Stamped> = self.keyframes.iter().map(Corrected::stamped).collect();
         self.fixes.compare_clocks(&stamped);

@@ -25,9 +25,9 @@ pub struct Content {
 
 /// Reads a whole journal, in bounded memory, and finds out what of it is valid.
 ///
-/// A record that is not valid is one of two things. If no later record knows that it was on the
-/// disk, and there are no more of them than can have been in danger, it is what a death or a power
-/// failure leaves, and it is cut off with all that follows: those poses are computed anew. Else the
+/// A record that is not valid is one of two things. If no later record proves that it was on the
+/// disk, and there are no more of them than can have been in danger, it results from a death or a
+/// power failure, and it is cut off with all that follows: those poses are computed again. Else the
 /// file was damaged after it had been written.
 pub fn check(path: &Path) -> Result<Content, JournalError> {
     let Some(mut places) = Places::open(path)? else {

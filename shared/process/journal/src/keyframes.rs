@@ -46,7 +46,7 @@ impl Keyframes {
     ) -> Result<Self, KeyframesError> {
         let mut log = RecordLog::open(out)?;
         let found = find(log.len(), poses, |index| log.read(index))?;
-        // The end of the keyframes is before that of the journal.
+        // The end of the keyframes is before the end of the journal.
         if !ended {
             log.cut(found.keyframes)?;
         }
@@ -63,7 +63,7 @@ impl Keyframes {
         }
     }
 
-    /// Takes the memory for keyframes of up to so many points: none is allocated for each.
+    /// Allocates the memory for keyframes of up to `points` points: later appends allocate nothing.
     pub fn reserve(&mut self, points: usize) {
         self.points.reserve(points);
         self.log.reserve(Keyframe::encoded_len(points));
@@ -88,8 +88,8 @@ impl Keyframes {
         Ok(true)
     }
 
-    /// Says that the stream has ended, before that is journalled. All keyframes survive a power
-    /// failure when this returns.
+    /// Marks the end of the stream, before the journal does. All keyframes survive a power failure
+    /// when this returns.
     pub fn end(&mut self) -> Result<(), KeyframesError> {
         Ok(self.log.end()?)
     }
@@ -151,13 +151,13 @@ fn recover(
     let mut builder = KeyframeBuilder::new(options);
     let last = found.last.as_ref().map_or(0, |keyframe| keyframe.seq);
     let records = crate::records_from(&crate::path(out), last)?;
-    // Behind them may be what a power failure has left of others, or the end of the stream.
+    // Behind them may be the remains of others after a power failure, or the end of the stream.
     let count = usize::try_from(poses.saturating_sub(last)).unwrap_or(usize::MAX);
     for pose in records.into_iter().flatten().take(count) {
         let pose = pose?;
         let seq = pose.item.seq;
         match &found.last {
-            // The pose of the journal: that of the keyframe has another rounding of its yaw.
+            // The pose of the journal, since the keyframe's yaw is rounded differently.
             Some(last) if last.seq == seq => builder.resume(&pose.pose(), last.path_m),
             _ if builder.next(&scan_pose(&pose)).is_some() => return Ok((builder, Some(seq))),
             _ => {}

@@ -1,12 +1,12 @@
-//! The files that a run goes on from after a death or a power failure: the journal of its poses;
-//! with SLAM its [`keyframes`]; with objects its [`scans`], and the [`objects`] in each; and the
+//! The files for resuming a run after a death or a power failure: the journal of its poses; with
+//! SLAM its [`keyframes`]; with objects its [`scans`], and the [`objects`] in each; and the
 //! [`checkpoint`] of its refinement.
 //!
-//! The journal is a file of poses, each with its motion and a checksum, from which all results of a
-//! run are made. Each record is one `write`, before its pose is published. A record that is cut
+//! The journal is a file of poses, each with its motion and a checksum. All results of a run are
+//! made from it. Each record is one `write`, before its pose is published. A record that is cut
 //! short by a death is found by its checksum; its pose had not been published. A thread
-//! synchronises the file about once a second, so a power failure takes the poses of the last
-//! second: what is left of them is found by [`check`] and cut off, and they are computed anew.
+//! synchronises the file about once a second, so a power failure destroys the poses of the last
+//! second: [`check`] finds their remains and cuts them off, and they are computed again.
 
 mod check;
 pub mod checkpoint;

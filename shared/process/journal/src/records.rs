@@ -34,7 +34,7 @@ pub(crate) struct Places {
     pub has_header: bool,
 }
 
-/// Opens a journal to read it; `None` if there is none.
+/// Opens a journal to read it; `None` without a journal.
 pub fn records(path: &Path) -> Result<Option<Records>, JournalError> {
     let places = Places::open(path)?.filter(|places| places.has_header);
     Ok(places.map(|places| Records { places }))
@@ -118,7 +118,7 @@ impl Places {
     }
 }
 
-/// Says why a file with such a header is none to go on with.
+/// Returns the reason why a file with such a header cannot be continued.
 pub(crate) fn refused(header: &[u8], path: &Path) -> JournalError {
     let path = path.to_owned();
     match header.starts_with(ANY_VERSION) {

@@ -13,7 +13,7 @@ use thiserror::Error;
 /// A scan with its pose and its points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoggedScan {
-    /// The scan's number in the run, from 0 without gaps: that of its record.
+    /// The scan's number in the run, from 0 without gaps, which is its record's number.
     pub seq: u64,
     /// The sensor's own number of the scan.
     pub scan: u64,
@@ -21,7 +21,7 @@ pub struct LoggedScan {
     pub stamp_ns: i64,
     /// The pose by odometry, in the frame of the first scan.
     pub pose: Pose,
-    /// Velocity of the sensor: that of the motion into the scan; zero where the chain starts.
+    /// Velocity of the sensor, from the motion into the scan; zero where the chain starts.
     pub twist: Twist,
     /// The points as measured.
     pub points: Vec<SparsePoint>,
@@ -133,7 +133,7 @@ impl Scans {
             let path = records_path::<LoggedScan>(out);
             return Err(ScansError::Missing { path, scans, poses });
         }
-        // The end of the scans is before that of the journal.
+        // The end of the scans is before the end of the journal.
         if !ended {
             log.cut(usize::try_from(poses).unwrap_or(usize::MAX))?;
         }
@@ -143,7 +143,7 @@ impl Scans {
         })
     }
 
-    /// Takes the memory for scans of up to so many points: none is allocated for each.
+    /// Allocates the memory for scans of up to `points` points: later appends allocate nothing.
     pub fn reserve(&mut self, points: usize) {
         self.points.reserve(points);
         self.log
@@ -161,8 +161,8 @@ impl Scans {
         Ok(appended?)
     }
 
-    /// Says that the stream has ended, before that is journalled. All scans survive a power failure
-    /// when this returns.
+    /// Marks the end of the stream, before the journal does. All scans survive a power failure when
+    /// this returns.
     pub fn end(&mut self) -> Result<(), ScansError> {
         Ok(self.log.end()?)
     }

@@ -15,7 +15,7 @@ pub enum FollowerId {
 }
 
 impl FollowerId {
-    /// All followers, in the order in which they read each other's logs.
+    /// All followers, in the order of reading each other's logs.
     pub const ALL: [Self; 4] = [
         Self::LoopClosure,
         Self::Trajectory,

@@ -114,8 +114,8 @@ pub struct Item {
     pub numbered_from: u64,
     /// Time of the middle of the sweep on the sensor's clock, ns since 1970.
     pub stamp_ns: i64,
-    /// Time at which the sweep was complete, or would have been at the sensor: `CLOCK_MONOTONIC`,
-    /// ns. Latency is measured from here.
+    /// Time when the sweep was complete, or would have been at the sensor: `CLOCK_MONOTONIC`, ns.
+    /// Latency is measured from here.
     pub due_ns: i64,
     /// Generation of the numbers: it grows when masking (live mode) or the source of a sensor is
     /// started, which may give a number again. 0 where the numbers follow from the recording.

@@ -112,9 +112,9 @@ pub fn topic(name: &str) -> Option<&'static Topic> {
     TOPICS.iter().find(|topic| topic.name == name)
 }
 
-/// Returns an upper limit of the transport's bookkeeping, of which each file takes whole pages: a
-/// service has its description and state, a subscriber its queue, its events, and a process of its
-/// own. Measured without observers: 83 pages.
+/// Returns an upper limit of the transport's bookkeeping, with whole pages for each file: a service
+/// has its description and state, a subscriber its queue, its events, and a process of its own.
+/// Measured without observers: 83 pages.
 fn bookkeeping(window: &Window) -> usize {
     let subscribers: usize = topics(window)
         .map(|topic| (topic.sizes)(window).subscribers())

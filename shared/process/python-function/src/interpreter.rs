@@ -49,7 +49,7 @@ pub(crate) fn name() -> String {
 }
 
 impl Interpreter {
-    /// Starts the interpreter that functions would be called in, and asks what it has.
+    /// Starts the interpreter for functions, and asks for its version and packages.
     pub fn find() -> Result<Self, NoInterpreter> {
         let python = name();
         let mut command = Command::new(&python);

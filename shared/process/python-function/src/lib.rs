@@ -57,7 +57,7 @@ pub enum FunctionError {
         /// The exit code or the signal.
         status: String,
     },
-    /// An exception: the file, its line, and what Python says. The traceback is on standard error.
+    /// An exception: the file, its line, and Python's message. The traceback is on standard error.
     #[error("{0}")]
     Exception(String),
 }
@@ -82,7 +82,7 @@ fn is_no_program(error: &std::io::Error) -> bool {
     kinds.contains(&error.kind())
 }
 
-/// The name of a function, which stands for what it gets and returns.
+/// The name of a function, which implies its arguments and results.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Name {
     /// `mask(scan)`: factors from 0 to 1.

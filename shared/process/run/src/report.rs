@@ -58,8 +58,8 @@ pub struct StageCounters {
     /// Azimuths that are missing from the published scans of a live radar (source only). This and
     /// the next four are counts since the start of the run, also of sources that have died.
     pub missing_azimuths: u64,
-    /// Turns of a live radar of which there is no scan: nothing arrived, the connection broke in
-    /// the middle, half of the azimuths are missing, or times that do not increase (source only).
+    /// Turns of a live radar without a scan: nothing arrived, the connection broke in the middle,
+    /// half of the azimuths are missing, or times do not increase (source only).
     pub scans_left_out: u64,
     /// Messages of a live radar that could not be read (source only).
     pub damaged_messages: u64,

@@ -23,22 +23,22 @@ pub const SOCKET: &str = "control.sock";
 const ANSWER: Duration = Duration::from_secs(15);
 /// Time between two looks at a swap that is waited for.
 const LOOK: Duration = Duration::from_secs(1);
-/// Said where a request that changes something is not waited for any more.
+/// Appended if the client stops waiting for a request that changes something.
 const NOT_LATER: &str = "; what it has not begun by now it does not begin";
 
 /// A request to the supervisor of a run.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Request {
-    /// Say how the run is.
+    /// Report the state of the run.
     Status,
-    /// End the run as an interrupt does: its journal stays, and the same command goes on.
+    /// End the run as an interrupt does: its journal stays, and the same command continues it.
     Stop,
     Restart {
         /// The name of the stage or follower, or `recorder`.
         process: String,
     },
-    /// Go on with another program in the place of a stage.
+    /// Replace the program of a stage.
     Swap(Swap),
 }
 
@@ -49,7 +49,7 @@ pub struct Swap {
     pub process: String,
     /// Program and arguments; `None`: those that the run was begun with.
     pub command: Option<Vec<String>>,
-    /// The directory in which the program is started.
+    /// The directory for starting the program.
     pub directory: PathBuf,
     /// True if the program is started only when the one before has ended, since it cannot stand by.
     pub cold: bool,
@@ -84,7 +84,7 @@ pub struct Status {
     pub phase: Phase,
     /// Time since the supervisor has started, s.
     pub uptime_s: f64,
-    /// Scans that the source has published; `None` if a replaced source does not tell.
+    /// Scans that the source has published; `None` if a replaced source does not report them.
     pub published: Option<u64>,
     pub poses: u64,
     /// Scans that were dropped before the newest pose.
@@ -106,8 +106,8 @@ pub struct PendingSwap {
     /// The name of the stage or follower.
     pub process: String,
     pub command: Vec<String>,
-    /// True if the program has taken over, and no scan has gone through it yet; false if it has not
-    /// said that it is ready to take over.
+    /// True if the program has taken over, but no scan has passed through it yet; false if it has
+    /// not reported that it is ready to take over.
     pub has_taken_over: bool,
     /// Time for which that has been waited for, s.
     pub waited_s: f64,
@@ -144,10 +144,10 @@ pub struct ProcessStatus {
     pub name: String,
     pub pid: u32,
     pub command: Vec<String>,
-    /// True if the program is another one than the run was begun with.
+    /// True if the program differs from the one at the run's begin.
     pub is_swapped: bool,
     pub activity: Activity,
-    /// For how long it has done that, s; `None` if it does not tell.
+    /// For how long it has done that, s; `None` if it does not report it.
     pub activity_s: Option<f64>,
     /// Time since its start, s.
     pub uptime_s: f64,
@@ -196,7 +196,7 @@ impl Activity {
 #[derive(Debug)]
 pub struct Control {
     root: PathBuf,
-    /// Device and inode of the root: a later run with the same results has another one.
+    /// Device and inode of the root, which differ for a later run with the same results.
     id: (u64, u64),
     out: PathBuf,
 }
@@ -261,18 +261,18 @@ impl Control {
         self.order(&Request::Restart { process })
     }
 
-    /// Goes on with another program in the place of a stage. Returns when that has worked on a
-    /// first pose; or, with a sentence, when it has taken over and no scan came for it to work on.
-    /// Each second meanwhile `observe` gets what is waited for.
-    /// If the new program fails to take over, the previous program continues.
+    /// Replaces the program of a stage. Returns when the new program has worked on a first pose;
+    /// or, with a sentence, when it has taken over but no scan came. Each second until then,
+    /// `observe` receives the reason for waiting. If the new program fails to take over, the
+    /// previous program continues.
     pub fn swap(
         &self,
         swap: Swap,
         observe: &mut dyn FnMut(&PendingSwap),
     ) -> Result<Option<String>, StageError> {
         let sent = self.send(&Request::Swap(swap))?;
-        // The supervisor has the limits: `run.start_timeout_s`, and that of the trial. But it may
-        // hang.
+        // The supervisor has the limits: `run.start_timeout_s`, and the limit of the trial. But it
+        // may hang.
         let answer = self.wait(sent, LOOK, |run| {
             let status = run.status_or(NOT_LATER)?;
             status.swap.iter().for_each(&mut *observe);
@@ -317,7 +317,7 @@ impl Control {
         sent.map_err(|error| self.failed(&error))
     }
 
-    /// Waits for the answer; calls `look` each time that there is none for another `period`.
+    /// Waits for the answer; calls `look` after each `period` without an answer.
     fn wait(
         &self,
         mut sent: Sent,

@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use crate::shared_memory::{self, SHARED_MEMORY};
 
-/// An error that ends a stage. The exit code tells the supervisor whether a restart can help.
+/// An error that ends a stage. The exit code informs the supervisor whether a restart can help.
 #[derive(Debug, Error)]
 pub enum StageError {
     #[error(

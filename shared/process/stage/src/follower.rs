@@ -33,8 +33,7 @@ pub trait Follower {
     /// for between two steps.
     fn step(&mut self) -> Result<Step<<Self::Output as Message>::Header>, StageError>;
 
-    /// Makes what it has written survive a power failure. A failure is found by nobody after the
-    /// process.
+    /// Makes its writes survive a power failure. A failure is found by nobody after the process.
     fn sync(&mut self) -> Result<(), StageError>;
 
     /// Returns the position in the logs.
@@ -74,7 +73,7 @@ pub fn run<F: Follower>(launch: &Launch, follower: &mut F) -> Result<StageCounte
     };
     let mut limit = Duration::ZERO;
     loop {
-        // Before the step: what is appended after this wakes the next one.
+        // Before the step: records appended after this wake the next one.
         let woken = launch
             .signals
             .wait(&grown, Some(flow.output.listener()), limit)?;

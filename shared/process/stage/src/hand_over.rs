@@ -1,7 +1,6 @@
-//! One topic without a run around it, to measure what the hand-over of a message costs, whatever
-//! its size.
+//! One topic without a run around it, to measure the cost of handing over a message of any size.
 //!
-//! The messages take the way of those of a run: [`Writer`] in the sender,
+//! The messages pass through the same code as in a run: [`Writer`] in the sender,
 //! [`Observer`](crate::observer::Observer) in each reader.
 
 use std::path::Path;

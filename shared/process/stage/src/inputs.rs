@@ -16,8 +16,7 @@ pub enum Action {
     Wait,
     /// Keep the current item only as the previous one of the next: advance and publish nothing.
     Keep,
-    /// Process this item, the last input of which was received at the given time
-    /// (`CLOCK_MONOTONIC`, ns).
+    /// Process this item, whose last input was received at the given time (`CLOCK_MONOTONIC`, ns).
     Process(Item, i64),
     /// Pass on the end of the stream.
     End(Item),

@@ -49,7 +49,7 @@ impl Manifest {
         serde_json::from_str(&text).map_err(|error| failed(error.to_string()))
     }
 
-    /// Returns the log to which all processes append their events.
+    /// Returns the log where all processes append their events.
     pub fn events(&self) -> PathBuf {
         self.out.join("log.jsonl")
     }

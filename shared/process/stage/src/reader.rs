@@ -16,7 +16,7 @@ use crate::{
 pub struct Received<M: Message> {
     sample: Sample,
     message: PhantomData<M>,
-    /// Time at which it was taken from the queue, `CLOCK_MONOTONIC`, ns.
+    /// Time of its removal from the queue, `CLOCK_MONOTONIC`, ns.
     pub received_ns: i64,
 }
 
@@ -201,7 +201,7 @@ impl<M: Message> Reader<M> {
         self.previous = None;
     }
 
-    /// Takes the next item out of shared memory; `None` if there is none yet.
+    /// Takes the next item out of shared memory; `None` if nothing has arrived yet.
     pub(crate) fn take_bytes(&mut self) -> Result<Option<RecordedMessage>, StageError> {
         let message = self.head()?.map(Received::to_bytes);
         self.release();

@@ -205,7 +205,7 @@ impl<M: Message<Header = MotionHeader>> Motions<M> {
 struct Input<'a> {
     motion: MotionHeader,
     scan: Option<&'a Received<Masked>>,
-    /// Time at which the last of them was received, `CLOCK_MONOTONIC`, ns.
+    /// Time when the last of them was received, `CLOCK_MONOTONIC`, ns.
     received_ns: i64,
 }
 

@@ -39,9 +39,9 @@ pub trait Source {
     /// The scans to play, by their index in the recording.
     fn scans(&self) -> Range<usize>;
 
-    /// Time at which scan `index` is complete on the sensor's clock, ns since 1970, if it is known
-    /// without reading the scan. Without it a restarted source in live mode cannot tell which scans
-    /// it has missed, and plays them late.
+    /// Time when scan `index` is complete on the sensor's clock, ns since 1970, if it is known
+    /// without reading the scan. Without it a restarted source in live mode cannot determine the
+    /// missed scans, and plays them late.
     fn complete_ns(&self, index: usize) -> Option<i64>;
 
     /// Time between two scans, ns.
@@ -87,7 +87,7 @@ pub fn run(
         counters: StageCounters::default(),
         may_have_new_readers: false,
     };
-    // The system ends a wait up to 50 us late unless told. If it refuses, scans are that late.
+    // By default the system ends a wait up to 50 us late. If it refuses, scans are that late.
     let _ = set_current_timer_slack(NonZeroU64::new(1));
     if let Some(position) = playback.wait_for_start()? {
         playback.play(position)?;

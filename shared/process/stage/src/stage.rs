@@ -27,8 +27,8 @@ pub trait Stage {
         output: &mut Draft<Self::Output>,
     ) -> Result<(), StageError>;
 
-    /// Adds what it has found in the item that was processed last to its identity, which all later
-    /// messages carry.
+    /// Adds the findings from the last processed item to its identity, which all later messages
+    /// carry.
     fn identify(&self, _item: &mut Item) {}
 }
 

@@ -48,7 +48,7 @@ pub fn let_signals_end_the_process() -> Result<(), StageError> {
     Ok(())
 }
 
-/// The signals by which a process is asked to stop.
+/// The signals that request a stop.
 const STOP: [i32; 3] = [consts::SIGTERM, consts::SIGINT, consts::SIGHUP];
 
 /// Signals as file descriptors to wait for.
@@ -160,7 +160,7 @@ impl Signals {
         let timed_out = sleep_until_ready(&mut polled, limit);
         self.beat(Activity::Works);
         let timed_out = timed_out?;
-        // Read only what is ready: each system call saved reduces latency.
+        // Read only ready descriptors: each system call saved reduces latency.
         let mut ready = polled.iter().map(|polled| !polled.revents().is_empty());
         let mut next = || ready.next().unwrap_or(false);
         let (stop, child) = (next() && drain(&self.stop), next() && drain(&self.child));

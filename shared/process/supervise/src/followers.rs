@@ -1,5 +1,5 @@
 //! The supervision of followers: they are restarted alone, and waited for at the end of the stream.
-//! Odometry goes on without one that dies again and again.
+//! Odometry continues without a follower that dies again and again.
 
 use std::time::{Duration, Instant};
 

@@ -2,12 +2,12 @@
 //!
 //! After a death only the dead stage is restarted: every start resumes. All stages are restarted if
 //! that does not help (the stage dies again before a new pose, or no pose is published) or if the
-//! plan says so. Followers are no part of that: they are restarted alone, and waited for at the
+//! plan demands it. Followers are no part of that: they are restarted alone, and waited for at the
 //! end. [`rig`] runs one process alone, to test it.
 //!
 //! Reading order: `supervisor`, the loop; its parts, each with a file of that name: `processes`,
-//! `poses`, `stall`, `recovery`, `followers`, `swaps`, `recorder`; `restarts` and `requests`, where
-//! it is done what they decide; `start` and `child`, a process; `clean`.
+//! `poses`, `stall`, `recovery`, `followers`, `swaps`, `recorder`; `restarts` and `requests`, which
+//! carry out their decisions; `start` and `child`, a process; `clean`.
 
 // `pre_exec` and raw file descriptors need `unsafe`; each use states why it is sound.
 #![allow(unsafe_code)]

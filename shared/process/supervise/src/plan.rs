@@ -44,7 +44,7 @@ pub struct StagePlan {
     /// The files that the command executes. After a change of one of them the stage is not started
     /// again.
     pub programs: Vec<Program>,
-    /// The directory in which it is started; `None`: the supervisor's.
+    /// The directory for starting it; `None`: the supervisor's.
     pub directory: Option<PathBuf>,
     /// The scheduling of the process.
     pub scheduling: Scheduling,
@@ -55,11 +55,11 @@ pub struct StagePlan {
     /// True if its death restarts the others too: it has state that its own restart does not
     /// recover.
     pub restarts_all: bool,
-    /// Time in which it may end by itself when the run is complete, unless a stop is requested.
+    /// Time for it to end unasked when the run is complete, unless a stop is requested.
     pub end_timeout: Duration,
 }
 
-/// Time for a process to end by itself before it is killed.
+/// Time for a process to end before it is killed.
 pub const END_TIMEOUT: Duration = Duration::from_secs(2);
 
 impl StagePlan {
@@ -96,7 +96,7 @@ pub enum Event<'a> {
         follower: &'a str,
         progress: Progress,
     },
-    /// A follower is not restarted any more. Odometry goes on, and then the run ends with this
+    /// A follower is not restarted any more. Odometry continues, and then the run ends with this
     /// error.
     GaveUp {
         /// The name of the follower.
@@ -232,7 +232,7 @@ pub enum SuperviseError {
         /// The name of the stage.
         stage: String,
         times: usize,
-        /// The time in which they were counted, s.
+        /// The window for counting them, s.
         window_s: f64,
         /// The cause of the last death.
         cause: String,
@@ -249,7 +249,7 @@ pub enum SuperviseError {
 }
 
 impl SuperviseError {
-    /// Returns whether it says that one process cannot be kept alive.
+    /// Returns whether it means that one process cannot be kept alive.
     pub(crate) fn is_of_one_process(&self) -> bool {
         matches!(
             self,

@@ -3,7 +3,7 @@
 //! output.
 //!
 //! Messages are values here ([`Recorded`]), since the tester is to send also what no stage may
-//! send. Readers check what they receive as the readers of a run do.
+//! send. Readers check received messages as the readers of a run do.
 
 mod recorded;
 
@@ -82,8 +82,8 @@ pub trait Tap {
 }
 
 impl<'a> Rig<'a> {
-    /// Creates the root of a run with this manifest, the prefix and the root of which are set, and
-    /// this configuration, and the services of the run. `guardian` is as in [`Plan`](crate::Plan).
+    /// Creates the root of a run with this manifest, whose prefix and root are set, and this
+    /// configuration, and the services of the run. `guardian` is as in [`Plan`](crate::Plan).
     pub fn new(
         manifest: Manifest,
         configuration: &str,
@@ -150,7 +150,7 @@ impl<'a> Rig<'a> {
         })
     }
 
-    /// Removes what a killed process has left, as the supervisor does before it starts another one.
+    /// Removes the remains of a killed process, as the supervisor does before it starts a new one.
     pub fn remove_dead(&self) -> Result<(), SuperviseError> {
         clean::remove_dead(&self.manifest, &self.transport, false)
     }
@@ -214,7 +214,7 @@ impl<'a> Rig<'a> {
     }
 }
 
-/// The way in which a reader joins.
+/// The manner of a reader's joining.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Joining {
     /// It notifies the publisher, and so receives its history.
@@ -290,7 +290,7 @@ fn no_such(topic: &str) -> StageError {
 }
 
 impl Process {
-    /// Returns the process id, which is also that of its group.
+    /// Returns the process id, which is also its group's.
     pub fn pid(&self) -> u32 {
         self.child.pid()
     }

@@ -8,7 +8,7 @@ use rustix::{
     thread::{CpuSet, sched_setaffinity},
 };
 
-/// Returns what a new process can apply to itself between fork and exec.
+/// Returns the settings that a new process can apply to itself between fork and exec.
 pub(super) fn prepare(scheduling: &Scheduling) -> Prepared {
     let mut set = CpuSet::new();
     scheduling.cpus.iter().for_each(|cpu| set.set(*cpu));

@@ -1,5 +1,5 @@
-//! The loop of the supervisor. Its parts look at what has happened and decide; what they have
-//! decided is done in `restarts` and `requests`.
+//! The loop of the supervisor. Its parts look at events and decide; `restarts` and `requests` carry
+//! out their decisions.
 
 use std::collections::BTreeMap;
 

@@ -8,8 +8,7 @@ use std::{fs::File, io::Write};
 
 use crate::SuperviseError;
 
-/// The system keeps to what a process has written here until that process closes it (Linux, "PM
-/// QoS").
+/// The system applies the value written here until the process closes the file (Linux, "PM QoS").
 const FILE: &str = "/dev/cpu_dma_latency";
 
 /// A limit that is in effect until it is dropped.

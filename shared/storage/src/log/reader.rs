@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::{LogError, LogMagic, records::Records};
 
-/// Reads a log to which another process may append. It needs 16 bytes of memory for each record.
+/// Reads a log while another process may append to it. It needs 16 bytes of memory for each record.
 #[derive(Debug)]
 pub struct LogReader {
     records: Records,
@@ -59,7 +59,7 @@ impl LogReader {
     }
 
     /// Reads at most `length` bytes of the start of a record, which replace the content of `bytes`.
-    /// They are not checked: the checksum is that of the whole record.
+    /// They are not checked: the checksum covers the whole record.
     ///
     /// # Panics
     /// There are no more than `index` records.

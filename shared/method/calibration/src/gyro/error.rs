@@ -1,4 +1,4 @@
-//! Why a drive does not tell the clock and the axes of a gyro.
+//! Why a drive does not determine the clock and the axes of a gyro.
 
 use thiserror::Error;
 
@@ -54,7 +54,7 @@ pub enum GyroError {
     Axes {
         /// The axis of one drive.
         one: &'static str,
-        /// The axis of another one.
+        /// The axis of the other drive.
         other: &'static str,
     },
 }

@@ -1,5 +1,5 @@
-//! Measured positions of keyframes in a frame of their own, as those of GNSS, and the pose of the
-//! graph's frame in it.
+//! Measured positions of keyframes in a frame of their own, for example by GNSS, and the pose of
+//! the graph's frame in it.
 
 use gyre_geometry::{Pose, UncertainMotion};
 use nalgebra::{Matrix2x3, Matrix3, Vector2};
@@ -30,12 +30,12 @@ pub struct Position {
     pub position_m: Vector2<f64>,
     /// Variance along each axis, m².
     pub variance_m2: f64,
-    /// The factor of its information, above 0 up to 1: less than 1 if its error depends on those of
-    /// others.
+    /// The factor of its information, above 0 up to 1: less than 1 if its error depends on other
+    /// errors.
     pub share: f64,
 }
 
-/// A position with what the last solution makes of it.
+/// A position with its weight in the last solution.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WeightedPosition {
     pub position: Position,
@@ -120,7 +120,7 @@ impl Measured {
 
 impl PoseGraph {
     /// Takes a measured position. Positions move no pose until [`PoseGraph::solve`], nor before
-    /// they tell the heading of the frame.
+    /// they determine the heading of the frame.
     pub fn measure(&mut self, position: Position) -> Result<(), EstimationError> {
         let keyframe = position.keyframe;
         keyframe_exists(keyframe, self.state.poses.len())?;
@@ -149,7 +149,7 @@ impl PoseGraph {
     }
 
     /// Returns the pose of the graph's frame in the frame of the positions; `None` if they do not
-    /// tell it.
+    /// determine it.
     pub fn frame(&self) -> Option<Pose> {
         self.state.frame
     }
@@ -164,8 +164,8 @@ impl PoseGraph {
         Ok(Some(UncertainMotion { motion, covariance }))
     }
 
-    /// Returns all positions in the order in which they came; none have weight before the frame is
-    /// known.
+    /// Returns all positions in the order of arrival; before the frame is known, their weight is
+    /// zero.
     pub fn positions(&self) -> impl Iterator<Item = WeightedPosition> + '_ {
         let State { poses, frame } = &self.state;
         self.positions.iter().map(move |measured| WeightedPosition {
@@ -188,8 +188,8 @@ impl PoseGraph {
 
     /// Weighs the positions against each other and the rest, from poses that know nothing of them:
     /// graduated non-convexity (Yang et al., RA-L 2020). With a wide kernel all count alike, and
-    /// the poses follow most of them; as it narrows those that contradict lose their weight. What
-    /// is beyond the gate at the end is not used.
+    /// the poses follow most of them; as it narrows those that contradict lose their weight.
+    /// Positions beyond the gate at the end are not used.
     pub(super) fn choose_positions(&mut self) -> Result<(), EstimationError> {
         for measured in &mut self.positions {
             (measured.weight, measured.is_refused) = (1.0, false);
@@ -240,7 +240,7 @@ struct Pair {
     position: Vector2<f64>,
 }
 
-/// Returns the pose of the poses' frame in that of the positions that fits best, by weighted least
+/// Returns the pose of the poses' frame in the positions' frame that fits best, by weighted least
 /// squares (Umeyama, PAMI 1991, without scale); `None` if its heading is not known well enough.
 ///
 /// # Panics

@@ -108,7 +108,8 @@ impl Describer {
         }
     }
 
-    /// Computes the descriptor of a submap. That of an empty one is zero, and similar to none.
+    /// Computes the descriptor of a submap. The descriptor of an empty submap is zero, and similar
+    /// to no other.
     pub fn describe(&mut self, submap: &Submap, out: &mut Descriptor) {
         submap.draw(CELL_M, self.raster.view_mut()).expect(PLANNED);
         let raster = self.raster.view();

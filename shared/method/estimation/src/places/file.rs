@@ -14,7 +14,7 @@ use super::descriptor::SPECTRUM_BYTES;
 use super::{Descriptor, PlaceIndex};
 
 const MARK: [u8; 8] = *b"GYREPLCS";
-/// Increases with every change of the layout or of what the descriptors mean.
+/// Increases with every change of the layout or of the meaning of descriptors.
 const VERSION: u32 = 1;
 const SIZES: [u32; 2] = [Descriptor::SIEVE_BYTES as u32, SPECTRUM_BYTES as u32];
 const HEADER_BYTES: usize = MARK.len() + 4 + 8 + 8;

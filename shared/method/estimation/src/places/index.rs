@@ -24,12 +24,12 @@ pub struct Candidate {
     pub place: usize,
     /// Correlation coefficient of the descriptors at the best angle.
     pub score: f64,
-    /// Yaw of the queried place in the found one's frame, in (-pi/2, pi/2] rad: the descriptors
-    /// cannot tell it from half a turn more.
+    /// Yaw of the queried place in the found one's frame, in (-pi/2, pi/2] rad: descriptors are
+    /// ambiguous by half a turn.
     pub yaw_rad: f64,
 }
 
-/// A place whose path does not continue that of the place before.
+/// A place whose path does not continue from the place before.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error(
     "a place at {path_m} m of the path cannot follow one at {last_m} m: places are added in the order of the path"
@@ -146,8 +146,7 @@ impl PlaceIndex {
     }
 
     /// Finds the places among the first `eligible` ones that look most similar: at most 32, the
-    /// best first. Of places that lie less than `apart_m` along the path from a better one none is
-    /// returned.
+    /// best first. Places less than `apart_m` along the path from a better one are left out.
     pub fn query(
         &mut self,
         descriptor: &Descriptor,
@@ -167,7 +166,7 @@ impl PlaceIndex {
     }
 
     /// Ranks all places by their whole descriptors, the best first, each at the best `angles`
-    /// angles: for a query that must not miss its place, such as a scan of which half is hidden. It
+    /// angles: for a query that must not miss its place, such as a scan that is half hidden. It
     /// takes some microseconds a place.
     pub fn rank_all(&mut self, descriptor: &Descriptor, angles: usize) -> &[Candidate] {
         let places = 0..self.places.len() as u32;

@@ -33,7 +33,7 @@ impl Pen {
 }
 
 const GLYPHS: RasterHeight = RasterHeight::Size32;
-/// Lengths in units, of which a picture is at least so many wide.
+/// Least width of a picture, in units of length.
 const MIN_WIDTH: f32 = 900.0;
 const FOOTER: f32 = 44.0;
 const MARGIN: f32 = 20.0;
@@ -47,7 +47,7 @@ const UNIT_SIDE: f32 = 1300.0;
 /// A picture that is being drawn.
 pub struct Canvas {
     pixmap: Pixmap,
-    /// Pixels of a unit: what is drawn has the same share of every picture.
+    /// Pixels of a unit: drawn elements have the same share of every picture.
     unit: f32,
     view: View,
     /// Row of the middle of the footer.
@@ -227,7 +227,7 @@ impl Canvas {
     }
 }
 
-/// Adds a line but for the points that are too near to the one before to be told apart.
+/// Adds a line without the points that are indistinguishably near to the one before.
 fn add_line(builder: &mut PathBuilder, points: &[(f32, f32)]) {
     let mut points = points
         .iter()

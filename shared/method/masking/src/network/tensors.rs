@@ -58,7 +58,7 @@ impl<'a> Constants<'a> {
         })
     }
 
-    /// Returns the values of a constant of any type; those of a network of 8 bits are exact.
+    /// Returns the values of a constant of any type; values of a network of 8 bits are exact.
     fn values(&self, name: &str) -> Option<Vec<f64>> {
         let tensor = self.0.get(name)?;
         let raw = tensor.raw_data.as_ref().map(|raw| raw.borrow());

@@ -29,7 +29,7 @@ pub enum ScanError {
     StampOrder {
         /// The row, from 0.
         row: usize,
-        /// Time by which it is earlier, s.
+        /// Difference to the earlier stamp, s.
         back_s: f64,
     },
     #[error(
@@ -38,14 +38,14 @@ pub enum ScanError {
     StampSpan {
         /// The row, from 0.
         row: usize,
-        /// The stamp minus that of the first row, s.
+        /// The stamp minus the stamp of the first row, s.
         after_s: f64,
         /// The longest sweep, s.
         max_s: f64,
     },
     #[error("the scan's stamp is {apart_s:.3} s from that of its first row")]
     StampApart {
-        /// Stamp of the scan minus that of the first row, s.
+        /// Stamp of the scan minus the stamp of the first row, s.
         apart_s: f64,
     },
     #[error("azimuth {index} of the scan is at {value} rad")]
@@ -108,8 +108,8 @@ impl PolarScan<'_> {
         }
     }
 
-    /// Checks that the times of the rows, and the scan's own, are those of one sweep. For a scan
-    /// that passes [`PolarScan::check`].
+    /// Checks that the times of the rows, and the scan's own, form one sweep. For a scan that
+    /// passes [`PolarScan::check`].
     pub fn check_times(&self) -> Result<(), ScanError> {
         let stamps = &self.stamp_ns[..self.geometry.azimuths];
         check_sweep(stamps, MAX_INTERVAL_NS)?;

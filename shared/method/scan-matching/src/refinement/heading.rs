@@ -2,9 +2,10 @@
 //! bias of the gyro and its scale, and the lean of the radar.
 //!
 //! The gyro predicts the heading of the next scan, and registration measures it against the map.
-//! While the vehicle stands the map stays, so that the bias is seen well. While it drives, the map
-//! is made anew of its own scans and follows a bias that is wrong; and a small steady error of
-//! registration, the *lean*, drags the map along as a bias would. The covariance knows both.
+//! While the vehicle stands the map stays, so that the bias is observed well. While it drives, the
+//! map is rebuilt from its own scans and follows a wrong bias; and a small steady error of
+//! registration, the *yaw bias of registration* (`lean`), drags the map along as a gyro bias would.
+//! The covariance includes both.
 
 use gyre_geometry::{Pose, UncertainMotion, pose, wrap_angle, xy_yaw};
 use gyre_samples::{GyroConfig, GyroTurn};
@@ -17,14 +18,14 @@ pub(super) const GATE: f64 = 16.0;
 /// 1.4 s drifts with it by 0.1 degrees in a minute, as the radar alone does on six simulated roads.
 const LEAN_SIGMA_RAD: f64 = 4e-5;
 const LEAN_TIME_S: f64 = 60.0;
-/// Noise of the turn about the vertical where the gyro's axis tilts with the vehicle, rad/√s.
-/// It is what the best bias and scale leave of the turns in 4 to 16 s on six simulated roads, whose
-/// gradient is 2.6 % RMS along and across.
+/// Noise of the turn about the vertical where the gyro's axis tilts with the vehicle, rad/√s. It is
+/// the residual of the best bias and scale in the turns over 4 to 16 s on six simulated roads,
+/// whose gradient is 2.6 % RMS along and across.
 const TILT_RAD_PER_SQRT_S: f64 = 3e-4;
 /// Time over which an error of the bias counts as new, s: for covariances of motions, which are
 /// composed as if independent.
 const BIAS_TIME_S: f64 = 30.0;
-/// Angle over which an error of the scale counts as new, rad: that of a bend.
+/// Angle after which an error of the scale counts as new, rad: a bend.
 const SCALE_TURN_RAD: f64 = std::f64::consts::FRAC_PI_2;
 
 /// The states, in the order of the covariance.
@@ -47,11 +48,11 @@ pub struct Heading {
     pub scale: f64,
     /// Covariance of the errors of the heading against the map, the bias, the lean and the scale.
     pub covariance: Matrix4<f64>,
-    /// The verdict of the last registered heading on that of the gyro.
+    /// The verdict of the last registered heading on the gyro's.
     pub verdict: Verdict,
 }
 
-/// The verdict of a registered heading on that of the gyro.
+/// The verdict of a registered heading on the gyro's.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Verdict {
     /// Noise can bring both so far apart.
@@ -94,9 +95,9 @@ pub(super) struct PredictedTurn {
 }
 
 impl PredictedTurn {
-    /// Returns the variance after a time, s, and an angle, rad, in which all turns were the gyro's,
-    /// such that those of all of them add up, rad². The errors of bias and scale are those of all:
-    /// their squares grow with the squares of the time and of the angle.
+    /// Returns the variance after a time, s, and an angle, rad, with all turns by the gyro, such
+    /// that the variances of all turns add up, rad². The errors of bias and scale are common to
+    /// all: their squares grow with the squares of the time and of the angle.
     pub fn variance_after_rad2(&self, [time_s, angle_rad]: [f64; 2]) -> f64 {
         self.noise_rad2
             + self.bias_radps2 * grown(self.interval_s, time_s)
@@ -135,7 +136,7 @@ impl Heading {
         }
     }
 
-    /// Returns what is known of the bias.
+    /// Returns the estimate of the bias.
     pub(super) fn bias(&self) -> GyroBias {
         GyroBias {
             rate_radps: self.bias_radps,
@@ -170,8 +171,8 @@ impl Heading {
         }
     }
 
-    /// Lets a time pass whose turn the gyro has not measured: bias and lean change, and the heading
-    /// is another one. Either [`adopt`](Self::adopt) or [`guess`](Self::guess) says which.
+    /// Lets a time pass without a gyro measurement of the turn: bias and lean change, and so does
+    /// the heading. Either [`adopt`](Self::adopt) or [`guess`](Self::guess) sets the heading.
     pub(super) fn wait(&mut self, time_s: f64, config: &GyroConfig) {
         let kept = (-time_s / LEAN_TIME_S).exp();
         let step = Matrix4::from_diagonal(&Vector4::new(1.0, 1.0, kept, 1.0));
@@ -183,9 +184,8 @@ impl Heading {
 
     /// Takes the heading of a pose that was registered with the map, whatever it was before: the
     /// gyro has not measured the turn. That is the correction of a prediction without any
-    /// certainty, so that the lean alone is taken off. The error is that of the lean, which the
-    /// bias may share, and the noise of registration. The place moves along as in
-    /// [`weigh`](Self::weigh).
+    /// certainty, so that the lean alone is taken off. The error is the lean's, which the bias may
+    /// share, plus the noise of registration. The place moves along as in [`weigh`](Self::weigh).
     pub(super) fn adopt(
         &mut self,
         registered: &UncertainMotion,
@@ -208,8 +208,8 @@ impl Heading {
         self.covariance[(HEADING, HEADING)] += variance_rad2;
     }
 
-    /// Returns what a registered heading says of the predicted one, where single matches err by up
-    /// to `jitter_rad`.
+    /// Compares a registered heading with the predicted one, where single matches err by up to
+    /// `jitter_rad`.
     pub(super) fn judge(
         &self,
         registered: &UncertainMotion,
@@ -229,8 +229,8 @@ impl Heading {
     }
 
     /// Weighs the heading of a pose that was registered with the map against the predicted one. The
-    /// place moves along as far as its error depends on that of the heading. `previous` is the pose
-    /// of the scan before, `drift_share` the share of the covariance that accumulates.
+    /// place moves along as far as its error depends on the heading's. `previous` is the pose of
+    /// the scan before, `drift_share` the share of the covariance that accumulates.
     pub(super) fn weigh(
         &mut self,
         registered: &UncertainMotion,
@@ -267,13 +267,14 @@ impl Heading {
         step[HEADING]
     }
 
-    /// A new map starts with the scan before: its heading is that of the map.
+    /// A new map starts with the scan before: its heading is the map's.
     pub(super) fn start_map(&mut self) {
         let step = Matrix4::from_diagonal(&Vector4::new(0.0, 1.0, 1.0, 1.0));
         self.covariance = step * self.covariance * step;
     }
 
-    /// The map has a new keyframe, one of `keyframes`: its heading follows that of the scans.
+    /// The map has a new keyframe, one of `keyframes`: its heading follows the heading of the
+    /// scans.
     pub(super) fn follow(&mut self, keyframes: usize) {
         let kept = 1.0 - 2.0 / (keyframes as f64 + 1.0);
         let step = Matrix4::from_diagonal(&Vector4::new(kept, 1.0, 1.0, 1.0));
@@ -281,9 +282,9 @@ impl Heading {
     }
 }
 
-/// The pose that was registered, turned by an angle: the place moves along as far as its error
-/// depends on that of the heading. Its covariance is along the axes of the scan before, whose pose
-/// is `previous`, and the pose along those of the map.
+/// The registered pose, turned by an angle: the place moves along as far as its error depends on
+/// the heading's. Its covariance is along the axes of the scan before, whose pose is `previous`,
+/// and the pose along the axes of the map.
 fn turned(registered: &UncertainMotion, previous: &Pose, angle_rad: f64) -> Pose {
     let covariance = registered.covariance;
     let step = covariance.column(2) * (angle_rad / covariance[(2, 2)]);

@@ -14,7 +14,7 @@ pub enum InitialGuess {
     /// The prediction with a yaw offset, tried if nothing else gave a plausible match.
     YawOffset,
     /// The prediction, whose place along walls without structure stays: the radar does not see how
-    /// far the vehicle has driven. The wheels say it, or the motions before.
+    /// far the vehicle has driven. The wheels or the motions before determine it.
     AlongWalls,
 }
 

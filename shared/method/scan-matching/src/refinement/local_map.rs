@@ -149,7 +149,7 @@ impl LocalMap {
         self.coarse.view()
     }
 
-    /// Returns whether `pose` is far enough from the last keyframe for another one, also by the
+    /// Returns whether `pose` is far enough from the last keyframe for a new one, also by the
     /// search.
     pub fn needs_keyframe(
         &self,
@@ -173,8 +173,8 @@ mod tests {
 
     use super::*;
 
-    /// Keyframes come and go, the map is cleared and filled again: the sum is that of the keyframes
-    /// in it.
+    /// Keyframes come and go, the map is cleared and filled again: the sum equals the sum of its
+    /// keyframes.
     #[test]
     fn the_sum_is_that_of_the_keyframes_in_the_map() {
         let config = RefinementConfig {

@@ -1,24 +1,23 @@
-//! The distance by the wheels beside that of the radar's matches: a Kalman filter over the place
-//! along the path against the map, and the scale of the wheels. The way by Doppler has one of its
-//! own, since it is a distance with a scale too: that of the Doppler coefficient.
+//! The distance by the wheels beside the distance by the radar's matches: a Kalman filter over the
+//! place along the path against the map, and the scale of the wheels. The displacement by Doppler
+//! has a filter of its own, since it is a distance with a scale too: the scale of the Doppler
+//! coefficient.
 //!
-//! Where the radar sees, it says how far the vehicle has driven, and so what the scale is: the
-//! motions of a drive share it, and the noise of one registration is taken back by the next. A
-//! registered distance that is too far from that of the wheels says that they slip, and so does a
-//! scale that is too far from 1; they are not used then. Where the radar sees nothing, or little
-//! that does not agree, the motion is that of an arc: as long as the wheels say, turned as the
-//! gyro says.
+//! Where the radar determines the distance, it determines the scale, too: the motions of a drive
+//! share the scale, and the next registration cancels the noise of one registration. If a
+//! registered distance differs too much from the wheels' distance, or if the scale differs too much
+//! from 1, the wheels slip and are not used. If the radar sees nothing, or little that disagrees,
+//! the motion is an arc: its length by the wheels, its turn by the gyro.
 
 use super::heading::{GATE, grown};
 use gyre_geometry::{Pose, Twist, UncertainMotion, pose};
 use gyre_samples::{WheelDistance, WheelsConfig};
 use nalgebra::{Matrix2, Matrix3, RowVector3, Vector2, Vector3};
 
-/// Standard deviation by which a scale may differ from 1 in any case: the settings may be of other
-/// tyres.
+/// Standard deviation of the scale around 1 in any case: the settings may belong to other tyres.
 const TYRES: f64 = 0.02;
 
-/// The scale of the wheels, and what they were used for.
+/// The scale of the wheels, and the uses of their distance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WheelState {
     /// True distance over the one that is measured.
@@ -27,8 +26,8 @@ pub struct WheelState {
     pub offset_m: f64,
     /// Covariance of the errors of that offset and of the scale.
     pub covariance: Matrix2<f64>,
-    /// The last registered distance was another one than that of the wheels, or the scale by which
-    /// they agree is none that they can have.
+    /// The last registered distance differed from the wheels' distance, or the implied scale is
+    /// implausible.
     pub slips: bool,
     /// The distance by the wheels since the last registered scan, m.
     pub dead_m: f64,
@@ -36,7 +35,7 @@ pub struct WheelState {
     pub dead_s: f64,
     /// The turn since then, rad.
     pub dead_rad: f64,
-    /// The time since a match has last told the place along the path, s: also along walls.
+    /// The time since a match last determined the place along the path, s: also along walls.
     pub untold_s: f64,
     /// Covariance of the predicted motions since then together, or since a new map was started:
     /// along the axes of the last scan.
@@ -69,12 +68,12 @@ pub(super) struct PredictedDistance {
     pub distance_m: f64,
     /// Way to the left of the heading half-way, m, by Doppler.
     pub left_m: f64,
-    /// Variance of the distance, m², such that those of the motions since the last registered one
-    /// add up.
+    /// Variance of the distance, m², such that the variances of the motions since the last
+    /// registered one add up.
     pub variance_m2: f64,
     /// Variance across the path, m².
     pub side_variance_m2: f64,
-    /// Distance by which the radar is ahead of the axle that does not steer, m.
+    /// Distance of the radar ahead of the axle that does not steer, m.
     pub radar_ahead_m: f64,
     /// Time, s, and turn, rad, from the last registered scan to the scan before.
     pub dead: [f64; 2],
@@ -104,7 +103,7 @@ impl Registered {
         }
     }
 
-    /// The variance of the place of one of its poses, and that of the drift.
+    /// The variance of the place of one of its poses, and the variance of the drift.
     fn noise_and_drift_m2(&self) -> [f64; 2] {
         let drift = self.drift_share * self.variance_m2;
         [0.5 * (self.variance_m2 - drift), drift]
@@ -138,7 +137,7 @@ impl WheelState {
         }
     }
 
-    /// Returns what is known of the scale.
+    /// Returns the estimate of the scale.
     pub(super) fn known(&self) -> WheelScale {
         WheelScale {
             scale: self.scale,
@@ -160,7 +159,7 @@ impl WheelState {
         config: &WheelsConfig,
     ) -> Option<PredictedDistance> {
         let step_m = measured.distance_m;
-        // The error of the scale is that of all motions since the last registered one: its square
+        // The error of the scale is common to all motions since the last registered one: its square
         // grows with the square of the whole distance.
         let since_m2 = grown(step_m, self.dead_m);
         (!self.slips).then_some(PredictedDistance {
@@ -204,9 +203,9 @@ impl WheelState {
         }
     }
 
-    /// Compares a registered pose with the measured distance, if there is one: it is another one
-    /// where both disagree, if the match is certain. If the motions together say a scale that the
-    /// wheels cannot have, they have slipped: it is learnt anew.
+    /// Compares a registered pose with the measured distance, if there is one: the distance is
+    /// rejected if both disagree and the match is certain. If the motions together imply an
+    /// implausible scale, the wheels have slipped: the scale is learnt again.
     pub(super) fn weigh(
         &mut self,
         measured: Option<&WheelDistance>,
@@ -249,7 +248,7 @@ impl WheelState {
         let after = kept * before * kept.transpose() + gain * gain.transpose() * noise_m2;
         self.scale += gain[1] * apart_m;
         self.offset_m = gain[2] * apart_m;
-        // The offset of the last scan takes the place of that of the scan before.
+        // The offset of the last scan replaces the offset of the scan before.
         self.covariance = Matrix2::new(after[(2, 2)], after[(2, 1)], after[(1, 2)], after[(1, 1)]);
         self.slips = false;
         self.see();
@@ -288,7 +287,7 @@ impl WheelState {
         }
     }
 
-    /// Takes a registered pose whose place along the path is that of the wheels, since the map does
+    /// Takes a registered pose whose place along the path comes from the wheels, since the map does
     /// not determine it: the map moves along.
     pub(super) fn slide(&mut self, measured: &WheelDistance) {
         self.offset_m = 0.0;
@@ -296,8 +295,8 @@ impl WheelState {
         self.dead_m += measured.distance_m;
     }
 
-    /// Takes a pose whose place along the path is that of the motions before, since the map does
-    /// not determine it: wheels that had slipped are believed again if they do not contradict that.
+    /// Takes a pose whose place along the path comes from the motions before, since the map does
+    /// not determine it: wheels that had slipped are used again if they agree with it.
     pub(super) fn slide_without(&mut self, measured: &WheelDistance, driven: &Registered) {
         let apart_m = driven.distance_m - self.scale * measured.distance_m;
         let [_, variance_m2] = driven.noise_and_drift_m2();
@@ -322,7 +321,7 @@ impl WheelState {
         self.dead_rad += predicted.motion.rotation.angle();
     }
 
-    /// A new map starts with the scan before: its place is that of the map.
+    /// A new map starts with the scan before: its place is the map's.
     pub(super) fn start_map(&mut self) {
         self.offset_m = 0.0;
         self.covariance = Matrix2::new(0.0, 0.0, 0.0, self.covariance[(1, 1)]);

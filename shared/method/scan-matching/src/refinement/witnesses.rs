@@ -1,5 +1,4 @@
-//! Gyro, wheels and Doppler as witnesses of a motion: against what the matches of the radar say of
-//! it.
+//! Gyro, wheels and Doppler as aiding sensors of a motion, compared with the radar's matches.
 
 use gyre_geometry::UncertainMotion;
 use gyre_samples::{DopplerWay, WheelDistance, WheelsConfig};
@@ -33,8 +32,8 @@ impl Refiner {
         by_wheels.or(by_doppler)
     }
 
-    /// Returns the way since the scan before by Doppler; `None` where one of both scans does not
-    /// say its velocity.
+    /// Returns the way since the scan before by Doppler; `None` if one of both scans does not
+    /// determine its velocity.
     pub(super) fn way_by_doppler(&self, interval_s: f64) -> Option<DopplerWay> {
         let [earlier, later] = &self.velocities;
         let both = [earlier.as_ref()?, later.as_ref()?];
@@ -51,8 +50,8 @@ impl Refiner {
         state.wait(interval_s, config);
         let way = self.way?;
         let predicted = state.predict(&way.ahead, config)?;
-        // The error that lasts is that of all motions since a match has told the place: the
-        // variance of one motion alone is that of the way.
+        // The lasting error is common to all motions since a match determined the place: the
+        // variance of one motion alone is the displacement's.
         let before_s = (state.untold_s - interval_s).max(0.0);
         let lasting = grown(interval_s, before_s) - interval_s.powi(2);
         let lasting_m2 = self.doppler.noise_mps.powi(2) * lasting;
@@ -104,7 +103,7 @@ impl Refiner {
             }
         }
         let best = self.registration(scan).best();
-        // A match that is not plausible says nothing.
+        // An implausible match gives no evidence.
         let verdict = match best.is_plausible {
             true => self.judge(&best, &turn),
             false => Verdict::Agrees,
@@ -127,7 +126,7 @@ impl Refiner {
     }
 
     /// Returns the best match of a scan without the turn of the gyro, if it is certain that it
-    /// contradicts that. Otherwise the deskewed points stay those of the match before.
+    /// contradicts that. Otherwise the deskewed points stay with the match before.
     fn match_against_gyro(&mut self, alone: &Scan<'_>, turn: &PredictedTurn) -> Option<Candidate> {
         std::mem::swap(&mut self.points, &mut self.other_points);
         let best = self.registration(alone).best();
@@ -141,7 +140,7 @@ impl Refiner {
     }
 
     /// Returns whether a match is certain enough to refuse the gyro. The search looks for rotations
-    /// near that of the gyro alone, so it need not agree where the scan before has matched.
+    /// near the gyro's, so it need not agree if the scan before has matched.
     fn is_certain(&self, scan: &Scan<'_>, best: &Candidate) -> bool {
         let Some(registered) = self.registered(&best.alignment) else {
             return false;
@@ -151,7 +150,7 @@ impl Refiner {
             && (self.state.unmatched == 0 || self.agrees_with_search(scan, best, along))
     }
 
-    /// Returns what the heading of a match says of that of the gyro.
+    /// Compares the heading of a match with the gyro's.
     fn judge(&self, best: &Candidate, turn: &PredictedTurn) -> Verdict {
         let registered = self.registered(&best.alignment);
         let both = registered.zip(self.state.heading);
@@ -180,7 +179,7 @@ impl Refiner {
         }
     }
 
-    /// Returns what is known of a witness of the distance, what it has measured since the scan
+    /// Returns the state of an aiding sensor of the distance, its measurement since the scan
     /// before, and its settings.
     fn distance_by(
         &self,
@@ -196,8 +195,8 @@ impl Refiner {
         }
     }
 
-    /// Hands each witness of the distance what it has measured, and what was driven to a registered
-    /// pose.
+    /// Hands each aiding sensor of the distance its measurement and the distance driven to a
+    /// registered pose.
     pub(super) fn each_distance(
         &mut self,
         registered: &UncertainMotion,
@@ -237,8 +236,8 @@ impl Refiner {
         }
     }
 
-    /// Returns the part along the path of the motion to a registered pose, of the axle that these
-    /// settings say.
+    /// Returns the part along the path of the motion to a registered pose, for the axle in these
+    /// settings.
     fn driven(&self, registered: &UncertainMotion, config: &WheelsConfig) -> Registered {
         let motion = UncertainMotion {
             motion: self.state.pose.inv_mul(&registered.motion),
@@ -266,7 +265,7 @@ impl Refiner {
         true
     }
 
-    /// Weighs the heading of a registered pose against that of the gyro, if there is one.
+    /// Weighs the heading of a registered pose against the gyro's, if there is a gyro.
     pub(super) fn with_gyro_heading(
         &mut self,
         scan: &Scan<'_>,

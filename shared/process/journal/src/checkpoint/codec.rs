@@ -14,10 +14,10 @@ const STATE_WORDS: usize = 1 + 3 + TRACKER_WORDS;
 const NAME_WORDS: usize = 2;
 const TRACKER_WORDS: usize = DOPPLER + WHEEL_WORDS;
 const STANDSTILL_WORDS: usize = 4 + 4 + 4;
-/// A word that says whether there is one; bias, lean, scale, covariance; the last verdict.
+/// A word for its presence; bias, lean, scale, covariance; the last verdict.
 const HEADING_WORDS: usize = 1 + 3 + 16 + 1;
-/// A word that says whether there are any; scale, offset, three dead reckonings and the time of the
-/// last; both covariances; whether they slip.
+/// A word for their presence; scale, offset, three dead reckonings and the time of the last; both
+/// covariances; whether they slip.
 const WHEEL_WORDS: usize = 1 + 6 + 4 + 9 + 1;
 const ANCHOR_WORDS: usize = 9;
 /// Where the means and counts of a tracker state begin, its standstill, its heading, its wheels and
@@ -323,7 +323,7 @@ pub(super) fn keyframe_name(slot: &[u8]) -> Option<Name> {
     })
 }
 
-/// Decodes the keyframe of this name; false if the slot has another one.
+/// Decodes the keyframe of this name; false if the slot has a different one.
 pub(super) fn decode_keyframe(slot: &[u8], name: Name, keyframe: &mut Keyframe) -> bool {
     keyframe.id = word(slot, 1);
     keyframe.pose = pose_from(&std::array::from_fn::<u64, 4, _>(|k| word(slot, k + 2)));

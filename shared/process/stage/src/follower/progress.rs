@@ -1,5 +1,5 @@
-//! The progress of a follower, a file in the run's root. The supervisor reads it to know whether
-//! the follower has come to its end, which no exit code tells: a follower that somebody asks to end
+//! The progress of a follower, a file in the run's root. The supervisor reads it to learn whether
+//! the follower has come to its end, which no exit code shows: a follower that was asked to end
 //! exits as well.
 
 use std::{

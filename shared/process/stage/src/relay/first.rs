@@ -59,7 +59,7 @@ impl<'a> FirstStages<'a> {
     }
 
     /// Returns the newest pose of the trajectory at the last start of the last stage; `None` before
-    /// it has told.
+    /// its report.
     pub fn resume_at(&self) -> Option<&Item> {
         self.credit.resume_at.as_ref()
     }
@@ -74,7 +74,7 @@ impl<'a> FirstStages<'a> {
         self.credit.newest
     }
 
-    /// Returns the next motion; `None` if there is none yet.
+    /// Returns the next motion; `None` if nothing has arrived yet.
     pub fn next_motion(&mut self) -> Result<Option<RecordedMessage>, StageError> {
         self.motions.as_mut().map_or(Ok(None), Reader::take_bytes)
     }

@@ -12,8 +12,8 @@ use crate::{
     remote_progress::ProgressWriter, sink, transport::Listener, wake, writer::Writer,
 };
 
-/// Reads what the last stages read, which are on another machine, and publishes the poses that come
-/// back from them.
+/// Reads the topics of the last stages, which are on another machine, and publishes the poses that
+/// come back from them.
 pub struct LastStages<'a> {
     launch: &'a Launch,
     poses: Writer<Pose>,
@@ -39,8 +39,8 @@ impl<'a> LastStages<'a> {
         })
     }
 
-    /// Publishes the last poses again, of which the newest says where the source goes on; without
-    /// any, that it begins.
+    /// Publishes the last poses again. The newest pose determines where the source continues;
+    /// without any pose, the source begins.
     pub fn republish(&self, restored: &[PoseHeader]) -> Result<(), StageError> {
         sink::republish(&self.poses, restored, StageId::PoseIntegration)
     }
@@ -57,14 +57,14 @@ impl<'a> LastStages<'a> {
         Ok(())
     }
 
-    /// Returns the next message of one of these topics, by its place among them; `None` if there is
-    /// none yet.
+    /// Returns the next message of one of these topics, by its place among them; `None` if nothing
+    /// has arrived yet.
     pub fn receive(&mut self, topic: usize) -> Result<Option<RecordedMessage>, StageError> {
         let inlet = self.inlets.get_mut(topic);
         inlet.map_or(Ok(None), |inlet| inlet.receive())
     }
 
-    /// Says that the other machine owes the poses of so many items, counted at the source.
+    /// Reports the number of items whose poses the other machine owes, counted at the source.
     pub fn has_handed_over(&self, items: u64) -> Result<(), StageError> {
         self.progress.has_published(items)
     }

@@ -3,7 +3,7 @@
 //! All runs of a user lie in `/dev/shm/gyre-<uid>`, which is the user's alone. Beside the root of
 //! each run lies its lock, and as long as the run lives its supervisor holds it. So a lock that is
 //! free belongs to a dead run, and whoever holds it may remove that run. No lock is shared between
-//! runs, and none is waited for.
+//! runs, and no run waits for one.
 
 use std::{
     collections::BTreeSet,
@@ -28,7 +28,7 @@ use thiserror::Error;
 use crate::{StageError, clock, shared_memory::SHARED_MEMORY, wake::Signals};
 
 const OWNER_ONLY: u32 = 0o700;
-/// Modes of a directory in which others could have put something, or that is a special one.
+/// Modes of a directory where others could have put something, or of a special directory.
 const NOT_OWN: u32 = 0o7022;
 /// Hexadecimal digits in the name of a run.
 const DIGITS: usize = 10;
@@ -175,9 +175,9 @@ fn lock_of(root: &Path) -> PathBuf {
     root.with_extension("lock")
 }
 
-/// Returns the directory of the user's runs, which is created if there is none. `/dev/shm` is open
-/// to all users, so what is there is used only if it is a directory of this user in which no other
-/// can write.
+/// Returns the directory of the user's runs, and creates it if it is missing. `/dev/shm` is open to
+/// all users, so an entry there is used only if it is a directory of this user that no other can
+/// write to.
 fn user_directory() -> Result<PathBuf, RootError> {
     let path = path_of(geteuid());
     make_directory(&path).map_err(|source| RootError::Unusable {
@@ -201,7 +201,7 @@ fn set_owner_only(directory: &impl AsFd) -> io::Result<()> {
     fs::set_permissions(path, Permissions::from_mode(OWNER_ONLY))
 }
 
-/// Checks that a path is a directory of this user in which no other could write, and closes it to
+/// Checks that a path is a directory of this user that no other could write to, and closes it to
 /// all others. A process with another umask may have created it, as the transport does in a process
 /// whose run has been removed.
 fn make_owner_only(path: &Path) -> Result<(), RootError> {
@@ -259,7 +259,7 @@ pub fn sweep() {
     }
 }
 
-/// Removes what the run with this root has left in shared memory, if its supervisor is dead and no
+/// Removes the remains of the run with this root in shared memory, if its supervisor is dead and no
 /// other run has its place.
 pub fn sweep_run(root: &Path) {
     let is_run = root.file_name().and_then(|name| name.to_str());
@@ -329,7 +329,7 @@ fn remove_files(root: &Path) {
     for (path, _) in own_files(Path::new(SHARED_MEMORY), &format!("{name}_")) {
         let _ = fs::remove_file(path);
     }
-    // An empty directory goes without a descriptor, of which there may be none left.
+    // An empty directory is removed without a descriptor, since there may be no descriptor left.
     let _ = fs::remove_dir(root).or_else(|_| fs::remove_dir_all(root));
 }
 

@@ -28,7 +28,7 @@ pub(super) struct LiveSensors {
     /// The samples of the last scan.
     of_scan: Vec<Sample>,
     max_wait: Duration,
-    /// Samples that were left out so far, and the number at which that is said next.
+    /// Samples that were left out so far, and the number for the next report.
     left_out: usize,
     said_at: usize,
 }
@@ -45,7 +45,7 @@ struct Live {
 }
 
 impl LiveSensors {
-    /// Opens those of the sections `[gyro]` and `[wheels]`; `None` without one.
+    /// Opens the samples of the sections `[gyro]` and `[wheels]`; `None` without one.
     pub fn open(launch: &Launch) -> Result<Option<Self>, StageError> {
         let (gyro, wheels): (GyroConfig, WheelsConfig) =
             (launch.section("gyro")?, launch.section("wheels")?);

@@ -111,7 +111,8 @@ impl<R: Recorded> Player<'_, R> {
     }
 
     /// Waits until the sink has reported the newest pose, and returns the first message to send:
-    /// that of this pose, which the others need as the previous one. `None` on a request to stop.
+    /// the message of this pose, which the others need as the previous one. `None` on a request to
+    /// stop.
     fn wait_for_start(&mut self) -> Result<Option<u64>, StageError> {
         loop {
             // Sleep first, as the source of scans does.

@@ -14,7 +14,7 @@ const NOISE_RAD: f64 = 2e-3;
 /// Weighs a drive of `scans` scans that turns at a rate, with a gyro that has a bias. Each scan
 /// becomes a keyframe, unless the vehicle stands.
 fn drive(scans: u32, rate_radps: f64, keyframes: Option<usize>) -> (Heading, f64) {
-    // A turn that stays does not tell the scale from the bias.
+    // A constant turn does not separate the scale from the bias.
     let config = GyroConfig {
         scale_sigma: 0.0,
         ..GyroConfig::default()
@@ -107,7 +107,7 @@ enum Event {
     Blind,
     /// The scan is registered, and the log has a gap.
     Gap,
-    /// Neither: the heading is that of the motions before.
+    /// Neither: the motions before determine the heading.
     Lost,
 }
 

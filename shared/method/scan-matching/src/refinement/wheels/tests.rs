@@ -17,7 +17,7 @@ struct Drive {
     config: WheelsConfig,
     wheels: WheelState,
     true_scale: f64,
-    /// Places along the path against the map: the true one, and that of the last scan.
+    /// Places along the path against the map: the true one, and the last scan's.
     true_m: f64,
     at_m: f64,
 }
@@ -155,7 +155,7 @@ fn the_variance_of_a_time_without_a_match_grows_with_noise_and_scale() {
         let mut drive = Drive::new(seed);
         drive.steps(40);
         let from_m = drive.true_m;
-        // That of the pose before is the noise of its registration.
+        // The error of the pose before is the noise of its registration.
         let start_m = drive.at_m;
         let predicted = (0..40).map(|_| drive.blind_step(2.5).variance_m2);
         variance_m2 += predicted.sum::<f64>() / DRIVES as f64;
@@ -201,7 +201,7 @@ fn wheels_that_slip_from_the_first_metre_are_noticed_and_their_scale_is_learnt_a
     }
 }
 
-/// A tachometer that shows 11 % too much, which the settings do not say, is not learnt in silence.
+/// A tachometer that shows 11 % too much, contrary to the settings, is not learnt in silence.
 #[test]
 fn wheels_of_another_scale_than_the_settings_allow_slip_again_and_again() {
     for seed in 0..100 {
@@ -253,7 +253,7 @@ proptest! {
         }
     }
 
-    /// The covariance is that of motions whose distance and turn are off by one standard deviation.
+    /// The covariance matches motions whose distance and turn are off by one standard deviation.
     #[test]
     fn the_covariance_is_that_of_small_errors(
         distance_m in -5.0..20.0f64, yaw_rad in -0.5..0.5f64, ahead_m in -3.0..5.0f64,
