@@ -42,7 +42,7 @@ impl OdometryMotion {
         }
     }
 
-    /// Returns the motion without its cross-covariances.
+    /// Returns the motion and its covariance, without the shares.
     pub fn alone(&self) -> UncertainMotion {
         UncertainMotion {
             motion: self.motion,

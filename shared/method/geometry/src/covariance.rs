@@ -22,7 +22,7 @@ pub fn unpack(&[xx, xy, xyaw, yy, yyaw, yawyaw]: &Packed) -> Matrix3<f64> {
     Matrix3::new(xx, xy, xyaw, xy, yy, yyaw, xyaw, yyaw, yawyaw)
 }
 
-/// The relative rounding error that may make a covariance indefinite.
+/// Tolerance of the test for positive semidefinite matrices, relative: rounding.
 const ROUNDING: f64 = 1e-6;
 
 /// Returns whether a covariance is finite and positive semidefinite, but for rounding: no variance

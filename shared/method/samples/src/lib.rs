@@ -33,7 +33,7 @@ mod wheels_config;
 
 pub use bounds::SampleConfigError;
 pub use config::{GyroConfig, GyroKind, UpAxis};
-pub use doppler::{DopplerConfig, DopplerKind, DopplerVelocity, DopplerWay};
+pub use doppler::{DopplerConfig, DopplerDisplacement, DopplerKind, DopplerVelocity};
 pub use geodesy::{Geographic, LocalPlane};
 pub use gnss::{BagFixes, GnssConfig, GnssFix, GnssKind, RawFix};
 pub use gyro::{Gyro, GyroTurn, with_yaw_rate};

@@ -12,17 +12,18 @@
 //! - `alignment`, `normal_equations`: Gauss-Newton with a line search;
 //! - `tracker`: the last poses, predictions from them, and the poses that a vehicle can have
 //!   reached;
-//! - `witnesses`: the motion by gyro, wheels and Doppler, against the radar's;
+//! - `aiding`: the motion by gyro, wheels and Doppler, against the radar's;
 //! - `heading`: with a gyro, the heading and the gyro's bias;
 //! - `wheels`: with wheels or Doppler, their scale, and the motions of scans that match nothing;
 //! - `along_walls`: the displacement where only other sensors determine the distance; `structure`:
-//!   where that is so; `structure`: where that is so;
+//!   where that is so;
 //! - `uncertainty`: covariances, and the shares of them that accumulate;
 //! - `standstill`: the pose of a standing vehicle is held;
 //! - [`Submap`]: the points of a keyframe and of those around it;
 //! - [`KeyframeAligner`]: the same alignment for two keyframes of one place that are far apart in
 //!   time.
 
+mod aiding;
 mod alignment;
 mod along_walls;
 mod config;
@@ -40,12 +41,12 @@ mod submap;
 mod tracker;
 mod uncertainty;
 mod wheels;
-mod witnesses;
 
 pub use config::{RefinementConfig, RefinementKind};
 use gyre_geometry::{OdometryMotion, Pose, SparsePoint, Twist, UncertainMotion};
 use gyre_samples::{
-    DopplerConfig, DopplerVelocity, DopplerWay, GyroConfig, GyroTurn, WheelDistance, WheelsConfig,
+    DopplerConfig, DopplerDisplacement, DopplerVelocity, GyroConfig, GyroTurn, WheelDistance,
+    WheelsConfig,
 };
 pub use heading::{GyroBias, Heading, Verdict};
 pub use initial_guess::InitialGuess;
@@ -132,7 +133,7 @@ pub struct Refiner {
     turn: Option<GyroTurn>,
     distance: Option<WheelDistance>,
     velocities: [Option<DopplerVelocity>; 2],
-    way: Option<DopplerWay>,
+    displacement: Option<DopplerDisplacement>,
 }
 
 impl Refiner {
@@ -153,7 +154,7 @@ impl Refiner {
             turn: None,
             distance: None,
             velocities: [None; 2],
-            way: None,
+            displacement: None,
         })
     }
 
@@ -218,7 +219,7 @@ impl Refiner {
     ) -> Refined {
         // Stamps that do not advance give no velocity: a second is assumed.
         let interval_s = if interval_s > 0.0 { interval_s } else { 1.0 };
-        self.way = self.way_by_doppler(interval_s);
+        self.displacement = self.displacement_by_doppler(interval_s);
         let mut scan = Scan {
             id: scan,
             points: later,
@@ -237,7 +238,7 @@ impl Refiner {
         let outcome = accepted.outcome;
         let gyro = self.turn.and(self.state.heading);
         let wheels = self.distance.and(self.state.wheels);
-        let doppler = self.way.and(self.state.doppler);
+        let doppler = self.displacement.and(self.state.doppler);
         let report = self.hold_standstill(&scan, &accepted);
         self.update(&scan, &best, &accepted);
         Refined {
@@ -253,8 +254,8 @@ impl Refiner {
             outcome,
             stationary: report.stationary,
             gyro: gyro.map(|it| it.bias()),
-            wheels: wheels.map(|it| it.known()),
-            doppler: doppler.map(|it| it.known()),
+            wheels: wheels.map(|it| it.estimate()),
+            doppler: doppler.map(|it| it.estimate()),
         }
     }
 
@@ -349,8 +350,8 @@ impl Refiner {
             ..found.registered
         };
         if best.guess == InitialGuess::AlongWalls {
-            self.slide(scan, &registered);
-        } else if self.weigh_distance(scan, &registered, is_certain) {
+            self.propagate_along_walls(scan, &registered);
+        } else if self.update_distance(scan, &registered, is_certain) {
             (self.state.along_walls, self.state.sliding) = (0, 0);
         } else {
             return self.predicted(scan, uncertainty);
@@ -381,13 +382,13 @@ impl Refiner {
         let [motion, _] = self.state.predict(&scan.step);
         let covariance = uncertainty.of_prediction();
         if let (None, Some(heading)) = (scan.step.turn, &mut self.state.heading) {
-            heading.guess(covariance[(2, 2)]);
+            heading.inflate(covariance[(2, 2)]);
         }
         let alone = UncertainMotion {
             motion: self.state.pose.inv_mul(&motion),
             covariance,
         };
-        self.carry(scan, &alone);
+        self.propagate_distances(scan, &alone);
         let ahead_m = match self.state.sliding > 0 && scan.step.distance.is_none() {
             true => scan.searched.translation.vector - motion.translation.vector,
             false => Vector2::zeros(),
@@ -475,7 +476,7 @@ impl Refiner {
         } else if outcome == Outcome::Refined && self.map.needs_keyframe(pose, ahead_m, config) {
             self.insert_keyframe(scan.id, scan.points, pose, &twist);
             if let Some(heading) = &mut self.state.heading {
-                heading.follow(self.map.len());
+                heading.add_keyframe(self.map.len());
             }
         }
     }

@@ -105,7 +105,9 @@ impl Refiner {
         }
         let of_search = self.step_m(scan).powi(2);
         found.registered = match best.guess {
-            InitialGuess::AlongWalls => self.slid(scan, found.registered, along, uncertainty),
+            InitialGuess::AlongWalls => {
+                self.with_predicted_place(scan, found.registered, along, uncertainty)
+            }
             // Without its map nothing takes back an error of the place.
             _ if found.leaves_map => self.placed(found.registered, along, of_search, 1.0),
             _ => self.placed(found.registered, along, of_search, self.drift_share()),
@@ -167,7 +169,7 @@ impl Refiner {
     }
 
     /// Returns how much farther than predicted a vehicle drives if it accelerates, m: since the
-    /// last refined scan, or since the scan before if the way is measured.
+    /// last refined scan, or since the scan before if the displacement is measured.
     fn step_m(&self, scan: &Scan<'_>) -> f64 {
         let age_s = match (scan.step.distance, &self.state.anchors[0]) {
             (None, Some(anchor)) => anchor.age_s,
@@ -183,7 +185,7 @@ impl Refiner {
 
     /// Returns a registered pose with the prediction's covariance in an undetermined direction: by
     /// wheels, by Doppler, or at constant velocity.
-    fn slid(
+    fn with_predicted_place(
         &self,
         scan: &Scan<'_>,
         registered: UncertainMotion,
@@ -195,7 +197,7 @@ impl Refiner {
             None => self.state.sliding,
         };
         let ahead = self.state.pose.rotation.inverse() * along.into_inner();
-        let variance = uncertainty.of_sliding(ahead, sliding);
+        let variance = uncertainty.of_predicted_place(ahead, sliding);
         self.placed(registered, along, variance, self.drift_share())
     }
 
@@ -224,14 +226,14 @@ impl Refiner {
     }
 
     /// Takes a scan whose place along the walls is the predicted one.
-    pub(super) fn slide(&mut self, scan: &Scan<'_>, registered: &UncertainMotion) {
+    pub(super) fn propagate_along_walls(&mut self, scan: &Scan<'_>, registered: &UncertainMotion) {
         self.state.along_walls = self.state.along_walls.saturating_add(1);
         self.state.sliding = match scan.step.distance {
             Some(_) => 0,
             None => self.state.sliding.saturating_add(1),
         };
         self.each_distance(registered, |state, measured, driven, _| {
-            state.slide_along(measured, driven);
+            state.propagate_along_walls(measured, driven);
         });
     }
 }

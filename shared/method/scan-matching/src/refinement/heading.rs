@@ -1,11 +1,11 @@
 //! The heading by gyro and radar together: a Kalman filter over the heading against the map, the
-//! bias of the gyro and its scale, and the lean of the radar.
+//! bias of the gyro and its scale, and the yaw bias of registration.
 //!
 //! The gyro predicts the heading of the next scan, and registration measures it against the map.
 //! While the vehicle stands the map stays, so that the bias is observed well. While it drives, the
 //! map is rebuilt from its own scans and follows a wrong bias; and a small steady error of
-//! registration, the *yaw bias of registration* (`lean`), drags the map along as a gyro bias would.
-//! The covariance includes both.
+//! registration, the *yaw bias*, drags the map along as a gyro bias would. The covariance includes
+//! both.
 
 use gyre_geometry::{Pose, UncertainMotion, pose, wrap_angle, xy_yaw};
 use gyre_samples::{GyroConfig, GyroTurn};
@@ -14,10 +14,11 @@ use nalgebra::{Matrix4, RowVector4, Vector4};
 /// Square of what gyro, wheels or Doppler and the radar are apart, over its variance, beyond which
 /// one of them is wrong: four standard deviations.
 pub(super) const GATE: f64 = 16.0;
-/// Standard deviation of the lean, rad, and the time over which it changes, s. A map that lags by
-/// 1.4 s drifts with it by 0.1 degrees in a minute, as the radar alone does on six simulated roads.
-const LEAN_SIGMA_RAD: f64 = 4e-5;
-const LEAN_TIME_S: f64 = 60.0;
+/// Standard deviation of the yaw bias of registration, rad, and the time over which it changes, s.
+/// A map that lags by 1.4 s drifts with it by 0.1 degrees in a minute, as the radar alone does on
+/// six simulated roads.
+const YAW_BIAS_SIGMA_RAD: f64 = 4e-5;
+const YAW_BIAS_TIME_S: f64 = 60.0;
 /// Noise of the turn about the vertical where the gyro's axis tilts with the vehicle, rad/√s. It is
 /// the residual of the best bias and scale in the turns over 4 to 16 s on six simulated roads,
 /// whose gradient is 2.6 % RMS along and across.
@@ -31,7 +32,7 @@ const SCALE_TURN_RAD: f64 = std::f64::consts::FRAC_PI_2;
 /// The states, in the order of the covariance.
 const HEADING: usize = 0;
 const BIAS: usize = 1;
-const LEAN: usize = 2;
+const YAW_BIAS: usize = 2;
 const SCALE: usize = 3;
 /// The part that each has in a registered heading against the predicted one.
 const SEEN: RowVector4<f64> = RowVector4::new(1.0, 0.0, 1.0, 0.0);
@@ -42,11 +43,12 @@ pub struct Heading {
     /// Bias of the gyro, rad/s.
     pub bias_radps: f64,
     /// Steady error of registered headings, rad.
-    pub lean_rad: f64,
+    pub yaw_bias_rad: f64,
     /// True turn over the one that is measured, but for the bias. With one that the gyro cannot
     /// have ([`GyroConfig::allows_scale`]) it is not used any more.
     pub scale: f64,
-    /// Covariance of the errors of the heading against the map, the bias, the lean and the scale.
+    /// Covariance of the errors of the heading against the map, the bias, the yaw bias and the
+    /// scale.
     pub covariance: Matrix4<f64>,
     /// The verdict of the last registered heading on the gyro's.
     pub verdict: Verdict,
@@ -126,10 +128,10 @@ impl Heading {
     /// Creates the state before the first scan.
     pub(super) fn new(config: &GyroConfig) -> Self {
         let [bias, scale] = [config.bias_sigma_radps, config.scale_sigma].map(|it| it * it);
-        let variances = Vector4::new(0.0, bias, LEAN_SIGMA_RAD.powi(2), scale);
+        let variances = Vector4::new(0.0, bias, YAW_BIAS_SIGMA_RAD.powi(2), scale);
         Self {
             bias_radps: config.bias_radps,
-            lean_rad: 0.0,
+            yaw_bias_rad: 0.0,
             scale: 1.0,
             covariance: Matrix4::from_diagonal(&variances),
             verdict: Verdict::Agrees,
@@ -154,7 +156,7 @@ impl Heading {
         (step[(HEADING, BIAS)], step[(HEADING, SCALE)]) = (-time_s, turn.yaw_rad);
         self.covariance = step * self.covariance * step.transpose();
         self.covariance[(HEADING, HEADING)] += turn_rad2;
-        self.wait(time_s, config);
+        self.propagate(time_s, config);
         let bias_radps2 = self.covariance[(BIAS, BIAS)];
         let scale_variance = self.covariance[(SCALE, SCALE)];
         let angle_rad = turn.yaw_rad.abs();
@@ -171,53 +173,55 @@ impl Heading {
         }
     }
 
-    /// Lets a time pass without a gyro measurement of the turn: bias and lean change, and so does
-    /// the heading. Either [`adopt`](Self::adopt) or [`guess`](Self::guess) sets the heading.
-    pub(super) fn wait(&mut self, time_s: f64, config: &GyroConfig) {
-        let kept = (-time_s / LEAN_TIME_S).exp();
+    /// Propagates the state over a time without a gyro measurement of the turn: the gyro's bias and
+    /// the yaw bias change, and so does the heading. Either [`reset_to`](Self::reset_to) or
+    /// [`inflate`](Self::inflate) sets the heading.
+    pub(super) fn propagate(&mut self, time_s: f64, config: &GyroConfig) {
+        let kept = (-time_s / YAW_BIAS_TIME_S).exp();
         let step = Matrix4::from_diagonal(&Vector4::new(1.0, 1.0, kept, 1.0));
         self.covariance = step * self.covariance * step;
         self.covariance[(BIAS, BIAS)] += config.bias_walk_radps_per_sqrt_s.powi(2) * time_s;
-        self.covariance[(LEAN, LEAN)] += LEAN_SIGMA_RAD.powi(2) * (1.0 - kept * kept);
-        self.lean_rad *= kept;
+        self.covariance[(YAW_BIAS, YAW_BIAS)] += YAW_BIAS_SIGMA_RAD.powi(2) * (1.0 - kept * kept);
+        self.yaw_bias_rad *= kept;
     }
 
     /// Takes the heading of a pose that was registered with the map, whatever it was before: the
     /// gyro has not measured the turn. That is the correction of a prediction without any
-    /// certainty, so that the lean alone is taken off. The error is the lean's, which the bias may
-    /// share, plus the noise of registration. The place moves along as in [`weigh`](Self::weigh).
-    pub(super) fn adopt(
+    /// certainty, so that only the yaw bias is taken off. The error is the yaw bias's, which the
+    /// bias may share, plus the noise of registration. The place moves along as in
+    /// [`update`](Self::update).
+    pub(super) fn reset_to(
         &mut self,
         registered: &UncertainMotion,
         previous: &Pose,
     ) -> UncertainMotion {
         let variance_rad2 = registered.covariance[(2, 2)];
         let mut step = Matrix4::identity();
-        (step[(HEADING, HEADING)], step[(HEADING, LEAN)]) = (0.0, -1.0);
+        (step[(HEADING, HEADING)], step[(HEADING, YAW_BIAS)]) = (0.0, -1.0);
         self.covariance = step * self.covariance * step.transpose();
         self.covariance[(HEADING, HEADING)] += variance_rad2;
         UncertainMotion {
-            motion: turned(registered, previous, -self.lean_rad),
+            motion: turned(registered, previous, -self.yaw_bias_rad),
             ..*registered
         }
     }
 
     /// Takes a heading that neither the gyro nor the map has measured: one that is predicted from
     /// the motions before, with this variance.
-    pub(super) fn guess(&mut self, variance_rad2: f64) {
+    pub(super) fn inflate(&mut self, variance_rad2: f64) {
         self.covariance[(HEADING, HEADING)] += variance_rad2;
     }
 
     /// Compares a registered heading with the predicted one, where single matches err by up to
     /// `jitter_rad`.
-    pub(super) fn judge(
+    pub(super) fn gate(
         &self,
         registered: &UncertainMotion,
         previous: &Pose,
         turn: &PredictedTurn,
         jitter_rad: f64,
     ) -> Verdict {
-        let apart_rad = turn.apart_rad(registered, previous) - self.lean_rad;
+        let apart_rad = turn.apart_rad(registered, previous) - self.yaw_bias_rad;
         let variance_rad2 = (SEEN * self.covariance * SEEN.transpose())[0];
         if apart_rad.powi(2) <= GATE * (variance_rad2 + registered.covariance[(2, 2)]) {
             Verdict::Agrees
@@ -231,7 +235,7 @@ impl Heading {
     /// Weighs the heading of a pose that was registered with the map against the predicted one. The
     /// place moves along as far as its error depends on the heading's. `previous` is the pose of
     /// the scan before, `drift_share` the share of the covariance that accumulates.
-    pub(super) fn weigh(
+    pub(super) fn update(
         &mut self,
         registered: &UncertainMotion,
         previous: &Pose,
@@ -256,9 +260,9 @@ impl Heading {
     fn correct(&mut self, apart_rad: f64, variance_rad2: f64) -> f64 {
         let across = self.covariance * SEEN.transpose();
         let gain = across / ((SEEN * across)[0] + variance_rad2);
-        let step = gain * (apart_rad - self.lean_rad);
+        let step = gain * (apart_rad - self.yaw_bias_rad);
         self.bias_radps += step[BIAS];
-        self.lean_rad += step[LEAN];
+        self.yaw_bias_rad += step[YAW_BIAS];
         self.scale += step[SCALE];
         // Joseph's form stays symmetric and positive.
         let kept = Matrix4::identity() - gain * SEEN;
@@ -275,7 +279,7 @@ impl Heading {
 
     /// The map has a new keyframe, one of `keyframes`: its heading follows the heading of the
     /// scans.
-    pub(super) fn follow(&mut self, keyframes: usize) {
+    pub(super) fn add_keyframe(&mut self, keyframes: usize) {
         let kept = 1.0 - 2.0 / (keyframes as f64 + 1.0);
         let step = Matrix4::from_diagonal(&Vector4::new(kept, 1.0, 1.0, 1.0));
         self.covariance = step * self.covariance * step;

@@ -233,7 +233,7 @@ impl TrackerState {
         let interval_s = step.interval_s;
         match outcome {
             Outcome::Refined => self.push_anchor(pose, step, config),
-            Outcome::Predicted if step.distance.is_some() => self.carry_anchor(pose, step),
+            Outcome::Predicted if step.distance.is_some() => self.move_anchor(pose, step),
             _ => self
                 .anchors
                 .iter_mut()
@@ -259,7 +259,7 @@ impl TrackerState {
 
     /// Makes `pose`, predicted by wheels, the newest anchor. The last refined scan stays behind it,
     /// in case they slip meanwhile.
-    fn carry_anchor(&mut self, pose: Pose, step: &Step) {
+    fn move_anchor(&mut self, pose: Pose, step: &Step) {
         let interval_s = step.interval_s;
         let twist = self.mean_twist_to(&pose, interval_s);
         let [first, second] = self.anchors;

@@ -67,7 +67,7 @@ impl Uncertainty {
     /// Returns the variance of the prediction in an otherwise undetermined direction, such that the
     /// variances of consecutive scans add up; `before` of them are at constant velocity, whose
     /// error is common to all.
-    pub fn of_sliding(&self, along: Vector2<f64>, before: u32) -> f64 {
+    pub fn of_predicted_place(&self, along: Vector2<f64>, before: u32) -> f64 {
         let place = self.of_step.fixed_view::<2, 2>(0, 0);
         let variance = (along.transpose() * place * along)[0];
         variance * grown(1.0, f64::from(before))
@@ -176,7 +176,9 @@ fn of_prediction(
         config.yaw_acceleration_degps2.to_radians(),
     );
     if let Some(distance) = &step.distance {
-        let by_gyro = step.turn.map(|it| it.variance_after_rad2(distance.dead));
+        let by_gyro = step
+            .turn
+            .map(|it| it.variance_after_rad2(distance.since_match));
         let yaw_rad = state.predicted_turn_rad(step);
         return distance
             .motion([yaw_rad, by_gyro.map_or(turn, |it| it.min(turn))])

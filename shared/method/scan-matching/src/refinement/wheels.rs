@@ -30,13 +30,13 @@ pub struct WheelState {
     /// implausible.
     pub slips: bool,
     /// The distance by the wheels since the last registered scan, m.
-    pub dead_m: f64,
+    pub since_match_m: f64,
     /// The time since then, s.
-    pub dead_s: f64,
+    pub since_match_s: f64,
     /// The turn since then, rad.
-    pub dead_rad: f64,
+    pub since_match_rad: f64,
     /// The time since a match last determined the place along the path, s: also along walls.
-    pub untold_s: f64,
+    pub since_place_s: f64,
     /// Covariance of the predicted motions since then together, or since a new map was started:
     /// along the axes of the last scan.
     pub unmatched: Matrix3<f64>,
@@ -53,7 +53,7 @@ pub struct WheelScale {
     pub slip: bool,
 }
 
-/// The witness of a distance.
+/// The aiding sensor of a distance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum DistanceBy {
     Wheels,
@@ -66,7 +66,7 @@ pub(super) struct PredictedDistance {
     pub by: DistanceBy,
     /// Distance since the scan before, m; negative backwards.
     pub distance_m: f64,
-    /// Way to the left of the heading half-way, m, by Doppler.
+    /// Displacement to the left of the heading in the middle, m, by Doppler.
     pub left_m: f64,
     /// Variance of the distance, m², such that the variances of the motions since the last
     /// registered one add up.
@@ -76,7 +76,7 @@ pub(super) struct PredictedDistance {
     /// Distance of the radar ahead of the axle that does not steer, m.
     pub radar_ahead_m: f64,
     /// Time, s, and turn, rad, from the last registered scan to the scan before.
-    pub dead: [f64; 2],
+    pub since_match: [f64; 2],
 }
 
 /// A registered motion along the path.
@@ -129,16 +129,16 @@ impl WheelState {
             offset_m: 0.0,
             covariance: Matrix2::new(0.0, 0.0, 0.0, config.scale_sigma.powi(2)),
             slips: false,
-            dead_m: 0.0,
-            dead_s: 0.0,
-            dead_rad: 0.0,
-            untold_s: 0.0,
+            since_match_m: 0.0,
+            since_match_s: 0.0,
+            since_match_rad: 0.0,
+            since_place_s: 0.0,
             unmatched: Matrix3::zeros(),
         }
     }
 
     /// Returns the estimate of the scale.
-    pub(super) fn known(&self) -> WheelScale {
+    pub(super) fn estimate(&self) -> WheelScale {
         WheelScale {
             scale: self.scale,
             sigma: self.covariance[(1, 1)].max(0.0).sqrt(),
@@ -147,9 +147,9 @@ impl WheelState {
     }
 
     /// Lets time pass: the scale changes.
-    pub(super) fn wait(&mut self, time_s: f64, config: &WheelsConfig) {
+    pub(super) fn propagate(&mut self, time_s: f64, config: &WheelsConfig) {
         self.covariance[(1, 1)] += config.scale_walk_per_sqrt_s.powi(2) * time_s;
-        self.untold_s += time_s;
+        self.since_place_s += time_s;
     }
 
     /// Predicts the distance of the next scan; `None` while the wheels slip.
@@ -161,7 +161,7 @@ impl WheelState {
         let step_m = measured.distance_m;
         // The error of the scale is common to all motions since the last registered one: its square
         // grows with the square of the whole distance.
-        let since_m2 = grown(step_m, self.dead_m);
+        let since_m2 = grown(step_m, self.since_match_m);
         (!self.slips).then_some(PredictedDistance {
             by: DistanceBy::Wheels,
             distance_m: self.scale * step_m,
@@ -169,7 +169,7 @@ impl WheelState {
             variance_m2: measured.variance_m2 + self.covariance[(1, 1)] * since_m2,
             side_variance_m2: measured.side_variance_m2,
             radar_ahead_m: config.radar_ahead_m,
-            dead: [self.dead_s, self.dead_rad],
+            since_match: [self.since_match_s, self.since_match_rad],
         })
     }
 
@@ -206,7 +206,7 @@ impl WheelState {
     /// Compares a registered pose with the measured distance, if there is one: the distance is
     /// rejected if both disagree and the match is certain. If the motions together imply an
     /// implausible scale, the wheels have slipped: the scale is learnt again.
-    pub(super) fn weigh(
+    pub(super) fn update(
         &mut self,
         measured: Option<&WheelDistance>,
         registered: &Registered,
@@ -218,12 +218,12 @@ impl WheelState {
                 self.correct(measured, registered);
                 if is_certain && !self.has_scale_of(config) {
                     *self = Self::new(config);
-                    self.adopt(registered, true);
+                    self.reset_to(registered, true);
                 }
             }
             measured => {
                 let slips = self.slips || (measured.is_some() && is_certain);
-                self.adopt(registered, slips);
+                self.reset_to(registered, slips);
             }
         }
     }
@@ -251,65 +251,69 @@ impl WheelState {
         // The offset of the last scan replaces the offset of the scan before.
         self.covariance = Matrix2::new(after[(2, 2)], after[(2, 1)], after[(1, 2)], after[(1, 1)]);
         self.slips = false;
-        self.see();
+        self.reset_since_match();
     }
 
     /// Takes a registered pose whose distance the wheels have not measured, or where they slip.
-    pub(super) fn adopt(&mut self, registered: &Registered, slips: bool) {
+    pub(super) fn reset_to(&mut self, registered: &Registered, slips: bool) {
         let [noise_m2, _] = registered.noise_and_drift_m2();
         self.offset_m = 0.0;
         self.covariance = Matrix2::new(noise_m2, 0.0, 0.0, self.covariance[(1, 1)]);
         self.slips = slips;
-        self.see();
+        self.reset_since_match();
     }
 
-    fn see(&mut self) {
-        (self.dead_m, self.dead_s, self.dead_rad) = (0.0, 0.0, 0.0);
-        self.untold_s = 0.0;
+    fn reset_since_match(&mut self) {
+        (self.since_match_m, self.since_match_s, self.since_match_rad) = (0.0, 0.0, 0.0);
+        self.since_place_s = 0.0;
         self.unmatched = Matrix3::zeros();
     }
 
     /// Takes a pose that is predicted by the wheels.
-    pub(super) fn carry(&mut self, measured: &WheelDistance) {
+    pub(super) fn dead_reckon(&mut self, measured: &WheelDistance) {
         let step = Matrix2::new(1.0, -measured.distance_m, 0.0, 1.0);
         self.covariance = step * self.covariance * step.transpose();
         self.covariance[(0, 0)] += measured.variance_m2;
-        self.dead_m += measured.distance_m;
+        self.since_match_m += measured.distance_m;
     }
 
     /// Takes a registered pose whose place along the path is the predicted one, since the map does
     /// not determine it.
-    pub(super) fn slide_along(&mut self, measured: Option<&WheelDistance>, driven: &Registered) {
+    pub(super) fn propagate_along_walls(
+        &mut self,
+        measured: Option<&WheelDistance>,
+        driven: &Registered,
+    ) {
         match measured {
-            Some(measured) if !self.slips => self.slide(measured),
-            Some(measured) => self.slide_without(measured, driven),
+            Some(measured) if !self.slips => self.follow_map(measured),
+            Some(measured) => self.gate_slip(measured, driven),
             None => {}
         }
     }
 
     /// Takes a registered pose whose place along the path comes from the wheels, since the map does
     /// not determine it: the map moves along.
-    pub(super) fn slide(&mut self, measured: &WheelDistance) {
+    pub(super) fn follow_map(&mut self, measured: &WheelDistance) {
         self.offset_m = 0.0;
         self.covariance = Matrix2::new(measured.variance_m2, 0.0, 0.0, self.covariance[(1, 1)]);
-        self.dead_m += measured.distance_m;
+        self.since_match_m += measured.distance_m;
     }
 
     /// Takes a pose whose place along the path comes from the motions before, since the map does
     /// not determine it: wheels that had slipped are used again if they agree with it.
-    pub(super) fn slide_without(&mut self, measured: &WheelDistance, driven: &Registered) {
+    pub(super) fn gate_slip(&mut self, measured: &WheelDistance, driven: &Registered) {
         let apart_m = driven.distance_m - self.scale * measured.distance_m;
         let [_, variance_m2] = driven.noise_and_drift_m2();
         self.slips &= apart_m.powi(2) > GATE * (variance_m2 + measured.variance_m2);
     }
 
     /// Takes a pose that is predicted from the motions before, with this variance.
-    pub(super) fn guess(&mut self, variance_m2: f64) {
+    pub(super) fn inflate(&mut self, variance_m2: f64) {
         self.covariance[(0, 0)] += variance_m2;
     }
 
     /// Adds a predicted motion to those whose error the next match takes back.
-    pub(super) fn miss(&mut self, predicted: &UncertainMotion, time_s: f64) {
+    pub(super) fn add_unmatched(&mut self, predicted: &UncertainMotion, time_s: f64) {
         let before = UncertainMotion {
             motion: Pose::identity(),
             covariance: self.unmatched,
@@ -317,8 +321,8 @@ impl WheelState {
         let turn = predicted.motion.rotation.inverse().to_rotation_matrix();
         let turn = turn.to_homogeneous();
         self.unmatched = turn * before.then(predicted).covariance * turn.transpose();
-        self.dead_s += time_s;
-        self.dead_rad += predicted.motion.rotation.angle();
+        self.since_match_s += time_s;
+        self.since_match_rad += predicted.motion.rotation.angle();
     }
 
     /// A new map starts with the scan before: its place is the map's.

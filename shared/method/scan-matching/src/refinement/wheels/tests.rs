@@ -45,7 +45,7 @@ impl Drive {
     fn drive(&mut self, step_m: f64, slip_m: f64) -> WheelDistance {
         let walk = self.config.scale_walk_per_sqrt_s * INTERVAL_S.sqrt();
         self.true_scale += self.normal(walk);
-        self.wheels.wait(INTERVAL_S, &self.config);
+        self.wheels.propagate(INTERVAL_S, &self.config);
         self.true_m += step_m;
         let variance_m2 = 1e-4 * step_m.abs() + 2.5e-5;
         let noise_m = self.normal(variance_m2.sqrt());
@@ -82,7 +82,7 @@ impl Drive {
         let measured = self.drive(step_m, slip_m);
         let registered = self.register();
         self.wheels
-            .weigh(Some(&measured), &registered, true, &self.config);
+            .update(Some(&measured), &registered, true, &self.config);
         !self.wheels.slips
     }
 
@@ -101,9 +101,9 @@ impl Drive {
         let predicted = self.wheels.predict(&measured, &self.config);
         let predicted = predicted.expect("no slip");
         self.at_m += predicted.distance_m;
-        self.wheels.carry(&measured);
+        self.wheels.dead_reckon(&measured);
         let motion = predicted.motion([0.0, 0.0]);
-        self.wheels.miss(&motion, INTERVAL_S);
+        self.wheels.add_unmatched(&motion, INTERVAL_S);
         predicted
     }
 
@@ -162,7 +162,7 @@ fn the_variance_of_a_time_without_a_match_grows_with_noise_and_scale() {
         let off_m = (drive.at_m - start_m) - (drive.true_m - from_m);
         squares += off_m * off_m / DRIVES as f64;
         let along = drive.wheels.unmatched[(0, 0)];
-        assert!(along > 0.0 && drive.wheels.dead_s == 10.0);
+        assert!(along > 0.0 && drive.wheels.since_match_s == 10.0);
     }
     let ratio = squares / variance_m2;
     assert!((0.7..1.4).contains(&ratio), "{ratio}: {squares} m2");
@@ -220,7 +220,7 @@ fn a_new_map_starts_where_the_last_scan_is() {
     drive.wheels.start_map();
     assert_eq!(drive.wheels.offset_m, 0.0);
     assert_eq!(drive.wheels.covariance[(0, 0)], 0.0);
-    assert!(drive.wheels.covariance[(1, 1)] > 0.0 && drive.wheels.dead_m > 2.0);
+    assert!(drive.wheels.covariance[(1, 1)] > 0.0 && drive.wheels.since_match_m > 2.0);
 }
 
 fn distance(distance_m: f64, radar_ahead_m: f64) -> PredictedDistance {
@@ -231,7 +231,7 @@ fn distance(distance_m: f64, radar_ahead_m: f64) -> PredictedDistance {
         variance_m2: 1e-4,
         side_variance_m2: 4e-4,
         radar_ahead_m,
-        dead: [0.0; 2],
+        since_match: [0.0; 2],
     }
 }
 

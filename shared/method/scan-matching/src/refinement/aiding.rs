@@ -1,7 +1,7 @@
 //! Gyro, wheels and Doppler as aiding sensors of a motion, compared with the radar's matches.
 
 use gyre_geometry::UncertainMotion;
-use gyre_samples::{DopplerWay, WheelDistance, WheelsConfig};
+use gyre_samples::{DopplerDisplacement, WheelDistance, WheelsConfig};
 
 use super::{
     Heading, Refiner, WheelState,
@@ -17,7 +17,7 @@ impl Refiner {
     pub(super) fn predict_turn(&mut self, interval_s: f64) -> Option<PredictedTurn> {
         let Some(turn) = self.turn else {
             let heading = self.state.heading.iter_mut();
-            heading.for_each(|heading| heading.wait(interval_s, &self.gyro));
+            heading.for_each(|heading| heading.propagate(interval_s, &self.gyro));
             return None;
         };
         let heading = self.state.heading.get_or_insert(Heading::new(&self.gyro));
@@ -32,32 +32,32 @@ impl Refiner {
         by_wheels.or(by_doppler)
     }
 
-    /// Returns the way since the scan before by Doppler; `None` if one of both scans does not
-    /// determine its velocity.
-    pub(super) fn way_by_doppler(&self, interval_s: f64) -> Option<DopplerWay> {
+    /// Returns the displacement since the scan before by Doppler; `None` if one of both scans does
+    /// not determine its velocity.
+    pub(super) fn displacement_by_doppler(&self, interval_s: f64) -> Option<DopplerDisplacement> {
         let [earlier, later] = &self.velocities;
         let both = [earlier.as_ref()?, later.as_ref()?];
         let is_used = self.doppler.is_used();
-        is_used.then(|| self.doppler.way(both, interval_s))
+        is_used.then(|| self.doppler.displacement(both, interval_s))
     }
 
     fn predict_by_doppler(&mut self, interval_s: f64) -> Option<PredictedDistance> {
         let config = &self.doppler_as_wheels;
-        if self.way.is_some() {
+        if self.displacement.is_some() {
             self.state.doppler.get_or_insert(WheelState::new(config));
         }
         let state = self.state.doppler.as_mut()?;
-        state.wait(interval_s, config);
-        let way = self.way?;
-        let predicted = state.predict(&way.ahead, config)?;
+        state.propagate(interval_s, config);
+        let displacement = self.displacement?;
+        let predicted = state.predict(&displacement.ahead, config)?;
         // The lasting error is common to all motions since a match determined the place: the
         // variance of one motion alone is the displacement's.
-        let before_s = (state.untold_s - interval_s).max(0.0);
+        let before_s = (state.since_place_s - interval_s).max(0.0);
         let lasting = grown(interval_s, before_s) - interval_s.powi(2);
         let lasting_m2 = self.doppler.noise_mps.powi(2) * lasting;
         Some(PredictedDistance {
             by: DistanceBy::Doppler,
-            left_m: state.scale * way.left_m,
+            left_m: state.scale * displacement.left_m,
             variance_m2: predicted.variance_m2 + lasting_m2,
             side_variance_m2: predicted.side_variance_m2 + lasting_m2,
             ..predicted
@@ -72,7 +72,7 @@ impl Refiner {
                 .get_or_insert(WheelState::new(&self.wheels));
         }
         let wheels = self.state.wheels.as_mut()?;
-        wheels.wait(interval_s, &self.wheels);
+        wheels.propagate(interval_s, &self.wheels);
         wheels.predict(&measured?, &self.wheels)
     }
 
@@ -97,7 +97,7 @@ impl Refiner {
             let is_known = self.state.unmatched == 0
                 && best.is_plausible
                 && self.gyro.allows_scale(heading.scale);
-            if !is_known || self.judge(&best, &turn) != Verdict::Agrees {
+            if !is_known || self.gate(&best, &turn) != Verdict::Agrees {
                 *scan = alone;
                 return best;
             }
@@ -105,7 +105,7 @@ impl Refiner {
         let best = self.registration(scan).best();
         // An implausible match gives no evidence.
         let verdict = match best.is_plausible {
-            true => self.judge(&best, &turn),
+            true => self.gate(&best, &turn),
             false => Verdict::Agrees,
         };
         let refusal = match best.is_plausible && verdict != Verdict::Refused {
@@ -131,7 +131,7 @@ impl Refiner {
         std::mem::swap(&mut self.points, &mut self.other_points);
         let best = self.registration(alone).best();
         let is_certain = best.is_plausible
-            && self.judge(&best, turn) == Verdict::Refused
+            && self.gate(&best, turn) == Verdict::Refused
             && self.is_certain(alone, &best);
         if !is_certain {
             std::mem::swap(&mut self.points, &mut self.other_points);
@@ -151,12 +151,12 @@ impl Refiner {
     }
 
     /// Compares the heading of a match with the gyro's.
-    fn judge(&self, best: &Candidate, turn: &PredictedTurn) -> Verdict {
+    fn gate(&self, best: &Candidate, turn: &PredictedTurn) -> Verdict {
         let registered = self.registered(&best.alignment);
         let both = registered.zip(self.state.heading);
         let jitter_rad = self.config.jitter_deg.to_radians();
         both.map_or(Verdict::Agrees, |(registered, heading)| {
-            heading.judge(&registered, &self.state.pose, turn, jitter_rad)
+            heading.gate(&registered, &self.state.pose, turn, jitter_rad)
         })
     }
 
@@ -189,7 +189,7 @@ impl Refiner {
             DistanceBy::Wheels => (self.state.wheels.as_ref(), self.distance, &self.wheels),
             DistanceBy::Doppler => (
                 self.state.doppler.as_ref(),
-                self.way.map(|way| way.ahead),
+                self.displacement.map(|it| it.ahead),
                 &self.doppler_as_wheels,
             ),
         }
@@ -204,12 +204,16 @@ impl Refiner {
     ) {
         let driven =
             [&self.wheels, &self.doppler_as_wheels].map(|config| self.driven(registered, config));
-        let way = self.way.map(|way| way.ahead);
-        let witnesses = [
+        let displacement = self.displacement.map(|it| it.ahead);
+        let sensors = [
             (&mut self.state.wheels, self.distance, &self.wheels),
-            (&mut self.state.doppler, way, &self.doppler_as_wheels),
+            (
+                &mut self.state.doppler,
+                displacement,
+                &self.doppler_as_wheels,
+            ),
         ];
-        for ((state, measured, config), driven) in witnesses.into_iter().zip(driven) {
+        for ((state, measured, config), driven) in sensors.into_iter().zip(driven) {
             if let Some(state) = state {
                 take(state, measured.as_ref(), &driven, config);
             }
@@ -217,22 +221,22 @@ impl Refiner {
     }
 
     /// Takes the predicted motion of a scan that matches nothing.
-    pub(super) fn carry(&mut self, scan: &Scan<'_>, predicted: &UncertainMotion) {
+    pub(super) fn propagate_distances(&mut self, scan: &Scan<'_>, predicted: &UncertainMotion) {
         let by = scan.step.distance.map(|it| it.by);
-        let way = self.way.map(|way| way.ahead);
-        let witnesses = [
+        let displacement = self.displacement.map(|it| it.ahead);
+        let sensors = [
             (&mut self.state.wheels, self.distance, DistanceBy::Wheels),
-            (&mut self.state.doppler, way, DistanceBy::Doppler),
+            (&mut self.state.doppler, displacement, DistanceBy::Doppler),
         ];
-        for (state, measured, witness) in witnesses {
+        for (state, measured, sensor) in sensors {
             let Some(state) = state else {
                 continue;
             };
-            match measured.filter(|_| by == Some(witness)) {
-                Some(measured) => state.carry(&measured),
-                None => state.guess(predicted.covariance[(0, 0)]),
+            match measured.filter(|_| by == Some(sensor)) {
+                Some(measured) => state.dead_reckon(&measured),
+                None => state.inflate(predicted.covariance[(0, 0)]),
             }
-            state.miss(predicted, scan.step.interval_s);
+            state.add_unmatched(predicted, scan.step.interval_s);
         }
     }
 
@@ -250,7 +254,7 @@ impl Refiner {
     /// Compares a registered pose with the distances of wheels and Doppler, if there are any: they
     /// slip, or are refused, where it disagrees. Returns false if the predicted one is believed
     /// instead, since the match is not certain.
-    pub(super) fn weigh_distance(
+    pub(super) fn update_distance(
         &mut self,
         scan: &Scan<'_>,
         registered: &UncertainMotion,
@@ -260,7 +264,7 @@ impl Refiner {
             return false;
         }
         self.each_distance(registered, |state, measured, driven, config| {
-            state.weigh(measured, driven, is_certain, config);
+            state.update(measured, driven, is_certain, config);
         });
         true
     }
@@ -275,19 +279,19 @@ impl Refiner {
             return registered;
         };
         let Some(turn) = scan.step.turn else {
-            return heading.adopt(&registered, &self.state.pose);
+            return heading.reset_to(&registered, &self.state.pose);
         };
         let drift_share = uncertainty::drift_share(self.map.len(), &self.config);
         let scale_before = heading.scale;
-        let weighed = heading.weigh(&registered, &self.state.pose, &turn, drift_share);
+        let updated = heading.update(&registered, &self.state.pose, &turn, drift_share);
         if self.gyro.allows_scale(heading.scale) {
-            return weighed;
+            return updated;
         }
         match heading.verdict {
             // Either the match or the gyro has a gross error, so the scale is not updated.
             Verdict::Doubted => heading.scale = scale_before,
             _ => heading.verdict = Verdict::Refused,
         }
-        heading.adopt(&registered, &self.state.pose)
+        heading.reset_to(&registered, &self.state.pose)
     }
 }
