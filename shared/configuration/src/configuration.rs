@@ -42,7 +42,7 @@ pub struct Configuration {
     pub run: RunConfig,
     /// The recording to play.
     pub source: SourceConfig,
-    /// The format of the recording and the constants of its radar. A key that is left out is taken
+    /// The format of the recording and the constants of its radar. A key that is left out comes
     /// from the recording's `dataset.toml`, else from the format.
     pub dataset: DatasetOptions,
     /// A drive to simulate and play, instead of `source.data`.

@@ -9,17 +9,17 @@ use thiserror::Error;
 
 use crate::kind::Kind;
 
-/// The words and options that say what a command works on.
+/// The words and options that name the inputs of a command.
 #[derive(Clone, Debug, Default, Args)]
 pub struct Inputs {
     /// The recording (a folder, NAME.mcap, a bag of ROS 2), the configuration (a TOML file, or a
     /// name that `gyre config` lists) or the address of a radar, in any order.
     #[arg(value_name = "WHAT")]
     pub what: Vec<PathBuf>,
-    /// The configuration. Default: what the recording's format and its scans say.
+    /// The configuration. Default: settings from the recording's format and its scans.
     #[arg(long, value_name = "FILE|NAME")]
     pub config: Option<PathBuf>,
-    /// The recording (source.data). Default: that of the configuration.
+    /// The recording (source.data). Default: the recording of the configuration.
     #[arg(long, value_name = "PATH")]
     pub data: Option<PathBuf>,
     /// Override a key of the configuration, as in masking.kind=none; may be repeated.

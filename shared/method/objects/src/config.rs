@@ -18,23 +18,23 @@ pub enum ObjectsKind {
 
 /// The tracking of moving objects: the section `[objects]`.
 ///
-/// The constants are those of road vehicles, and of radars that turn four times a second; those of
-/// the score were chosen on simulated drives.
+/// The constants suit road vehicles, and radars that turn four times a second; the constants of the
+/// score were chosen on simulated drives.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ObjectsConfig {
     /// `none` or `tracks`. Default `none`.
     pub kind: ObjectsKind,
-    /// Likelihood, by the network, from which on a place counts as one of a vehicle that moves.
-    /// Default 0.1: what is less likely keeps no track alive.
+    /// Least likelihood, by the network, of a place that counts as a moving vehicle's. Default 0.1:
+    /// a less likely place keeps no track alive.
     pub least_likely: f64,
-    /// Likelihood at which the network is as often wrong as right. Default 0.35: it was trained to
+    /// Likelihood where the network is as often wrong as right. Default 0.35: it was trained to
     /// miss rather than to invent. Less finds more, and more that is false.
     pub even_likely: f64,
-    /// The score from which on a track is an object: the sum of the logarithms of how much likelier
-    /// an object is than none. More finds less, and less that is false. Default 1.
+    /// Least score of a track that becomes an object: the sum of the log-likelihood ratios of an
+    /// object to no object. More finds less, and less that is false. Default 1.
     pub confirm_score: f64,
-    /// The score from which on an object that a scan shows is reported. Default 0.
+    /// Least score of an object in a scan that is reported. Default 0.
     pub keep_score: f64,
     /// The score below which a track ends. Default -2.
     pub end_score: f64,
@@ -57,9 +57,9 @@ pub struct ObjectsConfig {
     /// Time between two scans beyond which all tracks end, s. Default 2: by then a car at walking
     /// pace is elsewhere.
     pub max_gap_s: f64,
-    /// Squared Mahalanobis distance, by place and velocity, between what a scan shows and a
-    /// prediction, up to which the two can be one object. Default 50: more than its own noise, so
-    /// that one that brakes hard or turns off is within it.
+    /// Largest squared Mahalanobis distance, by place and velocity, between a detection and a
+    /// prediction that can be one object. Default 50: more than its own noise, so that one that
+    /// brakes hard or turns off is within it.
     pub gate: f64,
     /// Factor of the standard deviation that the network gives of a velocity. Default 2: five of
     /// six scans that it sees are those that it saw before, and so is most of the error.
@@ -69,21 +69,21 @@ pub struct ObjectsConfig {
     /// Standard deviation of an object's acceleration along its way, m/s²: vehicles brake and
     /// accelerate with 1 to 3. Default 1.5.
     pub acceleration_mps2: f64,
-    /// Standard deviation of its acceleration across its way beyond that of a turn, m/s²: a lane is
-    /// changed with about 1. Default 1.
+    /// Standard deviation of its acceleration across its path beyond a turn's, m/s²: a change of
+    /// lane has about 1. Default 1.
     pub lateral_acceleration_mps2: f64,
     /// Largest turn rate, rad/s: a car turns off at 7 m/s on a radius of 10 m. Default 0.7.
     pub turn_rate_radps: f64,
     /// Mean time for which a turn rate lasts, s: a driver steers into a corner, and out of it, in
     /// about that. Default 0.5.
     pub turn_lasts_s: f64,
-    /// Speed up to which an object counts as standing, m/s: the odometry's own error, and what
-    /// wind moves. Default 0.8.
+    /// Highest speed of an object that counts as standing, m/s: the odometry's own error, and
+    /// motion by wind. Default 0.8.
     pub standing_mps: f64,
     /// Speed above which its direction is the heading, m/s. Default 1: below, noise turns it.
     pub heading_mps: f64,
-    /// Standard deviations by which the speed must exceed `standing_mps` for an object to be
-    /// moving. Default 1.
+    /// Least excess of the speed of a moving object over `standing_mps`, in standard deviations.
+    /// Default 1.
     pub moving_sigmas: f64,
 }
 

@@ -38,7 +38,7 @@ pub struct PointsConfig {
     /// Maximum range, m. Farther away the beam is metres wide, and bearings are inaccurate.
     /// Default 80.
     pub max_range_m: f32,
-    /// Power above the floor at which the weight of a point reaches 1. Default 60.
+    /// Power above the floor that gives a point the weight 1. Default 60.
     pub weight_cap: f32,
     /// Maximum number of points per scan; the weakest are dropped. 0 disables the extraction.
     /// Default 8192.

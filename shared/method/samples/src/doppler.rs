@@ -42,13 +42,12 @@ pub struct DopplerDisplacement {
 pub struct DopplerConfig {
     /// Use of the velocity.
     pub kind: DopplerKind,
-    /// Standard deviation of the true velocity over the measured one: how well
-    /// `dataset.doppler_s` is known. The drive itself tells it better.
+    /// Standard deviation of the true velocity over the measured one: how well `dataset.doppler_s`
+    /// is known. The drive itself determines it better.
     pub scale_sigma: f64,
     /// Random walk of that scale, /√s.
     pub scale_walk_per_sqrt_s: f64,
-    /// Standard deviation of an error of the velocity that lasts, beside the noise that each scan
-    /// says, m/s.
+    /// Standard deviation of a lasting error of the velocity, beside the noise of each scan, m/s.
     pub noise_mps: f64,
 }
 
@@ -58,10 +57,10 @@ pub struct DopplerConfig {
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum DopplerKind {
-    /// None: the motion is that of the matches alone.
+    /// None: only the matches determine the motion.
     #[default]
     None,
-    /// That of each scan; with a radar whose chirps do not alternate, or without
+    /// The velocity of each scan; with a radar whose chirps do not alternate, or without
     /// `dataset.doppler_s`, it is an error.
     Auto,
 }

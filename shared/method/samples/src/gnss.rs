@@ -22,12 +22,12 @@ pub struct GnssConfig {
     /// `kind = "auto"` (default: the only one), or for `kind = "ros2"` (default: `/fix`).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub topic: Option<String>,
-    /// The address and port at which datagrams of a live receiver arrive, for `kind = "udp"`: lines
+    /// The address and port for receiving datagrams of a live receiver, for `kind = "udp"`: lines
     /// of a stamp (ns since 1970), latitude and longitude (degrees) and, if it is known, the
     /// standard deviation along each axis (m), with commas between. For `kind = "ros2"` those that
     /// the source passes on.
     pub listen: String,
-    /// Time by which the stamps of the fixes are late against the radar's, s: it is taken off them.
+    /// Delay of the stamps of the fixes against the radar's, s: it is subtracted from them.
     pub late_s: f64,
     /// The antenna in the frame of the radar: x forward, y left, m.
     pub lever_m: [f64; 2],

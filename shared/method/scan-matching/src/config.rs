@@ -169,7 +169,7 @@ pub struct TranslationConfig {
     /// distinguish the two.
     pub half_turn: bool,
     /// Factor of the covariance: factor x (1 - score) x inverse curvature of the peak, calibrated
-    /// like that of the angle.
+    /// like the angle's factor.
     pub variance_scale: f64,
 }
 

@@ -36,7 +36,7 @@ impl PlayedFaultKind {
     }
 }
 
-/// A fault that is put into what is played of a recording, at the same place of each turn.
+/// A fault to inject into the playback of a recording, at the same place of each turn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PlayedFault {

@@ -3,7 +3,7 @@
 use rustix::thread::CpuSet;
 use serde::{Deserialize, Serialize};
 
-/// The scheduling of a process. A key that is left out leaves what the process inherits.
+/// The scheduling of a process. A key that is left out keeps the inherited setting.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Scheduling {

@@ -10,8 +10,8 @@ use gyre_mapping::Origin;
 pub struct MapArguments {
     /// The folder of the run's results, its --out, with journal/keyframes.log.
     pub run: PathBuf,
-    /// A later run through the same place: report what has appeared and what has gone since RUN,
-    /// which may be the folder of a map too, in changes.csv and changes.png.
+    /// A later run through the same place: report the things that have appeared or vanished since
+    /// RUN, which may be the folder of a map too, in changes.csv and changes.png.
     #[arg(conflicts_with_all = ["format", "trajectory", "extend", "cell_m", "origin"])]
     pub later: Option<PathBuf>,
     /// The folder of the map, or of the changes.
@@ -33,7 +33,7 @@ pub struct MapArguments {
     #[arg(long, default_value = "0.2")]
     pub cell_m: f64,
     /// Place of the first keyframe on the earth and its heading, degrees: latitude, longitude (WGS
-    /// 84), clockwise from true north. Default: what the run has found by GNSS.
+    /// 84), clockwise from true north. Default: the run's place by GNSS.
     #[arg(long, value_name = "LAT,LON,HEADING", value_parser = origin, allow_hyphen_values = true)]
     pub origin: Option<Origin>,
     /// Print the changes as JSON instead of sentences.

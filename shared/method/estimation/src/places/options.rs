@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PlaceOptions {
-    /// Distance from the last keyframe at which a scan becomes a keyframe, m.
+    /// Distance from the last keyframe that makes a scan a keyframe, m.
     pub keyframe_distance_m: f64,
-    /// Rotation from the last keyframe at which a scan becomes a keyframe, degrees.
+    /// Rotation from the last keyframe that makes a scan a keyframe, degrees.
     pub keyframe_angle_deg: f64,
     /// Length of the path to each side of a keyframe whose keyframes make its submap, m.
     pub submap_reach_m: f64,

@@ -13,9 +13,9 @@ pub struct RefinementConfig {
     pub kind: RefinementKind,
     /// Number of keyframes in the map, 1 to 64. 1 registers against the last keyframe alone.
     pub keyframes: usize,
-    /// Distance from the last keyframe at which a scan becomes a keyframe, m.
+    /// Distance from the last keyframe that makes a scan a keyframe, m.
     pub keyframe_distance_m: f64,
-    /// Rotation from the last keyframe at which a scan becomes a keyframe, degrees.
+    /// Rotation from the last keyframe that makes a scan a keyframe, degrees.
     pub keyframe_angle_deg: f64,
     /// Size of a cell of the map, m. The map is blurred by a Gaussian with a standard deviation of
     /// one cell.
@@ -23,7 +23,7 @@ pub struct RefinementConfig {
     /// Extent of the map to each side of its newest keyframe, m: a little more than
     /// `points.max_range_m`.
     pub reach_m: f64,
-    /// Cell size of the coarse map, on which registration starts, over that of the fine map.
+    /// Cell size of the coarse map, where registration starts, over the cell size of the fine map.
     pub coarse: f64,
     /// Maximum acceleration of the vehicle, m/s². A match that exceeds it is rejected.
     pub acceleration_mps2: f64,
@@ -53,8 +53,8 @@ pub struct RefinementConfig {
     /// rotation of the antenna.
     pub yaw_sigma_deg: f64,
     /// Standard deviation of the drift of a map of k keyframes with each motion, over 2 / (k + 1)
-    /// of that of the motion. The share (drift_scale x 2 / (k + 1))² of the covariance accumulates,
-    /// at most all of it; the next motion takes back the rest.
+    /// of the motion's standard deviation. The share (drift_scale x 2 / (k + 1))² of the covariance
+    /// accumulates, at most all of it; the next motion takes back the rest.
     pub drift_scale: f64,
     /// Standard deviation of the scale that all motions of a drive share: how well the range
     /// resolution is known.
