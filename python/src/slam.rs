@@ -191,8 +191,8 @@ impl Slam {
         })
     }
 
-    /// Takes the next scan with its points, those of `Odometry.points`, and closes the loops that
-    /// it completes. Returns whether the scan is a keyframe.
+    /// Takes the next scan with its points, `Odometry.points`, and closes the loops that it
+    /// completes. Returns whether the scan is a keyframe.
     fn add(
         &self,
         py: Python<'_>,
@@ -223,7 +223,7 @@ impl Slam {
         added.map_err(errors::other)
     }
 
-    /// Says that no scan comes after the last one, and closes the last loops.
+    /// Ends the stream after the last scan, and closes the last loops.
     fn finish(&self, py: Python<'_>) -> PyResult<()> {
         self.state.with(py, State::finish)?.map_err(errors::other)
     }

@@ -22,10 +22,6 @@ pub use drive::drive;
 
 /// Computes the drives of a list that are not complete, and writes the table. The exit code is 0 if
 /// all are complete, 1 if not, and 130 after an interruption.
-///
-/// # Errors
-/// A list that cannot be read, a folder that cannot be written, or to which another batch is
-/// writing.
 pub fn batch(arguments: &BatchArguments) -> Result<ExitCode, Failure> {
     let list = List::read(&arguments.list)?;
     let settings = settings(arguments)?;

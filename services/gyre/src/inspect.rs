@@ -1,4 +1,4 @@
-//! `gyre inspect`: reports what a dataset contains.
+//! `gyre inspect`: reports the contents of a dataset.
 
 use std::process::ExitCode;
 
@@ -9,10 +9,7 @@ use gyre_terminal::{Failure, print};
 
 use crate::cli::InspectArguments;
 
-/// Prints what a dataset contains and what looks wrong with it.
-///
-/// # Errors
-/// A folder that is not a dataset, a trajectory that cannot be read, a key that is none.
+/// Prints the contents of a dataset and its apparent faults.
 pub fn inspect(arguments: &InspectArguments) -> Result<ExitCode, Failure> {
     let trajectory = arguments
         .trajectory

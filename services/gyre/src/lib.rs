@@ -39,9 +39,6 @@ use cli::{Command, SchemaArguments};
 use split::absent as link;
 
 /// Executes a command of `gyre`.
-///
-/// # Errors
-/// One sentence that says what, where and what to do.
 pub fn execute(command: Command) -> Result<ExitCode, Failure> {
     gyre_stage::wake::report_file_size_limit()?;
     if is_private(&command) {
@@ -102,8 +99,8 @@ pub fn execute(command: Command) -> Result<ExitCode, Failure> {
     }
 }
 
-/// Looks for what this machine lacks for a run of the default configuration, whose scans are as
-/// large as those of Oxford.
+/// Checks this machine for missing requirements of a run of the default configuration, whose scans
+/// are as large as Oxford's.
 fn doctor(arguments: &DoctorArguments) -> Result<ExitCode, Failure> {
     let simulated = Configuration::of_overrides(&["simulation.scans=2".to_owned()])?;
     let checked = preflight::check(&simulated, &mut preflight::ask)?;
@@ -111,7 +108,7 @@ fn doctor(arguments: &DoctorArguments) -> Result<ExitCode, Failure> {
 }
 
 /// Returns whether the files of a command are its user's alone: all but a simulated recording. The
-/// umask of what a run starts may be the one that the transport sets for a moment.
+/// umask of a child process may be the one that the transport sets for a moment.
 fn is_private(command: &Command) -> bool {
     !matches!(command, Command::Simulate(_))
 }

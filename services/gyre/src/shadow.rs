@@ -13,11 +13,8 @@ use gyre_terminal::{Failure, own, print, seconds, words};
 
 use crate::{cli::ShadowArguments, preflight};
 
-/// Compares until the run ends or as long as the arguments say, and prints the report. The exit
-/// code is 1 if nothing was compared, or the program died, hung or broke the contract.
-///
-/// # Errors
-/// There is no such run or stage, the stage cannot have a shadow, or the program cannot be started.
+/// Compares until the run ends or the given time is over, and prints the report. The exit code is 1
+/// if nothing was compared, or the program died, hung or broke the contract.
 pub fn shadow(arguments: &ShadowArguments) -> Result<ExitCode, Failure> {
     let stage = stage(&arguments.stage)?;
     let options = options(arguments, stage)?;

@@ -82,7 +82,8 @@ fn work_of_follower(follower: FollowerId) -> Work {
     })
 }
 
-/// Checks that this is the supervisor's build. A command of the configuration may name another one.
+/// Checks that this is the supervisor's build. A command of the configuration may name a different
+/// build.
 fn require_same_build(manifest: &Manifest) -> Result<(), StageError> {
     let path = own();
     let supervisor = PathBuf::from(format!(
@@ -90,7 +91,7 @@ fn require_same_build(manifest: &Manifest) -> Result<(), StageError> {
         getppid().map_or(0, Pid::as_raw_pid)
     ));
     let file = |path: &Path| fs::metadata(path).map(|file| (file.dev(), file.ino())).ok();
-    // A shell can be in between; then the content tells.
+    // A shell can stand between the two processes; then the file contents decide.
     if file(&path).is_some_and(|own| file(&supervisor) == Some(own)) {
         return Ok(());
     }

@@ -22,7 +22,7 @@ use crate::{
     simulate,
 };
 
-/// The exit code of a stress test that could not be carried out, which says nothing of the
+/// The exit code of a stress test that could not be carried out, which is no verdict on the
 /// pipeline.
 const NOT_CARRIED_OUT: u8 = 2;
 /// Duration of a scenario with `--quick`, s.
@@ -33,9 +33,6 @@ const RENDERED: usize = 240;
 
 /// Carries out the scenarios and writes the report. The exit code is 0 if all limits of the budget
 /// are kept, 1 if not, and 2 if the test could not be carried out.
-///
-/// # Errors
-/// Standard output cannot be written.
 pub fn stress(arguments: &StressArguments) -> Result<ExitCode, Failure> {
     if arguments.list {
         for scenario in Scenario::ALL {
@@ -55,9 +52,6 @@ pub fn stress(arguments: &StressArguments) -> Result<ExitCode, Failure> {
 }
 
 /// Does the work of a helper process.
-///
-/// # Errors
-/// A failure of it.
 pub fn help(arguments: &[String]) -> Result<ExitCode, Failure> {
     gyre_stress::helper::help(&own(), arguments)?;
     Ok(ExitCode::SUCCESS)
@@ -125,8 +119,8 @@ fn carry_out(arguments: &StressArguments) -> Result<Report, Failure> {
     Ok(report)
 }
 
-/// Stores a simulation, so that rendering does not bound the pipeline. What is stored already and
-/// is the same is kept.
+/// Stores a simulation, so that rendering does not bound the pipeline. An unchanged stored
+/// simulation is kept.
 fn render(configuration: &mut Configuration, out: &Out) -> Result<(), Failure> {
     let Some(mut simulation) = configuration.simulation.take() else {
         return Ok(());
@@ -141,7 +135,7 @@ fn render(configuration: &mut Configuration, out: &Out) -> Result<(), Failure> {
     Ok(())
 }
 
-/// All scenarios but those of gyro and wheels that the run or its recording has no place for.
+/// All scenarios except faults of gyro and wheels that are absent from the run or its recording.
 fn possible(tested: &TestedPipeline) -> Vec<Scenario> {
     let all = Scenario::ALL.into_iter();
     all.filter(|scenario| match witness_fault::lacks(tested, *scenario) {

@@ -17,16 +17,12 @@ pub struct CalibrationError {
     reason: String,
 }
 
-/// The sections of which a calibration may have any key: those of the radar, the gyro and the
-/// wheels.
+/// The sections where a calibration may have any key: radar, gyro and wheels.
 const WHOLE: [&str; 3] = ["dataset", "gyro", "wheels"];
 /// The sections whose key `min_range_m` a calibration may have.
 const RANGES: [&str; 2] = ["points", "raster"];
 
 /// Returns the constants in a file of `gyre calibrate` as overrides, as `dataset.key=value`.
-///
-/// # Errors
-/// A file that cannot be read, or has anything else.
 pub fn overrides(file: &Path) -> Result<Vec<String>, CalibrationError> {
     let unusable = |reason: String| CalibrationError {
         file: file.to_owned(),

@@ -17,9 +17,6 @@ pub struct ConfigArguments {
 }
 
 /// Lists the configurations in the program, or prints one as it is.
-///
-/// # Errors
-/// There is none of this name.
 pub fn config(arguments: &ConfigArguments) -> Result<ExitCode, Failure> {
     match &arguments.name {
         Some(name) => {

@@ -1,4 +1,4 @@
-//! The arguments, and what they name.
+//! The arguments and the inputs that they name.
 
 use std::path::{Path, PathBuf};
 
@@ -9,17 +9,17 @@ use thiserror::Error;
 
 use crate::kind::Kind;
 
-/// The words and options that say what a command works on.
+/// The words and options that name the inputs of a command.
 #[derive(Clone, Debug, Default, Args)]
 pub struct Inputs {
     /// The recording (a folder, NAME.mcap, a bag of ROS 2), the configuration (a TOML file, or a
     /// name that `gyre config` lists) or the address of a radar, in any order.
     #[arg(value_name = "WHAT")]
     pub what: Vec<PathBuf>,
-    /// The configuration. Default: what the recording's format and its scans say.
+    /// The configuration. Default: settings from the recording's format and its scans.
     #[arg(long, value_name = "FILE|NAME")]
     pub config: Option<PathBuf>,
-    /// The recording (source.data). Default: that of the configuration.
+    /// The recording (source.data). Default: the recording of the configuration.
     #[arg(long, value_name = "PATH")]
     pub data: Option<PathBuf>,
     /// Override a key of the configuration, as in masking.kind=none; may be repeated.
@@ -32,7 +32,6 @@ pub struct Inputs {
 pub struct Given {
     /// The configuration: a file, or the name of one in the program.
     pub configuration: Option<PathBuf>,
-    /// The recording.
     pub data: Option<PathBuf>,
     /// The address of a radar.
     pub radar: Option<String>,
@@ -41,28 +40,22 @@ pub struct Given {
 /// Why the arguments of a command are refused.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum InputError {
-    /// Two of a kind.
     #[error("`{0}` and `{1}` are both {2}: name one")]
     Twice(String, String, &'static str),
-    /// A recording and a radar.
     #[error("`{0}` is a recording and `{1}` the address of a radar: name one")]
     Both(String, String),
-    /// The results of a run.
     #[error(
         "{0} has the results of a run: name {0}/config.toml to compute them again, or export a recording of it (`gyre export`)"
     )]
     Results(String),
-    /// A name with two meanings.
     #[error(
         "`{0}` is a folder here and the name of a configuration: write ./{0} for the folder, --config {0} for the configuration"
     )]
     Ambiguous(String),
-    /// A word that names nothing.
     #[error(
         "`{0}` is no file or folder, no name that `gyre config` lists, and not the address of a radar{1}"
     )]
     Unknown(String, String),
-    /// A radar, for a command that reads recordings.
     #[error(
         "`{0}` is the address of a radar, and only `gyre run` and `gyre up` receive one: name a recording"
     )]
@@ -70,10 +63,6 @@ pub enum InputError {
 }
 
 impl Inputs {
-    /// Returns what is named.
-    ///
-    /// # Errors
-    /// A word that names nothing or has two meanings; two of a kind.
     pub fn given(&self) -> Result<Given, InputError> {
         let mut given = Given {
             configuration: self.config.clone(),
@@ -91,9 +80,6 @@ impl Inputs {
     }
 
     /// As [`given`](Self::given), for a command that receives no radar.
-    ///
-    /// # Errors
-    /// As [`given`](Self::given); a radar.
     pub fn given_recording(&self) -> Result<Given, InputError> {
         let given = self.given()?;
         match given.radar {
@@ -102,20 +88,14 @@ impl Inputs {
         }
     }
 
-    /// Reads the configuration that is named; without one, that of the recording, which is said.
-    /// The scans are those of the recording, or of the configuration.
-    ///
-    /// # Errors
-    /// As [`given`](Self::given); a configuration or a recording that cannot be used.
+    /// Reads the named configuration; without a name, the configuration of the recording, which is
+    /// then printed. The scans come from the recording, or from the configuration.
     pub fn configuration(&self) -> Result<Configuration, Failure> {
         self.configuration_of(&self.given_recording()?)
     }
 
     /// As [`configuration`](Self::configuration), of another recording that is read in the same
     /// way.
-    ///
-    /// # Errors
-    /// As [`configuration`](Self::configuration).
     pub fn configuration_with(&self, data: &Path) -> Result<Configuration, Failure> {
         self.configuration_of(&Given {
             data: Some(data.to_owned()),
@@ -137,11 +117,8 @@ impl Inputs {
     }
 }
 
-/// Reads a configuration by its path or its name, and says where its files are taken from if that
-/// is not clear.
-///
-/// # Errors
-/// A configuration that cannot be used.
+/// Reads a configuration by its path or its name, and prints the place of its files if that is not
+/// clear.
 pub fn configuration(named: &Path, overrides: &[String]) -> Result<Configuration, Failure> {
     let (configuration, notes) = Configuration::named(named, overrides)?;
     let notes = notes.iter();
@@ -151,9 +128,6 @@ pub fn configuration(named: &Path, overrides: &[String]) -> Result<Configuration
 
 impl Given {
     /// Adds the radar of an option.
-    ///
-    /// # Errors
-    /// There is one already, or a recording.
     pub fn with_radar(mut self, radar: Option<&String>) -> Result<Self, InputError> {
         if let Some(radar) = radar {
             self.take(Path::new(radar), Kind::Radar)?;

@@ -23,7 +23,7 @@ pub enum Kind {
     Data,
     /// The folder of a run's results.
     Results,
-    /// A folder whose name is also that of a configuration in the program.
+    /// A folder whose name is also the name of a configuration in the program.
     Ambiguous,
     /// The address of a radar.
     Radar,
@@ -32,7 +32,8 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// Tells what a word is: by what is there, then by the names in the program, then by its form.
+    /// Determines the kind of a word: by existing files, then by the names in the program, then by
+    /// its form.
     pub fn of(word: &Path) -> Self {
         let ending = word.extension().and_then(|ending| ending.to_str());
         let is_recording = ending.is_some_and(|ending| RECORDINGS.contains(&ending));
@@ -59,7 +60,7 @@ impl Kind {
     }
 }
 
-/// Returns whether a path is that of a file that begins as a text.
+/// Returns whether a path is a file that begins as a text.
 fn is_text(path: &Path) -> bool {
     let start = || -> io::Result<Vec<u8>> {
         let mut start = Vec::new();

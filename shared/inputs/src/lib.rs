@@ -1,8 +1,8 @@
-//! The things that commands work on: a recording, a configuration, a radar. All commands are given
-//! them in one way, and each is recognised by what it is.
+//! The things that commands work on: a recording, a configuration, a radar. All commands receive
+//! them in one form, and recognise each by its content.
 //!
 //! - [`Inputs`]: the arguments;
-//! - [`Given`]: what they name;
+//! - [`Given`]: the things that they name;
 //! - [`Kind`]: what one of them is;
 //! - [`config`](config()): the configurations in the program.
 

@@ -1,4 +1,4 @@
-//! The terminal: what a program of Gyre says to the person there, and how it ends.
+//! The terminal: a program's messages to the person there, and its end.
 
 mod command;
 mod failure;

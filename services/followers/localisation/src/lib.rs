@@ -1,8 +1,8 @@
 //! Localisation of a run in the map of an earlier drive, while it drives.
 //!
 //! It follows `journal/keyframes.log`, localises keyframe after keyframe, and publishes each place
-//! as a `fix`. It writes no file: what it publishes follows from the keyframes and the map,
-//! whenever the keyframes come.
+//! as a `fix`. It writes no file: its fixes depend only on the keyframes and the map, whenever the
+//! keyframes arrive.
 
 use std::path::PathBuf;
 
@@ -18,10 +18,6 @@ use gyre_stage::{
 };
 
 /// Runs the follower to the end of the keyframes, or until SIGTERM.
-///
-/// # Errors
-/// A map or keyframes that cannot be used, an invalid configuration, or an error of
-/// [`follower::run`].
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let slam: SlamConfig = launch.section("slam")?;
     let refinement: RefinementConfig = launch.section("refinement")?;
@@ -48,12 +44,12 @@ struct Fixes {
     out: PathBuf,
     keyframes: RecordReader<Keyframe>,
     localiser: Localiser,
-    /// Keyframes that were read.
     read: usize,
 }
 
 impl Fixes {
-    /// Looks for new keyframes. If some of those that were read have been cut off, it begins anew.
+    /// Looks for new keyframes. If some of the keyframes that were read have been cut off, it
+    /// restarts from the first keyframe.
     fn look(&mut self) -> Result<(), StageError> {
         self.keyframes.refresh()?;
         if self.keyframes.unchanged() < self.read {

@@ -1,9 +1,9 @@
 //! Loop closing: finds the places that the vehicle has come back to, among the keyframes of the
 //! run.
 //!
-//! It follows `journal/keyframes.log`. The places of keyframes are kept in `journal/places.log` and
-//! the verdicts on all candidates in `journal/loops.log`, from which a restarted process continues.
-//! Both follow from the keyframes, whenever those come.
+//! It follows `journal/keyframes.log`. It keeps the places of keyframes in `journal/places.log` and
+//! the verdicts on all candidates in `journal/loops.log`. A restarted process continues from both
+//! logs. Both follow from the keyframes, whenever those come.
 
 use std::{collections::VecDeque, path::PathBuf};
 
@@ -22,9 +22,6 @@ use gyre_stage::{
 };
 
 /// Runs the follower to the end of the keyframes, or until SIGTERM.
-///
-/// # Errors
-/// Logs that cannot be used, an invalid configuration, or an error of [`follower::run`].
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     if !launch.take_place()? {
         return Ok(StageCounters::default());
@@ -106,7 +103,7 @@ impl Follower for LoopClosing {
     }
 }
 
-/// The logs, and what has been read of them.
+/// The logs and the records read so far.
 struct State {
     keyframes: RecordReader<Keyframe>,
     places: RecordLog<Place>,

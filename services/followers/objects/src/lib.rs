@@ -1,9 +1,10 @@
 //! Moving objects: tracks what moves around the vehicle, scan after scan.
 //!
-//! It follows `journal/scans.log`, which has each scan's points and pose, and keeps the objects of
-//! each scan in `journal/objects.log`, from which `objects.csv` is made. A restarted process works
-//! through the scans again from the first one, since an identity can be as old as the run, and
-//! appends what the log lacks. What it writes follows from the scans, whenever they come.
+//! It follows `journal/scans.log`, which has each scan's points and pose. It keeps the objects of
+//! each scan in `journal/objects.log`, and `objects.csv` is made from that log. A restarted process
+//! works through the scans again from the first scan, since an identity can be as old as the run,
+//! and appends the records that the log lacks. Its records depend only on the scans, whenever the
+//! scans arrive.
 
 use std::path::PathBuf;
 
@@ -22,9 +23,6 @@ use gyre_stage::{
 };
 
 /// Runs the follower to the end of the scans, or until SIGTERM.
-///
-/// # Errors
-/// Logs that cannot be used, an invalid configuration, or an error of [`follower::run`].
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     if !launch.take_place()? {
         return Ok(StageCounters::default());
@@ -46,9 +44,6 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
 }
 
 /// Returns a tracker whose network is computed by the library of learned masks.
-///
-/// # Errors
-/// An invalid configuration, or a library that cannot be used.
 pub fn tracker(
     config: &ObjectsConfig,
     masking: &MaskingConfig,
@@ -67,12 +62,12 @@ struct Tracking {
     scans: RecordReader<LoggedScan>,
     tracked: RecordLog<LoggedObjects>,
     tracker: ObjectTracker,
-    /// Scans that were read.
     read: usize,
 }
 
 impl Tracking {
-    /// Looks for new scans. If some of those that were read have been cut off, it begins anew.
+    /// Looks for new scans. If some of the scans that were read have been cut off, it restarts from
+    /// the first scan.
     fn look(&mut self) -> Result<(), StageError> {
         self.scans.refresh()?;
         if self.scans.unchanged() < self.read {

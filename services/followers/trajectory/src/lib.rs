@@ -5,10 +5,10 @@
 //! when it starts, or grows: fixes of a live receiver are written to `journal/gnss.csv` here, until
 //! both other logs have ended. A fix counts once both keyframes around it have come.
 //!
-//! While the run goes on, new loops and fixes are taken into the standing estimate, which may
-//! depend a little on when they came. When both logs have ended the poses are solved anew: the last
-//! correction is a function of the logs, and that of the results, which the supervisor makes from
-//! the same logs.
+//! During the run, new loops and fixes update the standing estimate, which may depend a little on
+//! their time of arrival. When both logs have ended, the poses are solved again. The last
+//! correction is then a function of the logs alone, and so equals the results that the supervisor
+//! makes from the same logs.
 
 mod live_fixes;
 
@@ -30,9 +30,6 @@ use gyre_stage::{
 use live_fixes::LiveFixes;
 
 /// Runs the follower to the end of both logs, or until SIGTERM.
-///
-/// # Errors
-/// Logs that cannot be used, or an error of [`follower::run`].
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     if !launch.take_place()? {
         return Ok(StageCounters::default());
@@ -64,9 +61,9 @@ struct Trajectory {
     /// The folder of the results.
     out: PathBuf,
     kind: EstimatorKind,
-    /// The fixes, of which no keyframe has one yet.
+    /// The fixes that are later than all keyframes.
     fixes: Fixes,
-    /// Those that arrive while the run goes on.
+    /// The fixes that arrive during the run.
     live_fixes: Option<LiveFixes>,
     keyframes: RecordReader<Keyframe>,
     queries: RecordReader<Query>,
@@ -78,7 +75,7 @@ struct Trajectory {
     /// The pose of the newest keyframe as corrected; `None` if loops were read since that have
     /// corrected no pose yet.
     corrected: Option<UncertainMotion>,
-    /// True if the poses are those of the results.
+    /// True if the poses equal the results.
     is_final: bool,
     /// True if something was read since the last correction.
     has_changed: bool,
@@ -106,7 +103,8 @@ impl Trajectory {
         })
     }
 
-    /// Looks for new records. If some of those that were read have been cut off, it begins anew.
+    /// Looks for new records. If some of the records that were read have been cut off, it restarts
+    /// from the first record.
     fn look(&mut self) -> Result<(), StageError> {
         self.keyframes.refresh()?;
         self.queries.refresh()?;
@@ -125,7 +123,7 @@ impl Trajectory {
         Ok(())
     }
 
-    /// Reads the next record; false if there is none.
+    /// Reads the next record; returns false if there is no new record.
     fn advance(&mut self) -> Result<bool, StageError> {
         let [keyframes, queries] = self.read;
         if keyframes < self.keyframes.len() {

@@ -22,9 +22,6 @@ pub struct LiveFixes {
 
 impl LiveFixes {
     /// Begins to receive, in a run with its results in `out`.
-    ///
-    /// # Errors
-    /// An address at which nothing can be received, or a file that cannot be written.
     pub fn open(config: GnssConfig, out: &Path) -> Result<Self, StageError> {
         let log = received_fixes(out);
         Ok(Self {
@@ -35,19 +32,13 @@ impl LiveFixes {
         })
     }
 
-    /// Ends reception. What has arrived survives a power failure.
-    ///
-    /// # Errors
-    /// Reception has failed.
+    /// Ends reception. Received fixes survive a power failure.
     pub fn finish(&mut self) -> Result<(), StageError> {
         self.receiver.finish()
     }
 
     /// Returns all fixes that have arrived; `None` if there are no new ones, or few beside all.
     /// With `is_last` nothing is received after this.
-    ///
-    /// # Errors
-    /// Reception has failed, or a log that cannot be read.
     pub fn take(&mut self, is_last: bool) -> Result<Option<Fixes>, StageError> {
         if is_last {
             self.finish()?;

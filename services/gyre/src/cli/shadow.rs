@@ -26,7 +26,7 @@ pub struct ShadowArguments {
     /// Time after which it ends, s.
     #[arg(long, value_name = "S")]
     pub duration: Option<f64>,
-    /// Write shadow.json, shadow.csv with a row for each item, and what the program prints,
+    /// Write shadow.json, shadow.csv with a row for each item, and the program's output,
     /// shadow.txt, to this folder.
     #[arg(long, value_name = "DIR")]
     pub report: Option<PathBuf>,

@@ -11,10 +11,7 @@ use gyre_terminal::{Failure, print};
 use super::results_folder;
 use crate::cli::RunArguments;
 
-/// Reads the configuration and resolves what it leaves open.
-///
-/// # Errors
-/// An invalid configuration, or a model that cannot be read.
+/// Reads the configuration and resolves its open settings.
 pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
     let given = arguments.given()?;
     if arguments.from.is_some() && given.data.is_none() {
@@ -59,15 +56,12 @@ pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
     let idle = configuration.without_effect(&arguments.inputs.set)?;
     idle.iter()
         .for_each(|sentence| print::note(format_args!("gyre: {sentence}")));
-    // The run's processes are told where it is.
+    // The run's processes receive the path of the run.
     path_value(&absolute(&results_folder(arguments)?)?)?;
     Ok(configuration)
 }
 
 /// The overrides: the calibration, `--set`, the options; of two for one key the later one holds.
-///
-/// # Errors
-/// A calibration that cannot be read.
 fn overrides(arguments: &RunArguments, given: &Given) -> Result<Vec<String>, Failure> {
     let options = &arguments.options;
     let calibration = arguments.calibration.as_deref().map(calibration::overrides);

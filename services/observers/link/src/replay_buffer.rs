@@ -14,7 +14,7 @@ use gyre_stage::{StageError, source::RecordedMessage};
 
 use crate::LinkError;
 
-/// A message on its way: the bytes of its header, then those of its payload.
+/// A message on its way: the bytes of its header, then the bytes of its payload.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Message {
     /// The number of the message in its topic.
@@ -43,12 +43,11 @@ pub(crate) struct Place {
     /// The number of the next message.
     pub seq: u64,
     /// The generation of the newest one: messages of a later generation are wanted whatever their
-    /// numbers. `None`: no number is given anew.
+    /// numbers. `None`: no number is given twice.
     pub generation: Option<u32>,
 }
 
 impl Place {
-    /// Goes behind a message.
     pub fn pass(&mut self, message: &Message) {
         self.seq = message.seq.saturating_add(1);
         self.generation = self.generation.map(|_| message.generation);
@@ -63,9 +62,8 @@ impl Place {
 /// The next message of a buffer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Next {
-    /// A message.
     Message(Message),
-    /// There is none yet.
+    /// There is no message yet.
     Nothing,
     /// There will be none.
     Ended,
@@ -130,7 +128,7 @@ impl ReplayBuffer for MemoryBuffer {
         let item = message.item().unwrap_or_default();
         let message = Message::of(message);
         let held = &mut *lock(&self.held);
-        // Masking was started again, and gives numbers anew: perhaps some that did not come.
+        // Masking was restarted and numbers again, perhaps including numbers that did not arrive.
         let is_void = |last: &mut Message| {
             let is_earlier = last.generation < message.generation;
             last.seq >= message.seq || is_earlier && last.seq >= item.numbered_from
@@ -252,7 +250,7 @@ impl<L: Log> LogBuffer<L> {
         let message = |logged| {
             Next::Message(Message {
                 seq,
-                // What a log has is never void.
+                // A message in a log is never void.
                 generation: 0,
                 bytes: bytemuck::bytes_of(&header(logged)).into(),
             })

@@ -39,7 +39,7 @@ const NAME: &str = "link";
 const DEFAULT: [&str; 6] = ["motion", "refined", "pose", "loop", "correction", "fix"];
 /// Bytes that are kept of a topic without payloads: hours.
 const MAX_BYTES: usize = 64 << 20;
-/// Time in which a receiver reconnects whose sender was restarted just before the end.
+/// Time for a receiver to reconnect if its sender was restarted just before the end.
 const RECONNECT_TIME: Duration = Duration::from_secs(6);
 /// Scans that are kept. With one more the newest would arrive later.
 const MAX_SCANS: usize = 2;
@@ -60,7 +60,6 @@ pub struct SendOptions {
 /// The messages and bytes that were sent to all receivers together.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Sent {
-    /// The counts by topic.
     pub topics: BTreeMap<String, (u64, u64)>,
     /// True if a receiver was out of reach at the end, and has not received everything.
     pub is_incomplete: bool,
@@ -121,9 +120,6 @@ pub(crate) fn offer_key(name: &str) -> String {
 }
 
 /// Sends the topics of a run until all receivers have everything, or a signal requests a stop.
-///
-/// # Errors
-/// There is no such run or topic, or the network cannot be used.
 pub fn send(options: &SendOptions) -> Result<Sent, LinkError> {
     options.network.check()?;
     let run = ObservedRun::writing_to(&options.out)?;
@@ -250,7 +246,7 @@ impl SentTopic<'_> {
             match self.observer.take() {
                 Ok(Some(message)) => self.buffer.add(&message),
                 Ok(None) => return Ok(()),
-                // The run judges what its stages send. The message counts as missed.
+                // The run judges the messages of its stages. The message counts as missed.
                 Err(StageError::Malformed { .. }) => {}
                 Err(error) => return Err(error),
             }

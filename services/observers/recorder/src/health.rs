@@ -1,5 +1,5 @@
-//! The health of the run, as its supervisor reports it: for recordings, in which one sees later
-//! when a process died.
+//! The health of the run, as its supervisor reports it. In a recording it shows later when a
+//! process died.
 
 use std::{
     path::PathBuf,
@@ -11,7 +11,6 @@ use std::{
 use gyre_stage::control::Control;
 use gyre_supervise::UsedRun;
 
-/// Time between two questions.
 const PERIOD: Duration = Duration::from_secs(1);
 
 /// Asks the supervisor of a run once a second, in a thread that ends when nobody takes the answers,

@@ -1,9 +1,9 @@
 //! The recorder: an observer that writes the messages of a running run to an MCAP file.
 //!
-//! One thread takes messages from the observers' queues and copies them, another one compresses and
-//! writes. Between them is a queue with a limit in bytes. So a slow disk costs memory first, and
-//! then messages, which are counted. Nothing that the recorder does reaches the run: see
-//! [`gyre_stage::observer`].
+//! One thread takes messages from the observers' queues and copies them, and a second thread
+//! compresses and writes. Between them is a queue with a limit in bytes. So a slow disk costs
+//! memory first, and then messages, which are counted. Nothing that the recorder does reaches the
+//! run: see [`gyre_stage::observer`].
 //!
 //! Reading order: `options`, `recorder` (the loop), `begin`, `tap` (the observers), `queue`,
 //! `writing` (the other thread), `health`.

@@ -22,7 +22,6 @@ const POLL: Duration = Duration::from_millis(10);
 /// A radar that cannot be used.
 #[derive(Debug, Error)]
 pub enum AskError {
-    /// No radar answers.
     #[error(
         "no radar answers at {address} ({source}): check source.address, and that the radar is on and in reach"
     )]
@@ -32,7 +31,6 @@ pub enum AskError {
         /// The system's reason.
         source: std::io::Error,
     },
-    /// Something else answers.
     #[error(
         "{address} sent no configuration of a radar within {} s: is it a Navtech radar, and has it less than three clients?",
         MAX_WAIT.as_secs()
@@ -41,7 +39,6 @@ pub enum AskError {
         /// The address of the radar.
         address: String,
     },
-    /// No datagram arrives.
     #[error(
         "nothing arrives at {address} within {} s: check that the radar's data output is CAT-240 to this address, and that source.interface is this machine's address on the radar's network",
         MAX_WAIT.as_secs()
@@ -50,20 +47,16 @@ pub enum AskError {
         /// The destination of the datagrams.
         address: String,
     },
-    /// The datagrams contain no azimuths.
     #[error("what arrives at {address} are no scans: {source}")]
     NoScans {
         /// The destination of the datagrams.
         address: String,
-        /// The reason.
         source: Damage,
     },
-    /// The configuration is not usable.
     #[error("the radar at {address} cannot be used: {source}")]
     Unusable {
         /// The address of the radar.
         address: String,
-        /// The reason.
         source: BadConfiguration,
     },
 }
@@ -88,14 +81,11 @@ impl AskError {
 pub struct Sizes {
     /// Time of a turn, ns.
     pub period_ns: i64,
-    /// The size of a scan.
     pub limits: ScanLimits,
 }
 
-/// Asks a radar for its configuration; one that sends by UDP says it with each datagram.
-///
-/// # Errors
-/// No answer, or one that cannot be used.
+/// Asks a radar for its configuration. A radar that sends by UDP includes the configuration in each
+/// datagram.
 pub fn ask(settings: &Settings) -> Result<Sizes, AskError> {
     let configuration = configuration(settings)?;
     match SweepAssembler::new(&configuration, settings.constants) {

@@ -16,7 +16,7 @@ use crate::{Settings, parser::RadarParser};
 
 /// The longest time for an attempt to connect.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(1);
-/// Pauses between attempts to connect: the first, and the limit up to which they double.
+/// Pauses between attempts to connect: the first pause, which doubles up to the second.
 const RETRY_PAUSES: [Duration; 2] = [Duration::from_millis(100), Duration::from_secs(5)];
 /// Bytes of other messages, more than wait for a stage that was held up, after which a radar that
 /// sends no azimuths is left although it never falls silent.
@@ -29,7 +29,6 @@ const RECEIVE_BYTES: usize = 4 << 20;
 pub enum ReadResult {
     /// Bytes were read, and are in the parser.
     Bytes,
-    /// The connection was opened.
     Opened,
     /// Nothing was read; try again after this time.
     Nothing(Duration),
@@ -90,7 +89,7 @@ impl Connection {
         self.socket.as_ref().map(RadarSocket::as_fd)
     }
 
-    /// Reads what has arrived, or opens the connection; does not wait for bytes.
+    /// Reads the bytes that have arrived, or opens the connection; does not wait for bytes.
     pub fn receive(&mut self, messages: &mut RadarParser) -> ReadResult {
         let Some(socket) = &mut self.socket else {
             return self.open();
@@ -119,8 +118,8 @@ impl Connection {
         }
     }
 
-    /// Notes that an azimuth has arrived. Other messages do not count: a radar may send no powers
-    /// and still say that it is alive.
+    /// Notes that an azimuth has arrived. Other messages do not count: a radar may send keep-alives
+    /// without powers.
     pub fn note_azimuth(&mut self) {
         self.last_azimuth = Instant::now();
         self.without_azimuth = 0;
@@ -128,7 +127,6 @@ impl Connection {
         self.pause = RETRY_PAUSES[0];
     }
 
-    /// Returns whether azimuths arrive.
     pub fn receives_azimuths(&self) -> bool {
         self.receives_azimuths
     }
@@ -228,7 +226,6 @@ impl Drop for Connection {
 /// An open connection, or the socket that receives datagrams.
 #[derive(Debug)]
 pub enum RadarSocket {
-    /// A connection by TCP.
     Tcp(TcpStream),
     /// A socket that receives datagrams.
     Udp(UdpSocket),
@@ -236,9 +233,6 @@ pub enum RadarSocket {
 
 impl RadarSocket {
     /// Connects and sends requests, or begins to receive.
-    ///
-    /// # Errors
-    /// The radar cannot be reached.
     pub fn open(address: &Address, requests: &[Request]) -> io::Result<Self> {
         match address {
             Address::Tcp(address) => connect(address, requests).map(Self::Tcp),
@@ -247,9 +241,6 @@ impl RadarSocket {
     }
 
     /// Reads bytes of a stream, or one datagram with its sender; does not wait.
-    ///
-    /// # Errors
-    /// Nothing has arrived, or the connection has ended.
     pub fn read(&mut self, space: &mut [u8]) -> io::Result<(usize, Option<SocketAddr>)> {
         match self {
             Self::Tcp(stream) => match stream.read(space)? {
@@ -290,7 +281,6 @@ fn join(to: SocketAddrV4, interface: Ipv4Addr) -> io::Result<UdpSocket> {
     Ok(socket)
 }
 
-/// Connects and sends requests.
 fn connect(address: &str, requests: &[Request]) -> io::Result<TcpStream> {
     let mut last = None;
     for address in address.to_socket_addrs()? {

@@ -9,7 +9,7 @@ use thiserror::Error;
 
 use crate::{scan_assembly::ScanAssembly, turn_counter::TurnCounter};
 
-/// Assembles the scans of a live source, and counts what is lost.
+/// Assembles the scans of a live source, and counts losses.
 pub struct Intake {
     constants: Constants,
     /// `None` until the radar has sent its configuration.
@@ -25,10 +25,8 @@ pub struct Intake {
 /// A configuration whose scans do not fit into this run.
 #[derive(Debug, Error)]
 pub enum NoScans {
-    /// The configuration makes no scans.
     #[error(transparent)]
     Bad(#[from] BadConfiguration),
-    /// The scans are larger than at the start of the run.
     #[error(
         "the scans of the radar have {bytes} bytes now, {room} at the start of the run: start the run again"
     )]
@@ -55,9 +53,6 @@ impl Intake {
     }
 
     /// Begins the scans of a configuration of at most `room` bytes; false if it is not new.
-    ///
-    /// # Errors
-    /// The scans do not fit into this run.
     pub fn configure(&mut self, radar: Configuration, room: usize) -> Result<bool, NoScans> {
         if self.scans.as_ref().is_some_and(|scans| scans.is_of(&radar)) {
             return Ok(false);
@@ -115,12 +110,12 @@ impl Intake {
         }
     }
 
-    /// Returns the pause until a scan can be complete, if it is that of a few azimuths.
+    /// Returns the pause until a scan can be complete, if only a few azimuths are missing.
     pub fn pause(&self) -> Option<Duration> {
         self.scans.as_ref().and_then(ScanAssembly::pause)
     }
 
-    /// Returns the time at which the last scan was complete by the radar's clock,
+    /// Returns the time at which the last scan was complete by the radar's clock, in
     /// `CLOCK_MONOTONIC`, ns; `None`: not known.
     pub fn due_ns(&self) -> Option<i64> {
         self.due_ns

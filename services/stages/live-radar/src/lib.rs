@@ -3,7 +3,7 @@
 //!
 //! Reading order: `radar` (the sensor), `connection` and `parser` (bytes to messages), [`Intake`]
 //! and `scan_assembly` (azimuths to scans), `turn_counter` (turns without a scan), `read_delay`
-//! (the time at which a scan was complete).
+//! (the completion time of a scan).
 
 mod ask;
 mod connection;
@@ -26,10 +26,6 @@ pub use parser::RadarParser;
 pub use settings::{Settings, encoder_counts, silence};
 
 /// Receives the scans of a radar until SIGTERM, or until there are enough.
-///
-/// # Errors
-/// A radar that is connected to by TCP and whose scans are larger than at the start of the run, or
-/// a failure of the transport.
 pub fn run(launch: &Launch, settings: Settings) -> Result<StageCounters, StageError> {
     let scans = settings.scans;
     source::run_sensor(launch, &mut radar::Radar::new(settings), scans)

@@ -8,9 +8,7 @@ const CHUNK: usize = 1 << 16;
 /// The parser of a stream, or of datagrams.
 #[derive(Debug)]
 pub enum RadarParser {
-    /// Of a TCP stream.
     Stream(Parser),
-    /// Of datagrams.
     Datagrams(Datagrams),
 }
 

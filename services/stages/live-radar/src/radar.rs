@@ -18,7 +18,7 @@ use crate::{
 
 /// The most reads between two checks for signals and new readers.
 const MAX_READS: usize = 64;
-/// Bytes without a message after which the other end is taken for no radar.
+/// Bytes without a message after which the other end does not count as a radar.
 const MAX_SKIPPED_BYTES: usize = 1 << 22;
 
 /// A radar on the network.

@@ -1,21 +1,20 @@
-//! The time at which a scan was complete by the radar's clock, on this host's clock: so the time
-//! for which it waited in the buffers of a late source is a part of its latency.
+//! The time at which a scan was complete by the radar's clock, on this host's clock. So the latency
+//! of a scan includes its time in the buffers of a late source.
 
-/// Scans of a window. The smallest difference of the clocks is that of this window and the one
-/// before: of 8 to 16 s at 4 Hz, in which two clocks of 100 ppm drift apart by 1.6 ms. The
+/// Scans of a window. The smallest difference of the clocks comes from this window and the one
+/// before: 8 to 16 s at 4 Hz, during which two clocks of 100 ppm drift apart by 1.6 ms. The
 /// supervisor kills a source that stands still for longer.
 const WINDOW: usize = 32;
 /// Scans after which the pace of the radar's clock is known.
 const MIN_PACES: usize = 3;
-/// The part by which it may differ from this host's: less than that of a recording played at
-/// another pace, and more than the variation on a busy machine.
+/// The share by which the radar's pace may differ from this host's: less than for a recording
+/// played at a different pace, and more than the variation on a busy machine.
 const MAX_PACE_ERROR: f64 = 0.1;
 
 /// Compares the clocks of the radar and of this host at the last azimuth of each scan.
 ///
-/// The smallest difference host - radar is that of the scan that was read with the least delay.
-/// That scan was due when it was read; others were due earlier by as much as their difference is
-/// larger.
+/// The scan that was read with the least delay has the smallest difference host - radar. That scan
+/// was due when it was read; others were due earlier by as much as their difference is larger.
 #[derive(Clone, Debug, Default)]
 pub struct ReadDelay {
     last: Option<(i64, i64)>,

@@ -15,7 +15,7 @@ use crate::{
 
 /// The most azimuths that are read at once. The buffers of sockets hold many more.
 const BATCH: f64 = 10.0;
-/// The part of the azimuths up to the end of a turn: the radar may turn faster than it says.
+/// The part of the azimuths up to the end of a turn: the radar may turn faster than configured.
 const BATCH_SHARE: f64 = 0.5;
 
 /// Assembles the azimuths of one connection to scans.
@@ -30,7 +30,6 @@ pub struct ScanAssembly {
     is_delay_logged: bool,
 }
 
-/// A scan that is complete.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CompleteScan {
     /// The number of missing azimuths.
@@ -135,7 +134,7 @@ impl ScanAssembly {
         }
     }
 
-    /// Returns the pause until a scan can be complete, if it is that of a few azimuths.
+    /// Returns the pause until a scan can be complete, if only a few azimuths are missing.
     pub fn pause(&self) -> Option<Duration> {
         match self.clock.found() {
             // Stamps are the times of arrival: each azimuth is read when it arrives.

@@ -8,16 +8,16 @@ use gyre_run::SourceConfig;
 
 use crate::parser::RadarParser;
 
-/// Encoder counts per turn of a radar that does not tell them, unless `dataset.encoder_counts` says
-/// otherwise.
+/// Encoder counts per turn of a radar that does not report them, unless `dataset.encoder_counts` is
+/// set.
 const ENCODER_COUNTS: u16 = 5600;
 
 /// The address of a radar, and the properties that it does not send.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// The address at which it is received.
+    /// The address where the radar is received.
     pub address: Address,
-    /// Encoder counts per turn, to which the angles of a radar are rounded that sends by UDP.
+    /// Encoder counts per turn, for rounding the angles of a radar that sends by UDP.
     pub encoder_counts: u16,
     /// Time without an azimuth after which the run reconnects.
     pub silence: Duration,
@@ -30,9 +30,6 @@ pub struct Settings {
 impl Settings {
     /// Returns the settings of the section `[source]`, with the constants of the section
     /// `[dataset]`.
-    ///
-    /// # Errors
-    /// The address is none.
     pub fn of(source: &SourceConfig, options: &DatasetOptions) -> Result<Self, BadAddress> {
         Ok(Self {
             address: Address::parse(&source.address, &source.interface)?,
@@ -48,7 +45,7 @@ impl Settings {
     }
 }
 
-/// Returns the encoder counts per turn of a radar that does not tell them.
+/// Returns the encoder counts per turn of a radar that does not report them.
 pub fn encoder_counts(options: &DatasetOptions) -> u16 {
     options.encoder_counts.unwrap_or(ENCODER_COUNTS)
 }

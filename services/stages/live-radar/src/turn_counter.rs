@@ -4,7 +4,7 @@ use gyre_stage::source::LastScan;
 
 /// The limit of the pace of the radar's clock: recordings may be played so fast.
 const MAX_PACE: f64 = 4.0;
-/// Turns by which it may be ahead beyond that: scans that were read late.
+/// Turns by which the count may be ahead beyond that: scans that were read late.
 const SLACK_TURNS: f64 = 16.0;
 /// The clock was set back where it has advanced by less than this since the last scan, turns.
 const MIN_TURNS: f64 = 0.25;
@@ -24,12 +24,11 @@ pub struct AzimuthTime {
 
 /// Counts the turns between scans by time, also across connections and restarts.
 ///
-/// The turn in which the first azimuth arrives is not counted if it had begun before.
+/// The turn of the first azimuth is not counted if it had begun before that azimuth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TurnCounter {
     /// Duration of a turn: as configured, then as measured. 0: not known.
     turn_ns: f64,
-    /// The configured one.
     configured_ns: i64,
     last: Option<LastScan>,
     newest: Option<AzimuthTime>,
@@ -82,7 +81,6 @@ impl TurnCounter {
         self.last = Some(scan);
     }
 
-    /// Returns the last scan.
     pub fn last(&self) -> Option<LastScan> {
         self.last
     }
@@ -213,7 +211,7 @@ mod tests {
     #[test]
     fn turns_are_counted_as_long_as_they_are() {
         let mut turns = turns();
-        // 2 % faster than the radar says: 400 of its turns are 392 of those.
+        // 2 % faster than the radar reports: 400 of its turns are 392 reported turns.
         let scan = |turn: i64| LastScan {
             stamp_ns: turn * TURN_NS / 100 * 98,
             at_ns: turn * TURN_NS / 100 * 98,

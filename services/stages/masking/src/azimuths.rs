@@ -1,5 +1,5 @@
-//! Where azimuths were lost: found in each scan from the one before, so that a masking that is
-//! restarted goes on from those that the poses have kept.
+//! The lost azimuths of each scan, found from the scan before. A restarted masking continues from
+//! the record in the poses.
 
 use gyre_masking::Sweep;
 use gyre_radar::{LostAzimuthFinder, LostAzimuths, lost::stale_rows};
@@ -14,8 +14,8 @@ pub struct Azimuths {
 
 impl Azimuths {
     /// Returns where azimuths of a sweep were lost: the next one, or the last one again. `known` is
-    /// what a masking before this one has found. Where a chain of motions `starts`, nothing is
-    /// known of the scan before.
+    /// the finding of an earlier masking. Where a chain of motions `starts`, nothing is known of
+    /// the scan before.
     pub fn lost(
         &mut self,
         sweep: &Sweep<'_>,
@@ -30,7 +30,7 @@ impl Azimuths {
         if starts {
             self.finder.reset();
         }
-        // What another masking has told of this scan, if it has told of all.
+        // Another masking's finding about this scan, if it has found all.
         let known = known.filter(|known| known.count() == stale_rows(&sweep.scan));
         let lost = match known {
             Some(known) => {
@@ -43,7 +43,7 @@ impl Azimuths {
         lost
     }
 
-    /// Returns what was found last.
+    /// Returns the last finding.
     pub fn last(&self) -> LostAzimuths {
         self.last.map(|(_, lost)| lost).unwrap_or_default()
     }

@@ -28,18 +28,11 @@ use scans::{ScanView, Scans};
 pub use python::python;
 
 /// Runs the stage until SIGTERM.
-///
-/// # Errors
-/// An invalid configuration, or an error of [`stage::run`].
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     work(launch, launch.section("masking")?, None)
 }
 
 /// Runs the stage until SIGTERM with a mask of your own, in the place of a network.
-///
-/// # Errors
-/// A run whose masks look at two scans, an invalid configuration, a function that fails, or an
-/// error of [`stage::run`].
 pub fn run_with(
     launch: &Launch,
     function: Box<dyn MaskFunction>,

@@ -28,7 +28,7 @@ pub struct NewestOnly {
     /// The previous scan, if the mask takes two.
     previous: Option<Received<Scan>>,
     window: Window,
-    /// The run, in which the generation of the numbers begins with them.
+    /// The run, where the generation and its numbers begin together.
     manifest: Manifest,
     chain: Option<Chain>,
     /// Scans that may still be processed in order after a start; 0: the newest scan alone.
@@ -68,7 +68,6 @@ impl NewestOnly {
         })
     }
 
-    /// Receives the new scans.
     pub fn receive(&mut self) -> Result<(), StageError> {
         while let Some(received) = self.port.receive()? {
             if self
@@ -226,7 +225,7 @@ impl NewestOnly {
 }
 
 impl Chain {
-    /// Returns whether a scan precedes that of the newest pose.
+    /// Returns whether a scan precedes the scan of the newest pose.
     fn precedes(item: &Item, newest_pose: &Item) -> bool {
         !newest_pose.is(flag::BASE) && !item.is(flag::END) && item.published < newest_pose.published
     }

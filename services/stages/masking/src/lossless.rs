@@ -11,8 +11,8 @@ use gyre_stage::{
 pub struct InOrder {
     reader: Reader<Scan>,
     window: Window,
-    /// True once the first scan is processed. From then on none is skipped, which would leave a gap
-    /// in the output.
+    /// True once the first scan is processed. After that no scan is skipped, which would leave a
+    /// gap in the output.
     started: bool,
 }
 
@@ -25,7 +25,6 @@ impl InOrder {
         })
     }
 
-    /// Receives the next scan.
     pub fn receive(&mut self) -> Result<(), StageError> {
         self.reader.head().map(drop)
     }

@@ -10,9 +10,6 @@ use ndarray::{ArrayView1, ArrayView2};
 use serde_json::{Map, json};
 
 /// Loads the function `mask` of a file of Python, for [`run_with`](crate::run_with).
-///
-/// # Errors
-/// No such file, function or interpreter, or an exception while it is loaded.
 pub fn python(launch: &Launch, file: &Path) -> Result<Box<dyn MaskFunction>, StageError> {
     let raster: RasterConfig = launch.section("raster")?;
     let function = Function::load(file, Name::Mask)?;

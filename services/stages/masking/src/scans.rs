@@ -32,9 +32,7 @@ enum Queue {
     Live(Box<NewestOnly>),
 }
 
-/// A scan to mask.
 pub struct ScanView<'a> {
-    /// The scan.
     pub scan: &'a Received<Scan>,
     /// The velocity for its motion compensation: of the motion of the scan `lag` scans earlier,
     /// with the yaw rate of the gyro; `None` without such a motion.
@@ -51,9 +49,8 @@ pub struct ScanView<'a> {
 
 /// The scan before the one to mask.
 pub struct PreviousScan<'a> {
-    /// The scan.
     pub scan: &'a Received<Scan>,
-    /// The velocity with which it was compensated.
+    /// The velocity used for motion compensation.
     pub twist: Option<Twist>,
     /// Where its azimuths were lost, if it has a pose.
     pub lost: Option<LostAzimuths>,
@@ -182,8 +179,9 @@ impl Scans {
         found.iter().all(Option::is_some)
     }
 
-    /// Hands the samples of the current scan to gyro and wheels, once; before it those of the
-    /// previous scan, if that came with a restart, and of the scans that were dropped since.
+    /// Hands the samples of the current scan to gyro and wheels, once. Before that it hands over
+    /// the samples of the previous scan, if that scan came with a restart, and of the scans dropped
+    /// since.
     fn take_samples(&mut self, starts_chain: bool) -> Result<(), StageError> {
         let (scans, dropped) = match &mut self.queue {
             Queue::Lossless(queue) => ([queue.previous(), queue.current()], Vec::new()),

@@ -25,9 +25,6 @@ use gyre_stage::{
 use gyre_storage::{LogError, continue_when_full, was_full};
 
 /// Runs the stage until SIGTERM.
-///
-/// # Errors
-/// A journal or a log of keyframes that cannot be used, or an error of [`sink::run`].
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     if !launch.take_place()? {
         return Ok(StageCounters::default());
@@ -92,7 +89,7 @@ impl Sink for Integration {
     }
 
     fn restore(&mut self, count: usize) -> Result<(Vec<PoseHeader>, bool), StageError> {
-        // One at least, to go on from.
+        // At least one pose, to continue from.
         let (mut poses, ended) = self.journal.last(count.max(1)).map_err(unusable)?;
         self.last = poses.last().copied();
         poses.drain(..poses.len().saturating_sub(count));

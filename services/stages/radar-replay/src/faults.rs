@@ -1,4 +1,4 @@
-//! Faults that are put into what is played: `source.faults`.
+//! Faults to inject into the played scans: `source.faults`.
 
 use gyre_datasets::ScanSamples;
 use gyre_messages::ScanHeader;
@@ -16,9 +16,6 @@ pub struct Faults {
 
 impl Faults {
     /// Faults of a turn whose first scan has this stamp.
-    ///
-    /// # Errors
-    /// There are faults, and the stamp is not known.
     pub fn of(faults: Vec<PlayedFault>, first_ns: Option<i64>) -> Result<Self, StageError> {
         match (first_ns, faults.is_empty()) {
             (None, false) => Err(StageError::Input(
@@ -33,9 +30,6 @@ impl Faults {
     }
 
     /// Puts them into the samples of logs.
-    ///
-    /// # Errors
-    /// The samples are in the recording of a run, scan by scan.
     pub fn put_into(&self, samples: ScanSamples) -> Result<ScanSamples, StageError> {
         let is_of_samples = |fault: &PlayedFault| fault.kind != PlayedFaultKind::RadarBlind;
         if !self.faults.iter().any(is_of_samples) {
@@ -68,7 +62,7 @@ impl Faults {
         spoilt.is_valid().then_some(spoilt)
     }
 
-    /// Removes what the radar sees, if it is blind.
+    /// Removes the echoes of the radar, if it is blind.
     pub fn blind(&self, header: &ScanHeader, bytes: &mut [u8]) {
         let is_blind = |fault: &PlayedFault| fault.kind == PlayedFaultKind::RadarBlind;
         if !self.at(header.item.stamp_ns).any(is_blind) {

@@ -31,16 +31,13 @@ const NOTABLE_SLIP_S: f64 = 0.01;
 /// or down.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
-    /// They are dropped, as those of a real sensor.
+    /// They are dropped, as a real sensor would.
     Sensor,
     /// They are played late, since each scan is rendered only when it is read.
     OnDemand,
 }
 
 /// Plays the recording of the section `[source]` until SIGTERM.
-///
-/// # Errors
-/// An invalid configuration, a recording that cannot be opened, or an error of [`source::run`].
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let config: SourceConfig = launch.section("source")?;
     if config.from != PlayedFrom::Scan {
@@ -86,9 +83,6 @@ fn open(
 }
 
 /// Plays the part of a dataset that the section `[source]` selects, until SIGTERM.
-///
-/// # Errors
-/// An invalid configuration, or an error of [`source::run`].
 pub fn play(
     launch: &Launch,
     dataset: Box<dyn Dataset>,

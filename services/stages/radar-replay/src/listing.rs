@@ -17,14 +17,12 @@ const FILE: &str = "recording.list";
 /// The format and the files of a recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Listing {
-    /// The format.
     pub format: Format,
-    /// The images.
     pub files: FileList,
 }
 
 impl Listing {
-    /// Returns those of an open dataset.
+    /// Returns the listing of an open dataset.
     pub fn of(dataset: &dyn Dataset) -> Self {
         Self {
             format: dataset.format(),
@@ -33,18 +31,12 @@ impl Listing {
     }
 
     /// Writes it into the root of a run.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
     pub fn write(&self, root: &Path) -> io::Result<()> {
         let format = self.format.name().as_bytes();
         fs::write(root.join(FILE), [format, self.files.as_bytes()].join(&0))
     }
 
-    /// Reads that of a run; `None` if it has none.
-    ///
-    /// # Errors
-    /// A file that cannot be read, or is not such a list.
+    /// Reads the listing of a run; `None` if it has none.
     pub fn read(root: &Path) -> io::Result<Option<Self>> {
         let mut bytes = match fs::read(root.join(FILE)) {
             Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),

@@ -10,9 +10,6 @@ use gyre_stage::{
 };
 
 /// Plays the recording of the section `[source]` from its topic on, until SIGTERM.
-///
-/// # Errors
-/// An invalid configuration, a recording that cannot be read, or an error of [`run_player`].
 pub fn play_recorded(launch: &Launch) -> Result<StageCounters, StageError> {
     let config: SourceConfig = launch.section("source")?;
     let manifest = &launch.manifest;
@@ -30,9 +27,6 @@ pub struct Player {
 
 impl Player {
     /// Opens a recording, and checks that it has each message of each topic from the first one on.
-    ///
-    /// # Errors
-    /// One sentence: it cannot be read, or lacks a topic or a message.
     pub fn open(config: &SourceConfig, topics: Vec<&'static str>) -> Result<Self, String> {
         let recording = gyre_recording::open_recording(&config.data).map_err(|e| e.to_string())?;
         let path = config.data.display();

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use gyre_datasets::Dataset;
 
-/// The turns of a part of a recording. Each goes on in time where the one before ended.
+/// The turns of a part of a recording. Each turn continues in time where the one before ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Turns {
     /// The scans of a turn, by their index in the recording.
@@ -27,11 +27,11 @@ impl Turns {
         Self { once, turn_ns }
     }
 
-    /// Returns the index in the recording of scan `index` of the stream, and what is to be added to
+    /// Returns the index in the recording of scan `index` of the stream, and the offset to add to
     /// its times, ns.
     pub fn place(&self, index: usize) -> (usize, i64) {
         let (scans, after) = (self.once.len(), index.saturating_sub(self.once.start));
-        // Without a turn there is nothing to play; the reader says so.
+        // Without a turn there is nothing to play; the reader reports it.
         if scans == 0 || after < scans {
             return (index, 0);
         }

@@ -18,9 +18,6 @@ use gyre_stage::{
 };
 
 /// Runs the stage until SIGTERM.
-///
-/// # Errors
-/// An invalid configuration, a checkpoint that cannot be used, or an error of [`stage::run`].
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let points: PointsConfig = launch.section("points")?;
     let config: RefinementConfig = launch.section("refinement")?;
@@ -111,8 +108,8 @@ impl RefinementStage {
         if self.next != Some(item.seq) {
             let before = item.seq.saturating_sub(1);
             let restored = self.checkpoint.restore(before, &mut self.refiner);
-            // A chain goes on with what is known of gyro, wheels and Doppler alone, which the first
-            // one has not.
+            // A chain continues only with the state of gyro, wheels and Doppler, which the first
+            // chain lacks.
             restored.or_else(|error| match starts_chain {
                 true => Ok(()),
                 false => Err(unusable(error)),

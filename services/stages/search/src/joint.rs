@@ -13,9 +13,6 @@ use gyre_stage::{
 };
 
 /// Runs the stage until SIGTERM.
-///
-/// # Errors
-/// An invalid configuration, or an error of [`stage::run`].
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let raster: RasterConfig = launch.section("raster")?;
     let config: ExhaustiveConfig = launch.section("exhaustive")?;

@@ -16,9 +16,6 @@ use crate::{rotation, translation};
 
 /// Loads the function `rotation` of a file: the yaw of the later scan in the frame of the earlier
 /// one, rad, and its standard deviation.
-///
-/// # Errors
-/// No such file, function or interpreter, or an exception while it is loaded.
 pub fn rotation(launch: &Launch, file: &Path) -> Result<rotation::Search, StageError> {
     let (mut function, cell_m) = load(launch, file, Name::Rotation)?;
     Ok(Box::new(move |pair| {
@@ -37,9 +34,6 @@ pub fn rotation(launch: &Launch, file: &Path) -> Result<rotation::Search, StageE
 
 /// Loads the function `translation` of a file: the place of the later scan in the frame of the
 /// earlier one, m, and its standard deviation or covariance.
-///
-/// # Errors
-/// No such file, function or interpreter, or an exception while it is loaded.
 pub fn translation(launch: &Launch, file: &Path) -> Result<translation::Search, StageError> {
     let (mut function, cell_m) = load(launch, file, Name::Translation)?;
     Ok(Box::new(move |pair, rotation| {

@@ -16,9 +16,6 @@ pub type Search =
     Box<dyn FnMut(&PairView<'_, Masked>) -> Result<Option<RotationMatch>, StageError>>;
 
 /// Runs the stage until SIGTERM.
-///
-/// # Errors
-/// An invalid configuration, or an error of [`stage::run`].
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let raster: RasterConfig = launch.section("raster")?;
     let config: RotationConfig = launch.section("rotation")?;
@@ -35,9 +32,6 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
 }
 
 /// Runs the stage until SIGTERM with a search of your own.
-///
-/// # Errors
-/// A search that fails, or an error of [`stage::run`].
 pub fn run_with(launch: &Launch, search: Search) -> Result<StageCounters, StageError> {
     stage::run(launch, &mut RotationStage { search })
 }

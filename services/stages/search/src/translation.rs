@@ -18,9 +18,6 @@ pub type Search = Box<
 >;
 
 /// Runs the stage until SIGTERM.
-///
-/// # Errors
-/// An invalid configuration, or an error of [`stage::run`].
 pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
     let raster: RasterConfig = launch.section("raster")?;
     let config: TranslationConfig = launch.section("translation")?;
@@ -37,9 +34,6 @@ pub fn run(launch: &Launch) -> Result<StageCounters, StageError> {
 }
 
 /// Runs the stage until SIGTERM with a search of your own.
-///
-/// # Errors
-/// A search that fails, or an error of [`stage::run`].
 pub fn run_with(launch: &Launch, search: Search) -> Result<StageCounters, StageError> {
     stage::run(launch, &mut TranslationStage { search })
 }

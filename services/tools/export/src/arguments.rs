@@ -56,7 +56,7 @@ pub enum DatasetForm {
     Radiate,
 }
 
-/// The form in which scans are written.
+/// The form of the scans in the bag.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum ScanForm {
     /// A message a turn: navtech_msgs/msg/RadarBScanMsg.

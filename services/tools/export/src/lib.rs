@@ -1,5 +1,5 @@
-//! `gyre export`: what a run has found, and its scans, as a bag of ROS 2; or the repaired recording
-//! of a run, as RADIATE has it (`repaired`).
+//! `gyre export`: the results of a run, and its scans, as a bag of ROS 2; or the repaired recording
+//! of a run, in RADIATE's format (`repaired`).
 
 mod arguments;
 mod places;
@@ -28,9 +28,6 @@ use scans::ScanWriter;
 use source::Source;
 
 /// Writes the bag or the dataset.
-///
-/// # Errors
-/// A source that cannot be read, a bag or a dataset that exists or cannot be written.
 pub fn export(arguments: &ExportArguments) -> Result<ExitCode, Failure> {
     let mut source = Source::open(&arguments.source)?;
     match (&arguments.mcap, &arguments.out) {

@@ -1,7 +1,7 @@
 //! The recording of a run with its lost azimuths put back, in RADIATE's form: so that others can be
 //! run on the same scans.
 //!
-//! Where they were lost is taken from the run's journal, which keeps it with each pose.
+//! The places of the losses come from the run's journal, which keeps them with each pose.
 
 use std::{
     fs,
@@ -30,10 +30,6 @@ const OPTIONS: &str = "dataset.toml";
 const LISTS: [&str; 6] = ["csv", "json", "npy", "toml", "tum", "txt"];
 
 /// Writes the scans that a run has played to a new folder.
-///
-/// # Errors
-/// Not the results of a run on a recording of RADIATE, a recording that is not as it was in the
-/// run, files that cannot be read or written.
 pub fn write(source: &Source, out: &Path) -> Result<(), Failure> {
     let Some((_, configuration)) = source.run() else {
         return Err(
@@ -85,7 +81,7 @@ fn recording(configuration: &Configuration) -> Result<Box<dyn Dataset>, Failure>
     Ok(dataset)
 }
 
-/// Creates the folder of a dataset and of its images, and returns that of the images.
+/// Creates the folder of a dataset and of its images, and returns the folder of the images.
 fn new_folder(out: &Path) -> Result<PathBuf, Failure> {
     let is_free = !out.exists() || fs::read_dir(out).is_ok_and(|mut files| files.next().is_none());
     if !is_free {
@@ -192,20 +188,18 @@ fn copy_lists(images: &Path, root: &Path, out: &Path) -> Result<(), Failure> {
     copy(&times, &out.join(IMAGES).with_extension("txt"))
 }
 
-/// Copies a file.
 fn copy(from: &Path, to: &Path) -> Result<(), Failure> {
     let bytes = fs::read(from).map_err(StorageError::at("read", from))?;
     Ok(write_file(to, bytes)?)
 }
 
-/// Counts of scans.
 #[derive(Debug, Default)]
 struct Counts {
     scans: usize,
     repaired: usize,
     /// Azimuths that were put back.
     azimuths: usize,
-    /// Scans of which it is not known where they lost azimuths.
+    /// Scans whose lost azimuths have unknown places.
     anywhere: usize,
 }
 

@@ -48,12 +48,12 @@ struct Losses {
     chirps: bool,
     /// Rows that were not measured but have powers.
     interpolated: u64,
-    /// Scans with lost azimuths: with their rows where the run has found them, and those of which
-    /// it is not known where.
+    /// Scans with lost azimuths: with their rows if the run has found them, and scans whose rows
+    /// are unknown.
     placed: u64,
     not_placed: u64,
-    /// Scans whose time is another one than the middle of their first and last azimuth, and the
-    /// largest difference, ns.
+    /// Scans whose time differs from the middle of their first and last azimuth, and the largest
+    /// difference, ns.
     retimed: u64,
     retimed_by_ns: u64,
     /// The radar's constants in the settings of `[dataset]`.
@@ -92,7 +92,7 @@ impl Losses {
         self.constants.retain(|(_, value)| *value != 0.0);
     }
 
-    /// Returns what is lost: whole sentences.
+    /// Returns the losses as whole sentences.
     fn sentences(&self) -> Vec<String> {
         let mut sentences = Vec::new();
         if self.unreadable > 0 {
@@ -148,9 +148,6 @@ impl Losses {
 
 impl ScanWriter {
     /// Adds the topics of scans, if they are wanted and there are any.
-    ///
-    /// # Errors
-    /// Scans that cannot be opened, or are of no such radar.
     pub fn begin(
         bag: &mut BagWriter,
         source: &mut Source,
@@ -196,7 +193,7 @@ impl ScanWriter {
         Ok(writer)
     }
 
-    /// Returns what the radar of these scans says of itself.
+    /// Returns the radar's description of itself in these scans.
     fn radar(&mut self, scans: &Scans, scan: &OwnedScan) -> Result<Radar, Failure> {
         let geometry = &scan.geometry;
         if geometry.sense != Sense::Clockwise {
@@ -225,9 +222,6 @@ impl ScanWriter {
     }
 
     /// Writes the next scan that can be read, and returns its time; `None` at the end.
-    ///
-    /// # Errors
-    /// A disk that does not give it, a bag that cannot be written.
     pub fn write_next(&mut self, bag: &mut BagWriter) -> Result<Option<i64>, Failure> {
         let Some(open) = &mut self.open else {
             return Ok(None);
@@ -245,7 +239,7 @@ impl ScanWriter {
         Ok(None)
     }
 
-    /// Says what is not in the bag as it is in the source.
+    /// Prints the differences between the bag and its source.
     pub fn describe_losses(&self) {
         self.losses.sentences().iter().for_each(print::note);
     }
@@ -295,8 +289,8 @@ impl Scans {
             return Ok(());
         }
         let angles = &mut scan.azimuth_rad[..scan.geometry.azimuths];
-        // The angle at which the correction is taken is itself corrected: its error is that of the
-        // eccentricity squared.
+        // The correction uses an angle that is itself corrected, with an error of the eccentricity
+        // squared.
         let mut encoder = angles.to_vec();
         correct_eccentricity(&mut encoder, -self.eccentricity_rad);
         for (angle, encoder) in angles.iter_mut().zip(encoder) {
@@ -364,7 +358,7 @@ mod tests {
         only(&interpolated, 0.0, "interpolated rows: 1");
         let mut lossy = scan();
         lossy.flags[8..].fill(flag::STALE | flag::ASSUMED);
-        // Without the last rows, the middle of the rows is another one too.
+        // Without the last rows, the middle of the rows differs, too.
         let found = sentences(&lossy, 0.0);
         let places = "1 scans have lost azimuths, and it is not known where";
         assert!(found.len() == 2 && found[0].contains(places), "{found:?}");

@@ -42,7 +42,6 @@ enum Kind {
     Run(Box<Configuration>),
     /// A recording of a run.
     Recording,
-    /// Scans.
     Dataset,
 }
 
@@ -65,10 +64,7 @@ pub struct Scans {
 }
 
 impl Source {
-    /// Finds out what a path is.
-    ///
-    /// # Errors
-    /// A run that cannot be read.
+    /// Determines the kind of a path.
     pub fn open(path: &Path) -> Result<Self, Failure> {
         let kind = match path {
             path if gyre_recording::is_recording(path) => Kind::Recording,
@@ -93,9 +89,6 @@ impl Source {
     }
 
     /// Returns the poses of a run; none of a dataset.
-    ///
-    /// # Errors
-    /// They cannot be read.
     pub fn places(&self) -> Result<Places, Failure> {
         match self.kind {
             Kind::Run(_) => {
@@ -120,9 +113,6 @@ impl Source {
 
     /// Returns where azimuths were lost of each scan that has a pose in a run; nothing of another
     /// source.
-    ///
-    /// # Errors
-    /// The poses cannot be read.
     pub fn lost(&self) -> Result<Lost, Failure> {
         let mut lost = Lost::new();
         if let Some((run, _)) = self.run() {
@@ -137,9 +127,6 @@ impl Source {
     }
 
     /// Returns the scans; `None` of a run of a radar, which leaves none.
-    ///
-    /// # Errors
-    /// They cannot be read.
     pub fn scans(&self) -> Result<Option<Scans>, Failure> {
         match &self.kind {
             Kind::Run(configuration) if configuration.is_radar() => Ok(None),
@@ -179,9 +166,6 @@ impl Source {
     }
 
     /// Writes the map of a run that has keyframes.
-    ///
-    /// # Errors
-    /// Keyframes that cannot be read, a bag that cannot be written.
     pub fn write_map(
         &self,
         bag: &mut BagWriter,

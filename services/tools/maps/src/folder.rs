@@ -24,9 +24,6 @@ const MARKS: [&str; 2] = [Keyframe::FILE, MANIFEST];
 
 /// Makes a map ready to be read: if the command that drew it was killed when the map was about to
 /// take its place, it takes it now.
-///
-/// # Errors
-/// A command that is drawing it now, or a folder that this user may not write.
 pub fn settle(map: &Path) -> Result<(), Failure> {
     if !is_interrupted(map) {
         return Ok(());
@@ -51,9 +48,6 @@ fn unfinished(map: &impl Display, source: &io::Error) -> String {
 /// Writes a map and its keyframes into `out`. A map that is there stays as it is until the new one
 /// is complete, and takes as much of the disk until then; pictures and exports stay. It survives a
 /// power failure when this returns.
-///
-/// # Errors
-/// A folder that cannot be written, or has other content than a map.
 pub fn write(
     out: &Path,
     keyframes: &Map,
@@ -69,8 +63,8 @@ pub fn write(
     })
 }
 
-/// Lets `write` fill a folder, whose files and folders then take the place of those of the same
-/// names in `out`. A process that is killed between these renames leaves what [`finish`] needs.
+/// Lets `write` fill a folder, whose files and folders then replace the entries of the same names
+/// in `out`. A process that is killed between these renames leaves what [`finish`] needs.
 fn replace(out: &Path, write: impl FnOnce(&Path) -> Result<(), Failure>) -> Result<(), Failure> {
     let next = out.join(NEXT);
     storage::create_folder(&next)?;
@@ -87,11 +81,8 @@ fn is_interrupted(out: &Path) -> bool {
     out.join(NEXT).join(MANIFEST).exists()
 }
 
-/// Finishes what a killed process has left: the next map, if it is whole, takes its place, and all
-/// else is removed.
-///
-/// # Errors
-/// A folder that cannot be written.
+/// Finishes an exchange that a kill interrupted: the next map, if it is whole, takes its place, and
+/// all else is removed.
 fn finish(out: &Path) -> Result<(), StorageError> {
     let [next, earlier] = [NEXT, EARLIER].map(|name| out.join(name));
     if is_interrupted(out) {
@@ -207,7 +198,7 @@ mod tests {
         assert_eq!(content(map, "map.toml"), "later");
     }
 
-    /// All states in which a kill between two renames leaves the folder.
+    /// All states of the folder after a kill between two renames.
     #[test]
     fn an_exchange_that_was_interrupted_anywhere_is_finished() {
         for renames in 0..=6 {

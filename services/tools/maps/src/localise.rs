@@ -3,7 +3,7 @@
 //! - `scans`: registers scan after scan by odometry in this process;
 //! - `known`: opens the map;
 //! - `fixes`: `fixes.csv`;
-//! - `counts`: what was found, lost and left out.
+//! - `counts`: found, lost and skipped scans.
 
 mod counts;
 pub mod fixes;
@@ -77,10 +77,7 @@ struct Figures<'a> {
 }
 
 /// Localises the scans of a recording in a map, and writes `fixes.csv`.
-///
-/// # Errors
-/// A map or a recording that cannot be used, a file that cannot be written. When all is written: no
-/// scan was found.
+/// If no scan was found, the error is returned after all files are written.
 pub fn localise(arguments: &LocaliseArguments) -> Result<ExitCode, Failure> {
     let configuration = arguments.inputs.configuration()?;
     let mut localiser = searched_map::open(&arguments.map, &configuration)?;

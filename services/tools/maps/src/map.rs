@@ -27,7 +27,7 @@ use gyre_terminal::{Failure, print};
 use crate::folder;
 pub use arguments::{MapArguments, MapFormat};
 
-/// The corrected trajectory, and that of odometry.
+/// The corrected trajectory, and the trajectory of odometry.
 const CORRECTED: &str = "trajectory_slam.tum";
 const ODOMETRY: &str = "trajectory.tum";
 const LOOPS: &str = "loops.csv";
@@ -83,12 +83,9 @@ fn draw_run(arguments: &MapArguments) -> Result<Drawing, Failure> {
     Ok(drawing)
 }
 
-/// Draws the keyframes of a run along its trajectory, in the frame in which the frame of the
-/// trajectory has the pose `placed`. What does not fit into memory lies in a file in `folder`,
-/// which has no name.
-///
-/// # Errors
-/// A run without keyframes or without a trajectory.
+/// Draws the keyframes of a run along its trajectory, whose frame has the pose `placed` in the
+/// frame of the drawing. What does not fit into memory lies in a file in `folder`, which has no
+/// name.
 pub fn evidence(run: &Path, folder: &Path, placed: &Pose) -> Result<Evidence, Failure> {
     let mut keyframes = open(run)?;
     let poses = read_trajectory(&trajectory_of(run))?;
@@ -102,7 +99,7 @@ pub fn evidence(run: &Path, folder: &Path, placed: &Pose) -> Result<Evidence, Fa
     Ok(evidence)
 }
 
-/// Returns the place of the map on the earth: the one that was given, else that of the run by GNSS.
+/// Returns the place of the map on the earth: the given place, else the place of the run by GNSS.
 /// Another trajectory has a frame of its own, and so has odometry once fixes have corrected it.
 fn origin(arguments: &MapArguments) -> Result<Option<Origin>, Failure> {
     let is_corrected = trajectory_of(&arguments.run).ends_with(CORRECTED);
@@ -123,9 +120,6 @@ pub fn trajectory_of(run: &Path) -> PathBuf {
 }
 
 /// Returns whether a file exists. Of another user's run that may be unknown.
-///
-/// # Errors
-/// A folder that may not be read.
 pub fn exists(path: &Path) -> Result<bool, StorageError> {
     path.try_exists().map_err(StorageError::at("read", path))
 }
@@ -267,7 +261,7 @@ mod tests {
         }
     }
 
-    /// The results of a run of four keyframes, of which the last one is not in the trajectory.
+    /// The results of a run of four keyframes, where the trajectory lacks the last keyframe.
     fn run(folder: &Path) {
         fs::create_dir_all(folder.join("run/journal")).unwrap();
         fs::write(

@@ -1,5 +1,5 @@
-//! A picture of what the mask keeps. Side by side: the raster with all its power, the mask (black
-//! is nothing, white is all), what the search gets, and the points, each in the colour of its
+//! A picture of the mask's effect. Side by side: the raster with all its power, the mask (black is
+//! nothing, white is all), the input of the search, and the points, each in the colour of its
 //! factor. Where the mask looks at two scans, the scan before is below. Ahead is up, left is left.
 
 use std::path::Path;
@@ -13,19 +13,17 @@ use crate::{
 
 type Colour = [u8; 3];
 
-/// Pixels around each panel.
 const MARGIN: usize = 6;
 const AROUND: Colour = [60; 3];
 /// Panels are enlarged to about so many pixels a side.
 const SIDE: usize = 256;
-/// Power, in the sensor's counts, that has the brightest colour: what is above is rare.
+/// Power, in the sensor's counts, with the brightest colour: higher powers are rare.
 const BRIGHT: f32 = 120.0;
-/// The share of cells that the brightest colour goes to in what the search gets, of which
-/// proportions alone count.
+/// The share of cells with the brightest colour in the input of the search, where only proportions
+/// count.
 const BRIGHTEST: f32 = 1e-3;
 /// Maximum brightness of the raster behind the points.
 const FAINT: f32 = 0.4;
-/// A picture in colour.
 pub struct Canvas {
     width: usize,
     /// Row by row.
@@ -33,7 +31,6 @@ pub struct Canvas {
 }
 
 impl Canvas {
-    /// Draws an inspected scan.
     pub fn of(inspection: &Inspection) -> Self {
         let rows: Vec<[Array2<Colour>; 4]> = inspection.rasters.iter().map(panels).collect();
         let n = rows.first().map_or(1, |panels| panels[0].nrows());
@@ -66,10 +63,6 @@ impl Canvas {
         }
     }
 
-    /// Writes it as PNG.
-    ///
-    /// # Errors
-    /// [`PictureError`] names the file.
     pub fn write(&self, path: &Path) -> Result<(), PictureError> {
         write_rgb(path, self.width, &self.pixels)
     }
@@ -105,7 +98,7 @@ fn panels(raster: &MaskedRaster) -> [Array2<Colour>; 4] {
     [
         raster.whole.map(|power| colour(power / BRIGHT)),
         raster.mask.map(|factor| grey(*factor)),
-        // The root shows what is faint, too.
+        // The root shows faint echoes, too.
         raster
             .masked
             .map(|power| colour((power / brightest).sqrt())),

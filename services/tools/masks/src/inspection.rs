@@ -16,7 +16,7 @@ const KEPT: f32 = 0.5;
 pub struct Inspection {
     /// The scan's place in the recording.
     pub number: usize,
-    /// The raster of the scan; where the mask looks at two scans, then that of the scan before.
+    /// The raster of the scan; if the mask looks at two scans, then the raster of the scan before.
     pub rasters: Vec<MaskedRaster>,
     /// The points that lie in the raster: cell (row, column), and the factor of the mask on the
     /// weight.

@@ -15,8 +15,8 @@ use ndarray::{Array2, ArrayView2};
 use crate::inspection::{Inspection, MaskedRaster};
 
 /// Scans registered before each inspected one where those are far apart. The first motions are
-/// found without motion compensation, as at a run's start; a few scans later they are what a run
-/// finds, but for its noise.
+/// found without motion compensation, as at a run's start; a few scans later they equal a run's
+/// motions, except for noise.
 const RUN_UP: usize = 8;
 
 /// Masks scans as a run does.
@@ -43,10 +43,6 @@ pub struct MaskInspector {
 }
 
 impl MaskInspector {
-    /// Plans masks and search.
-    ///
-    /// # Errors
-    /// A setting that is out of its bounds, a network that cannot be used.
     pub fn new(configuration: &Configuration, played: Played) -> Result<Self, Failure> {
         let (dataset, samples) = (played.dataset, played.samples);
         let config = OdometryConfig {
@@ -89,9 +85,6 @@ impl MaskInspector {
 
     /// Advances to scan `number`, which is not before the last one, and inspects it; `None` if it
     /// cannot be read.
-    ///
-    /// # Errors
-    /// A scan that cannot be masked.
     pub fn inspect(&mut self, number: usize) -> Result<Option<Inspection>, Failure> {
         let from = number.saturating_sub(self.lag + RUN_UP);
         if from > self.next {

@@ -1,7 +1,7 @@
-//! `gyre masks`: draws what the mask keeps of scans.
+//! `gyre masks`: draws the mask's effect on scans.
 //!
 //! - `inspector`: masks scans one after the other as in a run, and inspects chosen ones;
-//! - `inspection`: what the mask keeps of one of them, in figures;
+//! - `inspection`: the power that the mask keeps of one scan, in figures;
 //! - `drawing`: the same as a picture.
 
 mod drawing;
@@ -46,9 +46,6 @@ pub struct MasksArguments {
 }
 
 /// Draws the chosen scans, and prints a line on each.
-///
-/// # Errors
-/// A recording or mask that cannot be used, a picture that cannot be written.
 pub fn masks(arguments: &MasksArguments) -> Result<ExitCode, Failure> {
     let configuration = arguments.inputs.configuration()?;
     let played = gyre_configuration::open(&configuration)?;

@@ -8,24 +8,16 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 #[error("cannot write the picture {path}: {source}", path = path.display())]
 pub struct PictureError {
-    /// The file.
     path: std::path::PathBuf,
-    /// Why.
     source: png::EncodingError,
 }
 
 /// Writes rows of grey values as PNG.
-///
-/// # Errors
-/// [`PictureError`] names the file.
 pub fn write_grey(path: &Path, width: usize, pixels: &[u8]) -> Result<(), PictureError> {
     encode(path, width, png::ColorType::Grayscale, pixels)
 }
 
 /// Writes rows of red, green and blue as PNG.
-///
-/// # Errors
-/// [`PictureError`] names the file.
 pub fn write_rgb(path: &Path, width: usize, pixels: &[[u8; 3]]) -> Result<(), PictureError> {
     encode(path, width, png::ColorType::Rgb, pixels.as_flattened())
 }

@@ -47,10 +47,6 @@ pub struct StageArguments {
 /// A file of a project: its name and its text.
 type File = (&'static str, &'static str);
 
-/// Writes a project.
-///
-/// # Errors
-/// The folder exists, or cannot be written.
 pub fn new(arguments: &NewArguments) -> Result<ExitCode, Failure> {
     let New::Stage(arguments) = &arguments.what;
     let stage = arguments.stage.as_str();

@@ -44,7 +44,7 @@ pub struct PsArguments {
     /// Print JSON.
     #[arg(long)]
     pub json: bool,
-    /// Fail unless a run is running, and of each run all processes do what they should: for health
+    /// Fail unless a run is running, and all processes of each run work as they should: for health
     /// checks.
     #[arg(long)]
     pub check: bool,
@@ -58,7 +58,7 @@ pub struct LogsArguments {
     /// The run.
     #[command(flatten)]
     pub run: RunChoice,
-    /// Go on with what comes, until the run ends.
+    /// Continue with new lines, until the run ends.
     #[arg(short, long)]
     pub follow: bool,
     /// Number of lines to begin with, of each log.

@@ -28,11 +28,11 @@ const DETACHED: &str = "GYRE_DETACHED";
 const LOG: &str = "log/gyre.txt";
 /// Time between two looks at a run that starts or ends.
 const PERIOD: Duration = Duration::from_millis(50);
-/// Time after which what is waited for is printed.
+/// Time after which the reason for waiting is printed.
 const EXPLAIN_AFTER: Duration = Duration::from_secs(3);
 
-/// Leaves the session of the terminal, if this run was started by `gyre up`: it goes on when that
-/// is closed.
+/// Leaves the session of the terminal if `gyre up` started this run: the run continues when the
+/// terminal closes.
 pub fn detach_if_asked() {
     if env::var_os(DETACHED).is_some() {
         // Fails for the leader of a session, which has left it already.
@@ -42,9 +42,6 @@ pub fn detach_if_asked() {
 
 /// Starts a run in the background, and returns when all its stages are there, or when it has ended
 /// before.
-///
-/// # Errors
-/// A run that does not start, in the words of `gyre run`.
 pub fn up(out: &Path) -> Result<ExitCode, Failure> {
     let log = out.join(LOG);
     let unwritable = |error: std::io::Error| format!("cannot write to {}: {error}", log.display());
@@ -112,7 +109,7 @@ fn interrupt(run: &Child) {
     let _ = kill_process(Pid::from_child(run), Signal::INT);
 }
 
-/// Repeats what a run has printed that has ended already, and its exit code.
+/// Repeats the output of an ended run, and its exit code.
 fn ended(
     status: ExitStatus,
     output: &mut File,
@@ -133,9 +130,6 @@ fn ended(
 }
 
 /// Ends a run as an interrupt does, and waits until its results are written.
-///
-/// # Errors
-/// There is no such run, its supervisor does not answer, or it has ended without results.
 pub fn down(choice: &RunChoice) -> Result<ExitCode, Failure> {
     let run = chosen_to_change(choice, "end it")?;
     let status = run.status()?;
@@ -165,8 +159,8 @@ pub fn down(choice: &RunChoice) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Returns what tells one version of the results from another: the summary is written last, and as
-/// a new file.
+/// Returns a mark that distinguishes versions of the results: the summary is written last, and as a
+/// new file.
 fn version_of_results(out: &Path) -> Option<(u64, SystemTime)> {
     let summary = fs::metadata(out.join(SUMMARY)).ok()?;
     Some((summary.ino(), summary.modified().ok()?))

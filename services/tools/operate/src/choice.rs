@@ -12,10 +12,7 @@ use gyre_terminal::{Failure, print};
 use crate::arguments::RunChoice;
 
 impl RunChoice {
-    /// Returns the folder that is named, or that of the only run there is.
-    ///
-    /// # Errors
-    /// No run is running, or several are.
+    /// Returns the named folder, or the folder of the only run.
     pub fn folder(&self) -> Result<PathBuf, Failure> {
         match self.named() {
             Some(run) => Ok(run.to_owned()),
@@ -25,9 +22,6 @@ impl RunChoice {
 }
 
 /// Returns the run that is meant: the one that is named, or the only one, which is named here.
-///
-/// # Errors
-/// There is no such run, or there are several and none is named.
 pub fn chosen(choice: &RunChoice) -> Result<Control, Failure> {
     if let Some(out) = choice.named() {
         return Ok(Control::of(out)?);
@@ -39,9 +33,6 @@ pub fn chosen(choice: &RunChoice) -> Result<Control, Failure> {
 
 /// Returns the run that is meant by a command that changes it. Without a name that is one which was
 /// started from the current folder; for any other a person is asked, `what` being done to it.
-///
-/// # Errors
-/// As [`chosen`]; a run from elsewhere, and nobody to ask or who agrees.
 pub fn chosen_to_change(choice: &RunChoice, what: &str) -> Result<Control, Failure> {
     if let Some(out) = choice.named() {
         return Ok(Control::of(out)?);

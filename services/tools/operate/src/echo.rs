@@ -58,9 +58,6 @@ pub enum Topic {
 }
 
 /// Prints a line for each message of a topic, and how many were missed, until the run ends.
-///
-/// # Errors
-/// There is no such run, all places for observers are taken, or the transport fails.
 pub fn echo(arguments: &EchoArguments) -> Result<ExitCode, Failure> {
     let (out, topic) = chosen_topic(&arguments.words)?;
     let out = &out;

@@ -1,4 +1,4 @@
-//! `gyre logs`: the events of a run's processes and what they print, as lines for a person.
+//! `gyre logs`: the events of a run's processes and their printed lines, as lines for a person.
 
 use std::{
     fs::File,
@@ -18,11 +18,8 @@ use crate::{arguments::LogsArguments, events};
 /// Time between two looks at the files.
 const PERIOD: Duration = Duration::from_millis(200);
 
-/// Prints the newest lines of a run's logs, also of one that has ended, and goes on with those that
-/// come if asked to.
-///
-/// # Errors
-/// There is no such run or process, or a log cannot be read.
+/// Prints the newest lines of a run's logs, even after its end, and continues with new lines if
+/// asked to.
 pub fn logs(arguments: &LogsArguments) -> Result<ExitCode, Failure> {
     let process = arguments.process.as_deref();
     let run = arguments.run.run.as_deref();
@@ -34,7 +31,7 @@ pub fn logs(arguments: &LogsArguments) -> Result<ExitCode, Failure> {
         _ => (process, arguments.run.folder()?),
     };
     let mut logs = open(&out, process)?;
-    // Of each: printed lines have no time by which they could be put between the events.
+    // Of each log: printed lines have no time by which they could be sorted among the events.
     for log in &mut logs {
         let lines = log.lines();
         let first = lines.len().saturating_sub(arguments.lines);
@@ -47,7 +44,7 @@ pub fn logs(arguments: &LogsArguments) -> Result<ExitCode, Failure> {
     }
     let run = run.ok().filter(|_| arguments.follow);
     while let Some(run) = &run {
-        // Before the logs: what is written last is still printed.
+        // Before the logs: lines that are written last are still printed.
         let is_there = run.is_there();
         let mut lines = logs.iter_mut().flat_map(Log::lines);
         lines.try_for_each(print::line)?;
@@ -91,7 +88,6 @@ fn open(out: &Path, process: Option<&str>) -> Result<Vec<Log>, Failure> {
     Ok(logs)
 }
 
-/// A log that grows.
 struct Log {
     path: PathBuf,
     kind: Kind,

@@ -15,10 +15,6 @@ use crate::arguments::PsArguments;
 const NO_RUN: &str = "no run is running";
 
 /// Lists the runs of this user.
-///
-/// # Errors
-/// There is no such run, one does not answer, standard output cannot be written, or, with
-/// `--check`, not all is well.
 pub fn ps(arguments: &PsArguments) -> Result<ExitCode, Failure> {
     let (mut rows, mut faults) = (Vec::new(), Vec::new());
     let runs = match arguments.run.named() {
@@ -81,7 +77,7 @@ impl fmt::Display for Listed<'_> {
     }
 }
 
-/// Returns what is wrong with a run, a sentence each.
+/// Returns the faults of a run, a sentence each.
 fn ills(status: &Status) -> Vec<String> {
     let out = status.out.display();
     let is_ill = |activity| matches!(activity, Activity::Silent | Activity::Ended);
@@ -120,7 +116,7 @@ pub fn summary(status: &Status) -> String {
     )
 }
 
-/// Returns what is unusual about a process.
+/// Returns the unusual facts about a process.
 fn remarks(process: &ProcessStatus) -> String {
     let mut remarks = String::new();
     if let Some(death) = &process.last_death {
@@ -138,7 +134,7 @@ fn remarks(process: &ProcessStatus) -> String {
     remarks
 }
 
-/// Returns what a radar has not delivered.
+/// Returns the missing deliveries of a radar.
 pub fn lacks(received: &Received) -> String {
     let counts = [
         (received.scans_left_out, "scans left out"),

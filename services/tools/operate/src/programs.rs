@@ -1,4 +1,4 @@
-//! `gyre restart` and `gyre swap`: other processes in the places of those of a running run.
+//! `gyre restart` and `gyre swap`: replace processes of a running run.
 
 use std::{env, process::ExitCode};
 
@@ -13,9 +13,6 @@ use crate::{
 };
 
 /// Starts a process of a running run again.
-///
-/// # Errors
-/// There is no such run or process, or the supervisor does not answer.
 pub fn restart(arguments: &RestartArguments) -> Result<ExitCode, Failure> {
     let what = format!("restart its {}", arguments.process);
     let run = chosen_to_change(&arguments.run, &what)?;
@@ -24,10 +21,10 @@ pub fn restart(arguments: &RestartArguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Time after which what is waited for is said.
+/// Time after which the reason for waiting is printed.
 const EXPLAIN_AFTER_S: f64 = 5.0;
 
-/// The progress of a swap that a person has been told of.
+/// The printed progress of a swap.
 #[derive(Default)]
 struct Waiting {
     /// True if the program had taken over then.
@@ -35,7 +32,7 @@ struct Waiting {
 }
 
 impl Waiting {
-    /// Says once for each step of a swap what is waited for.
+    /// Prints the reason for waiting once for each step of a swap.
     fn explain(&mut self, pending: &PendingSwap) {
         if pending.waited_s > EXPLAIN_AFTER_S && self.told != Some(pending.has_taken_over) {
             self.told = Some(pending.has_taken_over);
@@ -44,7 +41,7 @@ impl Waiting {
     }
 }
 
-/// Says what a swap waits for and how long, and what can be done about it.
+/// Explains the wait of a swap, its duration, and the remedy.
 fn sentence(pending: &PendingSwap) -> String {
     let (process, command) = (&pending.process, pending.command.join(" "));
     let limit = match pending.limit_s {
@@ -65,11 +62,8 @@ fn sentence(pending: &PendingSwap) -> String {
 /// The exit code of a swap to a program that nothing is known against, and nothing for.
 const UNTRIED: u8 = 2;
 
-/// Goes on with another program in the place of a stage.
-///
-/// # Errors
-/// There is no such run or process, or the program does not come to take over, or fails at its
-/// first scan: the one before goes on.
+/// Replaces the program of a stage. If the new program fails to take over, the previous program
+/// continues.
 pub fn swap(arguments: &SwapArguments) -> Result<ExitCode, Failure> {
     let what = format!("swap its {}", arguments.process);
     let run = chosen_to_change(&arguments.run, &what)?;

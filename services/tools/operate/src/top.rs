@@ -26,9 +26,6 @@ use snapshot::{Snapshot, Snapshots};
 const PERIOD: Duration = Duration::from_millis(50);
 
 /// Shows a run until it ends, or until `q` is pressed.
-///
-/// # Errors
-/// There is no such run, it has no place for an observer, or the terminal cannot be used.
 pub fn top(arguments: &TopArguments) -> Result<ExitCode, Failure> {
     let every = Duration::try_from_secs_f64(arguments.every)
         .ok()
@@ -61,7 +58,7 @@ pub fn top(arguments: &TopArguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Returns the columns of the terminal; any number where the output is none.
+/// Returns the columns of the terminal; an arbitrary number if the output is not a terminal.
 fn width() -> u16 {
     match io::stdout().is_terminal() {
         true => ratatui::crossterm::terminal::size().map_or(WIDTH as u16, |(columns, _)| columns),
@@ -100,7 +97,7 @@ fn show(
     }
 }
 
-/// Takes the poses that come within `time`; true if `quit` says so.
+/// Takes the poses that come within `time`; true if `quit` returns true.
 fn wait(
     snapshots: &mut Snapshots<'_>,
     time: Duration,

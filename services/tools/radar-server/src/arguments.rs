@@ -18,8 +18,8 @@ pub struct RadarServerArguments {
     /// `[simulation]`, `[source]` and `[dataset]`.
     #[command(flatten)]
     pub inputs: Inputs,
-    /// Record what the radar at --radar sends, byte for byte, into this new file, instead of
-    /// playing; until it ends, or Ctrl-C.
+    /// Record the data of the radar at --radar, byte for byte, into this new file, instead of
+    /// playing; until the radar ends, or Ctrl-C.
     #[arg(long, value_name = "FILE", requires = "radar", conflicts_with = "data")]
     pub capture: Option<PathBuf>,
     /// The radar to capture: HOST, HOST:PORT or udp://GROUP:PORT (--interface: this machine's
@@ -34,7 +34,7 @@ pub struct RadarServerArguments {
     /// them by TCP: 239.192.43.78:4378.
     #[arg(long, value_name = "GROUP:PORT", conflicts_with_all = ["listen", "reset_every", "big_endian"])]
     pub udp: Option<SocketAddrV4>,
-    /// The address of this machine by which datagrams leave; 0.0.0.0: the system chooses.
+    /// The address of this machine for sending datagrams; 0.0.0.0: the system chooses.
     #[arg(long, default_value = "127.0.0.1", value_name = "ADDRESS")]
     pub interface: Ipv4Addr,
     /// Time before the first scan for which only the radar's description of itself is sent by UDP,
@@ -47,7 +47,7 @@ pub struct RadarServerArguments {
     /// Scans to play. Default: all.
     #[arg(long)]
     pub scans: Option<usize>,
-    /// Play again and again, with times that go on.
+    /// Play again and again, with times that advance.
     #[arg(long)]
     pub repeat: bool,
     /// Faults to make.

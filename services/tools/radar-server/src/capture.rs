@@ -32,7 +32,6 @@ const ENCODER_COUNTS: u16 = 5600;
 /// A failure to make or to play a capture.
 #[derive(Debug, Error)]
 pub enum CaptureError {
-    /// No radar answers.
     #[error("no radar answers at {address} ({source}): check the address")]
     NoAnswer {
         /// The address of the radar.
@@ -40,33 +39,25 @@ pub enum CaptureError {
         /// The system's reason.
         source: io::Error,
     },
-    /// The file cannot be read or written.
     #[error("{}: {source}", path.display())]
     File {
-        /// The path of the file.
         path: PathBuf,
         /// The system's reason.
         source: io::Error,
     },
-    /// The file is no capture, or a damaged one.
     #[error("{} is a damaged capture: {reason}", path.display())]
     Damaged {
         /// The path of the file.
         path: PathBuf,
-        /// The damage.
         reason: &'static str,
     },
-    /// The capture is of the other protocol.
     #[error("{} was captured by {of}, and can only be played so: {advice}", path.display())]
     Protocol {
         /// The path of the file.
         path: PathBuf,
-        /// The protocol.
         of: &'static str,
-        /// The remedy.
         advice: &'static str,
     },
-    /// The network fails.
     #[error("cannot serve as a radar: {0}")]
     Network(#[from] io::Error),
 }
@@ -87,19 +78,15 @@ impl CaptureError {
     }
 }
 
-/// The size of what was recorded or played.
+/// The size of a recorded or played capture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Captured {
-    /// The number of records.
     pub records: u64,
     /// The bytes of the records.
     pub bytes: u64,
 }
 
 /// Records the bytes of the radar at `address` until it ends, or `stop` returns true.
-///
-/// # Errors
-/// No radar answers, or the file cannot be written.
 pub fn record(
     address: &Address,
     path: &Path,
@@ -157,9 +144,6 @@ pub struct Capture {
 
 impl Capture {
     /// Opens a capture; `None` if the file is something else, or a folder.
-    ///
-    /// # Errors
-    /// It cannot be read.
     pub fn open(path: &Path) -> Result<Option<Self>, CaptureError> {
         let failed = &CaptureError::file(path);
         if !path.is_file() {
@@ -189,9 +173,6 @@ impl Capture {
 
     /// Reads the next record into `bytes`, which have room for [`MAX_RECORD_BYTES`]; returns the
     /// time and the number of bytes. `None` at the end.
-    ///
-    /// # Errors
-    /// It cannot be read, or is damaged.
     pub fn next(&mut self, bytes: &mut [u8]) -> Result<Option<(Duration, usize)>, CaptureError> {
         let failed = &CaptureError::file(&self.path);
         let (mut time_ns, mut count) = ([0; 8], [0; 4]);
@@ -215,9 +196,6 @@ impl Capture {
     }
 
     /// Reads up to the radar's first description of itself.
-    ///
-    /// # Errors
-    /// As [`Capture::next`]; there is none.
     pub fn configuration(mut self) -> Result<Configuration, CaptureError> {
         let mut bytes = vec![0; MAX_RECORD_BYTES];
         let mut parser = RadarParser::new(self.is_udp, ENCODER_COUNTS);
@@ -248,9 +226,6 @@ fn read_whole(file: &mut impl Read, bytes: &mut [u8]) -> io::Result<bool> {
 
 /// Plays a capture as its radar, until it has ended or `stop` returns true. `rate` is a factor of
 /// its pace; `None`: as fast as it is read.
-///
-/// # Errors
-/// A capture that cannot be read or is of the other protocol, or a failure of the network.
 pub fn play(
     audience: Audience,
     mut capture: Capture,

@@ -17,9 +17,6 @@ use capture::Capture;
 use server::{Audience, ByteOrder, ClockFormat, Faults, Playback};
 
 /// Plays a recording or a simulation as a radar, until it has ended or a signal arrives.
-///
-/// # Errors
-/// A recording that cannot be read, or an address that cannot be served at.
 pub fn serve(arguments: &RadarServerArguments) -> Result<ExitCode, Failure> {
     if let (Some(file), Some(radar)) = (&arguments.capture, &arguments.radar) {
         return record(file, radar, arguments);
@@ -65,7 +62,7 @@ fn played(inputs: &Inputs) -> Result<Configuration, Failure> {
     Ok(configuration.streaming(given.data.as_deref()))
 }
 
-/// Records what a radar sends.
+/// Records the data of a radar.
 fn record(file: &Path, radar: &str, arguments: &RadarServerArguments) -> Result<ExitCode, Failure> {
     let interface = match radar.starts_with("udp://") {
         true => arguments.interface.to_string(),
@@ -86,7 +83,6 @@ fn record(file: &Path, radar: &str, arguments: &RadarServerArguments) -> Result<
     Ok(ExitCode::SUCCESS)
 }
 
-/// Plays what was recorded.
 fn play(
     data: &Path,
     capture: Capture,
@@ -103,7 +99,7 @@ fn play(
     Ok(ExitCode::SUCCESS)
 }
 
-/// Returns to whom is played, and says so.
+/// Returns the audience, and prints it.
 fn announced(what: &str, arguments: &RadarServerArguments) -> Result<Audience, Failure> {
     let (audience, address, is_public) = audience(arguments)?;
     print::note(format_args!("gyre: playing {what} as a radar at {address}"));
@@ -115,8 +111,7 @@ fn announced(what: &str, arguments: &RadarServerArguments) -> Result<Audience, F
     Ok(audience)
 }
 
-/// Returns to whom is played, the address at which the radar is received, and whether others than
-/// this machine reach it.
+/// Returns the audience, the address for receiving the radar, and whether other machines reach it.
 fn audience(arguments: &RadarServerArguments) -> Result<(Audience, String, bool), Failure> {
     if let Some(to) = arguments.udp {
         if arguments.rate.factor().is_none() {

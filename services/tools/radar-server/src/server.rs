@@ -24,7 +24,7 @@ pub use gyre_colossus::{ByteOrder, ClockFormat};
 pub use output::Audience;
 pub(crate) use output::{Output, sleep_until};
 
-/// Encoder counts in a turn, where a recording does not say.
+/// Encoder counts in a turn, unless a recording contains them.
 const ENCODER_COUNTS: u16 = 5600;
 /// The longest wait within a recording: longer gaps are shortened to it.
 const MAX_WAIT: Duration = Duration::from_secs(2);
@@ -40,7 +40,6 @@ pub struct Playback {
     pub scans: Range<usize>,
     /// Play the recording again and again, its times going on.
     pub repeats: bool,
-    /// Faults to inject.
     pub faults: Faults,
     /// The format of the times.
     pub clock: ClockFormat,
@@ -49,18 +48,14 @@ pub struct Playback {
 /// A failure to play a recording as a radar.
 #[derive(Debug, Error)]
 pub enum ServeError {
-    /// A scan cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// The network.
     #[error("cannot serve as a radar: {0}")]
     Network(#[from] io::Error),
-    /// The recording does not fit the protocol.
     #[error(
         "scans of {azimuths} azimuths and {bins} range bins do not fit the protocol, which counts both in 16 bits"
     )]
     TooLarge {
-        /// Azimuths of a scan.
         azimuths: usize,
         /// Range bins of an azimuth.
         bins: usize,
@@ -70,22 +65,16 @@ pub enum ServeError {
 /// The counts of a playback.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Played {
-    /// Scans.
     pub scans: u64,
     /// Azimuths that were left out.
     pub lost_azimuths: u64,
     /// Datagrams that were left out.
     pub lost_datagrams: u64,
-    /// Connections that were reset.
     pub resets: u64,
-    /// Stalls.
     pub stalls: u64,
 }
 
-/// Plays a recording until it has ended or `stop` says so.
-///
-/// # Errors
-/// A scan that cannot be read, one that does not fit the protocol, or a failure of the network.
+/// Plays a recording until it has ended or `stop` returns true.
 pub fn serve(
     audience: Audience,
     dataset: &mut dyn Dataset,

@@ -40,7 +40,7 @@ impl LogTail {
         self.begun.extend(appended);
         let Some(end) = self.begun.iter().rposition(|byte| *byte == b'\n') else {
             if self.begun.len() as u64 > MAX_BYTES {
-                // Its end is none of a line of the log, and is passed over.
+                // The rest of the last part is not a line of the log, and is skipped.
                 self.begun.clear();
             }
             return Vec::new();
@@ -68,7 +68,7 @@ impl LogTail {
     }
 }
 
-/// Parses a line; `None` if it is none of the log's.
+/// Parses a line; `None` if the line is not from the log.
 fn parse(line: &[u8], now_ns: i64) -> Option<LogLine> {
     let line: Value = serde_json::from_slice(line).ok()?;
     let text = |value: &Value| match value {

@@ -1,7 +1,7 @@
 //! The clock and the scale of the wheels, from the distances that the radar drives.
 //!
 //! As for a [gyro](crate::calibrate_gyro): the log fits where the radar's distances correlate with
-//! it best, over all offsets of its clock. What tells the offset is how the speed changes.
+//! it best, over all offsets of its clock. Changes of the speed determine the offset.
 
 use std::path::Path;
 
@@ -25,26 +25,25 @@ const PERIOD_SHARE: f64 = 0.1;
 const SCALE_SIGMA: f64 = 2e-3;
 /// An offset that is known less well is refused, s: while braking at 5 m/s² it is half a m/s.
 const MAX_LATE_SIGMA_S: f64 = 0.1;
-/// Scales that wheels can have: beyond, their unit is another one.
+/// Scales that wheels can have: beyond, their unit is different.
 const SCALES: std::ops::RangeInclusive<f64> = 0.8..=1.25;
 
 /// The clock and the scale of the wheels, by the distances of the radar.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WheelCalibration {
-    /// Time by which the stamps of the wheels are late, s.
+    /// The delay of the wheels' stamps, s.
     pub late_s: Estimate,
     /// True distance over the measured one.
     pub scale: Estimate,
-    /// Correlation of the distances with those of the radar.
+    /// Correlation of the distances with the radar's.
     pub correlation: f64,
     /// Number of distances that were compared, of a second each.
     pub distances: usize,
 }
 
-/// Why a drive does not tell the clock of the wheels.
+/// Why a drive does not determine the clock of the wheels.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum WheelError {
-    /// The times of the log are not those of the scans.
     #[error(
         "with offsets of the clocks up to {MAX_LATE_S:.0} s the log covers {seconds} distances of a second, and {MIN_TURNS} are needed: the drive is too short, or the log is of another one"
     )]
@@ -52,7 +51,6 @@ pub enum WheelError {
         /// Distances that the log has samples for, at most.
         seconds: usize,
     },
-    /// Two offsets fit about as well.
     #[error(
         "the wheels drive as the radar best with late_s = {:.2} (correlation {:.2}), but about as well with {:.2} ({:.2}): the speed changes too little, or the log is of another drive",
         best[0], best[1], rival[0], rival[1]
@@ -60,21 +58,17 @@ pub enum WheelError {
     Ambiguous {
         /// The best offset, s, and its correlation.
         best: [f64; 2],
-        /// Another one.
         rival: [f64; 2],
     },
-    /// The least squares do not end near the peak.
     #[error(
         "the offset of the clocks is not determined: parts of the drive lead to different ones"
     )]
     Unsettled,
-    /// The speed changes too little.
     #[error(
         "the offset of the clocks is {:.2} \u{b1} {:.2} s, which is too uncertain to be used: the speed changes too little, or a clock drifts",
         .0.value, .0.sigma
     )]
     Steady(Estimate),
-    /// The speeds have another unit.
     #[error(
         "the radar drives {0:.3} times as far as the wheels measure: their speeds have another unit (0.278 is km/h, 0.447 mph)"
     )]
@@ -99,9 +93,6 @@ impl From<NoPeak> for WheelError {
 /// Finds the offset and the scale of the wheels by a track of the drive.
 ///
 /// Over `max_gap_s` without samples their speed is not interpolated.
-///
-/// # Errors
-/// A log that does not tell them.
 pub fn calibrate_wheels(
     drive: &Drive,
     track: &Track,
@@ -154,7 +145,7 @@ fn calibrate_distances(
 }
 
 impl WheelCalibration {
-    /// Returns the mean of what drives of one vehicle say, each weighted by its uncertainty.
+    /// Returns the mean over drives of one vehicle, each weighted by its uncertainty.
     #[must_use]
     pub fn mean(&self, others: &[Self]) -> Self {
         others.iter().fold(*self, |mean, other| Self {
@@ -186,7 +177,7 @@ impl WheelCalibration {
         )
     }
 
-    /// Returns the lines of a table, beside what is configured if wheels are used.
+    /// Returns the lines of a table, beside the configured values if wheels are used.
     pub fn table(&self, configured: &WheelsConfig) -> String {
         let line = |name: &str, found: &Estimate, unit: &str, value: f64| {
             let verdict = match (value - found.value).abs() > WRONG_SIGMAS * found.sigma {

@@ -1,7 +1,7 @@
 //! Fourier transforms of `f32` by `rustfft` and `realfft`, compiled here once.
 //!
-//! Both are generic in the number. Each crate that plans a transform by itself compiles all of
-//! their algorithms anew, which takes longer than all the rest of it.
+//! Both are generic in the number. Each crate that plans a transform itself compiles all algorithms
+//! of these again, which takes longer than the rest of the crate.
 
 use std::sync::Arc;
 

@@ -17,11 +17,11 @@
 //!    consistent with the prediction by chi-square updates the pose, as in a Kalman filter.
 //! 3. Scans without such a registration are predicted. After [`LocaliserOptions::lost_after_s`] of
 //!    them the localiser is lost, and begins with 1. again. A prediction is no fix, and away from
-//!    all keyframes of the map there is none.
+//!    all keyframes of the map there is no fix.
 //!
 //! # Frames and units
-//! Those of [`gyre_geometry`]; poses are in the map's frame, and covariances are of (x, y, yaw)
-//! along its axes.
+//! As in [`gyre_geometry`]; poses are in the map's frame, and covariances are of (x, y, yaw) along
+//! its axes.
 
 mod localiser;
 mod map;

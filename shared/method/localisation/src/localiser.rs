@@ -30,7 +30,6 @@ pub struct Observation<'a> {
 /// The state of the localisation of a scan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
-    /// Nothing.
     Lost,
     /// A first fix, without prior.
     Found,
@@ -47,17 +46,15 @@ pub struct Fix {
     pub pose: UncertainMotion,
     /// Masked correlation of the scan with the submap.
     pub correlation: f64,
-    /// Difference of the correlation from that of any other pose that was tried; for a first fix
-    /// only.
+    /// Difference of the correlation from the next best pose that was tried; for a first fix only.
     pub margin: f64,
-    /// The keyframe of the map with which it was registered.
+    /// The keyframe of the map that was used for registration.
     pub keyframe: usize,
 }
 
 /// The place of a scan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Localisation {
-    /// The state.
     pub status: Status,
     /// The fix, or the prediction; `None` if lost or outside the map.
     pub fix: Option<Fix>,
@@ -71,7 +68,6 @@ struct Hypothesis {
     keyframe: usize,
 }
 
-/// The last known place.
 #[derive(Clone, Copy)]
 struct Track {
     pose: UncertainMotion,
@@ -95,12 +91,8 @@ pub struct Localiser {
 }
 
 impl Localiser {
-    /// Plans the localisation of scans of at most `capacity` points. `refinement` is that of the
-    /// odometry.
-    ///
-    /// # Errors
-    /// The first value of `refinement` that is out of its bounds, or a reach of more than the
-    /// rasters allow.
+    /// Plans the localisation of scans of at most `capacity` points. `refinement` is the
+    /// odometry's.
     pub fn new(
         map: Map,
         options: LocaliserOptions,
@@ -122,7 +114,6 @@ impl Localiser {
         })
     }
 
-    /// Returns the map.
     pub fn map(&self) -> &Map {
         &self.map
     }
@@ -132,7 +123,6 @@ impl Localiser {
         self.track = None;
     }
 
-    /// Localises the next scan.
     pub fn locate(&mut self, observation: &Observation<'_>) -> Localisation {
         match self.track {
             None => self.start(observation),
@@ -157,7 +147,7 @@ impl Localiser {
         fix.filter(|fix| self.is_accepted(fix))
     }
 
-    /// Finds the pose at which a scan is most similar to the map, however little.
+    /// Finds the pose with the highest similarity of a scan to the map, however low.
     pub fn most_similar(&mut self, points: &[SparsePoint], twist: &Twist) -> Option<Fix> {
         self.scan.start(points, twist);
         self.registration.set_scan(&self.scan);
@@ -205,7 +195,8 @@ impl Localiser {
         }
     }
 
-    /// Searches around a candidate, at both headings that its descriptor cannot tell apart.
+    /// Searches around a candidate, at both headings, since its descriptor is ambiguous by half a
+    /// turn.
     fn search(&mut self, candidate: usize) {
         let Candidate { place, yaw_rad, .. } = self.candidates[candidate];
         self.draw(place);

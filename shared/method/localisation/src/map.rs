@@ -21,29 +21,22 @@ const PLACES: &str = "places.index";
 /// Keyframes that make no map, or a map that cannot be read or written.
 #[derive(Debug, Error)]
 pub enum MapError {
-    /// There is none.
     #[error("a map needs keyframes: there is none")]
     Empty,
-    /// They are not in the order of the path.
     #[error(transparent)]
     Order(#[from] OrderError),
-    /// The keyframes cannot be read or written.
     #[error(transparent)]
     Keyframes(#[from] LogError),
-    /// The descriptors of submaps cannot be read or written.
     #[error(transparent)]
     Places(#[from] PlaceFileError),
-    /// The two files are not of one map.
     #[error(
         "{KEYFRAMES} has {keyframes} keyframes{end}, and {PLACES} {places}: draw the map again with gyre map",
         end = if *.is_complete { "" } else { " and no end" }
     )]
     Unlike {
-        /// The number of keyframes.
         keyframes: usize,
         /// The file of keyframes was written to its end.
         is_complete: bool,
-        /// The number of places.
         places: usize,
     },
 }
@@ -57,9 +50,6 @@ pub struct Map {
 
 impl Map {
     /// Describes all keyframes of a drive. [`Keyframe::pose`] is in the map's frame.
-    ///
-    /// # Errors
-    /// No keyframes, or keyframes that are not in the order of the path.
     pub fn new(keyframes: Vec<Keyframe>) -> Result<Self, MapError> {
         let index = PlaceIndex::with_capacity(keyframes.len());
         let mut map = Self::with_index(keyframes, index)?;
@@ -77,9 +67,6 @@ impl Map {
 
     /// Writes the map into a folder: `keyframes.log` and `places.index`. A map that is there is
     /// replaced.
-    ///
-    /// # Errors
-    /// Files that cannot be written.
     pub fn save(&self, folder: &Path) -> Result<(), MapError> {
         let mut log = RecordLog::<Keyframe>::open_file(&folder.join(KEYFRAMES))?;
         log.cut(0)?;
@@ -91,9 +78,6 @@ impl Map {
     }
 
     /// Reads the map in a folder. All of it is kept in memory.
-    ///
-    /// # Errors
-    /// Files that cannot be read, are damaged, incomplete or not of one map.
     pub fn open(folder: &Path) -> Result<Self, MapError> {
         let mut reader = RecordReader::<Keyframe>::open_file(&folder.join(KEYFRAMES))?;
         let keyframes: Result<Vec<_>, _> = (0..reader.len()).map(|k| reader.read(k)).collect();
@@ -125,7 +109,6 @@ impl Map {
         &self.keyframes
     }
 
-    /// Returns the pose of a keyframe.
     pub fn pose(&self, keyframe: usize) -> Pose {
         self.keyframes[keyframe].pose.motion
     }
@@ -157,7 +140,7 @@ impl Map {
         }
     }
 
-    /// Plans a submap with room for that of any keyframe.
+    /// Plans a submap with room for any keyframe's submap.
     pub(crate) fn new_submap(&self) -> Submap {
         Submap::with_capacity(self.largest() * (2 * MAX_NEIGHBOURS + 1))
     }

@@ -1,6 +1,5 @@
 //! The options of localisation.
 
-/// The options of localisation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LocaliserOptions {
     /// Number of places and headings that are searched first for a first fix; if none of them is
@@ -8,14 +7,13 @@ pub struct LocaliserOptions {
     pub first_candidates: usize,
     /// Largest number of places and headings that are searched for a first fix.
     pub candidates: usize,
-    /// Number of headings at which a place is compared.
+    /// Number of headings for comparing a place.
     pub angles: usize,
     /// Two candidates are of different places if they are farther apart, m.
     pub apart_m: f64,
-    /// Largest distance of a scan from the keyframe by which its place is found, along each axis,
-    /// m.
+    /// Largest distance of a scan from the keyframe of its place, along each axis, m.
     pub search_reach_m: f64,
-    /// Smallest correlation of a first fix with the map, 0 to 1. It is that of a single scan with a
+    /// Smallest correlation of a first fix with the map, 0 to 1. It compares a single scan with a
     /// submap of many.
     pub min_correlation: f64,
     /// Smallest difference of the correlations of a first fix and of any other pose that was tried.
@@ -27,8 +25,8 @@ pub struct LocaliserOptions {
     /// Largest chi-square (3 degrees of freedom) between a registration and the prediction: 16.27
     /// is passed by 99.9 %.
     pub gate: f64,
-    /// Factor of the covariance of a registration with the map over that of one with the scans just
-    /// before.
+    /// Factor of the covariance of a registration with the map over a registration with the scans
+    /// just before.
     pub variance_scale: f64,
     /// Distance from the nearest keyframe of the map beyond which there is no fix, m.
     pub reach_m: f64,

@@ -31,7 +31,6 @@ const NEAR_STRETCHES: u64 = 4;
 pub struct FoundKeyframe {
     /// The number of the keyframe in its drive.
     pub keyframe: usize,
-    /// The place.
     pub fix: Fix,
 }
 
@@ -67,8 +66,8 @@ impl PlacedDrive {
 }
 
 impl DriveSearch {
-    /// Looks for the next keyframe of the drive, by itself: what tracking finds depends on what it
-    /// found before.
+    /// Looks for the next keyframe of the drive, independently: the result of tracking depends on
+    /// earlier results.
     pub fn add(&mut self, localiser: &mut Localiser, keyframe: &Keyframe) {
         let number = self.stretches.len();
         self.stretches.push((keyframe.path_m / DEPENDENT_M) as u64);
@@ -91,15 +90,12 @@ impl DriveSearch {
     /// Returns the poses of the drive in the map frame that fit its motions, its loops and its
     /// places on the map best; `None` if no keyframe was found. `drive` has the keyframes that were
     /// looked for.
-    ///
-    /// # Errors
-    /// Motions that determine no poses.
     pub fn place(&self, drive: &G2o) -> Result<Option<PlacedDrive>, EstimationError> {
         let Some(map_from_drive) = self.most_agreed(drive) else {
             return Ok(None);
         };
         let placed = drive.poses.iter().map(|pose| map_from_drive * pose);
-        // The first pose of a graph stays where it is: it is that of the map.
+        // The first pose of a graph stays where it is: it is the map's.
         let poses: Vec<Pose> = std::iter::once(Pose::identity()).chain(placed).collect();
         let mut graph = self.graph(drive, &poses)?;
         graph.start_from(&poses)?;
@@ -234,7 +230,7 @@ mod tests {
         assert_eq!(poses.len(), 100);
         assert!((10..60).all(|k| error_m(k) < 0.2), "{}", error_m(35));
         assert!(error_m(0) < 1.0, "{}", error_m(0));
-        // Beyond, odometry goes on from the last place.
+        // Beyond, odometry continues from the last place.
         let ahead = poses[59].inv_mul(&poses[60]);
         assert!((ahead.translation.vector - motion.motion.translation.vector).norm() < 0.05);
         // Keyframes are 2 m apart, in stretches of 5 m.

@@ -1,4 +1,4 @@
-//! The directions in which a sensor saw anything.
+//! The directions that a sensor could see.
 
 use std::f64::consts::TAU;
 
@@ -12,7 +12,7 @@ const SECTORS: usize = 72;
 const HIDDEN: usize = 12;
 
 /// The cells of a raster that a sensor could see. A vehicle's roof, a wall or a broken sensor hides
-/// a part of the turn; what the map has there says nothing against a place.
+/// a part of the turn, so the map's contents there are no evidence against a place.
 pub(crate) struct Sight {
     /// The sector of each cell.
     sectors: Array2<u8>,
@@ -33,7 +33,7 @@ impl Sight {
         }
     }
 
-    /// Finds what the sensor of a scan could see.
+    /// Finds the visible region of a scan's sensor.
     pub fn look(&mut self, scan: &Submap) {
         let mut saw = [false; SECTORS];
         for [x_m, y_m, _] in scan.points() {

@@ -14,10 +14,8 @@ use crate::runtime::{self, RuntimeError};
 /// A network could not be loaded or computed.
 #[derive(Debug, Error)]
 pub enum PlanesError {
-    /// ONNX Runtime cannot be used.
     #[error(transparent)]
     Runtime(#[from] RuntimeError),
-    /// The library does not compute it.
     #[error("{network} cannot be computed: {reason}")]
     Network {
         /// The name of the file.
@@ -32,7 +30,7 @@ pub enum PlanesError {
 pub struct PlanesNetwork {
     name: &'static str,
     engine: Engine,
-    /// Planes, rows and columns of what it is shown, and of what it gives.
+    /// Planes, rows and columns of its input and of its output.
     shown: [usize; 3],
     given: [usize; 3],
 }
@@ -46,9 +44,6 @@ enum Engine {
 impl PlanesNetwork {
     /// Loads the network of a name in `gyre_shipped`, into the ONNX Runtime at a path or, without
     /// one, into rten, which takes several times as long.
-    ///
-    /// # Errors
-    /// A library or a network that cannot be used.
     pub fn load(
         name: &'static str,
         runtime: Option<&Path>,
@@ -93,9 +88,6 @@ impl PlanesNetwork {
     }
 
     /// Computes it, for planes row after row.
-    ///
-    /// # Errors
-    /// Planes of another size, or what the library says.
     pub fn compute(&mut self, planes: &[f32]) -> Result<Vec<f32>, PlanesError> {
         let [depth, rows, columns] = self.shown;
         let shape = [1, depth, rows, columns];

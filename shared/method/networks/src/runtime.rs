@@ -22,7 +22,7 @@ use thiserror::Error;
 pub const INSTALL: &str = "python3 -m pip install --no-deps --python-version 3.12 --target \"${XDG_DATA_HOME:-$HOME/.local/share}/gyre/onnxruntime\" onnxruntime==1.31.1";
 /// The environment variable that may name the library.
 const VARIABLE: &str = "ORT_DYLIB_PATH";
-/// The folder that [`INSTALL`] creates in that of Gyre's data; beside the program it has the same
+/// The folder that [`INSTALL`] creates in Gyre's data folder; beside the program it has the same
 /// name.
 const INSTALLED: &str = "onnxruntime";
 /// Positions of the library in a named folder: the folder itself, the package, the parent of the
@@ -35,23 +35,18 @@ static PACKAGES: OnceLock<PathBuf> = OnceLock::new();
 /// An error in finding or opening ONNX Runtime.
 #[derive(Debug, Error)]
 pub enum RuntimeError {
-    /// It is not installed.
     #[error(
         "ONNX Runtime is not installed: `{INSTALL}` installs it; masking.runtime or {VARIABLE} names one in another place; \
          masking.backend = \"rten\" does not need it"
     )]
     Missing,
-    /// The named path has no library.
     #[error(
         "{named_by} is {path}, but there is no {LIBRARY}: correct it, or leave it out and run `{INSTALL}`"
     )]
     NotFound {
-        /// The setting or variable.
         named_by: &'static str,
-        /// The path.
         path: PathBuf,
     },
-    /// It is too old.
     #[error(
         "ONNX Runtime at {path} is version {version}, but at least 1.{} is needed: `{INSTALL}` installs one",
         ort::MINOR_VERSION
@@ -67,7 +62,6 @@ pub enum RuntimeError {
     Unusable {
         /// The path of the library.
         path: PathBuf,
-        /// The reason.
         reason: String,
     },
 }
@@ -76,10 +70,6 @@ pub enum RuntimeError {
 /// environment, installed by [`INSTALL`], beside this program, or a package of the Python that
 /// Gyre is installed in. A library is code, so no folder is searched that is not the user's own or
 /// the program's; the current one may be anybody's.
-///
-/// # Errors
-/// [`RuntimeError::NotFound`] if a named path has no library, [`RuntimeError::Missing`] if none is
-/// named or installed.
 pub fn find(configured: Option<&Path>) -> Result<PathBuf, RuntimeError> {
     find_in(configured, env::var_os(VARIABLE), &installed_in())
 }
@@ -146,7 +136,7 @@ fn packages_beside(bin: &Path) -> Vec<PathBuf> {
 }
 
 /// Returns the folder of Gyre's data. A relative path would be in the current folder and is
-/// ignored, as the XDG specification says.
+/// ignored, as the XDG specification demands.
 fn data_folder(data_home: Option<OsString>, home: Option<OsString>) -> Option<PathBuf> {
     let absolute =
         |path: Option<OsString>| path.map(PathBuf::from).filter(|path| path.is_absolute());
@@ -182,16 +172,13 @@ fn version(file: &Path) -> Option<Vec<u32>> {
     numbers.map(|number| number.parse().ok()).collect()
 }
 
-/// Returns whether the name of a library says a version older than the one that is needed.
+/// Returns whether the name of a library contains an older version than the required one.
 fn is_too_old(file: &Path) -> bool {
     let version = version(file).filter(|version| version.len() > 1);
     version.is_some_and(|version| version < vec![1, ort::MINOR_VERSION])
 }
 
 /// Opens the library. A process opens only one: later calls return the first one that succeeded.
-///
-/// # Errors
-/// A file that is not ONNX Runtime, or too old a version.
 pub fn open(path: &Path) -> Result<Environment, RuntimeError> {
     static OPENED: Mutex<Option<Environment>> = Mutex::new(None);
     let mut opened = OPENED.lock().unwrap_or_else(PoisonError::into_inner);
@@ -238,9 +225,6 @@ pub fn open(path: &Path) -> Result<Environment, RuntimeError> {
 }
 
 /// Returns a builder of sessions whose results are the same to the byte each time.
-///
-/// # Errors
-/// A setting that the library refuses.
 pub fn session(environment: &Environment, threads: usize) -> ort::Result<SessionBuilder> {
     let builder = Session::builder(environment)?
         .with_intra_threads(threads)?

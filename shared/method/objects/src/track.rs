@@ -9,7 +9,7 @@ use crate::{Object, ObjectsConfig};
 
 /// Speed of a vehicle's centre across its heading, m/s: it has its place by the rear axle.
 const SLIP_MPS: f64 = 0.1;
-/// Standard deviation of a velocity before it is measured, m/s: that of any vehicle.
+/// Standard deviation of an unmeasured velocity, m/s: the speed of any vehicle.
 const UNKNOWN_MPS: f64 = 30.0;
 
 /// Factor of the standard deviation that the network gives of a velocity: five of six scans that it
@@ -53,7 +53,7 @@ const MOVING_SIGMAS: f64 = 1.0;
 pub(crate) struct Track {
     filter: Filter,
     heading: Vector2<f64>,
-    /// Length and width, m: the mean of what was seen, weighed by how likely it was.
+    /// Length and width, m: the mean over detections, weighted by their likelihood.
     size_m: [f64; 2],
     weight: f64,
     /// Identity of an object that was moving once; before it has none.
@@ -65,16 +65,15 @@ pub(crate) struct Track {
     known_s: f64,
     unseen_s: f64,
     moving: bool,
-    /// True if it is neither seen nor expected any more, or has given way to another one, and if it
-    /// was about to stand then: the network finds what moves.
+    /// True if the object is neither seen nor expected any more, or a different track has replaced
+    /// it, and if it was about to stand then: the network finds moving objects only.
     lost: bool,
     stopped: bool,
-    /// Logarithm of the likelihood of an object over that of clutter.
+    /// Logarithm of the likelihood ratio of an object to clutter.
     score: f64,
 }
 
 impl Track {
-    /// Begins a track.
     pub fn new(detection: &Detection, config: &ObjectsConfig) -> Self {
         let mut filter = Filter::new(&sighting(detection), UNKNOWN_MPS);
         measure_velocity(&mut filter, detection);
@@ -119,7 +118,7 @@ impl Track {
         (place.chi_square() + chi_square <= GATE).then_some(cost)
     }
 
-    /// Updates it by what a scan shows.
+    /// Updates the track with a detection.
     pub fn update(&mut self, detection: &Detection, config: &ObjectsConfig) {
         self.filter.update(&sighting(detection));
         measure_velocity(&mut self.filter, detection);
@@ -198,7 +197,7 @@ impl Track {
         (may_be && chi_square <= GATE).then_some(chi_square)
     }
 
-    /// Decides whether it moves: whether its speed is above that of what stands by more than its
+    /// Decides whether it moves: whether its speed exceeds a standing object's by more than its
     /// uncertainty explains. Returns whether it becomes an object by that.
     pub fn judge(&mut self, config: &ObjectsConfig) -> bool {
         let (speed_mps, sigma_mps) = self.filter.speed();
@@ -268,7 +267,7 @@ impl Track {
     }
 }
 
-/// Returns where a detection says that an object is.
+/// Returns the position that a detection reports.
 fn sighting(detection: &Detection) -> Sighting {
     Sighting {
         at: detection.at,
@@ -285,7 +284,7 @@ fn measure_velocity(filter: &mut Filter, detection: &Detection) {
     }
 }
 
-/// Returns the logarithm of how much likelier an object is than none, by what a scan shows.
+/// Returns the log-likelihood ratio of an object to no object, given a detection.
 fn evidence(detection: &Detection, config: &ObjectsConfig) -> f64 {
     let odds = |likely: f64| {
         let likely = likely.clamp(1e-3, 1.0 - 1e-3);

@@ -33,8 +33,8 @@ const MIN_CORRELATION: f64 = 0.6;
 /// Offset between the clocks of two trajectories.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ClockOffset {
-    /// Delay, s: the motion of the reference at `t` is that of the other trajectory at
-    /// `t + late_s`.
+    /// Delay, s: the motion of the reference at `t` equals the motion of the other trajectory at `t
+    /// + late_s`.
     pub late_s: f64,
     /// Correlation of the speeds at that offset.
     pub speed_correlation: f64,
@@ -148,7 +148,6 @@ fn motions(reference: &Trajectory) -> Vec<Motion> {
     starts.map_while(over_baseline).collect()
 }
 
-/// Correlation at one offset.
 struct Fit {
     late_ns: i64,
     count: usize,

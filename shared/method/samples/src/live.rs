@@ -11,9 +11,7 @@ const MAX_WAITING: usize = 16 * MAX_SAMPLES;
 /// The sensor that the samples are of, by whose settings they are taken over to the radar's clock.
 #[derive(Clone, Debug)]
 pub enum LiveSensor {
-    /// A gyro.
     Gyro(GyroConfig),
-    /// The wheels.
     Wheels(WheelsConfig),
 }
 
@@ -38,7 +36,6 @@ pub struct LiveSamples {
 }
 
 impl LiveSamples {
-    /// Creates an empty queue.
     pub fn new(sensor: LiveSensor) -> Self {
         Self {
             sensor,

@@ -11,7 +11,7 @@ use crate::{
 
 /// Configuration of the wheels' speed: section `[wheels]`.
 ///
-/// The defaults are those of a car, whose speed is of its own bus.
+/// The defaults suit a car whose speed comes from its own bus.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct WheelsConfig {
@@ -24,16 +24,16 @@ pub struct WheelsConfig {
     /// `geometry_msgs/msg/TwistStamped`. Default: `/odom` of a live radar, none of a bag.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub topic: Option<String>,
-    /// The address and port at which datagrams of live wheels are received: lines of a stamp (ns
-    /// since 1970) and the speed (m/s), with a comma between.
+    /// The address and port for receiving datagrams of live wheels: lines of a stamp (ns since
+    /// 1970) and the speed (m/s), with a comma between.
     pub listen: String,
     /// Longest time for which a scan of a live radar waits for its samples, ms.
     pub max_wait_ms: f64,
-    /// Time by which the stamps of the speed are late against the radar's, s: it is taken off them.
+    /// Delay of the stamps of the speed against the radar's, s: it is subtracted from them.
     pub late_s: f64,
-    /// Distance by which the radar is ahead of the axle that does not steer, m.
+    /// Distance of the radar ahead of the axle that does not steer, m.
     pub radar_ahead_m: f64,
-    /// Distance of one tick of a log that counts them, or to which an odometer rounds, m.
+    /// Distance of one tick of a log that counts ticks, or the rounding step of an odometer, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub m_per_tick: Option<f64>,
     /// True speed over the measured one.
@@ -52,10 +52,10 @@ pub struct WheelsConfig {
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum WheelsKind {
-    /// None's: the radar alone says how far the vehicle drives.
+    /// No wheels: only the radar determines the distance.
     #[default]
     None,
-    /// The log that lies beside the scans, or what comes with them; without one it is an error.
+    /// The log beside the scans, or the samples that come with them; without either it is an error.
     Auto,
     /// The log that `file` names.
     Log,
@@ -103,10 +103,6 @@ impl WheelsConfig {
         Sample::speed(sample.stamp_ns.saturating_sub(late_ns), speed_mps)
     }
 
-    /// Checks every value.
-    ///
-    /// # Errors
-    /// The first key that is out of its bounds.
     pub fn validate(&self) -> Result<(), SampleConfigError> {
         let bounds = Bounds("wheels");
         bounds.late_s(self.late_s)?;

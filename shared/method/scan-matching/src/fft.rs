@@ -122,7 +122,7 @@ impl Transform {
         }
     }
 
-    /// Transforms a line into another one.
+    /// Transforms a line into a second line.
     pub fn line_into(&mut self, line: &[Complex32], out: &mut [Complex32]) {
         self.fft
             .process_immutable_with_scratch(line, out, &mut self.scratch);
@@ -178,7 +178,7 @@ impl RowPass {
     }
 }
 
-/// Transform of two real lines at once: that of g + i h, whose halves are then separated.
+/// Transform of two real lines at once: of g + i h, whose halves are then separated.
 ///
 /// Faster than `realfft`, which separates the halves of a single line without vector instructions.
 pub(crate) struct RealLines {

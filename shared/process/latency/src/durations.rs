@@ -6,7 +6,7 @@ use crate::Percentiles;
 
 /// Significant digits of a percentile.
 const DIGITS: u8 = 3;
-/// The longest duration that is told from longer ones, ns: an hour.
+/// The longest distinguished duration, ns: an hour.
 const LONGEST_NS: u64 = 3_600_000_000_000;
 
 /// The distribution of a duration, ns.
@@ -25,7 +25,6 @@ impl Durations {
         }
     }
 
-    /// Returns the number of durations.
     pub fn count(&self) -> u64 {
         self.0.as_ref().map_or(0, Histogram::len)
     }

@@ -32,7 +32,6 @@ pub struct HopLatency {
     pub transport: Option<Percentiles>,
     /// From the reception to the start of the work.
     pub wait: Percentiles,
-    /// Duration of the work.
     pub work: Percentiles,
     /// Share of the time that the stage worked.
     pub busy: f64,
@@ -41,11 +40,9 @@ pub struct HopLatency {
 /// The latency of a run: `latency.json`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Latency {
-    /// Scans counted.
     pub scans: usize,
     /// From the completion of the sweep (its last azimuth's time) to the journalled pose.
     pub sensor_to_pose: Percentiles,
-    /// Stage by stage.
     pub stages: BTreeMap<&'static str, HopLatency>,
     /// Share of the time that two or more stages worked at once.
     pub overlap: f64,
@@ -70,7 +67,6 @@ pub struct HopMeter {
     pub transport: Durations,
     /// From the reception to the start of the work.
     pub wait: Durations,
-    /// Duration of the work.
     pub work: Durations,
     busy_ns: i64,
 }

@@ -1,11 +1,11 @@
-//! The time in which two or more stages work at once.
+//! The time while two or more stages work at once.
 
 use std::{cmp::Reverse, collections::BinaryHeap};
 
 use gyre_messages::{Hop, Hops};
 
-/// Starts (+1) and ends (-1) of work in the order of time. What is earlier than the first work on
-/// the newest scan is final, so only the scans in flight are kept.
+/// Starts (+1) and ends (-1) of work in the order of time. Work earlier than the first work on the
+/// newest scan is final, so only the scans in flight are kept.
 #[derive(Debug, Default)]
 pub struct Overlap {
     edges: BinaryHeap<Reverse<(i64, i32)>>,
@@ -25,7 +25,7 @@ impl Overlap {
         self.sweep(hops[0].started_ns);
     }
 
-    /// Returns the time in which two or more stages worked at once, ns.
+    /// Returns the time while two or more stages worked at once, ns.
     pub fn together_ns(mut self) -> i64 {
         self.sweep(i64::MAX);
         self.together_ns

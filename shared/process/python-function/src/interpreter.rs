@@ -23,12 +23,9 @@ except ImportError:
 print(json.dumps({'executable': sys.executable, 'version': list(sys.version_info[:3]), 'numpy': version}))
 ";
 
-/// An interpreter that starts.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 pub struct Interpreter {
-    /// The path.
     pub executable: String,
-    /// Major, minor, micro.
     pub version: [u32; 3],
     /// The version of numpy; `None`: it cannot be imported.
     pub numpy: Option<String>,
@@ -37,20 +34,13 @@ pub struct Interpreter {
 /// There is none.
 #[derive(Debug, Error)]
 pub enum NoInterpreter {
-    /// It cannot be started.
     #[error("cannot start {python}: {source}; install Python 3, or name one with GYRE_PYTHON")]
     Start {
-        /// The name.
         python: String,
-        /// The system error.
         source: std::io::Error,
     },
-    /// It is another program, or too old.
     #[error("{python} is no Python of version {}.{} or newer: name one with GYRE_PYTHON", OLDEST[0], OLDEST[1])]
-    Other {
-        /// The name.
-        python: String,
-    },
+    Other { python: String },
 }
 
 /// Returns what `GYRE_PYTHON` names, or `python3`.
@@ -59,10 +49,7 @@ pub(crate) fn name() -> String {
 }
 
 impl Interpreter {
-    /// Starts the interpreter that functions would be called in, and asks what it has.
-    ///
-    /// # Errors
-    /// It cannot be started, or it is no Python in which functions can be called.
+    /// Starts the interpreter for functions, and asks for its version and packages.
     pub fn find() -> Result<Self, NoInterpreter> {
         let python = name();
         let mut command = Command::new(&python);

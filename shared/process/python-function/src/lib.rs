@@ -28,32 +28,25 @@ const PIPE_BYTES: usize = 1 << 20;
 /// A function that cannot be called, or that has failed.
 #[derive(Debug, Error)]
 pub enum FunctionError {
-    /// There is no such file.
     #[error("there is no file {0}")]
     Missing(PathBuf),
-    /// The interpreter cannot be started.
     #[error(
         "cannot start {python} for {file}: {source}; install Python 3, or name one with GYRE_PYTHON"
     )]
     Start {
-        /// The interpreter.
         python: String,
         /// The file of the function.
         file: PathBuf,
-        /// The system error.
         source: std::io::Error,
     },
-    /// The interpreter has ended by itself before it had loaded the file.
     #[error(
         "{python} has ended before it had loaded {file}: {status}; name a Python of version 3 with \
          GYRE_PYTHON, and see that the file does not end it"
     )]
     NotLoaded {
-        /// The interpreter.
         python: String,
         /// The file of the function.
         file: PathBuf,
-        /// The exit code.
         status: ExitStatus,
     },
     /// The interpreter was killed while it loaded the file, or has ended in the middle of a call.
@@ -64,7 +57,7 @@ pub enum FunctionError {
         /// The exit code or the signal.
         status: String,
     },
-    /// An exception: the file, its line, and what Python says. The traceback is on standard error.
+    /// An exception: the file, its line, and Python's message. The traceback is on standard error.
     #[error("{0}")]
     Exception(String),
 }
@@ -89,7 +82,7 @@ fn is_no_program(error: &std::io::Error) -> bool {
     kinds.contains(&error.kind())
 }
 
-/// The name of a function, which stands for what it gets and returns.
+/// The name of a function, which implies its arguments and results.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Name {
     /// `mask(scan)`: factors from 0 to 1.
@@ -114,32 +107,25 @@ impl Name {
 
 /// An argument of a call.
 pub enum Argument<'a> {
-    /// A number.
     Number(f64),
-    /// An object with attributes.
     Scan(Scan<'a>),
 }
 
 /// The attributes of a scan.
 pub struct Scan<'a> {
-    /// Single values.
     pub values: Map<String, Value>,
-    /// Arrays, by name.
     pub arrays: Vec<(&'static str, Array<'a>)>,
 }
 
 /// An array that is sent as it lies in memory.
 pub enum Array<'a> {
-    /// Powers.
     Bytes(ArrayViewD<'a, u8>),
-    /// A raster or angles.
     Floats(ArrayViewD<'a, f32>),
 }
 
 /// The result of a call.
 #[derive(Debug)]
 pub enum Returned {
-    /// Numbers.
     Values(Vec<f64>),
     /// Factors, and the array of the scan whose shape they have.
     Factors(Array2<f32>, String),
@@ -156,9 +142,6 @@ pub struct Function {
 
 impl Function {
     /// Starts the interpreter that `GYRE_PYTHON` names, or `python3`, and loads the file.
-    ///
-    /// # Errors
-    /// No such file or interpreter, no numpy, or an exception while the file is loaded.
     pub fn load(file: &Path, name: Name) -> Result<Self, FunctionError> {
         let absolute = std::path::absolute(file).ok().filter(|file| file.is_file());
         let file = absolute.ok_or_else(|| FunctionError::Missing(file.to_owned()))?;
@@ -204,10 +187,6 @@ impl Function {
         }
     }
 
-    /// Calls the function.
-    ///
-    /// # Errors
-    /// An exception, or a value that a function of its name does not return.
     pub fn call(&mut self, arguments: &[Argument<'_>]) -> Result<Returned, FunctionError> {
         if self.send(arguments).is_err() {
             return Err(self.ended());

@@ -21,7 +21,7 @@ macro_rules! limits {
         }
 
         impl Limits {
-            /// Returns these limits, and those of `other` where there are none.
+            /// Returns these limits, completed by the limits of `other`.
             #[must_use]
             pub fn or(&self, other: &Self) -> Self {
                 Self {
@@ -53,8 +53,8 @@ limits! {
     /// worked on since, ms. Of a fault of gyro, wheels or radar: from its end to the first pose of
     /// a motion that is as before it.
     recovery_ms,
-    /// Motions that the radar does not tell as a whole (`along walls`, `way guessed`, `dead
-    /// reckoning`, `guessed`), % of those before the recording starts anew.
+    /// Motions that the radar does not wholly determine (`along walls`, `way guessed`, `dead
+    /// reckoning`, `guessed`), % of the motions before the recording repeats.
     degraded_percent,
     /// Processor time of all processes of the run, % of one processor.
     cpu_percent,

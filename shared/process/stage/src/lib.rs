@@ -8,8 +8,8 @@
 //!    topic, with the handshake that gives a new reader the history.
 //! 4. [`wake`]: how a process sleeps until there is work.
 //! 5. [`source`], [`stage`], [`sink`]: the loops of the first, the middle and the last processes;
-//!    [`inputs`]: what a middle process waits for.
-//!    [`Generation`]: what tells a number that is given again from one that is sent again.
+//!    [`inputs`]: the next input of a middle process. [`Generation`]: distinguishes a reused number
+//!    from a message that is sent again.
 //! 6. [`follower`]: the loop of a process that reads durable logs and is not in the stream;
 //!    [`GnssReceiver`]: fixes that arrive during a run, as such a log.
 //! 7. [`observer`]: subscribers that the run does not depend on; [`relay`]: stand-ins for stages on

@@ -2,7 +2,7 @@
 //!
 //! After a death only the dead stage is restarted: every start resumes. All stages are restarted if
 //! that does not help (the stage dies again before a new pose, or no pose is published) or if the
-//! plan says so. Followers are no part of that: they are restarted alone, and waited for at the
+//! plan demands it. Followers are no part of that: they are restarted alone, and waited for at the
 //! end. [`rig`] runs one process alone, to test it.
 //!
 //! Reading order: `supervisor`, the loop; its parts, each with a file of that name: `processes`,

@@ -5,11 +5,8 @@ use std::{fs, str::FromStr};
 /// A process, as of now.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ProcessStat {
-    /// The process.
     pub pid: u32,
-    /// The parent.
     pub parent: u32,
-    /// The process group.
     pub group: u32,
     /// True if it has ended, and nobody has waited for it yet.
     pub has_ended: bool,
@@ -26,7 +23,6 @@ impl ProcessStat {
         Self::parse(pid, &fs::read_to_string(format!("/proc/{pid}/stat")).ok()?)
     }
 
-    /// Returns all processes.
     pub fn all() -> impl Iterator<Item = Self> {
         let entries = fs::read_dir("/proc").into_iter().flatten().flatten();
         entries.filter_map(|entry| Self::of(entry.file_name().to_str()?.parse().ok()?))

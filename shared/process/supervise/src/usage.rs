@@ -15,15 +15,14 @@ pub struct Usage {
     /// Memory that is the process's own, bytes: neither files nor memory that it shares with
     /// others.
     pub own_bytes: u64,
-    /// Memory that is mapped into the process and present, bytes, with what it shares.
+    /// Memory that is mapped into the process and present, bytes, including shared memory.
     pub resident_bytes: u64,
     /// Times that its threads have gone to sleep: each is a wake-up. A thread that has ended
     /// takes its count with it.
     pub wake_ups: u64,
-    /// Times that its threads were taken off a processor while they had work; those of threads
-    /// that have ended are gone too.
+    /// Times that its threads were taken off a processor while they had work; counts of ended
+    /// threads are gone.
     pub preemptions: u64,
-    /// Number of threads.
     pub threads: u64,
 }
 
@@ -79,7 +78,7 @@ fn status(folder: &Path) -> Option<String> {
     fs::read_to_string(folder.join("status")).ok()
 }
 
-/// Returns the number behind a name at the beginning of a line; 0 if there is none.
+/// Returns the number behind a name at the beginning of a line; 0 without the name.
 fn count(status: &str, name: &str) -> u64 {
     let value = status.lines().find_map(|line| line.strip_prefix(name));
     let number = value.and_then(|value| value.split_whitespace().next()?.parse().ok());

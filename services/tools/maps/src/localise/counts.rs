@@ -1,4 +1,4 @@
-//! Counts of what was found, lost and left out.
+//! Counts of found, lost and skipped scans.
 
 use std::fmt::Write;
 
@@ -21,7 +21,7 @@ pub struct Counts {
     first_ns: Option<i64>,
     /// The first scan with a fix, and its time after the first scan, s.
     first_fix: Option<(usize, f64)>,
-    /// The first and the last scan of each span in which the localiser was lost.
+    /// The first and the last scan of each span where the localiser was lost.
     #[serde(rename = "lost_scans")]
     spans: Vec<(usize, usize)>,
     #[serde(skip)]
@@ -29,7 +29,6 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// Counts a scan.
     pub fn add(&mut self, scan: &RegisteredScan<'_>, status: Status) {
         let stamp_ns = scan.observation.stamp_ns;
         self.count(scan.number, stamp_ns, status);
@@ -56,7 +55,6 @@ impl Counts {
         self.was_lost = is_lost;
     }
 
-    /// Returns the number of scans.
     pub fn scans(&self) -> usize {
         self.found + self.tracked + self.predicted + self.lost
     }
@@ -66,7 +64,7 @@ impl Counts {
         self.first_fix.is_some()
     }
 
-    /// Says what was found, lost and left out.
+    /// Returns a sentence with the numbers of found, lost and skipped scans.
     pub fn summary(&self, left_out: usize) -> String {
         let mut text = match self.first_fix {
             Some((scan, after_s)) => format!("first fix: scan {scan}, after {after_s:.1} s"),

@@ -7,7 +7,6 @@ use gyre_localisation::{Localisation, Map, Status};
 
 use super::RegisteredScan;
 
-/// The header line.
 pub const HEADER: &str = "scan,stamp_ns,status,x_m,y_m,yaw_rad,\
     cov_xx,cov_xy,cov_xyaw,cov_yy,cov_yyaw,cov_yawyaw,correlation,place\n";
 

@@ -34,10 +34,7 @@ pub struct RegisteredScan<'a> {
 }
 
 impl Scans {
-    /// Opens what a configuration plays.
-    ///
-    /// # Errors
-    /// A recording or a configuration that cannot be used.
+    /// Opens the scans that a configuration plays.
     pub fn open(configuration: &Configuration) -> Result<Self, Failure> {
         let played = gyre_configuration::open(configuration)?;
         let dataset = played.dataset;
@@ -72,9 +69,6 @@ impl Scans {
     }
 
     /// Registers the next scan that can be read; `None` after the last one.
-    ///
-    /// # Errors
-    /// More scans in a row that cannot be used than the configuration allows.
     pub fn register_next(&mut self) -> Result<Option<RegisteredScan<'_>>, Failure> {
         while let Some(number) = self.played.next() {
             let registered = match self.dataset.read(number, self.scan.slot()) {
@@ -118,9 +112,6 @@ impl Scans {
 
     /// Registers scans that are spread evenly over those that are left, each by the scan before
     /// alone, and returns whether `is_found` holds for one of them.
-    ///
-    /// # Errors
-    /// As [`register_next`](Self::register_next).
     pub fn any_of(
         mut self,
         probes: usize,

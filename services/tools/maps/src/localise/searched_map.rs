@@ -1,4 +1,4 @@
-//! The map in which scans are localised.
+//! The map for localising scans.
 
 use std::path::Path;
 
@@ -9,9 +9,6 @@ use gyre_terminal::Failure;
 use crate::folder;
 
 /// Opens the map in a folder, and plans localisation in it.
-///
-/// # Errors
-/// A folder without a whole map, a configuration that extracts no points.
 pub fn open(path: &Path, configuration: &Configuration) -> Result<Localiser, Failure> {
     folder::settle(path)?;
     let drawn = gyre_mapping::Map::open(path)?;
@@ -30,9 +27,6 @@ pub fn open(path: &Path, configuration: &Configuration) -> Result<Localiser, Fai
 }
 
 /// Plans localisation in a map.
-///
-/// # Errors
-/// A configuration that extracts no points.
 pub fn plan(map: Map, configuration: &Configuration) -> Result<Localiser, Failure> {
     let odometry = &configuration.odometry;
     if odometry.points.capacity == 0 {

@@ -29,7 +29,7 @@ pub struct MapArguments {
     #[arg(long, default_value = "0.2")]
     pub cell_m: f64,
     /// Place of the first keyframe on the earth and its heading, degrees: latitude, longitude (WGS
-    /// 84), clockwise from true north. Default: what the run has found by GNSS.
+    /// 84), clockwise from true north. Default: the run's place by GNSS.
     #[arg(long, value_name = "LAT,LON,HEADING", value_parser = origin, allow_hyphen_values = true)]
     pub origin: Option<Origin>,
 }

@@ -16,10 +16,6 @@ use crate::{folder, localise::searched_map};
 const BETWEEN_DRIVES_M: f64 = 1e3;
 
 /// Places a run in the map in a folder, draws both, and writes the map of all.
-///
-/// # Errors
-/// A folder without a map that can be localised in or the one that is written to, a run without
-/// `graph.g2o`, and one that is nowhere on the map.
 pub fn extend(arguments: &MapArguments, map: &Path) -> Result<Drawing, Failure> {
     let (run, out) = (&arguments.run, &arguments.out);
     require_another_folder(map, out)?;
@@ -53,7 +49,7 @@ pub fn extend(arguments: &MapArguments, map: &Path) -> Result<Drawing, Failure> 
     Ok(drawing)
 }
 
-/// The keyframes of the map and those of the run at their poses, numbered through.
+/// The keyframes of the map and the keyframes of the run at their poses, numbered through.
 fn all(
     known: &[Keyframe],
     keyframes: &mut RecordReader<Keyframe>,

@@ -7,9 +7,6 @@ use gyre_slam::{Keyframe, RecordReader};
 use gyre_terminal::Failure;
 
 /// Returns the keyframes that have a pose, with their poses in the frame of the first one.
-///
-/// # Errors
-/// No keyframe has a pose, or they cannot be read.
 pub fn placed(keyframes: &mut RecordReader<Keyframe>, poses: &Trajectory) -> Result<Map, Failure> {
     let (mut kept, mut first): (_, Option<Pose>) = (Vec::new(), None);
     for index in 0..keyframes.len() {

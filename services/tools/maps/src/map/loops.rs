@@ -17,9 +17,6 @@ struct LoopRow {
 }
 
 /// Returns the scans of both keyframes of each loop that is used; none without the file.
-///
-/// # Errors
-/// A file that cannot be read, a missing column, a row that is damaged.
 pub fn used_loops(path: &Path) -> Result<Vec<[u64; 2]>, Failure> {
     if !super::exists(path)? {
         return Ok(Vec::new());

@@ -14,9 +14,6 @@ const GRAPH: &str = "graph.g2o";
 const MAX_GRAPH_BYTES: u64 = 1 << 30;
 
 /// Reads the corrected keyframes of a run.
-///
-/// # Errors
-/// A file that cannot be read, is damaged, or has another number of keyframes than the run.
 pub fn read_graph(run: &Path, keyframes: usize) -> Result<G2o, Failure> {
     let path = run.join(GRAPH);
     let text =
@@ -33,10 +30,8 @@ pub fn read_graph(run: &Path, keyframes: usize) -> Result<G2o, Failure> {
     }
 }
 
-/// Places a run in a map, and says how much of it was found. `names` are the folders of both.
-///
-/// # Errors
-/// Keyframes that cannot be read, and a run that is nowhere on the map.
+/// Places a run in a map, and reports the share of the run that was found. `names` are the folders
+/// of both.
 pub fn place(
     graph: &G2o,
     keyframes: &mut RecordReader<Keyframe>,

@@ -45,7 +45,6 @@ fn columns(width: u16) -> Vec<usize> {
     shown
 }
 
-/// Draws a snapshot.
 pub fn draw(frame: &mut Frame<'_>, snapshot: &Snapshot) {
     let rows = snapshot.status.processes.len() as u16;
     let lines = head_lines(snapshot, frame.area().width);
@@ -155,7 +154,7 @@ fn head_lines(snapshot: &Snapshot, width: u16) -> Vec<String> {
     wrap(&lines.join("\n"), width.into())
 }
 
-/// Returns what the newest motion rests on, how often gyro, wheels and Doppler were used, and the
+/// Returns the basis of the newest motion, how often gyro, wheels and Doppler were used, and the
 /// rates of their samples.
 fn witnesses(snapshot: &Snapshot) -> String {
     let basis = snapshot.basis.unwrap_or("no motion");
@@ -169,7 +168,7 @@ fn witnesses(snapshot: &Snapshot) -> String {
     }
 }
 
-/// Returns what a recorder lacks, if it lacks anything.
+/// Returns the losses of a recorder, if there are any.
 fn missed_by_recorder(status: &Status) -> String {
     let missed: u64 = status.processes.iter().filter_map(|it| it.missed).sum();
     match missed {

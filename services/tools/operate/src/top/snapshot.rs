@@ -28,11 +28,11 @@ pub struct Snapshot {
     pub status: Status,
     /// Scans with a pose, 1/s.
     pub rate: f64,
-    /// Scans that were published and have no pose; `None` if the source does not tell.
+    /// Scans that were published and have no pose; `None` if the source does not report them.
     pub in_flight: Option<u64>,
     /// Of the poses of the last 10 s that were seen.
     pub latency: Latency,
-    /// The basis of those motions, and that of the newest one in words.
+    /// The basis of those motions, and the basis of the newest motion in words.
     pub witnesses: WitnessCounts,
     /// Rates of the samples of gyro and wheels, in words.
     pub samples: Option<String>,
@@ -124,7 +124,6 @@ impl<'run> Snapshots<'run> {
         Ok(())
     }
 
-    /// Snapshots at the run.
     pub fn take(&mut self) -> Result<Snapshot, Failure> {
         let status = self.control.status()?;
         let now = Instant::now();
@@ -179,8 +178,8 @@ impl<'run> Snapshots<'run> {
         Ok(snapshot)
     }
 
-    /// Adds the longest time since the last snapshot to what is drawn: where poses are owed and
-    /// none comes, the time for which that lasts.
+    /// Adds the longest time since the last snapshot to the drawing: while poses are due and none
+    /// arrives, the duration of the wait.
     fn draw(&mut self, now: Instant, in_flight: Option<u64>) {
         let is_owed =
             !std::mem::take(&mut self.has_new) && in_flight.is_some_and(|scans| scans > 0);

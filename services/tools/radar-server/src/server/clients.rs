@@ -69,14 +69,13 @@ impl Clients {
         });
     }
 
-    /// Breaks all connections.
     pub fn reset(&self) {
         for client in lock(&self.all).drain(..) {
             let _ = client.stream.shutdown(Shutdown::Both);
         }
     }
 
-    /// Ends all connections when the clients have read what was sent.
+    /// Ends all connections when the clients have read all sent bytes.
     pub fn close(&self) {
         let clients: Vec<_> = lock(&self.all).drain(..).collect();
         for mut client in clients {

@@ -27,9 +27,6 @@ pub struct Group {
 
 impl Group {
     /// Opens a socket for datagrams that leave by an interface; unspecified: the system chooses it.
-    ///
-    /// # Errors
-    /// The system has no such interface.
     pub fn open(to: SocketAddrV4, interface: Ipv4Addr, faults: Faults) -> io::Result<Self> {
         Ok(Self {
             socket: UdpSocket::bind((interface, 0))?,

@@ -1,4 +1,4 @@
-//! Why a drive does not tell the clock and the axes of a gyro.
+//! Why a drive does not determine the clock and the axes of a gyro.
 
 use thiserror::Error;
 
@@ -8,10 +8,8 @@ use super::{
 };
 use crate::Estimate;
 
-/// Why nothing was found.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum GyroError {
-    /// The times of the log are not those of the scans.
     #[error(
         "with offsets of the clocks up to {MAX_LATE_S:.0} s the log covers {turns} turns of a second, and {needed} are needed: {}",
         begins(*begins_s)
@@ -24,22 +22,18 @@ pub enum GyroError {
         /// From the first scan to the first sample, s.
         begins_s: Option<f64>,
     },
-    /// Two offsets or axes fit about as well.
     #[error(
         "the gyro turns as the radar best {best}, but about as well {rival}: the drive is too straight or too short, its turns repeat, or the log is of another drive"
     )]
     Ambiguous {
         /// The best offset and axis.
         best: Candidate,
-        /// Another one.
         rival: Candidate,
     },
-    /// The least squares do not end near the peak.
     #[error(
         "the offset of the clocks is not determined: parts of the drive lead to different ones"
     )]
     Unsettled,
-    /// The drive turns too little.
     #[error(
         "the offset of the clocks is {:.2} \u{b1} {:.2} s and the scale {:.2} \u{b1} {:.2}, which is too uncertain to be used: the drive turns too little, or a clock drifts",
         late_s.value, late_s.sigma, scale.value, scale.sigma
@@ -47,26 +41,20 @@ pub enum GyroError {
     Straight {
         /// The offset, s.
         late_s: Estimate,
-        /// The scale.
         scale: Estimate,
     },
-    /// The rates have another unit.
     #[error(
         "the radar turns {scale:.4} times as much as the gyro measures: {}",
         unit(*scale)
     )]
-    Scale {
-        /// The scale.
-        scale: f64,
-    },
-    /// Drives of one gyro that contradict each other.
+    Scale { scale: f64 },
     #[error(
         "one drive says that {one} points up, another that {other} does: these are not logs of one gyro as it is mounted"
     )]
     Axes {
         /// The axis of one drive.
         one: &'static str,
-        /// The axis of another one.
+        /// The axis of the other drive.
         other: &'static str,
     },
 }
@@ -96,7 +84,6 @@ pub struct Candidate {
     pub axis: &'static str,
     /// The offset, s.
     pub late_s: f64,
-    /// The correlation.
     pub correlation: f64,
 }
 

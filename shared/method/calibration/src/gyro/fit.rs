@@ -15,7 +15,7 @@ const CONVERGED_S: f64 = 1e-6;
 const USUAL_SIGMAS: f64 = 3.0;
 /// Standard deviation over the median of the absolute deviation, of a normal distribution.
 const OF_MEDIAN: f64 = 1.4826;
-/// An offset farther than this from the peak is another one, s.
+/// An offset farther than this from the peak counts as different, s.
 const NEAR_S: f64 = 1.0;
 
 /// Scale, bias (rad/s), offset (s), drift (s/s):
@@ -37,8 +37,8 @@ pub(crate) struct Fit {
 }
 
 impl Fit {
-    /// Fits the turns around a peak; `None` if they do not determine the parameters, or another
-    /// offset than that of the peak.
+    /// Fits the turns around a peak; `None` if they do not determine the parameters, or determine a
+    /// different offset than the peak's.
     ///
     /// Speeds have no bias: without one it stays zero.
     pub(crate) fn new(
@@ -104,14 +104,13 @@ struct Problem<'a> {
     angles: &'a Angles,
     axis: usize,
     sign: f64,
-    /// The time at which the offset is that of the parameters, s.
+    /// The time when the offset equals the parameter, s.
     middle_s: f64,
     /// The offset to begin with, s.
     late_s: f64,
 }
 
 impl Problem<'_> {
-    /// Solves for the parameters that are free.
     fn solve(&self, turns: &[Turn], free: Free) -> Option<Parameters> {
         let mut at = Parameters::new(1.0, 0.0, self.late_s, 0.0);
         for _ in 0..ROUNDS {

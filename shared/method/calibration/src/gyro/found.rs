@@ -7,7 +7,7 @@ use gyre_samples::{GyroConfig, UpAxis};
 use super::GyroError;
 use crate::Estimate;
 
-/// A scale that is known less well says no more than the default does.
+/// A scale that is less certain adds nothing to the default.
 const USEFUL_SCALE_SIGMA: f64 = 0.01;
 /// A drift that differs from none by so many standard deviations is one.
 const DRIFT_SIGMAS: f64 = 3.0;
@@ -19,9 +19,9 @@ const WRONG_SIGMAS: f64 = 3.0;
 pub struct GyroCalibration {
     /// The axis that points up.
     pub up: UpAxis,
-    /// Time by which the stamps of the gyro are late, s.
+    /// The delay of the gyro's stamps, s.
     pub late_s: Estimate,
-    /// That of each half of the drive, where it tells it, s.
+    /// The delay in each half of the drive, if the half determines it, s.
     pub halves_s: [Option<f64>; 2],
     /// Change of that time, s/s.
     pub drift: Estimate,
@@ -29,17 +29,14 @@ pub struct GyroCalibration {
     pub scale: Estimate,
     /// Bias, rad/s: scaled rate less true one.
     pub bias_radps: Estimate,
-    /// Correlation of the turns with those of the radar.
+    /// Correlation of the turns with the radar's.
     pub correlation: f64,
     /// Number of turns that were compared, of a second each.
     pub turns: usize,
 }
 
 impl GyroCalibration {
-    /// Returns the mean of what drives of one gyro say, each weighted by its uncertainty.
-    ///
-    /// # Errors
-    /// Another axis points up in one of them.
+    /// Returns the mean over drives of one gyro, each weighted by its uncertainty.
     pub fn mean(&self, others: &[Self]) -> Result<Self, GyroError> {
         let mut mean = self.clone();
         for other in others {
@@ -60,12 +57,12 @@ impl GyroCalibration {
         Ok(mean)
     }
 
-    /// Returns whether the clock of the gyro drifts against that of the radar.
+    /// Returns whether the clock of the gyro drifts against the radar's.
     pub fn drifts(&self) -> bool {
         self.drift.value.abs() > DRIFT_SIGMAS * self.drift.sigma
     }
 
-    /// Returns whether the drive says more about the scale than is known of any gyro.
+    /// Returns whether the drive adds to the prior knowledge about the scale of any gyro.
     fn tells_scale(&self) -> bool {
         self.scale.sigma < USEFUL_SCALE_SIGMA
     }
@@ -104,7 +101,7 @@ impl GyroCalibration {
         )
     }
 
-    /// Returns the lines of a table, beside what is configured if a gyro is used.
+    /// Returns the lines of a table, beside the configured values if a gyro is used.
     pub fn table(&self, configured: &GyroConfig) -> String {
         let verdict = |value: f64, found: &Estimate| match configured.is_used() {
             false => String::new(),

@@ -1,4 +1,4 @@
-//! The axis and the offset at which the gyro turns as the radar.
+//! The axis and the offset that make the gyro turn as the radar.
 
 use gyre_samples::UpAxis;
 
@@ -21,7 +21,7 @@ pub(crate) const MIN_TURNS: usize = 36;
 const MIN_SHARE: f64 = 0.6;
 /// Time after which a turn is independent of another, baselines.
 const INDEPENDENT: f64 = 2.0;
-/// Logarithm of the likelihood by which the best offset must exceed any other.
+/// Least excess of the best offset's log-likelihood over any other's.
 const MIN_EVIDENCE: f64 = 5.0;
 /// Range of the delays that are searched in a run, s: buffers and stalling hosts cause them.
 const MAX_DELAY_S: f64 = 10.0;
@@ -65,8 +65,8 @@ impl Peak {
             .unwrap_or(*self)
     }
 
-    /// The logarithm of the likelihood of this peak over that of another one, by so many turns that
-    /// are independent.
+    /// The logarithm of the likelihood ratio of this peak to another, for this number of
+    /// independent turns.
     fn evidence(&self, other: &Self, independent: f64) -> f64 {
         let unexplained = |peak: &Self| (1.0 - peak.correlation.powi(2)).max(1e-12);
         0.5 * independent * (unexplained(other) / unexplained(self)).ln()
@@ -102,7 +102,7 @@ pub(crate) fn peak(turns: &[Turn], angles: &Angles) -> Result<Peak, NoPeak> {
             highest.push(peak);
         }
     }
-    // Between the steps each may be higher, and another one the best.
+    // Between the steps each may be higher, and a different one the best.
     let mut refined = highest
         .iter()
         .map(|peak| peak.refined(turns, angles))
@@ -136,8 +136,8 @@ pub(crate) fn nearest(turns: &[Turn], angles: &Angles) -> Option<Peak> {
     nearest.filter(|_| !fits(&Peak::default()))
 }
 
-/// The number of turns that are independent of each other, each as far as it turns: a straight road
-/// tells nothing, and one bend looks like any other.
+/// The number of independent turns, each weighted by its angle: a straight road determines nothing,
+/// and one bend looks like any other.
 fn independent(turns: &[Turn]) -> f64 {
     let count = turns.len() as f64;
     let mean = turns.iter().map(|turn| turn.amount).sum::<f64>() / count;
@@ -171,7 +171,7 @@ fn correlations(turns: &[Turn], angles: &Angles, late_s: f64) -> [Peak; 3] {
         Peak {
             late_s,
             axis,
-            // Of what does not turn there is none.
+            // A series that does not turn has no correlation.
             correlation: if correlation.is_finite() {
                 correlation
             } else {

@@ -21,7 +21,7 @@ fn normal(rng: &mut ChaCha8Rng) -> Vector2<f64> {
     Vector2::from_fn(|_, _| (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0)
 }
 
-/// A vehicle whose turn rate and accelerations are those of the models.
+/// A vehicle whose turn rate and accelerations match the models.
 struct Vehicle {
     position: Vector2<f64>,
     velocity: Vector2<f64>,

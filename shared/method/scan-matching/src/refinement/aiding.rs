@@ -1,5 +1,4 @@
-//! Gyro, wheels and Doppler as witnesses of a motion: against what the matches of the radar say of
-//! it.
+//! Gyro, wheels and Doppler as aiding sensors of a motion, compared with the radar's matches.
 
 use gyre_geometry::UncertainMotion;
 use gyre_samples::{DopplerConfig, DopplerWay, WheelDistance, WheelsConfig};
@@ -19,7 +18,7 @@ impl Refiner {
     pub(super) fn predict_turn(&mut self, interval_s: f64) -> Option<PredictedTurn> {
         let Some(turn) = self.turn else {
             let heading = self.state.heading.iter_mut();
-            heading.for_each(|heading| heading.wait(interval_s, &self.gyro));
+            heading.for_each(|heading| heading.propagate(interval_s, &self.gyro));
             return None;
         };
         let heading = self.state.heading.get_or_insert(Heading::new(&self.gyro));
@@ -34,18 +33,18 @@ impl Refiner {
         by_wheels.or(by_doppler)
     }
 
-    /// Returns the way since the scan before by Doppler; `None` where one of both scans does not
-    /// say its velocity.
-    pub(super) fn way_by_doppler(&self, interval_s: f64) -> Option<DopplerWay> {
+    /// Returns the displacement since the scan before by Doppler; `None` if one of both scans does
+    /// not determine its velocity.
+    pub(super) fn displacement_by_doppler(&self, interval_s: f64) -> Option<DopplerDisplacement> {
         let [earlier, later] = &self.velocities;
         let both = [earlier.as_ref()?, later.as_ref()?];
         let is_used = self.doppler.is_used();
-        is_used.then(|| self.doppler.way(both, interval_s))
+        is_used.then(|| self.doppler.displacement(both, interval_s))
     }
 
     fn predict_by_doppler(&mut self, interval_s: f64) -> Option<PredictedDistance> {
         let config = &self.doppler_as_wheels;
-        if self.way.is_some() {
+        if self.displacement.is_some() {
             self.state.doppler.get_or_insert(WheelState::new(config));
         }
         let state = self.state.doppler.as_mut()?;
@@ -59,7 +58,7 @@ impl Refiner {
         let lasting_m2 = DopplerConfig::NOISE_MPS.powi(2) * lasting;
         Some(PredictedDistance {
             by: DistanceBy::Doppler,
-            left_m: state.scale * way.left_m,
+            left_m: state.scale * displacement.left_m,
             variance_m2: predicted.variance_m2 + lasting_m2,
             side_variance_m2: predicted.side_variance_m2 + lasting_m2,
             ..predicted
@@ -99,15 +98,15 @@ impl Refiner {
             let is_known = self.state.unmatched == 0
                 && best.is_plausible
                 && self.gyro.allows_scale(heading.scale);
-            if !is_known || self.judge(&best, &turn) != Verdict::Agrees {
+            if !is_known || self.gate(&best, &turn) != Verdict::Agrees {
                 *scan = alone;
                 return best;
             }
         }
         let best = self.registration(scan).best();
-        // A match that is not plausible says nothing.
+        // An implausible match gives no evidence.
         let verdict = match best.is_plausible {
-            true => self.judge(&best, &turn),
+            true => self.gate(&best, &turn),
             false => Verdict::Agrees,
         };
         let refusal = match best.is_plausible && verdict != Verdict::Refused {
@@ -128,12 +127,12 @@ impl Refiner {
     }
 
     /// Returns the best match of a scan without the turn of the gyro, if it is certain that it
-    /// contradicts that. Otherwise the deskewed points stay those of the match before.
+    /// contradicts that. Otherwise the deskewed points stay with the match before.
     fn match_against_gyro(&mut self, alone: &Scan<'_>, turn: &PredictedTurn) -> Option<Candidate> {
         std::mem::swap(&mut self.points, &mut self.other_points);
         let best = self.registration(alone).best();
         let is_certain = best.is_plausible
-            && self.judge(&best, turn) == Verdict::Refused
+            && self.gate(&best, turn) == Verdict::Refused
             && self.is_certain(alone, &best);
         if !is_certain {
             std::mem::swap(&mut self.points, &mut self.other_points);
@@ -142,7 +141,7 @@ impl Refiner {
     }
 
     /// Returns whether a match is certain enough to refuse the gyro. The search looks for rotations
-    /// near that of the gyro alone, so it need not agree where the scan before has matched.
+    /// near the gyro's, so it need not agree if the scan before has matched.
     fn is_certain(&self, scan: &Scan<'_>, best: &Candidate) -> bool {
         let Some(registered) = self.registered(&best.alignment) else {
             return false;
@@ -152,13 +151,13 @@ impl Refiner {
             && (self.state.unmatched == 0 || self.agrees_with_search(scan, best, along))
     }
 
-    /// Returns what the heading of a match says of that of the gyro.
-    fn judge(&self, best: &Candidate, turn: &PredictedTurn) -> Verdict {
+    /// Compares the heading of a match with the gyro's.
+    fn gate(&self, best: &Candidate, turn: &PredictedTurn) -> Verdict {
         let registered = self.registered(&best.alignment);
         let both = registered.zip(self.state.heading);
         let jitter_rad = JITTER_DEG.to_radians();
         both.map_or(Verdict::Agrees, |(registered, heading)| {
-            heading.judge(&registered, &self.state.pose, turn, jitter_rad)
+            heading.gate(&registered, &self.state.pose, turn, jitter_rad)
         })
     }
 
@@ -181,7 +180,7 @@ impl Refiner {
         }
     }
 
-    /// Returns what is known of a witness of the distance, what it has measured since the scan
+    /// Returns the state of an aiding sensor of the distance, its measurement since the scan
     /// before, and its settings.
     fn distance_by(
         &self,
@@ -191,14 +190,14 @@ impl Refiner {
             DistanceBy::Wheels => (self.state.wheels.as_ref(), self.distance, &self.wheels),
             DistanceBy::Doppler => (
                 self.state.doppler.as_ref(),
-                self.way.map(|way| way.ahead),
+                self.displacement.map(|it| it.ahead),
                 &self.doppler_as_wheels,
             ),
         }
     }
 
-    /// Hands each witness of the distance what it has measured, and what was driven to a registered
-    /// pose.
+    /// Hands each aiding sensor of the distance its measurement and the distance driven to a
+    /// registered pose.
     pub(super) fn each_distance(
         &mut self,
         registered: &UncertainMotion,
@@ -206,12 +205,16 @@ impl Refiner {
     ) {
         let driven =
             [&self.wheels, &self.doppler_as_wheels].map(|config| self.driven(registered, config));
-        let way = self.way.map(|way| way.ahead);
-        let witnesses = [
+        let displacement = self.displacement.map(|it| it.ahead);
+        let sensors = [
             (&mut self.state.wheels, self.distance, &self.wheels),
-            (&mut self.state.doppler, way, &self.doppler_as_wheels),
+            (
+                &mut self.state.doppler,
+                displacement,
+                &self.doppler_as_wheels,
+            ),
         ];
-        for ((state, measured, config), driven) in witnesses.into_iter().zip(driven) {
+        for ((state, measured, config), driven) in sensors.into_iter().zip(driven) {
             if let Some(state) = state {
                 take(state, measured.as_ref(), &driven, config);
             }
@@ -219,27 +222,27 @@ impl Refiner {
     }
 
     /// Takes the predicted motion of a scan that matches nothing.
-    pub(super) fn carry(&mut self, scan: &Scan<'_>, predicted: &UncertainMotion) {
+    pub(super) fn propagate_distances(&mut self, scan: &Scan<'_>, predicted: &UncertainMotion) {
         let by = scan.step.distance.map(|it| it.by);
-        let way = self.way.map(|way| way.ahead);
-        let witnesses = [
+        let displacement = self.displacement.map(|it| it.ahead);
+        let sensors = [
             (&mut self.state.wheels, self.distance, DistanceBy::Wheels),
-            (&mut self.state.doppler, way, DistanceBy::Doppler),
+            (&mut self.state.doppler, displacement, DistanceBy::Doppler),
         ];
-        for (state, measured, witness) in witnesses {
+        for (state, measured, sensor) in sensors {
             let Some(state) = state else {
                 continue;
             };
-            match measured.filter(|_| by == Some(witness)) {
-                Some(measured) => state.carry(&measured),
-                None => state.guess(predicted.covariance[(0, 0)]),
+            match measured.filter(|_| by == Some(sensor)) {
+                Some(measured) => state.dead_reckon(&measured),
+                None => state.inflate(predicted.covariance[(0, 0)]),
             }
-            state.miss(predicted, scan.step.interval_s);
+            state.add_unmatched(predicted, scan.step.interval_s);
         }
     }
 
-    /// Returns the part along the path of the motion to a registered pose, of the axle that these
-    /// settings say.
+    /// Returns the part along the path of the motion to a registered pose, for the axle in these
+    /// settings.
     fn driven(&self, registered: &UncertainMotion, config: &WheelsConfig) -> Registered {
         let motion = UncertainMotion {
             motion: self.state.pose.inv_mul(&registered.motion),
@@ -252,7 +255,7 @@ impl Refiner {
     /// Compares a registered pose with the distances of wheels and Doppler, if there are any: they
     /// slip, or are refused, where it disagrees. Returns false if the predicted one is believed
     /// instead, since the match is not certain.
-    pub(super) fn weigh_distance(
+    pub(super) fn update_distance(
         &mut self,
         scan: &Scan<'_>,
         registered: &UncertainMotion,
@@ -262,12 +265,12 @@ impl Refiner {
             return false;
         }
         self.each_distance(registered, |state, measured, driven, config| {
-            state.weigh(measured, driven, is_certain, config);
+            state.update(measured, driven, is_certain, config);
         });
         true
     }
 
-    /// Weighs the heading of a registered pose against that of the gyro, if there is one.
+    /// Weighs the heading of a registered pose against the gyro's, if there is a gyro.
     pub(super) fn with_gyro_heading(
         &mut self,
         scan: &Scan<'_>,
@@ -277,19 +280,19 @@ impl Refiner {
             return registered;
         };
         let Some(turn) = scan.step.turn else {
-            return heading.adopt(&registered, &self.state.pose);
+            return heading.reset_to(&registered, &self.state.pose);
         };
         let drift_share = uncertainty::drift_share(self.map.len(), &self.config);
         let scale_before = heading.scale;
-        let weighed = heading.weigh(&registered, &self.state.pose, &turn, drift_share);
+        let updated = heading.update(&registered, &self.state.pose, &turn, drift_share);
         if self.gyro.allows_scale(heading.scale) {
-            return weighed;
+            return updated;
         }
         match heading.verdict {
             // Either the match or the gyro has a gross error, so the scale is not updated.
             Verdict::Doubted => heading.scale = scale_before,
             _ => heading.verdict = Verdict::Refused,
         }
-        heading.adopt(&registered, &self.state.pose)
+        heading.reset_to(&registered, &self.state.pose)
     }
 }
