@@ -7,7 +7,7 @@ use gyre_fuzz::{
     Failure, Target,
     edit::{ByteEdit, Number, edit_bytes},
 };
-use gyre_radar_server::capture::{Capture, MAGIC, MAX_RECORD_BYTES};
+use gyre_tools::radar_server::capture::{Capture, MAGIC, MAX_RECORD_BYTES};
 
 use crate::{
     recordings::folder,

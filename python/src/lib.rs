@@ -28,7 +28,7 @@ mod values;
 
 use std::path::Path;
 
-use gyre_networks::runtime::search_packages;
+use gyre_masking::networks::runtime::search_packages;
 use pyo3::{prelude::*, types::PyModule};
 
 /// The part of the package that is written in Rust.

@@ -119,7 +119,7 @@ pub fn real_data(folder: &str) -> Option<PathBuf> {
 
 /// Returns whether networks can be computed here; prints why a test is skipped.
 pub fn runtime_is_installed() -> bool {
-    let found = gyre_networks::runtime::find(None).is_ok();
+    let found = gyre_masking::networks::runtime::find(None).is_ok();
     if !found {
         println!("skipped: ONNX Runtime is not installed");
     }

@@ -9,7 +9,7 @@ use std::{
 use crate::common::{
     Run, Running, STAGES, odometry, recording, runtime_is_installed, send, undisturbed,
 };
-use gyre_networks::runtime;
+use gyre_masking::networks::runtime;
 use rustix::process::Signal;
 
 const MIDDLE: usize = recording::SCANS / 3;

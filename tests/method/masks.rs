@@ -10,7 +10,7 @@ use std::{
 
 use crate::common::{Ended, Run, folder, gyre, recording};
 use gyre_geometry::Twist;
-use gyre_networks::runtime;
+use gyre_masking::networks::runtime;
 use nalgebra::{Isometry2, Vector2};
 
 /// Pixels a side of a panel, each cell of 127 two wide; and around it.

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use gyre_datasets::read_trajectory;
-use gyre_localisation::Map;
+use gyre_slam::localisation::Map;
 
 use crate::common::{Ended, Run, gyre};
 

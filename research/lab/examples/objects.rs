@@ -19,7 +19,7 @@ use std::{env, fs};
 use gyre_datasets::{Dataset, DatasetOptions, ScanSamples};
 use gyre_evaluation::{ObjectOptions, ObjectScan, TrackedObject, TrueObject, object_errors};
 use gyre_geometry::{Pose, SparsePoint, Twist, xy_yaw};
-use gyre_networks::runtime;
+use gyre_masking::networks::runtime;
 use gyre_objects::{Object, ObjectTracker, ObjectsConfig, ObjectsKind, PlacedScan};
 use gyre_odometry::{Odometry, OdometryConfig};
 use gyre_radar::OwnedScan;

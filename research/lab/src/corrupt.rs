@@ -19,7 +19,7 @@ use std::{
 
 use clap::{Args, ValueEnum, builder::PossibleValue};
 use gyre_datasets::{Dataset, DatasetOptions};
-use gyre_masks::picture::write_grey;
+use gyre_tools::masks::picture::write_grey;
 use gyre_radar::OwnedScan;
 use gyre_terminal::{Failure, print};
 use rand::{RngCore, SeedableRng};

@@ -10,11 +10,11 @@ use std::{
     thread,
 };
 
-use gyre_batch::{Batch, Ended, List, Outcome, Settings, compute, table};
 use gyre_configuration::paths::shipped;
 use gyre_results::{Content, Out};
 use gyre_stage::wake::Signals;
 use gyre_terminal::{Failure, INTERRUPTED, own, print};
+use gyre_tools::batch::{Batch, Ended, List, Outcome, Settings, compute, table};
 
 use crate::cli::BatchArguments;
 

@@ -13,21 +13,21 @@ mod watch;
 use std::{io::IsTerminal, num::NonZeroUsize, path::PathBuf};
 
 use clap::{Args, Parser, Subcommand};
-use gyre_doctor::DoctorArguments;
-use gyre_export::ExportArguments;
-use gyre_inputs::{ConfigArguments, Given, InputError, Inputs};
-use gyre_maps::{localise::LocaliseArguments, map::MapArguments};
-use gyre_masks::MasksArguments;
-use gyre_new::NewArguments;
-use gyre_operate::{
-    EchoArguments, LogsArguments, PsArguments, RestartArguments, RunChoice, SwapArguments,
-    TopArguments,
-};
-use gyre_radar_server::RadarServerArguments;
-use gyre_report::ReportArguments;
 use gyre_results::{Form, evaluate::EvaluateArguments};
 use gyre_run::Rate;
 use gyre_simulator::OutputFormat;
+use gyre_terminal::inputs::{ConfigArguments, Given, InputError, Inputs};
+use gyre_tools::doctor::DoctorArguments;
+use gyre_tools::export::ExportArguments;
+use gyre_tools::maps::{localise::LocaliseArguments, map::MapArguments};
+use gyre_tools::masks::MasksArguments;
+use gyre_tools::new::NewArguments;
+use gyre_tools::operate::{
+    EchoArguments, LogsArguments, PsArguments, RestartArguments, RunChoice, SwapArguments,
+    TopArguments,
+};
+use gyre_tools::radar_server::RadarServerArguments;
+use gyre_tools::report::ReportArguments;
 
 pub use batch::{BatchArguments, BatchDriveArguments};
 pub use conformance::ConformanceArguments;
@@ -61,7 +61,7 @@ pub enum Command {
     /// continues after an interruption.
     Batch(BatchArguments),
     /// Compute a drive of a batch (what `gyre batch` starts).
-    #[command(hide = true, name = gyre_batch::COMMAND)]
+    #[command(hide = true, name = gyre_tools::batch::COMMAND)]
     BatchDrive(BatchDriveArguments),
     /// Run the whole pipeline in the background. Returns when all its stages are there.
     Up(RunArguments),
@@ -103,7 +103,7 @@ pub enum Command {
     /// load.
     Stress(StressArguments),
     /// Load the machine or take part in a measurement (what `gyre stress` starts).
-    #[command(hide = true, name = gyre_stress::helper::COMMAND)]
+    #[command(hide = true, name = gyre_tools::stress::helper::COMMAND)]
     StressHelper {
         /// The process that has started it, the work, and what that needs.
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]

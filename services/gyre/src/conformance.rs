@@ -3,14 +3,14 @@
 use std::{path::Path, process::ExitCode};
 
 use gyre_configuration::{Configuration, describe_masks, with_stored_options};
-use gyre_conformance::{Candidate, Demands, InputScans, ProgramError, Report, Test, check};
-use gyre_inputs::Inputs;
 use gyre_messages::StageId;
 use gyre_odometry::SearchKind;
 use gyre_run::Scheduling;
 use gyre_scan_matching::RefinementKind;
 use gyre_stage::{Manifest, wake::Signals};
+use gyre_terminal::inputs::Inputs;
 use gyre_terminal::{Failure, INTERRUPTED, own, print, seconds, words};
+use gyre_tools::conformance::{Candidate, Demands, InputScans, ProgramError, Report, Test, check};
 
 use crate::{
     cli::{ConformanceArguments, RunArguments},

@@ -4,15 +4,15 @@ use std::{io, net::UdpSocket, path::Path, time::Duration};
 
 use gyre_configuration::{Configuration, Played, gnss_log, open};
 use gyre_datasets::{DEFAULT_TURN_NS, Dataset, Fingerprint, Format, turn_ns};
-use gyre_live_radar::{Settings, Sizes};
-use gyre_maps::localise::searched_map;
 use gyre_masking::Masker;
 use gyre_messages::{Footprint, Limits, StageId, Window};
-use gyre_radar_replay::{Listing, Player};
 use gyre_run::{MOST_OPEN_FILES, PlayedFrom, Side, SourceKind};
 use gyre_samples::{GyroKind, MAX_SAMPLES, WheelsKind};
 use gyre_stage::run::free_shared_memory;
+use gyre_stages::live_radar::{Settings, Sizes};
+use gyre_stages::radar_replay::{Listing, Player};
 use gyre_terminal::{Failure, print};
+use gyre_tools::maps::localise::searched_map;
 use rustix::process::{Resource, getrlimit};
 use thiserror::Error;
 
@@ -98,7 +98,7 @@ pub fn check(configuration: &Configuration, ask: &mut Ask<'_>) -> Result<Preflig
         &configuration.odometry.masking,
     )?;
     if configuration.objects.is_on() {
-        gyre_objects_follower::tracker(&configuration.objects, &configuration.odometry.masking)?;
+        gyre_followers::objects::tracker(&configuration.objects, &configuration.odometry.masking)?;
     }
     check_gnss(configuration)?;
     if configuration.slam.is_localised() {
@@ -259,7 +259,9 @@ pub fn ask(configuration: &Configuration) -> Result<Sizes, Failure> {
     let (source, options) = (&configuration.source, &configuration.dataset);
     match source.kind {
         SourceKind::Ros2 => ros2::ask(source, options),
-        _ => Ok(gyre_live_radar::ask(&Settings::of(source, options)?)?),
+        _ => Ok(gyre_stages::live_radar::ask(&Settings::of(
+            source, options,
+        )?)?),
     }
 }
 

@@ -14,7 +14,6 @@ use std::{
 use gyre_configuration::{Configuration, describe_masks, describe_objects, with_stored_options};
 use gyre_datasets::GnssLog;
 use gyre_messages::StageId;
-use gyre_operate::detach_if_asked;
 use gyre_recording::{copied_fixes, received_fixes};
 use gyre_results::{Form, Identity, Out, Programs, Results, SIMULATED_TRUTH, Session};
 use gyre_run::{Ending, Mode};
@@ -28,6 +27,7 @@ use gyre_stage::{
 use gyre_storage as storage;
 use gyre_supervise::{Plan, SuperviseError, supervise};
 use gyre_terminal::{Failure, INTERRUPTED, own, print};
+use gyre_tools::operate::detach_if_asked;
 
 use crate::{
     cli::RunArguments,

@@ -3,13 +3,13 @@
 
 use std::process::ExitCode;
 
-use gyre_conformance::shadow::{self, Options, STAGES};
 use gyre_messages::{FollowerId, Footprint, StageId, Window};
-use gyre_operate::chosen;
 use gyre_results::{Content, Out};
 use gyre_run::{Scheduling, StageConfig};
 use gyre_stage::{control::Control, observer::ObservedRun};
 use gyre_terminal::{Failure, own, print, seconds, words};
+use gyre_tools::conformance::shadow::{self, Options, STAGES};
+use gyre_tools::operate::chosen;
 
 use crate::{cli::ShadowArguments, preflight};
 

@@ -18,7 +18,7 @@ pub fn simulate(arguments: &SimulateArguments) -> Result<ExitCode, Failure> {
     Content::SIMULATION.require_place(&arguments.out)?;
     let overrides = overrides(arguments)?;
     let configuration = match &arguments.configuration {
-        Some(named) => gyre_inputs::configuration(named, &overrides)?,
+        Some(named) => gyre_terminal::inputs::configuration(named, &overrides)?,
         None => Configuration::of_overrides(&overrides)?,
     };
     let started = Instant::now();

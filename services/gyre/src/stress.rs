@@ -10,10 +10,10 @@ use gyre_results::{
 };
 use gyre_run::Scenario;
 use gyre_scan_matching::RefinementKind;
-use gyre_stress::{
+use gyre_terminal::{Failure, own, print};
+use gyre_tools::stress::{
     Options, Others, Provenance, Report, TestedPipeline, report::Verdict, witness_fault,
 };
-use gyre_terminal::{Failure, own, print};
 
 use crate::{
     cli::{RunArguments, StressArguments},
@@ -53,7 +53,7 @@ pub fn stress(arguments: &StressArguments) -> Result<ExitCode, Failure> {
 
 /// Does the work of a helper process.
 pub fn help(arguments: &[String]) -> Result<ExitCode, Failure> {
-    gyre_stress::helper::help(&own(), arguments)?;
+    gyre_tools::stress::helper::help(&own(), arguments)?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -108,7 +108,7 @@ fn carry_out(arguments: &StressArguments) -> Result<Report, Failure> {
     let mut printed = Ok(());
     let judged = &mut |verdict: &str| printed = print::line(verdict);
     let note = &mut |line: &str| print::note(line);
-    let mut report = gyre_stress::stress(&tested, &options, note, judged);
+    let mut report = gyre_tools::stress::stress(&tested, &options, note, judged);
     report.provenance = provenance;
     report.write(out.path())?;
     printed?;

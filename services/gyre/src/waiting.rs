@@ -8,13 +8,13 @@ use std::{
 };
 
 use gyre_configuration::Configuration;
-use gyre_live_radar::{AskError, Sizes};
 use gyre_results::Out;
 use gyre_stage::{
     control::Status,
     run::{RootError, RunRoot},
     wake::Signals,
 };
+use gyre_stages::live_radar::{AskError, Sizes};
 use gyre_supervise::wait;
 use gyre_terminal::{Failure, print};
 

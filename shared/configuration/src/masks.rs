@@ -2,9 +2,9 @@
 
 use std::error::Error;
 
+use gyre_masking::networks::runtime::{INSTALL, RuntimeError};
 use gyre_masking::{Library, MaskKind, MaskingConfig, model::Card};
 use gyre_messages::StageId;
-use gyre_networks::runtime::{INSTALL, RuntimeError};
 use gyre_odometry::OdometryConfig;
 
 use crate::configuration::Configuration;

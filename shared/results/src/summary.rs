@@ -9,9 +9,9 @@ mod slam;
 use std::{collections::BTreeMap, fmt, path::Path, time::Duration};
 
 use gyre_configuration::Configuration;
-use gyre_latency::{Latency, Percentiles};
 use gyre_masking::{Backend, MaskKind, MaskingConfig};
 use gyre_messages::{Footprint, StageId};
+use gyre_run::latency::{Latency, Percentiles};
 use gyre_run::{Ending, Mode, Rate, Report, StageCounters, Swapped};
 use serde::Serialize;
 use thiserror::Error;

@@ -2,6 +2,7 @@
 
 mod command;
 mod failure;
+pub mod inputs;
 pub mod print;
 mod program;
 mod wrap;

@@ -7,7 +7,7 @@ use std::{env, fs};
 use gyre_datasets::write_tum;
 use gyre_estimation::{Constraint, G2o};
 use gyre_geometry::pose;
-use gyre_localisation::{DriveSearch, Localiser, LocaliserOptions, Map};
+use gyre_slam::localisation::{DriveSearch, Localiser, LocaliserOptions, Map};
 use gyre_odometry::{Odometry, OdometryConfig};
 use gyre_radar::{OwnedScan, Trajectory};
 use gyre_worlds::drive::{DriveConfig, DriveKind};

@@ -8,11 +8,11 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_batch::{End, Outcome};
 use gyre_configuration::{Configuration, paths::shipped};
 use gyre_results::{Form, Holds, Identity, Out, OutError, Problem, SUMMARY};
 use gyre_stage::run::end_with;
 use gyre_terminal::{Failure, INTERRUPTED, print};
+use gyre_tools::batch::{End, Outcome};
 use rustix::process::Signal;
 
 use crate::{

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::{Args, builder::PossibleValuesParser};
-use gyre_inputs::Inputs;
 use gyre_messages::StageId;
+use gyre_terminal::inputs::Inputs;
 
 /// The arguments of `gyre conformance`.
 #[derive(Debug, Args)]

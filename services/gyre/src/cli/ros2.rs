@@ -1,8 +1,8 @@
 //! The arguments of `gyre ros2`.
 
 use clap::Args;
-use gyre_export::FrameArguments;
-use gyre_operate::RunChoice;
+use gyre_tools::export::FrameArguments;
+use gyre_tools::operate::RunChoice;
 
 /// The arguments of `gyre ros2`.
 #[derive(Debug, Args)]

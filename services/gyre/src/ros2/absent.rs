@@ -3,9 +3,9 @@
 use std::process::ExitCode;
 
 use gyre_datasets::DatasetOptions;
-use gyre_live_radar::Sizes;
 use gyre_run::SourceConfig;
 use gyre_stage::{Launch, StageCounters, StageError};
+use gyre_stages::live_radar::Sizes;
 use gyre_terminal::Failure;
 
 use crate::{cli::Ros2Arguments, features::Absent};

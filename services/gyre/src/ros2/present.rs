@@ -4,7 +4,6 @@ use std::{path::Path, process::ExitCode};
 
 use gyre_configuration::Configuration;
 use gyre_datasets::DatasetOptions;
-use gyre_live_radar::Sizes;
 use gyre_results::{absolute, map_options};
 use gyre_ros2_bridge::{
     Bridge, MapSettings, Settings,
@@ -13,6 +12,7 @@ use gyre_ros2_bridge::{
 use gyre_ros2_messages::Domain;
 use gyre_run::SourceConfig;
 use gyre_stage::{Launch, StageCounters, StageError, observer::ObservedRun, wake::Signals};
+use gyre_stages::live_radar::Sizes;
 use gyre_terminal::{Failure, print};
 
 use crate::cli::Ros2Arguments;

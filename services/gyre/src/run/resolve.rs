@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use gyre_configuration::{Configuration, calibration, strict::path_value};
-use gyre_inputs::Given;
 use gyre_results::absolute;
 use gyre_run::PlayedFrom;
+use gyre_terminal::inputs::Given;
 use gyre_terminal::{Failure, print};
 
 use super::results_folder;
@@ -22,7 +22,7 @@ pub fn resolve(arguments: &RunArguments) -> Result<Configuration, Failure> {
     }
     let overrides = overrides(arguments, &given)?;
     let mut configuration = match (&given.configuration, &given.data) {
-        (Some(named), _) => gyre_inputs::configuration(named, &overrides)?,
+        (Some(named), _) => gyre_terminal::inputs::configuration(named, &overrides)?,
         (None, Some(data)) => {
             let (configuration, sentence) = Configuration::of_recording(data, &overrides)?;
             print::note(sentence);

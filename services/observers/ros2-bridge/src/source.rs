@@ -12,15 +12,15 @@ use std::time::Duration;
 
 use gyre_colossus::Constants;
 use gyre_datasets::DatasetOptions;
-use gyre_live_radar::{encoder_counts, silence};
 use gyre_ros2_messages::{Domain, DomainError};
 use gyre_run::SourceConfig;
 use gyre_samples::{GnssConfig, GnssKind, GyroConfig, GyroKind, WheelsConfig, WheelsKind};
 use gyre_stage::{Launch, StageCounters, StageError, source};
+use gyre_stages::live_radar::{encoder_counts, silence};
 
 pub use ask::{AskError, ask};
 pub use fixes::FixSettings;
-pub use gyre_live_radar::Sizes;
+pub use gyre_stages::live_radar::Sizes;
 
 /// The topic of an inertial sensor by REP-145.
 const IMU: &str = "/imu/data";

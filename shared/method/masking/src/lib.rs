@@ -15,6 +15,7 @@ mod learned;
 mod library;
 pub mod model;
 pub mod network;
+pub mod networks;
 mod points;
 mod resolve;
 mod sweep;

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use gyre_networks::runtime::{self, RuntimeError};
+use crate::networks::runtime::{self, RuntimeError};
 
 use crate::{Backend, MaskingConfig, Provider};
 

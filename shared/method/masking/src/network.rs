@@ -13,11 +13,11 @@ use gyre_simd::simd;
 use ndarray::{Array3, ArrayView3, ArrayViewMut3, Axis};
 use thiserror::Error;
 
+use crate::networks::runtime::RuntimeError;
 use crate::{
     Backend, Library, MaskingConfig, Provider,
     model::{Model, ModelError},
 };
-use gyre_networks::runtime::RuntimeError;
 use integers::Integers;
 use onnx_runtime::OnnxRuntime;
 use rten::Rten;

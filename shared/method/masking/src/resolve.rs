@@ -1,6 +1,6 @@
 //! Resolves the inputs of a network.
 
-use gyre_networks::runtime::RuntimeError;
+use crate::networks::runtime::RuntimeError;
 
 use crate::{Library, MaskKind, MaskingConfig, model::Card, network::NetworkError};
 

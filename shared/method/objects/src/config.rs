@@ -1,6 +1,6 @@
 //! The section `[objects]` of a configuration.
 
-use gyre_networks::PlanesError;
+use gyre_masking::networks::PlanesError;
 use serde::{Deserialize, Serialize};
 
 use crate::track::MAX_SCORE;

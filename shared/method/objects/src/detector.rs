@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use std::path::Path;
 
 use gyre_geometry::{Pose, SparsePoint};
-use gyre_networks::PlanesNetwork;
+use gyre_masking::networks::PlanesNetwork;
 use nalgebra::{Matrix2, Point2, Vector2};
 
 use crate::raster::{Memory, PLANES, SIDE};

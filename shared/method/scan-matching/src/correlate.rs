@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use gyre_fourier::{Complex32, FftDirection};
+use gyre_radar::fourier::{Complex32, FftDirection};
 
 use crate::fft::{BLOCK, Columns, RowPass, Transform};
 use crate::kernels;

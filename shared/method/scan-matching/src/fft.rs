@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 
-use gyre_fourier::{Complex32, ComplexToReal, Fft, FftDirection};
+use gyre_radar::fourier::{Complex32, ComplexToReal, Fft, FftDirection};
 
 use crate::kernels;
 
@@ -112,7 +112,7 @@ pub(crate) struct Transform {
 
 impl Transform {
     pub fn new(size: usize, direction: FftDirection) -> Self {
-        let fft = gyre_fourier::complex(size, direction);
+        let fft = gyre_radar::fourier::complex(size, direction);
         let scratch = fft
             .get_inplace_scratch_len()
             .max(fft.get_immutable_scratch_len());
@@ -278,7 +278,7 @@ pub(crate) struct PairSpectrum {
 impl PairSpectrum {
     /// Transforms of `size` (even) a side.
     pub fn new(size: usize) -> Self {
-        let inverse_row = gyre_fourier::real_inverse(size);
+        let inverse_row = gyre_radar::fourier::real_inverse(size);
         Self {
             size,
             rows: RowPass::new(size),

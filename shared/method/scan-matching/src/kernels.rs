@@ -5,7 +5,7 @@
 // position is clamped to the image right before it is read.
 #![allow(unsafe_code)]
 
-use gyre_fourier::Complex32;
+use gyre_radar::fourier::Complex32;
 use gyre_simd::simd;
 
 /// Number of partial sums, so that a sum can be vectorised.

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 
-use gyre_fourier::{Complex32, ComplexToReal, RealToComplex};
+use gyre_radar::fourier::{Complex32, ComplexToReal, RealToComplex};
 use ndarray::ArrayView2;
 use serde::{Deserialize, Serialize};
 
@@ -83,8 +83,8 @@ impl RotationSearch {
         let (angles, harmonics) = (config.angles, config.angles / 2 + 1);
         let grid = PolarGrid::new(n, size, config);
         let (forward, inverse) = (
-            gyre_fourier::real(angles),
-            gyre_fourier::real_inverse(angles),
+            gyre_radar::fourier::real(angles),
+            gyre_radar::fourier::real_inverse(angles),
         );
         let scratch = forward.get_scratch_len().max(inverse.get_scratch_len());
         let step = PI / angles as f64;

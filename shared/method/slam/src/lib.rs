@@ -20,6 +20,7 @@ mod exact;
 mod fixes;
 mod keyframe;
 mod keyframe_builder;
+pub mod localisation;
 mod loops;
 mod place;
 mod records;

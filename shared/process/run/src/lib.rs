@@ -9,6 +9,7 @@
 //! configurations, need neither the mathematics nor the transport.
 
 mod budget;
+pub mod latency;
 mod link;
 mod played_fault;
 mod played_from;

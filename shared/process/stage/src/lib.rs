@@ -43,6 +43,7 @@ mod log_id;
 mod manifest;
 pub mod observer;
 mod outlet;
+pub mod python_function;
 pub mod reader;
 pub mod relay;
 pub mod remote_progress;

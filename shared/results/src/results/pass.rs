@@ -1,9 +1,9 @@
 //! One pass over the journal.
 
 use gyre_datasets::ground_truth::write_tum_pose;
-use gyre_latency::LatencyMeter;
 use gyre_messages::{Item, PoseHeader, flag};
 use gyre_radar::Trajectory;
+use gyre_run::latency::LatencyMeter;
 use gyre_storage::Draft;
 use gyre_terminal::Failure;
 

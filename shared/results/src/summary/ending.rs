@@ -131,7 +131,7 @@ mod tests {
     use std::time::Duration;
 
     use gyre_configuration::Configuration;
-    use gyre_latency::{Latency, Percentiles};
+    use gyre_run::latency::{Latency, Percentiles};
 
     use super::*;
     use crate::summary::{

@@ -6,7 +6,7 @@ use std::{
 };
 
 use gyre_colossus::{Configuration, SweepAssembler};
-use gyre_live_radar::Sizes;
+use gyre_stages::live_radar::Sizes;
 use thiserror::Error;
 
 use super::{

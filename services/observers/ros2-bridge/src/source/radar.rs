@@ -6,7 +6,6 @@ use std::{
     time::{Duration, Instant},
 };
 
-use gyre_live_radar::{Intake, NoScans};
 use gyre_messages::{ScanHeader, StageId};
 use gyre_ros2_messages::navtech_msgs::RadarBScanMsg;
 use gyre_samples::{Sample, SampleKind};
@@ -14,6 +13,7 @@ use gyre_stage::{
     StageError, clock,
     source::{Arrival, Received, Sensor},
 };
+use gyre_stages::live_radar::{Intake, NoScans};
 use ros2_client::Gid;
 
 use super::{

@@ -1,6 +1,6 @@
 //! The descriptor of a place.
 
-use gyre_fourier::Complex32;
+use gyre_radar::fourier::Complex32;
 use gyre_scan_matching::{Magnitude, PolarSpectrum, RotationConfig, RotationSearch, Submap, Taper};
 use ndarray::{Array2, ArrayView2, ArrayView3};
 

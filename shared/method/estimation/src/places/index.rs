@@ -3,8 +3,8 @@
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use gyre_fourier::{Complex32, ComplexToReal};
 use gyre_geometry::wrap_angle;
+use gyre_radar::fourier::{Complex32, ComplexToReal};
 use gyre_scan_matching::{Peak, line_peak};
 use gyre_simd::simd;
 
@@ -184,7 +184,7 @@ impl PlaceIndex {
 
 impl Query {
     fn new(places: usize) -> Self {
-        let inverse = gyre_fourier::real_inverse(ANGLES);
+        let inverse = gyre_radar::fourier::real_inverse(ANGLES);
         Self {
             distances: Vec::with_capacity(places),
             cross: inverse.make_input_vec(),

@@ -6,7 +6,7 @@ use std::{
     sync::Arc,
 };
 
-use gyre_networks::one_line;
+use crate::networks::one_line;
 use ndarray::{Array3, ArrayView3, ArrayViewMut3};
 use rten::{ModelOptions, RunOptions, ThreadPool, Value};
 use rten_onnx::onnx::{

@@ -6,8 +6,8 @@
 use std::path::{Path, PathBuf};
 
 use gyre_geometry::Twist;
+use gyre_masking::networks::runtime;
 use gyre_masking::{Backend, MaskKind, Masker, MaskingConfig, Sweep};
-use gyre_networks::runtime;
 use gyre_radar::{
     OwnedScan, PointsConfig, RasterConfig, ScanLimits, Sense, SweepGeometry, scan::flag,
 };
