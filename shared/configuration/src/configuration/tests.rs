@@ -90,7 +90,7 @@ fn settings_without_effect_are_named() {
         &["gyro.kind=auto", "gyro.file=a.csv"][..],
         &["wheels.late_s=1"],
         &["gnss.listen=127.0.0.1:1"],
-        &["objects.lost_s=9"],
+        &["objects.even_likely=0.5"],
         &["masking.kind=none", "masking.threshold=60"],
     ] {
         assert_eq!(named(idle).len(), 1, "{idle:?}");

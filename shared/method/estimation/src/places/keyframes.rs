@@ -13,8 +13,8 @@ pub const SUBMAP_REACH_M: f64 = 10.0;
 const DISTANCE_M: f64 = 2.0;
 const ANGLE_DEG: f64 = 15.0;
 
-/// Selects the scans that become keyframes, and measures the path along them. The first scan becomes
-/// one.
+/// Selects the scans that become keyframes, and measures the path along them. The first scan
+/// becomes one.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct KeyframeSelector {
     last: Option<(Pose, f64)>,
