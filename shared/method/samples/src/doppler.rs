@@ -108,7 +108,7 @@ impl DopplerConfig {
         let by_change = (dx * dx + dy * dy) / (4.0 * PI).powi(2);
         let variance =
             |of_scans: f64| (of_scans + by_change + Self::NOISE_MPS.powi(2)) * interval_s.powi(2);
-        DopplerWay {
+        DopplerDisplacement {
             ahead: WheelDistance {
                 distance_m: ahead * interval_s,
                 variance_m2: variance(mean(|it| it.covariance[0])),

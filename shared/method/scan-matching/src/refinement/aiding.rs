@@ -1,7 +1,7 @@
 //! Gyro, wheels and Doppler as aiding sensors of a motion, compared with the radar's matches.
 
 use gyre_geometry::UncertainMotion;
-use gyre_samples::{DopplerConfig, DopplerWay, WheelDistance, WheelsConfig};
+use gyre_samples::{DopplerConfig, DopplerDisplacement, WheelDistance, WheelsConfig};
 
 use super::{
     Heading, Refiner, WheelState,
@@ -49,11 +49,11 @@ impl Refiner {
         }
         let state = self.state.doppler.as_mut()?;
         state.wait(interval_s);
-        let way = self.way?;
-        let predicted = state.predict(&way.ahead, config)?;
+        let displacement = self.displacement?;
+        let predicted = state.predict(&displacement.ahead, config)?;
         // The error that lasts is that of all motions since a match has told the place: the
-        // variance of one motion alone is that of the way.
-        let before_s = (state.untold_s - interval_s).max(0.0);
+        // variance of one motion is the variance of the displacement.
+        let before_s = (state.since_place_s - interval_s).max(0.0);
         let lasting = grown(interval_s, before_s) - interval_s.powi(2);
         let lasting_m2 = DopplerConfig::NOISE_MPS.powi(2) * lasting;
         Some(PredictedDistance {

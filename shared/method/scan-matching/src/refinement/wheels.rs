@@ -152,7 +152,7 @@ impl WheelState {
     /// Lets time pass: the scale changes.
     pub(super) fn wait(&mut self, time_s: f64) {
         self.covariance[(1, 1)] += SCALE_WALK_PER_SQRT_S.powi(2) * time_s;
-        self.untold_s += time_s;
+        self.since_place_s += time_s;
     }
 
     /// Predicts the distance of the next scan; `None` while the wheels slip.
