@@ -30,7 +30,7 @@ fn evaluation(configuration: &str, seed: u32) -> Value {
 }
 
 #[test]
-#[ignore = "nightly: whole drives"]
+#[ignore = ".ci/nightly: whole drives"]
 fn the_shipped_configuration_ends_within_a_hundredth_and_the_papers_does_not_come_near() {
     let (mut shipped_m, mut papers_m) = (0.0, 0.0);
     for seed in SEEDS {
@@ -71,7 +71,7 @@ fn end_error_m(estimate: &Path, truth: &Path) -> f64 {
 }
 
 #[test]
-#[ignore = "nightly: a drive of two rounds"]
+#[ignore = ".ci/nightly: a drive of two rounds"]
 fn a_closed_loop_lowers_the_final_error_to_a_fifth() {
     let configs = Path::new(crate::PROJECT).join("configs");
     let run = Run::of_file(&configs.join("k2pi-loop.toml")).rate("max");

@@ -9,4 +9,4 @@ mod masks;
 mod pipeline;
 mod real_scans;
 mod refinement;
-mod standstill;
+pub mod standstill;

@@ -35,7 +35,7 @@ fn count(report: &Value, kind: &str) -> u64 {
 }
 
 #[test]
-#[ignore = "nightly: two drives through a town"]
+#[ignore = ".ci/nightly: two drives through a town"]
 fn parked_cars_that_have_come_and_gone_are_reported_and_a_drive_has_not_changed_since_itself() {
     let (first, second) = (drive(3, 1, None), drive(3, 9, Some(5)));
     let out = second.folder().join("changes");
@@ -88,7 +88,7 @@ fn a_drive_that_cannot_be_compared_is_refused() {
 }
 
 #[test]
-#[ignore = "nightly: a drive in another town"]
+#[ignore = ".ci/nightly: a drive in another town"]
 fn drives_through_two_towns_are_refused() {
     let (first, elsewhere) = (drive(3, 1, None), drive(5, 9, None));
     let out = elsewhere.folder().join("changes");

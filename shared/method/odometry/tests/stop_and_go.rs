@@ -124,7 +124,7 @@ fn a_vehicle_that_stands_creeps_and_drives_off_is_followed() {
 
 /// The table of `docs/results.md`: with `--ignored --nocapture`, in a release build.
 #[test]
-#[ignore = "renders 680 scans of each radar, twice"]
+#[ignore = ".ci/nightly: renders 680 scans of each radar, twice"]
 fn stop_and_go_of_several_radars() {
     println!(
         "| radar | held | path | while standing | while creeping | `stationary` standing, moving |"
