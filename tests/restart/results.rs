@@ -3,7 +3,7 @@
 
 use std::{fs, os::unix::fs::symlink, path::Path, process::Command};
 
-use crate::common::{Ended, Run, gyre, recording, undisturbed};
+use crate::common::{Ended, Run, gyre, recording, undisturbed, wrapped};
 use rustix::process::Signal;
 
 const MODERATE: &str = "6";
@@ -282,45 +282,29 @@ fn a_journal_that_is_removed_during_the_run_ends_it_and_is_named() {
     }
 }
 
-/// The paths to a folder of results, of which the last ones need a mount.
 #[test]
 fn a_second_run_with_the_same_results_is_refused_whatever_it_calls_them() {
     let run = Run::of_recording().rate("2");
     let mut running = run.start();
     running.await_poses(1);
-    let place = run.folder().join("place");
-    symlink(run.out(), &place).unwrap();
+    let [link, mounted] = ["link", "mounted"].map(|name| run.folder().join(name));
+    symlink(run.out(), &link).unwrap();
+    fs::create_dir(&mounted).unwrap();
     let named = |out: &Path| run.clone().into(out).command();
-    let same = run.command();
-    let script = |script: &str| {
-        let mut command = Command::new("unshare");
-        command.args(["--mount", "sh", "-c", script, "sh"]);
-        command.arg(same.get_program()).args(same.get_args());
-        command
+    let unshared = |mount: &str, run: &Command| {
+        let script = format!("mount {mount} && exec \"$@\"");
+        wrapped(&["unshare", "--mount", "sh", "-c", &script, "sh"], run)
     };
-    let mounted = format!(
-        "mkdir '{0}/mounted' && mount --bind '{1}' '{0}/mounted' && exec \"$@\" --out '{0}/mounted'",
-        run.folder().display(),
-        run.out().display(),
-    );
     let mut seconds = vec![
         run.command(),
-        named(&place),
+        named(&link),
         named(&run.out().join("log/..")),
     ];
-    if script("true").status().is_ok_and(|it| it.success()) {
-        seconds.push(script("mount -t tmpfs tmpfs /dev/shm && exec \"$@\""));
-        let mut command = Command::new("unshare");
-        command.args(["--mount", "sh", "-c", &mounted, "sh"]);
-        let without_out = Run::of_recording().command();
-        let arguments: Vec<_> = without_out
-            .get_args()
-            .take_while(|it| *it != "--out")
-            .collect();
-        seconds.push({
-            command.arg(without_out.get_program()).args(arguments);
-            command
-        });
+    let permitted = unshared("-t tmpfs tmpfs /mnt", &Command::new("true")).status();
+    if permitted.is_ok_and(|it| it.success()) {
+        let bound = format!("--bind '{}' '{}'", run.out().display(), mounted.display());
+        seconds.push(unshared(&bound, &named(&mounted)));
+        seconds.push(unshared("-t tmpfs tmpfs /dev/shm", &run.command()));
     } else {
         println!("skipped: a mount namespace of its own is not permitted here");
     }
