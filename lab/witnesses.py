@@ -4,7 +4,7 @@
     gyre run radiate $GYRE_DATA/radiate-2019-02-12 --out out/radiate
     lab/witnesses.py out/radiate $GYRE_DATA
 
-Prints the rows of the table in docs/covariance.md: RMS over each of four times of what the truth's heading turns more than the gyro, what
+Prints the rows of the table in research/notes/covariance.md: RMS over each of four times of what the truth's heading turns more than the gyro, what
 odometry's turns more than the truth, and how far the receiver's position moves along an axis while the vehicle of `-standing` stands
 (3.5 to 19 s). The gyro's bias is that of the whole drive.
 """

@@ -15,17 +15,11 @@ def blocks(guide: str) -> str:
     return "\n".join(found)
 
 
-def test_the_blocks_of_the_guide_run(recording: Path, tmp_path: Path) -> None:
-    (tmp_path / "recording").symlink_to(recording)
-    done = python("-c", blocks("python.md"), cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-
-
-def test_the_tutorial_runs_and_its_motions_are_those_of_a_run(around: Path, tmp_path: Path) -> None:
+def test_the_guide_runs_and_its_motions_are_those_of_a_run(around: Path, tmp_path: Path) -> None:
     (tmp_path / "recording").symlink_to(around)
     (tmp_path / "models").symlink_to(ROOT / "models")
     (tmp_path / "own").mkdir()  # of an earlier execution
-    done = python("-c", blocks("python-tutorial.md"), cwd=tmp_path, MPLBACKEND="agg")
+    done = python("-c", blocks("python.md"), cwd=tmp_path, MPLBACKEND="agg")
     assert done.returncode == 0, done.stderr
     assert "64 of 64 scans" in done.stdout and "with loops" in done.stdout
     assert (tmp_path / "scan.png").stat().st_size > 10_000

@@ -113,7 +113,7 @@ fn masks_help_on_scans_of_a_kind_that_they_have_never_seen() {
             1.0,
         ),
         // Where loops close the truth differs from what the radar sees twice by 3.5 m, so that 0.1
-        // m of ATE say nothing of a refined drive: docs/decisions.md.
+        // m of ATE do not rank refined drives: docs/results.md.
         (
             "refined",
             run("radiate.toml"),

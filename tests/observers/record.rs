@@ -403,7 +403,7 @@ fn a_recording_without_the_topic_that_is_played_is_refused_with_how_to_record_it
         "record.topics",
         "without --from",
     ]);
-    // As in docs/record.md.
+    // As in docs/watch.md.
     let run = recorded(&played()).set("record.topics=['scan','masked','pose']");
     let odometry = run.complete();
     assert_eq!(replay(&file(&run), &["--from", "masked"]), odometry);

@@ -87,7 +87,7 @@ pub enum Command {
         /// radar-replay, masking, rotation-search, translation-search, joint-search, refinement or
         /// pose-integration.
         name: String,
-        /// File of Python with a function that does the work: see docs/python-stage.md.
+        /// File of Python with a function that does the work: see docs/replace-a-stage.md.
         #[arg(long, value_name = "FILE")]
         python: Option<PathBuf>,
     },

@@ -16,7 +16,7 @@ pub struct ConformanceArguments {
     /// Default: the command of the stage in the configuration, else Gyre's own stage.
     #[arg(long, value_name = "COMMAND")]
     pub command: Option<String>,
-    /// File of Python with a function in the place of a program: see docs/python-stage.md.
+    /// File of Python with a function in the place of a program: see docs/replace-a-stage.md.
     #[arg(long, value_name = "FILE", conflicts_with = "command")]
     pub python: Option<PathBuf>,
     /// The scans to test with and their configuration. Default: a simulated drive on small rasters.

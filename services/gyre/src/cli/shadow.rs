@@ -17,7 +17,7 @@ pub struct ShadowArguments {
     /// Default: Gyre's own stage.
     #[arg(long, value_name = "COMMAND")]
     pub command: Option<String>,
-    /// File of Python with a function in the place of a program: see docs/python-stage.md.
+    /// File of Python with a function in the place of a program: see docs/replace-a-stage.md.
     #[arg(long, value_name = "FILE", conflicts_with = "command")]
     pub python: Option<PathBuf>,
     /// Items to compare. Default: until the run ends.

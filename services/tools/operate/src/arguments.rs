@@ -88,7 +88,7 @@ pub struct SwapArguments {
     /// involved. Default: the one that the run was begun with.
     #[arg(long, value_name = "COMMAND")]
     pub command: Option<String>,
-    /// File of Python with a function in the place of a program: see docs/python-stage.md.
+    /// File of Python with a function in the place of a program: see docs/replace-a-stage.md.
     #[arg(long, value_name = "FILE", conflicts_with = "command")]
     pub python: Option<PathBuf>,
     /// End the program before first. For a program that cannot stand by; scans wait for it

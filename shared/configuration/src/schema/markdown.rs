@@ -19,7 +19,7 @@ gyre run mine.toml DRIVE --set run.window=2    # overrides a key
 A run is configured by one TOML file; every key has a default, so a file is a few lines. A value of `--set` that is not TOML is taken as text.
 Unknown keys are rejected. The resolved configuration is written beside the results as `config.toml`.
 
-A relative path is that of a file beside the configuration, or of [one of the program](commands.md#configurations-and-networks-of-the-program).
+A relative path is that of a file beside the configuration, or of [one of the program](quickstart.md#configurations-and-networks-of-the-program).
 
 Units are in the names: `_m`, `_s`, `_ms`, `_deg`, `_rad`, `_mps` (m/s), `_mps2` (m/s²), `_degps2` (degrees/s²).
 

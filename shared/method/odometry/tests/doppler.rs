@@ -1,5 +1,5 @@
 //! The velocity by Doppler on simulated scans of a RAS6, against the true one. The table of
-//! `docs/fusion.md`.
+//! `research/notes/fusion-measurements.md`.
 
 use gyre_datasets::open_source;
 use gyre_radar::{DopplerEstimator, NoDoppler, OwnedScan, PointsConfig};

@@ -1,5 +1,5 @@
 //! A tunnel of 300 m, whose walls look the same everywhere: the radar does not see how far the
-//! vehicle drives. The tables of `docs/fusion.md`.
+//! vehicle drives. The tables of `research/notes/fusion-measurements.md`.
 
 use std::{fmt::Write as _, path::Path};
 

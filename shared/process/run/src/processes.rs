@@ -82,7 +82,7 @@ pub struct StageConfig {
     pub command: Vec<String>,
     /// File of Python with the function that does the work, in the place of a command: `mask` for
     /// `masking`, `rotation` for `rotation-search`, `translation` for `translation-search`. A mask
-    /// replaces the network of `[masking]`. See docs/python-stage.md.
+    /// replaces the network of `[masking]`. See docs/replace-a-stage.md.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub python: Option<PathBuf>,
     /// Limits of its restarts.
