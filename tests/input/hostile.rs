@@ -40,7 +40,7 @@ fn sparse(file: &Path, gigabytes: u64) {
         .unwrap();
 }
 
-/// What a reader refuses is tested where files are opened. Here, that each command reads by it.
+/// Files are opened by one reader, which has tests of its own; here, each command reads by it.
 #[test]
 fn files_without_end_are_refused_whatever_reads_them() {
     let folder = tempfile::tempdir().unwrap();

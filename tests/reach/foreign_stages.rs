@@ -30,7 +30,7 @@ fn run_with(stage: &str, fault: &str, once: bool) -> Run {
     .set(&format!("stages.{stage}.restart.backoff_ms=10"))
 }
 
-/// What each message may hold is tested where it is checked; here, that each stage checks what it
+/// The limits of each message have tests where they are checked; here, each stage checks what it
 /// receives, names sender and field, and keeps good poses only.
 #[test]
 fn a_message_that_no_stage_may_send_is_refused_by_the_name_of_its_sender() {

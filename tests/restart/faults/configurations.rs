@@ -71,7 +71,7 @@ pub struct Undisturbed {
     pub results: Results,
     /// The size of its folder of results.
     pub bytes: u64,
-    /// Its stages and followers.
+    /// The stages and followers of the run.
     pub processes: BTreeSet<String>,
 }
 
@@ -357,7 +357,7 @@ const LATE_S: f64 = 0.75;
 const WHEELS_LATE_S: f64 = 0.2;
 
 /// A recording as RADIATE has them, with the log of a gyro whose clock is late and whose host
-/// stalls and loses samples, and with the log of wheels, which slip; the radar is blind for a while.
+/// stalls and loses samples, and with the log of wheels, which slip. The radar goes blind.
 fn with_logs() -> PathBuf {
     let mut config = SimulationConfig {
         scans: Some(recording::SCANS),

@@ -1,4 +1,4 @@
-//! A fault: its random numbers, the moments when it happens, and the judgement of how the run ended.
+//! A fault: its random numbers, the moments when it happens, and the judgement of the run's end.
 
 use std::{thread, time::Duration};
 
@@ -51,7 +51,7 @@ impl<'a> Scene<'a> {
         thread::sleep(Duration::from_millis(self.rng.random_range(0..=limit_ms)));
     }
 
-    /// Numbers of poses at which something happens, in order: early enough for a restart to be seen.
+    /// Numbers of poses at which something happens, in order: early enough to see a restart.
     pub fn moments(&mut self, count: usize) -> Vec<usize> {
         let moments = self.configuration.moments();
         let end = moments.end.min(self.configuration.poses * 3 / 4);
