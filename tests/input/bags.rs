@@ -159,7 +159,7 @@ fn the_objects_of_a_run_and_of_its_recording_are_those_of_the_results_to_another
 }
 
 #[test]
-#[ignore = "nightly: a bag of a recording of a run"]
+#[ignore = ".ci/nightly: a bag of a recording of a run"]
 fn a_recorded_run_becomes_the_same_bag() {
     let whole = completed();
     let run = Run::small().data(whole.path());

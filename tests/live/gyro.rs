@@ -114,10 +114,9 @@ fn a_live_gyro_that_is_silent_leaves_the_radar_alone() {
 #[test]
 fn a_log_beside_a_live_radar_is_refused() {
     let radar = Radar::playing(recording::small(), &[]);
-    let run = radar.run(SCANS).set("gyro.kind=auto");
-    run.finish()
-        .refused_with(&["gyro.kind", "the radar is live", "`udp`"]);
-    let run = radar.run(SCANS).set("wheels.kind=auto");
-    run.finish()
-        .refused_with(&["wheels.kind", "the radar is live", "`udp`"]);
+    for sensor in ["gyro.kind", "wheels.kind"] {
+        let run = radar.run(SCANS).set(&format!("{sensor}=auto"));
+        run.finish()
+            .refused_with(&[sensor, "the radar is live", "`udp`"]);
+    }
 }

@@ -107,7 +107,7 @@ fn with_the_gyro_of_a_real_drive() {
 }
 
 #[test]
-#[ignore = "nightly: a whole drive"]
+#[ignore = ".ci/nightly: a whole drive"]
 fn on_all_real_scans() {
     on_a_real_drive(466);
 }

@@ -8,4 +8,4 @@ mod masks;
 mod pipeline;
 mod real_scans;
 mod refinement;
-mod standstill;
+pub mod standstill;

@@ -20,10 +20,11 @@ use crate::{
         send, undisturbed,
     },
     operate::commands::{ask, await_status, process},
+    restart::faults::configurations,
 };
 
 /// Every topic that a replay can begin with.
-const ALL: &str = "record.topics=['scan','masked','rotation','motion','refined','pose','log']";
+pub const ALL: &str = "record.topics=['scan','masked','rotation','motion','refined','pose','log']";
 /// With so large a window the queues hold all scans of these tests: nothing is missed, however slow
 /// the machine is.
 pub const WINDOW: &str = "run.window=32";
@@ -336,21 +337,29 @@ fn the_recorder_is_listed_with_the_processes_and_started_again_on_request() {
     );
 }
 
+/// The logs of the sensors are not there any more, and their delays are in the samples already.
 #[test]
-fn a_player_and_a_stage_that_are_killed_change_no_byte_of_a_replay() {
-    let run = recorded(&played()).set(ALL);
-    let odometry = run.complete();
-    let again = Run::configured("");
-    let mut command = gyre();
-    command.arg("run").arg("--data").arg(file(&run));
-    command
-        .args(["--from", "masked", "--rate", "2", "--out"])
-        .arg(again.out());
-    let mut running = again.start_as(command);
-    running.await_poses(SCANS / 4).kill("radar-replay");
-    running.await_poses(SCANS / 2).kill("refinement");
-    running.finish().succeeded();
-    assert_eq!(again.odometry(), odometry);
+fn a_recording_holds_what_sensors_measured_and_replays_with_and_without_it() {
+    let without_doppler: fn() -> Run = configurations::without_doppler;
+    for (configuration, setting, without) in [
+        (
+            configurations::gyro_and_wheels(),
+            "wheels.kind=none",
+            configurations::with_gyro as fn() -> Run,
+        ),
+        (
+            configurations::doppler(),
+            "doppler.kind=none",
+            without_doppler,
+        ),
+    ] {
+        let run = recorded(&configuration.run()).set(WINDOW);
+        let odometry = run.complete();
+        assert_eq!(replay(&file(&run), &[]), odometry);
+        let alone = without().complete();
+        assert_eq!(replay(&file(&run), &["--set", setting]), alone);
+        assert_ne!(alone, odometry);
+    }
 }
 
 #[test]

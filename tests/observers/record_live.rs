@@ -88,7 +88,7 @@ fn assert_lacks_little(run: &Run) {
 }
 
 #[test]
-#[ignore = "nightly: kills at many moments"]
+#[ignore = ".ci/nightly: kills at many moments"]
 fn a_recording_is_of_the_results_after_masking_was_killed() {
     let run = played();
     let mut running = run.start();
@@ -100,7 +100,7 @@ fn a_recording_is_of_the_results_after_masking_was_killed() {
 }
 
 #[test]
-#[ignore = "nightly: kills at many moments"]
+#[ignore = ".ci/nightly: kills at many moments"]
 fn a_recording_is_of_the_results_after_masking_was_killed_with_the_recorder() {
     let run = played();
     let mut running = run.start();
@@ -179,7 +179,7 @@ fn a_recording_is_of_the_results_after_masking_was_killed_twice_while_no_recorde
 }
 
 #[test]
-#[ignore = "nightly: kills at many moments"]
+#[ignore = ".ci/nightly: kills at many moments"]
 fn a_recording_of_a_radar_is_of_the_results_after_masking_was_killed_and_swapped() {
     let radar = radar();
     let run = slow(radar.run(SCANS));
@@ -194,7 +194,7 @@ fn a_recording_of_a_radar_is_of_the_results_after_masking_was_killed_and_swapped
 }
 
 #[test]
-#[ignore = "nightly: kills at many moments"]
+#[ignore = ".ci/nightly: kills at many moments"]
 fn a_recording_is_of_the_results_after_the_run_was_interrupted_and_after_its_supervisor_was_killed()
 {
     assert_goes_on(&played());

@@ -249,7 +249,7 @@ fn a_program_that_does_not_come_is_given_up_while_the_run_goes_on() {
 }
 
 #[test]
-#[ignore = "nightly: a drive in several runs"]
+#[ignore = ".ci/nightly: a drive in several runs"]
 fn shadows_that_fall_behind_again_and_again_are_compared_exactly() {
     // The mask takes two scans, and the motions of both.
     let run = long().rate(RATE).masked_by(&card(TWO_SCANS));
@@ -285,8 +285,7 @@ fn shadows_that_fall_behind_again_and_again_are_compared_exactly() {
 
 #[test]
 fn shadows_are_compared_exactly_across_a_break_of_the_chain() {
-    let recording = breaks::with_a_gap();
-    let run = breaks::run_of(&recording).rate("0.5");
+    let run = Run::small().data(&breaks::with_a_gap()).rate("0.5");
     let run = run.masked_by(&card(TWO_SCANS));
     let running = held(&run);
     let shadows = STAGES.map(|stage| Shadow::start(&run, stage, stage, &[]));
@@ -381,7 +380,7 @@ fn the_program_of_a_killed_shadow_ends_and_the_run_does_not_notice() {
 }
 
 #[test]
-#[ignore = "nightly: a stage in Python beside a run"]
+#[ignore = ".ci/nightly: a stage in Python beside a run"]
 fn python_masking_beside_the_own_one_is_compared() {
     if !python_stage::can_start() {
         return;

@@ -191,7 +191,7 @@ const OUTCOMES: [(&str, &str); 9] = [
 ];
 
 #[test]
-#[ignore = "nightly: kills at many moments"]
+#[ignore = ".ci/nightly: kills at many moments"]
 fn a_batch_that_is_killed_gives_the_table_of_one_that_is_not() {
     let drives = drives_with_failures();
     // So that there is time to kill a run.

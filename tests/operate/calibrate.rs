@@ -39,7 +39,7 @@ fn range_offset_m(settings: &str) -> f64 {
 }
 
 #[test]
-#[ignore = "nightly: calibrates a drive"]
+#[ignore = ".ci/nightly: calibrates a drive"]
 fn a_wrong_range_offset_is_named_and_put_right_by_the_file() {
     let recording = recording::around_a_block();
     let out = tempfile::tempdir().unwrap();
@@ -98,7 +98,7 @@ fn offset_of(block: &str) -> [f64; 2] {
 }
 
 #[test]
-#[ignore = "nightly: calibrates two drives"]
+#[ignore = ".ci/nightly: calibrates two drives"]
 fn two_drives_of_one_radar_tell_more_than_one() {
     let recording = recording::around_a_block();
     let out = tempfile::tempdir().unwrap();

@@ -332,7 +332,7 @@ fn with_gyro_and_wheels() -> PathBuf {
 const BOTH: [&str; 4] = ["--set", "gyro.kind=auto", "--set", "wheels.kind=auto"];
 
 #[test]
-#[ignore = "nightly: 25 s, two runs at the pace of a radar"]
+#[ignore = ".ci/nightly: 25 s, two runs at the pace of a radar"]
 fn a_gyro_that_drops_out_is_noticed_and_a_recovery_that_takes_too_long_fails() {
     let stress = Stress::of(&with_gyro_and_wheels());
     let scenarios = [

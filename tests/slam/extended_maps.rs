@@ -38,7 +38,7 @@ fn extend(run: &Run, map: &Path, out: &Path) -> Ended {
 }
 
 #[test]
-#[ignore = "nightly: two drives through the same streets"]
+#[ignore = ".ci/nightly: two drives through the same streets"]
 fn a_second_drive_is_placed_in_the_map_and_goes_on_beyond_it() {
     let (first, map) = first();
     // From half way round on, to the end of the block.
@@ -101,7 +101,7 @@ fn a_second_drive_is_placed_in_the_map_and_goes_on_beyond_it() {
 }
 
 #[test]
-#[ignore = "nightly: a drive in another town"]
+#[ignore = ".ci/nightly: a drive in another town"]
 fn a_drive_through_another_town_is_refused_and_the_map_is_kept() {
     let (first, map) = first();
     let elsewhere = drive(5, 9);

@@ -5,33 +5,24 @@ use std::{
     collections::BTreeMap,
     fs,
     path::{Path, PathBuf},
-    thread,
-    time::Duration,
 };
 
 use gyre_datasets::read_trajectory;
 use gyre_mapping::{Map, Origin};
-use gyre_messages::FollowerId;
 use gyre_radar::Trajectory;
 use gyre_ros2_messages::{Ros2Message, encode, sensor_msgs::NavSatFix, std_msgs::Header};
 use gyre_samples::{Geographic, LocalPlane};
 use mcap::{MessageStream, WriteOptions, records::MessageHeader};
 use rand::{Rng, SeedableRng, rngs::StdRng};
-use rustix::process::Signal;
 use serde_json::Value;
 
 use super::followers::undisturbed;
 use crate::{
-    common::{
-        Ended, Run, gyre,
-        recording::{SCANS_AROUND as SCANS, around_a_block},
-        send,
-    },
+    common::{Ended, Run, gyre, recording::around_a_block},
     live::gnss::assert_replays,
     observers::record::{WINDOW, recorded},
 };
 
-const TRAJECTORY: &str = FollowerId::Trajectory.name();
 /// Where the world of the simulation lies.
 const PLACE: Geographic = Geographic {
     latitude_deg: 51.75,
@@ -122,7 +113,7 @@ fn without() -> Run {
 }
 
 /// A run with the log of a receiver whose clock is late by this.
-fn run(late_s: f64) -> Run {
+pub fn run(late_s: f64) -> Run {
     let run = without();
     let file = run.folder().join("gnss.csv");
     fs::write(&file, log(late_s)).unwrap();
@@ -245,28 +236,7 @@ fn fixes_in_a_bag_lead_to_the_results_of_the_same_log_beside_it() {
 }
 
 #[test]
-#[ignore = "nightly: kills at many moments"]
-fn a_trajectory_that_is_killed_leaves_the_same() {
-    let undisturbed = run(0.0);
-    undisturbed.complete();
-    for seed in 0..5 {
-        let mut random = StdRng::seed_from_u64(seed);
-        let run = run(0.0).rate("6");
-        let mut running = run.start();
-        for _ in 0..3 {
-            running.await_poses_or_end(random.random_range(1..SCANS));
-            thread::sleep(Duration::from_micros(random.random_range(0..50_000)));
-            if let Some(pid) = running.stages().get(TRAJECTORY) {
-                send(*pid, Signal::KILL);
-            }
-        }
-        running.finish().succeeded();
-        assert_eq!(left(&run), left(&undisturbed), "seed {seed}");
-    }
-}
-
-#[test]
-#[ignore = "nightly: a drive with loops in several runs"]
+#[ignore = ".ci/nightly: a drive with loops in several runs"]
 fn a_clock_that_is_wrong_is_refused_and_told() {
     let run = run(6.0);
     run.finish()
@@ -276,20 +246,4 @@ fn a_clock_that_is_wrong_is_refused_and_told() {
     let gnss = &run.summary()["gnss"];
     assert_eq!(gnss["used"], 0, "{gnss}");
     assert!(gnss.get("origin").is_none(), "{gnss}");
-}
-
-#[test]
-fn what_cannot_be_used_is_refused_before_the_run() {
-    let missing = without().set("gnss.kind=log").set("gnss.file=nowhere.csv");
-    missing.finish().refused_with(&["nowhere.csv"]);
-    let beside = without().set("gnss.kind=auto");
-    beside
-        .finish()
-        .refused_with(&["no log of a GNSS receiver lies beside"]);
-    let without_graph = Run::small().set("gnss.kind=auto");
-    without_graph
-        .finish()
-        .refused_with(&["gnss", "set slam.kind to `graph`"]);
-    let nameless = without().set("gnss.kind=log");
-    nameless.finish().refused_with(&["no file is named"]);
 }

@@ -99,7 +99,7 @@ fn rows(out: &Path) -> Vec<(i64, String, Option<Pose>)> {
 }
 
 #[test]
-#[ignore = "nightly: two drives through a town"]
+#[ignore = ".ci/nightly: two drives through a town"]
 fn a_drive_on_another_day_is_found_in_the_map_of_a_run() {
     let (run, folder) = (mapped(), folder());
     let out = folder.path().join("found");
@@ -157,7 +157,7 @@ fn a_drive_on_another_day_is_found_in_the_map_of_a_run() {
 }
 
 #[test]
-#[ignore = "nightly: a drive in another town"]
+#[ignore = ".ci/nightly: a drive in another town"]
 fn a_drive_through_another_town_is_lost_and_gets_no_fix() {
     let (run, folder) = (mapped(), folder());
     let out = folder.path().join("lost");
@@ -207,32 +207,4 @@ fn a_run_that_names_a_map_publishes_the_places_of_its_keyframes() {
     assert!(places.count() > 10, "{watched}");
     assert!(!watched.contains("lost"), "{watched}");
     assert_eq!(run.odometry(), plain.complete());
-}
-
-#[test]
-fn a_run_in_a_map_that_does_not_exist_is_refused_before_it_starts() {
-    let run = Run::configured(CONFIGURATION).data(recording::small());
-    let run = run.set("slam.map='nowhere'");
-    let refused = run.clone().set("slam.kind=graph").finish();
-    refused.refused_with(&["nowhere is not a map"]);
-    run.finish()
-        .refused_with(&["[slam]: map is set", "`graph`"]);
-}
-
-#[test]
-fn a_folder_that_is_no_map_to_localise_in_is_refused_with_what_to_do() {
-    let (run, folder) = (mapped(), folder());
-    let out = folder.path().join("refused");
-    let map = folder.path().join("map");
-    fs::create_dir(&map).unwrap();
-    for name in ["map.toml", "places.index"] {
-        fs::copy(map_of(&run).join(name), map.join(name)).unwrap();
-    }
-    localise(&map, TOWN, &out).refused_with(&[
-        "keyframes.log has 0 keyframes and no end",
-        "draw the map again with gyre map",
-    ]);
-    fs::remove_file(map.join("map.toml")).unwrap();
-    localise(&map, TOWN, &out).refused_with(&["is not a map", "map.toml"]);
-    assert!(!out.exists());
 }

@@ -80,7 +80,7 @@ fn belts_leave_the_streets_free_and_hide_what_is_beside_them() {
 }
 
 #[test]
-#[ignore = "nightly: whole drives"]
+#[ignore = ".ci/nightly: whole drives"]
 fn real_drives_have_free_streets_and_towns_of_a_reasonable_size() {
     let Some(data) = std::env::var_os("GYRE_DATA") else {
         println!("skipped: GYRE_DATA is not set");

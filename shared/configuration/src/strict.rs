@@ -211,6 +211,11 @@ mod tests {
         assert_eq!(table["masking"]["kind"].as_str(), Some("none"));
         assert_eq!(table["raster"]["n"].as_integer(), Some(127));
         assert_eq!(table["stages"]["masking"]["command"][1].as_str(), Some("b"));
-        assert!(set(&mut table, "n=3").is_err() && set(&mut table, "masking").is_err());
+        for sentence in ["n=3", "masking", "=", "masking.threshold"] {
+            let error = set(&mut table, sentence).unwrap_err().to_string();
+            for word in ["--set", sentence, "section.key=value"] {
+                assert!(error.contains(word), "{error}");
+            }
+        }
     }
 }

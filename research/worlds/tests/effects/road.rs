@@ -185,7 +185,7 @@ fn a_bounce_appears_between_a_post_and_its_image_with_the_power_of_both_ways() {
 }
 
 #[test]
-#[ignore = "nightly: a distribution over many scans"]
+#[ignore = ".ci/nightly: a distribution over many scans"]
 fn a_vibrating_mount_moves_bearings_by_a_fiftieth_of_a_degree() {
     let bearings = |vibration| {
         let setup = Setup::of(

@@ -35,7 +35,7 @@ fn powers_db(scans: &[OwnedScan]) -> Vec<f64> {
 }
 
 #[test]
-#[ignore = "nightly: a distribution over many scans"]
+#[ignore = ".ci/nightly: a distribution over many scans"]
 fn power_is_exponentially_distributed_over_directions_about_the_constant_one() {
     let (steady, flickering) = (
         powers_db(&scans(SCANS, false, TURN_RADPS)),

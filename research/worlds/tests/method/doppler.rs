@@ -127,7 +127,7 @@ fn scans_of_a_town_say_the_velocity() {
 }
 
 #[test]
-#[ignore = "nightly: renders 1,200 scans"]
+#[ignore = ".ci/nightly: renders 1,200 scans"]
 fn velocities_of_towns_in_rain_and_in_traffic() {
     println!("| | scans | mean error ahead, left | RMS | worst | NEES |");
     for (name, vehicles_per_km, rain_mm_h) in [

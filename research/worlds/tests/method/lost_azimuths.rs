@@ -79,13 +79,13 @@ fn errors_m(seed: u64) -> [f64; 4] {
 }
 
 #[test]
-#[ignore = "nightly: four drives"]
+#[ignore = ".ci/nightly: four drives"]
 fn motions_are_as_good_as_without_losses_where_the_places_are_known_and_better_where_found() {
     assert_as_good(errors_m(2));
 }
 
 #[test]
-#[ignore = "nightly: twelve drives"]
+#[ignore = ".ci/nightly: twelve drives"]
 fn motions_of_several_drives_are_as_good_as_without_losses() {
     let mut means_m = [0.0; 4];
     for seed in 1..4 {

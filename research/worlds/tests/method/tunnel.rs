@@ -202,7 +202,7 @@ fn through(motions: &[(OdometryMotion, Pose, Pose, InitialGuess)]) -> Through {
 }
 
 #[test]
-#[ignore = "nightly: renders eight drives, and registers four of them four times"]
+#[ignore = ".ci/nightly: renders eight drives, and registers four of them four times"]
 fn the_way_through_a_tunnel_is_that_of_the_wheels() {
     let folder = tempfile::tempdir().unwrap();
     println!(
@@ -232,7 +232,7 @@ fn the_way_through_a_tunnel_is_that_of_the_wheels() {
 }
 
 #[test]
-#[ignore = "nightly: renders eight drives, and registers each three times"]
+#[ignore = ".ci/nightly: renders eight drives, and registers each three times"]
 fn the_way_through_a_tunnel_is_that_of_doppler() {
     let folder = tempfile::tempdir().unwrap();
     println!(

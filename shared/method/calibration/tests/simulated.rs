@@ -58,13 +58,13 @@ fn assert_found(profile: Profile) {
 }
 
 #[test]
-#[ignore = "nightly: takes most of a minute"]
+#[ignore = ".ci/nightly: takes most of a minute"]
 fn wrong_constants_are_found_where_all_chirps_rise() {
     assert_found(Profile::Cts350xRadiate);
 }
 
 #[test]
-#[ignore = "nightly: takes most of a minute"]
+#[ignore = ".ci/nightly: takes most of a minute"]
 fn wrong_constants_are_found_where_chirps_alternate() {
     assert_found(Profile::Ras6);
 }

@@ -46,7 +46,7 @@ fn estimates_are_consistent_without_loops_before_and_after_closing() {
 }
 
 #[test]
-#[ignore = "nightly: as many drives as tell small faults from chance"]
+#[ignore = ".ci/nightly: as many drives as tell small faults from chance"]
 fn estimates_of_many_drives_are_consistent() {
     assert_consistent(200);
 }

@@ -300,13 +300,13 @@ fn no_fault_of_samples_changes_a_motion_silently() {
 }
 
 #[test]
-#[ignore = "nightly: 300 faults, each with the refinement of 40 scans"]
+#[ignore = ".ci/nightly: 300 faults, each with the refinement of 40 scans"]
 fn no_fault_of_many_changes_a_motion_silently() {
     faults(308, 40, Length::Long);
 }
 
 #[test]
-#[ignore = "nightly: 308 faults, each with the refinement of 40 scans"]
+#[ignore = ".ci/nightly: 308 faults, each with the refinement of 40 scans"]
 fn no_short_fault_of_many_changes_a_motion_silently() {
     faults(308, 40, Length::Short);
 }

@@ -5,12 +5,9 @@ use gyre_geometry::{ComposedMotion, Pose, SparsePoint, pose};
 use gyre_samples::{WheelDistance, WheelsConfig};
 use gyre_scan_matching::{InitialGuess, Outcome, Refined, Refiner};
 
-const NOISY: Sensor = Sensor {
+const LITTLE_NOISE: Sensor = Sensor {
     noise_m: 0.05,
-    offset_m: 0.0,
-    doppler_s: 0.0,
-    hides_doppler: false,
-    seed: 1,
+    ..NOISY
 };
 const SCANS: usize = 100;
 /// The last houses are out of sight.
@@ -35,7 +32,7 @@ fn between_walls_and(more: Vec<Reflector>) -> (Drive, Vec<Vec<SparsePoint>>) {
     let walls = [3.0, -6.5].map(|y| wall([0.0, y], [400.0, y], 2500));
     scene.extend(walls);
     scene.extend(more);
-    (drive, scans(&scene, &drive, &NOISY))
+    (drive, scans(&scene, &drive, &LITTLE_NOISE))
 }
 
 fn refine_with(
@@ -194,7 +191,7 @@ fn behind_a_tunnel_the_way_is_seen_again() {
     let mut scene = town([[-110.0, -10.0], [-60.0, 60.0]], 1);
     scene.extend([3.0, -6.5].map(|y| wall([0.0, y], [250.0, y], 1600)));
     scene.extend(town([[250.0, 400.0], [-60.0, 60.0]], 2));
-    let scans = scans(&scene, &drive, &NOISY);
+    let scans = scans(&scene, &drive, &LITTLE_NOISE);
     let mut numbers = Numbers(7);
     let is_inside = |k: usize| (85.0..155.0).contains(&drive.pose(k).translation.x);
     let search = |k: usize| match is_inside(k) {

@@ -223,6 +223,22 @@ pub fn point(values: [f64; 5]) -> SparsePoint {
     }
 }
 
+/// Points unrelated to any scene, as strong as those of one.
+pub fn noise(seed: u64) -> Vec<SparsePoint> {
+    let mut numbers = Numbers(seed);
+    let mut place = || {
+        [
+            numbers.within(65.0),
+            numbers.within(65.0),
+            numbers.within(0.125),
+        ]
+    };
+    let points = (0..900).map(|_| place());
+    points
+        .map(|[x, y, time]| point([x, y, time, 0.65, 0.0]))
+        .collect()
+}
+
 /// The time at which the beam, clockwise from straight ahead, meets a reflector that is `seen` at a
 /// position at each time: s from the middle of the sweep. `None` if the reflector crosses the seam.
 fn swept(seen: impl Fn(f64) -> Point2<f64>) -> Option<f64> {
