@@ -52,7 +52,9 @@ fn main() -> ExitCode {
 
 fn write(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let config = simulation(arguments)?;
-    let threads = arguments.threads.or(std::thread::available_parallelism().ok());
+    let threads = arguments
+        .threads
+        .or(std::thread::available_parallelism().ok());
     let threads = threads.unwrap_or(NonZeroUsize::MIN);
     let summary = write_dataset_on(threads, &config, &arguments.out, &mut |_, _| ())?;
     println!(
@@ -70,8 +72,11 @@ fn write(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
 fn simulation(arguments: &Arguments) -> Result<SimulationConfig, Box<dyn Error>> {
     let mut table = Table::new();
     if let Some(path) = &arguments.configuration {
-        let text = fs::read_to_string(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
-        table = text.parse().map_err(|error| format!("{}: {error}", path.display()))?;
+        let text = fs::read_to_string(path)
+            .map_err(|error| format!("cannot read {}: {error}", path.display()))?;
+        table = text
+            .parse()
+            .map_err(|error| format!("{}: {error}", path.display()))?;
         let folder = path.parent().unwrap_or(Path::new(""));
         if let Some(Value::Table(simulation)) = table.get_mut("simulation") {
             in_folder(simulation, "drive", "file", folder);
@@ -79,9 +84,12 @@ fn simulation(arguments: &Arguments) -> Result<SimulationConfig, Box<dyn Error>>
         }
     }
     for sentence in &arguments.set {
-        set(&mut table, sentence).ok_or_else(|| format!("`{sentence}` is not of the form simulation.KEY=VALUE"))?;
+        set(&mut table, sentence)
+            .ok_or_else(|| format!("`{sentence}` is not of the form simulation.KEY=VALUE"))?;
     }
-    let section = table.remove("simulation").unwrap_or(Value::Table(Table::new()));
+    let section = table
+        .remove("simulation")
+        .unwrap_or(Value::Table(Table::new()));
     let mut config: SimulationConfig = section.try_into()?;
     config.scans = arguments.scans.or(config.scans);
     config.seed = arguments.seed.unwrap_or(config.seed);
@@ -99,7 +107,9 @@ fn in_folder(simulation: &mut Table, section: &str, key: &str, folder: &Path) {
         return;
     };
     let join = |value: &mut Value| {
-        let joined = value.as_str().map(|name| folder.join(name).display().to_string());
+        let joined = value
+            .as_str()
+            .map(|name| folder.join(name).display().to_string());
         if let Some(joined) = joined {
             *value = Value::String(joined);
         }

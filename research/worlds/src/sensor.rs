@@ -65,7 +65,6 @@ use self::line_of_sight::LineOfSight;
 use self::noise::Noise;
 use self::spectrum::RangeSpectrum;
 use self::sweep_poses::SweepPoses;
-pub use gyre_simulator::SweepTime;
 use crate::body::{Movers, Moving};
 use crate::path::Path;
 use crate::profile::{Chirp, METADATA_BYTES, Receiver, Sampling};
@@ -73,6 +72,7 @@ use crate::relief::Relief;
 use crate::stream::Stream;
 use crate::weather::WeatherConfig;
 use crate::world::World;
+pub use gyre_simulator::SweepTime;
 
 /// Size of each azimuth's part of a scan's random numbers, in words.
 const WORDS_PER_AZIMUTH: u128 = 1 << 24;

@@ -6,8 +6,8 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-use super::attitude::MeanMotion;
 use super::GyroFigures;
+use super::attitude::MeanMotion;
 use crate::stream::Stream;
 
 /// Steps of a log, of a rad/s and of a m/s².

@@ -4,9 +4,9 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Point2, Vector2};
 
-use gyre_simulator::SweepTime;
 use crate::path::Path;
 use crate::profile::Sampling;
+use gyre_simulator::SweepTime;
 
 /// Additional azimuths before the first and after the last, whose beams reach into the sweep.
 pub(super) const MARGIN: usize = 16;

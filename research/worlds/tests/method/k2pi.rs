@@ -55,7 +55,10 @@ fn the_shipped_configuration_ends_within_a_hundredth_and_the_papers_does_not_com
         let [off_m, path_m] = end_error_m("configs/k2pi.toml", &drive);
         let [papers_off_m, _] = end_error_m("configs/k2pi-checchin.toml", &drive);
         println!("seed {seed}: {off_m:.2} m of {path_m:.0} m, the paper's {papers_off_m:.2} m");
-        assert!(path_m > 150.0 && off_m < 0.01 * path_m, "seed {seed}: {off_m} m");
+        assert!(
+            path_m > 150.0 && off_m < 0.01 * path_m,
+            "seed {seed}: {off_m} m"
+        );
         shipped_m += off_m;
         papers_m += papers_off_m;
     }
