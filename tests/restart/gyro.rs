@@ -34,7 +34,7 @@ fn with_log() -> PathBuf {
     config.wheels.rate_hz = 20.0;
     config.wheels.late_s = WHEELS_LATE_S;
     config.wheels.faults = true;
-    config.blind_s = Some([2.5, 4.5]);
+    config.blind_s = Some([2.5, 4.0]);
     recording::of("gyro-and-wheels", &config)
 }
 
@@ -70,7 +70,8 @@ fn whatever_is_killed_the_result_is_the_undisturbed_one() {
     let undisturbed = undisturbed();
     let (alone, by_gyro) = (radar_alone(), with_gyro());
     // Where the radar is blind nothing else measures.
-    alone.finish().failed_with(&["hardly measured"]);
+    alone.complete();
+    assert!(alone.summary()["motions"]["predicted"].as_u64() > Some(5));
     assert_ne!(alone.odometry(), undisturbed);
     by_gyro.complete();
     assert_ne!(by_gyro.odometry(), undisturbed);
