@@ -9,7 +9,7 @@ use crate::path::Path;
 
 /// Distance between two nodes, metres.
 pub(crate) const STEP_M: f64 = 1.0;
-/// Time between the places of the path by which its length is measured, seconds.
+/// Time between two places of the path, seconds, when its length is measured.
 const STEP_S: f64 = 0.02;
 /// Distance from the vehicle to the kerbs on its left and on its right, metres: it keeps to the
 /// left of a street with two lanes.

@@ -1,5 +1,5 @@
-//! What stands along the streets: houses with fronts that hide what is behind them, walls, trees,
-//! posts and parked cars, in the order of the route, from one seed.
+//! The scenery along the streets: houses whose walls hide the space behind, fences, trees, posts and
+//! parked cars. One seed determines all of it.
 //!
 //! In real scans a row of houses appears as short bright pieces and dots with gaps between. So a
 //! front consists of bays, each with its own strength: rough wall (many weak scatterers, whose echoes
@@ -20,7 +20,7 @@ use crate::cars::car;
 use crate::route::{KERBS_M, Route, Side};
 use crate::stream::Stream;
 
-/// Side of the squares of which each has room for one thing, metres.
+/// Side of the squares, metres; each square has room for one thing.
 const SQUARE_M: f64 = 1.0;
 /// Width of the free lanes: distance of all things from the vehicle and from oncoming cars, metres.
 const CLEAR_M: f64 = 2.5;
@@ -61,7 +61,7 @@ pub(crate) fn build(route: &Route, seed: u64) -> Body {
 
 type Square = (i64, i64);
 
-/// The squares on which nothing may stand: those near the vehicle's lane and that of oncoming cars.
+/// The squares that stay free: near the vehicle's lane and near the lane of oncoming cars.
 fn lanes(route: &Route) -> HashSet<Square> {
     let reach = (CLEAR_M / SQUARE_M).ceil() as i64;
     let mut taken = HashSet::new();

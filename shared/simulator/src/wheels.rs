@@ -24,7 +24,7 @@ const CREEP_M_PER_SQRT_M: f64 = 0.01;
 /// Standard deviation of each sample, and its step, m/s: a hundredth of a km/h.
 const NOISE_MPS: f64 = 0.02;
 const STEP_MPS: f64 = 0.01 / 3.6;
-/// Time between slips, the duration of each, s, and the share by which the wheels turn too fast.
+/// Time between slips and their duration, s; excess speed of the wheels, a share.
 const SLIP_EVERY_S: f64 = 4.0;
 const SLIP_S: f64 = 0.5;
 const SLIP_SHARE: f64 = 0.3;
@@ -37,7 +37,7 @@ const LOST: f64 = 0.02;
 pub struct SimulatedWheelsConfig {
     /// Samples a second. Default: 0, no wheels, and then the other keys have no effect.
     pub rate_hz: f64,
-    /// Time by which stamps are late against the radar's, seconds.
+    /// Delay of the stamps against the radar's clock, seconds.
     pub late_s: f64,
     /// True if the wheels turn 30 % too fast for 0.5 s in each 4 s and 2 % of the samples are lost.
     pub faults: bool,

@@ -1,4 +1,4 @@
-//! The clock of a gyro: its offset, the stalls of its host, and what the host loses.
+//! The clock of a gyro: its offset, the stalls of its host, and lost samples.
 
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -8,8 +8,7 @@ use crate::{episodes::Episodes, stream::Stream};
 
 /// Time between two stamps while a host catches up, ns.
 const CATCH_UP_NS: i64 = 100_000;
-/// Time between stalls, and the duration of each, s: what is measured meanwhile is stamped at its
-/// end.
+/// Time between stalls and their duration, s. Samples of a stall are stamped at its end.
 const STALL_EVERY_S: f64 = 2.0;
 const STALL_S: f64 = 0.06;
 /// Share of the samples that are lost.

@@ -12,7 +12,7 @@ use crate::limits::require_within;
 pub struct SimulatedGyroConfig {
     /// The gyro. Default: `none`, and then the other keys have no effect.
     pub profile: GyroProfile,
-    /// Time by which stamps are late against the radar's, seconds.
+    /// Delay of the stamps against the radar's clock, seconds.
     pub late_s: f64,
     /// True if its host stalls for 60 ms in each 2 s and loses 2 % of the samples.
     pub faults: bool,

@@ -10,7 +10,7 @@ use crate::profile::{Profile, Receiver, Sampling};
 /// profile.
 const ENCODER_STEP: u16 = 14;
 
-/// The radar: one of the known ones, and all in which it differs from that.
+/// The radar: a known radar, and the values that differ from its profile.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SensorConfig {
@@ -35,7 +35,7 @@ pub struct SensorConfig {
     /// Two-way half-power width of the beam, degrees. Default: the profile's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub beam_deg: Option<f64>,
-    /// Decibels by which the receiver's noise is above its profile's.
+    /// Excess of the receiver's noise over its profile, decibels.
     pub noise_db: f64,
     /// Metres to add to a bin's range. Default: the profile's.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -86,7 +86,7 @@ impl SensorConfig {
         let kind = self.profile.receiver();
         Receiver {
             beam_rad: self.beam_deg.map_or(kind.beam_rad, f64::to_radians),
-            // A bin is no longer than what the radar resolves.
+            // A bin is at most as long as the radar's resolution.
             cell_m: kind.cell_m.max(self.bin_m.unwrap_or(0.0)),
             ..kind
         }
