@@ -49,7 +49,7 @@ fn table_within(sections: &Bound<'_, PyMapping>, depth: usize) -> PyResult<Table
     let mut table = Table::new();
     for item in sections.items()? {
         let (key, value) = item.extract::<(Bound<'_, PyAny>, Bound<'_, PyAny>)>()?;
-        // A setting that a configuration leaves open is None in the dictionary.
+        // An open setting of a configuration becomes None in the dictionary.
         if !value.is_none() {
             let key = name(&key)?;
             let value = value_within(&key, &value, depth)?;

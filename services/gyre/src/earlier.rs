@@ -255,9 +255,9 @@ fn kept(error: JournalError, path: &Path) -> Failure {
     .into()
 }
 
-/// Returns the number of poses of an unfinished journal up to the newest pose from which the run
-/// can continue: all poses up to it have their keyframes, and the map of the refinement knows it.
-/// After a power failure that may be an earlier one than the last; after a death it is the last.
+/// Returns the number of poses of an unfinished journal up to the newest pose where the run can
+/// continue: all poses up to it have their keyframes, and the map of the refinement knows it. After
+/// a power failure that may be an earlier one than the last; after a death it is the last.
 fn known_poses(
     out: &Out,
     configuration: &Configuration,
@@ -379,10 +379,10 @@ fn state_of_recording(out: &Path) -> [PathBuf; 2] {
 }
 
 /// Removes the state of an unfinished run, puts aside the state of a complete run, and returns the
-/// state with which the new run begins. The journal goes first: without it no other file counts as
-/// part of a run. The results of an unfinished run go before the new configuration is there. The
-/// results of a complete run stay until the new run has its own results, together with the files
-/// that its recording needs if the recording continues.
+/// state where the new run begins. The journal goes first: without it no other file counts as part
+/// of a run. The results of an unfinished run go before the new configuration is there. The results
+/// of a complete run stay until the new run has its own results, together with the files that its
+/// recording needs if the recording continues.
 pub fn begin(
     out: &Out,
     identity: &Identity,
@@ -394,8 +394,8 @@ pub fn begin(
     storage::create_folder(&folder)?;
     storage::remove(&journal::path(out.path()))?;
     storage::sync_folder(&folder)?;
-    // Results without a journal are refused, so the files with which the run began are replaced as
-    // a whole below.
+    // Results without a journal are refused, so the files of the run's begin are replaced as a
+    // whole below.
     let mut kept = vec![out.join(BEGUN_WITH)];
     if recording_goes_on {
         kept.extend(state_of_recording(out.path()));
@@ -444,8 +444,7 @@ pub fn end(out: &Out, poses: usize, is_complete: bool) -> Result<(), Failure> {
 }
 
 /// Prepares the folder for a resumed run: cuts off the remains of the last poses after a power
-/// failure, and writes `config.toml` again if it differs from the configuration with which the run
-/// began.
+/// failure, and writes `config.toml` again if it differs from the run's first configuration.
 pub fn resume(out: &Out, begun: &Begun) -> Result<(), Failure> {
     if begun.lost > 0 {
         journal::cut(&journal::path(out.path()), begun.poses)?;

@@ -129,7 +129,7 @@ fn make_ready(
 ) -> Result<Ready, Failure> {
     let unfinished = earlier.unfinished();
     if let Some(simulation) = configuration.stored() {
-        // A resumed run needs the recording with which it began.
+        // A resumed run needs its first recording.
         let replace = unfinished.is_none();
         simulate::store(simulation, &configuration.source.data, replace)?;
     }

@@ -16,7 +16,7 @@ use super::{CONFIGURATION, is_complete, state};
 const JOURNAL: &str = "journal";
 /// Files that the new run overwrites before it has results.
 const BESIDE: [&str; 2] = [CONFIGURATION, SIMULATED_TRUTH];
-/// The number of poses from which a run has a motion, and so results of its own.
+/// The least number of poses for a motion, and so for results.
 pub(super) const WITH_MOTION: usize = 2;
 
 /// Returns whether the results in the folder belong to a complete run that is being replaced.

@@ -310,7 +310,7 @@ impl RequestLoop {
         true
     }
 
-    /// Goes back to the item at which a later generation gives numbers again.
+    /// Goes back to the first item that a later generation numbers again.
     fn go_back_to(&mut self, item: &Item) {
         let Request {
             from, generation, ..

@@ -1,5 +1,5 @@
-//! The agreement of both sides of a split run on the item at which they continue, at each start of
-//! the robot's side.
+//! The agreement of both sides of a split run on the item where they continue, at each start of the
+//! robot's side.
 
 use std::{fs, path::Path, thread, time::Duration};
 
@@ -32,12 +32,12 @@ pub(crate) fn prefix(config: &LinkConfig, sender: Side) -> String {
     format!("gyre/split/{}/{side}", config.name)
 }
 
-/// Returns the key at which a base reports where to continue.
+/// Returns the key where a base reports the item to continue from.
 pub(crate) fn start_key(config: &LinkConfig) -> String {
     format!("{}/begin", prefix(config, Side::Base))
 }
 
-/// Returns the key at which a robot reports the size of its scans.
+/// Returns the key where a robot reports the size of its scans.
 pub(crate) fn scan_size_key(config: &LinkConfig) -> String {
     format!("{}/scans", prefix(config, Side::Robot))
 }

@@ -114,7 +114,7 @@ pub(crate) fn prefix(name: &str, sender: &str) -> String {
     format!("gyre/view/{name}/from/{sender}")
 }
 
-/// Returns the key at which any sender of a link describes its run.
+/// Returns the key where any sender of a link describes its run.
 pub(crate) fn offer_key(name: &str) -> String {
     format!("gyre/view/{name}/greeting")
 }

@@ -179,7 +179,7 @@ struct Recorder<'run> {
     is_of_run: bool,
     /// Missed messages that the log has reported.
     reported: u64,
-    /// The time at which the next message about missed messages is due.
+    /// The time of the next message about missed messages.
     due: Instant,
 }
 

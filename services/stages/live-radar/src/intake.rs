@@ -115,8 +115,8 @@ impl Intake {
         self.scans.as_ref().and_then(ScanAssembly::pause)
     }
 
-    /// Returns the time at which the last scan was complete by the radar's clock, in
-    /// `CLOCK_MONOTONIC`, ns; `None`: not known.
+    /// Returns the time when the last scan was complete by the radar's clock, in `CLOCK_MONOTONIC`,
+    /// ns; `None`: not known.
     pub fn due_ns(&self) -> Option<i64> {
         self.due_ns
     }

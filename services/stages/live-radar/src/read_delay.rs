@@ -1,5 +1,5 @@
-//! The time at which a scan was complete by the radar's clock, on this host's clock. So the latency
-//! of a scan includes its time in the buffers of a late source.
+//! The time when a scan was complete by the radar's clock, on this host's clock. So the latency of
+//! a scan includes its time in the buffers of a late source.
 
 /// Scans of a window. The smallest difference of the clocks comes from this window and the one
 /// before: 8 to 16 s at 4 Hz, during which two clocks of 100 ppm drift apart by 1.6 ms. The
@@ -7,8 +7,8 @@
 const WINDOW: usize = 32;
 /// Scans after which the pace of the radar's clock is known.
 const MIN_PACES: usize = 3;
-/// The share by which the radar's pace may differ from this host's: less than for a recording
-/// played at a different pace, and more than the variation on a busy machine.
+/// The largest difference between the radar's pace and this host's, as a share: less than for a
+/// recording played at a different pace, and more than the variation on a busy machine.
 const MAX_PACE_ERROR: f64 = 0.1;
 
 /// Compares the clocks of the radar and of this host at the last azimuth of each scan.

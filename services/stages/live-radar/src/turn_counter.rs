@@ -4,7 +4,7 @@ use gyre_stage::source::LastScan;
 
 /// The limit of the pace of the radar's clock: recordings may be played so fast.
 const MAX_PACE: f64 = 4.0;
-/// Turns by which the count may be ahead beyond that: scans that were read late.
+/// Tolerated lead of the count in turns beyond that: scans that were read late.
 const SLACK_TURNS: f64 = 16.0;
 /// The clock was set back where it has advanced by less than this since the last scan, turns.
 const MIN_TURNS: f64 = 0.25;

@@ -31,7 +31,7 @@ pub fn logs(arguments: &LogsArguments) -> Result<ExitCode, Failure> {
         _ => (process, arguments.run.folder()?),
     };
     let mut logs = open(&out, process)?;
-    // Of each log: printed lines have no time by which they could be sorted among the events.
+    // Of each log: printed lines have no time for sorting them among the events.
     for log in &mut logs {
         let lines = log.lines();
         let first = lines.len().saturating_sub(arguments.lines);

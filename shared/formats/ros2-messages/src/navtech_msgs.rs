@@ -46,7 +46,8 @@ pub struct RadarConfigurationMsg {
     pub azimuth_samples: u16,
     /// Encoder counts per turn.
     pub encoder_size: u16,
-    /// Rows by which the driver turns its images, without the encoder values beside them.
+    /// The rotation of images by the driver, in rows; the encoder values beside them are not
+    /// rotated.
     pub azimuth_offset: u16,
     /// Depth of a range bin, 1e-4 m.
     pub bin_size: f32,

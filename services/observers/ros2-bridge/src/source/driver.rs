@@ -139,7 +139,7 @@ pub struct Driver {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DescribedRadar {
     pub radar: Configuration,
-    /// Rows by which the driver turns the images.
+    /// The rotation of images by the driver, in rows.
     pub azimuth_offset: u16,
 }
 

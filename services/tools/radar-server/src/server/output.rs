@@ -27,7 +27,7 @@ pub enum Audience {
     Group {
         /// The group, or the address of one receiver.
         to: SocketAddrV4,
-        /// The address of this machine from which they leave; if unspecified, the system chooses.
+        /// The address of this machine for sending them; if unspecified, the system chooses.
         interface: Ipv4Addr,
         /// Time before the first scan, for which only the radar's description is sent.
         wait: Duration,

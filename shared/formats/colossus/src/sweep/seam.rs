@@ -3,8 +3,8 @@
 use super::{Empty, Reading};
 use crate::configuration::Configuration;
 
-/// The part of a turn by which the time between two azimuths may differ from the configured
-/// rotation. Where it differs by more, a turn or more is missing, or the clock was set.
+/// The largest difference of the time between two azimuths from the configured rotation, in turns.
+/// Where it differs by more, a turn or more is missing, or the clock was set.
 const BREAK_TURNS: f64 = 0.75;
 
 /// The encoder counts and times of a turn.

@@ -153,7 +153,7 @@ struct PowerImage<'a> {
     height: usize,
     width: usize,
     step: usize,
-    /// Rows by which the image is turned.
+    /// The rotation of the image, in rows.
     offset: usize,
 }
 
