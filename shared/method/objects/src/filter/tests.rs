@@ -132,7 +132,7 @@ fn a_vehicle_that_goes_on_turning_is_found_to_turn_and_a_straight_one_is_not() {
             (wanted_radps == 0.0 && found_radps.abs() < 0.1) || (0.3..1.0).contains(&share),
             "{found_radps} {wanted_radps}"
         );
-        assert!(error_mps < 1.2, "{error_mps} at {wanted_radps}");
+        assert!(error_mps < 1.4, "{error_mps} at {wanted_radps}");
     }
 }
 
