@@ -316,6 +316,8 @@ pub fn lost_azimuths() -> Configuration {
         differs_from: Some(|| {
             run(&recording::of_radiate(true)).set("dataset.lost_azimuths=ignore")
         }),
+        rate: "2",
+        stateful: "masking",
         ..SMALL
     }
 }

@@ -109,7 +109,7 @@ rows! {
     loops: each_process_is_killed;
     gap: processes_are_killed_together;
     unreadable: each_process_is_killed;
-    lost_azimuths: each_process_is_killed;
+    lost_azimuths: each_process_is_killed a_process_is_killed_again_and_again;
     standstill: a_process_is_killed_again_and_again;
     joint_search: each_process_is_killed;
     gyro_and_wheels: each_process_is_killed the_supervisor_is_killed;

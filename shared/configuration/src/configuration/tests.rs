@@ -175,6 +175,10 @@ fn impossible_values_are_refused_with_the_key_and_what_is_possible() {
              [gyro]\nkind = 'udp'\nlisten = '127.0.0.2:7'",
             &["gnss", "as that of gyro"],
         ),
+        (
+            "[budget]\nmax_ms = -1.0",
+            &["[budget]: max_ms is -1", "0 or more"],
+        ),
         ("[slam]\nmap = 'a'", &["[slam]: map is set", "`graph`"]),
         (
             "[source]\nkind = 'colossus'\n[run]\nmode = 'live'\nrate = 'realtime'",
