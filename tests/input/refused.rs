@@ -86,14 +86,17 @@ fn what_a_run_cannot_use_is_refused_before_anything_starts() {
             &["no log of the wheels lies beside the scans", "wheels.kind"],
         ),
         (
-            configurations::with_gyro().set("gyro.late_s=600"),
-            &["has no sample while the scans were measured", "gyro.late_s"],
+            configurations::with_gyro().set("gyro.delay_s=600"),
+            &[
+                "has no sample while the scans were measured",
+                "gyro.delay_s",
+            ],
         ),
         (
             configurations::gyro_and_wheels()
                 .run()
-                .set("wheels.late_s=600"),
-            &["the log of the wheels", "wheels.late_s is wrong"],
+                .set("wheels.delay_s=600"),
+            &["the log of the wheels", "wheels.delay_s is wrong"],
         ),
         (
             set(&[slam, "gnss.kind=auto"]),

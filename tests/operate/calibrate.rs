@@ -172,15 +172,15 @@ fn the_clock_and_the_axis_of_a_gyro_are_found_and_a_run_takes_them() {
     let file = out.path().join("calibration.toml");
     let table: toml::Table = fs::read_to_string(&file).unwrap().parse().unwrap();
     let gyro = table["gyro"].as_table().unwrap();
-    let late_s = gyro["late_s"].as_float().unwrap();
-    assert!((late_s - 1.58).abs() < 0.06, "{said}");
+    let delay_s = gyro["delay_s"].as_float().unwrap();
+    assert!((delay_s - 1.58).abs() < 0.06, "{said}");
     assert_eq!(gyro["kind"].as_str(), Some("auto"));
     let run = Run::of_recording_named(recording.to_str().unwrap())
         .set("source.scans=6")
         .argument("--calibration", file.to_str().unwrap());
     run.complete();
     let used: toml::Table = run.result("config.toml").parse().unwrap();
-    assert_eq!(used["gyro"]["late_s"].as_float(), Some(late_s));
+    assert_eq!(used["gyro"]["delay_s"].as_float(), Some(delay_s));
     assert_eq!(used["gyro"]["up"].as_str(), Some("-z"));
 }
 

@@ -40,7 +40,7 @@ fn truth() -> Trajectory {
 
 /// The stamps and places of a receiver at 5 Hz whose clock is late by this, with one without a fix
 /// and a reflection.
-fn fixes(late_s: f64) -> Vec<(i64, Geographic)> {
+fn fixes(delay_s: f64) -> Vec<(i64, Geographic)> {
     let (truth, mut random) = (truth(), StdRng::seed_from_u64(7));
     let plane = LocalPlane::new(PLACE, 0.0);
     let (first_ns, last_ns) = truth.span_ns().unwrap();
@@ -61,15 +61,15 @@ fn fixes(late_s: f64) -> Vec<(i64, Geographic)> {
                 longitude_deg: 0.0,
             };
         }
-        (stamp_ns + (late_s * 1e9) as i64, place)
+        (stamp_ns + (delay_s * 1e9) as i64, place)
     };
     stamps.map(fix).collect()
 }
 
 /// The log of that receiver as a table.
-pub fn log(late_s: f64) -> String {
+pub fn log(delay_s: f64) -> String {
     let mut text = "stamp_ns,latitude_deg,longitude_deg,sigma_m\n".to_owned();
-    for (stamp_ns, place) in fixes(late_s) {
+    for (stamp_ns, place) in fixes(delay_s) {
         let [latitude, longitude] = [place.latitude_deg, place.longitude_deg];
         text += &format!("{stamp_ns},{latitude},{longitude},{SIGMA_M}\n");
     }
@@ -113,10 +113,10 @@ fn without() -> Run {
 }
 
 /// A run with the log of a receiver whose clock is late by this.
-pub fn run(late_s: f64) -> Run {
+pub fn run(delay_s: f64) -> Run {
     let run = without();
     let file = run.folder().join("gnss.csv");
-    fs::write(&file, log(late_s)).unwrap();
+    fs::write(&file, log(delay_s)).unwrap();
     with_antenna(run.set("gnss.kind=log")).set(&format!("gnss.file={}", file.display()))
 }
 
@@ -240,7 +240,7 @@ fn fixes_in_a_bag_lead_to_the_results_of_the_same_log_beside_it() {
 fn a_clock_that_is_wrong_is_refused_and_told() {
     let run = run(6.0);
     run.finish()
-        .failed_with(&["the fixes of GNSS are not used", "gnss.late_s"]);
+        .failed_with(&["the fixes of GNSS are not used", "gnss.delay_s"]);
     let [corrected, _] = &undisturbed().corrected;
     assert_eq!(&run.result("trajectory_slam.tum"), corrected);
     let gnss = &run.summary()["gnss"];

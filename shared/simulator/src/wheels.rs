@@ -38,7 +38,7 @@ pub struct SimulatedWheelsConfig {
     /// Samples a second. Default: 0, no wheels, and then the other keys have no effect.
     pub rate_hz: f64,
     /// Delay of the stamps against the radar's clock, seconds.
-    pub late_s: f64,
+    pub delay_s: f64,
     /// True if the wheels turn 30 % too fast for 0.5 s in each 4 s and 2 % of the samples are lost.
     pub faults: bool,
 }
@@ -50,7 +50,7 @@ impl SimulatedWheelsConfig {
     /// [`SimulatorError::Config`] with the key of the first value that cannot.
     pub fn validate(&self) -> Result<(), SimulatorError> {
         require_within("wheels.rate_hz", self.rate_hz, 0.0, 1000.0)?;
-        require_within("wheels.late_s", self.late_s, -1e6, 1e6)
+        require_within("wheels.delay_s", self.delay_s, -1e6, 1e6)
     }
 }
 
@@ -69,7 +69,7 @@ pub(crate) fn samples(
             let span_s = [index, index + 1].map(|index| index as f64 / config.rate_hz);
             let middle_s = 0.5 * (span_s[0] + span_s[1]);
             let speed_mps = wheels.measure(span_s)?;
-            let stamp_ns = start_ns + ((middle_s + config.late_s) * 1e9).round() as i64;
+            let stamp_ns = start_ns + ((middle_s + config.delay_s) * 1e9).round() as i64;
             Some(Sample::speed(stamp_ns, speed_mps))
         };
         (0..count).filter_map(sample).collect()

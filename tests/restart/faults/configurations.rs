@@ -365,10 +365,10 @@ fn with_logs() -> PathBuf {
     config.drive.speed_mps = 5.0;
     config.sensor.lost_azimuths = true;
     config.gyro.profile = GyroProfile::Asm330lhh;
-    config.gyro.late_s = LATE_S;
+    config.gyro.delay_s = LATE_S;
     config.gyro.faults = true;
     config.wheels.rate_hz = 20.0;
-    config.wheels.late_s = WHEELS_LATE_S;
+    config.wheels.delay_s = WHEELS_LATE_S;
     config.wheels.faults = true;
     config.blind_s = Some([2.5, 4.5]);
     recording::of("gyro-and-wheels", &config)
@@ -377,7 +377,7 @@ fn with_logs() -> PathBuf {
 /// The run of the same recording with its gyro, without its wheels.
 pub fn with_gyro() -> Run {
     let run = Run::small().data(&with_logs()).set("gyro.kind=auto");
-    run.set(&format!("gyro.late_s={LATE_S}"))
+    run.set(&format!("gyro.delay_s={LATE_S}"))
 }
 
 /// Samples of a gyro and of wheels, which travel with the scans.
@@ -387,7 +387,7 @@ pub fn gyro_and_wheels() -> Configuration {
         recording: with_logs,
         run: |_| {
             let run = with_gyro().set("wheels.kind=auto");
-            run.set(&format!("wheels.late_s={WHEELS_LATE_S}"))
+            run.set(&format!("wheels.delay_s={WHEELS_LATE_S}"))
         },
         shows: &[
             ("/gyro/motions", 15.0),

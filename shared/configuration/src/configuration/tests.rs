@@ -91,8 +91,8 @@ fn impossible_values_are_refused_with_the_key_and_what_is_possible() {
             &["refinement.min_overlap = 1.5", "0 to 1"],
         ),
         (
-            "[refinement]\njitter_m = nan",
-            &["refinement.jitter_m = NaN", "positive"],
+            "[refinement]\nvariance_scale = nan",
+            &["refinement.variance_scale = NaN", "positive"],
         ),
         ("[masking]\nkind = 'magic'", &["magic", "threshold"]),
         ("[masking]\nlag = 0", &["lag"]),
@@ -239,7 +239,7 @@ fn settings_without_effect_are_named() {
     assert_eq!(named(&["gyro.file=a.csv"]), [sentence]);
     for idle in [
         &["gyro.kind=auto", "gyro.file=a.csv"][..],
-        &["wheels.late_s=1"],
+        &["wheels.delay_s=1"],
         &["gnss.listen=127.0.0.1:1"],
         &["objects.even_likely=0.5"],
         &["masking.kind=none", "masking.threshold=60"],
@@ -247,9 +247,9 @@ fn settings_without_effect_are_named() {
         assert_eq!(named(idle).len(), 1, "{idle:?}");
     }
     for used in [
-        &["gyro.kind=log", "gyro.file=a.csv", "gyro.late_s=1"][..],
+        &["gyro.kind=log", "gyro.file=a.csv", "gyro.delay_s=1"][..],
         &["gyro.kind=none", "run.window=3", "simulation.scans=3"],
-        &["masking.threshold=60", "simulation.gyro.late_s=1"],
+        &["masking.threshold=60", "simulation.gyro.delay_s=1"],
     ] {
         assert_eq!(named(used), [""; 0], "{used:?}");
     }

@@ -186,7 +186,7 @@ impl GnssLog {
     /// Returns the fixes on the radar's clock, with the configured uncertainty where the log has
     /// none.
     pub fn on_radar(&self, config: &GnssConfig) -> Vec<GnssFix> {
-        let late_ns = (config.late_s * 1e9).round() as i64;
+        let late_ns = (config.delay_s * 1e9).round() as i64;
         let fixes = self.fixes.iter().map(|fix| GnssFix {
             stamp_ns: fix.stamp_ns.saturating_sub(late_ns),
             east_m: fix.east_north_m[0],

@@ -63,7 +63,7 @@ pub enum LogError {
     /// `steps` describes the steps of the clock, if there are any, in sentences that end with a
     /// space.
     #[error(
-        "the log of the {of} {path} has no sample while the scans were measured: it begins {after_s:.1} s after the first of them. {steps}It is of another drive, or {of}.late_s is wrong"
+        "the log of the {of} {path} has no sample while the scans were measured: it begins {after_s:.1} s after the first of them. {steps}It is of another drive, or {of}.delay_s is wrong"
     )]
     Elsewhere {
         of: &'static str,

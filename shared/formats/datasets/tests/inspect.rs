@@ -57,7 +57,7 @@ fn stalls_stamps_and_transposed_images_of_radiate_are_reported() {
     );
     let stalls = at(&report, "/timing/stalls").as_array().unwrap();
     assert_eq!(stalls.len(), 7, "{stalls:?}");
-    let worst = stalls.iter().map(|s| s["late_s"].as_f64().unwrap());
+    let worst = stalls.iter().map(|s| s["delay_s"].as_f64().unwrap());
     let worst = worst.fold(0.0, f64::max);
     assert!((1.3..1.5).contains(&worst), "{worst}");
     assert_eq!(at(&report, "/timing/missing_scans"), 0);
@@ -86,15 +86,15 @@ fn a_late_ground_truth_is_detected_with_a_trajectory() {
         poses: truth.poses.iter().step_by(n).copied().collect(),
     };
     let report = report("radiate-2019-02-12", Some(&every(5))).unwrap();
-    let late_s = |name: &str| {
+    let delay_s = |name: &str| {
         let truths = at(&report, "/ground_truths").as_array().unwrap();
         let is_it = |it: &&Value| it["file"].as_str().unwrap().ends_with(name);
         let clock = &truths.iter().find(is_it).unwrap()["clock"];
-        clock["late_s"].as_f64().unwrap()
+        clock["delay_s"].as_f64().unwrap()
     };
-    assert!(late_s("ground_truth.tum").abs() < 0.1);
-    let late_s = late_s("gnss_as_logged.tum");
-    assert!((1.4..1.7).contains(&late_s), "{late_s}");
+    assert!(delay_s("ground_truth.tum").abs() < 0.1);
+    let delay_s = delay_s("gnss_as_logged.tum");
+    assert!((1.4..1.7).contains(&delay_s), "{delay_s}");
     assert_mentions(&report, &["gnss_as_logged.tum", "late"]);
     assert!(!mentions(&report, &["ground_truth.tum is"]));
 }

@@ -82,19 +82,19 @@ pub(crate) fn calibrate_turns(
     let begins_s = angles.span_s().map(|[first_s, _]| first_s);
     let peak = search::peak(&turns, &angles).map_err(|none| GyroError::of(none, begins_s))?;
     let fit = fit::Fit::new(&turns, &angles, &peak, true).ok_or(GyroError::Unsettled)?;
-    let [scale, bias_radps, late_s] = fit.parameters;
+    let [scale, bias_radps, delay_s] = fit.parameters;
     let floored = |estimate: Estimate, floor: f64| Estimate {
         sigma: estimate.sigma.hypot(floor),
         ..estimate
     };
     let least_s = PERIOD_SHARE * angles.period_s();
-    let late_s = floored(late_s, least_s);
+    let delay_s = floored(delay_s, least_s);
     let span_s = turns.last().map_or(1.0, |turn| turn.to_s);
     let found = GyroCalibration {
         up: peak.up(),
         scale: floored(scale, SCALE_SIGMA),
         bias_radps: floored(bias_radps, BIAS_SIGMA_RADPS),
-        late_s,
+        delay_s,
         halves_s: fit.halves_s,
         drift: floored(fit.drift, least_s / span_s),
         correlation: peak.correlation.abs(),
@@ -103,8 +103,8 @@ pub(crate) fn calibrate_turns(
     if !SCALES.contains(&scale.value) && (scale.value - 1.0).abs() > 3.0 * scale.sigma {
         return Err(GyroError::Scale { scale: scale.value });
     }
-    match late_s.sigma <= MAX_LATE_SIGMA_S && scale.sigma <= MAX_SCALE_SIGMA {
+    match delay_s.sigma <= MAX_LATE_SIGMA_S && scale.sigma <= MAX_SCALE_SIGMA {
         true => Ok(found),
-        false => Err(GyroError::Straight { late_s, scale }),
+        false => Err(GyroError::Straight { delay_s, scale }),
     }
 }

@@ -32,7 +32,7 @@ const SCALES: std::ops::RangeInclusive<f64> = 0.8..=1.25;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WheelCalibration {
     /// The delay of the wheels' stamps, s.
-    pub late_s: Estimate,
+    pub delay_s: Estimate,
     /// True distance over the measured one.
     pub scale: Estimate,
     /// Correlation of the distances with the radar's.
@@ -52,7 +52,7 @@ pub enum WheelError {
         seconds: usize,
     },
     #[error(
-        "the wheels drive as the radar best with late_s = {:.2} (correlation {:.2}), but about as well with {:.2} ({:.2}): the speed changes too little, or the log is of another drive",
+        "the wheels drive as the radar best with delay_s = {:.2} (correlation {:.2}), but about as well with {:.2} ({:.2}): the speed changes too little, or the log is of another drive",
         best[0], best[1], rival[0], rival[1]
     )]
     Ambiguous {
@@ -80,7 +80,7 @@ impl From<NoPeak> for WheelError {
         match none {
             NoPeak::Apart { turns } => Self::Apart { seconds: turns },
             NoPeak::Ambiguous { best, rival } => {
-                let of = |it: Peak| [it.late_s, it.correlation];
+                let of = |it: Peak| [it.delay_s, it.correlation];
                 Self::Ambiguous {
                     best: of(best),
                     rival: of(rival),
@@ -124,23 +124,23 @@ fn calibrate_distances(
     let log = Angles::new(samples, first_ns, max_gap_s);
     let peak = peak(&distances, &log)?;
     let fit = Fit::new(&distances, &log, &peak, false).ok_or(WheelError::Unsettled)?;
-    let [scale, _, late_s] = fit.parameters;
+    let [scale, _, delay_s] = fit.parameters;
     let floored = |estimate: Estimate, floor: f64| Estimate {
         sigma: estimate.sigma.hypot(floor),
         ..estimate
     };
-    let late_s = floored(late_s, PERIOD_SHARE * log.period_s());
+    let delay_s = floored(delay_s, PERIOD_SHARE * log.period_s());
     if !SCALES.contains(&scale.value) {
         return Err(WheelError::Scale(scale.value));
     }
-    match late_s.sigma <= MAX_LATE_SIGMA_S {
+    match delay_s.sigma <= MAX_LATE_SIGMA_S {
         true => Ok(WheelCalibration {
-            late_s,
+            delay_s,
             scale: floored(scale, SCALE_SIGMA),
             correlation: peak.correlation,
             distances: fit.turns,
         }),
-        false => Err(WheelError::Steady(late_s)),
+        false => Err(WheelError::Steady(delay_s)),
     }
 }
 
@@ -149,7 +149,7 @@ impl WheelCalibration {
     #[must_use]
     pub fn mean(&self, others: &[Self]) -> Self {
         others.iter().fold(*self, |mean, other| Self {
-            late_s: mean.late_s.combined(&other.late_s),
+            delay_s: mean.delay_s.combined(&other.delay_s),
             scale: mean.scale.combined(&other.scale),
             correlation: mean.correlation.min(other.correlation),
             distances: mean.distances + other.distances,
@@ -165,9 +165,9 @@ impl WheelCalibration {
             Some(file) => format!("kind = \"log\"\nfile = {file}\n"),
             None => "kind = \"auto\"\n".to_owned(),
         };
-        let (late, scale) = (self.late_s, self.scale);
+        let (late, scale) = (self.delay_s, self.scale);
         format!(
-            "\n[wheels]\n{kind}{tick}late_s = {:.4}\ntime_sigma_s = {:.4}\nscale = {:.4}\nscale_sigma = {:.4} # correlation {:.3} of {} distances with those of the radar\n",
+            "\n[wheels]\n{kind}{tick}delay_s = {:.4}\ntime_sigma_s = {:.4}\nscale = {:.4}\nscale_sigma = {:.4} # correlation {:.3} of {} distances with those of the radar\n",
             late.value,
             late.sigma.max(1e-4),
             scale.value,
@@ -190,9 +190,9 @@ impl WheelCalibration {
                 found.value, found.sigma
             )
         };
-        let (late, scale) = (&self.late_s, &self.scale);
+        let (late, scale) = (&self.delay_s, &self.scale);
         [
-            line("wheels, late by", late, " s", configured.late_s),
+            line("wheels, late by", late, " s", configured.delay_s),
             line("wheels, scale", scale, "", configured.scale),
             format!(
                 "{:<21} {} distances of a second, correlation {:.4}",
@@ -236,10 +236,10 @@ mod tests {
         (stamps.collect(), driven.collect())
     }
 
-    fn wheels(seed: f64, late_s: f64, scale: f64) -> Vec<Sample> {
+    fn wheels(seed: f64, delay_s: f64, scale: f64) -> Vec<Sample> {
         let samples = (-200 * 20..(SECONDS + 200) * 20).map(|k| {
             let time_s = 0.05 * k as f64;
-            let stamp_ns = START_NS + ((time_s + late_s) * 1e9) as i64;
+            let stamp_ns = START_NS + ((time_s + delay_s) * 1e9) as i64;
             Sample::speed(stamp_ns, speed(time_s, seed) / scale)
         });
         samples.collect()
@@ -251,14 +251,14 @@ mod tests {
         /// Whatever the offset and the scale, they are found within their uncertainties.
         #[test]
         fn clock_and_scale_are_found(
-            late_s in -60.0..60.0f64, scale in 0.95..1.05f64, seed in 1.0..9.0f64,
+            delay_s in -60.0..60.0f64, scale in 0.95..1.05f64, seed in 1.0..9.0f64,
         ) {
             let (stamps, driven) = radar(seed);
             let starts = vec![false; stamps.len()];
-            let log = wheels(seed, late_s, scale);
+            let log = wheels(seed, delay_s, scale);
             let found = calibrate_distances(&stamps, &driven, &starts, &log, 0.25).unwrap();
-            let late = found.late_s;
-            prop_assert!((late.value - late_s).abs() < 4.0 * late.sigma, "{late:?} {late_s}");
+            let late = found.delay_s;
+            prop_assert!((late.value - delay_s).abs() < 4.0 * late.sigma, "{late:?} {delay_s}");
             prop_assert!((found.scale.value - scale).abs() < 4.0 * found.scale.sigma);
             prop_assert!(late.sigma < 0.05 && found.scale.sigma < 0.01, "{found:?}");
         }

@@ -35,9 +35,9 @@ impl Bounds {
         }
     }
 
-    pub fn late_s(&self, value: f64) -> Result<(), SampleConfigError> {
+    pub fn delay_s(&self, value: f64) -> Result<(), SampleConfigError> {
         let expected = "seconds, at most a million";
-        self.within("late_s", value, [-1e6, 1e6], expected)
+        self.within("delay_s", value, [-1e6, 1e6], expected)
     }
 
     pub fn max_wait_ms(&self, value: f64) -> Result<(), SampleConfigError> {

@@ -33,7 +33,7 @@ pub struct GyroConfig {
     /// Longest time for which a scan of a live radar waits for its samples, ms.
     pub max_wait_ms: f64,
     /// Delay of the stamps of the gyro against the radar's, s: it is subtracted from them.
-    pub late_s: f64,
+    pub delay_s: f64,
     /// The axis of the gyro that points up: `z`, `-z`, `x`, `-x`, `y` or `-y`. Default: the axis
     /// where the log measures gravity, or the axis of its format; else `z`.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -137,7 +137,7 @@ impl Default for GyroConfig {
             topic: None,
             listen: "127.0.0.1:6321".to_owned(),
             max_wait_ms: 20.0,
-            late_s: 0.0,
+            delay_s: 0.0,
             up: None,
             scale: 1.0,
             scale_sigma: 0.01,
@@ -165,7 +165,7 @@ impl GyroConfig {
     /// Takes a sample over to the vehicle's axes and the radar's clock: the delay is taken off its
     /// stamp, the scale is applied to the yaw rate alone, and the bias to nothing.
     pub fn on_radar(&self, sample: &Sample) -> Sample {
-        let late_ns = (self.late_s * 1e9).round() as i64;
+        let late_ns = (self.delay_s * 1e9).round() as i64;
         let [x, y, z, along_x, along_y, along_z] = sample.values;
         let up = self.up.unwrap_or_default();
         let [roll, pitch, yaw] = up.in_vehicle([x, y, z]);
@@ -185,7 +185,7 @@ impl GyroConfig {
     pub fn validate(&self) -> Result<(), SampleConfigError> {
         let bounds = Bounds("gyro");
         let rate = "a rate in rad/s, at most 1";
-        bounds.late_s(self.late_s)?;
+        bounds.delay_s(self.delay_s)?;
         bounds.max_wait_ms(self.max_wait_ms)?;
         bounds.scale([self.scale, self.scale_sigma])?;
         bounds.within("bias_radps", self.bias_radps, [-1.0, 1.0], rate)?;

@@ -28,7 +28,7 @@ pub struct GnssConfig {
     /// the source passes on.
     pub listen: String,
     /// Delay of the stamps of the fixes against the radar's, s: it is subtracted from them.
-    pub late_s: f64,
+    pub delay_s: f64,
     /// The antenna in the frame of the radar: x forward, y left, m.
     pub lever_m: [f64; 2],
     /// Standard deviation of a fix along east and along north, m, where the log has none.
@@ -66,7 +66,7 @@ impl Default for GnssConfig {
             file: None,
             topic: None,
             listen: "127.0.0.1:6323".to_owned(),
-            late_s: 0.0,
+            delay_s: 0.0,
             lever_m: [0.0, 0.0],
             sigma_m: 2.0,
             correlation_s: 10.0,
@@ -87,7 +87,7 @@ impl GnssConfig {
 
     pub fn validate(&self) -> Result<(), SampleConfigError> {
         let bounds = Bounds("gnss");
-        bounds.late_s(self.late_s)?;
+        bounds.delay_s(self.delay_s)?;
         for metres in self.lever_m {
             bounds.within("lever_m", metres, [-100.0, 100.0], "metres, at most 100")?;
         }

@@ -199,7 +199,7 @@ mod tests {
     #[test]
     fn samples_are_put_on_the_radars_clock_and_axes() {
         let mut live = of_gyro(GyroConfig {
-            late_s: 0.1,
+            delay_s: 0.1,
             up: Some(crate::UpAxis::MinusZ),
             ..GyroConfig::default()
         });
@@ -211,7 +211,7 @@ mod tests {
     #[test]
     fn speeds_are_put_on_the_radars_clock_and_scaled() {
         let mut live = LiveSamples::new(LiveSensor::Wheels(WheelsConfig {
-            late_s: 0.1,
+            delay_s: 0.1,
             scale: 1.02,
             ..WheelsConfig::default()
         }));

@@ -30,7 +30,7 @@ pub struct WheelsConfig {
     /// Longest time for which a scan of a live radar waits for its samples, ms.
     pub max_wait_ms: f64,
     /// Delay of the stamps of the speed against the radar's, s: it is subtracted from them.
-    pub late_s: f64,
+    pub delay_s: f64,
     /// Distance of the radar ahead of the axle that does not steer, m.
     pub radar_ahead_m: f64,
     /// Distance of one tick of a log that counts ticks, or the rounding step of an odometer, m.
@@ -73,7 +73,7 @@ impl Default for WheelsConfig {
             topic: None,
             listen: "127.0.0.1:6322".to_owned(),
             max_wait_ms: 20.0,
-            late_s: 0.0,
+            delay_s: 0.0,
             radar_ahead_m: 0.0,
             m_per_tick: None,
             scale: 1.0,
@@ -98,14 +98,14 @@ impl WheelsConfig {
     /// Takes a sample over to the radar's clock: the delay is taken off its stamp, and the scale is
     /// applied.
     pub fn on_radar(&self, sample: &Sample) -> Sample {
-        let late_ns = (self.late_s * 1e9).round() as i64;
+        let late_ns = (self.delay_s * 1e9).round() as i64;
         let speed_mps = sample.values[0] * self.scale;
         Sample::speed(sample.stamp_ns.saturating_sub(late_ns), speed_mps)
     }
 
     pub fn validate(&self) -> Result<(), SampleConfigError> {
         let bounds = Bounds("wheels");
-        bounds.late_s(self.late_s)?;
+        bounds.delay_s(self.delay_s)?;
         bounds.max_wait_ms(self.max_wait_ms)?;
         let expected = "metres, -10 to 10";
         bounds.within("radar_ahead_m", self.radar_ahead_m, [-10.0, 10.0], expected)?;

@@ -39,15 +39,15 @@ impl std::fmt::Display for FixRefusal {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Elsewhere => f.write_str(
-                "there is no fix from the first keyframe to the last: the log is of another drive, or gnss.late_s is wrong",
+                "there is no fix from the first keyframe to the last: the log is of another drive, or gnss.delay_s is wrong",
             ),
             Self::Clock(offset) => write!(
                 f,
-                "by the speeds of both the fixes are {offset} against the radar: add that to gnss.late_s if it is their clock"
+                "by the speeds of both the fixes are {offset} against the radar: add that to gnss.delay_s if it is their clock"
             ),
             Self::Contradictory { agreeing, taken } => write!(
                 f,
-                "only {agreeing} of {taken} fixes agree with each other and with the radar: gnss.late_s is wrong, sigma_m is too small, or they are of another drive"
+                "only {agreeing} of {taken} fixes agree with each other and with the radar: gnss.delay_s is wrong, sigma_m is too small, or they are of another drive"
             ),
             Self::Undetermined => f.write_str(
                 "the fixes are too near each other for their uncertainty to tell the heading",
@@ -248,9 +248,9 @@ impl Fixes {
             poses: keyframes.iter().map(|it| it.odometry * lever).collect(),
         };
         let found = clock_offset(&fixes, &antenna)?;
-        // A motion of the fixes at t equals the radar's motion at t + late_s.
+        // A motion of the fixes at t equals the radar's motion at t + delay_s.
         Some(ClockOffset {
-            late_s: -found.late_s,
+            delay_s: -found.delay_s,
             ..found
         })
         .filter(ClockOffset::is_reliable)
@@ -268,7 +268,7 @@ impl Fixes {
         };
         let speed_mps = path.path_length_m() / seconds.max(f64::MIN_POSITIVE);
         let sigma_m = median(self.fixes.iter().map(|fix| fix.sigma_m)).unwrap_or_default();
-        !clock.agrees() && clock.late_s.abs() * speed_mps > CLOCK_SIGMAS * sigma_m
+        !clock.agrees() && clock.delay_s.abs() * speed_mps > CLOCK_SIGMAS * sigma_m
     }
 }
 

@@ -258,7 +258,7 @@ look at     gyre report out/radiate --open; all figures:
         assert!(problem(0, 41, 0, 1.0, 0.0).contains("41 of its 400 turns"));
         assert!(problem(0, 0, 201, 1.0, 0.0).contains("201 of their 400"));
         assert!(problem(0, 0, 0, 1.05, 0.0).contains("`gyro.scale` or"));
-        assert!(problem(0, 0, 0, 1.0, -0.3).contains("set gyro.late_s=-0.30"));
+        assert!(problem(0, 0, 0, 1.0, -0.3).contains("set gyro.delay_s=-0.30"));
         assert!(problem(0, 0, 0, 0.0, 0.0).contains("gyro.kind is set, but none of the 465"));
     }
 

@@ -35,10 +35,10 @@ pub struct GnssSummary {
     /// Why none are used.
     #[serde(skip_serializing_if = "Option::is_none")]
     refusal: Option<String>,
-    /// Time by which the fixes are late by their speeds, beyond `gnss.late_s`, s; `None` where the
+    /// Time by which the fixes are late by their speeds, beyond `gnss.delay_s`, s; `None` where the
     /// drive does not tell it.
     #[serde(skip_serializing_if = "Option::is_none")]
-    late_s: Option<f64>,
+    delay_s: Option<f64>,
     /// Root mean square of the distances of the used fixes from the corrected trajectory, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     residual_rms_m: Option<f64>,
@@ -119,7 +119,7 @@ impl GnssSummary {
                 .unusable
                 .clone()
                 .or_else(|| fixes.refusal().map(ToString::to_string)),
-            late_s: fixes.clock().map(|clock| clock.late_s),
+            delay_s: fixes.clock().map(|clock| clock.delay_s),
             residual_rms_m: (!squares.is_empty()).then_some(rms_m),
             east_north: frame.as_ref().map(EastNorth::of),
             plane: log.plane.map(|plane| {

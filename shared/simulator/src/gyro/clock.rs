@@ -41,7 +41,7 @@ impl<'a> Clock<'a> {
         let stall_s = self.stalls.begin_s(time_s);
         let stall_s = stall_s.filter(|_| self.config.faults);
         let handled_s = stall_s.map_or(time_s, |begin_s| begin_s + STALL_S);
-        let stamp_ns = ((handled_s + self.config.late_s) * 1e9).round() as i64;
+        let stamp_ns = ((handled_s + self.config.delay_s) * 1e9).round() as i64;
         if is_lost {
             return None;
         }

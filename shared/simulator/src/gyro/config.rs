@@ -13,7 +13,7 @@ pub struct SimulatedGyroConfig {
     /// The gyro. Default: `none`, and then the other keys have no effect.
     pub profile: GyroProfile,
     /// Delay of the stamps against the radar's clock, seconds.
-    pub late_s: f64,
+    pub delay_s: f64,
     /// True if its host stalls for 60 ms in each 2 s and loses 2 % of the samples.
     pub faults: bool,
 }
@@ -24,6 +24,6 @@ impl SimulatedGyroConfig {
     /// # Errors
     /// [`SimulatorError::Config`] with the key of the first value that cannot.
     pub fn validate(&self) -> Result<(), SimulatorError> {
-        require_within("gyro.late_s", self.late_s, -1e6, 1e6)
+        require_within("gyro.delay_s", self.delay_s, -1e6, 1e6)
     }
 }

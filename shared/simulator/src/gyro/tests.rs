@@ -109,9 +109,9 @@ fn the_numbers_of_the_file_are_those_of_the_samples_which_more_scans_extend() {
 
 #[test]
 fn a_clock_is_late_and_with_faults_loses_samples_and_stalls() {
-    let late_s = |faults: bool| -> Vec<f64> {
+    let delay_s = |faults: bool| -> Vec<f64> {
         let config = SimulatedGyroConfig {
-            late_s: 1.5,
+            delay_s: 1.5,
             faults,
             ..SimulatedGyroConfig::default()
         };
@@ -121,12 +121,15 @@ fn a_clock_is_late_and_with_faults_loses_samples_and_stalls() {
             .filter_map(|time_s| Some(clock.stamp_ns(time_s)? as f64 * 1e-9 - time_s))
             .collect()
     };
-    let good = late_s(false);
+    let good = delay_s(false);
     assert_eq!(good.len(), 10_000);
-    assert!(good.iter().all(|late_s| (late_s - 1.5).abs() < 1e-7));
-    let faulty = late_s(true);
+    assert!(good.iter().all(|delay_s| (delay_s - 1.5).abs() < 1e-7));
+    let faulty = delay_s(true);
     assert!((9_720..9_880).contains(&faulty.len()), "{}", faulty.len());
     // 50 stalls of 6 samples.
-    let stalled = faulty.iter().filter(|late_s| **late_s > 1.5 + 1e-6).count();
+    let stalled = faulty
+        .iter()
+        .filter(|delay_s| **delay_s > 1.5 + 1e-6)
+        .count();
     assert!((250..400).contains(&stalled), "{stalled}");
 }

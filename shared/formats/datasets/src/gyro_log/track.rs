@@ -155,7 +155,7 @@ mod tests {
         )
         .unwrap();
         let config = GyroConfig {
-            late_s: 1.58,
+            delay_s: 1.58,
             up: Some(UpAxis::MinusZ),
             scale: 1.01,
             bias_radps: 0.5,

@@ -79,8 +79,8 @@ fn examine_file(
         format!(", median distance of the nearest pose {:.1} ms", s * 1e3)
     });
     let of_clock = match &clock {
-        Some(clock) if clock.agrees() => format!(", clock agrees ({:+.2} s)", clock.late_s),
-        Some(clock) if clock.is_reliable() => format!(", clock {:+.2} s", clock.late_s),
+        Some(clock) if clock.agrees() => format!(", clock agrees ({:+.2} s)", clock.delay_s),
+        Some(clock) if clock.is_reliable() => format!(", clock {:+.2} s", clock.delay_s),
         Some(_) => ", clock unknown".to_owned(),
         None => String::new(),
     };

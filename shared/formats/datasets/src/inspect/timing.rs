@@ -55,7 +55,7 @@ pub(super) struct Stall {
     /// The first late scan.
     scan: usize,
     /// Delay of its stamp, s.
-    late_s: f64,
+    delay_s: f64,
 }
 
 impl Timing {
@@ -86,11 +86,11 @@ impl Timing {
             );
         }
         if stalls > 0 {
-            let worst = self.stalls.iter().map(|s| s.late_s).fold(0.0, f64::max);
+            let worst = self.stalls.iter().map(|s| s.delay_s).fold(0.0, f64::max);
             let places = self
                 .stalls
                 .iter()
-                .map(|s| format!("{} ({:.2} s)", s.scan, s.late_s));
+                .map(|s| format!("{} ({:.2} s)", s.scan, s.delay_s));
             let places = some(places);
             let times = match stalls {
                 1 => "once".to_owned(),
@@ -138,7 +138,7 @@ pub(super) fn examine(dataset: &dyn Dataset) -> Option<Timing> {
 fn times(used: &[i64], logged: &[i64]) -> Option<Timing> {
     let (used_s, logged_s) = (intervals_s(used), intervals_s(logged));
     let period_s = median(used_s.iter().copied()).unwrap_or(0.0);
-    let late_s = lateness_s(used, logged);
+    let delay_s = lateness_s(used, logged);
     let (mut gaps, mut stalls, mut backwards) = (Vec::new(), Vec::new(), Vec::new());
     for (i, (on_clock, on_host)) in used_s
         .iter()
@@ -160,7 +160,7 @@ fn times(used: &[i64], logged: &[i64]) -> Option<Timing> {
         } else if period_s > 0.0 && on_host > STALL_PERIODS * period_s {
             stalls.push(Stall {
                 scan,
-                late_s: late_s[scan].max(on_host - period_s),
+                delay_s: delay_s[scan].max(on_host - period_s),
             });
         } else if on_host < 0.0 {
             backwards.push(scan);
@@ -266,9 +266,9 @@ mod tests {
             assert_eq!(report.stalls.len(), 1);
             assert_eq!(report.stalls[0].scan, 10);
             assert!(
-                (report.stalls[0].late_s - 0.9).abs() < 1e-9,
+                (report.stalls[0].delay_s - 0.9).abs() < 1e-9,
                 "{}",
-                report.stalls[0].late_s
+                report.stalls[0].delay_s
             );
         }
     }

@@ -36,11 +36,11 @@ pub enum GyroError {
     Unsettled,
     #[error(
         "the offset of the clocks is {:.2} \u{b1} {:.2} s and the scale {:.2} \u{b1} {:.2}, which is too uncertain to be used: the drive turns too little, or a clock drifts",
-        late_s.value, late_s.sigma, scale.value, scale.sigma
+        delay_s.value, delay_s.sigma, scale.value, scale.sigma
     )]
     Straight {
         /// The offset, s.
-        late_s: Estimate,
+        delay_s: Estimate,
         scale: Estimate,
     },
     #[error(
@@ -78,12 +78,12 @@ impl GyroError {
 
 /// An offset with an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
-#[error("about {axis} with late_s = {late_s:.2} (correlation {correlation:.2})")]
+#[error("about {axis} with delay_s = {delay_s:.2} (correlation {correlation:.2})")]
 pub struct Candidate {
     /// The axis that points up.
     pub axis: &'static str,
     /// The offset, s.
-    pub late_s: f64,
+    pub delay_s: f64,
     pub correlation: f64,
 }
 
@@ -91,7 +91,7 @@ impl From<Peak> for Candidate {
     fn from(peak: Peak) -> Self {
         Self {
             axis: peak.up().name(),
-            late_s: peak.late_s,
+            delay_s: peak.delay_s,
             correlation: peak.correlation.abs(),
         }
     }

@@ -20,7 +20,7 @@ pub struct GyroCalibration {
     /// The axis that points up.
     pub up: UpAxis,
     /// The delay of the gyro's stamps, s.
-    pub late_s: Estimate,
+    pub delay_s: Estimate,
     /// The delay in each half of the drive, if the half determines it, s.
     pub halves_s: [Option<f64>; 2],
     /// Change of that time, s/s.
@@ -46,7 +46,7 @@ impl GyroCalibration {
                     other: other.up.name(),
                 });
             }
-            mean.late_s = mean.late_s.combined(&other.late_s);
+            mean.delay_s = mean.delay_s.combined(&other.delay_s);
             mean.drift = mean.drift.combined(&other.drift);
             mean.scale = mean.scale.combined(&other.scale);
             mean.bias_radps = mean.bias_radps.combined(&other.bias_radps);
@@ -69,7 +69,7 @@ impl GyroCalibration {
 
     /// Returns the section `[gyro]`, with the log if it does not lie beside the scans.
     pub fn toml(&self, file: Option<&Path>) -> String {
-        let (late, scale, bias) = (self.late_s, self.scale, self.bias_radps);
+        let (late, scale, bias) = (self.delay_s, self.scale, self.bias_radps);
         let mut text = match file.map(|file| toml::Value::from(file.display().to_string())) {
             Some(file) => format!("\n[gyro]\nkind = \"log\"\nfile = {file}\n"),
             None => "\n[gyro]\nkind = \"auto\"\n".to_owned(),
@@ -81,7 +81,7 @@ impl GyroCalibration {
             self.turns
         );
         text += &format!(
-            "late_s = {:.4}\ntime_sigma_s = {:.4}\n",
+            "delay_s = {:.4}\ntime_sigma_s = {:.4}\n",
             late.value,
             late.sigma.max(1e-4)
         );
@@ -118,7 +118,7 @@ impl GyroCalibration {
             ),
             false => String::new(),
         };
-        let (late, scale, drift) = (&self.late_s, &self.scale, &self.drift);
+        let (late, scale, drift) = (&self.delay_s, &self.scale, &self.drift);
         let halves = match self.halves_s {
             [Some(first), Some(second)] => {
                 format!(
@@ -128,7 +128,7 @@ impl GyroCalibration {
             _ => String::new(),
         };
         let drifts = match self.drifts() {
-            true => ": one late_s does not do for a long drive",
+            true => ": one delay_s does not do for a long drive",
             false => "",
         };
         let tells = match self.tells_scale() {
@@ -142,7 +142,7 @@ impl GyroCalibration {
             ),
             format!(
                 "{:<21} {:.4} \u{b1} {:.4} s{}\n{:<21} {halves}drift {:.0} \u{b1} {:.0} ppm{drifts}",
-                "gyro, late by", late.value, late.sigma, verdict(configured.late_s, late), "",
+                "gyro, late by", late.value, late.sigma, verdict(configured.delay_s, late), "",
                 drift.value * 1e6, drift.sigma * 1e6
             ),
             format!("{:<21} {:.4} \u{b1} {:.4}{tells}", "gyro, scale", scale.value, scale.sigma),

@@ -29,7 +29,7 @@ const MAX_DELAY_S: f64 = 10.0;
 /// The axis and the offset that fit best.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Peak {
-    pub(crate) late_s: f64,
+    pub(crate) delay_s: f64,
     pub(crate) axis: usize,
     /// Of the radar's turns and the angles about the axis.
     pub(crate) correlation: f64,
@@ -52,13 +52,13 @@ impl Peak {
 
     /// Returns whether it is about another axis, or farther than a peak is wide.
     fn is_other(&self, peak: &Self) -> bool {
-        peak.axis != self.axis || (peak.late_s - self.late_s).abs() > PEAK_S
+        peak.axis != self.axis || (peak.delay_s - self.delay_s).abs() > PEAK_S
     }
 
     /// The highest correlation within a step.
     fn refined(&self, turns: &[Turn], angles: &Angles) -> Self {
-        let near = (-FINE..=FINE).map(|k| self.late_s + STEP_S * f64::from(k) / f64::from(FINE));
-        let near = near.map(|late_s| correlations(turns, angles, late_s)[self.axis]);
+        let near = (-FINE..=FINE).map(|k| self.delay_s + STEP_S * f64::from(k) / f64::from(FINE));
+        let near = near.map(|delay_s| correlations(turns, angles, delay_s)[self.axis]);
         let covered = near.filter(|peak| 10 * peak.turns >= 9 * self.turns);
         covered
             .max_by(|a, b| a.correlation.abs().total_cmp(&b.correlation.abs()))
@@ -87,7 +87,7 @@ pub(crate) fn peak(turns: &[Turn], angles: &Angles) -> Result<Peak, NoPeak> {
     let steps = (MAX_LATE_S / STEP_S) as i32;
     let offsets = (-steps..=steps).map(|k| f64::from(k) * STEP_S);
     let mut peaks: Vec<Peak> = offsets
-        .flat_map(|late_s| correlations(turns, angles, late_s))
+        .flat_map(|delay_s| correlations(turns, angles, delay_s))
         .collect();
     let most = peaks.iter().map(|peak| peak.turns).max().unwrap_or(0);
     if most < MIN_TURNS {
@@ -121,7 +121,7 @@ pub(crate) fn peak(turns: &[Turn], angles: &Angles) -> Result<Peak, NoPeak> {
 pub(crate) fn nearest(turns: &[Turn], angles: &Angles) -> Option<Peak> {
     let steps = (MAX_DELAY_S / STEP_S) as i32;
     let delays = (-steps..=steps).map(|k| f64::from(k) * STEP_S);
-    let peaks = delays.map(|late_s| correlations(turns, angles, late_s)[2]);
+    let peaks = delays.map(|delay_s| correlations(turns, angles, delay_s)[2]);
     let peaks: Vec<Peak> = peaks.filter(|peak| peak.turns >= MIN_TURNS).collect();
     let strength = |peak: &Peak| peak.correlation.abs();
     let best = *peaks
@@ -132,7 +132,7 @@ pub(crate) fn nearest(turns: &[Turn], angles: &Angles) -> Option<Peak> {
     let fitting = peaks
         .into_iter()
         .filter(|it| it.correlation > 0.0 && fits(it));
-    let nearest = fitting.min_by(|a, b| a.late_s.abs().total_cmp(&b.late_s.abs()));
+    let nearest = fitting.min_by(|a, b| a.delay_s.abs().total_cmp(&b.delay_s.abs()));
     nearest.filter(|_| !fits(&Peak::default()))
 }
 
@@ -150,9 +150,9 @@ fn independent(turns: &[Turn]) -> f64 {
 }
 
 /// The correlations with the angles about each axis at one offset.
-fn correlations(turns: &[Turn], angles: &Angles, late_s: f64) -> [Peak; 3] {
+fn correlations(turns: &[Turn], angles: &Angles, delay_s: f64) -> [Peak; 3] {
     let common = turns.iter().filter_map(|turn| {
-        let turned = angles.between(turn.from_s + late_s, turn.to_s + late_s)?;
+        let turned = angles.between(turn.from_s + delay_s, turn.to_s + delay_s)?;
         Some((turn.amount, turned.angle))
     });
     let common: Vec<_> = common.collect();
@@ -169,7 +169,7 @@ fn correlations(turns: &[Turn], angles: &Angles, late_s: f64) -> [Peak; 3] {
         }
         let correlation = products / (yaws * angles).sqrt();
         Peak {
-            late_s,
+            delay_s,
             axis,
             // A series that does not turn has no correlation.
             correlation: if correlation.is_finite() {
