@@ -44,7 +44,6 @@ pub mod output;
 pub mod path;
 mod place_noise;
 pub mod profile;
-mod render_ahead;
 mod route;
 mod scenery;
 pub mod sensor;

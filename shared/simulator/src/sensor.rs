@@ -40,7 +40,6 @@ use self::spectrum::{NOISE_OVERLAP, RangeSpectrum};
 use self::sweep_poses::SweepPoses;
 pub use self::sweep_time::SweepTime;
 use crate::body::Moving;
-use crate::config::Realism;
 use crate::interpolate::interpolate;
 use crate::path::Path;
 use crate::profile::{Chirp, METADATA_BYTES, Receiver, Sampling};
@@ -86,8 +85,8 @@ pub struct Sensor {
 }
 
 impl Sensor {
-    /// A new radar; all its randomness comes from `seed`.
-    pub fn new(config: &SensorConfig, realism: Realism, seed: u64) -> Self {
+    /// A new radar, without errors if it is exact. All its randomness comes from `seed`.
+    pub fn new(config: &SensorConfig, is_exact: bool, seed: u64) -> Self {
         let (sampling, receiver) = (config.sampling(), config.receiver());
         let spectrum = RangeSpectrum::new(sampling.bins, sampling.range_resolution_m, &receiver);
         let (cells, spacing) = spectrum.noise_cells();
@@ -99,7 +98,7 @@ impl Sensor {
         Self {
             seed,
             eccentricity_rad: config.azimuth_eccentricity_rad,
-            is_exact: realism == Realism::Exact,
+            is_exact,
             antenna: Antenna::new(receiver.beam_rad),
             noise: (0..cells).map(power).collect(),
             spectrum,

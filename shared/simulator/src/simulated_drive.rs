@@ -1,6 +1,8 @@
 //! A simulated drive in a dataset format: images with their names, side files and ground truth. It
 //! can be written to a disk or streamed into a pipeline.
 
+mod render_ahead;
+
 use std::path::PathBuf;
 
 use gyre_datasets::{Dataset, DatasetOptions, Format, ImageSize, ImageSource, OpenError};
@@ -16,11 +18,11 @@ use crate::layout::{boreas, oxford, radiate};
 use crate::output::{HostStamps, OutputFormat};
 use crate::profile::Chirp;
 use crate::profile::METADATA_BYTES;
-use crate::render_ahead::Ahead;
 use crate::sensor::Sensor;
 use crate::simulator::Simulator;
 use crate::truth;
 use crate::{gnss, wheels};
+use render_ahead::Ahead;
 
 /// A simulated drive in a dataset format.
 #[derive(Clone)]
@@ -164,7 +166,10 @@ impl SimulatedDrive {
             truth::azimuth_poses_npy(&self.simulator),
         ));
         let stamps_ns = (0..self.scans()).map(|index| self.stamp_ns(index));
-        files.push((cars::FILE.into(), cars::csv(&self.simulator, stamps_ns)));
+        files.push((
+            cars::FILE.into(),
+            truth::objects_csv(&self.simulator, stamps_ns),
+        ));
         files.extend(
             self.gyro_samples()
                 .map(|samples| (log::FILE.into(), log::csv(&samples))),

@@ -8,7 +8,7 @@ use gyre_samples::{RawFix, Sample};
 use nalgebra::Point2;
 
 use crate::cars::Cars;
-use crate::config::{MAX_SCANS, SimulationConfig};
+use crate::config::{MAX_SCANS, Realism, SimulationConfig};
 use crate::error::SimulatorError;
 use crate::gyro::log;
 use crate::path::Path;
@@ -159,7 +159,8 @@ impl Simulator {
     /// A new sensor for [`Simulator::render_into`].
     pub fn sensor(&self) -> Sensor {
         let Self { config, .. } = self;
-        Sensor::new(&config.sensor, config.realism, config.sensor_seed())
+        let is_exact = config.realism == Realism::Exact;
+        Sensor::new(&config.sensor, is_exact, config.sensor_seed())
     }
 
     /// The size of one scan.

@@ -50,7 +50,7 @@ fn measured(body: Body, path: &dyn Path, sensor: &SensorConfig, realism: Realism
     };
     let bytes = azimuths * sensor.sampling().stride();
     let mut scan = OwnedScan::with_limits(ScanLimits { bytes, azimuths });
-    let mut radar = Sensor::new(sensor, realism, 7);
+    let mut radar = Sensor::new(sensor, realism == Realism::Exact, 7);
     scan.geometry = radar.sweep(scene, time, 0, &mut scan.slot());
     scan
 }

@@ -15,11 +15,6 @@ const MAX_BYTES: u64 = 1 << 16;
 /// The fault of a file that cannot be read.
 const UNREADABLE: &str = "the file of this number is missing, or has another form";
 
-/// Returns whether a folder has the list of times beside it.
-pub(crate) fn has_list(folder: &Path) -> bool {
-    folder.with_extension("txt").is_file()
-}
-
 /// Reads the files that the list beside a folder names. `entry` makes an entry of a time, ns since
 /// 1970, and of these lines, counted from 0, each of three numbers.
 ///
@@ -37,7 +32,7 @@ pub(crate) fn read<T, const N: usize>(
         reason,
     };
     let list = folder.with_extension("txt");
-    if !has_list(folder) {
+    if !list.is_file() {
         let list = list.display();
         return Err(unknown(format!(
             "a folder as RADIATE's GPS_IMU_Twist needs the list of the times of its files beside it, {list}"

@@ -11,7 +11,6 @@ use thiserror::Error;
 
 use crate::{
     OpenError,
-    gps_imu_twist::has_list,
     table::{Columns, MAX_BYTES, Rows},
 };
 
@@ -98,6 +97,11 @@ fn name(section: &str) -> &str {
         "gnss" => "GNSS receiver",
         other => other,
     }
+}
+
+/// Returns whether a folder has RADIATE's list of times beside it.
+fn has_list(folder: &Path) -> bool {
+    folder.with_extension("txt").is_file()
 }
 
 /// Returns the first of these places with a log beside the scans of a dataset folder. The folder of

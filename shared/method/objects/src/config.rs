@@ -3,7 +3,8 @@
 use gyre_masking::networks::PlanesError;
 use serde::{Deserialize, Serialize};
 
-use crate::track::MAX_SCORE;
+/// The largest score, so that an object that has gone ends soon.
+pub(crate) const MAX_SCORE: f64 = 4.0;
 
 /// The kind of the tracking.
 #[derive(

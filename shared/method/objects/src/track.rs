@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix2, Point2, Vector2};
 
+use crate::config::MAX_SCORE;
 use crate::detector::Detection;
 use crate::filter::{Filter, Sighting};
 use crate::object::Outline;
@@ -21,8 +22,6 @@ const HEADING_SIGMA_RAD: f64 = 0.2;
 /// which the two can be one object: more than its own noise, so that an object that brakes hard or
 /// turns off is within it.
 const GATE: f64 = 50.0;
-/// The largest score, so that an object that has gone ends soon.
-pub(crate) const MAX_SCORE: f64 = 4.0;
 /// The score from which on an object that a scan shows is reported.
 const KEEP_SCORE: f64 = 0.0;
 /// The score below which a track ends.

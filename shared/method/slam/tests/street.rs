@@ -5,10 +5,10 @@
 use std::f64::consts::PI;
 
 use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion, pose};
+use gyre_scan_matching::RefinementConfig;
 use gyre_slam::localisation::{
     Localisation, Localiser, LocaliserOptions, Map, MapError, Observation, Status,
 };
-use gyre_scan_matching::RefinementConfig;
 use gyre_slam::{Keyframe, RecordLog};
 use nalgebra::{Matrix3, Point2};
 
