@@ -51,7 +51,6 @@ pub const FLOATS: [f64; 12] = [
 ];
 
 impl Number {
-    /// Returns its bits.
     pub fn bits(self) -> u64 {
         match self {
             Self::Any(bits) => bits,
@@ -73,7 +72,6 @@ impl Number {
     }
 }
 
-/// Edits bytes.
 pub fn edit_bytes(bytes: &mut Vec<u8>, edits: &[ByteEdit]) {
     for edit in edits {
         let len = bytes.len();
@@ -123,9 +121,7 @@ pub enum TextEdit {
     Number(u16, u8, Number),
     /// Inserts a line of such a word.
     Line(u16, u8),
-    /// Removes a line.
     RemoveLine(u16),
-    /// Repeats a line.
     RepeatLine(u16),
     /// Swaps two lines.
     SwapLines(u16, u16),
@@ -192,7 +188,6 @@ const WORDS: [&str; 40] = [
     "\u{202e}",
 ];
 
-/// Edits a text.
 pub fn edit_text(text: &str, edits: &[TextEdit]) -> String {
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
     for edit in edits {

@@ -20,7 +20,6 @@ enum RowEdit {
     Count(u8, u16),
     /// The encoder counts of all rows from this one on, shifted.
     CountsFrom(u8, u16),
-    /// The flags.
     Flags(u8, u8),
     /// All rows alike.
     Copy(u8),

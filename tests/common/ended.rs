@@ -5,7 +5,6 @@ use std::process::{Command, ExitStatus};
 /// A run that is over, or another command.
 #[derive(Clone, Debug)]
 pub struct Ended {
-    /// The exit status.
     pub status: ExitStatus,
     /// The standard output.
     pub stdout: String,

@@ -21,9 +21,6 @@ pub struct DoctorArguments {
 }
 
 /// Prints what was found, and fails if a run cannot work here.
-///
-/// # Errors
-/// The output cannot be written.
 pub fn doctor(
     arguments: &DoctorArguments,
     footprint: &Footprint,

@@ -43,9 +43,6 @@ pub struct ReportArguments {
 }
 
 /// Writes the page and says where it is.
-///
-/// # Errors
-/// A run or a trajectory that cannot be read, a page that cannot be written or opened.
 pub fn report(arguments: &ReportArguments) -> Result<ExitCode, Failure> {
     let truth = match &arguments.ground_truth {
         Some(truth) => Some(truth.clone()),

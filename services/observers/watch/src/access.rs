@@ -52,9 +52,6 @@ pub enum Verdict {
 
 impl Token {
     /// Creates a random one.
-    ///
-    /// # Errors
-    /// The system has no random numbers.
     pub fn random() -> io::Result<Self> {
         let mut bytes = [0_u8; TOKEN_BYTES];
         getrandom::fill(&mut bytes).map_err(io::Error::other)?;
@@ -64,9 +61,6 @@ impl Token {
     }
 
     /// Reads the token of a file, or writes a random one there if there is no such file.
-    ///
-    /// # Errors
-    /// The file cannot be read or written, or holds no token.
     pub fn of_file(path: &Path) -> io::Result<Self> {
         match fs::read_to_string(path) {
             Ok(text) => Self::parse(text.trim()),

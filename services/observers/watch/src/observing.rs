@@ -41,9 +41,6 @@ pub struct Followed {
 }
 
 /// Starts the threads. They end when the view is stopped.
-///
-/// # Errors
-/// The system refuses a thread.
 pub fn start(followed: &Arc<Followed>) -> std::io::Result<Vec<JoinHandle<()>>> {
     let start = |name: &str, follow: fn(&Followed)| {
         let followed = Arc::clone(followed);

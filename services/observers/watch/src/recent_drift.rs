@@ -26,7 +26,6 @@ pub struct Drift {
     pub over_m: f64,
     /// Of the position along its worst direction, m.
     pub position_m: f64,
-    /// Of the yaw, rad.
     pub yaw_rad: f64,
 }
 

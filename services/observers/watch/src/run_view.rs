@@ -47,7 +47,6 @@ pub struct RunView {
 
 /// The newest of each kind of message to a browser.
 pub struct Updates {
-    /// The run.
     pub run: watch::Sender<Utf8Bytes>,
     /// Counts and delays.
     pub health: watch::Sender<Utf8Bytes>,
@@ -108,7 +107,6 @@ impl RunView {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Returns the run.
     pub fn run(&self) -> RunInfo {
         self.state().run.clone()
     }
@@ -258,7 +256,6 @@ impl RunView {
         state.processes = processes;
     }
 
-    /// Returns the processes.
     pub fn processes(&self) -> Vec<Process> {
         self.state().processes.clone()
     }
@@ -273,7 +270,6 @@ impl RunView {
         self.state().notice = notice;
     }
 
-    /// Returns the counts.
     pub fn counts(&self) -> RunCounts {
         self.state().counts
     }

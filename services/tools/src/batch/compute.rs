@@ -30,7 +30,6 @@ const TAIL: u64 = 1 << 16;
 pub struct Batch<'a> {
     /// The program `gyre`.
     pub program: PathBuf,
-    /// The list.
     pub list: &'a List,
     /// The drives of the list that are computed.
     pub drives: Vec<Drive>,

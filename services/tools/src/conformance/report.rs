@@ -32,13 +32,11 @@ pub struct Report {
 /// A rule and the verdict on it.
 #[derive(Clone, Debug, Serialize)]
 pub struct Judged {
-    /// The rule.
     pub rule: Rule,
     /// The section of the contract.
     pub section: &'static str,
     /// The conduct of a program that keeps it.
     pub says: &'static str,
-    /// The verdict.
     #[serde(flatten)]
     pub verdict: Verdict,
 }
@@ -51,7 +49,6 @@ const PERCENTILE_ITEMS: u64 = 100;
 /// Times of work on an item, without the first four items.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Work {
-    /// The items.
     pub items: u64,
     /// Median, ms.
     pub p50_ms: f64,

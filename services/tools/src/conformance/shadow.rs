@@ -33,7 +33,6 @@ use shadowing::Shadowing;
 /// The program, the stage that it shadows, and the limits of the comparison.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// The stage.
     pub stage: StageId,
     /// The program and its arguments.
     pub command: Vec<String>,

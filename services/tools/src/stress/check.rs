@@ -9,7 +9,6 @@ pub struct Check {
     pub key: &'static str,
     /// The measured figure; `None`: there is none, which misses the limit.
     pub measured: Option<f64>,
-    /// The limit.
     pub limit: f64,
     /// True if the limit is kept.
     pub passed: bool,

@@ -11,7 +11,6 @@ pub enum StressError {
     /// A process could not be started.
     #[error("cannot start `{program}`: {source}")]
     Start {
-        /// The program.
         program: String,
         /// The system error.
         source: io::Error,
@@ -19,7 +18,6 @@ pub enum StressError {
     /// A run ended before its first poses.
     #[error("the run of {scenario} ended before it could be measured: {said}")]
     EndedEarly {
-        /// The scenario.
         scenario: String,
         /// The last line that the run printed.
         said: String,
@@ -29,7 +27,6 @@ pub enum StressError {
         "the run of {scenario} has made no pose within {limit_s} s; {log} shows what it waits for"
     )]
     NoPose {
-        /// The scenario.
         scenario: String,
         /// The time limit, s.
         limit_s: u64,
@@ -46,7 +43,6 @@ pub enum StressError {
         "{scenario} needs --duration {least_s} or more: time for a fault, and for the recovery from it"
     )]
     TooShort {
-        /// The scenario.
         scenario: &'static str,
         /// The shortest duration, s.
         least_s: u64,

@@ -41,9 +41,7 @@ pub enum FaultKind {
 /// A fault on the timeline.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Fault {
-    /// The kind.
     pub kind: FaultKind,
-    /// The stage.
     pub stage: &'static str,
     /// The time at which it began, s since the measurement began.
     pub at_s: f64,

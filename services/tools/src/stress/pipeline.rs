@@ -40,7 +40,6 @@ const SAMPLE_EVERY: Duration = Duration::from_secs(1);
 /// A run with its load and faults.
 #[derive(Clone, Debug)]
 pub struct Setup {
-    /// The scenario.
     pub scenario: Scenario,
     /// The name of its folder.
     pub name: String,
@@ -89,7 +88,6 @@ impl Setup {
 /// A measured run.
 #[derive(Clone, Debug)]
 pub struct Measured {
-    /// The figures.
     pub figures: Figures,
     /// A load or a fault that was omitted, so that the figures are not of this scenario.
     pub omitted: Option<String>,
@@ -103,7 +101,6 @@ pub struct Measured {
 pub struct Summary {
     /// Restarts by stage.
     pub restarts: BTreeMap<String, usize>,
-    /// Counters by stage.
     pub stages: BTreeMap<String, Counters>,
 }
 
@@ -118,9 +115,6 @@ pub struct Counters {
 /// Starts a run, measures it, and ends it. Pipelines that are measured together have one ticket:
 /// the measurement begins when each has given up its share of it, after the warm-up or by a
 /// failure.
-///
-/// # Errors
-/// A run that makes no first poses; a helper that fails.
 pub fn measure(
     tested: &TestedPipeline,
     setup: &Setup,

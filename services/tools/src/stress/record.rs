@@ -59,7 +59,6 @@ pub struct Sample {
 /// The hop of one stage.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Hop {
-    /// The stage.
     pub stage: &'static str,
     /// From the publication by the stage before to the reception; `None` of the first stage.
     pub transport: Option<Distribution>,

@@ -28,7 +28,6 @@ pub struct Provenance {
     pub date: String,
     /// The processor and the number of its cores.
     pub machine: String,
-    /// The kernel.
     pub kernel: String,
     /// Gyre's version.
     pub gyre: String,
@@ -70,9 +69,6 @@ impl Report {
     }
 
     /// Writes all its files.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
     pub fn write(&self, out: &Path) -> Result<(), StressError> {
         let write = |name: &str, text: String| {
             let path = out.join(name);

@@ -24,9 +24,6 @@ pub struct Found {
 
 /// Returns the largest level from `first` on that passes, up to `most`. `grow` says which level to
 /// try after one that has passed.
-///
-/// # Errors
-/// An error of `passes`.
 pub fn largest<E>(
     first: u32,
     most: u32,
@@ -77,9 +74,6 @@ impl<'a> Steps<'a> {
     }
 
     /// Returns whether a level passes, at the second try at the latest.
-    ///
-    /// # Errors
-    /// An error of `step`.
     pub fn passes(
         &mut self,
         mut step: impl FnMut() -> Result<Step, StressError>,

@@ -79,7 +79,6 @@ pub fn lacks(tested: &TestedPipeline, scenario: Scenario) -> Option<String> {
 /// A fault of gyro, wheels or radar, and what the motions said of it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct WitnessFault {
-    /// The kind.
     pub kind: PlayedFaultKind,
     /// The time at which it began, s since the measurement began.
     pub at_s: f64,

@@ -19,9 +19,6 @@ pub struct LoggedLoops {
 
 impl LoggedLoops {
     /// Opens the logs of the run that writes to `out`.
-    ///
-    /// # Errors
-    /// A log that cannot be read.
     pub fn open(out: &Path) -> Result<Self, LogError> {
         Ok(Self {
             keyframes: RecordReader::open(out)?,
@@ -32,9 +29,6 @@ impl LoggedLoops {
     }
 
     /// Reads what was logged since the last call, and returns all loops so far, by their numbers.
-    ///
-    /// # Errors
-    /// A log that cannot be read.
     pub fn refresh(&mut self) -> Result<&[LoopHeader], LogError> {
         self.queries.refresh()?;
         self.keyframes.refresh()?;

@@ -47,9 +47,6 @@ struct FollowedTopic<M: Message> {
 }
 
 /// Starts the threads. They end when the view is stopped.
-///
-/// # Errors
-/// The system refuses a thread.
 pub fn start(followed: &Arc<Followed>, hub: &Arc<Hub>) -> io::Result<Vec<JoinHandle<()>>> {
     let report = {
         let (followed, hub) = (Arc::clone(followed), Arc::clone(hub));

@@ -35,7 +35,6 @@ pub(crate) struct Feedback {
     breaks: bool,
     /// The motion as searched.
     pub motion: Recorded,
-    /// The pose.
     pub pose: Recorded,
 }
 

@@ -11,7 +11,6 @@ use crate::conformance::Spreads;
 /// The comparison of a program with a stage of a run.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
-    /// The stage.
     pub stage: &'static str,
     /// The program and its arguments.
     pub command: Vec<String>,
@@ -27,7 +26,6 @@ pub struct Report {
     pub breaches: Vec<String>,
     /// The first ends of the program, and their reasons.
     pub ends: Vec<String>,
-    /// The verdict.
     pub verdict: Verdict,
 }
 
@@ -46,7 +44,6 @@ pub enum Verdict {
 /// Times of the same items.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Beside {
-    /// Of the shadow.
     pub shadow: Percentiles,
     /// Of the stage of the run.
     pub real: Percentiles,

@@ -16,7 +16,6 @@ use crate::stress::{
 /// The figures of a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Figures {
-    /// The latency.
     #[serde(flatten)]
     pub latency: RunLatency,
     /// Faults and recoveries.
