@@ -21,7 +21,7 @@ pub enum ByteEdit {
     Truncate(u32),
 }
 
-/// A number at which programs err.
+/// A number that often reveals faults of programs.
 #[derive(Clone, Copy, Debug, TypeGenerator)]
 pub enum Number {
     /// Any bits.
@@ -34,7 +34,7 @@ pub enum Number {
     Float(u8),
 }
 
-/// Floating-point numbers at which programs err.
+/// Floating-point numbers that often reveal faults of programs.
 pub const FLOATS: [f64; 12] = [
     0.0,
     -0.0,
@@ -125,7 +125,7 @@ pub enum TextEdit {
     RepeatLine(u16),
     /// Swaps two lines.
     SwapLines(u16, u16),
-    /// Edits the bytes; what is no UTF-8 then is replaced.
+    /// Edits the bytes; invalid UTF-8 is then replaced.
     Bytes(ByteEdit),
     /// Writes the text as another program does: see `WAYS`.
     Way(u8),
@@ -144,7 +144,7 @@ const WAYS: [(&str, &str); 7] = [
 /// A byte order mark, before a text.
 const MARK: char = '\u{feff}';
 
-/// Words at which parsers err.
+/// Words that often reveal faults of parsers.
 const WORDS: [&str; 40] = [
     "",
     "0",

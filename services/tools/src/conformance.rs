@@ -38,11 +38,8 @@ use checks::Examination;
 use reference::Reference;
 use test::Context;
 
-/// Tests a program with inputs from these scans; `observe` receives what is tested.
-///
-/// # Errors
-/// The inputs cannot be computed, the program cannot be started, or the transport fails. A program
-/// that breaks the contract is no error: the report has the breach.
+/// Tests a program with inputs from these scans; `observe` receives the name of each scenario.
+/// Breaches of the contract are in the report, not in the error.
 pub fn check(
     test: &Test,
     mut scans: InputScans,

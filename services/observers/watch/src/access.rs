@@ -13,7 +13,7 @@ use subtle::ConstantTimeEq;
 
 /// Random bytes of a token.
 const TOKEN_BYTES: usize = 16;
-/// The shortest token that is taken from a file.
+/// The minimum length of a token in a file.
 const MIN_TOKEN: usize = 16;
 
 /// The origins of viewers' pages: Foxglove's site, and the files of an application, which no site
@@ -26,7 +26,7 @@ pub struct Token(String);
 
 /// The conditions for an answer to a request.
 pub struct Access {
-    /// The token; none is needed from this machine.
+    /// The token; `None` on this machine.
     token: Option<Token>,
     /// The cookie's name: cookies are shared by all ports of a host.
     cookie: String,

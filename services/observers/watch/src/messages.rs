@@ -37,7 +37,7 @@ pub struct Missed {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum RunState {
-    /// There is none yet.
+    /// The run has not started yet.
     #[default]
     Waiting,
     /// It works.
@@ -61,7 +61,7 @@ impl RunState {
 #[derive(Clone, Debug, Default, Serialize)]
 #[serde(tag = "kind", rename = "run")]
 pub struct RunInfo {
-    /// Another one at each start of a run.
+    /// Each start of a run has a new id.
     pub id: String,
     /// The folder of its results.
     pub out: String,

@@ -1,5 +1,5 @@
-//! The drift of the last stretch of the path: what the odometry does not know of its newest pose
-//! against the one a stretch before.
+//! The drift of the last stretch of the path: the uncertainty of the newest pose relative to the
+//! pose at the start of the stretch.
 
 use std::collections::VecDeque;
 

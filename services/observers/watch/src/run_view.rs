@@ -29,9 +29,10 @@ use crate::{
     track::{Cursor, Track, Vertex},
 };
 
-/// Motions whose part of gyro, wheels and Doppler the page says: those of ten seconds at 4 Hz.
+/// The number of motions for which the page shows the share of gyro, wheels and Doppler: ten
+/// seconds at 4 Hz.
 const LAST_MOTIONS: usize = 40;
-/// Poses that are kept to find that of a scan whose points come later.
+/// The number of poses that are kept for scans whose points come later.
 const RECENT: usize = 256;
 
 /// The view of the run.
@@ -248,7 +249,7 @@ impl RunView {
     pub fn set_processes(&self, status: &Status, processes: Vec<Process>) {
         let mut state = self.state();
         let with_pose = status.poses + status.dropped;
-        // A replaced source need not say what it has published.
+        // A replaced source need not report its number of published scans.
         let published = status.published.unwrap_or_default().max(with_pose);
         // Poses that came since are counted already: a counter never decreases.
         state.counts.published = state.counts.published.max(published);
@@ -297,7 +298,7 @@ impl RunView {
     }
 
     /// Returns the message of new poses for a browser that has received those up to `last`; `None`
-    /// if there is none.
+    /// if there are no new poses.
     pub fn poses(&self, cursor: &mut Cursor, last: &mut Option<u64>) -> Option<Utf8Bytes> {
         let state = self.state();
         let seq = state.latest.map(|latest| latest.seq);

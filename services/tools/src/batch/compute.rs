@@ -52,11 +52,8 @@ pub struct Ended {
     pub interrupted: bool,
 }
 
-/// Computes all drives, and writes the row of each when it has ended. `say` receives a line for each
-/// drive. A request to stop ends the runs too, whose results so far are kept.
-///
-/// # Errors
-/// A process that cannot be started, or a row that cannot be written. The runs are ended then.
+/// Computes all drives, and writes the row of each when it has ended. `say` receives a line for
+/// each drive. A request to stop and an error end the runs; their results so far are kept.
 pub fn compute(
     batch: &Batch<'_>,
     signals: &Signals,

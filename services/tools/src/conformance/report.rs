@@ -23,9 +23,9 @@ pub struct Report {
     /// The time from sending it an item to reading its answer, one item at a time; `None` unless
     /// there is a budget.
     pub answers: Option<Work>,
-    /// That of Gyre's own stage on the same inputs, directly after.
+    /// The work of Gyre's own stage on the same inputs, directly after.
     pub own_work: Option<Work>,
-    /// The distance of its results from those of Gyre's own stage.
+    /// The difference between its results and the results of Gyre's own stage.
     pub deviation: Option<String>,
 }
 
@@ -43,7 +43,7 @@ pub struct Judged {
 
 /// Items that are not measured: buffers grow, and memory is touched for the first time.
 const WARM_UP: usize = 4;
-/// Items from which on there is a 99th percentile.
+/// The minimum number of items for a 99th percentile.
 const PERCENTILE_ITEMS: u64 = 100;
 
 /// Times of work on an item, without the first four items.

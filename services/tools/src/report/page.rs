@@ -208,7 +208,7 @@ fn latency(run: &Run) -> String {
     }
 }
 
-/// Returns the configuration of a run; of several, the keys in which they differ.
+/// Returns the configuration of a run, or the keys that differ between several runs.
 fn configurations(subjects: &[Subject]) -> String {
     let runs: Vec<(&Subject, &Run)> = subjects
         .iter()

@@ -38,7 +38,7 @@ pub enum StressError {
         "run.observers is 0, and the stress test looks on as an observer: set run.observers to 1 or more"
     )]
     NoPlace,
-    /// A time too short for what is to be done in it.
+    /// A time too short for the scenario.
     #[error(
         "{scenario} needs --duration {least_s} or more: time for a fault, and for the recovery from it"
     )]
@@ -47,7 +47,7 @@ pub enum StressError {
         /// The shortest duration, s.
         least_s: u64,
     },
-    /// A helper process ended or said something else than it should.
+    /// A helper process ended or printed an unexpected line.
     #[error("the helper process `{helper}` {reason}")]
     Helper {
         /// The work of the helper.
@@ -69,7 +69,7 @@ pub enum StressError {
     /// A request to stop.
     #[error("interrupted")]
     Interrupted,
-    /// A helper was called with what it does not know.
+    /// A helper was called with unknown arguments.
     #[error("{0}")]
     Usage(String),
 }

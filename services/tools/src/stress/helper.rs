@@ -156,7 +156,7 @@ fn json(value: &impl Serialize) -> Result<String, StressError> {
     serde_json::to_string(value).map_err(|error| StressError::Usage(error.to_string()))
 }
 
-/// Says that the work has begun.
+/// Prints that the work has begun.
 pub(crate) fn say_ready() {
     say(READY);
 }

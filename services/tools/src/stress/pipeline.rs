@@ -31,7 +31,7 @@ use crate::stress::{
 
 use running::Running;
 
-/// Time after the measurement in which late poses still count.
+/// The time after the measurement during which late poses still count.
 const GRACE: Duration = Duration::from_secs(10);
 /// Time between two polls of faults and processes.
 const TICK: Duration = Duration::from_millis(20);
@@ -59,7 +59,7 @@ pub struct Setup {
     pub observers: usize,
     /// The fault of these stages.
     pub faults: Option<(FaultKind, Vec<StageId>)>,
-    /// The faults that the source puts into what it plays.
+    /// The faults of the source in its played scans.
     pub played: Vec<PlayedFault>,
     /// For the choice of faults.
     pub seed: u64,
@@ -209,8 +209,8 @@ struct Session {
     processes: Sampler,
     faults: Option<Faults>,
     witness: Option<WitnessFaults>,
-    /// The basis of the motions that are measured in the first turn of the recording: where it
-    /// starts anew, the vehicle jumps.
+    /// The basis of the measured motions in the first turn of the recording: where the recording
+    /// starts again, the vehicle jumps.
     motions: WitnessCounts,
     turn_end: u64,
     newest: u64,
@@ -288,7 +288,7 @@ impl Session {
         self.count(pose);
     }
 
-    /// Counts what a motion rests on.
+    /// Counts the basis of a motion.
     fn count(&mut self, pose: &PoseHeader) {
         let item = &pose.item;
         let is_new = item.seq > self.newest && !item.is(flag::BREAK);

@@ -47,7 +47,7 @@ pub struct Report {
     version: u32,
     /// The origin of the report.
     pub provenance: Provenance,
-    /// The scenarios, in the order in which they were carried out.
+    /// The scenarios in the order of their execution.
     pub outcomes: Vec<ScenarioOutcome>,
 }
 

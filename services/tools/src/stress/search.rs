@@ -22,8 +22,8 @@ pub struct Found {
     pub failed: Option<u32>,
 }
 
-/// Returns the largest level from `first` on that passes, up to `most`. `grow` says which level to
-/// try after one that has passed.
+/// Returns the largest level from `first` on that passes, up to `most`. `grow` returns the level to
+/// try after a level that has passed.
 pub fn largest<E>(
     first: u32,
     most: u32,

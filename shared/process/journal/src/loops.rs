@@ -28,7 +28,7 @@ impl LoggedLoops {
         })
     }
 
-    /// Reads what was logged since the last call, and returns all loops so far, by their numbers.
+    /// Reads new records since the last call, and returns all loops so far, by their numbers.
     pub fn refresh(&mut self) -> Result<&[LoopHeader], LogError> {
         self.queries.refresh()?;
         self.keyframes.refresh()?;

@@ -33,7 +33,7 @@ const POLL_INTERVAL: Duration = Duration::from_millis(200);
 /// The shortest time between two pictures of a topic, for recordings that are played fast.
 const PICTURE_INTERVAL: Duration = Duration::from_millis(50);
 
-/// The shortest time between two trajectories, each of which has all of it.
+/// The shortest time between two complete trajectories.
 const TRAJECTORY_INTERVAL: Duration = Duration::from_secs(1);
 
 /// A topic that is published to viewers.

@@ -20,7 +20,7 @@ pub struct Report {
     pub differences: Spreads,
     /// From the start of the work on an item to its end.
     pub work: Option<Beside>,
-    /// From the publication of an item's input to that of the output.
+    /// From the publication of an item's input to the publication of its output.
     pub answer: Option<Beside>,
     /// The first breaches of the contract.
     pub breaches: Vec<String>,

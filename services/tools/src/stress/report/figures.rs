@@ -50,7 +50,7 @@ impl Figures {
         !self.faults.is_empty() || !self.witness_faults.is_empty()
     }
 
-    /// Returns the longest recovery from a fault, ms; `None` if there was none from one of them.
+    /// Returns the longest recovery from a fault, ms; `None` if a fault had no recovery.
     pub fn longest_recovery_ms(&self) -> Option<f64> {
         let of_stages = self.faults.iter().map(|fault| fault.recovery_ms);
         let of_others = self.witness_faults.iter().map(|fault| fault.recovery_ms);
