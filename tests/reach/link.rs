@@ -139,7 +139,7 @@ fn a_robot_that_plays_another_drive_is_refused() {
     here.kill_supervisor();
     let ended = second.finish();
     ended.failed_with(&["the base has poses of another drive", "--fresh"]);
-    // The next run removes the remains of the killed one.
+    // The next run removes the leftovers of the killed one.
     first.option("--fresh").finish().succeeded();
 }
 
@@ -272,7 +272,7 @@ fn nobody_connects_without_a_certificate_of_the_authority() {
     running.kill_supervisor();
 }
 
-/// A free port of this machine, for `gyre link`.
+/// A link over a free port of this machine.
 struct Link {
     address: String,
 }

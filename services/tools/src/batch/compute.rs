@@ -52,8 +52,8 @@ pub struct Ended {
     pub interrupted: bool,
 }
 
-/// Computes all drives, and writes the row of each when it has ended. `say` receives a line for
-/// each drive. A request to stop and an error end the runs; their results so far are kept.
+/// Computes all drives, and writes the row of each when it has ended. The callback receives a line
+/// for each drive. A request to stop and an error end the runs; their results so far are kept.
 pub fn compute(
     batch: &Batch<'_>,
     signals: &Signals,

@@ -19,8 +19,8 @@ use crate::batch::{
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Settings {
-    /// The configuration of drives without a configuration, an absolute path; `None`: by their formats
-    /// and scans.
+    /// The configuration of drives without a configuration, an absolute path; `None`: by their
+    /// formats and scans.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub configuration: Option<PathBuf>,
     /// Overrides of each configuration, `section.key=value`. Overrides of a drive have precedence.

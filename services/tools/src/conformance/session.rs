@@ -224,7 +224,7 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    /// Kills the process and removes its remains.
+    /// Kills the process and removes its leftovers.
     pub(crate) fn kill(&mut self) -> Result<(), ProgramError> {
         self.harness.kill()?;
         self.receive()?;

@@ -140,7 +140,7 @@ fn recover(
     let mut builder = KeyframeBuilder::default();
     let last = found.last.as_ref().map_or(0, |keyframe| keyframe.seq);
     let records = crate::records_from(&crate::path(out), last)?;
-    // Behind them may be the remains of others after a power failure, or the end of the stream.
+    // Behind them may be the leftovers of others after a power failure, or the end of the stream.
     let count = usize::try_from(poses.saturating_sub(last)).unwrap_or(usize::MAX);
     for pose in records.into_iter().flatten().take(count) {
         let pose = pose?;

@@ -58,7 +58,7 @@ impl<'a> Running<'a> {
         );
         let output = File::create(&log).map_err(StressError::file(&log))?;
         let errors = output.try_clone().map_err(StressError::file(&log))?;
-        // Removes the remains of an earlier killed run.
+        // Removes the leftovers of an earlier killed run.
         sweep();
         let work = Work::Run(words(tested, setup, &out));
         let mut command = helper::command(&tested.program, &work)?;

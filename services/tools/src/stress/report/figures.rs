@@ -58,8 +58,8 @@ impl Figures {
         all?.into_iter().reduce(f64::max)
     }
 
-    /// Returns `p50 4.5, p99 7.0 of 480, max 7.2 ms; 0 of 480 scans dropped; processor 3.8 %, memory
-    /// 77 MB`.
+    /// Returns a sentence such as
+    /// `p50 4.5, p99 7.0 of 480, max 7.2 ms; 0 of 480 scans dropped; processor 3.8 %, memory 9 MB`.
     pub(super) fn sentence(&self) -> String {
         let (cpu, memory) = (self.cpu_percent(), self.memory_mb());
         let used = format!("processor {cpu:.1} %, memory {memory:.0} MB");
