@@ -26,7 +26,7 @@ pub struct Token(String);
 
 /// The conditions for an answer to a request.
 pub struct Access {
-    /// The token; `None` on this machine.
+    /// The token; `None`: only this machine has access.
     token: Option<Token>,
     /// The cookie's name: cookies are shared by all ports of a host.
     cookie: String,
