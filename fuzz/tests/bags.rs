@@ -86,7 +86,7 @@ fn scan(turn: usize) -> OwnedScan {
 struct Form {
     /// Azimuth by azimuth, otherwise turn by turn.
     by_azimuth: bool,
-    /// The encoder's counts per turn, where they are not those that the radar says.
+    /// The encoder's counts per turn, if they differ from the radar's own statement.
     encoder_size: Option<u16>,
     /// Times of rows in microseconds.
     has_microseconds: bool,
@@ -124,7 +124,7 @@ fn messages(form: Form) -> Vec<Message> {
     messages
 }
 
-/// Writes a bag without compression and checksums, so that edits of the file reach what is in it.
+/// Writes a bag without compression and checksums, so that edits of the file reach its messages.
 fn write(path: &Path, messages: &[Message], chunks: bool) {
     let options = WriteOptions::new()
         .profile("ros2")
@@ -150,7 +150,7 @@ fn write(path: &Path, messages: &[Message], chunks: bool) {
     mcap.finish().unwrap();
 }
 
-/// Opens a bag and reads all its scans, from the last to the first. What it accepts must be
+/// Opens a bag and reads all its scans, from the last to the first. An accepted bag must be
 /// consistent.
 fn use_bag(path: &Path) -> Result<(), Failure> {
     let mut dataset = gyre_recording::bags::open(path, &DatasetOptions::default())?;

@@ -1,5 +1,4 @@
-//! Messages that a stage of somebody else's may send: any header and any payload, against what the
-//! next stages do with them.
+//! Messages that a foreign stage may send: the next stages receive any header and any payload.
 
 use bolero::{TypeGenerator, check};
 use gyre_fuzz::{Failure, Target, edit::Number};
@@ -197,7 +196,7 @@ fn rotation(numbers: [Number; 5]) -> RotationEstimate {
     }
 }
 
-/// Whatever the cells hold, what the searches find of them has numbers.
+/// For any cells, the results of the searches are finite.
 fn assert_finite(angle: &RotationEstimate, motion: &MotionMatch) {
     let numbers = [
         angle.angle_rad,

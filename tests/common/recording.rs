@@ -189,8 +189,8 @@ fn encoded(width: u32, height: u32, pixels: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// Replaces an image by itself with other times of its rows, us since 1970: `stamp_us` returns that
-/// of a row, from 0, given the one that it has.
+/// Replaces the times of an image's rows, us since 1970: `stamp_us` returns the time of a row, from
+/// 0, for its present time.
 pub fn restamp(image: &Path, stamp_us: impl Fn(usize, i64) -> i64) {
     const STAMP: usize = 8;
     rewrite(image, |row, pixels| {
@@ -199,13 +199,13 @@ pub fn restamp(image: &Path, stamp_us: impl Fn(usize, i64) -> i64) {
     });
 }
 
-/// Replaces an image by itself with all rows marked as measured.
+/// Marks all rows of an image as measured.
 pub fn complete(image: &Path) {
     const VALIDITY: usize = 10;
     rewrite(image, |_, pixels| pixels[VALIDITY] = 255);
 }
 
-/// Replaces an image by itself with other rows: `edit` is given their numbers from 0.
+/// Edits the rows of an image: `edit` is given their numbers from 0.
 fn rewrite(image: &Path, edit: impl Fn(usize, &mut [u8])) {
     let bytes = fs::read(image).unwrap();
     let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info().unwrap();

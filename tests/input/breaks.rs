@@ -1,4 +1,4 @@
-//! Times that are wrong, and recordings with gaps: a run waits for no year, and says where the
+//! Wrong times, and recordings with gaps: a run does not wait for a year, and reports where the
 //! chain of motions breaks.
 
 use std::{

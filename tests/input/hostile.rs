@@ -13,7 +13,7 @@ use gyre_slam::{Keyframe, Place, Query, records_path};
 
 use crate::common::{Ended, Run, recording, undisturbed, wrapped};
 
-/// Address space of the process, kB: twice what the program and its libraries map.
+/// Address space of the process, kB: twice the mapped size of the program and its libraries.
 const LIMIT_KB: usize = 4_000_000;
 
 /// `gyre` with these arguments and a limit on its memory.
@@ -188,7 +188,7 @@ fn a_journal_and_logs_of_impossible_lengths_are_refused_and_a_mended_run_goes_on
         journal::path(out),
         records_path::<Keyframe>(out),
         records_path::<Query>(out),
-        // Last: loop-closure alone reads it, and odometry goes on to its end meanwhile.
+        // Last: only loop-closure reads this log, and odometry continues to its end meanwhile.
         records_path::<Place>(out),
     ] {
         let whole = fs::read(&log).unwrap();

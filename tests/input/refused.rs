@@ -129,7 +129,7 @@ fn a_dataset_of_truncated_images_alone_is_reported() {
 
 // A bad scan among good ones.
 
-/// Damages scan `bad` of eight, and asserts that it alone is left out.
+/// Damages scan `bad` of eight, and asserts that no other scan is left out.
 fn skips(bad: usize, reason: &str, damage: impl FnOnce(&Path)) {
     let recording = recording::copy(8);
     damage(&recording::images(recording.path())[bad]);

@@ -26,7 +26,7 @@ use crate::{
 pub const SCANS: usize = 48;
 pub const FIXES: usize = 58;
 
-/// The beginning of the drive around a block, all rows of which are measured: a radar sends no
+/// The beginning of the drive around a block. All its rows are measured, because a radar sends no
 /// others.
 pub fn drive() -> TempDir {
     let drive = recording::linked(around_a_block(), |scan| scan < SCANS);
@@ -47,7 +47,7 @@ pub fn with_graph(run: Run, address: &str) -> Run {
     with_antenna(run.set(&format!("gnss.listen='{address}'")))
 }
 
-/// The log of what the receiver sends during the drive.
+/// The messages that the receiver sends during the drive.
 pub fn log_of_drive() -> String {
     let text = log(0.0);
     text.lines()
@@ -62,7 +62,7 @@ fn received(run: &Run) -> PathBuf {
 }
 
 /// A receiver that sends the fixes of the drive once the run takes them: one late, one twice, one
-/// that is none, one line that is no fix.
+/// invalid, and one line without a fix.
 fn sending(run: &Run, address: String) -> JoinHandle<()> {
     let received = received(run);
     thread::spawn(move || {
@@ -143,7 +143,7 @@ fn a_trajectory_that_is_killed_goes_on_with_its_log() {
     let trajectory = running.stages()[FollowerId::Trajectory.name()];
     send(trajectory, Signal::KILL);
     running.await_poses_or_end(20);
-    // By now there is another one.
+    // By now the process has been restarted.
     let more = UdpSocket::bind("127.0.0.1:0").unwrap();
     more.send_to(b"hello", &address).unwrap();
     running.finish().succeeded();

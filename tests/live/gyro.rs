@@ -20,8 +20,8 @@ use crate::{
 
 pub const SCANS: usize = 12;
 
-/// A recording with the logs of a gyro and of wheels, all rows of which are measured: a radar sends
-/// no others.
+/// A recording with the logs of a gyro and of wheels. All its rows are measured, because a radar
+/// sends no others.
 pub fn with_log() -> TempDir {
     let simulation = format!("scans = {SCANS}\n{}", recording::SENSOR);
     let mut config: SimulationConfig = toml::from_str(&simulation).unwrap();
@@ -35,14 +35,14 @@ pub fn with_log() -> TempDir {
     whole
 }
 
-/// A sensor that sends what a log holds once somebody receives it, in datagrams of ten samples.
+/// A sensor that sends a log once somebody receives it, in datagrams of ten samples.
 fn sending(log: PathBuf, address: String) -> JoinHandle<()> {
     thread::spawn(move || {
         let text = fs::read_to_string(log).unwrap();
         let lines: Vec<&str> = text.lines().skip(1).collect();
         let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
         socket.connect(&address).unwrap();
-        // While nobody receives, the call after one that has sent says so.
+        // While nobody receives, each send reports the failure of the send before.
         let probe = || {
             socket.send(b"")?;
             thread::sleep(Duration::from_millis(5));

@@ -146,8 +146,7 @@ fn scans_of_a_burst_become_due_at_once() {
         .set("source.burst=4")
         .set("run.window=8");
     run.complete();
-    // The first three scans wait for the fourth, at a rate at which the pipeline keeps up
-    // otherwise.
+    // The first three scans wait for the fourth, at a rate that the pipeline sustains otherwise.
     let latency = run.summary()["latency"]["sensor_to_pose"]["p50_us"].clone();
     assert!(latency.as_f64() > Some(0.0), "{latency}");
     assert_eq!(run.summary()["published"], recording::SCANS as u64);

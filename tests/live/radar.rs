@@ -62,7 +62,7 @@ impl Radar {
         run_at(&self.address).set(&format!("source.scans={scans}"))
     }
 
-    /// Waits until it has played all, and returns what it says that it has played and lost.
+    /// Waits until the radar has played all, and returns its report of played and lost azimuths.
     pub fn played(&mut self) -> Played {
         let mut said = String::new();
         let mut words = self.server.stdout.take().unwrap();

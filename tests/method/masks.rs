@@ -1,5 +1,5 @@
-//! `gyre masks` as a whole: pictures of what each kind of mask keeps of a small simulated drive,
-//! and what is refused.
+//! `gyre masks` as a whole: pictures of the parts of a small simulated drive that each kind of mask
+//! keeps, and invalid arguments.
 
 use std::{
     collections::BTreeSet,

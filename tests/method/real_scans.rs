@@ -86,7 +86,7 @@ fn masks_help_on_scans_of_a_kind_that_they_have_never_seen() {
         return;
     }
     let run = |file: &str| Run::of_file(&configuration(file)).data(&data);
-    // What radiate.toml says of the sensor.
+    // The sensor's constants in radiate.toml.
     let sensor = [
         "format='radiate'",
         "range_resolution_m=0.1757",
@@ -112,8 +112,8 @@ fn masks_help_on_scans_of_a_kind_that_they_have_never_seen() {
             masked(run("radiate.toml"), "gyre-255.toml").set("refinement.kind=none"),
             1.0,
         ),
-        // Where loops close the truth differs from what the radar sees twice by 3.5 m, so that 0.1
-        // m of ATE do not rank refined drives: docs/results.md.
+        // Where loops close, the ground truth contradicts the radar by 3.5 m, so 0.1 m of ATE
+        // cannot rank refined drives: docs/results.md.
         (
             "refined",
             run("radiate.toml"),

@@ -1,4 +1,4 @@
-//! Refinement, the process between the search and the poses: what it changes, what it leaves alone,
+//! Refinement, the process between the search and the poses: changed motions, unchanged motions,
 //! and damage of its map.
 
 use std::{collections::BTreeSet, fs};

@@ -1,4 +1,4 @@
-//! Recordings of runs: they change nothing, survive kills and full disks, say what is missing, and
+//! Recordings of runs: they change nothing, survive kills and full disks, report missing items, and
 //! replay to the same bytes.
 
 use std::{
@@ -57,7 +57,7 @@ pub fn seqs(recording: &Recording, topic: &str) -> Vec<u64> {
     recording.entries(topic).map(|entry| entry.seq).collect()
 }
 
-/// Waits for the recorder of a run, another one than `not`.
+/// Waits for a recorder of the run other than `not`.
 pub fn await_recorder(running: &mut Running, not: Option<u32>) -> u32 {
     loop {
         let recorder = processes::child_with(running.pid(), "record");
@@ -214,8 +214,8 @@ fn a_recorder_that_is_stopped_for_long_says_exactly_what_it_missed() {
     from.finish().refused_with(&[&lacks]);
 }
 
-/// Returns the number of scans that are not there, four or more, which the recorder has said and
-/// written.
+/// Returns the number of missing scans, four or more. The recorder must have printed and written
+/// this number.
 fn counted_as_missed(run: &Run, ended: &Ended) -> usize {
     let recording = open_recording(&file(run)).unwrap();
     let there = seqs(&recording, "scan");

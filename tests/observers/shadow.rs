@@ -1,5 +1,5 @@
-//! `gyre shadow`: a second program beside a stage of a running run. Whatever it does, the run is
-//! the same; what it answers is compared.
+//! `gyre shadow`: a second program beside a stage of a running run. The shadow never changes the
+//! run; its answers are compared.
 
 use std::{
     fs::{self, File},
@@ -61,7 +61,7 @@ fn release(running: &Running) {
     send(running.stages()["refinement"], Signal::CONT);
 }
 
-/// A shadow that runs, and what it prints.
+/// A running shadow, and its output.
 struct Shadow {
     child: Child,
     /// The folder of its report.
@@ -69,7 +69,7 @@ struct Shadow {
 }
 
 impl Shadow {
-    /// Starts one beside a run; `name` is that of its report.
+    /// Starts one beside a run; `name` is the name of its report.
     fn start(run: &Run, name: &str, stage: &str, options: &[&str]) -> Self {
         let report = run.folder().join(name);
         fs::create_dir_all(&report).unwrap();
@@ -309,7 +309,7 @@ fn masking_of_a_live_run_is_identical_for_the_scans_that_were_not_dropped() {
     // With many scans dropped, motions may be too long for the radar: that is a problem of its own.
     running.finish();
     assert!(run.summary()["dropped"].as_u64() > Some(0));
-    // What is dropped is not compared, and of the rest what the shadow is behind with.
+    // The shadow does not compare dropped items, nor the items that it has not reached.
     assert_identical(shadow.end(), 1);
 }
 

@@ -1,5 +1,5 @@
-//! Observers of a run: whatever happens to them, the result is the same, nothing is left, and each
-//! knows what it has missed.
+//! Observers of a run: faults of observers change no result and leave nothing, and each observer
+//! reports the messages that it missed.
 
 use std::{path::Path, thread, time::Duration};
 

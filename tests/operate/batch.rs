@@ -1,5 +1,5 @@
-//! `gyre batch`: whatever is killed, the same command completes the table, and failures are told
-//! apart.
+//! `gyre batch`: after any kill, the same command completes the table, and the table distinguishes
+//! failures.
 
 mod drives;
 
@@ -134,7 +134,7 @@ impl Started<'_> {
         })
     }
 
-    /// Waits for what is there after a while.
+    /// Waits until `look` returns a value.
     fn await_some<T>(&mut self, look: impl Fn(&Batch<'_>) -> Option<T>) -> T {
         let since = Instant::now();
         loop {

@@ -1,4 +1,4 @@
-//! `gyre calibrate`: what it says of a recording, and that a run takes its file.
+//! `gyre calibrate`: its findings in a recording, and a run with its file.
 
 use std::{
     env, fs,
@@ -142,8 +142,8 @@ fn a_drive_that_is_too_short_is_refused() {
     assert!(!out.path().join("calibration.toml").exists());
 }
 
-/// The three-point turn of a real drive: it tells the clock of its gyro in a second, and is too
-/// short for the constants of the radar.
+/// The three-point turn of a real drive: it determines the delay of its gyro, and is too short for
+/// the constants of the radar.
 fn turning() -> Option<TempDir> {
     let Some(data) = env::var_os("GYRE_DATA").map(PathBuf::from) else {
         println!("skipped: GYRE_DATA is not set");

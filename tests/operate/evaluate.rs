@@ -60,7 +60,7 @@ fn evo(program: &str, run: &Run, options: &[&str]) -> Option<f64> {
     let program = python.with_file_name(program);
     let truth = run.out().join("ground_truth.tum");
     let mut command = Command::new(program);
-    // What it plots and logs is its user's.
+    // evo writes its settings and logs into the home folder.
     command.env("HOME", run.folder()).arg("tum").arg(truth);
     command.arg(run.out().join("trajectory.tum")).args(options);
     if command.output().is_err() {

@@ -1,5 +1,5 @@
-//! The ways in: the demo and the configurations of the program in any folder, and one page about
-//! what comes out.
+//! The first steps: the demo and the configurations of the program in any folder, and one page
+//! about the results.
 
 use std::{fs, path::Path};
 

@@ -1,4 +1,4 @@
-//! `gyre stress`: verdicts, exit codes, and what a measurement must not hide.
+//! `gyre stress`: verdicts, exit codes, and faults that a measurement must not hide.
 
 use std::{
     fs,
@@ -156,7 +156,7 @@ fn a_source_that_is_stopped_shows_in_sensor_to_pose_although_its_service_time_hi
     assert_eq!(figures["faults"][0]["stage"], "radar-replay");
     let open = ms(&figures["sensor_to_pose"]["max_ms"]);
     let closed = ms(&figures["closed_loop"]["max_ms"]);
-    // It is stopped for 1 s, of which up to a period passes before the next scan is due.
+    // The stage is stopped for 1 s. Up to a period passes before the next scan is due.
     assert!(open >= 1e3 * (1.0 - PERIOD_S), "{open} ms");
     assert!(closed < 0.7 * open, "{closed} ms of {open} ms");
     assert!(figures["counts"]["dropped"].as_u64() > Some(0));
@@ -211,7 +211,7 @@ fn a_test_that_cannot_be_carried_out_is_no_verdict() {
 fn a_stage_behind_a_shell_is_measured_and_stopped_with_all_that_it_has_started() {
     let stress = Stress::new();
     let program = crate::PROGRAM;
-    // The shell stays, and its name says nothing of the stage.
+    // The shell stays, and its name differs from the stage's.
     let command = format!(
         "stages.masking.command=['sh', '-c', '\"$0\" stage masking; exit $?', '{program}']"
     );
@@ -222,7 +222,7 @@ fn a_stage_behind_a_shell_is_measured_and_stopped_with_all_that_it_has_started()
     assert_eq!(outcome["verdict"], "passed");
     let figures = &outcome["figures"];
     assert_eq!(figures["faults"][0]["stage"], "masking");
-    // With the shell alone stopped, the stage would go on.
+    // If only the shell were stopped, the stage would continue.
     let longest = ms(&figures["sensor_to_pose"]["max_ms"]);
     assert!(longest >= 1e3 * (1.0 - PERIOD_S), "{longest} ms");
     let processes = figures["processes"].as_array().unwrap();

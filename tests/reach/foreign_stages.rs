@@ -11,7 +11,7 @@ use rand::{Rng, SeedableRng, rngs::StdRng, seq::IndexedRandom};
 use crate::common::{Run, recording};
 use stages::{FAULT, FAULTY, Fault, ONCE};
 
-/// A run in which this program replaces a stage, and sends this fault.
+/// A run with this program in place of a stage; the program sends this fault.
 fn run_with(stage: &str, fault: &str, once: bool) -> Run {
     let run = Run::of_recording();
     let marker = run.folder().join("sent");
@@ -30,8 +30,8 @@ fn run_with(stage: &str, fault: &str, once: bool) -> Run {
     .set(&format!("stages.{stage}.restart.backoff_ms=10"))
 }
 
-/// The limits of each message have tests where they are checked; here, each stage checks what it
-/// receives, names sender and field, and keeps good poses only.
+/// The limits of each message have tests beside their checks; here, each stage checks its inputs,
+/// names sender and field, and keeps only good poses.
 #[test]
 fn a_message_that_no_stage_may_send_is_refused_by_the_name_of_its_sender() {
     for (stage, fault, field) in [
@@ -82,8 +82,8 @@ fn a_source_that_reads_slower_than_the_stages_work_is_no_stall() {
 /// Numbers that break most contracts, and some that keep them.
 const NUMBERS: [&str; 6] = ["NaN", "-inf", "-1", "1e300", "0", "0.5"];
 
-/// Runs in which a stage writes a number anywhere into a header: refused by its name, or no harm is
-/// done.
+/// Runs with a stage that writes a number anywhere into a header: the run names the stage, or no
+/// harm is done.
 fn any_word_is_refused_or_harmless(runs: u64) {
     let stages = [
         ("masking", "masked"),
@@ -125,7 +125,7 @@ fn many_words_of_headers_are_refused_or_harmless() {
     any_word_is_refused_or_harmless(200);
 }
 
-/// Not a test: the program of a replaced stage, if the environment says so.
+/// Not a test: the program of a replaced stage, if the environment requests it.
 #[test]
 fn plays_a_foreign_stage() {
     let Ok(fault) = env::var(FAULT) else { return };

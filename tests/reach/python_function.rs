@@ -69,7 +69,7 @@ fn factors_of_powers_are_a_threshold_where_they_are_one() {
     }
     let threshold = Run::of_recording().set("masking.threshold=90").complete();
     assert_ne!(threshold, undisturbed());
-    // What is left of a power above 90 is the power, and what is not is below the threshold of 60.
+    // Powers above 90 stay unchanged, and all others are below the threshold of 60.
     let text = "def mask(scan):\n    return scan.power > 90\n";
     let (_folder, file) = file(text);
     let run = with(Run::of_recording(), "masking", &file);
@@ -343,7 +343,7 @@ fn one_that_changes_neither_goes_on_nor_passes_for_the_one_before() {
         .refused_with(&["unfinished run of another program", is_another]);
     fs::write(&file, &text).unwrap();
     assert_eq!(run.complete(), undisturbed());
-    // Nor are its results those of another one.
+    // A changed file does not continue the results of the old file.
     fs::write(&file, &other).unwrap();
     run.finish().refused_with(&[is_another]);
 }

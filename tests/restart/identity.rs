@@ -1,5 +1,4 @@
-//! A run is continued only with what it was begun with: the program, the configuration and the
-//! recording.
+//! A run is continued only with the program, the configuration and the recording of its start.
 
 use std::{
     fs,

@@ -140,7 +140,7 @@ fn a_complete_run_stays_until_another_one_has_results() {
     assert!(ended.stderr.contains(note), "{}", ended.stderr);
     is_there();
 
-    // The supervisor is killed: the next command gives back what has not been replaced.
+    // The supervisor is killed: the next command restores all results that are not yet replaced.
     let mut running = futile(&run, "exec sleep 60").start();
     running.await_stage("radar-replay");
     running.kill_supervisor();
@@ -169,7 +169,7 @@ fn a_killed_run_is_not_reported_with_the_results_of_the_run_before() {
     }
 }
 
-/// A run that begins anew ends, as by a kill, when it has removed what there was.
+/// A new run ends, as by a kill, when it has removed the old results.
 #[test]
 fn results_of_a_run_are_not_taken_for_those_of_an_unknown_one_while_another_begins() {
     let run = interrupted();

@@ -68,7 +68,7 @@ fn a_second_drive_is_placed_in_the_map_and_goes_on_beyond_it() {
         );
     }
     let truth = |run: &Run| read_trajectory(&run.out().join("ground_truth.tum")).unwrap();
-    // The map's frame is that of the first scan of the first drive.
+    // The map's frame is the frame of the first scan of the first drive.
     let (start, truth) = (truth(&first).poses[0], truth(&second));
     let added = &all.keyframes()[count..];
     assert!(added.len() > 20, "{}", added.len());

@@ -1,5 +1,5 @@
-//! The followers of a run with SLAM: whatever happens to them, odometry does not notice, and what
-//! they write is the same to the byte.
+//! The followers of a run with SLAM: faults of followers do not affect odometry, and the followers
+//! write the same bytes.
 
 use std::{fs, sync::OnceLock};
 
@@ -177,7 +177,7 @@ fn assert_restarted_when_it_hangs(follower: &str) {
     send(running.await_stage(follower), Signal::STOP);
     let ended = running.finish();
     ended.succeeded();
-    // While the stream goes on its heartbeat tells, and then its progress.
+    // While the stream continues, the heartbeat reveals the fault, and afterwards the progress.
     let sentences = ["hangs", "has made no progress"];
     let said = sentences.map(|it| ended.stderr.contains(&format!("{follower} {it}")));
     assert!(said.contains(&true), "{}", ended.stderr);

@@ -1,5 +1,5 @@
-//! GNSS: fixes move no byte of odometry, whatever is killed the corrected trajectory is the same,
-//! and the map lies where they say.
+//! GNSS: fixes change no byte of odometry, the corrected trajectory is the same after any kill, and
+//! the map agrees with the fixes.
 
 use std::{
     collections::BTreeMap,
@@ -76,7 +76,7 @@ pub fn log(delay_s: f64) -> String {
     text
 }
 
-/// Writes a bag with the messages of another one, and those of the receiver on `/fix`.
+/// Copies a bag, and adds the messages of the receiver on `/fix`.
 fn with_fixes(of: &Path, to: &Path) {
     let (bytes, file) = (fs::read(of).unwrap(), fs::File::create(to).unwrap());
     let mut bag = WriteOptions::new().profile("ros2").create(file).unwrap();
@@ -128,7 +128,7 @@ pub fn with_antenna(run: Run) -> Run {
 /// The results that must be the same to the byte.
 pub fn left(run: &Run) -> ([String; 3], Value) {
     let mut gnss = run.summary()["gnss"].clone();
-    // The log of each run is another one.
+    // The runs have different logs.
     for key in ["log", "topic"] {
         gnss.as_object_mut().unwrap().remove(key);
     }

@@ -15,7 +15,7 @@ use serde_json::Value;
 use crate::common::{Ended, Run, Shared, folder, gyre, recording};
 
 const CONFIGURATION: &str = "[raster]\nn = 255\ncell_m = 0.4\n";
-/// The town that is mapped, and another one.
+/// The mapped town, and a different town.
 const TOWN: u64 = 3;
 const OTHER_TOWN: u64 = 4;
 
@@ -119,8 +119,8 @@ fn a_drive_on_another_day_is_found_in_the_map_of_a_run() {
             status == "found" || status == "tracked",
             "{number}: {status}"
         );
-        // Both drives are of one path at one pace; the map's frame is that of its first scan, from
-        // which the map itself is up to 0.61 m off.
+        // Both drives follow one path at one pace; the map's frame is the frame of its first scan,
+        // and the map itself deviates from it by up to 0.61 m.
         let expected = first.inv_mul(&truth.poses[number]);
         let error = expected.inv_mul(&place.unwrap());
         let (error_m, error_rad) = (error.translation.vector.norm(), error.rotation.angle());
@@ -147,7 +147,7 @@ fn a_drive_on_another_day_is_found_in_the_map_of_a_run() {
     assert_eq!(figures["first_fix"], serde_json::json!([0, 0.0]));
     let bytes = |out: &Path| fs::read(out.join("fixes.csv")).unwrap();
     assert_eq!(bytes(&out), bytes(&again));
-    // Its results are their user's alone, as those of a run.
+    // Only the user can read the results, as with a run.
     let map = map_of(&run);
     let fixes = out.join("fixes.csv");
     for file in [map.join("map.toml"), map.join("keyframes.log"), fixes] {

@@ -5,7 +5,8 @@
 //! share only the folder, so that they can run on many computers.
 //!
 //! Reading order: [`list`], the drives; [`compute`], one process after the other, several at once;
-//! [`End`], the result of a process; [`Row`], the file of a drive; `figures`, its columns; [`table`].
+//! [`End`], the result of a process; [`Row`], the file of a drive; `figures`, its columns;
+//! [`table`].
 
 mod compute;
 mod end;

@@ -1,9 +1,9 @@
 //! Programs in the place of a stage: does one keep the contract of a stage, which is in
 //! `docs/replace-a-stage.md`, and how do its results differ from the results of a running stage?
 //!
-//! The program runs alone, in runs of its own, as the supervisor would start it. This process stands
-//! for the rest of such a run (`harness`): it feeds the program, and judges the messages that it
-//! sends. For [`check`] the inputs are the results of Gyre's own stages for some scans, for
+//! The program runs alone, in runs of its own, as the supervisor would start it. This process
+//! replaces the rest of such a run (`harness`): it feeds the program, and judges the program's
+//! messages. For [`check`] the inputs are the results of Gyre's own stages for some scans, for
 //! [`shadow`](mod@shadow) the items of a running run.
 //!
 //! Reading order: `harness` (a program in a run of its own), `topics`, `item` and `result` (the
@@ -38,11 +38,8 @@ use checks::Examination;
 use reference::Reference;
 use test::Context;
 
-/// Tests a program with inputs from these scans; `observe` receives what is tested.
-///
-/// # Errors
-/// The inputs cannot be computed, the program cannot be started, or the transport fails. A program
-/// that breaks the contract is no error: the report has the breach.
+/// Tests a program with inputs from these scans; `observe` receives the name of each scenario.
+/// Breaches of the contract are in the report, not in the error.
 pub fn check(
     test: &Test,
     mut scans: InputScans,

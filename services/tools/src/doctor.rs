@@ -20,10 +20,7 @@ pub struct DoctorArguments {
     pub out: PathBuf,
 }
 
-/// Prints what was found, and fails if a run cannot work here.
-///
-/// # Errors
-/// The output cannot be written.
+/// Prints the findings, and fails if a run cannot work here.
 pub fn doctor(
     arguments: &DoctorArguments,
     footprint: &Footprint,

@@ -42,10 +42,7 @@ pub struct ReportArguments {
     pub open: bool,
 }
 
-/// Writes the page and says where it is.
-///
-/// # Errors
-/// A run or a trajectory that cannot be read, a page that cannot be written or opened.
+/// Writes the page and prints its path.
 pub fn report(arguments: &ReportArguments) -> Result<ExitCode, Failure> {
     let truth = match &arguments.ground_truth {
         Some(truth) => Some(truth.clone()),

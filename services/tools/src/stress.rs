@@ -11,7 +11,7 @@
 //! 2. [`stress`] (in `campaign.rs`): one scenario after the other; [`pipeline`]: one run from its
 //!    start to its end.
 //! 3. [`record`]: poses in, distributions out; drops are samples too.
-//! 4. [`fault`]: stops and kills of stages; [`witness_fault`]: those of gyro, wheels and radar;
+//! 4. [`fault`]: stops and kills of stages; [`witness_fault`]: faults of gyro, wheels and radar;
 //!    [`helper`], `load`: the child processes that load the machine.
 //! 5. [`processes`]: the resources of each process.
 //! 6. [`report`]: a sentence for each scenario, `report.json`, and the latency scan by scan.

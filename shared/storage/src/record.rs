@@ -18,7 +18,6 @@ pub enum Operation {
         path: PathBuf,
         /// The place of the first byte.
         offset: u64,
-        /// The bytes.
         bytes: Vec<u8>,
     },
     /// A file cut or extended.

@@ -1,4 +1,4 @@
-//! Stages that send a fault: each does what its topic needs and no more.
+//! Stages that send a fault: each does only the minimum for its topic.
 
 use std::{env, path::Path, thread, time::Duration};
 

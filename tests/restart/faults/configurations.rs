@@ -56,7 +56,7 @@ pub struct Configuration {
     results: &'static [&'static str],
     /// Figures of the summary that must be the same.
     figures: &'static [&'static str],
-    /// Figures of the summary that are greater than these: a run does what its name means.
+    /// Figures of the summary that exceed these values: the run exercises the feature of its name.
     shows: &'static [(&'static str, f64)],
     /// A run whose motions are the same: followers change no byte of odometry.
     same_as: Option<fn() -> Run>,
@@ -88,7 +88,7 @@ impl Results {
 }
 
 impl Configuration {
-    /// Returns whether the machine has all that a run needs; prints what is missing.
+    /// Returns whether the machine can compute the run; prints the missing tools or data.
     pub fn is_possible(&self) -> bool {
         (self.can)()
     }

@@ -70,8 +70,8 @@ pub fn at_the_start(scene: &mut Scene) -> Option<()> {
     Some(())
 }
 
-/// A process at a write of a file from which its successor continues: refinement has two of them
-/// for each of its keyframes.
+/// A process at a write of a file that its successor continues from: refinement writes two such
+/// files for each of its keyframes.
 pub fn at_a_write(scene: &mut Scene) -> Option<()> {
     let run = scene.run();
     let mut running = run.start();

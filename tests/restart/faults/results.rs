@@ -80,8 +80,8 @@ pub fn io_errors(scene: &mut Scene) -> Option<()> {
     Some(())
 }
 
-/// No file may become longer: of the whole run, or of a process in the middle. A signal says so,
-/// unless it is ignored.
+/// No file may become longer: of the whole run, or of a process in the middle. A signal reports the
+/// limit, unless the signal is ignored.
 pub fn file_size_limit(scene: &mut Scene) -> Option<()> {
     let run = scene.run();
     let signal = if scene.one_in(2) {

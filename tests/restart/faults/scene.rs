@@ -51,7 +51,7 @@ impl<'a> Scene<'a> {
         thread::sleep(Duration::from_millis(self.rng.random_range(0..=limit_ms)));
     }
 
-    /// Numbers of poses at which something happens, in order: early enough to see a restart.
+    /// Numbers of poses for events, in order: early enough to see a restart.
     pub fn moments(&mut self, count: usize) -> Vec<usize> {
         let moments = self.configuration.moments();
         let end = moments.end.min(self.configuration.poses * 3 / 4);
@@ -120,7 +120,7 @@ impl<'a> Scene<'a> {
         self.finished_with(&self.configuration.undisturbed().results, run, ended);
     }
 
-    /// The same where the results are different from those of the configuration.
+    /// The same for results that differ from the results of the configuration.
     pub fn finished_with(&self, expected: &Results, run: &Run, ended: &Ended) {
         ended.succeeded();
         self.assert_complete(run, expected);
@@ -170,8 +170,8 @@ impl<'a> Scene<'a> {
     }
 }
 
-/// Asserts that its last words are the only sentence of the program; what comes before is the
-/// progress of the run.
+/// Asserts that the last words are the program's only sentence; all earlier output is the progress
+/// of the run.
 pub fn assert_one_sentence(ended: &Ended) {
     ended.failed_with(&[]);
     let notice = |line: &&str| line.ends_with("; starting over");

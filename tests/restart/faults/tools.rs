@@ -29,7 +29,7 @@ pub enum Need {
 }
 
 impl Need {
-    /// Returns what is missing; `None` if nothing is.
+    /// Returns the name of the missing tool; `None` if nothing is.
     pub fn missing(self) -> Option<&'static str> {
         let works = |command: &[&str]| {
             let output = Command::new(command[0]).args(&command[1..]).output();

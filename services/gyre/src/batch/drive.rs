@@ -29,9 +29,6 @@ const LOOK: Duration = Duration::from_millis(200);
 
 /// Computes a drive, unless it has been computed with the same configuration from the same scans,
 /// and prints its end.
-///
-/// # Errors
-/// The system does not let the process end with the batch; standard output cannot be written.
 pub fn drive(arguments: &BatchDriveArguments) -> Result<ExitCode, Failure> {
     if !end_with(arguments.parent, Signal::TERM)? {
         return Ok(ExitCode::FAILURE);

@@ -13,8 +13,9 @@ use gyre_supervise::UsedRun;
 
 const PERIOD: Duration = Duration::from_secs(1);
 
-/// Asks the supervisor of a run once a second, in a thread that ends when nobody takes the answers,
-/// which `gyre ps --json` prints too. A supervisor that is busy answers late, and recording does not wait for it.
+/// Asks the supervisor of a run once a second for the status that `gyre ps --json` prints, in a
+/// thread that ends when nobody takes the answers. A busy supervisor answers late, and recording
+/// does not wait for it.
 pub(crate) fn health(out: PathBuf) -> Receiver<String> {
     let (sender, receiver) = mpsc::sync_channel(1);
     thread::spawn(move || {

@@ -63,7 +63,7 @@ impl Bridge {
         })
     }
 
-    /// Publishes until a signal arrives. `say` prints sentences at the terminal.
+    /// Publishes until a signal arrives, and passes sentences for the terminal to the callback.
     pub fn publish(mut self, signals: &Signals, say: fn(&str)) -> Result<(), StageError> {
         self.mounting.send(mounted(&self.shared));
         let shared = &self.shared;

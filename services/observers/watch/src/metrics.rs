@@ -95,7 +95,7 @@ impl Snapshot {
         gauge(encoder, "scans_in_flight", help, counts.in_flight)
     }
 
-    /// Encodes what the motions rest on, and the part of gyro, wheels and Doppler.
+    /// Encodes the basis of the motions, and the share of gyro, wheels and Doppler.
     fn encode_witnesses(&self, encoder: &mut DescriptorEncoder<'_>) -> fmt::Result {
         let counts = &self.counts.witnesses;
         let by_basis = Basis::ALL.iter().zip(counts.by_basis);
@@ -376,7 +376,7 @@ mod tests {
         (record.outcome, record.gyro, record.wheels) =
             (outcome::PREDICTED, gyro::REFUSED, wheels::USED);
         view.add_to_track(&pose);
-        // The first pose of a chain is that of no motion.
+        // The first pose of a chain has no motion.
         pose.item.flags = flag::BREAK;
         view.add_to_track(&pose);
         let text = scrape(&view);

@@ -52,7 +52,6 @@ pub enum WatchError {
     /// The address cannot be listened at.
     #[error("cannot serve at {address}: {source}; choose another address")]
     Listen {
-        /// The address.
         address: SocketAddr,
         /// The reason.
         source: io::Error,
@@ -97,9 +96,6 @@ struct ReaderSlot(Arc<AtomicUsize>);
 
 impl Endpoint {
     /// Listens at an address. Without a token only this machine is answered.
-    ///
-    /// # Errors
-    /// The address cannot be listened at.
     pub fn listen(address: SocketAddr, token: Option<Token>) -> Result<Self, WatchError> {
         let failed = |source| WatchError::Listen { address, source };
         let listener = TcpListener::bind(address).map_err(failed)?;
@@ -152,9 +148,6 @@ impl Server {
     /// Shows the runs that write to `out`, one after the other, until a signal arrives.
     /// `is_complete` returns whether a run that has ended there has reached the end of its
     /// recording.
-    ///
-    /// # Errors
-    /// The system refuses a thread or the listener.
     pub fn show(
         self,
         out: PathBuf,

@@ -30,7 +30,6 @@ const TAIL: u64 = 1 << 16;
 pub struct Batch<'a> {
     /// The program `gyre`.
     pub program: PathBuf,
-    /// The list.
     pub list: &'a List,
     /// The drives of the list that are computed.
     pub drives: Vec<Drive>,
@@ -53,11 +52,8 @@ pub struct Ended {
     pub interrupted: bool,
 }
 
-/// Computes all drives, and writes the row of each when it has ended. `say` receives a line for each
-/// drive. A request to stop ends the runs too, whose results so far are kept.
-///
-/// # Errors
-/// A process that cannot be started, or a row that cannot be written. The runs are ended then.
+/// Computes all drives, and writes the row of each when it has ended. The callback receives a line
+/// for each drive. A request to stop and an error end the runs; their results so far are kept.
 pub fn compute(
     batch: &Batch<'_>,
     signals: &Signals,

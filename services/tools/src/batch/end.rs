@@ -40,7 +40,6 @@ impl fmt::Display for Outcome {
 /// The end of a drive's process: the last line that it prints, as JSON.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct End {
-    /// The outcome.
     pub outcome: Outcome,
     /// True if the drive had ended so before.
     pub earlier: bool,

@@ -62,9 +62,6 @@ pub(crate) const TIMES: [Column; 9] = [
 const BUILD_DIGITS: usize = 12;
 
 /// Reads the values of all columns from the results of a complete run.
-///
-/// # Errors
-/// Results that cannot be read.
 pub(crate) fn read(out: &Path) -> Result<Values, Failure> {
     let path = out.join("summary.json");
     let text = read_text(&path, SETTINGS)

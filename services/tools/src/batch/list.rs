@@ -38,7 +38,6 @@ pub struct Drive {
 /// The drives of a batch, in the order of its table.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct List {
-    /// The drives.
     pub drives: Vec<Drive>,
     /// The absolute path of the folder: paths are relative to it.
     folder: PathBuf,
@@ -49,9 +48,6 @@ type Lines = Vec<(u64, Result<Drive, String>)>;
 
 impl List {
     /// Reads a list. Relative paths in it are relative to its folder.
-    ///
-    /// # Errors
-    /// A list that cannot be read, is empty, or has an invalid line; two drives of one name.
     pub fn read(path: &Path) -> Result<Self, Failure> {
         let shown = path.display();
         let unread = |error: io::Error| format!("cannot read the list of drives {shown}: {error}");
@@ -90,9 +86,6 @@ impl List {
 
     /// Returns the drives of a task, counted from 0, of so many: each `tasks`-th drive, so that
     /// long drives that are neighbours are divided.
-    ///
-    /// # Errors
-    /// There is no such task.
     pub fn share(&self, task: usize, tasks: usize) -> Result<Vec<Drive>, Failure> {
         if task >= tasks {
             return Err(format!(

@@ -19,8 +19,8 @@ use crate::batch::{
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Settings {
-    /// The configuration of drives without a configuration, an absolute path; `None`: by their formats
-    /// and scans.
+    /// The configuration of drives without a configuration, an absolute path; `None`: by their
+    /// formats and scans.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub configuration: Option<PathBuf>,
     /// Overrides of each configuration, `section.key=value`. Overrides of a drive have precedence.
@@ -32,11 +32,9 @@ pub struct Settings {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Row {
-    /// The drive.
     pub drive: Drive,
     /// The settings that it was computed with.
     pub settings: Settings,
-    /// The outcome.
     pub outcome: Outcome,
     /// The reason why it is not complete, in a sentence; else empty.
     pub sentence: String,
@@ -79,9 +77,6 @@ impl Row {
     }
 
     /// Writes it as a whole, so that it is there or not, whatever is killed.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
     pub fn write(&self, batch: &Path) -> Result<(), Failure> {
         let text = serde_json::to_string_pretty(self)?;
         Ok(gyre_storage::write(&Self::path(batch, &self.drive), text)?)
@@ -89,9 +84,6 @@ impl Row {
 
     /// Reads the row of a drive with these settings, whose results are there if it had any. Without
     /// one the outcome is `not-run`.
-    ///
-    /// # Errors
-    /// A file that cannot be read.
     pub fn read(batch: &Path, drive: &Drive, settings: &Settings) -> Result<Self, Failure> {
         let not_run = |sentence: &str| Self::of(batch, drive, settings, Outcome::NotRun, sentence);
         let path = Self::path(batch, drive);

@@ -17,9 +17,6 @@ pub const RESULTS: &str = "results.csv";
 pub const TIMES_FILE: &str = "times.csv";
 
 /// Writes both files from the rows of all drives of a list, which are returned.
-///
-/// # Errors
-/// There is no batch; a row that cannot be read; a file that cannot be written.
 pub fn write(list: &List, settings: &Settings, out: &Path) -> Result<Vec<Row>, Failure> {
     if !out.join("rows").is_dir() {
         let out = out.display();

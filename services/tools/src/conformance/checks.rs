@@ -1,4 +1,4 @@
-//! The scenarios in which a program is tested, each in a run of its own.
+//! The scenarios of a test, each in a run of its own.
 
 mod absence;
 mod feedback;
@@ -50,7 +50,7 @@ impl<'a> Examination<'a> {
         self.context.test.candidate.stage
     }
 
-    /// Runs all scenarios. If the program does not get through the first, the others could say
+    /// Runs all scenarios. If the program does not complete the first, the others would show
     /// nothing.
     pub(crate) fn run(mut self) -> Result<Report, ProgramError> {
         self.note_inapplicable_rules();
@@ -198,8 +198,8 @@ fn work_on(stage: StageId, outputs: &[Recorded]) -> impl Iterator<Item = i64> {
     worked_on.map(move |it| work_ns(stage, &it))
 }
 
-/// Returns the distance of results from those of Gyre's own stage, in a sentence. Items that one of
-/// them lacks are left out.
+/// Returns a sentence with the difference between results and the results of Gyre's own stage.
+/// Items that one of them lacks are left out.
 fn deviation(topic: &str, own: &[Recorded], other: &[Recorded]) -> Result<String, ProgramError> {
     let (mut items, mut equal, mut differences) = (0, 0, Differences::default());
     for own in own.iter().filter(|own| !own.item().is(flag::END)) {

@@ -14,12 +14,7 @@ pub enum ProgramError {
     Supervise(#[from] SuperviseError),
     /// The inputs cannot be computed.
     #[error("cannot compute the inputs: our own {stage} ended: {reason}")]
-    Own {
-        /// The stage.
-        stage: &'static str,
-        /// The reason.
-        reason: String,
-    },
+    Own { stage: &'static str, reason: String },
     /// Too few scans.
     #[error(
         "{0} scans are too few to test a stage with: name a recording of more, or raise --scans"

@@ -152,7 +152,7 @@ impl<'a> Harness<'a> {
         feed.map_or(Ok(()), |feed| feed.send(message))
     }
 
-    /// Receives the next message of the process; `None` if there is none yet.
+    /// Receives the next message of the process; `None` if there is no message yet.
     pub(crate) fn receive(&self) -> Result<Option<Sent>, StageError> {
         match self.output.receive() {
             Ok(message) => Ok(message.map(Sent::Message)),
@@ -186,7 +186,7 @@ impl<'a> Harness<'a> {
     }
 }
 
-/// Returns the message with which a sink without poses starts.
+/// Returns the first message of a sink without poses.
 pub(crate) fn start_of_trajectory() -> Recorded {
     let start = PoseHeader {
         item: Item {

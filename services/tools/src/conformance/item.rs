@@ -27,9 +27,9 @@ pub(crate) fn not_copied(stage: StageId, input: &Item, output: &Item) -> Vec<&'s
     missing.map(|(field, _)| field).collect()
 }
 
-/// Returns what is wrong with the time stamps of a stage's own hop; `None` if they are in order,
-/// and between the times at which its input was sent (if that is known) and its output was read,
-/// both CLOCK_MONOTONIC, ns.
+/// Returns the fault in the time stamps of a stage's own hop; `None` if they are in order, and
+/// between the time of sending the input (if known) and the time of reading the output, both
+/// CLOCK_MONOTONIC, ns.
 pub(crate) fn wrong_stamps(
     stage: StageId,
     output: &Item,

@@ -32,7 +32,7 @@ pub(crate) const POLL_PERIOD: Duration = Duration::from_millis(2);
 pub(crate) struct Reference(BTreeMap<&'static str, Vec<Recorded>>);
 
 impl Reference {
-    /// Returns the message of a topic about item `seq`; that of the number of items is the end.
+    /// Returns the message of a topic about item `seq`; the message after the last item is the end.
     pub(crate) fn get(&self, topic: &str, seq: u64) -> Option<&Recorded> {
         self.0.get(topic)?.get(seq as usize)
     }

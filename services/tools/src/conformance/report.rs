@@ -23,35 +23,32 @@ pub struct Report {
     /// The time from sending it an item to reading its answer, one item at a time; `None` unless
     /// there is a budget.
     pub answers: Option<Work>,
-    /// That of Gyre's own stage on the same inputs, directly after.
+    /// The work of Gyre's own stage on the same inputs, directly after.
     pub own_work: Option<Work>,
-    /// The distance of its results from those of Gyre's own stage.
+    /// The difference between its results and the results of Gyre's own stage.
     pub deviation: Option<String>,
 }
 
 /// A rule and the verdict on it.
 #[derive(Clone, Debug, Serialize)]
 pub struct Judged {
-    /// The rule.
     pub rule: Rule,
     /// The section of the contract.
     pub section: &'static str,
     /// The conduct of a program that keeps it.
     pub says: &'static str,
-    /// The verdict.
     #[serde(flatten)]
     pub verdict: Verdict,
 }
 
 /// Items that are not measured: buffers grow, and memory is touched for the first time.
 const WARM_UP: usize = 4;
-/// Items from which on there is a 99th percentile.
+/// The minimum number of items for a 99th percentile.
 const PERCENTILE_ITEMS: u64 = 100;
 
 /// Times of work on an item, without the first four items.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Work {
-    /// The items.
     pub items: u64,
     /// Median, ms.
     pub p50_ms: f64,

@@ -77,7 +77,7 @@ pub enum Verdict {
     NotReached,
 }
 
-/// Sentences of one rule that are kept; more of the same say nothing new.
+/// The number of sentences that are kept for each rule; more would repeat the same fault.
 const MAX_SENTENCES: usize = 4;
 
 /// The verdicts so far.

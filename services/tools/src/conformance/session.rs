@@ -30,7 +30,7 @@ pub(crate) enum Pace {
     Window,
     /// One: the next item is sent when the one before is answered.
     Single,
-    /// None is sent by itself.
+    /// No item is sent automatically.
     Hold,
 }
 
@@ -41,7 +41,7 @@ pub(crate) struct Session<'a> {
     pub reference: &'a Reference,
     pub findings: &'a mut Findings,
     pub pace: Pace,
-    /// The first item that is not sent by itself.
+    /// The first item that is not sent automatically.
     pub until: u64,
     /// The next item to be sent.
     next: u64,
@@ -53,8 +53,8 @@ pub(crate) struct Session<'a> {
     pub outputs: Vec<Recorded>,
     /// The topics whose publishers it has notified.
     notified: BTreeSet<&'static str>,
-    /// The first time at which each item was sent: what a sink has journalled in one life and sends
-    /// in the next has the stamps of the first.
+    /// The time of the first sending of each item: an item that a sink has journalled in one life
+    /// and sends in the next keeps its stamps.
     sent_ns: BTreeMap<u64, i64>,
     progress: Instant,
 }
@@ -151,7 +151,7 @@ impl<'a> Session<'a> {
         self.wait(limit, |session| session.newest >= Some(seq))
     }
 
-    /// Waits until `done`, while the run goes on around the process; `limit` is counted from the
+    /// Waits until `done`, while the run continues around the process; `limit` is counted from the
     /// last item that it sent.
     pub(crate) fn wait(
         &mut self,
@@ -179,7 +179,8 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Lets time pass while the run goes on around the process; returns whether it is still alive.
+    /// Waits for a time while the run continues around the process; returns whether the process is
+    /// still alive.
     pub(crate) fn rest(&mut self, time: Duration) -> Result<bool, ProgramError> {
         let since = Instant::now();
         let ended = self.wait(time, |_| since.elapsed() >= time)?;
@@ -223,7 +224,7 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    /// Kills the process and removes what it leaves.
+    /// Kills the process and removes its leftovers.
     pub(crate) fn kill(&mut self) -> Result<(), ProgramError> {
         self.harness.kill()?;
         self.receive()?;
@@ -308,7 +309,7 @@ impl<'a> Session<'a> {
         Ok(results)
     }
 
-    /// Notes each output whose bytes are not those of the first scenario.
+    /// Notes each output whose bytes differ from the first scenario.
     pub(crate) fn compare(
         &mut self,
         first: &BTreeMap<u64, Vec<u8>>,

@@ -2,8 +2,8 @@
 //! stage, its results are compared with the stage's and timed, and nobody uses them.
 //!
 //! To the run this process is an observer ([`gyre_stage::observer`]): the run neither waits for it
-//! nor fails with it. The program gets the observed items one at a time. It takes nothing from the observed run but
-//! processor time.
+//! nor fails with it. The program gets the observed items one at a time. The only cost for the
+//! observed run is processor time.
 //!
 //! Reading order: [`shadow`], `shadowing` (the loop), `observation` (the items of the run),
 //! `renumbering` (the items as the shadow gets them), `life` (the process), `record`, [`Report`].
@@ -33,7 +33,6 @@ use shadowing::Shadowing;
 /// The program, the stage that it shadows, and the limits of the comparison.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// The stage.
     pub stage: StageId,
     /// The program and its arguments.
     pub command: Vec<String>,
@@ -63,11 +62,8 @@ pub const STAGES: [StageId; 5] = [
 ];
 
 /// Runs a program as the shadow of a stage until the run ends, a limit is reached, or a signal
-/// requests a stop. `observe` receives lines about the progress.
-///
-/// # Errors
-/// The run cannot be observed, the program cannot be started, or the report cannot be written. A
-/// fault of the program is no error: the report says so.
+/// requests a stop. `observe` receives lines about the progress. Faults of the program are in the
+/// report, not in the error.
 pub fn shadow(
     run: &ObservedRun,
     options: &Options,

@@ -33,9 +33,9 @@ pub struct Demands {
     pub item_timeout: Duration,
     /// Time for its exit after SIGTERM, and after an input that it has to refuse.
     pub stop_timeout: Duration,
-    /// Time in which a program that is to send nothing is watched.
+    /// The time of watching a program that must send nothing.
     pub quiet: Duration,
-    /// True if its results are to be those of Gyre's own stage, to the bit.
+    /// True if its results must equal the results of Gyre's own stage, to the bit.
     pub same_as_own: bool,
     /// The 99th percentile of its work on an item that is allowed; of fewer than a hundred items
     /// the maximum.

@@ -3,7 +3,7 @@
 use gyre_messages::{Masked, Message, Motion, Pose, Refined, Rotation, Scan, StageId, TopicSizes};
 use gyre_stage::Manifest;
 
-/// The direction in which a topic leads.
+/// The direction of a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Direction {
     /// Down the stream: item `seq` is sent for the stage to answer with its item `seq`.

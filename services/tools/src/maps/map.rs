@@ -34,9 +34,6 @@ const LOOPS: &str = "loops.csv";
 
 /// Draws the keyframes of a run along its trajectory, and writes the map in the forms that were
 /// asked for.
-///
-/// # Errors
-/// A run without keyframes or without a trajectory, a folder that cannot be written.
 pub fn map(arguments: &MapArguments) -> Result<ExitCode, Failure> {
     let mut drawing = match &arguments.extend {
         Some(map) => extend::extend(arguments, map)?,
@@ -125,17 +122,11 @@ pub fn exists(path: &Path) -> Result<bool, StorageError> {
 }
 
 /// Reads the configuration of a run.
-///
-/// # Errors
-/// A configuration that is missing or invalid.
 pub fn configuration(run: &Path) -> Result<Configuration, Failure> {
     Ok(Configuration::read(&run.join("config.toml"), &[])?)
 }
 
 /// Opens the keyframes of a run.
-///
-/// # Errors
-/// A run without keyframes.
 pub fn open(run: &Path) -> Result<RecordReader<Keyframe>, Failure> {
     require_results(run)?;
     let path = records_path::<Keyframe>(run);

@@ -16,7 +16,6 @@ pub struct Row {
 
 /// Rows under a title.
 pub struct Group {
-    /// The title.
     pub title: &'static str,
     /// The rows that have a value.
     pub rows: Vec<Row>,

@@ -22,9 +22,6 @@ const LARGEST_MAP: usize = 16 << 20;
 const BAR: f64 = 160.0;
 
 /// Returns the page about these runs and trajectories.
-///
-/// # Errors
-/// A plot that cannot be drawn.
 pub fn page(subjects: &[Subject]) -> Result<String, Failure> {
     let names: Vec<&str> = subjects.iter().map(|it| it.name.as_str()).collect();
     let title = names.join(" · ");
@@ -211,7 +208,7 @@ fn latency(run: &Run) -> String {
     }
 }
 
-/// Returns the configuration of a run; of several, the keys in which they differ.
+/// Returns the configuration of a run, or the keys that differ between several runs.
 fn configurations(subjects: &[Subject]) -> String {
     let runs: Vec<(&Subject, &Run)> = subjects
         .iter()

@@ -19,7 +19,6 @@ pub struct Subject {
     pub name: String,
     /// The errors, where there is a ground truth that fits.
     pub evaluation: Option<Evaluation>,
-    /// The trajectory.
     pub trajectory: Trajectory,
     /// The figures, as `summary.json` has them; the errors are those against the common ground
     /// truth.
@@ -30,7 +29,6 @@ pub struct Subject {
 
 /// The results of a run.
 pub struct Run {
-    /// The folder.
     pub folder: PathBuf,
     /// `summary.json`.
     pub summary: Value,
@@ -40,9 +38,6 @@ pub struct Run {
 
 impl Subject {
     /// Reads a run or a trajectory, and evaluates it against a ground truth.
-    ///
-    /// # Errors
-    /// A file that cannot be read, a folder without results.
     pub fn read(path: &Path, truth: Option<&Trajectory>) -> Result<Self, Failure> {
         let run = path.is_dir().then(|| Run::read(path)).transpose()?;
         let file = match &run {

@@ -195,7 +195,7 @@ impl Campaign<'_> {
             .collect()
     }
 
-    /// The limits of each step: those of the budget, else no drop and a p99 of a period.
+    /// The limits of each step: the limits of the budget, else no drop and a p99 of a period.
     fn step_limits(&self) -> Limits {
         let limits = Limits {
             rate_hz: None,
@@ -313,7 +313,7 @@ fn problem(measured: &Measured) -> Option<String> {
     let mut faults = measured.figures.faults.iter();
     let lost = faults.find(|fault| fault.recovery_ms.is_none());
     let lost = lost.map(|fault| format!("no pose has followed the fault of {}", fault.stage));
-    // A fault that could not be told says nothing of the pipeline.
+    // A fault that could not be observed is no result about the pipeline.
     let mut told = measured.figures.witness_faults.iter();
     lost.or_else(|| match measured.omitted {
         None => told.find_map(WitnessFault::problem),
@@ -347,7 +347,7 @@ fn checks(limits: &Limits, figures: &Figures) -> Vec<Check> {
             limits.degraded_percent.filter(|_| degraded.is_some()),
         ),
     ];
-    // Without scans there is nothing to judge but what the processes cost.
+    // Without scans only the cost of the processes can be judged.
     let has_scans = figures.latency.counts.due > 0;
     let recovery = limits.recovery_ms.filter(|_| figures.had_faults());
     let recovery =

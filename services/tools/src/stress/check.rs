@@ -7,9 +7,8 @@ use serde::Serialize;
 pub struct Check {
     /// The key of `[budget]`.
     pub key: &'static str,
-    /// The measured figure; `None`: there is none, which misses the limit.
+    /// The measured figure; `None`: there is no figure, which misses the limit.
     pub measured: Option<f64>,
-    /// The limit.
     pub limit: f64,
     /// True if the limit is kept.
     pub passed: bool,

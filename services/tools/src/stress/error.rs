@@ -11,7 +11,6 @@ pub enum StressError {
     /// A process could not be started.
     #[error("cannot start `{program}`: {source}")]
     Start {
-        /// The program.
         program: String,
         /// The system error.
         source: io::Error,
@@ -19,7 +18,6 @@ pub enum StressError {
     /// A run ended before its first poses.
     #[error("the run of {scenario} ended before it could be measured: {said}")]
     EndedEarly {
-        /// The scenario.
         scenario: String,
         /// The last line that the run printed.
         said: String,
@@ -29,7 +27,6 @@ pub enum StressError {
         "the run of {scenario} has made no pose within {limit_s} s; {log} shows what it waits for"
     )]
     NoPose {
-        /// The scenario.
         scenario: String,
         /// The time limit, s.
         limit_s: u64,
@@ -41,17 +38,16 @@ pub enum StressError {
         "run.observers is 0, and the stress test looks on as an observer: set run.observers to 1 or more"
     )]
     NoPlace,
-    /// A time too short for what is to be done in it.
+    /// A time too short for the scenario.
     #[error(
         "{scenario} needs --duration {least_s} or more: time for a fault, and for the recovery from it"
     )]
     TooShort {
-        /// The scenario.
         scenario: &'static str,
         /// The shortest duration, s.
         least_s: u64,
     },
-    /// A helper process ended or said something else than it should.
+    /// A helper process ended or printed an unexpected line.
     #[error("the helper process `{helper}` {reason}")]
     Helper {
         /// The work of the helper.
@@ -73,7 +69,7 @@ pub enum StressError {
     /// A request to stop.
     #[error("interrupted")]
     Interrupted,
-    /// A helper was called with what it does not know.
+    /// A helper was called with unknown arguments.
     #[error("{0}")]
     Usage(String),
 }

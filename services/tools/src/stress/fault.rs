@@ -41,18 +41,16 @@ pub enum FaultKind {
 /// A fault on the timeline.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Fault {
-    /// The kind.
     pub kind: FaultKind,
-    /// The stage.
     pub stage: &'static str,
-    /// The time at which it began, s since the measurement began.
+    /// The start of the fault, s since the measurement began.
     pub at_s: f64,
     /// Time from the kill, or from the end of the stop, to the first pose that the stage has worked
-    /// on since, ms; `None`: there was none.
+    /// on since, ms; `None`: there was no such pose.
     pub recovery_ms: Option<f64>,
 }
 
-/// Faults one after the other, of stages in a random order in which each has its turn.
+/// Faults one after the other. The stages have a random order, and each stage has its turn.
 #[derive(Debug)]
 pub struct Faults {
     kind: FaultKind,
@@ -207,7 +205,7 @@ impl Faults {
         self.stopped.is_some() || !self.open.is_empty()
     }
 
-    /// Returns all faults. A stage that is stopped goes on.
+    /// Returns all faults. A stopped stage is continued first.
     pub fn finish(mut self) -> Vec<Fault> {
         std::mem::take(&mut self.done)
     }

@@ -36,9 +36,6 @@ pub enum Work {
 }
 
 /// Does the work of a helper: its arguments are the process that has started it, and the work.
-///
-/// # Errors
-/// Work that is not known, or a failure of it.
 pub fn help(program: &Path, arguments: &[String]) -> Result<(), StressError> {
     let usage = || StressError::Usage(format!("`gyre {COMMAND}` is what `gyre stress` starts"));
     let [parent, work] = arguments else {
@@ -76,9 +73,6 @@ pub struct Helper {
 
 impl Helper {
     /// Starts a helper.
-    ///
-    /// # Errors
-    /// It cannot be started.
     pub fn start(program: &Path, work: Work) -> Result<Self, StressError> {
         let mut command = command(program, &work)?;
         command.stdin(Stdio::null()).stdout(Stdio::piped());
@@ -115,9 +109,6 @@ impl Helper {
     }
 
     /// Reads a result, a line of JSON.
-    ///
-    /// # Errors
-    /// The helper has ended, or said something else.
     pub fn read_result<T: DeserializeOwned>(&mut self) -> Result<T, StressError> {
         let line = self.read_line()?;
         serde_json::from_str(&line).map_err(|error| self.failed(&format!("says `{line}`: {error}")))
@@ -165,7 +156,7 @@ fn json(value: &impl Serialize) -> Result<String, StressError> {
     serde_json::to_string(value).map_err(|error| StressError::Usage(error.to_string()))
 }
 
-/// Says that the work has begun.
+/// Prints that the work has begun.
 pub(crate) fn say_ready() {
     say(READY);
 }

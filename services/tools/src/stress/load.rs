@@ -27,7 +27,7 @@ const LEFT: u64 = 1 << 30;
 /// Bytes that are taken at once.
 const PIECE: usize = 32 << 20;
 const PAGE: usize = 4096;
-/// Time in which memory is taken before the measurement. On a large machine all of it would take
+/// The time for allocating memory before the measurement. On a large machine all of it would take
 /// minutes.
 const TAKING: Duration = Duration::from_secs(20);
 /// Time between two polls for memory when there is no more to take.
@@ -69,8 +69,8 @@ pub(super) fn spin() -> ! {
     }
 }
 
-/// Takes memory until this share of what is available is taken, then gives back and takes pieces of
-/// it without end.
+/// Allocates memory up to this share of the available memory, then frees and allocates pieces of it
+/// without end.
 pub(super) fn churn(share: f64) -> Result<(), StressError> {
     // If memory runs out all the same, this process is the one to end.
     let _ = fs::write("/proc/self/oom_score_adj", "1000");
@@ -133,7 +133,7 @@ pub(super) fn observe(out: &Path) -> Result<(), StressError> {
         thread::spawn(move || follow(&root, attached))
     });
     drop(attached);
-    // One that cannot attach says so when it is joined.
+    // A thread that cannot attach reports this when it is joined.
     if attachments.iter().count() == threads.len() {
         say_ready();
     }

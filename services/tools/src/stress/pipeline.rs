@@ -31,7 +31,7 @@ use crate::stress::{
 
 use running::Running;
 
-/// Time after the measurement in which late poses still count.
+/// The time after the measurement during which late poses still count.
 const GRACE: Duration = Duration::from_secs(10);
 /// Time between two polls of faults and processes.
 const TICK: Duration = Duration::from_millis(20);
@@ -40,7 +40,6 @@ const SAMPLE_EVERY: Duration = Duration::from_secs(1);
 /// A run with its load and faults.
 #[derive(Clone, Debug)]
 pub struct Setup {
-    /// The scenario.
     pub scenario: Scenario,
     /// The name of its folder.
     pub name: String,
@@ -60,7 +59,7 @@ pub struct Setup {
     pub observers: usize,
     /// The fault of these stages.
     pub faults: Option<(FaultKind, Vec<StageId>)>,
-    /// The faults that the source puts into what it plays.
+    /// The faults of the source in its played scans.
     pub played: Vec<PlayedFault>,
     /// For the choice of faults.
     pub seed: u64,
@@ -89,7 +88,6 @@ impl Setup {
 /// A measured run.
 #[derive(Clone, Debug)]
 pub struct Measured {
-    /// The figures.
     pub figures: Figures,
     /// A load or a fault that was omitted, so that the figures are not of this scenario.
     pub omitted: Option<String>,
@@ -103,7 +101,6 @@ pub struct Measured {
 pub struct Summary {
     /// Restarts by stage.
     pub restarts: BTreeMap<String, usize>,
-    /// Counters by stage.
     pub stages: BTreeMap<String, Counters>,
 }
 
@@ -118,9 +115,6 @@ pub struct Counters {
 /// Starts a run, measures it, and ends it. Pipelines that are measured together have one ticket:
 /// the measurement begins when each has given up its share of it, after the warm-up or by a
 /// failure.
-///
-/// # Errors
-/// A run that makes no first poses; a helper that fails.
 pub fn measure(
     tested: &TestedPipeline,
     setup: &Setup,
@@ -215,8 +209,8 @@ struct Session {
     processes: Sampler,
     faults: Option<Faults>,
     witness: Option<WitnessFaults>,
-    /// The basis of the motions that are measured in the first turn of the recording: where it
-    /// starts anew, the vehicle jumps.
+    /// The basis of the measured motions in the first turn of the recording: where the recording
+    /// starts again, the vehicle jumps.
     motions: WitnessCounts,
     turn_end: u64,
     newest: u64,
@@ -294,7 +288,7 @@ impl Session {
         self.count(pose);
     }
 
-    /// Counts what a motion rests on.
+    /// Counts the basis of a motion.
     fn count(&mut self, pose: &PoseHeader) {
         let item = &pose.item;
         let is_new = item.seq > self.newest && !item.is(flag::BREAK);

@@ -78,7 +78,7 @@ impl Sampler {
                 first: Usage::default(),
                 last: usage,
             });
-            // It is `other` until the supervisor has said what it is.
+            // The process is named `other` until the supervisor has published its name.
             seen.name = member.name;
             seen.last = usage;
         }

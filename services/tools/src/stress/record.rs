@@ -24,7 +24,7 @@ pub struct Counts {
     pub due: u64,
     /// Scans with a pose.
     pub posed: u64,
-    /// Scans without a pose, those of `never` among them.
+    /// Scans without a pose, including `never`.
     pub dropped: u64,
     /// Scans that no later pose has replaced when the measurement ended. They count as long as that
     /// took.
@@ -48,7 +48,7 @@ impl Counts {
 /// A scan on the timeline.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Sample {
-    /// The time at which it was due, s since the measurement began.
+    /// The time when the scan was due, s since the measurement began.
     pub due_s: f64,
     /// Time from then to its pose, or to the pose that replaced it, ms.
     pub latency_ms: f64,
@@ -59,7 +59,6 @@ pub struct Sample {
 /// The hop of one stage.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Hop {
-    /// The stage.
     pub stage: &'static str,
     /// From the publication by the stage before to the reception; `None` of the first stage.
     pub transport: Option<Distribution>,
@@ -74,8 +73,8 @@ pub struct Hop {
 pub struct RunLatency {
     /// Counts of scans.
     pub counts: Counts,
-    /// From the time at which a scan was due to its pose; a scan that was dropped counts until the
-    /// pose that replaced it.
+    /// From the time when a scan was due to its pose; a dropped scan counts until the pose that
+    /// replaced it.
     pub sensor_to_pose: Distribution,
     /// The same of the scans that have a pose alone.
     pub posed: Distribution,
@@ -83,7 +82,7 @@ pub struct RunLatency {
     pub closed_loop: Distribution,
     /// Stage by stage.
     pub hops: Vec<Hop>,
-    /// Scan by scan, in the order in which they were due; written as CSV.
+    /// The scans in the order of their due times; written as CSV.
     #[serde(skip)]
     pub timeline: Vec<Sample>,
 }

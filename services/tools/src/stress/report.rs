@@ -28,7 +28,6 @@ pub struct Provenance {
     pub date: String,
     /// The processor and the number of its cores.
     pub machine: String,
-    /// The kernel.
     pub kernel: String,
     /// Gyre's version.
     pub gyre: String,
@@ -48,7 +47,7 @@ pub struct Report {
     version: u32,
     /// The origin of the report.
     pub provenance: Provenance,
-    /// The scenarios, in the order in which they were carried out.
+    /// The scenarios in the order of their execution.
     pub outcomes: Vec<ScenarioOutcome>,
 }
 
@@ -70,9 +69,6 @@ impl Report {
     }
 
     /// Writes all its files.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
     pub fn write(&self, out: &Path) -> Result<(), StressError> {
         let write = |name: &str, text: String| {
             let path = out.join(name);

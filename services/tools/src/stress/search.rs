@@ -22,11 +22,8 @@ pub struct Found {
     pub failed: Option<u32>,
 }
 
-/// Returns the largest level from `first` on that passes, up to `most`. `grow` says which level to
-/// try after one that has passed.
-///
-/// # Errors
-/// An error of `passes`.
+/// Returns the largest level from `first` on that passes, up to `most`. `grow` returns the level to
+/// try after a level that has passed.
 pub fn largest<E>(
     first: u32,
     most: u32,
@@ -77,9 +74,6 @@ impl<'a> Steps<'a> {
     }
 
     /// Returns whether a level passes, at the second try at the latest.
-    ///
-    /// # Errors
-    /// An error of `step`.
     pub fn passes(
         &mut self,
         mut step: impl FnMut() -> Result<Step, StressError>,

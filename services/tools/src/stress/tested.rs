@@ -24,7 +24,6 @@ pub struct TestedPipeline {
     pub others: Others,
     /// The stages of the run.
     pub stages: Vec<StageId>,
-    /// The budget.
     pub budget: Budget,
     /// Shared memory of a run, bytes.
     pub shared_bytes: u64,
@@ -45,9 +44,7 @@ impl TestedPipeline {
 /// The sensors beside the radar that the run uses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Others {
-    /// A gyro.
     pub gyro: bool,
-    /// Wheels.
     pub wheels: bool,
     /// True if they are weighed against the radar: there is a refinement.
     pub are_weighed: bool,

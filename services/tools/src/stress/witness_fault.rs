@@ -1,5 +1,4 @@
-//! Faults of gyro, wheels and radar: put into what the source plays, and looked for in what the
-//! motions say that they rest on.
+//! Faults of gyro, wheels and radar: the source plays them, and the motions must report them.
 
 use gyre_messages::{Basis, PoseHeader, RefinementRecord, StageId, WitnessCounts, flag, wheels};
 use gyre_run::{PlayedFault, PlayedFaultKind, Scenario};
@@ -13,12 +12,12 @@ const FROM_S: f64 = 4.0;
 const FOR_S: f64 = 3.0;
 /// Durations for which the radar is blind, s.
 const BLIND_S: [f64; 3] = [2.0, 5.0, 10.0];
-/// Time after a fault in which the run is to recover, s.
+/// The time after a fault for the recovery of the run, s.
 const AFTER_S: f64 = 4.0;
 /// Way of a vehicle that drives while its wheels slip, m.
 const LEAST_WAY_M: f64 = 1.0;
 
-/// Returns the faults that a scenario puts into what is played, in their order.
+/// Returns the faults that a scenario adds to the played data, in order.
 pub fn faults(scenario: Scenario) -> Vec<PlayedFault> {
     let (kind, durations) = match scenario {
         Scenario::GyroOut => (PlayedFaultKind::GyroOut, &[FOR_S][..]),
@@ -76,23 +75,22 @@ pub fn lacks(tested: &TestedPipeline, scenario: Scenario) -> Option<String> {
     })
 }
 
-/// A fault of gyro, wheels or radar, and what the motions said of it.
+/// A fault of gyro, wheels or radar, and how the motions reported it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct WitnessFault {
-    /// The kind.
     pub kind: PlayedFaultKind,
-    /// The time at which it began, s since the measurement began.
+    /// The start of the fault, s since the measurement began.
     pub at_s: f64,
     /// The duration, s.
     pub for_s: f64,
     /// Motions while it lasted.
     pub motions: u64,
-    /// Those of them that say so.
+    /// The number of these motions that report the fault.
     pub noticed: u64,
     /// The basis of these motions.
     pub counts: WitnessCounts,
     /// Time from its end to the first pose of a motion that is as before it, ms; `None`: there was
-    /// none before the next fault.
+    /// no such pose before the next fault.
     pub recovery_ms: Option<f64>,
     /// Way of the vehicle meanwhile, m.
     way_m: f64,
@@ -112,7 +110,7 @@ impl WitnessFault {
         }
     }
 
-    /// Returns what it is in words.
+    /// Returns the fault in words.
     pub fn name(&self) -> String {
         let what = match self.kind {
             PlayedFaultKind::GyroOut => "gyro out",
@@ -137,7 +135,7 @@ impl WitnessFault {
     }
 }
 
-/// The clock of what is played, against that of this computer.
+/// The clock of the played data relative to the clock of this computer.
 #[derive(Clone, Copy, Debug)]
 pub struct PlayedClock {
     /// The stamp of the first scan, ns since 1970.
@@ -164,7 +162,7 @@ impl PlayedClock {
     }
 }
 
-/// The faults of a run, as its poses tell of them.
+/// The faults of a run, as its poses report them.
 #[derive(Debug)]
 pub struct WitnessFaults {
     faults: Vec<PlayedFault>,
@@ -173,7 +171,7 @@ pub struct WitnessFaults {
     /// The begin of the measurement, `CLOCK_MONOTONIC`, ns.
     began_ns: i64,
     newest: Option<u64>,
-    /// Motions before the first fault, and those of them that were normal.
+    /// Motions before the first fault, and the normal ones among them.
     before: [u64; 2],
     found: Vec<WitnessFault>,
 }
@@ -241,7 +239,7 @@ impl WitnessFaults {
         self.found.iter().any(|fault| fault.recovery_ms.is_none())
     }
 
-    /// Returns the reason why the faults say nothing of the pipeline.
+    /// Returns the reason why the faults are no result about the pipeline.
     pub fn omitted(&self) -> Option<String> {
         match self.before {
             [0, _] => Some(
@@ -287,7 +285,7 @@ fn is_normal(kind: PlayedFaultKind, others: Others, motion: &RefinementRecord) -
     }
 }
 
-/// Returns whether a motion says that there is a fault of this kind.
+/// Returns whether a motion reports a fault of this kind.
 fn is_noticed(kind: PlayedFaultKind, others: Others, motion: &RefinementRecord) -> bool {
     match kind {
         PlayedFaultKind::GyroOut => !motion.uses_gyro(),

@@ -1,4 +1,4 @@
-//! Covariances of motions in simulated streets, whose truth is exact, with and without lost azimuths.
+//! Covariances of motions in simulated streets with exact truth, with and without lost azimuths.
 //! Roads as hard as real ones are in `research/worlds/tests/method/covariances.rs`.
 
 use std::{fs, path::Path};

@@ -37,9 +37,6 @@ impl Keyframes {
     /// Opens or creates the log of the run that writes to `out`, whose journal has `poses` poses,
     /// and perhaps the end of the stream. Keyframes beyond them are cut off, and the motion since
     /// the last one is recovered from the journal.
-    ///
-    /// # Errors
-    /// A file that cannot be used, or a pose without its keyframe.
     pub fn open(out: &Path, poses: u64, ended: bool) -> Result<Self, KeyframesError> {
         let mut log = RecordLog::open(out)?;
         let found = find(log.len(), poses, |index| log.read(index))?;
@@ -99,9 +96,6 @@ impl Keyframes {
 
 /// Returns how many of the first `poses` poses of the journal have all their keyframes. After a
 /// death all of them have; a power failure can take the last keyframes. Changes nothing.
-///
-/// # Errors
-/// A file that cannot be read or is damaged.
 pub fn complete_poses(out: &Path, poses: u64) -> Result<u64, KeyframesError> {
     let mut reader = RecordReader::open(out)?;
     let found = find(reader.len(), poses, |index| reader.read(index))?;
@@ -146,7 +140,7 @@ fn recover(
     let mut builder = KeyframeBuilder::default();
     let last = found.last.as_ref().map_or(0, |keyframe| keyframe.seq);
     let records = crate::records_from(&crate::path(out), last)?;
-    // Behind them may be the remains of others after a power failure, or the end of the stream.
+    // Behind them may be the leftovers of others after a power failure, or the end of the stream.
     let count = usize::try_from(poses.saturating_sub(last)).unwrap_or(usize::MAX);
     for pose in records.into_iter().flatten().take(count) {
         let pose = pose?;

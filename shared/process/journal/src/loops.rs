@@ -19,9 +19,6 @@ pub struct LoggedLoops {
 
 impl LoggedLoops {
     /// Opens the logs of the run that writes to `out`.
-    ///
-    /// # Errors
-    /// A log that cannot be read.
     pub fn open(out: &Path) -> Result<Self, LogError> {
         Ok(Self {
             keyframes: RecordReader::open(out)?,
@@ -31,10 +28,7 @@ impl LoggedLoops {
         })
     }
 
-    /// Reads what was logged since the last call, and returns all loops so far, by their numbers.
-    ///
-    /// # Errors
-    /// A log that cannot be read.
+    /// Reads new records since the last call, and returns all loops so far, by their numbers.
     pub fn refresh(&mut self) -> Result<&[LoopHeader], LogError> {
         self.queries.refresh()?;
         self.keyframes.refresh()?;

@@ -14,8 +14,8 @@
 //!    [`GnssReceiver`]: fixes that arrive during a run, as such a log.
 //! 7. [`observer`]: subscribers that the run does not depend on; [`relay`]: stand-ins for stages on
 //!    another machine.
-//! 8. [`schedule`], [`heartbeat`], [`remote_progress`], [`services`]: what the supervisor
-//!    (`gyre-supervise`) reads and creates.
+//! 8. [`schedule`], [`heartbeat`], [`remote_progress`], [`services`]: files and services that the
+//!    supervisor (`gyre-supervise`) reads and creates.
 //!
 //! The protocol in one paragraph: items carry consecutive sequence numbers. The source may have W
 //! of them in flight; each pose is the credit for one more. A stage is a function of its inputs,

@@ -6,8 +6,8 @@
 //! end. [`rig`] runs one process alone, to test it.
 //!
 //! Reading order: `supervisor`, the loop; its parts, each with a file of that name: `processes`,
-//! `poses`, `stall`, `recovery`, `followers`, `swaps`, `recorder`; `restarts` and `requests`, where
-//! it is done what they decide; `start` and `child`, a process; `clean`. [`ProcessStat`], [`Usage`]
+//! `poses`, `stall`, `recovery`, `followers`, `swaps`, `recorder`; `restarts` and `requests`, the
+//! actions that they decide; `start` and `child`, a process; `clean`. [`ProcessStat`], [`Usage`]
 //! and [`memory`] read `/proc`.
 
 // `pre_exec` and raw file descriptors need `unsafe`; each use states why it is sound.

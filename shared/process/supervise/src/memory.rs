@@ -10,7 +10,7 @@ const CGROUPS: &str = "/sys/fs/cgroup";
 /// The memory that the machine and the control groups leave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Room {
-    /// Bytes that programs of the machine can still get, if the kernel says so.
+    /// Bytes that programs of the machine can still allocate, if the kernel reports them.
     pub available: Option<u64>,
     /// The lowest limit of the control groups, bytes.
     pub limit: Option<u64>,
@@ -86,7 +86,7 @@ fn limits(root: &Path, groups: &str) -> Vec<Group> {
         .collect()
 }
 
-/// The files of a limit and of what is used of it.
+/// The files of a limit and of its use.
 type Files = (&'static str, &'static str);
 const V2: Files = ("memory.max", "memory.current");
 const V1: Files = ("memory.limit_in_bytes", "memory.usage_in_bytes");

@@ -74,7 +74,6 @@ pub enum PacketMessage {
     Azimuth(RadarFftDataMsg),
     /// One azimuth of a driver before 2024.
     Bytes(RadarFftDataMessage),
-    /// A turn.
     Turn(RadarBScanMsg),
 }
 

@@ -75,7 +75,8 @@ impl Examination<'_> {
     }
 }
 
-/// Returns the fault in the end of a program after a malformed item; `None` if there is none.
+/// Returns the fault in the end of a program after a malformed item; `None` if the program reported
+/// the fault as the contract demands.
 fn breach(ending: Option<Death>, topic: &str, fault: &str) -> Option<String> {
     let code = i32::from(StageError::TRANSIENT);
     let item = format!("an item on `{topic}` with {fault}");

@@ -1,5 +1,5 @@
-//! Told to stand by, as for a swap: the program says when it is ready, opens nothing before its
-//! standard input ends, and then works as at any start.
+//! A program that stands by, as for a swap, reports when it is ready, opens nothing before its
+//! standard input ends, and then works as after a normal start.
 
 use std::{
     fs::File,
@@ -102,7 +102,7 @@ impl StandardInput {
         }
     }
 
-    /// Returns the command that becomes the program with this input, told to stand by.
+    /// Returns the command that starts the program with this input and lets it stand by.
     fn command(&self, program: &[String]) -> Vec<String> {
         let told = format!("{STANDBY}=1");
         let path = self.path.display().to_string();

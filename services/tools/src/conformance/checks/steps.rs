@@ -1,5 +1,5 @@
 //! One item at a time, while observers come and go and one never reads; then SIGTERM in the middle.
-//! The results must be those of the whole stream.
+//! The results must equal the results of the whole stream.
 
 use super::{
     Examination,
@@ -35,7 +35,7 @@ impl Examination<'_> {
                 break;
             }
             if seq % BETWEEN == 0 {
-                // It takes what is there, if anything, and leaves.
+                // The observer takes a message, if there is one, and leaves.
                 drop(session.harness.rig.tap(output)?.receive());
             }
         }

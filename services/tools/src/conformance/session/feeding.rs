@@ -56,8 +56,8 @@ impl Session<'_> {
         Ok(())
     }
 
-    /// Publishes the inputs anew as after a restart of all stages: of the items so far no more than
-    /// a restarted stage may need, and the last poses. Those after them follow as they are
+    /// Publishes the inputs again as after a restart of all stages: the last poses, and of the
+    /// items so far only those that a restarted stage may need. Those after them follow as they are
     /// admitted.
     pub(crate) fn restart_inputs(&mut self, newest_pose: u64) -> Result<(), ProgramError> {
         self.harness.open_feeds()?;

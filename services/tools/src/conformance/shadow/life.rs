@@ -26,7 +26,7 @@ const POLL_PERIOD: Duration = Duration::from_millis(5);
 
 /// The program of the shadow, and the places of its files.
 pub(crate) struct ShadowProgram {
-    /// The program; its manifest is that of the observed run, without its live mode.
+    /// The program; its manifest is the manifest of the observed run, without its live mode.
     pub candidate: Candidate,
     /// The place for the files of all lives.
     pub folder: PathBuf,
@@ -120,8 +120,8 @@ impl ShadowProgram {
         appended.map_err(ProgramError::file(path))
     }
 
-    /// Copies the state of the run's refinement, from which a restarted one or one that is swapped
-    /// in starts too.
+    /// Copies the state of the run's refinement: a refinement that is restarted or swapped in
+    /// starts with the same state.
     fn copy_state(&self, out: &Path) -> Result<(), ProgramError> {
         let from = checkpoint::path(&self.candidate.manifest.out);
         let to = checkpoint::path(out);

@@ -35,7 +35,6 @@ pub(crate) struct Feedback {
     breaks: bool,
     /// The motion as searched.
     pub motion: Recorded,
-    /// The pose.
     pub pose: Recorded,
 }
 
@@ -63,8 +62,8 @@ pub(crate) struct Observation<'run> {
     observers: Vec<Box<dyn TopicObserver + 'run>>,
     forward: usize,
     lag: u64,
-    /// The messages of items that are not complete, by the number that the source gave to the scan:
-    /// masking numbers anew.
+    /// The messages of incomplete items, by the number of the scan at its source, because masking
+    /// renumbers scans.
     incomplete: BTreeMap<u64, Vec<Option<Recorded>>>,
     incomplete_bytes: usize,
     /// The last items without a gap: those that the lag reaches from an item and from the one
@@ -73,7 +72,7 @@ pub(crate) struct Observation<'run> {
     last: Option<u64>,
     /// Items of the stage that were not seen whole.
     pub missed: u64,
-    /// Places at which items are missing.
+    /// The number of places with missing items.
     pub gaps: u64,
 }
 

@@ -45,7 +45,7 @@ pub struct Counts {
     pub starts: u64,
     /// Ends of the shadow that were not asked for.
     pub deaths: u64,
-    /// Times at which it was ended because it did not come or answer.
+    /// The number of kills because the program did not start or answer in time.
     pub hangs: u64,
     /// Breaches of the contract of a stage.
     pub breaches: u64,
@@ -166,8 +166,8 @@ impl Record {
         })
     }
 
-    /// Returns the time from the publication of an item's last input to that of the item, in the
-    /// run.
+    /// Returns the time from the publication of an item's last input to the publication of the
+    /// item, in the run.
     fn answer_ns(&self, item: &Item) -> Option<i64> {
         let stage = self.stage as usize;
         let before = item.hops[..stage].iter().map(|hop| hop.published_ns).max();

@@ -1,15 +1,15 @@
 //! Renumbers an observed item, and sends it to the shadow.
 //!
-//! The shadow's numbers are consecutive, as the contract says, also where the observed ones are
-//! not: after a gap, or skipped items. Such an item *opens* the stream anew, and its result is not
-//! compared:
+//! The shadow's numbers are consecutive, as the contract demands, also where the observed numbers
+//! are not: after a gap, or skipped items. Such an item *opens* the stream again, and its result is
+//! not compared:
 //!
 //! - to a search it is the start of a chain (BREAK), so that the next item is matched against it
 //!   and not against an older one;
 //! - masking looks up motions by number: it gets each motion with that number, directly before the
 //!   scan;
-//! - refinement needs the state before its first item, with which each life begins: it is started
-//!   again.
+//! - refinement needs the state before its first item, because each life begins with that state: it
+//!   is started again.
 
 use gyre_messages::{Item, Message, Motion, Pose, StageId, flag};
 use gyre_stage::StageError;
@@ -24,7 +24,7 @@ pub(crate) struct Renumbering {
     lag: u64,
     /// The numbers of the last item in the run and for the shadow.
     last: Option<(u64, u64)>,
-    /// The shadow's number of the last item with which a chain of motions has begun.
+    /// The shadow's number of the last item that began a chain of motions.
     broken_at: Option<u64>,
 }
 

@@ -11,7 +11,6 @@ use crate::conformance::Spreads;
 /// The comparison of a program with a stage of a run.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
-    /// The stage.
     pub stage: &'static str,
     /// The program and its arguments.
     pub command: Vec<String>,
@@ -21,13 +20,12 @@ pub struct Report {
     pub differences: Spreads,
     /// From the start of the work on an item to its end.
     pub work: Option<Beside>,
-    /// From the publication of an item's input to that of the output.
+    /// From the publication of an item's input to the publication of its output.
     pub answer: Option<Beside>,
     /// The first breaches of the contract.
     pub breaches: Vec<String>,
     /// The first ends of the program, and their reasons.
     pub ends: Vec<String>,
-    /// The verdict.
     pub verdict: Verdict,
 }
 
@@ -46,7 +44,6 @@ pub enum Verdict {
 /// Times of the same items.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Beside {
-    /// Of the shadow.
     pub shadow: Percentiles,
     /// Of the stage of the run.
     pub real: Percentiles,

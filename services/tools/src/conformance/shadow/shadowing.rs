@@ -26,11 +26,12 @@ use crate::conformance::ProgramError;
 
 /// Items that wait for the shadow at most; then all but the newest are skipped.
 const BACKLOG: usize = 16;
-/// Bytes that wait at most for a refinement, which cannot skip an item: it is started anew instead.
+/// The maximum of waiting bytes for a refinement. A refinement cannot skip an item, and is
+/// restarted instead.
 const BACKLOG_BYTES: usize = 64 << 20;
 /// The shortest time between two polls of the run: see [`gyre_stage::observer`].
 const REST: Duration = Duration::from_millis(10);
-/// The same of the shadow while it starts, of which no listener is notified.
+/// The same interval while the shadow starts, because its listeners are not notified.
 const STARTING: Duration = Duration::from_millis(5);
 /// Time before the shadow is started again.
 const BACKOFF: Duration = Duration::from_secs(1);
@@ -208,7 +209,7 @@ impl<'a> Shadowing<'a> {
         }
     }
 
-    /// Starts the shadow if there is none, and exchanges messages with it.
+    /// Starts the shadow if it is not running, and exchanges messages with it.
     fn attend(&mut self) -> Result<(), ProgramError> {
         let Some(life) = &mut self.life else {
             return self.start();

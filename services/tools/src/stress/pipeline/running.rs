@@ -44,7 +44,7 @@ pub(super) struct Running<'a> {
     process: Child,
     out: PathBuf,
     log: PathBuf,
-    /// The time at which it must have made its first poses.
+    /// The latest time of its first poses.
     deadline: Instant,
 }
 
@@ -58,7 +58,7 @@ impl<'a> Running<'a> {
         );
         let output = File::create(&log).map_err(StressError::file(&log))?;
         let errors = output.try_clone().map_err(StressError::file(&log))?;
-        // What a run before this one has left, if it had to be killed.
+        // Removes the leftovers of an earlier killed run.
         sweep();
         let work = Work::Run(words(tested, setup, &out));
         let mut command = helper::command(&tested.program, &work)?;
@@ -113,7 +113,7 @@ impl<'a> Running<'a> {
 
     /// Waits until the run can be observed.
     pub fn attach(&mut self) -> Result<ObservedRun, StressError> {
-        // Another one with these results may be there still, if it was killed.
+        // A supervisor of the same results may still be there, if an earlier run was killed.
         while !self.is_supervised_by_its_process() {
             self.require_life()?;
             thread::sleep(POLL_PERIOD);
@@ -171,7 +171,7 @@ impl<'a> Running<'a> {
                 newest = *pose;
             })?;
             if has_ended {
-                // What it says is complete when its process has ended too.
+                // Its output is complete when its process has ended too.
                 self.await_end(self.deadline);
             }
             self.require_life()?;

@@ -3,7 +3,7 @@
 use gyre_run::latency::Durations;
 use serde::Serialize;
 
-/// Samples beyond a percentile from which on it is firm.
+/// The minimum number of samples beyond a firm percentile.
 const FIRM: f64 = 10.0;
 
 /// Percentiles of a duration, ms, as far as the number of samples supports them: the share q needs

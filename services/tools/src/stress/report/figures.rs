@@ -16,7 +16,6 @@ use crate::stress::{
 /// The figures of a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Figures {
-    /// The latency.
     #[serde(flatten)]
     pub latency: RunLatency,
     /// Faults and recoveries.
@@ -51,7 +50,7 @@ impl Figures {
         !self.faults.is_empty() || !self.witness_faults.is_empty()
     }
 
-    /// Returns the longest recovery from a fault, ms; `None` if there was none from one of them.
+    /// Returns the longest recovery from a fault, ms; `None` if a fault had no recovery.
     pub fn longest_recovery_ms(&self) -> Option<f64> {
         let of_stages = self.faults.iter().map(|fault| fault.recovery_ms);
         let of_others = self.witness_faults.iter().map(|fault| fault.recovery_ms);
@@ -59,8 +58,8 @@ impl Figures {
         all?.into_iter().reduce(f64::max)
     }
 
-    /// Returns `p50 4.5, p99 7.0 of 480, max 7.2 ms; 0 of 480 scans dropped; processor 3.8 %, memory
-    /// 77 MB`.
+    /// Returns a sentence such as
+    /// `p50 4.5, p99 7.0 of 480, max 7.2 ms; 0 of 480 scans dropped; processor 3.8 %, memory 9 MB`.
     pub(super) fn sentence(&self) -> String {
         let (cpu, memory) = (self.cpu_percent(), self.memory_mb());
         let used = format!("processor {cpu:.1} %, memory {memory:.0} MB");

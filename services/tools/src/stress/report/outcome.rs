@@ -37,11 +37,9 @@ impl Verdict {
 /// The outcome of a scenario.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ScenarioOutcome {
-    /// The scenario.
     pub scenario: Scenario,
     /// A line that describes it.
     pub line: &'static str,
-    /// The verdict.
     pub verdict: Verdict,
     /// The figures that have limits.
     pub checks: Vec<Check>,

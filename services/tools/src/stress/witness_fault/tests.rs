@@ -18,7 +18,7 @@ fn others() -> Others {
     }
 }
 
-/// The pose of a scan, 20 ms after it was due, and what its motion says.
+/// The pose of a scan, 20 ms after it was due, with this outcome of its motion.
 fn pose(scan: u64, outcome: u32, [gyro, wheels]: [u64; 2]) -> PoseHeader {
     let mut pose = PoseHeader::default();
     (pose.item.seq, pose.item.scan) = (scan, scan);
@@ -34,8 +34,8 @@ fn pose(scan: u64, outcome: u32, [gyro, wheels]: [u64; 2]) -> PoseHeader {
 
 const NORMAL: (u32, [u64; 2]) = (outcome::REFINED, [gyro::USED, wheels::USED]);
 
-/// The faults of a scenario after a drive whose scans from one to another, which is not included,
-/// say `meanwhile`.
+/// The faults of a scenario after a drive. The scans from one number up to another (excluded)
+/// report `meanwhile`.
 fn told(
     scenario: Scenario,
     spans: &[(u64, u64)],
@@ -55,14 +55,14 @@ fn told(
         let (outcome, by) = if is_spoilt { meanwhile } else { NORMAL };
         told.pose(&pose(scan, outcome, by));
     }
-    // The vehicle jumps where the recording starts anew: nothing of it counts.
+    // The vehicle jumps where the recording starts again: nothing there counts.
     told.pose(&pose(200, outcome::PREDICTED, [0, 0]));
     (told.omitted(), told.finish())
 }
 
 #[test]
 fn a_gyro_that_is_out_is_noticed_and_the_recovery_counts_from_its_end() {
-    // Out from 4 s to 7 s, scans 16 to 28, of which the last is half covered, and one more.
+    // Absent from 4 s to 7 s: scans 16 to 28, the last half covered, and one more.
     let meanwhile = (outcome::REFINED, [gyro::NONE, wheels::USED]);
     let (omitted, faults) = told(Scenario::GyroOut, &[(16, 30)], meanwhile);
     assert_eq!((omitted, faults.len()), (None, 1));

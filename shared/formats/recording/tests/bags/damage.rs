@@ -1,4 +1,4 @@
-//! Bags that lack a part of what they should have.
+//! Bags that lack required parts.
 
 use gyre_recording::file::{McapFile, Span};
 use mcap::records::op;
