@@ -27,9 +27,6 @@ pub struct Fingerprint {
 
 impl Fingerprint {
     /// Takes the fingerprint of a recording on disk. Images are not read.
-    ///
-    /// # Errors
-    /// The size of an image cannot be read.
     pub fn of(dataset: &dyn Dataset) -> Result<Self, OpenError> {
         let (mut digest, mut bytes) = (Sha256::new(), 0);
         for index in 0..dataset.len() {

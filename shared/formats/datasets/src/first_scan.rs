@@ -6,9 +6,6 @@ use crate::Dataset;
 
 /// Checks by the first scan of a recording that its radar says the velocity by Doppler: see
 /// [`check_chirps`]. A scan that cannot be read is reported where it is played.
-///
-/// # Errors
-/// The one of these that is missing.
 pub fn check_first_scan(dataset: &mut dyn Dataset) -> Result<(), NoDoppler> {
     let mut scan = OwnedScan::with_limits(dataset.limits());
     let Ok(geometry) = dataset.read(dataset.first(), scan.slot()) else {

@@ -71,9 +71,6 @@ pub struct LoggedFix {
 
 impl GnssLog {
     /// Reads a log. The first row, or the number of columns, says of which format it is.
-    ///
-    /// # Errors
-    /// A file that cannot be read or has no positions, and one without a usable fix.
     pub fn read(path: &Path) -> Result<Self, LogError> {
         let (raw, is_plane) = Self::raw(path)?;
         if let Some(reason) = raw.unreadable.are_most(raw.count()) {
@@ -107,9 +104,6 @@ impl GnssLog {
     }
 
     /// Returns all fixes of a log as one table.
-    ///
-    /// # Errors
-    /// A log that cannot be read.
     pub fn copy_of(path: &Path) -> Result<String, LogError> {
         let (raw, is_plane) = Self::raw(path)?;
         Ok(Self::table(&raw.entries, is_plane))
@@ -150,9 +144,6 @@ impl GnssLog {
     }
 
     /// Takes the fixes of this bag.
-    ///
-    /// # Errors
-    /// No usable fix.
     pub fn of(fixes: BagFixes, bag: &Path) -> Result<Self, LogError> {
         let raw = Raw {
             unmeasured: fixes.without_fix,
@@ -166,9 +157,6 @@ impl GnssLog {
 
     /// Returns the log that lies beside the scans of a dataset, which may also be named by the
     /// folder of the images; of the first file of a recording its own, if it has one.
-    ///
-    /// # Errors
-    /// No log.
     pub fn find(folder: &Path) -> Result<PathBuf, LogError> {
         let own = Self::of_recording(folder);
         // The first file itself may have been moved away.

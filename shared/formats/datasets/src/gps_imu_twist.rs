@@ -22,9 +22,6 @@ pub(crate) fn has_list(folder: &Path) -> bool {
 
 /// Reads the files that the list beside a folder names. `entry` makes an entry of a time, ns since
 /// 1970, and of these lines, counted from 0, each of three numbers.
-///
-/// # Errors
-/// A list that is missing, cannot be read or has a line of another form; an empty folder.
 pub(crate) fn read<T, const N: usize>(
     folder: &Path,
     of: &'static str,

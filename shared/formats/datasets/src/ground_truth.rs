@@ -63,9 +63,6 @@ type Parse = fn(&str) -> Result<Trajectory, LineError>;
 /// Reads a trajectory of any known format, detected from its first line, and converts it to
 /// REP-103. TUM and KITTI files may be of a vehicle (z up or down) or of a camera (z forward): the
 /// plane in which they move is found. Of a folder, its ground truth is read.
-///
-/// # Errors
-/// A file that cannot be read, or is not of a known format; a folder without ground truth.
 pub fn read_trajectory(path: &Path) -> Result<Trajectory, TrajectoryError> {
     let failed = |source| TrajectoryError::Io {
         path: path.to_owned(),
@@ -81,9 +78,6 @@ pub fn read_trajectory(path: &Path) -> Result<Trajectory, TrajectoryError> {
 }
 
 /// As [`read_trajectory`], from a text; `path` is the name in errors.
-///
-/// # Errors
-/// A text that is not of a known format.
 pub fn parse_trajectory(text: &str, path: &Path) -> Result<Trajectory, TrajectoryError> {
     let parse = detect(text).map_err(|reason| TrajectoryError::Unknown {
         path: path.to_owned(),

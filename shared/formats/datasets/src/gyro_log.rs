@@ -63,10 +63,6 @@ pub struct GyroLog {
 
 impl GyroLog {
     /// Reads a log. The first row, or the number of columns, says of which format it is.
-    ///
-    /// # Errors
-    /// A file that cannot be read or has no angular rates, and one whose stamps or rates cannot be
-    /// those of a gyro.
     pub fn read(path: &Path) -> Result<Self, LogError> {
         let (raw, unit_is_assumed) = match path.is_dir() {
             true => {
@@ -99,9 +95,6 @@ impl GyroLog {
 
     /// Returns the log that lies beside the scans of a dataset folder, which may also be that of
     /// the images.
-    ///
-    /// # Errors
-    /// No log, or only one of which the ground truth was made.
     pub fn find(folder: &Path) -> Result<PathBuf, LogError> {
         logs::find(folder, OF, &PLACES).map_err(|missing| {
             let mut in_truth = logs::roots(folder).map(|root| root.join(IN_TRUTH));
@@ -113,9 +106,6 @@ impl GyroLog {
     }
 
     /// Returns the axis that points up: the configured one, or that by gravity or the format.
-    ///
-    /// # Errors
-    /// Both contradict each other.
     pub fn up(&self, configured: Option<UpAxis>, dataset: Format) -> Result<UpAxis, LogError> {
         // Of RADIATE's logs z points down, and gravity is taken out of their accelerations.
         let is_radiates = dataset == Format::Radiate && self.path.ends_with("imu_as_logged.csv")
@@ -151,9 +141,6 @@ impl GyroLog {
     }
 
     /// Takes the samples of a bag or of a simulation, which messages name by this path.
-    ///
-    /// # Errors
-    /// Stamps or rates that cannot be those of a gyro.
     pub fn of(samples: Vec<Sample>, path: &Path) -> Result<Self, LogError> {
         Self::examined(Raw::of(samples), false, path)
     }

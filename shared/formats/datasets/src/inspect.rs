@@ -49,9 +49,6 @@ pub struct Report {
 ///
 /// With a `trajectory` of the dataset (an odometry result), the clock of each stamped ground truth
 /// is compared with it.
-///
-/// # Errors
-/// A dataset that cannot be opened; see [`open`].
 pub fn inspect(
     root: &Path,
     options: &DatasetOptions,

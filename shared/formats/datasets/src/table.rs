@@ -18,15 +18,9 @@ pub(crate) trait Columns: Sized {
     type Entry;
 
     /// Finds the columns by their names.
-    ///
-    /// # Errors
-    /// A column that is missing, and the remedy.
     fn by_names(header: &Header) -> Result<Self, String>;
 
     /// Finds the columns of a table without names, by their number.
-    ///
-    /// # Errors
-    /// An unknown number, and the remedy.
     fn by_number(columns: usize) -> Result<Self, String> {
         Err(format!(
             "its {columns} columns have no names: the first row must name them"
@@ -57,9 +51,6 @@ pub(crate) struct Rows<C: Columns> {
 
 impl<C: Columns> Rows<C> {
     /// Reads a table from its beginning.
-    ///
-    /// # Errors
-    /// Columns that are missing, and the remedy.
     pub fn of(text: &str) -> Result<Self, String> {
         let first = text.lines().next().unwrap_or_default().as_bytes();
         let mark = MARKS.into_iter().find(|mark| first.contains(mark));

@@ -46,10 +46,6 @@ pub struct WheelLog {
 impl WheelLog {
     /// Reads a log. Its first row names the columns, as in `stamp_ns,speed_m_s`, or those of
     /// ticks, `stamp_ns,ticks`, of which each is so many metres long.
-    ///
-    /// # Errors
-    /// A file that cannot be read or has no speed, one whose stamps or speeds cannot be those of
-    /// wheels, and ticks whose length is not given.
     pub fn read(path: &Path, m_per_tick: Option<f64>) -> Result<Self, LogError> {
         let no_speed = match logs::rows::<SpeedColumns>(path, OF) {
             Ok(rows) => return Self::examined(rows.raw, rows.columns.unit.is_none(), path),
@@ -63,17 +59,11 @@ impl WheelLog {
 
     /// Returns the log that lies beside the scans of a dataset folder, which may also be that of
     /// the images.
-    ///
-    /// # Errors
-    /// There is none.
     pub fn find(folder: &Path) -> Result<PathBuf, LogError> {
         logs::find(folder, OF, &PLACES)
     }
 
     /// Takes the samples of a bag or of a simulation, which messages name by this path.
-    ///
-    /// # Errors
-    /// Stamps or speeds that cannot be those of wheels.
     pub fn of(samples: Vec<Sample>, path: &Path) -> Result<Self, LogError> {
         Self::examined(Raw::of(samples), false, path)
     }
@@ -99,7 +89,6 @@ impl WheelLog {
     }
 }
 
-/// Names of the speed.
 const NAMES: &str = "speed wheel_speed vehicle_speed velocity v vx linear_x";
 /// Units at the end of its name.
 const UNITS: [(&str, f64); 8] = [

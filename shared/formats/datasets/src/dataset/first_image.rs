@@ -42,9 +42,6 @@ pub(crate) struct FirstImage {
 
 impl FirstImage {
     /// Returns `None` if the first images are damaged, or too narrow for metadata.
-    ///
-    /// # Errors
-    /// The first images cannot be read. Whatever depends on them would be another at another time.
     pub(crate) fn read(images: &mut Images) -> Result<Option<Self>, ReadError> {
         let size = images.size;
         if size.width <= METADATA_BYTES || size.height < 2 {

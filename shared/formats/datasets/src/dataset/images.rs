@@ -163,9 +163,6 @@ impl Images {
 
     /// Returns the first image with rows of azimuths that can be decoded, its index and its size;
     /// `None` if the first ones are damaged.
-    ///
-    /// # Errors
-    /// One of the first ones cannot be read, and none can be decoded.
     pub(crate) fn first_readable(
         &mut self,
     ) -> Result<Option<(usize, ImageSize, Vec<u8>)>, ReadError> {

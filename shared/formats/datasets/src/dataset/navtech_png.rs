@@ -73,7 +73,6 @@ pub(crate) fn chirps_alternate(bytes_ten: impl Iterator<Item = u8>) -> bool {
 pub(crate) enum ByteTen {
     /// 255: measured; otherwise interpolated from the neighbours.
     Validity,
-    /// Unused.
     Unused,
 }
 

@@ -80,9 +80,6 @@ pub struct DatasetOptions {
 
 impl DatasetOptions {
     /// Rejects values out of bounds.
-    ///
-    /// # Errors
-    /// The first of them.
     pub fn check(&self) -> Result<(), OpenError> {
         let checks = [
             (

@@ -60,9 +60,6 @@ pub(crate) fn open(found: Found, options: &DatasetOptions) -> Result<TransposedS
 }
 
 /// Reads a list of `Frame: <number> Time: <seconds>.<nanoseconds>`: the times by frame number, ns.
-///
-/// # Errors
-/// A list that cannot be read, or a line of another form.
 pub fn frame_stamps(list: &Path) -> Result<BTreeMap<i64, i64>, OpenError> {
     Ok(parse_stamps(list, &read_list(list)?)?.0)
 }

@@ -64,7 +64,6 @@ enum Sigma {
     None,
     /// Standard deviations, of which the mean square counts.
     Deviations([usize; 2]),
-    /// Variances.
     Variances([usize; 2]),
 }
 

@@ -34,9 +34,6 @@ const MAX_CLIMB: f64 = 0.3;
 impl Plane {
     /// Returns the plane in which the sensor moves: ahead along its z axis, it is a camera. Without
     /// headings the vertical axis is the one along which it moves least.
-    ///
-    /// # Errors
-    /// The sensor does not stay upright in any known frame.
     pub fn of(poses: &[Matrix]) -> Result<Self, String> {
         let moved = Displacement::of(poses);
         if poses.windows(2).all(|w| rotation(&w[0]) == rotation(&w[1])) {

@@ -78,10 +78,6 @@ impl Columns for CountColumns {
 
 /// Makes speeds of counts: each is the mean of the time between two, and has the stamp of its
 /// middle. Speeds that no vehicle has, as where a counter starts anew, are left out.
-///
-/// # Errors
-/// Ticks whose length is not given, stamps that cannot be those of a sensor, and speeds of which
-/// many are those of no vehicle.
 pub(super) fn speeds(
     rows: Rows<CountColumns>,
     path: &Path,
