@@ -47,9 +47,6 @@ impl Head {
     }
 
     /// Reads a record; `None` if it is another one.
-    ///
-    /// # Errors
-    /// It is of another version, or incomplete.
     pub(crate) fn of_metadata(record: &Metadata) -> Option<Result<Self, String>> {
         (record.name == NAME).then(|| Self::parse(&record.metadata))
     }

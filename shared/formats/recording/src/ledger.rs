@@ -47,9 +47,6 @@ impl Ledger {
 
     /// Reads what an earlier recorder of the run has begun to write to `to`, with the positions
     /// behind its newest part. What a part holds that cannot be read counts as missed.
-    ///
-    /// # Errors
-    /// A ledger that cannot be read.
     pub fn read(&self, to: &Path) -> Result<Option<Begun>, RecordingError> {
         let text = match gyre_storage::read_text(&self.0, SETTINGS) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),

@@ -75,9 +75,6 @@ struct Kept {
 
 impl Recording {
     /// Opens the files of a recording, in order. Those of another one after the first are left out.
-    ///
-    /// # Errors
-    /// A file that cannot be read, or is no recording.
     pub fn open(paths: &[PathBuf]) -> Result<Self, RecordingError> {
         let mut recording: Option<Self> = None;
         for path in paths {
@@ -202,9 +199,6 @@ impl Recording {
     }
 
     /// Reads a message.
-    ///
-    /// # Errors
-    /// It was not recorded, cannot be read, or is damaged.
     pub fn read(&mut self, topic: &str, seq: u64) -> Result<Stored, RecordingError> {
         let place = self.places.get(topic).and_then(|places| places.get(&seq));
         let Some(place) = place.copied() else {
@@ -227,9 +221,6 @@ impl Recording {
     }
 
     /// Reads the header of a message.
-    ///
-    /// # Errors
-    /// As [`Recording::read`]; a header that is not of the type.
     pub fn read_header<H: bytemuck::AnyBitPattern>(
         &mut self,
         topic: &str,

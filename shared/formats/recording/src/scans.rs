@@ -32,9 +32,6 @@ pub(crate) struct Scans {
 
 impl Scans {
     /// Opens the scans of a recording.
-    ///
-    /// # Errors
-    /// It has none, or the first one cannot be read.
     pub fn open(mut recording: Recording) -> Result<Self, OpenError> {
         let entries: BTreeMap<usize, Entry> = recording
             .entries(Scan::TOPIC)

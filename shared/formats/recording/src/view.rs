@@ -70,7 +70,6 @@ pub struct LogLine {
 /// An encoded message for viewers.
 #[derive(Clone, Debug)]
 pub struct View {
-    /// The channel.
     pub channel: &'static str,
     /// Returns the schema of the message.
     pub schema: fn() -> Option<Schema>,
@@ -82,7 +81,6 @@ pub struct View {
 pub struct Channel {
     /// The topic that it is made of; [`LOG`] is made of no topic.
     pub topic: Option<&'static str>,
-    /// The name.
     pub name: &'static str,
     /// Returns the schema of its messages.
     pub schema: fn() -> Option<Schema>,

@@ -39,7 +39,6 @@ const HEALTH_SCHEMA: &[u8] = br#"{"type":"object"}"#;
 /// A wire message to record.
 #[derive(Clone, Debug)]
 pub struct Incoming {
-    /// The topic.
     pub topic: &'static str,
     /// The bytes of the header.
     pub header: Vec<u8>,
@@ -97,9 +96,6 @@ impl Times {
 
 impl RecordingWriter {
     /// Begins a file, which must not exist.
-    ///
-    /// # Errors
-    /// The file exists or cannot be written.
     pub fn create(path: &Path, head: &Head) -> Result<Self, RecordingError> {
         Self::create_with(path, head, Disk::synchronises())
     }
@@ -176,8 +172,7 @@ impl RecordingWriter {
 
     /// Adds a message, and writes a chunk if one is due.
     ///
-    /// # Errors
-    /// The file cannot be written. It is cut back to its last complete chunk.
+    /// After an error the file is cut back to its last complete chunk.
     pub fn add(&mut self, message: &Incoming) -> Result<(), RecordingError> {
         let added = self.try_add(message);
         self.checked(added)?;
@@ -231,9 +226,6 @@ impl RecordingWriter {
     }
 
     /// Adds a line of the log at the time of the newest scan.
-    ///
-    /// # Errors
-    /// As [`RecordingWriter::add`].
     pub fn add_log(&mut self, line: LogLine) -> Result<(), RecordingError> {
         if self.newest_ns.is_none() {
             self.early.push(line);
@@ -250,9 +242,6 @@ impl RecordingWriter {
 
     /// Adds the health of the run, JSON, at the time of the newest scan; before the first one it is
     /// left out.
-    ///
-    /// # Errors
-    /// As [`RecordingWriter::add`].
     pub fn add_health(&mut self, json: &str, now_ns: i64) -> Result<(), RecordingError> {
         let Some(stamp_ns) = self.newest_ns else {
             return Ok(());
@@ -334,9 +323,6 @@ impl RecordingWriter {
 
     /// Writes the messages so far as a chunk if they are many, or have waited for long, and
     /// synchronises the file once a second. Call it twice a second while there are none.
-    ///
-    /// # Errors
-    /// As [`RecordingWriter::add`].
     pub fn flush_if_due(&mut self) -> Result<(), RecordingError> {
         let (bytes, since) = self.pending;
         let is_due =
@@ -349,9 +335,6 @@ impl RecordingWriter {
     }
 
     /// Writes the messages so far as a chunk, and its table.
-    ///
-    /// # Errors
-    /// As [`RecordingWriter::add`].
     pub fn flush(&mut self) -> Result<(), RecordingError> {
         let flushed = self.flush_all();
         self.checked(flushed)
@@ -372,9 +355,6 @@ impl RecordingWriter {
     }
 
     /// Writes what is left and the summary, and returns the number of messages missed, by topic.
-    ///
-    /// # Errors
-    /// As [`RecordingWriter::add`].
     pub fn finish(mut self) -> Result<BTreeMap<String, u64>, RecordingError> {
         for line in mem::take(&mut self.early).into_lines() {
             let added = self.try_add_log(&line);

@@ -44,9 +44,6 @@ pub(crate) fn described(form: Form, message: &Message) -> Result<Described, Stri
 
 /// Calls `each` with the azimuths in a message of a topic of scans, and the times at which they
 /// were received, ns.
-///
-/// # Errors
-/// A message that is not of its type, as a clause.
 pub(crate) fn azimuths(
     kind: Kind,
     message: &Message,

@@ -65,9 +65,6 @@ impl Bag {
     /// Opens the files, and learns all channels. Without a description they are in the order of
     /// their first messages: names do not give it, since tools number parts in several ways, and a
     /// folder may have several bags.
-    ///
-    /// # Errors
-    /// A file cannot be read, or files are of the same time.
     pub fn open(path: &Path, files: &Files) -> Result<Self, RecordingError> {
         let timed = files.paths.iter().map(|path| timed(path));
         let mut timed = timed.collect::<Result<Vec<Timed>, _>>()?;
@@ -111,9 +108,7 @@ impl Bag {
 
     /// Returns the messages of a span that are wanted.
     ///
-    /// # Errors
-    /// A file that cannot be read, or whose messages are compressed. A damaged span has none, and
-    /// counts as damage of its file.
+    /// A damaged span is not an error: it counts as damage of its file.
     pub fn read(
         &mut self,
         span: u32,
@@ -141,9 +136,6 @@ impl Bag {
 
     /// Calls `each` with the messages that are wanted, in the order in which they were received,
     /// until it returns false.
-    ///
-    /// # Errors
-    /// As [`Bag::read`].
     pub fn read_in_order(
         &mut self,
         wanted: impl Fn(&Channel) -> bool,

@@ -17,10 +17,6 @@ const RECEIVER: Sensor<Option<RawFix>> = Sensor {
 
 /// Reads the fixes of a bag without its scans, on the topic of this name, else on the only topic of
 /// such messages. `None` without such a topic.
-///
-/// # Errors
-/// No topic of this name, several without one, messages that cannot be decoded, or a bag that
-/// cannot be read.
 pub fn fixes(path: &Path, topic: Option<&str>) -> Result<Option<BagFixes>, OpenError> {
     let mut bag = Bag::open(path, &files(path)?)?;
     Ok(read(&mut bag, path, topic)?)

@@ -90,9 +90,6 @@ impl Survey {
     }
 
     /// Describes a radar of this depth of a range bin, m, and these encoder counts per turn.
-    ///
-    /// # Errors
-    /// The depth of a bin is not known, or nothing is shown.
     pub fn describe(
         &self,
         path: &Path,

@@ -9,7 +9,6 @@ use crate::bags::{Channel, RecordingError};
 /// The content of a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Kind {
-    /// Azimuths.
     Azimuths(Form),
     /// Whole turns, with encoder values and times.
     BScans,
@@ -79,9 +78,6 @@ pub(crate) struct Topics {
 impl Topics {
     /// Chooses the topic of scans, `wished` if it is named, and that of the radar's configuration
     /// nearest to it.
-    ///
-    /// # Errors
-    /// There is none, or one of several must be chosen.
     pub fn choose(
         path: &Path,
         channels: &[&Channel],

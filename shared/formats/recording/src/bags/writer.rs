@@ -62,9 +62,6 @@ struct Written {
 
 impl BagWriter {
     /// Begins a bag, which must not exist.
-    ///
-    /// # Errors
-    /// It exists, or cannot be written.
     pub fn create(path: &Path) -> Result<Self, RecordingError> {
         require_new(path)?;
         let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -111,9 +108,6 @@ impl BagWriter {
     }
 
     /// Adds a topic.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
     pub fn topic<T: Ros2Message>(
         &mut self,
         name: &str,
@@ -147,9 +141,6 @@ impl BagWriter {
     }
 
     /// Writes a message that was received at `log_ns`, ns since 1970.
-    ///
-    /// # Errors
-    /// A message that cannot be encoded, or a file that cannot be written.
     pub fn write<T: Ros2Message>(
         &mut self,
         topic: &Topic<T>,
@@ -180,9 +171,6 @@ impl BagWriter {
     }
 
     /// Ends the bag, and gives it its name.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
     pub fn finish(mut self) -> Result<(), RecordingError> {
         let path = self.path.clone();
         let failed = |error: &dyn std::fmt::Display| unwritable(&path, error.to_string());

@@ -9,9 +9,6 @@ use mcap::{
 
 /// Parses a header, a schema, a channel, a message or metadata. All other records are
 /// [`Record::Unknown`].
-///
-/// # Errors
-/// The bytes end before the record does.
 pub(crate) fn parse(opcode: u8, body: &[u8]) -> Result<Record<'_>, McapError> {
     let parsed = [
         op::HEADER,

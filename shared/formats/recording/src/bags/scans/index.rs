@@ -23,7 +23,6 @@ const RECENT: usize = 8;
 /// Place of an azimuth in a bag.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Place {
-    /// The message.
     pub message: Key,
     /// Number of the azimuth in its message.
     pub row: u32,
