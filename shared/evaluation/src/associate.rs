@@ -104,10 +104,6 @@ impl Coverage {
 
 /// Returns the estimated poses that have a ground-truth pose, with it, and counts those that have
 /// none.
-///
-/// # Errors
-/// [`EvaluationError`] if a pose is invalid (not finite, no rotation), if stamps are missing or out
-/// of order (by time only), or if fewer than two poses are associated.
 pub fn associate(
     estimate: TimedPoses<'_>,
     truth: TimedPoses<'_>,

@@ -16,7 +16,6 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::{MatchedMotions, TruthSigma, motions::Chain};
 
-/// The options of [`nees()`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct NeesOptions {
     /// Segment lengths, in motions.
@@ -77,7 +76,6 @@ pub struct NeesFigures {
     pub pose: NeesFigure,
     /// x and y.
     pub translation: NeesFigure,
-    /// Yaw.
     pub yaw: NeesFigure,
 }
 

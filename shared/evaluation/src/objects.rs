@@ -91,7 +91,6 @@ impl Default for ObjectOptions {
 /// The figures of a drive.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ObjectErrors {
-    /// Scans.
     pub scans: usize,
     /// Required objects, each once.
     pub objects: usize,

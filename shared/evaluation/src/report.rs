@@ -67,8 +67,7 @@ pub struct Evaluation {
 
 /// Compares `estimate` with `truth`.
 ///
-/// # Errors
-/// Those of [`associate()`]. A path that is too short for KITTI is no error.
+/// A path that is too short for KITTI is not an error.
 pub fn evaluate(
     estimate: TimedPoses<'_>,
     truth: TimedPoses<'_>,

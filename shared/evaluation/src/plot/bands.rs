@@ -21,9 +21,6 @@ const BAND: RGBColor = RGBColor(205, 226, 243);
 
 /// Returns the plot as an SVG document: the errors in x, y and yaw over time, each with its 3-sigma
 /// band.
-///
-/// # Errors
-/// [`PlotError::Empty`] if no pose has ground truth, and [`PlotError::Draw`].
 pub fn bands_svg(bands: &Bands) -> Result<String, PlotError> {
     let last = bands
         .chains
