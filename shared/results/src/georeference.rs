@@ -22,9 +22,6 @@ struct Placed {
 
 /// Returns the place on the earth of the frame of `trajectory_slam.tum` in the results of a run;
 /// `None` if GNSS does not tell it.
-///
-/// # Errors
-/// A summary that cannot be read.
 pub fn georeference(run: &Path) -> Result<Option<Origin>, Failure> {
     let path = run.join(SUMMARY);
     if !path.is_file() {

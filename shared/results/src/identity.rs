@@ -24,7 +24,6 @@ pub struct Identity {
     /// Scans to play; `None`: without end.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scans: Option<usize>,
-    /// The programs.
     programs: Programs,
     /// The options to read the recording, those of its `dataset.toml` among them.
     dataset: DatasetOptions,
@@ -87,9 +86,6 @@ impl Programs {
 impl Identity {
     /// The identity of a run that begins now. Its configuration has the options of `dataset.toml`
     /// in `dataset`.
-    ///
-    /// # Errors
-    /// A recording that cannot be read, or a configuration that TOML cannot hold.
     pub fn of(
         configuration: &Configuration,
         programs: &Programs,
@@ -107,9 +103,6 @@ impl Identity {
     }
 
     /// Writes it, once for a run. It survives a power failure when this returns.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
     pub fn write(&self, out: &Out) -> Result<(), Failure> {
         let text = toml::to_string_pretty(self)?;
         let checksum = checksum(&text);
@@ -120,10 +113,6 @@ impl Identity {
     }
 
     /// Reads that of the run which the folder holds.
-    ///
-    /// # Errors
-    /// One sentence that says what is wrong with the file. It is written as a whole before the
-    /// first pose, so the run did not leave it like that.
     pub fn read(out: &Out, holds: Holds) -> Result<Self, Failure> {
         let path = out.join(BEGUN_WITH);
         Self::read_file(&path).map_err(|state| {
@@ -165,9 +154,6 @@ impl Identity {
     }
 
     /// Checks that this configuration and these programs continue the run.
-    ///
-    /// # Errors
-    /// One sentence that says what differs.
     pub fn require(
         &self,
         configuration: &Configuration,
@@ -186,9 +172,6 @@ impl Identity {
 
     /// Checks that the recording is the one that the run was begun with, and is read in the same
     /// way.
-    ///
-    /// # Errors
-    /// One sentence that says what differs.
     pub fn require_recording(&self, now: &Self, out: &Path, holds: Holds) -> Result<(), Failure> {
         let options = |of: &Self| toml::Table::try_from(of.dataset);
         if let Some(difference) = difference::first(&options(self)?, &options(now)?) {
@@ -207,9 +190,6 @@ impl Identity {
     /// Returns whether a run of this configuration that begins now would compute the same and judge
     /// it by the same truth, if these are the replaced stages as in [`Programs::new`]. Gyre's own
     /// build may be another one.
-    ///
-    /// # Errors
-    /// A recording that cannot be read.
     pub fn has_inputs_of(
         &self,
         configuration: &Configuration,

@@ -65,9 +65,6 @@ impl Judgement {
 
     /// Draws the trajectory, errors where the truth has heading, and bands where there are
     /// covariances: names and SVG documents.
-    ///
-    /// # Errors
-    /// A plot that cannot be drawn.
     pub fn plots(&self) -> Result<Vec<(&'static str, String)>, Failure> {
         let matched = &self.evaluation.matched;
         let mut plots = vec![(
@@ -121,9 +118,6 @@ pub fn note_time_offset(estimate: &Trajectory, truth: &Trajectory) {
 }
 
 /// Returns the ground truth with the clock of the estimate, and the offset that was taken out.
-///
-/// # Errors
-/// The motions do not show an offset.
 pub fn without_time_offset(
     estimate: &Trajectory,
     truth: Trajectory,
@@ -140,9 +134,6 @@ pub fn without_time_offset(
 }
 
 /// Evaluates by time where both have stamps, else pose by pose.
-///
-/// # Errors
-/// Trajectories that do not overlap.
 pub fn judge(
     estimate: &Trajectory,
     truth: &Trajectory,
@@ -161,9 +152,6 @@ pub fn judge(
 }
 
 /// Compares motions with the truth against which their trajectory was evaluated.
-///
-/// # Errors
-/// A truth without times, without heading, or with other axes.
 pub fn judge_motions(
     motions: &[TimedMotion],
     truth: &Trajectory,

@@ -67,9 +67,6 @@ impl Content {
 
 impl Content {
     /// Checks that this content replaces only files of its own command in a folder.
-    ///
-    /// # Errors
-    /// A file in the place of the folder, or content of another command or of somebody else.
     pub fn require_place(&self, folder: &Path) -> Result<(), OutError> {
         let (Self(command, mark, files), path) = (self, folder.display());
         let refused = |reason| Err(OutError::Refused(reason));
@@ -111,9 +108,6 @@ fn owner(folder: &Path) -> Option<String> {
 
 /// Writes a page to a path that a user has named: into a new file, in the place of a file that
 /// contains the mark of such pages, or to a FIFO or a device.
-///
-/// # Errors
-/// Anything else at the path, or a file that cannot be written.
 pub fn write_page(to: &Path, page: &str, mark: &str) -> Result<(), OutError> {
     let unwritable = |source| OutError::Unwritable {
         path: to.to_owned(),
@@ -141,9 +135,6 @@ pub fn write_page(to: &Path, page: &str, mark: &str) -> Result<(), OutError> {
 }
 
 /// Checks that the results in the folder of a run are those of its configuration.
-///
-/// # Errors
-/// A run that replaces an earlier one has not ended.
 pub fn require_results(run: &Path) -> Result<(), OutError> {
     let reason = "has not ended, and the results in it are of the run before: start the same command again, and it continues";
     match run.join(REPLACED).exists() {
@@ -187,27 +178,17 @@ pub struct Out {
 }
 
 /// Returns the full name of a folder of results, which need not exist yet.
-///
-/// # Errors
-/// The system does not tell the working directory.
 pub fn absolute(out: &Path) -> io::Result<PathBuf> {
     out.canonicalize().or_else(|_| std::path::absolute(out))
 }
 
 impl Out {
     /// Creates and locks the folder for a run.
-    ///
-    /// # Errors
-    /// As [`lock_for`](Self::lock_for).
     pub fn lock(path: &Path) -> Result<Self, OutError> {
         Self::lock_for(path, Content::RUN)
     }
 
     /// Creates and locks the folder for this content. Nothing else in it is changed.
-    ///
-    /// # Errors
-    /// A folder that has other content, that cannot be written, or to which another command is
-    /// writing.
     pub fn lock_for(path: &Path, content: Content) -> Result<Self, OutError> {
         let unwritable = |source| OutError::Unwritable {
             path: path.to_owned(),

@@ -50,9 +50,6 @@ pub struct Results {
 /// all are complete; a result of an earlier session that cannot be made any more is removed. They
 /// survive a power failure when this returns. Those in place stay if `make_way`, which is called
 /// before the first one is replaced, says that results of so many poses do not replace them.
-///
-/// # Errors
-/// A journal that cannot be read, a file that cannot be written.
 pub fn write(
     configuration: &Configuration,
     out: &Out,

@@ -122,7 +122,6 @@ pub struct Measured {
     pub counts: Counts,
     /// The path.
     pub course: Course,
-    /// Latencies.
     pub latency: Latency,
     /// The errors, where there is a ground truth.
     pub evaluation: Option<Judgement>,
@@ -192,9 +191,6 @@ pub enum Form {
 
 impl Summary {
     /// Returns it in a form.
-    ///
-    /// # Errors
-    /// A figure that JSON cannot hold.
     pub fn text(&self, form: Form) -> serde_json::Result<String> {
         match form {
             Form::Brief => Ok(self.in_brief()),

@@ -59,9 +59,6 @@ struct PoseRow {
 
 /// Compares the `objects.csv` of a run with that of the simulated recording in `truth`, in the
 /// frame of the sensor: by the run's own poses, and the recording's `ground_truth.tum`.
-///
-/// # Errors
-/// A file that cannot be read, or whose times are not those of the other.
 pub fn evaluate(run: &Path, truth: &Path) -> Result<ObjectErrors, Failure> {
     let poses: Vec<PoseRow> = rows(&run.join("poses.csv"))?;
     let (folder, truth) = files(truth);

@@ -45,9 +45,6 @@ struct MotionRow {
 
 /// Reads the motions of an `odometry.csv`. A covariance that is left empty becomes NaN: the motion
 /// has none.
-///
-/// # Errors
-/// A file that cannot be read, a missing column, a row that is damaged.
 pub fn read(path: &Path) -> Result<Vec<TimedMotion>, Failure> {
     let file = gyre_storage::open(path)
         .map_err(|error| format!("cannot read {}: {error}", path.display()))?;

@@ -14,9 +14,6 @@ const HEADER: &str = "scan,stamp_ns,object,x_m,y_m,yaw_rad,vx_m_s,vy_m_s,length_
 
 /// Returns `objects.csv`: a row for each object and scan, in fixed decimals, so that equal objects
 /// give equal bytes. Of a run that goes on, the objects so far.
-///
-/// # Errors
-/// A log that cannot be read.
 pub fn csv(out: &Path) -> Result<String, Failure> {
     let mut logged = RecordReader::<LoggedObjects>::open(out)?;
     let mut rows = HEADER.to_owned();

@@ -47,9 +47,6 @@ pub struct Read {
 impl<'a, 'b> Pass<'a, 'b> {
     /// Starts with a journal of which `resumed` poses are of earlier sessions. Poses are kept if
     /// they are to be judged.
-    ///
-    /// # Errors
-    /// A file that cannot be created.
     pub fn new(
         files: &'a mut Files<'b>,
         resumed: usize,
@@ -75,9 +72,6 @@ impl<'a, 'b> Pass<'a, 'b> {
     }
 
     /// Adds the next record.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
     pub fn add(&mut self, pose: &PoseHeader) -> Result<(), Failure> {
         if pose.item.is(flag::END) {
             self.read.end = Some(pose.item);

@@ -62,9 +62,6 @@ impl Sketch {
     }
 
     /// Returns the plot as an SVG document; `None` without poses.
-    ///
-    /// # Errors
-    /// A plot that cannot be drawn.
     pub fn svg(&self) -> Result<Option<String>, PlotError> {
         let drawn = self.path();
         match drawn.is_empty() {

@@ -55,9 +55,6 @@ fn require_no_poses(out: &Out) -> Result<(), Failure> {
 impl Slam {
     /// Corrects the poses of the keyframes of a run by its loops; `None` without SLAM, and before
     /// the first keyframe. Of a run that goes on, the loops so far are left out.
-    ///
-    /// # Errors
-    /// Keyframes that cannot be read or used.
     pub fn read(configuration: &Configuration, out: &Out) -> Result<Option<Self>, Failure> {
         let Some(kind) = configuration.slam.kind.estimator() else {
             return Ok(None);
@@ -119,9 +116,6 @@ impl Slam {
     }
 
     /// Returns `loops.csv`: a row for each verified candidate.
-    ///
-    /// # Errors
-    /// None: writing to a string does not fail.
     pub fn loops_csv(&self) -> Result<String, fmt::Error> {
         let mut rows = HEADER.to_owned();
         let judged = self.estimator.loops();
@@ -164,9 +158,6 @@ impl Slam {
     }
 
     /// Returns what became of the fixes of GNSS, and the place on the earth; `None` without them.
-    ///
-    /// # Errors
-    /// Constraints that do not determine the poses.
     pub fn gnss(&mut self) -> Result<Option<GnssSummary>, Failure> {
         let Some(log) = &self.gnss else {
             return Ok(None);
@@ -177,9 +168,6 @@ impl Slam {
 
     /// Returns the errors of the corrected keyframes with what their covariances say, against the
     /// first one that has a true pose.
-    ///
-    /// # Errors
-    /// Constraints that do not determine the poses.
     pub fn bands(&mut self, truth: &Trajectory) -> Result<Bands, Failure> {
         self.estimator.scale_covariances()?;
         let step = self.keyframes.len().div_ceil(DRAWN);

@@ -185,7 +185,6 @@ impl DopplerCounts {
 /// Counts of motions by outcome.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct MotionCounts {
-    /// Refined.
     pub refined: u64,
     /// Accepted with a wider covariance because of little support.
     pub weak: u64,

@@ -83,9 +83,6 @@ impl EastNorth {
 
 impl GnssSummary {
     /// Takes what the last solution says of the fixes of a log.
-    ///
-    /// # Errors
-    /// Constraints that do not determine the poses.
     pub fn of(log: &GnssLog, estimator: &mut TrajectoryEstimator) -> Result<Self, EstimationError> {
         let positions = estimator.positions();
         let used = positions.iter().filter(|it| it.weight >= LEAST_WEIGHT);
