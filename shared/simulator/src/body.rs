@@ -54,7 +54,6 @@ pub struct Wall {
     pub to: Point2<f64>,
     /// Two-way share of the power that passes: 0 to 1.
     pub transmission: f64,
-    /// The body.
     pub body: u32,
 }
 
@@ -100,9 +99,7 @@ impl Wall {
 /// Scatterers and walls.
 #[derive(Clone, Debug, Default)]
 pub struct Body {
-    /// The scatterers.
     pub scatterers: Vec<Scatterer>,
-    /// The walls.
     pub walls: Vec<Wall>,
 }
 

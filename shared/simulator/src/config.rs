@@ -92,9 +92,6 @@ impl Default for SimulationConfig {
 
 impl SimulationConfig {
     /// Checks that all values can be simulated.
-    ///
-    /// # Errors
-    /// [`SimulatorError::Config`] with the key of the first value that cannot.
     pub fn validate(&self) -> Result<(), SimulatorError> {
         if let Some(scans) = self.scans {
             require_within("scans", scans as f64, 1.0, MAX_SCANS as f64)?;

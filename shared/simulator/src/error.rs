@@ -26,7 +26,6 @@ pub enum SimulatorError {
     Drive {
         /// The file.
         path: PathBuf,
-        /// The reason.
         reason: String,
     },
     /// More scans are wanted than the drive lasts.
@@ -44,17 +43,13 @@ pub enum SimulatorError {
     /// The output folder holds files of another dataset.
     #[error("{} holds `{other}`, which is no file of this dataset: choose an empty folder", folder.display())]
     OutputInUse {
-        /// The folder.
         folder: PathBuf,
         /// The first foreign file.
         other: String,
     },
     /// The output folder holds a dataset of another configuration.
     #[error("{} holds a dataset of another configuration (see its simulation.toml): choose another folder", folder.display())]
-    OtherDataset {
-        /// The folder.
-        folder: PathBuf,
-    },
+    OtherDataset { folder: PathBuf },
     /// An existing image differs from the rendered one.
     #[error("{} differs from the image that is rendered now: another build made it, or it was changed; choose another folder", path.display())]
     OtherImage {
@@ -63,17 +58,13 @@ pub enum SimulatorError {
     },
     /// Another process writes to the output folder.
     #[error("another process is writing to {}: wait for it, or choose another folder", folder.display())]
-    Busy {
-        /// The folder.
-        folder: PathBuf,
-    },
+    Busy { folder: PathBuf },
     /// A file could not be written.
     #[error(transparent)]
     Storage(#[from] StorageError),
     /// A file or folder could not be written.
     #[error("cannot write {}: {source}", path.display())]
     Write {
-        /// The path.
         path: PathBuf,
         /// The system's error.
         source: std::io::Error,
@@ -81,7 +72,6 @@ pub enum SimulatorError {
     /// A folder could not be listed.
     #[error("cannot list {}: {source}", folder.display())]
     List {
-        /// The folder.
         folder: PathBuf,
         /// The system's error.
         source: std::io::Error,

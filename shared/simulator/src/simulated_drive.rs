@@ -33,9 +33,6 @@ pub struct SimulatedDrive {
 
 impl SimulatedDrive {
     /// Builds the path and what stands along it.
-    ///
-    /// # Errors
-    /// As [`Simulator::new`]; [`SimulatorError::Config`] if the radar does not fit the format.
     pub fn new(config: &SimulationConfig) -> Result<Self, SimulatorError> {
         let simulator = Simulator::new(config)?;
         let output = config.output.format.unwrap_or_default();
@@ -50,7 +47,6 @@ impl SimulatedDrive {
         })
     }
 
-    /// The simulator.
     pub fn simulator(&self) -> &Simulator {
         &self.simulator
     }
@@ -212,9 +208,6 @@ impl SimulatedDrive {
 
     /// Opens the drive as a dataset that lies on no disk, its images rendered ahead on all
     /// processors.
-    ///
-    /// # Errors
-    /// Options that do not fit the drive's format.
     pub fn open(&self, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
         gyre_datasets::open_source(Box::new(self.renderer_ahead()), options)
     }

@@ -50,11 +50,6 @@ pub struct SimulatedScan {
 
 impl Simulator {
     /// Builds the path and what stands along it.
-    ///
-    /// # Errors
-    /// As [`SimulationConfig::validate`] and [`crate::drive::DriveConfig::path`];
-    /// [`SimulatorError::Config`] if the drive ends before its tunnel;
-    /// [`SimulatorError::TooManyScans`] if the drive has fewer scans than are wanted.
     pub fn new(config: &SimulationConfig) -> Result<Self, SimulatorError> {
         config.validate()?;
         let sampling = config.sensor.sampling();
@@ -76,7 +71,6 @@ impl Simulator {
         })
     }
 
-    /// The configuration.
     pub fn config(&self) -> &SimulationConfig {
         &self.config
     }
@@ -205,9 +199,6 @@ impl Simulator {
 }
 
 /// The number of scans of a drive: those of which at least the first half is driven before its end.
-///
-/// # Errors
-/// [`SimulatorError::TooManyScans`] if more are wanted.
 fn scans(wanted: Option<usize>, duration_s: f64, period_s: f64) -> Result<usize, SimulatorError> {
     if duration_s.is_infinite() {
         return Ok(wanted.unwrap_or(ENDLESS_SCANS));

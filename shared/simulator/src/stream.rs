@@ -27,7 +27,6 @@ pub(crate) enum Stream {
     GyroStalls,
     /// Scale, noise and losses of the wheels.
     WheelErrors,
-    /// Slips of the wheels.
     WheelSlips,
     /// Noise and lasting errors of the GNSS receiver.
     GnssErrors,

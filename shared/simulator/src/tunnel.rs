@@ -23,9 +23,6 @@ const TRANSMISSION: f64 = 1e-9;
 const BODY: u32 = (1 << 24) - 1;
 
 /// Builds a tunnel that begins after a distance, with a length, metres: what stands in it goes.
-///
-/// # Errors
-/// [`SimulatorError::Config`] if the drive ends before the tunnel does.
 pub(crate) fn build(
     [from_m, length_m]: [f64; 2],
     scenery: &mut Body,

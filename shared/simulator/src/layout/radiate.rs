@@ -23,9 +23,6 @@ const STALL_S: std::ops::Range<f64> = 0.3..1.4;
 const CATCH_UP_US: i64 = 5_000;
 
 /// Checks that readers of this format can handle the radar.
-///
-/// # Errors
-/// [`SimulatorError::Config`] if they cannot.
 pub(crate) fn check(simulator: &Simulator) -> Result<(), SimulatorError> {
     let sampling = simulator.sampling();
     match PERIODS_US.contains(&sampling.period_us) && sampling.bins > sampling.azimuths {

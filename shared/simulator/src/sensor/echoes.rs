@@ -14,7 +14,6 @@ pub(super) const NEGLIGIBLE_POWER: f64 = 0.05;
 /// Minimum range of scatterers, metres.
 const NEAREST_M: f64 = 0.5;
 
-/// An echo.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Echo {
     /// Position at the middle of the sweep, world frame.

@@ -10,9 +10,7 @@ use crate::simulated_drive::SimulatedDrive;
 
 /// Removes the dataset in `folder` with the configuration that made it.
 ///
-/// # Errors
-/// [`SimulatorError::OutputInUse`] if the folder holds a file that is not of such a dataset: then
-/// nothing is removed. [`SimulatorError::Busy`] if another process writes to it.
+/// If the folder holds any other file, nothing is removed.
 pub fn remove_dataset(folder: &Path) -> Result<(), SimulatorError> {
     let _alone = super::lock(folder)?;
     let found = files(folder)?;

@@ -44,10 +44,6 @@ fn to_toml(value: &impl serde::Serialize) -> Result<String, SimulatorError> {
 }
 
 /// Returns the scans that `out` lacks.
-///
-/// # Errors
-/// [`SimulatorError`] if `out` holds images of another dataset, or images that differ from what is
-/// rendered now.
 pub(super) fn missing(
     drive: &SimulatedDrive,
     config: &SimulationConfig,
