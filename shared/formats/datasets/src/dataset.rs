@@ -117,7 +117,7 @@ pub trait Dataset: Send {
         &[]
     }
 
-    /// The first place at which the recording is damaged or ends too early, so that scans may be
+    /// The first place where the recording is damaged or ends too early, so that scans may be
     /// missing: a sentence without its full stop. `None` if all that was recorded is there.
     fn damage(&self) -> Option<&str> {
         None
@@ -188,7 +188,7 @@ pub fn stored_options(root: &Path) -> Result<DatasetOptions, OpenError> {
     dataset_toml::options(root)
 }
 
-/// Opens the dataset at `root` with these options alone, whatever `dataset.toml` says by now.
+/// Opens the dataset at `root` with these options only: the current `dataset.toml` is ignored.
 pub fn open_resolved(root: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
     options.check()?;
     open_found(detect::locate(root, options.format)?, options)

@@ -1,4 +1,4 @@
-//! The identity of a recording: what tells it from another one without decoding it.
+//! The identity of a recording, computed without decoding it.
 
 use std::fs;
 

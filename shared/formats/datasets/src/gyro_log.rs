@@ -3,8 +3,8 @@
 //! - [`GyroLog`]: where it lies beside the scans of a dataset, and how it is read;
 //! - `columns`: which columns of a table are what;
 //! - [`SampleTrack`]: its samples in the vehicle's axes on the radar's clock;
-//! - `faults`: what is wrong with the samples, and which of them are left out; `jumps`: which of
-//!   them change faster than a vehicle can.
+//! - `faults`: the faults of the samples, and the removal of faulty samples; `jumps`: which of them
+//!   change faster than a vehicle can.
 
 mod columns;
 pub(crate) mod faults;
@@ -62,7 +62,7 @@ pub struct GyroLog {
 }
 
 impl GyroLog {
-    /// Reads a log. The first row, or the number of columns, says of which format it is.
+    /// Reads a log. The first row, or the number of columns, determines the format.
     pub fn read(path: &Path) -> Result<Self, LogError> {
         let (raw, unit_is_assumed) = match path.is_dir() {
             true => {
@@ -93,8 +93,8 @@ impl GyroLog {
         Self::find(folder).ok()
     }
 
-    /// Returns the log that lies beside the scans of a dataset folder, which may also be that of
-    /// the images.
+    /// Returns the log beside the scans of a dataset folder, which may also be the folder of the
+    /// images.
     pub fn find(folder: &Path) -> Result<PathBuf, LogError> {
         logs::find(folder, OF, &PLACES).map_err(|missing| {
             let mut in_truth = logs::roots(folder).map(|root| root.join(IN_TRUTH));

@@ -23,13 +23,13 @@ pub enum ScanSamples {
         /// A sentence for each kind of fault in a log, with its path.
         faults: Vec<String>,
     },
-    /// With the scans of the recording of a run, whatever their stamps: those of these kinds.
+    /// Recorded with the scans of a run, whatever their stamps: the samples of these kinds.
     Recorded(Vec<SampleKind>),
 }
 
 impl ScanSamples {
-    /// Opens what the sections `[gyro]` and `[wheels]` name for the dataset in this folder, or for
-    /// this bag.
+    /// Opens the logs in the sections `[gyro]` and `[wheels]` for the dataset in this folder, or
+    /// for this bag.
     pub fn open(
         gyro: &GyroConfig,
         wheels: &WheelsConfig,

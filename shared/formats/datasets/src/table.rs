@@ -9,10 +9,10 @@ use crate::header::Header;
 pub(crate) const MAX_BYTES: u64 = 4 << 30;
 /// Marks between columns that are looked for in the first row.
 const MARKS: [u8; 3] = [b',', b';', b'\t'];
-/// The first field of a row in place of as many as the second says, which could not be read before.
+/// The first field of a row that replaces unreadable rows; the second field is their number.
 const UNREADABLE: &str = "unreadable";
 
-/// The columns of a table in which each row is an entry.
+/// The columns of a table with one entry per row.
 pub(crate) trait Columns: Sized {
     /// The entry that a row becomes.
     type Entry;

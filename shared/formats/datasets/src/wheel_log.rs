@@ -1,6 +1,6 @@
 //! The log of the wheels' speed as a file: a table as CSV.
 //!
-//! `counts`: that of an encoder or an odometer, of which speeds are made.
+//! `counts`: the log of an encoder or an odometer, converted to speeds.
 
 mod counts;
 
@@ -44,8 +44,8 @@ pub struct WheelLog {
 }
 
 impl WheelLog {
-    /// Reads a log. Its first row names the columns, as in `stamp_ns,speed_m_s`, or those of
-    /// ticks, `stamp_ns,ticks`, of which each is so many metres long.
+    /// Reads a log. Its first row names the columns, as in `stamp_ns,speed_m_s`, or in
+    /// `stamp_ns,ticks` for ticks of `m_per_tick` metres.
     pub fn read(path: &Path, m_per_tick: Option<f64>) -> Result<Self, LogError> {
         let no_speed = match logs::rows::<SpeedColumns>(path, OF) {
             Ok(rows) => return Self::examined(rows.raw, rows.columns.unit.is_none(), path),
@@ -57,8 +57,8 @@ impl WheelLog {
         }
     }
 
-    /// Returns the log that lies beside the scans of a dataset folder, which may also be that of
-    /// the images.
+    /// Returns the log beside the scans of a dataset folder, which may also be the folder of the
+    /// images.
     pub fn find(folder: &Path) -> Result<PathBuf, LogError> {
         logs::find(folder, OF, &PLACES)
     }

@@ -304,8 +304,8 @@ fn a_gap_moves_no_scan_of_a_short_recording() {
     }
 }
 
-/// The truth is not known. By what the correlations of both chirps show, at zero in all directions,
-/// the vehicle stands.
+/// The truth is not known. The correlations of both chirps peak at zero in all directions, so the
+/// vehicle stands.
 #[test]
 fn a_scan_of_boreas_rt_says_that_its_vehicle_stands() {
     let Some(folder) = real("samples/boreas-rt-2024-12-03") else {

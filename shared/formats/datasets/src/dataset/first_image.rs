@@ -14,11 +14,11 @@ const SAME_TIME_NS: i64 = 5_000_000;
 /// The time in the sweep that an image is named by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum NamedBy {
-    /// That of the first row.
+    /// The time of the first row.
     Start,
-    /// That of row `n / 2 - 1`.
+    /// The time of row `n / 2 - 1`.
     Middle,
-    /// That of the last row.
+    /// The time of the last row.
     End,
 }
 

@@ -121,7 +121,7 @@ impl DatasetOptions {
         })
     }
 
-    /// Returns these options, with those of `other` where these are not set.
+    /// Returns these options; `other` supplies the ones that are not set.
     #[must_use]
     pub fn or(self, other: &Self) -> Self {
         Self {

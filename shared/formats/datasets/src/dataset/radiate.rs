@@ -83,7 +83,7 @@ struct Segment {
     receipts: Vec<Receipt>,
 }
 
-/// Divides the frames where the time between two of them is not that of their numbers, as after a
+/// Divides the frames where the time between two of them contradicts their numbers, as after a
 /// pause or when the clock was set. A single time that is off is left out.
 fn segments(received: &[Receipt]) -> Vec<Segment> {
     let mut segments: Vec<Segment> = Vec::new();

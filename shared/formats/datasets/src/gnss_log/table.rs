@@ -62,7 +62,7 @@ pub(super) struct FixColumns {
 #[derive(Clone)]
 enum Sigma {
     None,
-    /// Standard deviations, of which the mean square counts.
+    /// Standard deviations; their mean square is used.
     Deviations([usize; 2]),
     Variances([usize; 2]),
 }

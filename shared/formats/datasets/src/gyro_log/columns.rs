@@ -52,15 +52,15 @@ const ACCELERATION_UNITS: [(&str, f64); 6] = [
     ("_mg", 9.80665e-3),
 ];
 
-/// Headers of datasets, whose rates are in rad/s though they do not say so: Boreas-RT `dmu_imu.csv`
-/// and `aeva_imu.csv`, Boreas `applanix/imu.csv`.
+/// Headers of datasets, whose rates are in rad/s although the headers do not name the unit:
+/// Boreas-RT `dmu_imu.csv` and `aeva_imu.csv`, Boreas `applanix/imu.csv`.
 const KNOWN: [&[&str]; 2] = [
     &["time", "wx", "wy", "wz", "ax", "ay", "az"],
     &[
         "gpstime", "angvel_z", "angvel_y", "angvel_x", "accelz", "accely", "accelx",
     ],
 ];
-/// FoMo `vectornav.csv` and `xsens.csv`, in which `a` are angular rates, `l` accelerations.
+/// FoMo `vectornav.csv` and `xsens.csv`: `a` are angular rates, `l` accelerations.
 const FOMO: [&str; 7] = ["t", "ax", "ay", "az", "lx", "ly", "lz"];
 /// Columns of MulRan `xsens_imu.csv`, which has no header: stamp (ns), quaternion, Euler angles,
 /// rates, accelerations, magnetic field.

@@ -1,4 +1,4 @@
-//! Jumps: values that change faster than those of a vehicle can.
+//! Jumps: values that change faster than the values of a vehicle can.
 
 use gyre_samples::{Sample, SampleKind};
 

@@ -6,9 +6,9 @@ use super::{Report, some};
 use crate::dataset::Dataset;
 use gyre_radar::median;
 
-/// Interval on the used clock from which on scans are missing, periods.
+/// A longer interval on the used clock means missing scans, periods.
 const GAP_PERIODS: f64 = 1.5;
-/// Logged interval from which on the host has stalled, periods.
+/// A longer logged interval means that the host has stalled, periods.
 const STALL_PERIODS: f64 = 1.4;
 /// Maximum interval while the host catches up after a stall, periods.
 const CATCH_UP_PERIODS: f64 = 0.97;
@@ -34,7 +34,7 @@ pub(super) struct Timing {
     gaps: Vec<Gap>,
     /// Stalls of the host: stamps were logged late, but no scan is missing.
     stalls: Vec<Stall>,
-    /// Scans whose logged stamp is before that of the previous scan.
+    /// Scans whose logged stamp is before the stamp of the previous scan.
     backwards: Vec<usize>,
 }
 

@@ -106,7 +106,7 @@ fn mulran_is_transposed_and_named_by_the_end_of_the_sweep() {
         (Format::Mulran, true)
     );
     let scan = read(dataset.as_mut(), 2).unwrap();
-    // The name is the time of the last of 40 columns, the first of which is at half a step.
+    // The name is the time of the last of 40 columns; the first column is at half a step.
     assert_eq!((scan.stamp_ns[39], scan.geometry.bins), (end(2), 60));
     assert!((scan.azimuth_rad[0] - TAU / 80.0).abs() < 1e-6);
     assert!(

@@ -1,4 +1,4 @@
-//! Folders in which not every image is a scan, or images are not named by times.
+//! Folders with images that are not scans, or with images that are not named by times.
 
 use std::fs;
 use std::path::Path;
