@@ -10,13 +10,13 @@ use crate::{
     parts::first_part_in,
 };
 
-/// Returns the log of what a live receiver has sent during the run with its results in `out`.
+/// Returns the path of the log of a live receiver during the run with its results in `out`.
 pub fn received_fixes(out: &Path) -> PathBuf {
     out.join("journal/gnss.csv")
 }
 
-/// Reads what the section `[gnss]` names for the scans at `data`, of a live receiver what it has
-/// sent so far during the run with its results in `out`; `None` without GNSS.
+/// Reads the log that the section `[gnss]` names for the scans at `data`; for a live receiver, its
+/// log so far during the run with its results in `out`; `None` without GNSS.
 pub fn gnss_log(config: &GnssConfig, data: &Path, out: &Path) -> Result<Option<GnssLog>, LogError> {
     match config.kind {
         GnssKind::None => Ok(None),

@@ -1,4 +1,4 @@
-//! Opens what a source plays: a recording of a run, a bag of ROS 2, or a dataset of [`gyre_radar`].
+//! Opens any source: a recording of a run, a bag of ROS 2, or a dataset of [`gyre_radar`].
 
 use std::path::{Path, PathBuf};
 
@@ -12,7 +12,7 @@ use crate::{
 };
 
 /// Returns whether a path names a recording of a run: its first file, or a folder that holds it and
-/// no other one. A bag of ROS 2 is none, though it has files of the same form.
+/// no other one. A bag of ROS 2 is not a recording, although its files have the same format.
 pub fn is_recording(path: &Path) -> bool {
     if is_bag(path) {
         return false;
@@ -61,7 +61,7 @@ pub fn reopen(
     open_parts(&paths, root, options)
 }
 
-/// As [`gyre_datasets::stored_options`]: of a recording those of its run.
+/// As [`gyre_datasets::stored_options`]: for a recording, the options of its run.
 pub fn stored_options(root: &Path) -> Result<DatasetOptions, OpenError> {
     if is_bag(root) {
         return Ok(DatasetOptions {

@@ -122,7 +122,7 @@ impl Scans {
     }
 }
 
-/// Returns what is missing in a recording: whole sentences.
+/// Returns notes on missing data in a recording: whole sentences.
 fn notes(recording: &Recording, entries: &BTreeMap<usize, Entry>) -> Vec<String> {
     let damages = recording.damages();
     let mut notes: Vec<String> = damages.map(|it| format!("{it}.")).collect();

@@ -14,7 +14,7 @@ use crate::{
     parts::part,
 };
 
-/// When a file is ended. What it holds then is looked at before each message.
+/// When a file is ended. The limits are checked before each message.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Split {
     /// The size, bytes; `None`: any. A file is larger by at most a chunk and its summary.
@@ -30,7 +30,7 @@ pub struct SplitWriter {
     head: Head,
     split: Split,
     writer: RecordingWriter,
-    /// Knows the parts; none for a recording that nobody goes on with.
+    /// Stores the parts; `None` for a recording that nobody continues.
     ledger: Option<Ledger>,
     /// The positions behind all that was added.
     positions: Positions,
@@ -39,7 +39,7 @@ pub struct SplitWriter {
 }
 
 impl SplitWriter {
-    /// Begins the part of the recording `to` that `head` says, behind `positions`.
+    /// Begins the part of the recording `to` given by `head`, behind `positions`.
     pub fn create(
         to: PathBuf,
         head: Head,

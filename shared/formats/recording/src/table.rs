@@ -1,4 +1,4 @@
-//! The metadata record behind each chunk: the messages in it, and what was missed so far.
+//! The metadata record behind each chunk: its messages, and the messages missed so far.
 
 use std::{collections::BTreeMap, fmt::Write};
 
@@ -94,7 +94,7 @@ impl Table {
         record.name == NAME
     }
 
-    /// Reads a record; `None` if it is another one, or no table.
+    /// Reads a record; `None` for a different record, or an invalid table.
     pub fn of_metadata(record: &Metadata) -> Option<Self> {
         if !Self::is_of(record) {
             return None;

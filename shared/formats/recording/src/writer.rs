@@ -27,7 +27,7 @@ use crate::{
 /// The longest time for which a message stays in memory. At four scans a second the history of the
 /// topics covers twice as much, so that a recorder that is killed and started again misses none.
 const FLUSH_PERIOD: Duration = Duration::from_millis(500);
-/// The size of a chunk, uncompressed, from which on it is written.
+/// A chunk of this size, uncompressed, is written.
 const CHUNK_BYTES: usize = 4 << 20;
 /// The fastest level with entropy coding: the noise in a scan has no repetitions, but few values.
 const LEVEL: u32 = 1;
@@ -48,8 +48,7 @@ pub struct Incoming {
     pub received_ns: i64,
     /// Messages of the topic that were missed directly before it.
     pub missed: u64,
-    /// The numbers that were given anew by generations before its own, of which the recorder has no
-    /// message.
+    /// The numbers reassigned by earlier generations without a recorded message.
     pub skipped: Option<GivenAnew>,
 }
 
@@ -322,7 +321,7 @@ impl RecordingWriter {
     }
 
     /// Writes the messages so far as a chunk if they are many, or have waited for long, and
-    /// synchronises the file once a second. Call it twice a second while there are none.
+    /// synchronises the file once a second. Call it twice a second while there are no messages.
     pub fn flush_if_due(&mut self) -> Result<(), RecordingError> {
         let (bytes, since) = self.pending;
         let is_due =
@@ -354,7 +353,8 @@ impl RecordingWriter {
         Ok(self.disk.complete()?)
     }
 
-    /// Writes what is left and the summary, and returns the number of messages missed, by topic.
+    /// Writes the remaining messages and the summary, and returns the number of messages missed, by
+    /// topic.
     pub fn finish(mut self) -> Result<BTreeMap<String, u64>, RecordingError> {
         for line in mem::take(&mut self.early).into_lines() {
             let added = self.try_add_log(&line);
@@ -364,8 +364,8 @@ impl RecordingWriter {
         Ok(self.table.missed)
     }
 
-    /// Goes on in the next part after this one has ended; returns the number of messages missed in
-    /// this one, by topic.
+    /// Continues in the next part after this one has ended; returns the number of messages missed
+    /// in this one, by topic.
     pub(crate) fn go_on(
         &mut self,
         path: &Path,
@@ -373,12 +373,12 @@ impl RecordingWriter {
     ) -> Result<BTreeMap<String, u64>, RecordingError> {
         let next = Self::create_with(path, head, self.disk.synchronise_of_next())?;
         let before = mem::replace(self, next);
-        // What viewers draw goes on.
+        // The state of viewers continues.
         (self.recent, self.newest_ns) = (before.recent, before.newest_ns);
         Ok(before.table.missed)
     }
 
-    /// Writes what is left and the summary.
+    /// Writes the remaining messages and the summary.
     pub(crate) fn end(&mut self) -> Result<(), RecordingError> {
         self.flush()?;
         let finished = self.mcap().and_then(Writer::finish).map(drop);

@@ -273,8 +273,8 @@ fn a_ledger_knows_what_is_in_the_parts_that_were_moved_away() {
     assert_eq!(ledger.read(&other).unwrap(), None);
 }
 
-/// A message of a generation that gives numbers from `numbered_from` on; `scan` tells it from
-/// others of its number.
+/// A message of a generation that gives numbers from `numbered_from` on; `scan` distinguishes it
+/// from others of its number.
 fn of(generation: u32, numbered_from: u64, seq: u64, scan: u64) -> Incoming {
     let header = MotionHeader {
         item: Item {
@@ -353,7 +353,7 @@ fn what_a_generation_without_messages_gave_anew_is_void() {
         first.add(&of(1, 0, seq, 10 + seq)).unwrap();
     }
     first.finish().unwrap();
-    // Generation 2 gave 4 and 5 anew, and was gone before the second recorder was there.
+    // Generation 2 reassigned 4 and 5, and ended before the second recorder started.
     let mut second = RecordingWriter::create(&paths[1], &head(2)).unwrap();
     let anew = Incoming {
         skipped: Some(GivenAnew {

@@ -134,8 +134,7 @@ impl Bag {
         Ok((0..).zip(messages).map(key).collect())
     }
 
-    /// Calls `each` with the messages that are wanted, in the order in which they were received,
-    /// until it returns false.
+    /// Calls `each` with the wanted messages in the order of reception, until it returns false.
     pub fn read_in_order(
         &mut self,
         wanted: impl Fn(&Channel) -> bool,
@@ -168,8 +167,8 @@ impl Bag {
         files.flat_map(|file| file.channels.values()).collect()
     }
 
-    /// Describes the radar: by its first configuration, otherwise by what its azimuths and the
-    /// options show. Also returns what is to be said of that.
+    /// Describes the radar by its first configuration, or else by its azimuths and the options.
+    /// Also returns notes on the description.
     pub fn describe(
         &mut self,
         topics: &Topics,
@@ -227,8 +226,7 @@ impl Bag {
         Ok((survey, own))
     }
 
-    /// Returns what a message says of the radar, if it is of that topic, or why that cannot be
-    /// used.
+    /// Returns the configuration of the radar in a message of that topic, or why it is unusable.
     fn configuration(
         &self,
         span: u32,
@@ -260,7 +258,7 @@ fn timed(path: &Path) -> Result<Timed, RecordingError> {
     }
     if file.channels.is_empty() || !file.damage.is_empty() {
         for span in &found.messages {
-            // What is damaged has no channels.
+            // Damaged spans have no channels.
             let _ = file.read(span.span, |_| false);
         }
     }
@@ -307,7 +305,7 @@ pub(crate) enum RadarOrigin {
 /// The source of the encoder counts per turn.
 pub(crate) enum CountsOrigin {
     Configured,
-    /// The radar's own, or those of most radars.
+    /// The radar's own counts, or the usual ones of most radars.
     Usual,
     /// The azimuths, which are no turn with the usual ones.
     Azimuths {

@@ -8,7 +8,7 @@ use gyre_samples::{BagFixes, RawFix};
 
 use crate::bags::{Message, RecordingError, bag::Bag, files::files, sensors::Sensor};
 
-/// A message has a fix, or says that there is none.
+/// A message has a fix, or reports that there is no fix.
 const RECEIVER: Sensor<Option<RawFix>> = Sensor {
     section: "gnss",
     measurements: "fixes of a GNSS receiver",

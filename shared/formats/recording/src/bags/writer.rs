@@ -205,8 +205,8 @@ impl Drop for BagWriter {
     }
 }
 
-/// Creates the file of a bag that is not complete, and the folder of both where `aside` is another
-/// one; `None` while another command writes the bag.
+/// Creates the file of an incomplete bag, and the folder of both where `aside` is a different one;
+/// `None` while another command writes the bag.
 fn create_aside(aside: &Path, file: &Path) -> io::Result<Option<File>> {
     // Locked until it is removed, so that no other command takes it for its own.
     let left_over = try_lock_existing(file);
@@ -235,7 +235,7 @@ fn require_new(path: &Path) -> Result<(), RecordingError> {
     }
 }
 
-/// Removes what an earlier writer left. What cannot be removed shows when it is created anew.
+/// Removes the leftovers of an earlier writer. If the removal fails, the next creation reports it.
 fn remove(aside: &Path) {
     let _ = fs::remove_dir_all(aside).or_else(|_| fs::remove_file(aside));
 }

@@ -15,7 +15,7 @@ const MAX_RECORD_BYTES: usize = 128 << 20;
 const MAX_KEPT_BYTES: usize = 256 << 20;
 
 /// Calls `keep` with all records in the bytes of a file, of chunks with those in them. It returns
-/// the bytes of memory in which it keeps something of the record. Their checksums are compared.
+/// the bytes of memory that it uses for the record. Their checksums are compared.
 ///
 /// Incomplete records at the end are ignored.
 pub(super) fn records(

@@ -1,4 +1,4 @@
-//! Bags that lack a part of what they should have.
+//! Bags with missing parts.
 
 use gyre_recording::file::{McapFile, Span};
 use mcap::records::op;

@@ -17,7 +17,7 @@ fn changed(turns: usize, mut change: impl FnMut(usize, &mut RadarBScanMsg)) -> M
     messages
 }
 
-/// Replaces the configuration of a bag by that of a driver before 2024.
+/// Replaces the configuration of a bag by the configuration of a driver before 2024.
 fn with_older_configuration(mut messages: Messages, bin_size: f64) -> Messages {
     let older = RadarConfigurationMessage {
         azimuth_samples: (AZIMUTHS as u16).to_be_bytes().to_vec(),
@@ -119,7 +119,7 @@ fn one_message_that_is_no_scan_is_named_with_its_reason() {
 
 #[test]
 fn azimuths_whose_times_stand_against_the_rotation_are_named_so() {
-    // Behind the first azimuths, from which the clock is found, each is a second later.
+    // The first azimuths determine the clock; each later one is a second later.
     let messages = azimuths(4, |turn, row, mut message| {
         let number = (turn * AZIMUTHS + row) as i64;
         let step_ns = if number < 2 { 6_250_000 } else { 1_000_000_000 };

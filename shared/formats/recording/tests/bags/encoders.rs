@@ -5,7 +5,7 @@ use super::*;
 const SHOWN: &str = "with these the step from the last azimuth to the first is as the others";
 
 /// Turns with these encoder values in rows, as a turn a message and as an azimuth a message, of a
-/// radar that says a size of its encoder. A row without one is not there.
+/// radar that sends the size of its encoder. A row without one is not there.
 fn both(turns: usize, said: u16, count: impl Fn(usize) -> Option<u16>) -> [Messages; 2] {
     let said = Configuration {
         encoder_size: said,
@@ -94,7 +94,7 @@ fn what_is_configured_of_an_encoder_decides() {
 fn a_blanked_sector_over_zero_makes_no_smaller_encoder() {
     let count = |row: usize| (row < 36).then_some((140 * row + 13) as u16);
     for mut messages in both(6, 5600, count) {
-        // With what the radar says of itself, and without.
+        // With the configuration of the radar, and without.
         for _ in 0..2 {
             let folder = Folder::new();
             let path = folder.bag(&messages);

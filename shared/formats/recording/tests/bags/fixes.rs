@@ -28,7 +28,7 @@ fn fix(number: i64) -> NavSatFix {
     }
 }
 
-/// Four turns of a radar with a drive on each of these topics, of which `change` may change fixes.
+/// Four turns of a radar with a drive on each of these topics; `change` may change fixes.
 fn with(topics: &[&str], change: impl Fn(i64, &mut NavSatFix)) -> Messages {
     let mut messages = b_scans(4);
     for topic in topics {

@@ -321,7 +321,7 @@ fn azimuths_of_the_older_form_are_read_under_both_names() {
     }
 }
 
-/// The driver's clock of a radar that was never told the time.
+/// The clock of the driver, for a radar whose clock was never set.
 #[test]
 fn a_radar_without_a_clock_has_the_times_of_the_driver() {
     let messages = azimuths(6, |_, _, message| {
