@@ -29,7 +29,7 @@ impl<'a> TimedPoses<'a> {
     }
 }
 
-/// The rule by which estimated poses are associated with ground-truth poses.
+/// The rule that associates estimated poses with ground-truth poses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(tag = "by", rename_all = "snake_case")]
 pub enum Association {

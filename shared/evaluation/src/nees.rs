@@ -3,10 +3,10 @@
 //!
 //! Bar-Shalom, Li and Kirubarajan, "Estimation with applications to tracking and navigation", 2001,
 //! Sec. 5.4. The error of a segment of consecutive motions is e = (x, y, yaw) of the estimate less
-//! those of the ground truth, along the axes of its first frame; P is the covariance composed over
-//! the segment, plus that of the ground truth. The NEES e' inv(P) e of a consistent covariance has
-//! a chi-square distribution, whose expectation is its degrees of freedom: 3, or 2 for the
-//! translation alone, or 1 for the yaw. Segments of one length share no motion.
+//! the ground truth, along the axes of its first frame; P is the covariance composed over the
+//! segment, plus the covariance of the ground truth. The NEES e' inv(P) e of a consistent
+//! covariance has a chi-square distribution, whose expectation is its degrees of freedom: 3, or 2
+//! for the translation alone, or 1 for the yaw. Segments of one length share no motion.
 
 use std::num::NonZeroUsize;
 

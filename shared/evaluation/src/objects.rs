@@ -32,7 +32,7 @@ pub struct TrueObject {
     pub velocity: Option<Vector2<f64>>,
     /// Heading, rad.
     pub yaw_rad: f64,
-    /// True for what a tracker must find: motor vehicles.
+    /// True for motor vehicles, which a tracker must find.
     pub is_vehicle: bool,
     /// True if the sensor can see it in this scan.
     pub is_seen: bool,
@@ -51,7 +51,7 @@ pub struct TrackedObject {
     pub velocity_covariance: Matrix2<f64>,
     /// Heading, rad.
     pub yaw_rad: f64,
-    /// True if it is said to move. The others are not judged.
+    /// True if it is reported as moving. The others are not judged.
     pub moving: bool,
 }
 
@@ -71,7 +71,7 @@ pub struct ObjectOptions {
     pub max_range_m: f64,
     /// Lowest speed of a required object, m/s.
     pub min_speed_mps: f64,
-    /// Scans within that range in which it has been seen, the present one included.
+    /// Scans within that range that have shown it, including the present one.
     pub min_scans: usize,
     /// Largest distance between the centres of a pair, m: the length of a car.
     pub gate_m: f64,
@@ -178,7 +178,7 @@ pub fn object_errors(scans: &[ObjectScan], options: &ObjectOptions) -> ObjectErr
 /// The sums over the scans so far.
 #[derive(Default)]
 struct Count {
-    /// Scans in which each true object was seen within the range.
+    /// Scans that show each true object within the range.
     seen: BTreeMap<u64, usize>,
     /// The identity that each true object was last matched by.
     matches: BTreeMap<u64, u64>,

@@ -37,8 +37,8 @@ pub struct SegLength {
     pub segments: usize,
 }
 
-/// Returns the mean error of the segments of [`kitti`](crate::kitti::kitti), each aligned by
-/// itself; `None` if the path is not longer than 100 m.
+/// Returns the mean error of the segments of [`kitti`](crate::kitti::kitti), each aligned
+/// separately; `None` if the path is not longer than 100 m.
 pub fn seg(matched: &MatchedPoses, step: NonZeroUsize) -> Option<Seg> {
     let mut errors = PerLength::new();
     for segment in segments(&matched.distance_m(), step) {

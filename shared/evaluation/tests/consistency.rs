@@ -160,8 +160,8 @@ fn twice_the_covariance_halves_the_ratio() {
     }
 }
 
-/// The poses drift, and each has noise of its own besides, as those of scans that are registered
-/// with a map.
+/// The poses drift, and each pose also has independent noise, like poses of scans that are
+/// registered with a map.
 #[test]
 fn motions_that_share_the_noise_of_their_poses_are_consistent_over_all_lengths() {
     const DRIFT_SHARE: f64 = 0.05;

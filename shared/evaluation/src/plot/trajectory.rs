@@ -37,8 +37,8 @@ pub fn trajectory_svg(
     }
 }
 
-/// Returns the plot of a trajectory of so many poses and metres, of which only some poses are
-/// `drawn`.
+/// Returns the plot of a trajectory with this number of poses and this length; only the poses
+/// `drawn` are plotted.
 pub fn path_svg(drawn: &[Pose], poses: usize, length_m: f64) -> Result<String, PlotError> {
     require_poses(Side::Estimate, drawn)?;
     scene_svg(&Scene {
@@ -171,7 +171,7 @@ struct View {
 }
 
 impl View {
-    /// The view of all `points`; `None` if there are none.
+    /// The view of all `points`; `None` without points.
     fn around<'a>(points: impl Iterator<Item = &'a (f64, f64)>) -> Option<Self> {
         let grow = |b: [f64; 4], p: &(f64, f64)| {
             [b[0].min(p.0), b[1].max(p.0), b[2].min(p.1), b[3].max(p.1)]
