@@ -112,7 +112,7 @@ impl Files {
     }
 }
 
-/// Returns the ground truth of a run: its own, or that of its recording.
+/// Returns the ground truth of a run: its own, or the truth of its recording.
 pub fn truth_of_run(run: &Path) -> Result<PathBuf, Failure> {
     let configuration = Configuration::read(&run.join("config.toml"), &[])?;
     let none = || {

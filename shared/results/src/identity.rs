@@ -1,4 +1,5 @@
-//! `journal/run.toml`: what the run was begun with. A run is resumed only with the same.
+//! `journal/run.toml`: the programs, the recording and the configuration at the start of the run. A
+//! run is resumed only with the same.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -25,9 +26,10 @@ pub struct Identity {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scans: Option<usize>,
     programs: Programs,
-    /// The options to read the recording, those of its `dataset.toml` among them.
+    /// The options to read the recording, including its `dataset.toml`.
     dataset: DatasetOptions,
-    /// The recording; `None` for a simulation that is not stored, which its configuration tells.
+    /// The recording; `None` for a simulation that is not stored, which its configuration
+    /// determines.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     recording: Option<Fingerprint>,
     /// The resolved configuration.
@@ -56,7 +58,8 @@ pub struct Programs {
 }
 
 impl Programs {
-    /// Returns those of a run: the BLAKE3 digests of Gyre's program and of each replaced stage.
+    /// Returns the programs of a run: the BLAKE3 digests of Gyre's program and of each replaced
+    /// stage.
     pub fn new(build: String, replaced: BTreeMap<String, String>) -> Self {
         Self {
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -112,7 +115,7 @@ impl Identity {
         )?)
     }
 
-    /// Reads that of the run which the folder holds.
+    /// Reads the identity of the run in the folder.
     pub fn read(out: &Out, holds: Holds) -> Result<Self, Failure> {
         let path = out.join(BEGUN_WITH);
         Self::read_file(&path).map_err(|state| {
@@ -189,7 +192,7 @@ impl Identity {
 
     /// Returns whether a run of this configuration that begins now would compute the same and judge
     /// it by the same truth, if these are the replaced stages as in [`Programs::new`]. Gyre's own
-    /// build may be another one.
+    /// build may differ.
     pub fn has_inputs_of(
         &self,
         configuration: &Configuration,

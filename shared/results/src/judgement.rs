@@ -17,7 +17,7 @@ use serde::Serialize;
 /// longer one.
 #[derive(Debug, Serialize)]
 pub struct Judgement {
-    /// Time by which the clock of the ground truth was late, s, and which was taken out.
+    /// The removed delay of the clock of the ground truth, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     time_offset_s: Option<f64>,
     #[serde(flatten)]
@@ -25,8 +25,8 @@ pub struct Judgement {
     /// `None`: there are no covariances, or the truth cannot judge them.
     #[serde(skip_serializing_if = "Option::is_none")]
     nees: Option<Nees>,
-    /// Share of the poses whose error in x, y, yaw is within three standard deviations of what
-    /// their covariance says, %.
+    /// Share of the poses whose error in x, y, yaw is within three standard deviations by their
+    /// covariance, %.
     #[serde(skip_serializing_if = "Option::is_none")]
     within_3_sigma_percent: Option<[f64; 3]>,
     #[serde(skip)]
@@ -106,7 +106,7 @@ impl fmt::Display for Judgement {
     }
 }
 
-/// Says so if the clock of the ground truth differs from the estimate's.
+/// Reports a clock of the ground truth that differs from the estimate's clock.
 pub fn note_time_offset(estimate: &Trajectory, truth: &Trajectory) {
     let differs = |offset: &ClockOffset| offset.is_reliable() && !offset.agrees();
     if let Some(offset) = clock_offset(estimate, truth).filter(differs) {

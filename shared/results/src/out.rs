@@ -1,4 +1,4 @@
-//! The places that a user names for what a command writes, and the lock of such a folder.
+//! The output paths of commands, and the lock of an output folder.
 
 use std::{
     fs::{self, File, OpenOptions},
@@ -45,8 +45,8 @@ const LOCK: &str = ".lock";
 /// in the folder are of the complete run.
 pub const REPLACED: &str = "journal.replaced";
 
-/// The content that a command writes into a folder: the command, the file or folder by which an
-/// earlier content of its own is recognised, and the names of the files that it replaces.
+/// The content that a command writes into a folder: the command, the file or folder that identifies
+/// earlier content of its own, and the names of the files that it replaces.
 #[derive(Clone, Copy, Debug)]
 pub struct Content(&'static str, &'static str, &'static str);
 
@@ -134,7 +134,7 @@ pub fn write_page(to: &Path, page: &str, mark: &str) -> Result<(), OutError> {
     storage::write(&file, page).map_err(|error| unwritable(error.source))
 }
 
-/// Checks that the results in the folder of a run are those of its configuration.
+/// Checks that the results in the folder of a run belong to its configuration.
 pub fn require_results(run: &Path) -> Result<(), OutError> {
     let reason = "has not ended, and the results in it are of the run before: start the same command again, and it continues";
     match run.join(REPLACED).exists() {
@@ -146,7 +146,7 @@ pub fn require_results(run: &Path) -> Result<(), OutError> {
     }
 }
 
-/// Why a place cannot be that of what a command writes, or of results.
+/// Why a path is invalid for the output of a command, or for results.
 #[derive(Debug, Error)]
 pub enum OutError {
     /// It cannot be written.
@@ -162,7 +162,7 @@ pub enum OutError {
     Held {
         /// The folder.
         path: PathBuf,
-        /// The process, where the system tells: `, process 123 (gyre)`.
+        /// The process, if the system reports it: `, process 123 (gyre)`.
         holder: String,
     },
     /// Something else is there, which the sentence names.

@@ -67,7 +67,7 @@ impl Mask {
     }
 }
 
-/// Why the results of a run that has played all scans are hardly those of its recording.
+/// Why the results of a run that has played all scans are unreliable.
 #[derive(Clone, Debug, Error, Serialize)]
 #[error("{0}")]
 #[serde(transparent)]
@@ -210,7 +210,7 @@ impl Summary {
         &self.counts
     }
 
-    /// Returns why the results of all scans are hardly those of the recording.
+    /// Returns why the results of all scans are unreliable.
     pub fn problem(&self) -> Option<&Problem> {
         self.problem.as_ref()
     }

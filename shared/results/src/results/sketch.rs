@@ -1,4 +1,4 @@
-//! The path to be drawn, of which a picture needs only so many poses.
+//! The path to be drawn, reduced to the number of poses that a picture needs.
 
 use gyre_evaluation::{PlotError, plot::path_svg};
 use gyre_geometry::Pose;
