@@ -1,4 +1,4 @@
-//! Bodies: scatterers that reflect and walls that hide what is behind them, standing or moving.
+//! Bodies: scatterers that reflect and walls that hide the space behind them, standing or moving.
 
 use gyre_geometry::Pose;
 use nalgebra::{Point2, Vector2};

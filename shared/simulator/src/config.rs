@@ -123,7 +123,7 @@ impl SimulationConfig {
         self.sensor.seed.unwrap_or(self.seed)
     }
 
-    /// Returns the options with which a reader gets the ranges and angles of the simulated radar.
+    /// Returns the reader options for the ranges and angles of the simulated radar.
     pub fn dataset_options(&self) -> DatasetOptions {
         let sampling = self.sensor.sampling();
         let with_encoder = self.output.format != Some(OutputFormat::Radiate);

@@ -83,7 +83,7 @@ pub(crate) fn fixes(
     })
 }
 
-/// The fixes as CSV: the numbers read from it are those of the fixes.
+/// The fixes as CSV: a reader gets exactly the numbers of the fixes.
 pub(crate) fn csv(fixes: &[RawFix]) -> Vec<u8> {
     let mut text = format!("{HEADER}\n");
     for fix in fixes {

@@ -63,7 +63,7 @@ impl SimulatedDrive {
         }
     }
 
-    /// Returns the options with which a reader gets the ranges and angles of the simulated radar.
+    /// Returns the reader options for the ranges and angles of the simulated radar.
     pub fn dataset_options(&self) -> DatasetOptions {
         DatasetOptions {
             format: Some(self.format()),

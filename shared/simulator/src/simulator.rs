@@ -23,7 +23,7 @@ use crate::{gnss, scenery, tunnel, wheels};
 /// the same files.
 const EPOCH_US: i64 = 1_547_132_400_000_000;
 
-/// Number of scans of an endless drive, if none is given.
+/// Number of scans of an endless drive, if the configuration has no number.
 const ENDLESS_SCANS: usize = 64;
 /// Distance beyond the radar's reach within which bodies move, metres.
 const BEYOND_M: f64 = 10.0;
@@ -198,7 +198,8 @@ impl Simulator {
     }
 }
 
-/// The number of scans of a drive: those of which at least the first half is driven before its end.
+/// The number of scans of a drive. A scan counts if at least its first half is driven before the
+/// end.
 fn scans(wanted: Option<usize>, duration_s: f64, period_s: f64) -> Result<usize, SimulatorError> {
     if duration_s.is_infinite() {
         return Ok(wanted.unwrap_or(ENDLESS_SCANS));

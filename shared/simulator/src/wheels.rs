@@ -73,7 +73,7 @@ pub(crate) fn samples(
     })
 }
 
-/// The samples as CSV: the numbers read from it are those of the samples.
+/// The samples as CSV: a reader gets exactly the numbers of the samples.
 pub(crate) fn csv(samples: &[Sample]) -> Vec<u8> {
     let mut text = format!("{HEADER}\n");
     for sample in samples {

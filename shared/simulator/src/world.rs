@@ -91,8 +91,7 @@ impl World {
         passed
     }
 
-    /// Visits the walls between two points, each once, with the share of the line at which it is
-    /// crossed.
+    /// Visits the walls between two points, each once, with the share of the line up to the wall.
     pub fn walls_between(
         &self,
         from: Point2<f64>,

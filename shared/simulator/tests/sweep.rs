@@ -13,7 +13,7 @@ use gyre_simulator::{
 use nalgebra::Point2;
 
 const AZIMUTHS: usize = 400;
-/// Bins of the first metres, in which no point is placed.
+/// Bins of the first metres, which contain no points.
 const FIRST_FREE_BIN: usize = 80;
 
 fn sampling() -> Sampling {

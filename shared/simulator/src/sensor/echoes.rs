@@ -22,7 +22,7 @@ pub(super) struct Echo {
     pub velocity: Vector2<f64>,
     /// Amplitude on the beam's axis: the square root of the received power.
     pub amplitude: f64,
-    /// The azimuth at which the beam passes it, with fractions.
+    /// The azimuth when the beam passes it, with fractions.
     pub azimuth: f64,
 }
 

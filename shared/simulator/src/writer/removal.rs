@@ -28,7 +28,7 @@ pub fn remove_dataset(folder: &Path) -> Result<(), SimulatorError> {
     {
         return Err(in_use(other));
     }
-    // What says whose dataset it is goes last.
+    // The file that identifies the dataset is removed last.
     let (last, first): (Vec<_>, Vec<_>) = found
         .iter()
         .partition(|path| path.as_path() == Path::new(MADE_BY));
