@@ -9,8 +9,8 @@ use gyre_radar::OwnedScan;
 use gyre_simulator::{Profile, SimulatedDrive, SimulationConfig};
 
 const ECCENTRICITY_RAD: f64 = 4e-3;
-/// The errors of the constants with which the drive is read: range offset (m), eccentricity (rad),
-/// Doppler coefficient (s).
+/// The errors of the constants for reading the drive: range offset (m), eccentricity (rad), Doppler
+/// coefficient (s).
 const WRONG_BY: [f64; 3] = [0.2, -ECCENTRICITY_RAD, -0.02];
 
 /// Calibrates a short drive around a block that is read with wrong constants.

@@ -1,5 +1,5 @@
-//! The network of moving objects in both libraries. A process opens one ONNX Runtime alone, so that
-//! the tests of the search for it are in another one.
+//! The network of moving objects in both libraries. A process opens only one ONNX Runtime, so the
+//! tests of the search for it run in a different process.
 #![allow(clippy::unwrap_used)]
 
 use gyre_masking::networks::{PlanesNetwork, runtime};

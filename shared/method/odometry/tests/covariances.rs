@@ -1,5 +1,5 @@
-//! Covariances of motions in simulated streets, whose truth is exact, with and without lost azimuths.
-//! Roads as hard as real ones are in `research/worlds/tests/method/covariances.rs`.
+//! Covariances of motions in simulated streets, whose truth is exact, with and without lost
+//! azimuths. Roads as hard as real ones are in `research/worlds/tests/method/covariances.rs`.
 
 use std::{fs, path::Path};
 

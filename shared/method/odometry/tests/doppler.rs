@@ -1,5 +1,5 @@
-//! The velocity by Doppler on simulated scans of a RAS6, against the true one. Roads as hard as real
-//! ones are in `research/worlds/tests/method/doppler.rs`.
+//! The velocity by Doppler on simulated scans of a RAS6, against the true one. Roads as hard as
+//! real ones are in `research/worlds/tests/method/doppler.rs`.
 
 use gyre_datasets::open_source;
 use gyre_radar::{DopplerEstimator, OwnedScan, PointsConfig};

@@ -1,5 +1,5 @@
-//! Faults in the samples of a gyro and of wheels: each leaves the motions as they were, or is
-//! counted and named in what a run says of its samples and motions. One kind of faults lasts for a
+//! Faults in the samples of a gyro and of wheels: each leaves the motions unchanged, or is counted
+//! and named in the report of a run on its samples and motions. One kind of faults lasts for a
 //! sweep or more, the other for less: a third for one sample, a third for up to five.
 
 use std::collections::BTreeMap;
@@ -29,7 +29,7 @@ struct Scan {
     searched: Pose,
 }
 
-/// The motions, and all that a run says of its samples and of them.
+/// The motions, and the report of a run on its samples and motions.
 #[derive(Debug, PartialEq)]
 struct Ran {
     motions: Vec<[u64; 3]>,
@@ -75,7 +75,7 @@ impl Drive {
         }
     }
 
-    /// Reads both logs and refines all motions; what is refused is named by its message alone.
+    /// Reads both logs and refines all motions; for a rejected log only the message is kept.
     fn run(&self, gyro: &[Row], wheels: &[Row]) -> Ran {
         match self.read(gyro, wheels) {
             Ok(samples) => self.refine(&samples),

@@ -22,7 +22,7 @@ struct Configuration {
     odometry: OdometryConfig,
 }
 
-/// Length of the path and number of scans by true speed, with what odometry says of both.
+/// Length of the path and number of scans by true speed, with the results of odometry for both.
 #[derive(Debug, Default)]
 struct Part {
     scans: usize,

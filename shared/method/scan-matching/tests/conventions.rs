@@ -51,8 +51,8 @@ fn three_points_give_their_motion_back() {
 
 #[test]
 fn scatterers_do_not_wrap_around_the_edges() {
-    // The only scatterer lies at the near edge before, and is gone after; another one stands at the
-    // far edge only after. Around a circle of n cells they would match at a shift of two cells.
+    // The only scatterer lies at the near edge before, and is gone after; a new scatterer stands at
+    // the far edge only after. Around a circle of n cells they would match at a shift of two cells.
     let (earlier, later) = ([[25.0, 0.0]], [[-24.5, 0.0]]);
     let raster = |points: &[[f64; 2]]| draw(points.iter().map(|&p| (p, 1.0)), N, CELL_M, 0.8);
     let config = TranslationConfig {

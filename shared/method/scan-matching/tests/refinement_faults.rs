@@ -268,7 +268,7 @@ fn identical_input_gives_identical_bits() {
     );
 }
 
-/// A refiner with another state, restored to that of `from`.
+/// A refiner with a different state, restored to the state of `from`.
 fn restored(from: &Refiner, mut into: Refiner) -> Refiner {
     let mut keyframes = from.keyframes();
     into.restore(*from.state(), |to| {

@@ -1,4 +1,4 @@
-//! A vehicle with a gyro and wheels goes on where the radar is blind.
+//! A vehicle with a gyro and wheels continues where the radar is blind.
 
 use std::ops::Range;
 
@@ -14,7 +14,8 @@ const BIAS_RADPS: f64 = 0.004;
 /// Measured distance over the true one.
 const SCALE: f64 = 0.99;
 
-/// A vehicle that drives ever faster, so that its speed before tells little, and its scans.
+/// A vehicle that accelerates, so that its earlier speed contains little information, and its
+/// scans.
 fn faster() -> (Drive, Vec<Vec<SparsePoint>>) {
     let drive = Drive {
         acceleration_mps2: 0.4,

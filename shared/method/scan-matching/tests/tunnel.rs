@@ -1,4 +1,5 @@
-//! A tunnel, whose walls look the same everywhere: no scan tells how far the vehicle has driven.
+//! A tunnel, whose walls look the same everywhere: no scan determines how far the vehicle has
+//! driven.
 
 use crate::common::{Numbers, scenes::*};
 use gyre_geometry::{ComposedMotion, Pose, SparsePoint, pose};
@@ -102,7 +103,7 @@ fn the_wheels_say_how_far_and_the_radar_where_the_walls_are() {
     }
     let (off, sigma_m) = inside(&drive, &refined);
     println!("{off}, sigma {sigma_m:.2} m");
-    // One percent of 140 m, of which the scale was learnt before.
+    // One percent of 140 m, because the scale was learnt before.
     assert!(
         off.translation.x.abs() < 1.4 && off.translation.y.abs() < 0.5,
         "{off}"
@@ -121,7 +122,7 @@ fn radar_alone_says_that_it_does_not_know_how_far() {
     assert!(refined[INSIDE..].iter().all(slid));
     let (off, sigma_m) = inside(&drive, &refined);
     println!("{off}, sigma {sigma_m:.2} m");
-    // It goes on as fast as before, while the vehicle slows down.
+    // The estimate continues at the earlier speed, while the vehicle slows down.
     assert!(off.translation.x > 10.0, "{off}");
     assert!(off.translation.x < 3.0 * sigma_m, "{off}, {sigma_m} m");
     assert!(
@@ -162,7 +163,7 @@ fn one_scan_without_wheels_inside_does_not_ask_the_search() {
     assert!(off.translation.x.abs() < 1.4, "{off}");
 }
 
-/// The map does not tell posts beside such walls from speckle, but the search finds them.
+/// The map does not distinguish posts beside such walls from speckle, but the search finds them.
 #[test]
 fn as_long_as_the_search_sees_the_way_it_is_seen() {
     let posts = posts([[0.0, 400.0], [5.0, 30.0]], 15.0, 9);

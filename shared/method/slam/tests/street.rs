@@ -33,7 +33,7 @@ fn street() -> Vec<(Point2<f64>, f32)> {
     (0..3000).map(|_| post()).collect()
 }
 
-/// Returns what a sensor that stands at `at` sees of the street.
+/// Returns the points of the street that a sensor at `at` sees.
 fn seen(street: &[(Point2<f64>, f32)], at: &Pose) -> Vec<SparsePoint> {
     let local = street
         .iter()

@@ -1,4 +1,4 @@
-//! Keyframes that see what a test puts before them.
+//! Keyframes that observe the scene of a test.
 
 use gyre_geometry::{Pose, SparsePoint, Twist, UncertainMotion, pose};
 use gyre_mapping::{Cell, Evidence, MapOptions, TILE_CELLS, TileImage, TileIndex};

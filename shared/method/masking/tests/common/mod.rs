@@ -87,7 +87,7 @@ pub fn masker(config: &MaskingConfig) -> Masker {
     Masker::new(&raster(), &PointsConfig::default(), config).unwrap()
 }
 
-/// A scan in which neighbouring powers differ, for a seed.
+/// A scan with different neighbouring powers, for a seed.
 pub fn scan(seed: usize) -> OwnedScan {
     let mut scan = OwnedScan::with_limits(ScanLimits {
         bytes: AZIMUTHS * BINS,
