@@ -50,10 +50,8 @@ pub use stamp::{DEFAULT_TURN_NS, middle_ns, parse_seconds, to_ns as stamp_to_ns,
 ///
 /// A scan that cannot be read gives an error; the others stay readable.
 pub trait Dataset: Send {
-    /// The file format.
     fn format(&self) -> Format;
 
-    /// Number of scans.
     fn len(&self) -> usize;
 
     /// Index of the first scan that can be read; those before it are of another part of the drive.

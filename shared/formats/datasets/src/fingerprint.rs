@@ -11,9 +11,7 @@ use crate::dataset::{Dataset, Format, OpenError};
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fingerprint {
-    /// The file format.
     pub format: Format,
-    /// Number of scans.
     pub scans: usize,
     /// Size of all images, bytes.
     pub bytes: u64,

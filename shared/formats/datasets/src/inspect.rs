@@ -29,11 +29,8 @@ const MAX_LISTED: usize = 8;
 /// Summary of a dataset: [`std::fmt::Display`] prints it, serde serialises its figures.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
-    /// Root of the dataset.
     pub root: PathBuf,
-    /// File format.
     pub format: Format,
-    /// Number of scans.
     pub scans: usize,
     /// All other figures, by their names in JSON.
     #[serde(flatten)]

@@ -39,7 +39,6 @@ pub struct WheelLog {
     pub samples: Vec<Sample>,
     /// Faults of the log, with the number of samples that were left out for each.
     pub faults: LogFaults,
-    /// The file.
     pub path: PathBuf,
 }
 
@@ -102,7 +101,6 @@ const UNITS: [(&str, f64); 8] = [
     ("_mph", 0.44704),
 ];
 
-/// The remedy, for messages.
 const REMEDY: &str = "the first row must name the columns, as in `stamp_ns,speed_m_s` (also stamp_us, stamp_s; speed_km_h; ticks, distance_m)";
 
 /// Columns with the direction of a speed that has no sign.

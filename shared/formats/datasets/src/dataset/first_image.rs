@@ -60,7 +60,6 @@ impl FirstImage {
         self.name_ns
     }
 
-    /// Range bins.
     pub(crate) fn bins(&self) -> usize {
         self.size.width - METADATA_BYTES
     }

@@ -29,7 +29,6 @@ pub(crate) struct NavtechScans {
     format: Format,
     profile: Profile,
     period_ns: i64,
-    /// The longest plausible sweep.
     max_sweep_ns: i64,
     /// True if the names of the files are times of their sweeps.
     named_by_time: bool,

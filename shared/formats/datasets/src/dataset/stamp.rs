@@ -2,7 +2,6 @@
 
 use gyre_radar::median;
 
-/// Nanoseconds per second.
 pub(crate) const SECOND_NS: i64 = 1_000_000_000;
 
 /// 2015-01-01 and 2041-01-01, s since 1970: the range of plausible times.

@@ -39,7 +39,6 @@ const RATE_UNITS: [(&str, f64); 11] = [
     ("_mdps", PI / 180e3),
 ];
 
-/// Names of accelerations.
 const ACCELERATIONS: &str = "accel_* acc_* a* a_* linear_acceleration_* acceleration_* accel* \
     lin_acc_* a_rs_s_*";
 /// Units at the end of an acceleration's name.
@@ -68,7 +67,6 @@ const MULRAN: usize = 17;
 /// Columns of its first version, without rates.
 const MULRAN_WITHOUT_RATES: usize = 8;
 
-/// The remedy, for messages.
 const REMEDY: &str = "the first row must name the columns, as in `stamp_ns,gyro_x_radps,gyro_y_radps,gyro_z_radps` (also stamp_us, stamp_s; _degps)";
 
 impl Columns for GyroColumns {

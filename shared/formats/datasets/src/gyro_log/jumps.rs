@@ -18,7 +18,6 @@ const BACK_S: f64 = 0.5;
 const USUAL_SHARE: f64 = 0.95;
 const UNUSUAL: f64 = 3.0;
 
-/// Jumps of a log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Jumps {
     /// Samples between a jump and the one back: left out.

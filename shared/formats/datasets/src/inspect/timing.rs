@@ -28,7 +28,6 @@ pub(super) struct Timing {
     jitter_s: f64,
     /// Maximum and minimum logged interval, s.
     logged_interval_s: (f64, f64),
-    /// Number of missing scans.
     missing_scans: usize,
     /// Missing scans.
     gaps: Vec<Gap>,
@@ -43,7 +42,6 @@ pub(super) struct Timing {
 pub(super) struct Gap {
     /// The first scan after the gap.
     scan: usize,
-    /// Number of missing scans.
     missing: usize,
     /// Time between the scans before and after the gap, s.
     seconds: f64,

@@ -25,7 +25,6 @@ const LEFT_AND_RIGHT: [[&str; 2]; 3] = [
     ["ticks_left", "ticks_right"],
     ["left_count", "right_count"],
 ];
-/// Names of the metres.
 const METRES: [&str; 3] = ["distance_m", "odometer_m", "mileage_m"];
 
 /// Any count is plausible: only speeds are checked.
