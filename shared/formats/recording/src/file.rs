@@ -81,7 +81,6 @@ pub(crate) struct Channel {
     pub topic: String,
     /// The type, such as `nav_msgs/msg/Odometry`.
     pub type_name: String,
-    /// The type's definition.
     pub schema: String,
     /// The encoding of its messages.
     pub encoding: String,

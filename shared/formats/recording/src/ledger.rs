@@ -40,7 +40,6 @@ impl Ledger {
         Self(out.join("journal").join("recording.toml"))
     }
 
-    /// Returns the file.
     pub fn path(&self) -> &Path {
         &self.0
     }

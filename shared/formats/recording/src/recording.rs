@@ -145,7 +145,6 @@ impl Recording {
         &self.head
     }
 
-    /// Returns its files.
     pub fn paths(&self) -> impl Iterator<Item = &Path> {
         self.parts.iter().map(|part| part.file.path.as_path())
     }
@@ -199,7 +198,6 @@ impl Recording {
         parts.find_map(|(number, part)| part.file.damage(number == last))
     }
 
-    /// Reads a message.
     pub fn read(&mut self, topic: &str, seq: u64) -> Result<Stored, RecordingError> {
         let place = self.places.get(topic).and_then(|places| places.get(&seq));
         let Some(place) = place.copied() else {

@@ -14,7 +14,6 @@ const MISSED: &str = "missed.";
 /// A message of a chunk.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Entry {
-    /// The sequence number.
     pub seq: u64,
     /// The number of its scan.
     pub scan: u64,

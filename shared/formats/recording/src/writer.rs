@@ -266,7 +266,6 @@ impl RecordingWriter {
         self.write(channel, json.as_bytes(), times)
     }
 
-    /// Returns the file.
     pub(crate) fn path(&self) -> &Path {
         &self.path
     }

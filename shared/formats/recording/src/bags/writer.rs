@@ -107,7 +107,6 @@ impl BagWriter {
         })
     }
 
-    /// Adds a topic.
     pub fn topic<T: Ros2Message>(
         &mut self,
         name: &str,
