@@ -51,7 +51,6 @@ impl Axes {
 #[serde(rename_all = "snake_case")]
 pub enum HeadingFault {
     Estimate,
-    /// The ground truth.
     Truth,
     /// The paths do not show it.
     Unclear,

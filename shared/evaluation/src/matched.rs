@@ -38,7 +38,6 @@ impl MatchedPoses {
         &self.estimate
     }
 
-    /// The ground-truth poses.
     pub fn truth(&self) -> &[Pose] {
         &self.truth
     }

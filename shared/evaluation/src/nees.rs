@@ -70,7 +70,6 @@ pub struct NeesLength {
 /// The NEES of a set of segments.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NeesFigures {
-    /// Number of segments.
     pub segments: usize,
     /// x, y and yaw together.
     pub pose: NeesFigure,

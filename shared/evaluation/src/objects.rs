@@ -24,13 +24,11 @@ use hota::Compared;
 /// A true object at the time of a scan, in the frame of the sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrueObject {
-    /// The identity.
     pub id: u64,
     /// Centre, m.
     pub position: Point2<f64>,
     /// Velocity over ground, m/s; `None` if it is not known.
     pub velocity: Option<Vector2<f64>>,
-    /// Heading, rad.
     pub yaw_rad: f64,
     /// True for motor vehicles, which a tracker must find.
     pub is_vehicle: bool,
@@ -41,7 +39,6 @@ pub struct TrueObject {
 /// A tracked object at the time of a scan, in the frame of the sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackedObject {
-    /// The identity.
     pub id: u64,
     /// Centre, m.
     pub position: Point2<f64>,
@@ -49,7 +46,6 @@ pub struct TrackedObject {
     pub velocity: Vector2<f64>,
     /// Covariance of the velocity, (m/s)².
     pub velocity_covariance: Matrix2<f64>,
-    /// Heading, rad.
     pub yaw_rad: f64,
     /// True if it is reported as moving. The others are not judged.
     pub moving: bool,
