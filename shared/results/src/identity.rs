@@ -32,7 +32,6 @@ pub struct Identity {
     /// determines.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     recording: Option<Fingerprint>,
-    /// The resolved configuration.
     pub configuration: toml::Table,
 }
 
@@ -49,7 +48,6 @@ pub enum Holds {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Programs {
-    /// Gyre's version.
     version: String,
     /// BLAKE3 digest of Gyre's program.
     pub build: String,

@@ -42,7 +42,6 @@ pub struct Results {
     pub poses: usize,
     /// True if the journal has its end.
     pub ended: bool,
-    /// The summary to print.
     pub summary: Summary,
 }
 

@@ -33,7 +33,6 @@ pub struct Session<'a> {
     /// True if each scan that cannot be read is a problem: of recordings of runs and bags, whose
     /// scans were read once.
     pub needs_all: bool,
-    /// Wall-clock time.
     pub wall: Duration,
     /// Shared memory; `None` if no process was started, because only results were missing.
     pub footprint: Option<&'a Footprint>,
@@ -205,7 +204,6 @@ impl Summary {
         serde_json::to_value(self).unwrap_or_default()
     }
 
-    /// The counts of scans.
     pub fn counts(&self) -> &Counts {
         &self.counts
     }

@@ -204,7 +204,6 @@ impl Slam {
         }))
     }
 
-    /// Returns the counts.
     pub fn summary(&self) -> SlamSummary {
         let loops_used = self.used().count();
         let verified = |query: &Query| {

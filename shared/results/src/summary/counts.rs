@@ -17,7 +17,6 @@ const MAX_UNSURE_SHARE: f64 = 0.2;
 /// The radar's period is estimated from this many motions, so that longer runs take no more memory.
 const MOTIONS_OF_PERIOD: usize = 1 << 16;
 
-/// Counts of scans.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Counts {
     /// Scans that the source published.
