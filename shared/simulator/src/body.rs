@@ -32,12 +32,10 @@ impl Aspect {
     }
 }
 
-/// A point scatterer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scatterer {
     /// Position, world frame, metres.
     pub position: Point2<f64>,
-    /// Radar cross-section, square metres.
     pub cross_section_m2: f64,
     /// The dependence on direction.
     pub aspect: Aspect,

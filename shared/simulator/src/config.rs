@@ -12,7 +12,6 @@ use crate::output::{OutputConfig, OutputFormat};
 use crate::sensor::SensorConfig;
 use crate::wheels::SimulatedWheelsConfig;
 
-/// Maximum number of scans.
 pub(crate) const MAX_SCANS: usize = 100_000;
 
 /// The errors of the radar.

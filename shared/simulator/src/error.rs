@@ -49,7 +49,10 @@ pub enum SimulatorError {
     },
     /// The output folder holds a dataset of another configuration.
     #[error("{} holds a dataset of another configuration (see its simulation.toml): choose another folder", folder.display())]
-    OtherDataset { folder: PathBuf },
+    OtherDataset {
+        /// The folder.
+        folder: PathBuf,
+    },
     /// An existing image differs from the rendered one.
     #[error("{} differs from the image that is rendered now: another build made it, or it was changed; choose another folder", path.display())]
     OtherImage {
@@ -58,7 +61,10 @@ pub enum SimulatorError {
     },
     /// Another process writes to the output folder.
     #[error("another process is writing to {}: wait for it, or choose another folder", folder.display())]
-    Busy { folder: PathBuf },
+    Busy {
+        /// The folder.
+        folder: PathBuf,
+    },
     /// A file could not be written.
     #[error(transparent)]
     Storage(#[from] StorageError),

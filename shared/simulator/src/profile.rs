@@ -38,7 +38,6 @@ pub enum Chirp {
 /// The sampling of a radar.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sampling {
-    /// Azimuths of a turn.
     pub azimuths: usize,
     /// Range bins of an azimuth.
     pub bins: usize,
@@ -64,7 +63,6 @@ pub struct Sampling {
 /// The transmitter and receiver of a radar.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Receiver {
-    /// Carrier frequency, GHz.
     pub carrier_ghz: f64,
     /// Two-way half-power width of the beam, radians.
     pub beam_rad: f64,

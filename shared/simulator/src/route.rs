@@ -71,7 +71,6 @@ impl Route {
         }
     }
 
-    /// All nodes.
     pub fn nodes(&self) -> &[Pose] {
         &self.nodes
     }
@@ -81,7 +80,6 @@ impl Route {
         self.closed
     }
 
-    /// Length, metres.
     pub fn length_m(&self) -> f64 {
         self.nodes.len() as f64 * STEP_M
     }

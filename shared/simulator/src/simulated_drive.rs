@@ -71,7 +71,6 @@ impl SimulatedDrive {
         }
     }
 
-    /// Number of scans.
     pub fn scans(&self) -> usize {
         self.simulator.scans()
     }

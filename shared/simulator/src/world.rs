@@ -55,7 +55,6 @@ impl World {
         }
     }
 
-    /// All scatterers.
     pub fn scatterers(&self) -> &[Scatterer] {
         &self.scatterers
     }

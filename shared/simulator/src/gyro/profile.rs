@@ -8,7 +8,6 @@ use serde::{Deserialize, Serialize};
 
 /// Degrees in radians.
 const DEG: f64 = std::f64::consts::PI / 180.0;
-/// An hour in seconds.
 const HOUR_S: f64 = 3600.0;
 /// Time over which the temperature wanders, s.
 const TEMPERATURE_S: f64 = 600.0;

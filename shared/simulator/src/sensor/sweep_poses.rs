@@ -84,7 +84,6 @@ impl SweepPoses {
         self.at((self.azimuths / 2) as f64)
     }
 
-    /// Azimuths of the sweep.
     pub fn azimuths(&self) -> usize {
         self.azimuths
     }

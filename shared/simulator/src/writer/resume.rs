@@ -93,8 +93,8 @@ fn images(folder: &Path) -> Result<BTreeSet<String>, SimulatorError> {
     Ok(names)
 }
 
-/// Returns whether `out` was made by `config`, except for the number of scans and the speed of
-/// playback; false if that is unknown.
+/// Returns whether `out` was made by `config`, except for the number of scans and their storage;
+/// false if that is unknown.
 fn made_by_this(config: &SimulationConfig, out: &Path) -> Result<bool, SimulatorError> {
     match made_with(out)? {
         None => Ok(false),
