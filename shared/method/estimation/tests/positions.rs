@@ -89,7 +89,7 @@ fn the_solution_is_where_no_pose_lowers_the_sum_of_squares() {
         let step = 1e-4;
         let slope = |of: &dyn Fn(f64) -> f64| (of(step) - of(-step)) / (2.0 * step);
         let by_frame = |step| cost(&drive, &positions, &poses, &moved(&frame, axis, step));
-        // The step is scaled so that one unit is one standard deviation: sqrt of the curvature.
+        // Slopes are per standard deviation, which is 1 / sqrt of the curvature.
         let curvature = (by_frame(step) + by_frame(-step) - 2.0 * at_solution) / (step * step);
         assert!(
             slope(&by_frame).abs() < 1e-2 * curvature.sqrt(),

@@ -223,7 +223,7 @@ fn covariances_are_scaled_to_the_residuals() {
     let scales = [0.25, 1.0, 4.0, 16.0].map(|factor| scale(factor, &right));
     println!("{scales:?}");
     for (scale, expected) in scales.into_iter().zip([4.0, 1.0, 0.25, 0.0625]) {
-        // A few residuals are mixed with a prior of 1.
+        // The prior of 1 counts like a few residuals.
         let between = [0.6 * f64::min(expected, 1.0), 1.4 * f64::max(expected, 1.0)];
         assert!(
             (between[0]..between[1]).contains(&scale),
