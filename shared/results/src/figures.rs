@@ -5,7 +5,6 @@
 
 use serde_json::Value;
 
-/// A figure.
 #[derive(Clone, Copy, Debug)]
 pub struct Figure {
     /// The name, with the unit.

@@ -17,7 +17,7 @@ use serde::Serialize;
 /// longer one.
 #[derive(Debug, Serialize)]
 pub struct Judgement {
-    /// Time by which the clock of the ground truth was late, s, and which was taken out.
+    /// The removed delay of the clock of the ground truth, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     time_offset_s: Option<f64>,
     #[serde(flatten)]
@@ -25,8 +25,8 @@ pub struct Judgement {
     /// `None`: there are no covariances, or the truth cannot judge them.
     #[serde(skip_serializing_if = "Option::is_none")]
     nees: Option<Nees>,
-    /// Share of the poses whose error in x, y, yaw is within three standard deviations of what
-    /// their covariance says, %.
+    /// Share of the poses whose error in x, y, yaw is within three standard deviations by their
+    /// covariance, %.
     #[serde(skip_serializing_if = "Option::is_none")]
     within_3_sigma_percent: Option<[f64; 3]>,
     #[serde(skip)]
@@ -65,9 +65,6 @@ impl Judgement {
 
     /// Draws the trajectory, errors where the truth has heading, and bands where there are
     /// covariances: names and SVG documents.
-    ///
-    /// # Errors
-    /// A plot that cannot be drawn.
     pub fn plots(&self) -> Result<Vec<(&'static str, String)>, Failure> {
         let matched = &self.evaluation.matched;
         let mut plots = vec![(
@@ -109,7 +106,7 @@ impl fmt::Display for Judgement {
     }
 }
 
-/// Says so if the clock of the ground truth differs from the estimate's.
+/// Reports a clock of the ground truth that differs from the estimate's clock.
 pub fn note_time_offset(estimate: &Trajectory, truth: &Trajectory) {
     let differs = |offset: &ClockOffset| offset.is_reliable() && !offset.agrees();
     if let Some(offset) = clock_offset(estimate, truth).filter(differs) {
@@ -121,9 +118,6 @@ pub fn note_time_offset(estimate: &Trajectory, truth: &Trajectory) {
 }
 
 /// Returns the ground truth with the clock of the estimate, and the offset that was taken out.
-///
-/// # Errors
-/// The motions do not show an offset.
 pub fn without_time_offset(
     estimate: &Trajectory,
     truth: Trajectory,
@@ -140,9 +134,6 @@ pub fn without_time_offset(
 }
 
 /// Evaluates by time where both have stamps, else pose by pose.
-///
-/// # Errors
-/// Trajectories that do not overlap.
 pub fn judge(
     estimate: &Trajectory,
     truth: &Trajectory,
@@ -161,9 +152,6 @@ pub fn judge(
 }
 
 /// Compares motions with the truth against which their trajectory was evaluated.
-///
-/// # Errors
-/// A truth without times, without heading, or with other axes.
 pub fn judge_motions(
     motions: &[TimedMotion],
     truth: &Trajectory,

@@ -7,7 +7,7 @@
 //!   evaluation in it;
 //! - [`figures`]: all figures of a run, with their names and units;
 //! - [`georeference`]: the place of a run on the earth;
-//! - [`Identity`]: what the run was begun with;
+//! - [`Identity`]: the inputs of the run at its start;
 //! - [`evaluate`]: the report on a trajectory beside ground truth.
 
 pub mod evaluate;

@@ -33,7 +33,6 @@ pub struct Session<'a> {
     /// True if each scan that cannot be read is a problem: of recordings of runs and bags, whose
     /// scans were read once.
     pub needs_all: bool,
-    /// Wall-clock time.
     pub wall: Duration,
     /// Shared memory; `None` if no process was started, because only results were missing.
     pub footprint: Option<&'a Footprint>,
@@ -67,7 +66,7 @@ impl Mask {
     }
 }
 
-/// Why the results of a run that has played all scans are hardly those of its recording.
+/// Why the results of a run that has played all scans are unreliable.
 #[derive(Clone, Debug, Error, Serialize)]
 #[error("{0}")]
 #[serde(transparent)]
@@ -122,7 +121,6 @@ pub struct Measured {
     pub counts: Counts,
     /// The path.
     pub course: Course,
-    /// Latencies.
     pub latency: Latency,
     /// The errors, where there is a ground truth.
     pub evaluation: Option<Judgement>,
@@ -192,9 +190,6 @@ pub enum Form {
 
 impl Summary {
     /// Returns it in a form.
-    ///
-    /// # Errors
-    /// A figure that JSON cannot hold.
     pub fn text(&self, form: Form) -> serde_json::Result<String> {
         match form {
             Form::Brief => Ok(self.in_brief()),
@@ -209,12 +204,11 @@ impl Summary {
         serde_json::to_value(self).unwrap_or_default()
     }
 
-    /// The counts of scans.
     pub fn counts(&self) -> &Counts {
         &self.counts
     }
 
-    /// Returns why the results of all scans are hardly those of the recording.
+    /// Returns why the results of all scans are unreliable.
     pub fn problem(&self) -> Option<&Problem> {
         self.problem.as_ref()
     }

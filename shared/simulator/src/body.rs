@@ -1,4 +1,4 @@
-//! Bodies: scatterers that reflect and walls that hide what is behind them, standing or moving.
+//! Bodies: scatterers that reflect and walls that hide the space behind them, standing or moving.
 
 use gyre_geometry::Pose;
 use nalgebra::{Point2, Vector2};
@@ -32,12 +32,10 @@ impl Aspect {
     }
 }
 
-/// A point scatterer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scatterer {
     /// Position, world frame, metres.
     pub position: Point2<f64>,
-    /// Radar cross-section, square metres.
     pub cross_section_m2: f64,
     /// The dependence on direction.
     pub aspect: Aspect,
@@ -54,7 +52,6 @@ pub struct Wall {
     pub to: Point2<f64>,
     /// Two-way share of the power that passes: 0 to 1.
     pub transmission: f64,
-    /// The body.
     pub body: u32,
 }
 
@@ -100,9 +97,7 @@ impl Wall {
 /// Scatterers and walls.
 #[derive(Clone, Debug, Default)]
 pub struct Body {
-    /// The scatterers.
     pub scatterers: Vec<Scatterer>,
-    /// The walls.
     pub walls: Vec<Wall>,
 }
 

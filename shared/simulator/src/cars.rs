@@ -28,8 +28,9 @@ const APART_M: std::ops::Range<f64> = 50.0..120.0;
 /// resolve a car.
 pub(crate) const REPORTED_M: f64 = 100.0;
 
-/// A car around its own origin, x ahead: bright corners, wheels and plates, and sides that hide what
-/// is behind. The sum is about 10 m² on each side, the order reported for passenger cars at 77 GHz.
+/// A car around its own origin, x ahead: bright corners, wheels and plates, and sides that hide the
+/// space behind. The sum is about 10 m² on each side, the order reported for passenger cars at 77
+/// GHz.
 pub(crate) fn car(body: u32, rng: &mut impl Rng) -> Body {
     let [length, width] = HALF_M;
     let corners = [

@@ -12,7 +12,6 @@ use crate::output::{OutputConfig, OutputFormat};
 use crate::sensor::SensorConfig;
 use crate::wheels::SimulatedWheelsConfig;
 
-/// Maximum number of scans.
 pub(crate) const MAX_SCANS: usize = 100_000;
 
 /// The errors of the radar.
@@ -92,9 +91,6 @@ impl Default for SimulationConfig {
 
 impl SimulationConfig {
     /// Checks that all values can be simulated.
-    ///
-    /// # Errors
-    /// [`SimulatorError::Config`] with the key of the first value that cannot.
     pub fn validate(&self) -> Result<(), SimulatorError> {
         if let Some(scans) = self.scans {
             require_within("scans", scans as f64, 1.0, MAX_SCANS as f64)?;
@@ -126,7 +122,7 @@ impl SimulationConfig {
         self.sensor.seed.unwrap_or(self.seed)
     }
 
-    /// Returns the options with which a reader gets the ranges and angles of the simulated radar.
+    /// Returns the reader options for the ranges and angles of the simulated radar.
     pub fn dataset_options(&self) -> DatasetOptions {
         let sampling = self.sensor.sampling();
         let with_encoder = self.output.format != Some(OutputFormat::Radiate);

@@ -53,9 +53,6 @@ impl DriveConfig {
     }
 
     /// Checks that all values can be driven.
-    ///
-    /// # Errors
-    /// [`SimulatorError::Config`] with the key of the first value that cannot.
     pub fn validate(&self) -> Result<(), SimulatorError> {
         for side_m in self.block_m {
             require_within("drive.block_m", side_m, 30.0, 400.0)?;
@@ -66,10 +63,6 @@ impl DriveConfig {
     }
 
     /// Builds the path, for a radar with so many sweeps a second.
-    ///
-    /// # Errors
-    /// [`SimulatorError::Trajectory`] if the file cannot be read, [`SimulatorError::Drive`] if no
-    /// vehicle can drive along its poses.
     pub fn path(&self, rate_hz: f64) -> Result<Box<dyn Path>, SimulatorError> {
         let [length_m, width_m] = self.block_m;
         let Some(file) = &self.file else {

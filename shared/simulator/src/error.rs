@@ -26,7 +26,6 @@ pub enum SimulatorError {
     Drive {
         /// The file.
         path: PathBuf,
-        /// The reason.
         reason: String,
     },
     /// More scans are wanted than the drive lasts.
@@ -44,7 +43,6 @@ pub enum SimulatorError {
     /// The output folder holds files of another dataset.
     #[error("{} holds `{other}`, which is no file of this dataset: choose an empty folder", folder.display())]
     OutputInUse {
-        /// The folder.
         folder: PathBuf,
         /// The first foreign file.
         other: String,
@@ -73,7 +71,6 @@ pub enum SimulatorError {
     /// A file or folder could not be written.
     #[error("cannot write {}: {source}", path.display())]
     Write {
-        /// The path.
         path: PathBuf,
         /// The system's error.
         source: std::io::Error,
@@ -81,7 +78,6 @@ pub enum SimulatorError {
     /// A folder could not be listed.
     #[error("cannot list {}: {source}", folder.display())]
     List {
-        /// The folder.
         folder: PathBuf,
         /// The system's error.
         source: std::io::Error,

@@ -44,9 +44,6 @@ pub struct SimulatedGnssConfig {
 
 impl SimulatedGnssConfig {
     /// Checks that all values can be simulated.
-    ///
-    /// # Errors
-    /// [`SimulatorError::Config`] with the key of the first value that cannot.
     pub fn validate(&self) -> Result<(), SimulatorError> {
         require_within("gnss.rate_hz", self.rate_hz, 0.0, 100.0)
     }
@@ -86,7 +83,7 @@ pub(crate) fn fixes(
     })
 }
 
-/// The fixes as CSV: the numbers read from it are those of the fixes.
+/// The fixes as CSV: a reader gets exactly the numbers of the fixes.
 pub(crate) fn csv(fixes: &[RawFix]) -> Vec<u8> {
     let mut text = format!("{HEADER}\n");
     for fix in fixes {

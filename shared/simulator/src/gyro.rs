@@ -4,7 +4,7 @@
 //!
 //! - [`config`]: the configuration; [`profile`]: gyros that can be bought;
 //! - `attitude`: the vehicle's rate of rotation and acceleration, from its path;
-//! - `errors`: what the sensor makes of them;
+//! - `errors`: the errors of the sensor;
 //! - `clock`: the stamps, and which samples are lost;
 //! - `log`: the samples as a log has them.
 

@@ -5,8 +5,8 @@
 //! In the order of the data:
 //!
 //! - [`config`]: the configuration,
-//! - [`drive`], [`path`]: the path of the sensor, a pose for every instant; `route`: the places along
-//!   it,
+//! - [`drive`], [`path`]: the path of the sensor, a pose for every instant; `route`: the places
+//!   along it,
 //! - `scenery`, `cars`, `tunnel`: what stands along the route and what moves on it,
 //! - [`body`], [`world`], [`occlusion`]: scatterers and walls, and which walls lie between two
 //!   points,

@@ -109,7 +109,7 @@ pub fn crossing(from: Point2<f64>, line: Vector2<f64>, wall: &Wall) -> Option<f6
 struct CellWalk {
     cell: [i64; 2],
     step: [i64; 2],
-    /// Share of the line at which it leaves the cell in x and in y.
+    /// Share of the line where it leaves the cell in x and in y.
     next: [f64; 2],
     /// Share of the line that lies in one cell in x and in y.
     stride: [f64; 2],
@@ -144,7 +144,7 @@ impl CellWalk {
         walk
     }
 
-    /// Column, row, and the share of the line at which it leaves the cell (1 in the last).
+    /// Column, row, and the share of the line where it leaves the cell (1 in the last).
     fn next_cell(&mut self) -> Option<(i64, i64, f64)> {
         if self.done {
             return None;

@@ -2,7 +2,7 @@
 
 use nalgebra::Point2;
 
-/// A number from 0 to 1 for a place; each `index` gives another one.
+/// A number from 0 to 1 for a place; each `index` gives a different number.
 pub(crate) fn place_hash(place: Point2<f64>, index: u64) -> f64 {
     // The finaliser of SplitMix64 (Steele et al. 2014) over both coordinates' bits.
     let mut bits = place.x.to_bits()

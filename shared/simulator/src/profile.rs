@@ -31,14 +31,13 @@ pub enum Profile {
 pub enum Chirp {
     /// Approaching objects are measured too near.
     Rising,
-    /// Rising in even azimuths and falling in odd ones, as each azimuth's metadata says.
+    /// Rising in even azimuths and falling in odd ones, as recorded in each azimuth's metadata.
     Alternating,
 }
 
 /// The sampling of a radar.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sampling {
-    /// Azimuths of a turn.
     pub azimuths: usize,
     /// Range bins of an azimuth.
     pub bins: usize,
@@ -64,7 +63,6 @@ pub struct Sampling {
 /// The transmitter and receiver of a radar.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Receiver {
-    /// Carrier frequency, GHz.
     pub carrier_ghz: f64,
     /// Two-way half-power width of the beam, radians.
     pub beam_rad: f64,
@@ -79,7 +77,7 @@ pub struct Receiver {
     /// Range below which power rises with the square, metres: near objects lie below the beam of
     /// the antenna on the roof.
     pub near_m: f64,
-    /// Power at which the receiver saturates, in its units.
+    /// Saturation power of the receiver, in its units.
     pub full_scale: f32,
     /// True if powers are rounded to whole units.
     pub whole_powers: bool,
@@ -230,8 +228,8 @@ impl Profile {
                 ..oxford
             },
             // Checchin et al. 2010, Table 1: 24 GHz, an angular resolution of 3 degrees, 250 MHz,
-            // which is 0.6 m. Assumptions are the sensitivity, by which 1 m² at 100 m, the
-            // maximum range, is 16 dB above the floor, the filter and the floor.
+            // which is 0.6 m. Assumptions are the sensitivity (1 m² at 100 m, the maximum range, is
+            // 16 dB above the floor), the filter and the floor.
             Self::K2pi => Receiver {
                 carrier_ghz: 24.0,
                 beam_rad: 3.0f64.to_radians(),

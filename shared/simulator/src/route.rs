@@ -71,7 +71,6 @@ impl Route {
         }
     }
 
-    /// All nodes.
     pub fn nodes(&self) -> &[Pose] {
         &self.nodes
     }
@@ -81,12 +80,12 @@ impl Route {
         self.closed
     }
 
-    /// Length, metres.
     pub fn length_m(&self) -> f64 {
         self.nodes.len() as f64 * STEP_M
     }
 
-    /// The place after a distance, metres; none before the start or beyond the end of an open route.
+    /// The place after a distance, metres; none before the start or beyond the end of an open
+    /// route.
     pub fn at(&self, distance_m: f64) -> Option<Pose> {
         let count = self.nodes.len();
         let along = distance_m / STEP_M;
@@ -110,8 +109,8 @@ impl Route {
         Some(Pose::new(place, from.rotation.angle() + share * turn_rad))
     }
 
-    /// The frame beside the street after a distance: its origin lies so far beyond the kerb, x along
-    /// the street, y away from it.
+    /// The frame beside the street after a distance: its origin lies so far beyond the kerb, x
+    /// along the street, y away from it.
     pub fn beside(&self, side: Side, distance_m: f64, beyond_m: f64) -> Option<Pose> {
         let node = self.at(distance_m)?;
         let aside_m = side.kerb_m() + beyond_m;

@@ -1,11 +1,11 @@
-//! The scenery along the streets: houses whose walls hide the space behind, fences, trees, posts and
-//! parked cars. One seed determines all of it.
+//! The scenery along the streets: houses whose walls hide the space behind, fences, trees, posts
+//! and parked cars. One seed determines all of it.
 //!
 //! In real scans a row of houses appears as short bright pieces and dots with gaps between. So a
-//! front consists of bays, each with its own strength: rough wall (many weak scatterers, whose echoes
-//! interfere), relief between the bays, which appears as a row of dots along a street, and windows
-//! (reveals that face along the street, a pane that flashes at normal incidence, a room that extends
-//! the echo in range).
+//! front consists of bays, each with its own strength: rough wall (many weak scatterers, whose
+//! echoes interfere), relief between the bays, which appears as a row of dots along a street, and
+//! windows (reveals that face along the street, a pane that flashes at normal incidence, a room
+//! that extends the echo in range).
 
 use std::collections::HashSet;
 

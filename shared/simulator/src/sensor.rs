@@ -2,8 +2,7 @@
 //!
 //! In the order of a measurement:
 //!
-//! - `sweep_poses`: the sensor's pose at each azimuth, and the times at which its beam passes a
-//!   place,
+//! - `sweep_poses`: the sensor's pose at each azimuth, and the times when its beam passes a place,
 //! - `line_of_sight`: rays in all directions, and the walls along each,
 //! - `echoes`: the echoes with their amplitudes; `scintillation`: their fluctuation with the
 //!   direction,

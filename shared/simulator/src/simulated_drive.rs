@@ -35,9 +35,6 @@ pub struct SimulatedDrive {
 
 impl SimulatedDrive {
     /// Builds the path and what stands along it.
-    ///
-    /// # Errors
-    /// As [`Simulator::new`]; [`SimulatorError::Config`] if the radar does not fit the format.
     pub fn new(config: &SimulationConfig) -> Result<Self, SimulatorError> {
         let simulator = Simulator::new(config)?;
         let output = config.output.format.unwrap_or_default();
@@ -52,7 +49,6 @@ impl SimulatedDrive {
         })
     }
 
-    /// The simulator.
     pub fn simulator(&self) -> &Simulator {
         &self.simulator
     }
@@ -69,7 +65,7 @@ impl SimulatedDrive {
         }
     }
 
-    /// Returns the options with which a reader gets the ranges and angles of the simulated radar.
+    /// Returns the reader options for the ranges and angles of the simulated radar.
     pub fn dataset_options(&self) -> DatasetOptions {
         DatasetOptions {
             format: Some(self.format()),
@@ -77,7 +73,6 @@ impl SimulatedDrive {
         }
     }
 
-    /// Number of scans.
     pub fn scans(&self) -> usize {
         self.simulator.scans()
     }
@@ -217,9 +212,6 @@ impl SimulatedDrive {
 
     /// Opens the drive as a dataset that lies on no disk, its images rendered ahead on all
     /// processors.
-    ///
-    /// # Errors
-    /// Options that do not fit the drive's format.
     pub fn open(&self, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
         gyre_datasets::open_source(Box::new(self.renderer_ahead()), options)
     }

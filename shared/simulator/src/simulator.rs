@@ -23,7 +23,7 @@ use crate::{gnss, scenery, tunnel, wheels};
 /// the same files.
 const EPOCH_US: i64 = 1_547_132_400_000_000;
 
-/// Number of scans of an endless drive, if none is given.
+/// Number of scans of an endless drive, if the configuration has no number.
 const ENDLESS_SCANS: usize = 64;
 /// Distance beyond the radar's reach within which bodies move, metres.
 const BEYOND_M: f64 = 10.0;
@@ -50,11 +50,6 @@ pub struct SimulatedScan {
 
 impl Simulator {
     /// Builds the path and what stands along it.
-    ///
-    /// # Errors
-    /// As [`SimulationConfig::validate`] and [`crate::drive::DriveConfig::path`];
-    /// [`SimulatorError::Config`] if the drive ends before its tunnel;
-    /// [`SimulatorError::TooManyScans`] if the drive has fewer scans than are wanted.
     pub fn new(config: &SimulationConfig) -> Result<Self, SimulatorError> {
         config.validate()?;
         let sampling = config.sensor.sampling();
@@ -76,7 +71,6 @@ impl Simulator {
         })
     }
 
-    /// The configuration.
     pub fn config(&self) -> &SimulationConfig {
         &self.config
     }
@@ -205,10 +199,8 @@ impl Simulator {
     }
 }
 
-/// The number of scans of a drive: those of which at least the first half is driven before its end.
-///
-/// # Errors
-/// [`SimulatorError::TooManyScans`] if more are wanted.
+/// The number of scans of a drive. A scan counts if at least its first half is driven before the
+/// end.
 fn scans(wanted: Option<usize>, duration_s: f64, period_s: f64) -> Result<usize, SimulatorError> {
     if duration_s.is_infinite() {
         return Ok(wanted.unwrap_or(ENDLESS_SCANS));

@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 pub(crate) enum Stream {
     /// The sensor in one scan, by its number.
     Scan(u64),
-    /// What stands along the streets.
+    /// The scenery along the streets.
     Scenery,
     /// The other cars.
     Cars,
@@ -27,7 +27,6 @@ pub(crate) enum Stream {
     GyroStalls,
     /// Scale, noise and losses of the wheels.
     WheelErrors,
-    /// Slips of the wheels.
     WheelSlips,
     /// Noise and lasting errors of the GNSS receiver.
     GnssErrors,

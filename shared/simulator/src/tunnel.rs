@@ -1,8 +1,8 @@
 //! A tunnel: walls without structure along a stretch of the drive.
 //!
-//! Inside a radar sees two smooth lines and nothing else, until a portal comes into its range: how far
-//! the vehicle drives is not determined. The lining is rough to the radar and everywhere the same: its
-//! echoes are speckle, which is new at every place of the vehicle.
+//! Inside a radar sees two smooth lines and nothing else, until a portal comes into its range: how
+//! far the vehicle drives is not determined. The lining is rough to the radar and everywhere the
+//! same: its echoes are speckle, which is new at every place of the vehicle.
 
 use nalgebra::{Point2, Vector2};
 use rand::Rng;
@@ -23,9 +23,6 @@ const TRANSMISSION: f64 = 1e-9;
 const BODY: u32 = (1 << 24) - 1;
 
 /// Builds a tunnel that begins after a distance, with a length, metres: what stands in it goes.
-///
-/// # Errors
-/// [`SimulatorError::Config`] if the drive ends before the tunnel does.
 pub(crate) fn build(
     [from_m, length_m]: [f64; 2],
     scenery: &mut Body,

@@ -45,9 +45,6 @@ pub struct SimulatedWheelsConfig {
 
 impl SimulatedWheelsConfig {
     /// Checks that all values can be simulated.
-    ///
-    /// # Errors
-    /// [`SimulatorError::Config`] with the key of the first value that cannot.
     pub fn validate(&self) -> Result<(), SimulatorError> {
         require_within("wheels.rate_hz", self.rate_hz, 0.0, 1000.0)?;
         require_within("wheels.delay_s", self.delay_s, -1e6, 1e6)
@@ -76,7 +73,7 @@ pub(crate) fn samples(
     })
 }
 
-/// The samples as CSV: the numbers read from it are those of the samples.
+/// The samples as CSV: a reader gets exactly the numbers of the samples.
 pub(crate) fn csv(samples: &[Sample]) -> Vec<u8> {
     let mut text = format!("{HEADER}\n");
     for sample in samples {

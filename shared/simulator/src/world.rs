@@ -55,7 +55,6 @@ impl World {
         }
     }
 
-    /// All scatterers.
     pub fn scatterers(&self) -> &[Scatterer] {
         &self.scatterers
     }
@@ -91,8 +90,7 @@ impl World {
         passed
     }
 
-    /// Visits the walls between two points, each once, with the share of the line at which it is
-    /// crossed.
+    /// Visits the walls between two points, each once, with the share of the line up to the wall.
     pub fn walls_between(
         &self,
         from: Point2<f64>,

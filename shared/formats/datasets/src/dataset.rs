@@ -50,10 +50,8 @@ pub use stamp::{DEFAULT_TURN_NS, middle_ns, parse_seconds, to_ns as stamp_to_ns,
 ///
 /// A scan that cannot be read gives an error; the others stay readable.
 pub trait Dataset: Send {
-    /// The file format.
     fn format(&self) -> Format;
 
-    /// Number of scans.
     fn len(&self) -> usize;
 
     /// Index of the first scan that can be read; those before it are of another part of the drive.
@@ -117,25 +115,18 @@ pub trait Dataset: Send {
         &[]
     }
 
-    /// The first place at which the recording is damaged or ends too early, so that scans may be
+    /// The first place where the recording is damaged or ends too early, so that scans may be
     /// missing: a sentence without its full stop. `None` if all that was recorded is there.
     fn damage(&self) -> Option<&str> {
         None
     }
 
     /// Decodes a scan into `slot`, whose slices are at least as long as [`Dataset::limits`].
-    ///
-    /// # Errors
-    /// An index past the end, an image that cannot be read or decoded, metadata that is not of one
-    /// sweep, a slot that is too small.
     fn read(&mut self, index: usize, slot: ScanSlot<'_>) -> Result<SweepGeometry, ReadError>;
 
     /// Reads the samples of another sensor that the recording itself has, on the topic of this
     /// name, else on the only one: in the sensor's own axes and on its own clock, in the order of
     /// the recording. `None` without one.
-    ///
-    /// # Errors
-    /// No such topic, several without a name, or samples that cannot be read.
     fn logged(
         &mut self,
         of: SampleKind,
@@ -147,9 +138,6 @@ pub trait Dataset: Send {
 
     /// Reads the fixes of a GNSS receiver that the recording itself has, on the topic of this name,
     /// else on the only one. `None` without one.
-    ///
-    /// # Errors
-    /// No such topic, several without a name, or fixes that cannot be read.
     fn fixes(&mut self, topic: Option<&str>) -> Result<Option<BagFixes>, OpenError> {
         let _ = topic;
         Ok(None)
@@ -163,9 +151,6 @@ pub trait Dataset: Send {
 }
 
 /// Checks that a slot is as large as the limits of a dataset.
-///
-/// # Errors
-/// The first slice that is too small.
 pub fn check_capacity(limits: ScanLimits, slot: &ScanSlot<'_>) -> Result<(), ReadError> {
     let slices = [
         ("bytes", limits.bytes, slot.bytes.len()),
@@ -191,26 +176,17 @@ pub fn check_capacity(limits: ScanLimits, slot: &ScanSlot<'_>) -> Result<(), Rea
 ///
 /// The format is detected unless `options` names it. Options that are not set are read from a
 /// `dataset.toml` in the folder, if there is one.
-///
-/// # Errors
-/// A folder without images of a known format, options out of bounds, or files that cannot be read.
 pub fn open(root: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
     open_resolved(root, &options.or(&stored_options(root)?))
 }
 
 /// Returns the options in the `dataset.toml` of a recording; none are set where there is no such
 /// file.
-///
-/// # Errors
-/// A file that cannot be read or has other keys.
 pub fn stored_options(root: &Path) -> Result<DatasetOptions, OpenError> {
     dataset_toml::options(root)
 }
 
-/// Opens the dataset at `root` with these options alone, whatever `dataset.toml` says by now.
-///
-/// # Errors
-/// As [`open`].
+/// Opens the dataset at `root` with these options only: the current `dataset.toml` is ignored.
 pub fn open_resolved(root: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
     options.check()?;
     open_found(detect::locate(root, options.format)?, options)
@@ -219,9 +195,6 @@ pub fn open_resolved(root: &Path, options: &DatasetOptions) -> Result<Box<dyn Da
 /// Opens a dataset again as [`open_resolved`] has opened it before, with the format and the files
 /// that it had then. The folder is not listed, so it does not matter how many files it holds, or
 /// whether some came or went.
-///
-/// # Errors
-/// No file, options out of bounds, or files that cannot be read.
 pub fn reopen(
     root: &Path,
     options: &DatasetOptions,
@@ -233,9 +206,6 @@ pub fn reopen(
 }
 
 /// Opens a recording that is not on disk, in its own format unless `options` names another.
-///
-/// # Errors
-/// A source without images, or options out of bounds.
 pub fn open_source(
     source: Box<dyn ImageSource>,
     options: &DatasetOptions,

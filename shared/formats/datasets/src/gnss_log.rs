@@ -3,7 +3,7 @@
 //! - [`GnssLog`]: where it lies beside the scans of a dataset, and how it is read;
 //! - `table`: tables as CSV;
 //! - [`ReceivedFixes`]: the growing log of a live receiver;
-//! - `faults`: what is wrong with the fixes, and which of them are left out.
+//! - `faults`: the faults of the fixes, and the removal of faulty fixes.
 
 mod faults;
 mod received;
@@ -44,8 +44,8 @@ const OF_RECORDING: &str = "gnss.csv";
 pub struct GnssLog {
     /// The fixes in the order of their stamps, which all differ.
     pub fixes: Vec<LoggedFix>,
-    /// The plane in which the fixes are, which touches the earth at the first of them; `None` if
-    /// the log has coordinates in a plane of its own.
+    /// The plane of the fixes, which touches the earth at the first of them; `None` if the log has
+    /// coordinates in a plane of its own.
     pub plane: Option<LocalPlane>,
     /// Faults of the log, with the number of fixes that were left out for each.
     pub faults: GnssFaults,
@@ -53,8 +53,7 @@ pub struct GnssLog {
     pub path: PathBuf,
     /// The topic in the bag; `None` of a file.
     pub topic: Option<String>,
-    /// The reason why there are no fixes, of what a live receiver has sent; of any other log that
-    /// is an error.
+    /// The reason why the log of a live receiver has no fixes; in any other log that is an error.
     pub unusable: Option<String>,
 }
 
@@ -70,10 +69,7 @@ pub struct LoggedFix {
 }
 
 impl GnssLog {
-    /// Reads a log. The first row, or the number of columns, says of which format it is.
-    ///
-    /// # Errors
-    /// A file that cannot be read or has no positions, and one without a usable fix.
+    /// Reads a log. The first row, or the number of columns, determines the format.
     pub fn read(path: &Path) -> Result<Self, LogError> {
         let (raw, is_plane) = Self::raw(path)?;
         if let Some(reason) = raw.unreadable.are_most(raw.count()) {
@@ -107,9 +103,6 @@ impl GnssLog {
     }
 
     /// Returns all fixes of a log as one table.
-    ///
-    /// # Errors
-    /// A log that cannot be read.
     pub fn copy_of(path: &Path) -> Result<String, LogError> {
         let (raw, is_plane) = Self::raw(path)?;
         Ok(Self::table(&raw.entries, is_plane))
@@ -129,8 +122,8 @@ impl GnssLog {
         format!("stamp_ns,{at},altitude_m,sigma_m\n{rows}")
     }
 
-    /// Reads what a live receiver has sent during a run, be it among lines that are no fixes. A run
-    /// that has got nothing usable goes on without fixes, and with the reason.
+    /// Reads the log of a live receiver during a run. Lines without a fix are allowed. A run
+    /// without usable fixes continues without them, and keeps the reason.
     pub fn received(path: &Path) -> Self {
         let mut received = ReceivedFixes::new(path);
         match received.read_on() {
@@ -150,9 +143,6 @@ impl GnssLog {
     }
 
     /// Takes the fixes of this bag.
-    ///
-    /// # Errors
-    /// No usable fix.
     pub fn of(fixes: BagFixes, bag: &Path) -> Result<Self, LogError> {
         let raw = Raw {
             unmeasured: fixes.without_fix,
@@ -166,16 +156,13 @@ impl GnssLog {
 
     /// Returns the log that lies beside the scans of a dataset, which may also be named by the
     /// folder of the images; of the first file of a recording its own, if it has one.
-    ///
-    /// # Errors
-    /// No log.
     pub fn find(folder: &Path) -> Result<PathBuf, LogError> {
         let own = Self::of_recording(folder);
         // The first file itself may have been moved away.
         if !folder.is_dir() && own.is_file() {
             return Ok(own);
         }
-        // Of a bag or another recording in one file, the folder in which it lies.
+        // For a bag or a different recording in one file, the folder of the file.
         let folder = match folder.is_file() {
             true => folder.parent().unwrap_or(folder),
             false => folder,
@@ -203,7 +190,7 @@ impl GnssLog {
         }
     }
 
-    /// Examines the fixes. Returns the log, and what is wrong where none can be used.
+    /// Examines the fixes. Returns the log, or the reason if all fixes are unusable.
     fn examined(raw: Raw<RawFix>, is_plane: bool, path: &Path) -> (Self, Option<LogError>) {
         let all = raw.count();
         let (fixes, plane, faults) = faults::examine(raw, is_plane);

@@ -17,9 +17,6 @@ const UNREADABLE: &str = "the file of this number is missing, or has another for
 
 /// Reads the files that the list beside a folder names. `entry` makes an entry of a time, ns since
 /// 1970, and of these lines, counted from 0, each of three numbers.
-///
-/// # Errors
-/// A list that is missing, cannot be read or has a line of another form; an empty folder.
 pub(crate) fn read<T, const N: usize>(
     folder: &Path,
     of: &'static str,

@@ -61,11 +61,8 @@ struct LineError {
 type Parse = fn(&str) -> Result<Trajectory, LineError>;
 
 /// Reads a trajectory of any known format, detected from its first line, and converts it to
-/// REP-103. TUM and KITTI files may be of a vehicle (z up or down) or of a camera (z forward): the
-/// plane in which they move is found. Of a folder, its ground truth is read.
-///
-/// # Errors
-/// A file that cannot be read, or is not of a known format; a folder without ground truth.
+/// REP-103. TUM and KITTI files may be of a vehicle (z up or down) or of a camera (z forward):
+/// their plane of motion is found. Of a folder, its ground truth is read.
 pub fn read_trajectory(path: &Path) -> Result<Trajectory, TrajectoryError> {
     let failed = |source| TrajectoryError::Io {
         path: path.to_owned(),
@@ -81,9 +78,6 @@ pub fn read_trajectory(path: &Path) -> Result<Trajectory, TrajectoryError> {
 }
 
 /// As [`read_trajectory`], from a text; `path` is the name in errors.
-///
-/// # Errors
-/// A text that is not of a known format.
 pub fn parse_trajectory(text: &str, path: &Path) -> Result<Trajectory, TrajectoryError> {
     let parse = detect(text).map_err(|reason| TrajectoryError::Unknown {
         path: path.to_owned(),
@@ -155,8 +149,8 @@ fn detect(text: &str) -> Result<Parse, String> {
     }
 }
 
-/// Rejects what spreadsheets write in countries with decimal commas, and columns that are parted as
-/// those of other formats.
+/// Rejects the output of spreadsheets in countries with decimal commas, and the column separators
+/// of other formats.
 fn check_separators(first: &str, commas: usize, words: usize) -> Result<(), String> {
     // With a fraction: a comma at the end of a word parts columns, as in `1, 2`.
     let is_decimal = |word: &str| match word.split_once(',') {

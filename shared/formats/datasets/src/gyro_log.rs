@@ -3,8 +3,8 @@
 //! - [`GyroLog`]: where it lies beside the scans of a dataset, and how it is read;
 //! - `columns`: which columns of a table are what;
 //! - [`SampleTrack`]: its samples in the vehicle's axes on the radar's clock;
-//! - `faults`: what is wrong with the samples, and which of them are left out; `jumps`: which of
-//!   them change faster than a vehicle can.
+//! - `faults`: the faults of the samples, and the removal of faulty samples; `jumps`: which of them
+//!   change faster than a vehicle can.
 
 mod columns;
 pub(crate) mod faults;
@@ -62,11 +62,7 @@ pub struct GyroLog {
 }
 
 impl GyroLog {
-    /// Reads a log. The first row, or the number of columns, says of which format it is.
-    ///
-    /// # Errors
-    /// A file that cannot be read or has no angular rates, and one whose stamps or rates cannot be
-    /// those of a gyro.
+    /// Reads a log. The first row, or the number of columns, determines the format.
     pub fn read(path: &Path) -> Result<Self, LogError> {
         let (raw, unit_is_assumed) = match path.is_dir() {
             true => {
@@ -97,11 +93,8 @@ impl GyroLog {
         Self::find(folder).ok()
     }
 
-    /// Returns the log that lies beside the scans of a dataset folder, which may also be that of
-    /// the images.
-    ///
-    /// # Errors
-    /// No log, or only one of which the ground truth was made.
+    /// Returns the log beside the scans of a dataset folder, which may also be the folder of the
+    /// images.
     pub fn find(folder: &Path) -> Result<PathBuf, LogError> {
         logs::find(folder, OF, &PLACES).map_err(|missing| {
             let mut in_truth = logs::roots(folder).map(|root| root.join(IN_TRUTH));
@@ -113,9 +106,6 @@ impl GyroLog {
     }
 
     /// Returns the axis that points up: the configured one, or that by gravity or the format.
-    ///
-    /// # Errors
-    /// Both contradict each other.
     pub fn up(&self, configured: Option<UpAxis>, dataset: Format) -> Result<UpAxis, LogError> {
         // Of RADIATE's logs z points down, and gravity is taken out of their accelerations.
         let is_radiates = dataset == Format::Radiate && self.path.ends_with("imu_as_logged.csv")
@@ -151,9 +141,6 @@ impl GyroLog {
     }
 
     /// Takes the samples of a bag or of a simulation, which messages name by this path.
-    ///
-    /// # Errors
-    /// Stamps or rates that cannot be those of a gyro.
     pub fn of(samples: Vec<Sample>, path: &Path) -> Result<Self, LogError> {
         Self::examined(Raw::of(samples), false, path)
     }

@@ -29,11 +29,8 @@ const MAX_LISTED: usize = 8;
 /// Summary of a dataset: [`std::fmt::Display`] prints it, serde serialises its figures.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
-    /// Root of the dataset.
     pub root: PathBuf,
-    /// File format.
     pub format: Format,
-    /// Number of scans.
     pub scans: usize,
     /// All other figures, by their names in JSON.
     #[serde(flatten)]
@@ -49,9 +46,6 @@ pub struct Report {
 ///
 /// With a `trajectory` of the dataset (an odometry result), the clock of each stamped ground truth
 /// is compared with it.
-///
-/// # Errors
-/// A dataset that cannot be opened; see [`open`].
 pub fn inspect(
     root: &Path,
     options: &DatasetOptions,

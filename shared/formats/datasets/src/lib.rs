@@ -2,7 +2,7 @@
 //!
 //! Reading order:
 //! - [`mod@dataset`]: the scans of a recording behind one trait;
-//! - [`fingerprint`]: what tells a recording from another one;
+//! - [`fingerprint`]: the identity of a recording;
 //! - [`GyroLog`], [`WheelLog`], [`GnssLog`]: what other sensors logged; [`ScanSamples`]: which of
 //!   it goes with each scan;
 //! - [`mod@ground_truth`]: trajectories in the formats of datasets and tools, converted to REP-103;

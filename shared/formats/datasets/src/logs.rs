@@ -106,9 +106,6 @@ fn has_list(folder: &Path) -> bool {
 
 /// Returns the first of these places with a log beside the scans of a dataset folder. The folder of
 /// the images may be given instead.
-///
-/// # Errors
-/// A log is missing.
 pub(crate) fn find(folder: &Path, of: &'static str, places: &[&str]) -> Result<PathBuf, LogError> {
     let mut paths = roots(folder).flat_map(|root| places.iter().map(|place| root.join(place)));
     let found = paths.find(|path| path.is_file() || (path.is_dir() && has_list(path)));

@@ -19,21 +19,17 @@ pub enum ScanSamples {
     None,
     /// From logs.
     Log {
-        /// The samples.
         track: SampleTrack,
         /// A sentence for each kind of fault in a log, with its path.
         faults: Vec<String>,
     },
-    /// With the scans of the recording of a run, whatever their stamps: those of these kinds.
+    /// Recorded with the scans of a run, whatever their stamps: the samples of these kinds.
     Recorded(Vec<SampleKind>),
 }
 
 impl ScanSamples {
-    /// Opens what the sections `[gyro]` and `[wheels]` name for the dataset in this folder, or for
-    /// this bag.
-    ///
-    /// # Errors
-    /// No log beside the scans, or one that cannot be read.
+    /// Opens the logs in the sections `[gyro]` and `[wheels]` for the dataset in this folder, or
+    /// for this bag.
     pub fn open(
         gyro: &GyroConfig,
         wheels: &WheelsConfig,
@@ -87,9 +83,6 @@ impl ScanSamples {
     }
 
     /// Takes the samples of the log of a gyro.
-    ///
-    /// # Errors
-    /// It has none from the first scan to the last, or another axis than the configuration.
     pub fn of_gyro(
         log: &GyroLog,
         config: &GyroConfig,
@@ -104,9 +97,6 @@ impl ScanSamples {
     }
 
     /// Takes the samples of the log of the wheels.
-    ///
-    /// # Errors
-    /// It has none from the first scan to the last.
     pub fn of_wheels(
         log: &WheelLog,
         config: &WheelsConfig,

@@ -9,24 +9,18 @@ use crate::header::Header;
 pub(crate) const MAX_BYTES: u64 = 4 << 30;
 /// Marks between columns that are looked for in the first row.
 const MARKS: [u8; 3] = [b',', b';', b'\t'];
-/// The first field of a row in place of as many as the second says, which could not be read before.
+/// The first field of a row that replaces unreadable rows; the second field is their number.
 const UNREADABLE: &str = "unreadable";
 
-/// The columns of a table in which each row is an entry.
+/// The columns of a table with one entry per row.
 pub(crate) trait Columns: Sized {
     /// The entry that a row becomes.
     type Entry;
 
     /// Finds the columns by their names.
-    ///
-    /// # Errors
-    /// A column that is missing, and the remedy.
     fn by_names(header: &Header) -> Result<Self, String>;
 
     /// Finds the columns of a table without names, by their number.
-    ///
-    /// # Errors
-    /// An unknown number, and the remedy.
     fn by_number(columns: usize) -> Result<Self, String> {
         Err(format!(
             "its {columns} columns have no names: the first row must name them"
@@ -57,9 +51,6 @@ pub(crate) struct Rows<C: Columns> {
 
 impl<C: Columns> Rows<C> {
     /// Reads a table from its beginning.
-    ///
-    /// # Errors
-    /// Columns that are missing, and the remedy.
     pub fn of(text: &str) -> Result<Self, String> {
         let first = text.lines().next().unwrap_or_default().as_bytes();
         let mark = MARKS.into_iter().find(|mark| first.contains(mark));

@@ -1,6 +1,6 @@
 //! The log of the wheels' speed as a file: a table as CSV.
 //!
-//! `counts`: that of an encoder or an odometer, of which speeds are made.
+//! `counts`: the log of an encoder or an odometer, converted to speeds.
 
 mod counts;
 
@@ -39,17 +39,12 @@ pub struct WheelLog {
     pub samples: Vec<Sample>,
     /// Faults of the log, with the number of samples that were left out for each.
     pub faults: LogFaults,
-    /// The file.
     pub path: PathBuf,
 }
 
 impl WheelLog {
-    /// Reads a log. Its first row names the columns, as in `stamp_ns,speed_m_s`, or those of
-    /// ticks, `stamp_ns,ticks`, of which each is so many metres long.
-    ///
-    /// # Errors
-    /// A file that cannot be read or has no speed, one whose stamps or speeds cannot be those of
-    /// wheels, and ticks whose length is not given.
+    /// Reads a log. Its first row names the columns, as in `stamp_ns,speed_m_s`, or in
+    /// `stamp_ns,ticks` for ticks of `m_per_tick` metres.
     pub fn read(path: &Path, m_per_tick: Option<f64>) -> Result<Self, LogError> {
         let no_speed = match logs::rows::<SpeedColumns>(path, OF) {
             Ok(rows) => return Self::examined(rows.raw, rows.columns.unit.is_none(), path),
@@ -61,19 +56,13 @@ impl WheelLog {
         }
     }
 
-    /// Returns the log that lies beside the scans of a dataset folder, which may also be that of
-    /// the images.
-    ///
-    /// # Errors
-    /// There is none.
+    /// Returns the log beside the scans of a dataset folder, which may also be the folder of the
+    /// images.
     pub fn find(folder: &Path) -> Result<PathBuf, LogError> {
         logs::find(folder, OF, &PLACES)
     }
 
     /// Takes the samples of a bag or of a simulation, which messages name by this path.
-    ///
-    /// # Errors
-    /// Stamps or speeds that cannot be those of wheels.
     pub fn of(samples: Vec<Sample>, path: &Path) -> Result<Self, LogError> {
         Self::examined(Raw::of(samples), false, path)
     }
@@ -99,7 +88,6 @@ impl WheelLog {
     }
 }
 
-/// Names of the speed.
 const NAMES: &str = "speed wheel_speed vehicle_speed velocity v vx linear_x";
 /// Units at the end of its name.
 const UNITS: [(&str, f64); 8] = [
@@ -113,7 +101,6 @@ const UNITS: [(&str, f64); 8] = [
     ("_mph", 0.44704),
 ];
 
-/// The remedy, for messages.
 const REMEDY: &str = "the first row must name the columns, as in `stamp_ns,speed_m_s` (also stamp_us, stamp_s; speed_km_h; ticks, distance_m)";
 
 /// Columns with the direction of a speed that has no sign.

@@ -81,13 +81,11 @@ pub(crate) struct Channel {
     pub topic: String,
     /// The type, such as `nav_msgs/msg/Odometry`.
     pub type_name: String,
-    /// The type's definition.
     pub schema: String,
     /// The encoding of its messages.
     pub encoding: String,
 }
 
-/// A message.
 #[derive(Clone, Debug)]
 pub(crate) struct Message {
     pub channel: u16,
@@ -97,7 +95,6 @@ pub(crate) struct Message {
     pub data: Vec<u8>,
 }
 
-/// An MCAP file.
 #[derive(Debug)]
 pub struct McapFile {
     pub(crate) path: PathBuf,
@@ -119,9 +116,6 @@ pub struct McapFile {
 
 impl McapFile {
     /// Opens a file behind the signature of MCAP.
-    ///
-    /// # Errors
-    /// The file cannot be read, or does not begin with the signature.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
         let failed = |error| RecordingError::io(path, error);
         let file = gyre_storage::open(path).map_err(failed)?;
@@ -145,9 +139,6 @@ impl McapFile {
     /// Returns the opcode and the place of the next record, past those that are damaged; `None`
     /// where the file ends, or ends within it. Of a record only the lengths of its fields are read:
     /// they must add up to its own.
-    ///
-    /// # Errors
-    /// The file cannot be read.
     pub fn next_record(&mut self) -> Result<Option<(u8, Span)>, RecordingError> {
         let next = self.find_next();
         let next = next.map_err(|error| RecordingError::io(&self.path, error))?;
@@ -212,9 +203,6 @@ impl McapFile {
     }
 
     /// Returns the messages in a place that are of wanted channels, and learns the channels there.
-    ///
-    /// # Errors
-    /// It cannot be read, or is damaged, which counts as damage of the file.
     pub(crate) fn read(
         &mut self,
         span: Span,

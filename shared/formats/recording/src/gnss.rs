@@ -10,16 +10,13 @@ use crate::{
     parts::first_part_in,
 };
 
-/// Returns the log of what a live receiver has sent during the run with its results in `out`.
+/// Returns the path of the log of a live receiver during the run with its results in `out`.
 pub fn received_fixes(out: &Path) -> PathBuf {
     out.join("journal/gnss.csv")
 }
 
-/// Reads what the section `[gnss]` names for the scans at `data`, of a live receiver what it has
-/// sent so far during the run with its results in `out`; `None` without GNSS.
-///
-/// # Errors
-/// No log, a topic that is not in the bag or of scans in no bag, or fixes that cannot be used.
+/// Reads the log that the section `[gnss]` names for the scans at `data`; for a live receiver, its
+/// log so far during the run with its results in `out`; `None` without GNSS.
 pub fn gnss_log(config: &GnssConfig, data: &Path, out: &Path) -> Result<Option<GnssLog>, LogError> {
     match config.kind {
         GnssKind::None => Ok(None),
@@ -31,9 +28,6 @@ pub fn gnss_log(config: &GnssConfig, data: &Path, out: &Path) -> Result<Option<G
 
 /// Returns a table of the fixes that `gnss.kind = "auto"` takes with the scans at `data`, for a
 /// recording of the run.
-///
-/// # Errors
-/// As [`gnss_log`].
 pub fn copied_fixes(config: &GnssConfig, data: &Path) -> Result<String, LogError> {
     let in_bag = match is_bag(data) {
         true => bags::fixes(data, config.topic.as_deref())?,

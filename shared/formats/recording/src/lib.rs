@@ -13,12 +13,12 @@
 //! number. [`image`] takes a payload apart and puts it together again.
 //!
 //! The log time of a message is the sensor's: the stamp of its scan. So a drive that was replayed
-//! thirty times faster plays at its own pace. The publish time is that of the machine at which the
-//! recorder received it.
+//! thirty times faster plays at its own pace. The publish time is measured by the machine that runs
+//! the recorder, at reception.
 //!
-//! Behind each chunk a metadata record (`table`) lists the messages in it and what was missed so
-//! far. So a reader finds a message without decompressing what is before it, also in a file that
-//! has no summary because its writer was killed.
+//! Behind each chunk a metadata record (`table`) lists its messages and all messages missed so far.
+//! So a reader finds a message without decompressing earlier chunks, even in a file without a
+//! summary because its writer was killed.
 //!
 //! Reading order: `head` and `table` (the metadata), `writer`, `split` and `ledger` (several
 //! files), [`mod@file`] (the records of a file that may be damaged or cut), `recording`,

@@ -33,7 +33,7 @@ pub(crate) fn newest(path: &Path) -> Result<(Head, Positions), RecordingError> {
     Ok((head, positions))
 }
 
-/// Returns the head of a file; `None` if it is not that of a recording, or cannot be read.
+/// Returns the head of a file; `None` if the file is not part of a recording, or is unreadable.
 pub(crate) fn head(path: &Path) -> Option<Head> {
     let mut file = McapFile::open(path).ok()?;
     // It is before all messages.

@@ -51,7 +51,7 @@ struct Part {
     number: usize,
     file: McapFile,
     missed: BTreeMap<String, u64>,
-    /// The generations of a topic of which the recorder has seen no message.
+    /// The generations of a topic without a recorded message.
     skipped: Vec<(String, GivenAnew)>,
 }
 
@@ -74,10 +74,8 @@ struct Kept {
 }
 
 impl Recording {
-    /// Opens the files of a recording, in order. Those of another one after the first are left out.
-    ///
-    /// # Errors
-    /// A file that cannot be read, or is no recording.
+    /// Opens the files of a recording, in order. Files of a different recording than the first are
+    /// left out.
     pub fn open(paths: &[PathBuf]) -> Result<Self, RecordingError> {
         let mut recording: Option<Self> = None;
         for path in paths {
@@ -101,8 +99,8 @@ impl Recording {
         })
     }
 
-    /// Adds a part. A message that an earlier one has is the same, unless its number was given
-    /// anew: the first message of a generation makes earlier ones void.
+    /// Adds a part. Two messages with the same number are equal, unless the number was reassigned:
+    /// the first message of a generation makes earlier ones void.
     fn add(&mut self, part: Part, places: Places) {
         let number = self.parts.len();
         for (topic, skipped) in &part.skipped {
@@ -147,7 +145,6 @@ impl Recording {
         &self.head
     }
 
-    /// Returns its files.
     pub fn paths(&self) -> impl Iterator<Item = &Path> {
         self.parts.iter().map(|part| part.file.path.as_path())
     }
@@ -201,10 +198,6 @@ impl Recording {
         parts.find_map(|(number, part)| part.file.damage(number == last))
     }
 
-    /// Reads a message.
-    ///
-    /// # Errors
-    /// It was not recorded, cannot be read, or is damaged.
     pub fn read(&mut self, topic: &str, seq: u64) -> Result<Stored, RecordingError> {
         let place = self.places.get(topic).and_then(|places| places.get(&seq));
         let Some(place) = place.copied() else {
@@ -227,9 +220,6 @@ impl Recording {
     }
 
     /// Reads the header of a message.
-    ///
-    /// # Errors
-    /// As [`Recording::read`]; a header that is not of the type.
     pub fn read_header<H: bytemuck::AnyBitPattern>(
         &mut self,
         topic: &str,
@@ -347,7 +337,7 @@ fn stored(
         is_named && message.sequence == entry.seq as u32
     };
     let (exact, bytes) = (exact_channel(name), topic(name)?.header.bytes);
-    // A number that was given anew may be twice in a chunk.
+    // A reassigned number may occur twice in a chunk.
     let is_it = |message: &Message| {
         let item = message.data.get(..size_of::<Item>()).and_then(read::<Item>);
         let is_it = |item: Item| (item.seq, item.generation) == (entry.seq, entry.generation);

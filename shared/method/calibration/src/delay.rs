@@ -21,9 +21,9 @@ pub struct Compared {
     pub other: Option<f64>,
 }
 
-/// Estimates the delay of the stamps of the other sensor, s: the smallest delay at which its
-/// measurements fit about as well as at the best one. `None` where they do not determine it. Speeds
-/// have no bias: `has_bias` is for rates.
+/// Estimates the delay of the stamps of the other sensor, s: the smallest delay that fits the
+/// measurements about as well as the best one. `None` where they do not determine it. Speeds have
+/// no bias: `has_bias` is for rates.
 pub fn delay(motions: &[Compared], has_bias: bool) -> Option<Estimate> {
     let first_ns = motions.first()?.stamp_ns;
     let stamps: Vec<i64> = motions.iter().map(|it| it.stamp_ns).collect();

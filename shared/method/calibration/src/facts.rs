@@ -24,7 +24,7 @@ pub enum Fact {
     EccentricitySin,
     /// Doppler coefficient, s.
     Doppler,
-    /// Share by which the times of rows within a sweep are too short: 0 if they are right.
+    /// Relative shortening of the times of rows within a sweep: 0 if they are right.
     RowTime,
 }
 

@@ -18,7 +18,7 @@ pub enum Kernel {
     /// Dynamic covariance scaling (Agarwal et al., ICRA 2013): weight 1 up to c = phi, then (2 phi
     /// / (phi + c))^2.
     DynamicCovarianceScaling {
-        /// The chi-square up to which a loop keeps its weight.
+        /// A loop keeps its weight up to this chi-square.
         phi: f64,
     },
 }

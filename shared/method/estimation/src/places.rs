@@ -52,7 +52,8 @@
 //!
 //! The smallest correlation of an accepted loop, 0.65, lies between right and wrong ones. The
 //! normalised estimation error squared of these loops is 1.4 to 3.0 of its expectation, with the
-//! scales of the covariance in `research/worlds/methods/simulated-oxford.toml`: they are somewhat overconfident.
+//! scales of the covariance in `research/worlds/methods/simulated-oxford.toml`: they are somewhat
+//! overconfident.
 //!
 //! # Memory
 //! [`PlaceIndex::BYTES_PER_PLACE`] for a keyframe, including [`Descriptor::SIEVE_BYTES`] for the

@@ -8,7 +8,7 @@ use nalgebra::Point2;
 
 use crate::{Evidence, MapError, MapOptions, Overlay, map_png};
 
-/// Odometry's trajectory is drawn if it is somewhere this many cells away from the other one:
+/// Odometry's trajectory is drawn if it is somewhere this many cells away from the corrected one:
 /// nearer lines coincide.
 const APART_CELLS: f64 = 3.0;
 

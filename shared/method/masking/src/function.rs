@@ -17,7 +17,7 @@ use crate::{MaskError, Sweep, compensation::CompensatedRaster};
 /// use gyre_radar::{PointsConfig, PolarScan, RasterConfig};
 /// use ndarray::{Array2, ArrayView2, s};
 ///
-/// /// Masks what is nearer than the bumper.
+/// /// Masks everything nearer than the bumper.
 /// #[derive(Debug)]
 /// struct WithoutBumper;
 ///

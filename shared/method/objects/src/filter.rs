@@ -22,11 +22,11 @@ const TURN_LASTS_S: f64 = 0.5;
 /// Standard deviation of an object's acceleration along its way, m/s²: vehicles brake and
 /// accelerate with 1 to 3.
 const ACCELERATION_MPS2: f64 = 1.5;
-/// Standard deviation of its acceleration across its way beyond that of a turn, m/s²: a lane is
-/// changed with about 1.
+/// Standard deviation of its lateral acceleration beyond the acceleration of a turn, m/s²: a lane
+/// change has about 1.
 const LATERAL_ACCELERATION_MPS2: f64 = 1.0;
 
-/// Distance by which an object that stood may be seen behind its place, m: less than its length.
+/// An object that stood may be detected this far behind its place, m: less than its length.
 const BEHIND_M: f64 = 4.0;
 
 /// Position and velocity with their covariance, by models of different turn rates.
@@ -226,9 +226,9 @@ impl Filter {
         })
     }
 
-    /// Returns the squared Mahalanobis distance of the place at which another one began to drive
-    /// from that of this one, which stood: it came so fast with the usual acceleration. It is
-    /// infinite for one that has yet to come to that place.
+    /// Returns the squared Mahalanobis distance between this object, which stood, and the place
+    /// where the other object began to drive, if that object reached its speed with the usual
+    /// acceleration. It is infinite for one that has yet to come to that place.
     pub fn apart_from_start(&self, started: &Self) -> f64 {
         let velocity = started.velocity();
         let ahead = started.position() - self.position();

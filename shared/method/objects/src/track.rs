@@ -18,9 +18,9 @@ const UNKNOWN_MPS: f64 = 30.0;
 const VELOCITY_SIGMAS: f64 = 2.0;
 /// Standard deviation of the heading that the network gives, rad.
 const HEADING_SIGMA_RAD: f64 = 0.2;
-/// Squared Mahalanobis distance, by place and velocity, between a detection and a prediction, up to
-/// which the two can be one object: more than its own noise, so that an object that brakes hard or
-/// turns off is within it.
+/// Gate on the squared Mahalanobis distance, by place and velocity, between a detection and a
+/// prediction of the same object: wider than its own noise, so that it contains an object that
+/// brakes hard or turns off.
 const GATE: f64 = 50.0;
 /// The score from which on an object that a scan shows is reported.
 const KEEP_SCORE: f64 = 0.0;
@@ -39,12 +39,11 @@ const LOST_S: f64 = 8.0;
 const STOPPED_S: f64 = 60.0;
 /// Speed below which an object that is lost has stopped, m/s.
 const STOPPING_MPS: f64 = 2.0;
-/// Speed up to which an object counts as standing, m/s: the odometry's own error, and what wind
-/// moves.
+/// A slower object counts as standing, m/s: odometry has errors, and wind moves things.
 const STANDING_MPS: f64 = 0.8;
 /// Speed above which its direction is the heading, m/s: below, noise turns it.
 const HEADING_MPS: f64 = 1.0;
-/// Standard deviations by which the speed must exceed that of standing for an object to be moving.
+/// A moving object must exceed the standing speed by this many standard deviations.
 const MOVING_SIGMAS: f64 = 1.0;
 
 /// A vehicle that may be there: its filter, score and identity.
@@ -105,7 +104,7 @@ impl Track {
         self.moving = false;
     }
 
-    /// Returns what it costs that a scan shows it there; `None` outside of its gate.
+    /// Returns the cost of assigning a detection to the track; `None` outside of its gate.
     pub fn cost(&self, detection: &Detection) -> Option<f64> {
         let place = self.filter.innovation(&sighting(detection));
         let variance = (detection.sigma_mps * VELOCITY_SIGMAS).powi(2);
@@ -184,8 +183,8 @@ impl Track {
     }
 
     /// Returns how far from where a lost object would be now a track is that has become an object,
-    /// or from where one that stopped would have begun to drive; `None` if it is another one, as
-    /// what was seen before this one was lost.
+    /// or from where one that stopped would have begun to drive; `None` if it is a different
+    /// object, for example one that was detected before this one was lost.
     pub fn distance(&self, found: &Self) -> Option<f64> {
         let is_along = !self.stopped || self.heading.dot(&found.heading) > 0.0;
         let may_be = self.is_object() && self.lost && found.known_s < self.unseen_s && is_along;

@@ -9,8 +9,8 @@ use crate::detector::{Detection, Detector};
 use crate::track::Track;
 use crate::{Object, ObjectsConfig, ObjectsError, PlacedScan};
 
-/// Likelihood, by the network, from which on a place counts as one of a vehicle that moves: what is
-/// less likely keeps no track alive.
+/// A place counts as part of a moving vehicle from this likelihood of the network on: a less likely
+/// place keeps no track alive.
 const LEAST_LIKELY: f64 = 0.1;
 /// Time between two scans beyond which all tracks end, s: by then a car at walking pace is
 /// elsewhere.

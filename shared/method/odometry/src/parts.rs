@@ -24,7 +24,7 @@ pub trait Refine: Send + Sync {
 /// use gyre_radar::PolarScan;
 /// use ndarray::s;
 ///
-/// /// Masks what is behind the vehicle, where it pulls a trailer.
+/// /// Masks the sector behind the vehicle, which contains its trailer.
 /// struct WithoutTrailer(Box<dyn Mask>);
 ///
 /// impl Mask for WithoutTrailer {

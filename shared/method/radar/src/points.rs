@@ -21,7 +21,7 @@ use peaks::{Beam, Peak};
 use range_cells::RangeCells;
 use serde::{Deserialize, Serialize};
 
-/// Power above the floor at which the weight of a point reaches 1.
+/// The weight of a point is 1 from this power above the floor on.
 pub const WEIGHT_CAP: f32 = 60.0;
 /// The largest [`PointsConfig::capacity`].
 pub const MAX_POINTS: usize = 65_536;

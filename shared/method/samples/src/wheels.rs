@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::{Sample, SampleKind, WheelsConfig, integral::Integrator};
 
-/// Standard deviation of a speed by the step to which it is rounded, m/s.
+/// Standard deviation of a speed by the rounding to a step, m/s.
 const NOISE_MPS: f64 = 0.02;
 /// Standard deviation of the time of a sample against the radar's clock, s.
 const TIME_SIGMA_S: f64 = 0.01;
@@ -62,7 +62,7 @@ impl Wheels {
     pub fn distance(&self) -> Option<WheelDistance> {
         let integral = self.speed.integral()?;
         let of_rolling = self.config.noise_m_per_sqrt_m.powi(2) * integral.sum.abs();
-        // What a speed is rounded by stays while the speed does.
+        // The rounding error of a speed is constant while the speed is constant.
         let by_speed = NOISE_MPS * integral.interval_s;
         let by_time = TIME_SIGMA_S * integral.change;
         // Both ends are anywhere within a tick.

@@ -52,7 +52,7 @@ impl MotionMatch {
 }
 
 /// Factor of the covariance: factor x (1 - score) x inverse curvature of the peak, calibrated like
-/// that of the angle.
+/// the factor of the angle.
 const VARIANCE_SCALE: f64 = 0.015;
 
 /// Finds the shift between two scans whose angle is known (Weston et al., Algorithm 1, lines 16 to

@@ -11,7 +11,7 @@ use crate::figures::all_unusual;
 /// Columns of the names of the lines.
 const NAMES: usize = 12;
 
-/// The way a run has gone, of which all results tell parts.
+/// The text at the end of a run.
 impl Summary {
     /// Returns a line each for the path, its accuracy, the latency, unusual events and the files;
     /// with SLAM one for the loops, and one for a problem.

@@ -18,15 +18,15 @@ pub struct GnssSummary {
     /// The topic in the bag.
     #[serde(skip_serializing_if = "Option::is_none")]
     topic: Option<String>,
-    /// Fixes of the log without those of its faults.
+    /// Fixes of the log without the faulty ones.
     fixes: usize,
     /// The faults of the log.
     faults: GnssFaults,
     /// Fixes before the first keyframe or after the last.
     outside: usize,
-    /// Fixes beside another one that is nearer to the same keyframe.
+    /// Fixes that are farther from their keyframe than a different fix.
     thinned: usize,
-    /// Fixes too far from a keyframe for odometry to say where the vehicle was.
+    /// Fixes too far from a keyframe for odometry to predict the place of the vehicle.
     far: usize,
     /// Fixes that the corrected trajectory is made with.
     used: usize,
@@ -35,8 +35,8 @@ pub struct GnssSummary {
     /// Why none are used.
     #[serde(skip_serializing_if = "Option::is_none")]
     refusal: Option<String>,
-    /// Time by which the fixes are late by their speeds, beyond `gnss.delay_s`, s; `None` where the
-    /// drive does not tell it.
+    /// Delay of the fixes, estimated from their speeds, beyond `gnss.delay_s`, s; `None` if the
+    /// drive does not determine it.
     #[serde(skip_serializing_if = "Option::is_none")]
     delay_s: Option<f64>,
     /// Root mean square of the distances of the used fixes from the corrected trajectory, m.
@@ -82,10 +82,7 @@ impl EastNorth {
 }
 
 impl GnssSummary {
-    /// Takes what the last solution says of the fixes of a log.
-    ///
-    /// # Errors
-    /// Constraints that do not determine the poses.
+    /// Summarises the fixes of a log by the last solution.
     pub fn of(log: &GnssLog, estimator: &mut TrajectoryEstimator) -> Result<Self, EstimationError> {
         let positions = estimator.positions();
         let used = positions.iter().filter(|it| it.weight >= LEAST_WEIGHT);

@@ -6,7 +6,6 @@ use serde::Serialize;
 /// The counts of loops in the summary.
 #[derive(Debug, Default, Serialize)]
 pub struct SlamSummary {
-    /// Keyframes.
     pub keyframes: usize,
     /// Loops that the corrected trajectory is made with.
     pub loops_used: usize,

@@ -4,13 +4,11 @@ use nalgebra::Vector3;
 
 use crate::path::Path;
 
-/// Standard gravity, m/s².
 const GRAVITY_MPS2: f64 = 9.806_65;
 
 /// The mean motion of the vehicle during a time, in its own axes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct MeanMotion {
-    /// Angular velocity, rad/s.
     pub rates_radps: Vector3<f64>,
     /// Acceleration as an accelerometer has it, with gravity: m/s².
     pub acceleration_mps2: Vector3<f64>,

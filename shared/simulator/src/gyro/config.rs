@@ -20,9 +20,6 @@ pub struct SimulatedGyroConfig {
 
 impl SimulatedGyroConfig {
     /// Checks that all values can be simulated.
-    ///
-    /// # Errors
-    /// [`SimulatorError::Config`] with the key of the first value that cannot.
     pub fn validate(&self) -> Result<(), SimulatorError> {
         require_within("gyro.delay_s", self.delay_s, -1e6, 1e6)
     }

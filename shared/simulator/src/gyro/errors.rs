@@ -18,11 +18,11 @@ pub(super) struct Errors {
     step_radps: f64,
     /// Standard deviation of one sample, rad/s.
     noise_radps: f64,
-    /// From the vehicle's axes to those of the gyro as it is mounted, up still up.
+    /// From the vehicle's axes to the axes of the gyro as mounted, up still up.
     mounting: UnitQuaternion<f64>,
     scale: Vector3<f64>,
     bias_radps: Vector3<f64>,
-    /// Share of the drift that is left a sample later, and standard deviation of what is new.
+    /// Share of the drift that remains a sample later, and standard deviation of the added drift.
     kept: f64,
     new_drift_radps: f64,
     drift_radps: Vector3<f64>,

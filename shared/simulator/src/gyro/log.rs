@@ -12,7 +12,7 @@ use crate::path::Path;
 
 /// The file beside the scans.
 pub(crate) const FILE: &str = "imu.csv";
-/// The first row of the file: that of the log of RADIATE.
+/// The first row of the file, as in the log of RADIATE.
 const HEADER: &str =
     "stamp_ns,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_mps2,accel_y_mps2,accel_z_mps2";
 
@@ -42,7 +42,7 @@ pub(crate) fn samples(
     Some((0..count).filter_map(sample).collect())
 }
 
-/// The samples as CSV: the numbers read from it are those of the samples.
+/// The samples as CSV: a reader gets exactly the numbers of the samples.
 pub(crate) fn csv(samples: &[Sample]) -> Vec<u8> {
     let mut text = format!("{HEADER}\n");
     for sample in samples {

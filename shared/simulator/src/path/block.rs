@@ -106,7 +106,7 @@ fn bend_heading(share: f64) -> f64 {
     FRAC_PI_2 * gained / area
 }
 
-/// Distance from a corner at which its bend begins, metres.
+/// Distance from a corner to the start of its bend, metres.
 fn bend_footprint() -> f64 {
     let count = (BEND_M / STEP_M) as usize;
     let step = BEND_M / count as f64;

@@ -31,10 +31,6 @@ pub struct Excerpt {
 ///
 /// The path passes within 5 cm of 95 % of a real drive's poses and within 10 cm of 99 %; the rest
 /// is noise of the poses.
-///
-/// # Errors
-/// [`SimulatorError::Trajectory`] if the file cannot be read; [`SimulatorError::Drive`] if the
-/// excerpt has fewer than two poses, jumps, pauses for hours, or does not move forward.
 pub fn read(path: &Path, excerpt: Excerpt) -> Result<SplinePath, SimulatorError> {
     let poses = timed(path, excerpt.rate_hz)?;
     let error = |reason: String| SimulatorError::Drive {

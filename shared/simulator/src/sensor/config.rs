@@ -54,9 +54,6 @@ pub struct SensorConfig {
 
 impl SensorConfig {
     /// Checks that all values can be simulated.
-    ///
-    /// # Errors
-    /// [`SimulatorError::Config`] with the key of the first value that cannot.
     pub fn validate(&self) -> Result<(), SimulatorError> {
         let sampling = self.sampling();
         let (bins, azimuths) = (sampling.bins as f64, sampling.azimuths as f64);

@@ -14,7 +14,6 @@ pub(super) const NEGLIGIBLE_POWER: f64 = 0.05;
 /// Minimum range of scatterers, metres.
 const NEAREST_M: f64 = 0.5;
 
-/// An echo.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Echo {
     /// Position at the middle of the sweep, world frame.
@@ -23,7 +22,7 @@ pub(super) struct Echo {
     pub velocity: Vector2<f64>,
     /// Amplitude on the beam's axis: the square root of the received power.
     pub amplitude: f64,
-    /// The azimuth at which the beam passes it, with fractions.
+    /// The azimuth when the beam passes it, with fractions.
     pub azimuth: f64,
 }
 

@@ -1,4 +1,4 @@
-//! The sensor's pose at each azimuth of a sweep, and the times at which its beam passes a place.
+//! The sensor's pose at each azimuth of a sweep, and the times when its beam passes a place.
 
 use std::f64::consts::TAU;
 
@@ -84,7 +84,6 @@ impl SweepPoses {
         self.at((self.azimuths / 2) as f64)
     }
 
-    /// Azimuths of the sweep.
     pub fn azimuths(&self) -> usize {
         self.azimuths
     }
@@ -94,7 +93,7 @@ impl SweepPoses {
         self.step_rad
     }
 
-    /// Visits the azimuths, with fractions, at which the beam passes an object at
+    /// Visits the azimuths, with fractions, where the beam passes an object at
     /// `place(azimuth_pose)`: usually once, twice or never near the sweep's seam if the vehicle
     /// turns, and up to [`MARGIN`] azimuths outside the sweep.
     pub fn beam_passes(

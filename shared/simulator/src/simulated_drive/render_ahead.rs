@@ -49,7 +49,7 @@ struct Shared {
     changed: Condvar,
 }
 
-/// The scans that are rendered, and what is next.
+/// The rendered scans, and the next scans to render and to read.
 #[derive(Default)]
 struct Queue {
     /// All images.

@@ -96,14 +96,13 @@ pub(crate) fn locate(root: &Path, forced: Option<Format>) -> Result<Found, OpenE
     })
 }
 
-/// Returns whether images have times in their rows where those of the format have none, or none
-/// where they have.
+/// Returns whether the presence of row times in the images differs from the format.
 fn is_other_form(format: Format, image: &FirstImage) -> bool {
     let has_stamps = !matches!(format, Format::Mulran | Format::Radiate);
     image.has_stamps() != has_stamps
 }
 
-/// Returns whether both the names of images and the files beside them are those of another format.
+/// Returns whether both the names of images and the files beside them belong to a different format.
 /// A recording of one's own may differ in either.
 fn is_marked_otherwise(format: Format, image: &FirstImage, root: &Path, folder: &Path) -> bool {
     let names = Profile::of(format)
@@ -112,7 +111,7 @@ fn is_marked_otherwise(format: Format, image: &FirstImage, root: &Path, folder: 
     let is_named_otherwise =
         names.is_some() && image.named_by().is_some_and(|by| names != Some(by));
     let is_boreas = matches!(format, Format::Boreas | Format::BoreasRt);
-    // The names of folders say less: `navtech` may hold anything.
+    // The names of folders are weaker evidence: `navtech` may hold anything.
     let has_oxford_files = by_layout(root, folder) == Some(Format::Oxford);
     let by_files = has_oxford_files && format != Format::Oxford;
     is_named_otherwise && (by_files || (has_boreas_folders(root) && !is_boreas))
@@ -148,7 +147,7 @@ fn check_folder(root: &Path) -> Result<(), OpenError> {
     }
 }
 
-/// Returns the folder that holds the images: that of a known layout, otherwise the root.
+/// Returns the folder of the images: the folder of a known layout, otherwise the root.
 fn find_folder(root: &Path, forced: Option<Format>) -> Result<PathBuf, OpenError> {
     let known = || {
         KNOWN

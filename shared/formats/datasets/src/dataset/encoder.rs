@@ -93,7 +93,7 @@ impl EncoderStep {
         })
     }
 
-    /// Returns the counts per turn with which the step over the seam is as the others.
+    /// Returns the counts per turn that make the step over the seam equal to the others.
     pub(crate) fn size(self) -> Option<u16> {
         u16::try_from(self.span + u32::from(self.step)).ok()
     }

@@ -1,4 +1,4 @@
-//! Errors of datasets. Each message says what is wrong, where, and what to do.
+//! Errors of datasets. Each message names the fault, its place and the remedy.
 
 use std::path::PathBuf;
 

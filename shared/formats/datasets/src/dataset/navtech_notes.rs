@@ -1,4 +1,4 @@
-//! Sentences on what the first image of Navtech scans shows.
+//! Sentences on the properties of the first image of Navtech scans.
 
 use super::first_image::FirstImage;
 use super::format::Format;

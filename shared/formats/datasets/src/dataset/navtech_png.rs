@@ -9,7 +9,6 @@ use super::options::AzimuthSource;
 use super::stamp;
 use gyre_radar::scan::{check_sweep, flag};
 
-/// Metadata bytes per row.
 pub(crate) const METADATA_BYTES: usize = 11;
 /// Minimum share of consecutive rows that differ in byte 10 if it is the direction of the chirp.
 const ALTERNATING_SHARE: f64 = 0.9;
@@ -73,7 +72,6 @@ pub(crate) fn chirps_alternate(bytes_ten: impl Iterator<Item = u8>) -> bool {
 pub(crate) enum ByteTen {
     /// 255: measured; otherwise interpolated from the neighbours.
     Validity,
-    /// Unused.
     Unused,
 }
 

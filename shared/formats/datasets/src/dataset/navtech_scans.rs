@@ -29,7 +29,6 @@ pub(crate) struct NavtechScans {
     format: Format,
     profile: Profile,
     period_ns: i64,
-    /// The longest plausible sweep.
     max_sweep_ns: i64,
     /// True if the names of the files are times of their sweeps.
     named_by_time: bool,
@@ -102,8 +101,8 @@ impl NavtechScans {
         Ok(scans)
     }
 
-    /// Takes the size of the encoder that the first images show, unless it is the usual one. Only
-    /// says what the first image shows if that took less or more than a turn.
+    /// Takes the size of the encoder that the first images show, unless it is the usual one. If the
+    /// first image took less or more than a turn, the size is only reported.
     fn find_encoder(&mut self, first_image: &FirstImage, turn_ns: Option<i64>) {
         let usual = self.profile.encoder_counts;
         match encoder_counts(&[first_image.turn()], turn_ns, usual) {

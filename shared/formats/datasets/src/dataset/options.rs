@@ -80,9 +80,6 @@ pub struct DatasetOptions {
 
 impl DatasetOptions {
     /// Rejects values out of bounds.
-    ///
-    /// # Errors
-    /// The first of them.
     pub fn check(&self) -> Result<(), OpenError> {
         let checks = [
             (
@@ -124,7 +121,7 @@ impl DatasetOptions {
         })
     }
 
-    /// Returns these options, with those of `other` where these are not set.
+    /// Returns these options; `other` supplies the ones that are not set.
     #[must_use]
     pub fn or(self, other: &Self) -> Self {
         Self {

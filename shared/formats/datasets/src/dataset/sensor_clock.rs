@@ -12,7 +12,7 @@ const TOUCHING_NS: f64 = 1_000.0;
 const PROMPT_SHARE: f64 = 0.25;
 /// One time in so many may be early, and one more.
 const TIMES_PER_EARLY: usize = 30;
-/// Minimum number of times of which one can be told to be early.
+/// Minimum number of times for the detection of an early one.
 const MIN_TIMES: usize = 8;
 
 /// The number of a scan, and when it was received, ns.
@@ -65,7 +65,7 @@ impl SensorClock {
         })
     }
 
-    /// Fits as [`SensorClock::below`], but without times that are early, of which a few may be: one
+    /// Fits as [`SensorClock::below`], but without a few times that are early: a single early time
     /// would bend the whole series. Returns these too.
     pub(crate) fn below_most(
         received: &[Receipt],

@@ -55,7 +55,8 @@ pub(crate) struct TransposedScans {
     doppler_s: f32,
     azimuth_eccentricity_rad: f32,
     scratch: Vec<u8>,
-    /// Without angles nothing else tells that the host has lost azimuths; `None`: they are ignored.
+    /// Without angles, only stale rows show that the host has lost azimuths; `None`: they are
+    /// ignored.
     pub(crate) stale: Option<StaleRows>,
 }
 

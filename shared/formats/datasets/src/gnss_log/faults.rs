@@ -13,7 +13,7 @@ use crate::{
 const MAX_SPEED_MPS: f64 = 70.0;
 /// A step of fixes by less is noise, m.
 const SLACK_M: f64 = 10.0;
-/// The stated accuracy, in standard deviations, by which a step may be longer.
+/// A step may be longer by this many stated standard deviations.
 const SLACK_SIGMAS: f64 = 5.0;
 /// No receiver measures better than 1 cm with the phase of the carrier, nor is a fix compared with
 /// the radar's place better than that: within 1 ms a car drives a centimetre.
@@ -23,10 +23,10 @@ const MOST_SIGMA_M: f64 = 1e6;
 /// Stretches between jumps that are looked back over: behind so many the fixes are noise.
 const LOOK_BACK: usize = 200;
 
-/// Faults of a log. What is counted is not among its fixes, but what came out of order.
+/// Faults of a log. Counted fixes are left out unless the count states otherwise.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct GnssFaults {
-    /// Rows that are none of the table, as one that was cut off.
+    /// Rows that do not fit the table, such as a truncated row.
     pub unreadable: usize,
     /// Line (of a folder of files: number) of the first of them.
     #[serde(skip_serializing_if = "is_zero")]
@@ -39,12 +39,12 @@ pub struct GnssFaults {
     pub off_the_earth: usize,
     /// Fixes at latitude 0, longitude 0: what receivers write without a fix.
     pub zero: usize,
-    /// Fixes with the stamp of another one.
+    /// Fixes with a repeated stamp.
     pub repeated: usize,
     /// Fixes at the very place of the fix before, as of a frozen receiver or a standing vehicle:
     /// only the first is used.
     pub frozen: usize,
-    /// Fixes with a stamp before that of an earlier one: sorted.
+    /// Fixes with a stamp before an earlier one: sorted.
     pub out_of_order: usize,
     /// Fixes whose status the receiver does not state: used.
     pub of_unknown_status: usize,
@@ -84,7 +84,7 @@ impl GnssFaults {
         format!("none of its {all} entries is a usable fix{named}")
     }
 
-    /// Returns the counts that are not zero, with what was counted.
+    /// Returns the counts that are not zero, with their names.
     pub fn named(&self) -> Vec<(usize, &'static str)> {
         let all = [
             (self.unreadable, "unreadable"),
@@ -106,7 +106,7 @@ impl GnssFaults {
 /// The fixes that can be used, the plane that they are in, and the faults.
 type Examined = (Vec<LoggedFix>, Option<LocalPlane>, GnssFaults);
 
-/// Leaves out and sorts what the faults name, and counts it.
+/// Removes and sorts faulty fixes, and counts them.
 pub(super) fn examine(raw: Raw<RawFix>, is_plane: bool) -> Examined {
     let mut faults = GnssFaults {
         unreadable: raw.unreadable.count,
@@ -150,7 +150,7 @@ fn leave_out(rows: &mut Vec<RawFix>, is_bad: impl Fn(&RawFix) -> bool) -> usize 
     before - rows.len()
 }
 
-/// Sorts fixes by their stamps, each of which is used once: the one that was written first.
+/// Sorts fixes by their stamps. Of fixes with the same stamp only the first in the log is used.
 fn sort(rows: &mut Vec<RawFix>, faults: &mut GnssFaults) {
     let before = rows.len();
     let mut latest_ns = i64::MIN;

@@ -32,9 +32,6 @@ impl ReceivedFixes {
     }
 
     /// Reads the rows that were appended since.
-    ///
-    /// # Errors
-    /// A file that cannot be read, or is no log of fixes.
     pub fn read_on(&mut self) -> Result<(), LogError> {
         let path = || self.path.clone();
         let bytes = self.appended();

@@ -43,7 +43,6 @@ const STATUS_UNKNOWN: &str = "-2";
 
 /// The remedy for a line of a trajectory.
 const TUM: &str = "a line has seconds, x and y, with spaces between";
-/// The remedy, for messages.
 const REMEDY: &str = "the first row must name the columns, as in `stamp_ns,latitude_deg,longitude_deg,sigma_m` or `stamp_ns,east_m,north_m,sigma_m` (also stamp_us, stamp_s)";
 
 /// Where a table has what.
@@ -62,9 +61,8 @@ pub(super) struct FixColumns {
 #[derive(Clone)]
 enum Sigma {
     None,
-    /// Standard deviations, of which the mean square counts.
+    /// Standard deviations; their mean square is used.
     Deviations([usize; 2]),
-    /// Variances.
     Variances([usize; 2]),
 }
 

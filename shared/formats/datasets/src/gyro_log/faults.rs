@@ -14,7 +14,7 @@ use gyre_samples::{Sample, SampleKind};
 
 /// Rates beyond this one are no vehicle's, rad/s.
 const ABSURD_RADPS: f64 = 10.0;
-/// Share of absurd rates above which the unit must be another one.
+/// If the share of absurd rates is larger, the unit must be different.
 pub(crate) const ABSURD_SHARE: f64 = 0.01;
 /// Longest time between two samples that is no gap, median periods, whatever stamps round to.
 const GAP_PERIODS: f64 = 3.0 + 1e-6;
@@ -22,10 +22,10 @@ const GAP_PERIODS: f64 = 3.0 + 1e-6;
 /// Counters of 32 bits overflow after so long, if they count ns, µs or ms, s.
 const OVERFLOWS_S: [f64; 3] = [4.294967296, 4294.967296, 4294967.296];
 
-/// Faults of a log. What is counted as left out is not in its samples.
+/// Faults of a log. Its samples do not include the ones counted as left out.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct LogFaults {
-    /// Rows that are none of the table, as one that was cut off: left out.
+    /// Rows that do not fit the table, such as a truncated row: left out.
     pub unreadable: usize,
     /// Line (of a folder of files: number) of the first of them.
     pub first_unreadable: usize,
@@ -35,9 +35,9 @@ pub struct LogFaults {
     pub absurd: usize,
     /// Samples that come in bursts of one stamp: spread over the time since the burst before.
     pub spread: usize,
-    /// Samples with the stamp of another one: left out.
+    /// Samples with a repeated stamp: left out.
     pub repeated: usize,
-    /// Samples with a stamp before that of an earlier one: sorted.
+    /// Samples with a stamp before an earlier one: sorted.
     pub out_of_order: usize,
     /// Samples of times for which the clock was set back, by up to a second: left out.
     pub measured_twice: usize,
@@ -187,7 +187,7 @@ pub(super) const RATES: Plausible = Plausible {
     beyond: "have rates beyond 10 rad/s, at which no vehicle turns: if they are in deg/s, name the columns so, as gyro_z_degps",
 };
 
-/// Leaves out and sorts what the faults name, and counts it.
+/// Removes and sorts faulty samples, and counts them.
 pub(crate) fn examine(
     raw: Raw<Sample>,
     unit_is_assumed: bool,

@@ -6,9 +6,9 @@ use super::{Report, some};
 use crate::dataset::Dataset;
 use gyre_radar::median;
 
-/// Interval on the used clock from which on scans are missing, periods.
+/// A longer interval on the used clock means missing scans, periods.
 const GAP_PERIODS: f64 = 1.5;
-/// Logged interval from which on the host has stalled, periods.
+/// A longer logged interval means that the host has stalled, periods.
 const STALL_PERIODS: f64 = 1.4;
 /// Maximum interval while the host catches up after a stall, periods.
 const CATCH_UP_PERIODS: f64 = 0.97;
@@ -28,13 +28,12 @@ pub(super) struct Timing {
     jitter_s: f64,
     /// Maximum and minimum logged interval, s.
     logged_interval_s: (f64, f64),
-    /// Number of missing scans.
     missing_scans: usize,
     /// Missing scans.
     gaps: Vec<Gap>,
     /// Stalls of the host: stamps were logged late, but no scan is missing.
     stalls: Vec<Stall>,
-    /// Scans whose logged stamp is before that of the previous scan.
+    /// Scans whose logged stamp is before the stamp of the previous scan.
     backwards: Vec<usize>,
 }
 
@@ -43,7 +42,6 @@ pub(super) struct Timing {
 pub(super) struct Gap {
     /// The first scan after the gap.
     scan: usize,
-    /// Number of missing scans.
     missing: usize,
     /// Time between the scans before and after the gap, s.
     seconds: f64,

@@ -14,21 +14,20 @@ use crate::{
     table::{Columns, Rows},
 };
 
-/// Shortest time over which a speed is that of two counts: over less, ticks are too coarse.
+/// Shortest time between the two counts of a speed: over less, ticks are too coarse.
 const SPAN_NS: i64 = 90_000_000;
 
 /// Names of the ticks of one wheel, or of an axle.
 const TICKS: [&str; 4] = ["ticks", "pulses", "wheel_ticks", "encoder_ticks"];
-/// Those of two wheels of an axle, whose mean counts.
+/// Names of the ticks of two wheels of an axle; their mean is used.
 const LEFT_AND_RIGHT: [[&str; 2]; 3] = [
     ["left_ticks", "right_ticks"],
     ["ticks_left", "ticks_right"],
     ["left_count", "right_count"],
 ];
-/// Names of the metres.
 const METRES: [&str; 3] = ["distance_m", "odometer_m", "mileage_m"];
 
-/// Any count: what is plausible are the speeds.
+/// Any count is plausible: only speeds are checked.
 const COUNTS: Plausible = Plausible {
     of: SampleKind::Wheels,
     values: 2,
@@ -77,11 +76,7 @@ impl Columns for CountColumns {
 }
 
 /// Makes speeds of counts: each is the mean of the time between two, and has the stamp of its
-/// middle. Speeds that no vehicle has, as where a counter starts anew, are left out.
-///
-/// # Errors
-/// Ticks whose length is not given, stamps that cannot be those of a sensor, and speeds of which
-/// many are those of no vehicle.
+/// middle. Speeds that no vehicle has, as after a reset of the counter, are left out.
 pub(super) fn speeds(
     rows: Rows<CountColumns>,
     path: &Path,

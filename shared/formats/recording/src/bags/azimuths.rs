@@ -42,11 +42,7 @@ pub(crate) fn described(form: Form, message: &Message) -> Result<Described, Stri
     }
 }
 
-/// Calls `each` with the azimuths in a message of a topic of scans, and the times at which they
-/// were received, ns.
-///
-/// # Errors
-/// A message that is not of its type, as a clause.
+/// Calls `each` with the azimuths in a message of a scan topic and their receive times, ns.
 pub(crate) fn azimuths(
     kind: Kind,
     message: &Message,
@@ -86,8 +82,7 @@ pub(crate) fn azimuths(
     Ok(())
 }
 
-/// Returns when the driver received what is in a message; when the bag did, if the driver does not
-/// say.
+/// Returns when the driver received the content of a message, or else when the bag received it.
 fn received_ns(header: &Header, message: &Message) -> i64 {
     match header.stamp.ns() {
         0 => message.log_ns,

@@ -65,9 +65,6 @@ impl Bag {
     /// Opens the files, and learns all channels. Without a description they are in the order of
     /// their first messages: names do not give it, since tools number parts in several ways, and a
     /// folder may have several bags.
-    ///
-    /// # Errors
-    /// A file cannot be read, or files are of the same time.
     pub fn open(path: &Path, files: &Files) -> Result<Self, RecordingError> {
         let timed = files.paths.iter().map(|path| timed(path));
         let mut timed = timed.collect::<Result<Vec<Timed>, _>>()?;
@@ -111,9 +108,7 @@ impl Bag {
 
     /// Returns the messages of a span that are wanted.
     ///
-    /// # Errors
-    /// A file that cannot be read, or whose messages are compressed. A damaged span has none, and
-    /// counts as damage of its file.
+    /// A damaged span is not an error: it counts as damage of its file.
     pub fn read(
         &mut self,
         span: u32,
@@ -139,11 +134,7 @@ impl Bag {
         Ok((0..).zip(messages).map(key).collect())
     }
 
-    /// Calls `each` with the messages that are wanted, in the order in which they were received,
-    /// until it returns false.
-    ///
-    /// # Errors
-    /// As [`Bag::read`].
+    /// Calls `each` with the wanted messages in the order of reception, until it returns false.
     pub fn read_in_order(
         &mut self,
         wanted: impl Fn(&Channel) -> bool,
@@ -176,8 +167,8 @@ impl Bag {
         files.flat_map(|file| file.channels.values()).collect()
     }
 
-    /// Describes the radar: by its first configuration, otherwise by what its azimuths and the
-    /// options show. Also returns what is to be said of that.
+    /// Describes the radar by its first configuration, or else by its azimuths and the options.
+    /// Also returns notes on the description.
     pub fn describe(
         &mut self,
         topics: &Topics,
@@ -235,8 +226,7 @@ impl Bag {
         Ok((survey, own))
     }
 
-    /// Returns what a message says of the radar, if it is of that topic, or why that cannot be
-    /// used.
+    /// Returns the configuration of the radar in a message of that topic, or why it is unusable.
     fn configuration(
         &self,
         span: u32,
@@ -268,7 +258,7 @@ fn timed(path: &Path) -> Result<Timed, RecordingError> {
     }
     if file.channels.is_empty() || !file.damage.is_empty() {
         for span in &found.messages {
-            // What is damaged has no channels.
+            // Damaged spans have no channels.
             let _ = file.read(span.span, |_| false);
         }
     }
@@ -315,7 +305,7 @@ pub(crate) enum RadarOrigin {
 /// The source of the encoder counts per turn.
 pub(crate) enum CountsOrigin {
     Configured,
-    /// The radar's own, or those of most radars.
+    /// The radar's own counts, or the usual ones of most radars.
     Usual,
     /// The azimuths, which are no turn with the usual ones.
     Azimuths {

@@ -91,9 +91,6 @@ pub(crate) struct Files {
 }
 
 /// Returns the files of a bag.
-///
-/// # Errors
-/// A bag that is not of MCAP files, or that is compressed as a whole.
 pub(crate) fn files(path: &Path) -> Result<Files, RecordingError> {
     let is_described = path.is_dir() && has_metadata(path);
     let paths = match path.is_dir() {

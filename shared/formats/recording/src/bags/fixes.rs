@@ -8,7 +8,7 @@ use gyre_samples::{BagFixes, RawFix};
 
 use crate::bags::{Message, RecordingError, bag::Bag, files::files, sensors::Sensor};
 
-/// A message has a fix, or says that there is none.
+/// A message has a fix, or reports that there is no fix.
 const RECEIVER: Sensor<Option<RawFix>> = Sensor {
     section: "gnss",
     measurements: "fixes of a GNSS receiver",
@@ -17,10 +17,6 @@ const RECEIVER: Sensor<Option<RawFix>> = Sensor {
 
 /// Reads the fixes of a bag without its scans, on the topic of this name, else on the only topic of
 /// such messages. `None` without such a topic.
-///
-/// # Errors
-/// No topic of this name, several without one, messages that cannot be decoded, or a bag that
-/// cannot be read.
 pub fn fixes(path: &Path, topic: Option<&str>) -> Result<Option<BagFixes>, OpenError> {
     let mut bag = Bag::open(path, &files(path)?)?;
     Ok(read(&mut bag, path, topic)?)

@@ -1,4 +1,4 @@
-//! The description of a radar: its own in the bag, or what its azimuths show of it.
+//! The description of a radar, by its configuration in the bag or by its azimuths.
 
 use std::path::Path;
 
@@ -18,7 +18,7 @@ use crate::bags::{
 
 /// Encoder counts of Navtech's radars.
 pub(crate) const ENCODER_COUNTS: u16 = 5600;
-/// Azimuths from which the number of a turn and the size of the encoder are told: several turns.
+/// Azimuths, several turns, that determine the number per turn and the size of the encoder.
 pub(crate) const MAX_SAMPLES: usize = 2000;
 /// The rotation of Navtech's radars, turns per 1000 s, where the times do not show it.
 const ROTATION_MHZ: u16 = 4000;
@@ -90,9 +90,6 @@ impl Survey {
     }
 
     /// Describes a radar of this depth of a range bin, m, and these encoder counts per turn.
-    ///
-    /// # Errors
-    /// The depth of a bin is not known, or nothing is shown.
     pub fn describe(
         &self,
         path: &Path,
@@ -124,9 +121,9 @@ impl Survey {
         })
     }
 
-    /// Returns the encoder counts of a turn that the azimuths show, if `usual` is not them. Where
-    /// no times show that a turn is whole it may lack a blanked sector: then `usual` is believed if
-    /// the radar has said it itself, `is_said`.
+    /// Returns the encoder counts of a turn that the azimuths show, if `usual` is not them. Without
+    /// times, a turn may lack a blanked sector: then `usual` is used if the radar itself sent it
+    /// (`is_said`).
     pub fn other_counts(&self, usual: u16, is_said: bool) -> Option<u16> {
         let rows = self
             .samples
@@ -152,7 +149,7 @@ impl Survey {
             EncoderTurn::new(counts, |row| rows.get(row)?.1.checked_mul(unit_ns))
         };
         let turns: Vec<EncoderTurn> = whole.iter().map(turn).collect();
-        // The last step of a turn may be another one.
+        // The last step of a turn may differ.
         let is_other = |counts: &u16| counts.abs_diff(usual) > usual / 50;
         encoder_counts(&turns, turn_ns, usual).filter(is_other)
     }
@@ -172,7 +169,7 @@ impl Survey {
         Some((usize::from(encoder_size) + step / 2) / step)
     }
 
-    /// Returns the rotation from the times at which messages were received.
+    /// Returns the rotation from the receive times of messages.
     fn rotation_mhz(&self, azimuths: usize) -> u16 {
         let measured = || {
             let (first, last) = (self.samples.first()?, self.samples.last()?);
@@ -192,7 +189,7 @@ impl Survey {
     }
 }
 
-/// Returns the unit of the times of rows in which turns take the time of one, and that, ns.
+/// Returns the unit of row times that gives a plausible duration of a turn, and this duration, ns.
 fn turn_time(turns: &[&[RowShown]]) -> Option<(i64, i64)> {
     let starts = turns.iter().filter_map(|rows| Some(rows.first()?.1));
     [1, 1_000, 1_000_000].into_iter().find_map(|unit_ns| {

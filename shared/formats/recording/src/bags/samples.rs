@@ -31,9 +31,6 @@ const WHEELS: Sensor<Sample> = Sensor {
 ///
 /// The topic of the wheels must be named: odometry may be of anything, as the radar's own in a bag
 /// that Gyre has exported.
-///
-/// # Errors
-/// As [`Sensor::read`].
 pub(crate) fn read(
     bag: &mut Bag,
     path: &Path,

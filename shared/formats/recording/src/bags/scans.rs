@@ -29,18 +29,12 @@ use index::{Entry, Index};
 use notes::notes;
 
 /// Opens the scans in a bag.
-///
-/// # Errors
-/// It has no scans, or cannot be read; options that it cannot be read with.
 pub fn open(path: &Path, options: &DatasetOptions) -> Result<Box<dyn Dataset>, OpenError> {
     options.check()?;
     open_files(path, &files(path)?, options)
 }
 
 /// Opens the scans in a bag again, with the files that it had.
-///
-/// # Errors
-/// As [`open`].
 pub fn reopen(
     path: &Path,
     options: &DatasetOptions,

@@ -28,10 +28,6 @@ pub(crate) struct Measured<T> {
 impl<T> Sensor<T> {
     /// Reads all measurements on the topic of this name, else on the only topic of the sensor's
     /// types. `None` without such a topic. Damaged parts of the bag are skipped, as for scans.
-    ///
-    /// # Errors
-    /// No topic of this name, several without one, messages that cannot be decoded, or a file that
-    /// cannot be read.
     pub fn read(
         &self,
         bag: &mut Bag,

@@ -7,7 +7,7 @@ use crate::{
     file::{McapFile, Span, Times, joined},
 };
 
-/// The size from which on records outside of chunks are a span of their own, bytes.
+/// Records outside of chunks form a span of their own from this size on, bytes.
 const PLAIN_BYTES: u64 = 4 << 20;
 
 /// The spans of a file: chunks, or records that are read together.
@@ -23,7 +23,7 @@ pub(crate) struct Spans {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct TimedSpan {
     pub span: Span,
-    /// The first and last time at which a message in it was received.
+    /// The receive times of its first and last message.
     pub times_ns: Times,
 }
 

@@ -1,4 +1,4 @@
-//! The topics of a bag that are a radar's, told by their types.
+//! The topics of a radar in a bag, recognised by their types.
 
 use std::{collections::BTreeSet, path::Path};
 
@@ -9,7 +9,6 @@ use crate::bags::{Channel, RecordingError};
 /// The content of a topic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Kind {
-    /// Azimuths.
     Azimuths(Form),
     /// Whole turns, with encoder values and times.
     BScans,
@@ -77,11 +76,8 @@ pub(crate) struct Topics {
 }
 
 impl Topics {
-    /// Chooses the topic of scans, `wished` if it is named, and that of the radar's configuration
-    /// nearest to it.
-    ///
-    /// # Errors
-    /// There is none, or one of several must be chosen.
+    /// Chooses the topic of scans, `wished` if it is named, and the nearest topic of the radar's
+    /// configuration.
     pub fn choose(
         path: &Path,
         channels: &[&Channel],
@@ -122,8 +118,8 @@ impl Topics {
     }
 }
 
-/// Returns the topics from which one is chosen. Images are of many sensors: only those that the
-/// driver names so are a radar's, unless one is named.
+/// Returns the candidate topics. Images are of many sensors: only those that the driver names so
+/// are a radar's, unless one is named.
 fn candidates<'a>(topics: &'a BTreeSet<Topic>, wished: Option<&str>) -> Vec<&'a Topic> {
     let scans = || topics.iter().filter(|topic| topic.has_scans());
     if let Some(wished) = wished {

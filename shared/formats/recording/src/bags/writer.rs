@@ -62,9 +62,6 @@ struct Written {
 
 impl BagWriter {
     /// Begins a bag, which must not exist.
-    ///
-    /// # Errors
-    /// It exists, or cannot be written.
     pub fn create(path: &Path) -> Result<Self, RecordingError> {
         require_new(path)?;
         let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -110,10 +107,6 @@ impl BagWriter {
         })
     }
 
-    /// Adds a topic.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
     pub fn topic<T: Ros2Message>(
         &mut self,
         name: &str,
@@ -147,9 +140,6 @@ impl BagWriter {
     }
 
     /// Writes a message that was received at `log_ns`, ns since 1970.
-    ///
-    /// # Errors
-    /// A message that cannot be encoded, or a file that cannot be written.
     pub fn write<T: Ros2Message>(
         &mut self,
         topic: &Topic<T>,
@@ -180,9 +170,6 @@ impl BagWriter {
     }
 
     /// Ends the bag, and gives it its name.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
     pub fn finish(mut self) -> Result<(), RecordingError> {
         let path = self.path.clone();
         let failed = |error: &dyn std::fmt::Display| unwritable(&path, error.to_string());
@@ -217,8 +204,8 @@ impl Drop for BagWriter {
     }
 }
 
-/// Creates the file of a bag that is not complete, and the folder of both where `aside` is another
-/// one; `None` while another command writes the bag.
+/// Creates the file of an incomplete bag, and the folder of both where `aside` is a different one;
+/// `None` while another command writes the bag.
 fn create_aside(aside: &Path, file: &Path) -> io::Result<Option<File>> {
     // Locked until it is removed, so that no other command takes it for its own.
     let left_over = try_lock_existing(file);
@@ -247,7 +234,7 @@ fn require_new(path: &Path) -> Result<(), RecordingError> {
     }
 }
 
-/// Removes what an earlier writer left. What cannot be removed shows when it is created anew.
+/// Removes the leftovers of an earlier writer. If the removal fails, the next creation reports it.
 fn remove(aside: &Path) {
     let _ = fs::remove_dir_all(aside).or_else(|_| fs::remove_file(aside));
 }

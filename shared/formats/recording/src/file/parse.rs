@@ -9,9 +9,6 @@ use mcap::{
 
 /// Parses a header, a schema, a channel, a message or metadata. All other records are
 /// [`Record::Unknown`].
-///
-/// # Errors
-/// The bytes end before the record does.
 pub(crate) fn parse(opcode: u8, body: &[u8]) -> Result<Record<'_>, McapError> {
     let parsed = [
         op::HEADER,
@@ -33,8 +30,8 @@ pub(crate) fn parse(opcode: u8, body: &[u8]) -> Result<Record<'_>, McapError> {
     }
 }
 
-/// Returns the fields that a record consists of; those of a message come before its content. `None`
-/// for an opcode that MCAP does not have.
+/// Returns the fields of a record; the fields of a message come before its content. `None` for an
+/// opcode that MCAP does not have.
 pub(super) fn fields(opcode: u8) -> Option<&'static [Field]> {
     use Field::{Bytes, Long, Map, Text};
     Some(match opcode {
@@ -108,7 +105,7 @@ pub(super) enum Field {
 }
 
 impl Field {
-    /// Goes on behind the field; `None` if the bytes end in it.
+    /// Continues behind the field; `None` if the bytes end in it.
     fn skip(self, rest: &mut &[u8]) -> Option<()> {
         match self {
             Self::Bytes(bytes) => *rest = rest.get(bytes..)?,

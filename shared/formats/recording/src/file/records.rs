@@ -15,11 +15,9 @@ const MAX_RECORD_BYTES: usize = 128 << 20;
 const MAX_KEPT_BYTES: usize = 256 << 20;
 
 /// Calls `keep` with all records in the bytes of a file, of chunks with those in them. It returns
-/// the bytes of memory in which it keeps something of the record. Their checksums are compared.
+/// the bytes of memory that it uses for the record. Their checksums are compared.
 ///
-/// # Errors
-/// The bytes are damaged, or have more than a scan and its rasters take. Records at the end that
-/// are not whole are none.
+/// Incomplete records at the end are ignored.
 pub(super) fn records(
     mut bytes: &[u8],
     mut keep: impl FnMut(Record<'_>) -> usize,

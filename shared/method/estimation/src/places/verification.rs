@@ -69,8 +69,8 @@ pub struct LoopVerifier {
 }
 
 impl LoopVerifier {
-    /// Plans registrations of keyframes of at most `capacity` points. `refinement` is that of the
-    /// odometry: its cells and reach, and the scales of its covariance.
+    /// Plans registrations of keyframes of at most `capacity` points. `refinement` is the
+    /// refinement of the odometry: its cells and reach, and the scales of its covariance.
     ///
     /// # Errors
     /// The first value of `refinement` that is out of its bounds.

@@ -51,8 +51,8 @@ impl Refiner {
         state.wait(interval_s);
         let displacement = self.displacement?;
         let predicted = state.predict(&displacement.ahead, config)?;
-        // The error that lasts is that of all motions since a match has told the place: the
-        // variance of one motion is the variance of the displacement.
+        // The lasting error is the error of all motions since the last match that determined the
+        // place: the variance of one motion is the variance of the displacement.
         let before_s = (state.since_place_s - interval_s).max(0.0);
         let lasting = grown(interval_s, before_s) - interval_s.powi(2);
         let lasting_m2 = DopplerConfig::NOISE_MPS.powi(2) * lasting;

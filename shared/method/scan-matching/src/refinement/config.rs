@@ -8,7 +8,7 @@ use crate::config::{ConfigError, Section};
 pub(super) const JITTER_M: f64 = 0.8;
 /// Tolerance of the limit of yaw acceleration for the noise of matches, degrees.
 pub(super) const JITTER_DEG: f64 = 3.0;
-/// Cell size of the coarse map, on which registration starts, over that of the fine map.
+/// Cell size of the coarse map, where registration starts, over the cell size of the fine map.
 pub(super) const COARSE: f64 = 3.0;
 
 /// Configuration of [`Refiner`](crate::Refiner): section `[refinement]`.

@@ -13,7 +13,7 @@ use super::{
     points::DeskewedPoints,
 };
 
-/// Distance and rotation from the last keyframe at which a scan becomes a keyframe, m and degrees.
+/// A scan becomes a keyframe at this distance or rotation from the last keyframe, m and degrees.
 const KEYFRAME_DISTANCE_M: f64 = 1.5;
 const KEYFRAME_ANGLE_DEG: f64 = 3.0;
 

@@ -16,8 +16,7 @@ use nalgebra::{Matrix2, Matrix3, RowVector3, Vector2, Vector3};
 
 /// Random walk of the scale, /√s: tyres that warm change it by 0.06 % in an hour.
 const SCALE_WALK_PER_SQRT_S: f64 = 1e-5;
-/// Standard deviation by which a scale may differ from 1 in any case: the settings may be of other
-/// tyres.
+/// Least standard deviation of a scale around 1: the settings may be for other tyres.
 const TYRES: f64 = 0.02;
 
 /// The scale of the wheels, and the uses of their distance.

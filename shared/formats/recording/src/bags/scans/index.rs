@@ -23,7 +23,6 @@ const RECENT: usize = 8;
 /// Place of an azimuth in a bag.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Place {
-    /// The message.
     pub message: Key,
     /// Number of the azimuth in its message.
     pub row: u32,
@@ -32,7 +31,7 @@ pub(super) struct Place {
 /// A scan.
 #[derive(Clone, Debug)]
 pub(super) struct Entry {
-    /// The azimuth before its first one, from which the assembler sees where it begins.
+    /// The azimuth before its first one, which shows the assembler where the scan begins.
     pub start: Place,
     /// The azimuth that completes it.
     pub end: Place,
@@ -113,7 +112,7 @@ impl Index {
         })
     }
 
-    /// Returns what was found of the times, and what is missing: whole sentences.
+    /// Returns notes on the times and on missing scans: whole sentences.
     pub fn notes(&self) -> Vec<String> {
         let found = self.clocks.iter().filter_map(|(_, clock)| clock.found());
         let mut notes: Vec<String> = found.map(|found| found.to_string()).collect();
@@ -323,7 +322,7 @@ fn only(place: Place) -> RangeInclusive<u32> {
     place.message.span..=place.message.span
 }
 
-/// Returns the spans, with that of a place.
+/// Returns the spans, extended by the span of a place.
 fn joined(spans: &RangeInclusive<u32>, place: Place) -> RangeInclusive<u32> {
     let span = place.message.span;
     span.min(*spans.start())..=span.max(*spans.end())

@@ -7,7 +7,7 @@ use crate::bags::{
     topics::Topics,
 };
 
-/// Returns what is known of the radar, and what is missing: whole sentences.
+/// Returns notes on the radar and on missing data: whole sentences.
 pub(super) fn notes(
     bag: &Bag,
     topics: &Topics,

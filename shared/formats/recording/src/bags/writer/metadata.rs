@@ -1,4 +1,4 @@
-//! The `metadata.yaml` of a bag, in version 5: that of ROS 2 Humble, which later versions read.
+//! The `metadata.yaml` of a bag, in version 5 of ROS 2 Humble, which later versions read.
 
 use std::fmt::Write;
 
@@ -16,7 +16,7 @@ pub(super) struct Described {
 /// Returns the qualities of service of a topic, as `rosbag2` writes them: the last message or a
 /// hundred kept, reliable, no deadlines.
 pub(super) fn qualities(kept: Kept) -> String {
-    // The numbers are those of rmw: history keep last, reliability reliable, durability transient
+    // The numbers are defined by rmw: history keep last, reliability reliable, durability transient
     // local or volatile.
     let (depth, durability) = match kept {
         Kept::ForLater => (1, 1),
