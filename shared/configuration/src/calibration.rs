@@ -86,11 +86,11 @@ mod tests {
         storage::write(&file, text).unwrap();
         let ranges = ["points.min_range_m=7.5", "raster.min_range_m=7.5"];
         assert_eq!(overrides(&file).unwrap(), ranges);
-        let text = "[gyro]\nkind = \"auto\"\nup = \"-z\"\nlate_s = 1.58\n";
+        let text = "[gyro]\nkind = \"auto\"\nup = \"-z\"\ndelay_s = 1.58\n";
         storage::write(&file, text).unwrap();
         let gyro = ["gyro.kind=\"auto\"", "gyro.delay_s=1.58", "gyro.up=\"-z\""];
         assert_eq!(overrides(&file).unwrap(), gyro);
-        let text = "[wheels]\nkind = \"auto\"\nlate_s = 0.35\n";
+        let text = "[wheels]\nkind = \"auto\"\ndelay_s = 0.35\n";
         storage::write(&file, text).unwrap();
         let wheels = ["wheels.kind=\"auto\"", "wheels.delay_s=0.35"];
         assert_eq!(overrides(&file).unwrap(), wheels);

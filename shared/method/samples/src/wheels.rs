@@ -6,8 +6,6 @@ use crate::{Sample, SampleKind, WheelsConfig, integral::Integrator};
 
 /// Standard deviation of a speed by the rounding to a step, m/s.
 const NOISE_MPS: f64 = 0.02;
-/// Standard deviation of the time of a sample against the radar's clock, s.
-const TIME_SIGMA_S: f64 = 0.01;
 
 /// The distance from one scan to the next by the wheels, along the vehicle's path.
 #[repr(C)]
@@ -64,7 +62,7 @@ impl Wheels {
         let of_rolling = self.config.noise_m_per_sqrt_m.powi(2) * integral.sum.abs();
         // The rounding error of a speed is constant while the speed is constant.
         let by_speed = NOISE_MPS * integral.interval_s;
-        let by_time = TIME_SIGMA_S * integral.change;
+        let by_time = self.config.time_sigma_s * integral.change;
         // Both ends are anywhere within a tick.
         let by_ticks_m2 = self.config.m_per_tick.unwrap_or_default().powi(2) / 6.0;
         Some(WheelDistance {

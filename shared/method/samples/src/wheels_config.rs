@@ -42,6 +42,8 @@ pub struct WheelsConfig {
     pub scale_sigma: f64,
     /// Noise of the distance and of the place across the path, m/√m.
     pub noise_m_per_sqrt_m: f64,
+    /// Standard deviation of the time of a sample against the radar's clock, s.
+    pub time_sigma_s: f64,
     /// Longest time between two samples over which the speed is interpolated, s.
     pub max_gap_s: f64,
 }
@@ -79,6 +81,7 @@ impl Default for WheelsConfig {
             scale: 1.0,
             scale_sigma: 0.02,
             noise_m_per_sqrt_m: 0.01,
+            time_sigma_s: 0.01,
             max_gap_s: 0.25,
         }
     }
@@ -115,6 +118,7 @@ impl WheelsConfig {
         }
         bounds.scale([self.scale, self.scale_sigma])?;
         bounds.noise("noise_m_per_sqrt_m", self.noise_m_per_sqrt_m)?;
+        bounds.noise("time_sigma_s", self.time_sigma_s)?;
         bounds.max_gap_s(self.max_gap_s)
     }
 }
