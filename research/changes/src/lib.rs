@@ -25,7 +25,6 @@ use std::fmt;
 
 use gyre_mapping::{TILE_CELLS, TileIndex};
 use gyre_masking::networks::{PlanesError, PlanesNetwork};
-use nalgebra::Point2;
 use serde::Serialize;
 
 use clusters::Cluster;

@@ -80,9 +80,7 @@ impl Drive {
         let middle = &self.keyframes[keyframe];
         let submap = &mut self.submaps[submap];
         submap.start(&middle.points, &middle.twist);
-        for k in neighbours(&self.path_m, keyframe, SUBMAP_REACH_M)
-            .filter(|k| *k != keyframe)
-        {
+        for k in neighbours(&self.path_m, keyframe, SUBMAP_REACH_M).filter(|k| *k != keyframe) {
             let other = &self.keyframes[k];
             submap.add(
                 &other.points,
