@@ -88,11 +88,11 @@ mod tests {
         assert_eq!(overrides(&file).unwrap(), ranges);
         let text = "[gyro]\nkind = \"auto\"\nup = \"-z\"\ndelay_s = 1.58\n";
         storage::write(&file, text).unwrap();
-        let gyro = ["gyro.kind=\"auto\"", "gyro.delay_s=1.58", "gyro.up=\"-z\""];
+        let gyro = ["gyro.delay_s=1.58", "gyro.kind=\"auto\"", "gyro.up=\"-z\""];
         assert_eq!(overrides(&file).unwrap(), gyro);
         let text = "[wheels]\nkind = \"auto\"\ndelay_s = 0.35\n";
         storage::write(&file, text).unwrap();
-        let wheels = ["wheels.kind=\"auto\"", "wheels.delay_s=0.35"];
+        let wheels = ["wheels.delay_s=0.35", "wheels.kind=\"auto\""];
         assert_eq!(overrides(&file).unwrap(), wheels);
         for text in [
             "[dataset]\n[points]\nbeam_deg = 3\n",
